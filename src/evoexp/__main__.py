@@ -1,0 +1,7 @@
+"""`python -m evoexp`."""
+
+import sys
+
+from evoexp.cli import main
+
+sys.exit(main())

@@ -1,0 +1,1 @@
+"""Batch: runs seeded replicates, and runs them again to compare."""

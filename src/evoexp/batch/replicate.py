@@ -1,0 +1,41 @@
+"""The one loop: a planner yields generations, a log takes them."""
+
+import time
+
+from evoexp.condition import Condition
+from evoexp.records import Generation, ReplicateSummary
+from evoexp.store.log import Finished, Log
+from evoexp.store.manifest import environment
+
+
+def run_replicate(condition: Condition, index: int) -> Finished:
+    """Run one seeded replicate; return its finished log as bytes and its summary row."""
+    cpu, wall = time.process_time(), time.perf_counter()
+    rng = condition.rng(index)
+    planner, problem = condition.prepare()
+    log = Log(condition.id, condition.to_json(), index, rng, environment=environment())
+    first_feasible: int | None = None
+    last: Generation | None = None
+    for last in planner.evolve(problem, rng):
+        log.write(last)  # the planner knows nothing of files
+        if first_feasible is None and last.num_feasible > 0:
+            first_feasible = last.index
+    assert last is not None, "a planner yields its initial population at least"
+    summary = ReplicateSummary(
+        condition=condition.id,
+        replicate=index,
+        status="done",
+        stop_reason="generations",
+        num_generations=last.index,
+        best_cost=last.best_cost,
+        first_feasible_generation=first_feasible,
+        evaluations=last.evaluations,
+        collision_queries=last.collision_queries,
+        solved=last.solved,
+        length_unit=condition.length_unit,
+        terms=planner.evaluate(problem, last.best),
+        digest="",
+        cpu_s=time.process_time() - cpu,
+        wall_s=time.perf_counter() - wall,
+    )
+    return log.finish(summary)

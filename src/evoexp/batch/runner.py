@@ -1,0 +1,233 @@
+"""Runs the missing replicates of conditions: fans them out, writes what comes back, resumes what was cut off.
+
+Descriptions go out and bytes come back; only the calling process writes. A finished log is the only mark of completion,
+so an interrupted batch is resumed by asking for it again.
+"""
+
+import contextlib
+import itertools
+import os
+import time
+import traceback
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import joblib
+from joblib.externals.loky.process_executor import TerminatedWorkerError
+
+from evoexp.batch.replicate import run_replicate
+from evoexp.batch.settings import RunnerSettings
+from evoexp.condition import Condition
+from evoexp.store.manifest import manifest
+from evoexp.store.run_directory import RunDirectory, lock_all
+from evoexp.store.tables import write_summary
+
+TASK_S = 0.05  # [s] replicates are bundled into tasks of about this length
+MAX_BUNDLE = 64  # replicates per task at most, so that results keep streaming
+
+
+class Job(NamedTuple):
+    """One replicate to run."""
+
+    condition_id: str
+    condition_json: bytes
+    replicate: int
+
+    @property
+    def key(self) -> tuple[str, int]:
+        """Names it among all jobs."""
+        return self.condition_id, self.replicate
+
+
+class Outcome(NamedTuple):
+    """One replicate that ended.
+
+    Attributes:
+        condition_id: 64 hex digits.
+        replicate: Its index.
+        reason: Why it failed, in one line; empty when done.
+        traceback: Of the failure.
+        content: The finished log; dropped once it is written.
+        wall_s: How long it took.
+    """
+
+    condition_id: str
+    replicate: int
+    reason: str
+    traceback: str
+    content: bytes
+    wall_s: float
+
+    @property
+    def failed(self) -> bool:
+        """Whether it ended without a log."""
+        return bool(self.reason)
+
+
+class Batch:
+    """All replicates that some conditions shall have.
+
+    Attributes:
+        runs: One run directory per distinct condition.
+        jobs: What is missing, condition by condition.
+    """
+
+    def __init__(
+        self,
+        conditions: Iterable[tuple[Condition, int, dict[str, Any]]],
+        settings: RunnerSettings,
+        outputs: Path,
+    ) -> None:
+        """Plan; nothing is written yet.
+
+        Args:
+            conditions: (condition, number of replicates, notes for the manifest of a new run); one may occur twice.
+            settings: How to fan out.
+            outputs: Root of all outputs.
+        """
+        self._settings, self._outputs = settings, outputs
+        self._wanted: dict[str, tuple[Condition, int, dict[str, Any]]] = {}
+        for condition, count, notes in conditions:
+            known = self._wanted.get(condition.id)
+            self._wanted[condition.id] = (condition, max(count, known[1] if known else 0), known[2] if known else notes)
+        self.runs = {key: RunDirectory(outputs, key) for key in self._wanted}
+        self.jobs = self._missing()
+
+    def prepare(self) -> None:
+        """Check every condition against its robot and scenario, before anything is written.
+
+        Raises:
+            SettingError: If one contradicts itself.
+        """
+        for condition, _, _ in self._wanted.values():
+            condition.prepare()
+
+    def run(self) -> Iterator[Outcome]:
+        """Run what is missing; yield every outcome once it is stored. Closing the iterator keeps what is finished.
+
+        Raises:
+            Busy: If another process writes one of the runs.
+        """
+        with lock_all(self.runs.values()):
+            for key, run in self.runs.items():
+                condition, _, notes = self._wanted[key]
+                run.create(condition.to_json(), manifest(key) | notes)
+            self.jobs = self._missing()
+            try:
+                for outcomes in fan_out(self.jobs, _warm(self.jobs, self._settings)):
+                    yield from self._store(outcomes)
+            finally:
+                for run in self.runs.values():
+                    write_summary(run)
+
+    def _missing(self) -> list[Job]:
+        jobs = []
+        for key, (condition, count, _) in self._wanted.items():
+            done = self.runs[key].completed()
+            jobs += [Job(key, condition.to_json(), index) for index in range(count) if index not in done]
+        return jobs
+
+    def _store(self, outcomes: Sequence[Outcome]) -> list[Outcome]:
+        by_run: dict[str, dict[int, bytes]] = {}
+        for outcome in outcomes:
+            if outcome.failed:
+                run = self.runs[outcome.condition_id]
+                run.write_failure(outcome.replicate, outcome.reason, outcome.traceback)
+            else:
+                by_run.setdefault(outcome.condition_id, {})[outcome.replicate] = outcome.content
+        for key, contents in by_run.items():
+            self.runs[key].write_logs(contents)
+        return [outcome._replace(content=b"") for outcome in outcomes]
+
+
+def run_jobs(jobs: Sequence[Job]) -> list[Outcome]:
+    """Run some replicates, here; a failure is an outcome."""
+    outcomes = []
+    for job in jobs:
+        start = time.perf_counter()
+        try:
+            condition = Condition.from_json(job.condition_json)
+            content, reason, trace = run_replicate(condition, job.replicate).content, "", ""
+        except Exception as error:
+            content, trace = b"", traceback.format_exc()
+            reason = f"{type(error).__name__}: {error}".splitlines()[0]
+        seconds = time.perf_counter() - start
+        outcomes.append(Outcome(job.condition_id, job.replicate, reason, trace, content, seconds))
+    return outcomes
+
+
+def fan_out(jobs: Sequence[Job], num_workers: int) -> Iterator[list[Outcome]]:
+    """Run jobs in worker processes; yield outcomes as they come.
+
+    A worker that dies takes the pool with it, and everything in flight: each of those jobs then runs alone, so that only
+    the one that kills its worker fails; the others go on in a new pool.
+    """
+    waiting = deque(jobs)
+    while waiting:
+        if num_workers == 1:
+            yield run_jobs([waiting.popleft()])
+            continue
+        in_flight: dict[tuple[str, int], Job] = {}
+        pool = joblib.Parallel(
+            n_jobs=num_workers,
+            batch_size=1,
+            pre_dispatch=2 * num_workers,
+            return_as="generator_unordered",
+            inner_max_num_threads=1,
+            backend="loky",
+        )
+        bundles = _Bundles(waiting, in_flight, num_workers)
+        try:
+            for outcomes in pool(joblib.delayed(run_jobs)(bundle) for bundle in bundles):
+                bundles.took(outcomes)
+                yield outcomes
+        except TerminatedWorkerError:
+            for job in list(in_flight.values()):
+                yield [_run_alone(job)]
+
+
+class _Bundles:
+    """Takes waiting jobs into tasks of about `TASK_S`, by the times seen so far."""
+
+    def __init__(self, waiting: deque[Job], in_flight: dict[tuple[str, int], Job], num_workers: int) -> None:
+        self._waiting, self._in_flight, self._num_workers = waiting, in_flight, num_workers
+        self._seconds, self._count = 0.0, 0
+
+    def __iter__(self) -> Iterator[list[Job]]:
+        while self._waiting:
+            mean = self._seconds / self._count if self._count else TASK_S
+            fair = -(-len(self._waiting) // (2 * self._num_workers))
+            size = max(1, min(MAX_BUNDLE, fair, int(TASK_S / max(mean, 1e-6))))
+            bundle = [self._waiting.popleft() for _ in range(min(size, len(self._waiting)))]
+            for job in bundle:
+                self._in_flight[job.key] = job
+            yield bundle
+
+    def took(self, outcomes: Sequence[Outcome]) -> None:
+        """Note what came back."""
+        for outcome in outcomes:
+            self._seconds += outcome.wall_s
+            self._count += 1
+            self._in_flight.pop((outcome.condition_id, outcome.replicate), None)
+
+
+def _run_alone(job: Job) -> Outcome:
+    """Run one job in a process of its own; a second death is a failure."""
+    pool = joblib.Parallel(n_jobs=2, batch_size=1, inner_max_num_threads=1, backend="loky")
+    try:
+        return next(itertools.chain.from_iterable(pool([joblib.delayed(run_jobs)([job])])))
+    except TerminatedWorkerError as error:
+        return Outcome(job.condition_id, job.replicate, "worker process died twice", str(error), b"", 0.0)
+
+
+def _warm(jobs: Sequence[Job], settings: RunnerSettings) -> int:
+    """Compile every kernel the jobs need, once and here; return the number of workers that make sense."""
+    for text in dict.fromkeys(job.condition_json for job in jobs):
+        with contextlib.suppress(Exception):  # a planner that fails does so again in its replicate, and is noted there
+            condition = Condition.from_json(text)
+            planner, problem = condition.prepare()
+            for generation in itertools.islice(planner.evolve(problem, condition.rng(0)), 2):
+                planner.evaluate(problem, generation.best)
+    return max(1, min(settings.num_workers or os.cpu_count() or 1, len(jobs)))

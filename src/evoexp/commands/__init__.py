@@ -1,0 +1,1 @@
+"""The commands: one small file each, with `add_arguments` and `main`."""

@@ -1,0 +1,19 @@
+"""Arguments that several commands share."""
+
+import argparse
+
+
+def add_experiment_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what chooses conditions: overrides, `-m`, `--only`."""
+    parser.add_argument(
+        "overrides",
+        nargs="*",
+        metavar="KEY=VALUE",
+        help="experiment=NAME, budget=paper|quick|smoke, num_replicates=N, and any setting: ga.population_size=20",
+    )
+    parser.add_argument("-m", "--multirun", action="store_true", help="sweep over values with commas: ga.num_elites=0,2")
+    parser.add_argument("--only", type=_labels, default=(), metavar="LABEL,...", help="only these conditions")
+
+
+def _labels(text: str) -> tuple[str, ...]:
+    return tuple(label.strip() for label in text.split(",") if label.strip())

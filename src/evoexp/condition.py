@@ -1,0 +1,164 @@
+"""A condition: everything that can change a result, as one typed value with a hash.
+
+Also the registry: the names a configuration may use for components. A configuration is data; it can name registered
+components only, also when it comes out of somebody else's log.
+"""
+
+import functools
+import hashlib
+import importlib
+import importlib.metadata
+import json
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+
+from evoexp.errors import RevisionMismatch, SettingError, UnknownSetting, nearest
+from evoexp.validation import TARGET, Component, build
+
+REGISTRY = {
+    "arms": "evoexp.robots.arms:Arms",
+    "planar_chain": "evoexp.robots.planar_chain:PlanarChain",
+    "arm_motion": "evoexp.scenarios.arm_motion:ArmMotion",
+    "via_point_ga": "evoexp.planners.via_point_ga:ViaPointGa",
+    "random_search": "evoexp.planners.random_search:RandomSearch",
+    "genetic": "evoexp.evolution.settings:GeneticSettings",
+    "string_fitness": "evoexp.objectives.string_fitness:StringFitness",
+    "touching_spheres": "evoexp.collision.touching_spheres:TouchingSpheres",
+}
+"""Registered name → `module:class`. Installed plug-ins add to it through the entry-point group `evoexp.components`."""
+
+PARTS = ("robot", "scenario", "planner")
+
+
+def component_class(name: str, field: str = TARGET) -> type[Component]:
+    """Return the class registered under a name.
+
+    Raises:
+        SettingError: If the name is not registered; a configuration cannot name other code.
+    """
+    path = _registry().get(name)
+    if path is None:
+        must = "a registered component"
+        raise SettingError(f"{field}.{TARGET}", must, name, nearest(name, _registry()))
+    module, _, attribute = path.partition(":")
+    return cast(type[Component], getattr(importlib.import_module(module), attribute))
+
+
+@functools.cache
+def _registry() -> dict[str, str]:
+    plugins = {point.name: point.value for point in importlib.metadata.entry_points(group="evoexp.components")}
+    return plugins | REGISTRY
+
+
+class Prepared(NamedTuple):
+    """A condition ready to run: its planner and the problem that the planner prepared."""
+
+    planner: Any
+    problem: Any
+
+
+class Condition(NamedTuple):
+    """Robot, scenario, planner with its parts, and the seed; nothing else has a say in a result."""
+
+    robot: Component
+    scenario: Component
+    planner: Component
+    seed: int
+
+    @classmethod
+    def from_config(cls, config: Any) -> "Condition":
+        """Build a condition from plain data.
+
+        Args:
+            config: Mapping with `robot`, `scenario`, `planner` (each with its `_target_`) and `seed`.
+
+        Raises:
+            SettingError: For any value that cannot be.
+            UnknownSetting: For any key that does not exist.
+        """
+        unknown = set(config) - {*PARTS, "seed"}
+        if unknown:
+            raise UnknownSetting(min(unknown), (*PARTS, "seed"))
+        parts = [build(config.get(part), component_class, part) for part in PARTS]
+        for part, value in zip(PARTS, parts, strict=True):
+            if not isinstance(value, Component):
+                raise SettingError(part, f"a component, given by its {TARGET}", config.get(part))
+        seed = config.get("seed")
+        if type(seed) is not int or seed < 0:
+            raise SettingError("seed", "a whole number, at least 0", seed)
+        return cls(*parts, seed)
+
+    @classmethod
+    def from_json(cls, text: bytes) -> "Condition":
+        """Build a condition from the canonical form that a run or a log stores.
+
+        Raises:
+            RevisionMismatch: If a component has another revision in this installation.
+            SettingError: If the text is no condition.
+        """
+        try:
+            config = json.loads(text)
+        except ValueError:
+            raise SettingError("config.json", "a condition in JSON", text[:40]) from None
+        if not isinstance(config, dict):
+            raise SettingError("config.json", "a condition in JSON", config)
+        stale = [
+            f"{field} was revision {stored}, installed is {installed}"
+            for field, stored, installed in revisions(config)
+            if stored != installed
+        ]
+        if stale:
+            raise RevisionMismatch("; ".join(stale))
+        return cls.from_config(config)
+
+    def to_json(self) -> bytes:
+        """Return the canonical form: keys sorted, floats by shortest repr. Its SHA-256 is the identity."""
+        config = {part: getattr(self, part).canonical() for part in PARTS} | {"seed": self.seed}
+        return json.dumps(config, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
+
+    @property
+    def id(self) -> str:
+        """64 hex digits; 12 are shown, any unique prefix is accepted."""
+        return hashlib.sha256(self.to_json()).hexdigest()
+
+    @property
+    def length_unit(self) -> str:
+        """Unit of every length in the results, as the scenario names it."""
+        return str(getattr(self.scenario, "length_unit", ""))
+
+    def rng(self, replicate: int) -> np.random.Generator:
+        """Return the replicate's generator; equal seeds give equal streams to all conditions (common seeds)."""
+        return np.random.Generator(np.random.PCG64(np.random.SeedSequence(self.seed, spawn_key=(replicate,))))
+
+    def prepare(self) -> Prepared:
+        """Build the robot, check the scenario against it, and let the planner prepare; once per process.
+
+        Raises:
+            SettingError: If the parts contradict each other (a start in collision, say).
+        """
+        return _prepare(self)
+
+
+@functools.lru_cache(maxsize=64)
+def _prepare(condition: Condition) -> Prepared:
+    planner: Any = condition.planner
+    return Prepared(planner, planner.prepare(condition.robot, condition.scenario))
+
+
+def revisions(config: Any, field: str = "") -> list[tuple[str, Any, int]]:
+    """Return (field, stored revision, installed revision) of every component in plain configuration data."""
+    found: list[tuple[str, Any, int]] = []
+    if isinstance(config, dict):
+        if TARGET in config:
+            kind = component_class(str(config[TARGET]), field or "config")
+            found.append((field or "config", config.get("revision"), kind.revision))
+        for key, value in config.items():
+            found += revisions(value, f"{field}.{key}" if field else str(key))
+    elif isinstance(config, list):
+        for k, value in enumerate(config):
+            found += revisions(value, f"{field}[{k}]")
+    return found
+
+
+

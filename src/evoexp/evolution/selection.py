@@ -1,0 +1,52 @@
+"""Selection: which members of a population become parents, and which stay."""
+
+import numpy as np
+
+from evoexp.numerics import kernel
+from evoexp.records import FloatArray
+
+
+def roulette(rng: np.random.Generator, weights: FloatArray, count: int) -> np.ndarray:
+    """Draw parents with probabilities proportional to their weights (Goldberg 1989).
+
+    Args:
+        rng: Source of one uniform number per parent.
+        weights: (individuals,) ≥ 0; if all are 0, every individual is equally likely.
+        count: Number of parents.
+
+    Returns:
+        (count,) indices, in the order drawn: neighbours are a random pairing.
+    """
+    chosen = np.empty(count, dtype=np.int64)
+    _roulette(weights, rng.random(count), chosen)
+    return chosen
+
+
+def elites(costs: FloatArray, count: int) -> np.ndarray:
+    """Return the indices of the lowest costs, best first; among equals the lower index wins."""
+    return np.argsort(costs, kind="stable")[:count]
+
+
+@kernel
+def _roulette(weights, uniforms, chosen):  # type: ignore[no-untyped-def]
+    num = len(weights)
+    wheel = np.empty(num)
+    total = 0.0
+    for k in range(num):
+        total += weights[k]
+        wheel[k] = total
+    for i in range(len(uniforms)):
+        if total > 0.0:
+            pointer = uniforms[i] * total
+            low, high = 0, num - 1  # the first k with wheel[k] > pointer
+            while low < high:
+                middle = (low + high) // 2
+                if wheel[middle] > pointer:
+                    high = middle
+                else:
+                    low = middle + 1
+            while weights[low] == 0.0 and low > 0:  # a pointer rounded up to the total
+                low -= 1
+            chosen[i] = low
+        else:
+            chosen[i] = min(int(uniforms[i] * num), num - 1)

@@ -1,0 +1,44 @@
+"""The hyperparameters that evolutionary planners share."""
+
+from typing import ClassVar, Self
+
+from pydantic import model_validator
+
+from evoexp.errors import SettingError
+from evoexp.validation import Component, Count, NonNegativeCount, Rate
+
+
+class GeneticSettings(Component):
+    """Settings of a generational genetic algorithm; every planner uses the same words.
+
+    Attributes:
+        population_size: Individuals per generation.
+        num_generations: Generations after the initial one.
+        num_elites: Best individuals copied untouched into the next generation.
+        crossover_rate: Probability that a pair of parents is crossed.
+        mutation_rate: Probability of a mutation; what is mutated is the planner's.
+    """
+
+    component: ClassVar[str] = "genetic"
+
+    population_size: Count
+    num_generations: NonNegativeCount
+    num_elites: NonNegativeCount
+    crossover_rate: Rate
+    mutation_rate: Rate
+
+    @model_validator(mode="after")
+    def _elites_fit(self) -> Self:
+        if self.num_elites > self.population_size:
+            raise SettingError("num_elites", f"at most population_size ({self.population_size})", self.num_elites)
+        return self
+
+    @property
+    def num_offspring(self) -> int:
+        """Individuals that are new in every generation."""
+        return self.population_size - self.num_elites
+
+    @property
+    def num_evaluations(self) -> int:
+        """Evaluations of a whole run: the initial population, then the offspring of every generation."""
+        return self.population_size + self.num_generations * self.num_offspring

@@ -1,0 +1,60 @@
+"""The Python door: stored results as pandas frames."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import pandas as pd
+
+from evoexp import compose
+from evoexp.errors import NothingStored
+from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
+from evoexp.store.tables import read_generations, read_summaries
+
+
+class Frames(NamedTuple):
+    """Results of one or several conditions.
+
+    Attributes:
+        generations: One row per generation of every finished replicate, columns of `evoexp.records.GenerationRow`.
+        summaries: One row per replicate, done or failed, columns of `evoexp.records.ReplicateSummary`.
+    """
+
+    generations: pd.DataFrame
+    summaries: pd.DataFrame
+
+
+def load(
+    what: str, *overrides: str, budget: str = "paper", multirun: bool = False, outputs: Path | str | None = None
+) -> Frames:
+    """Load results: `evoexp.load("rana_planar")`, `evoexp.load("9a95c3")`.
+
+    Args:
+        what: Name of an experiment, or any unique prefix of a run's hash.
+        overrides: Of the experiment, as on the command line.
+        budget: Of the experiment.
+        multirun: Whether overrides with commas are swept over.
+        outputs: Root of the outputs; by default `EVOEXP_OUTPUTS` or `outputs`.
+
+    Returns:
+        Frames whose column `label` names the condition as the figures do; a hash is its own label.
+
+    Raises:
+        UnknownHash: If `what` is neither.
+        AmbiguousHash: If several runs begin with it.
+        NothingStored: If nothing of it has been run.
+    """
+    root = Path(outputs) if outputs is not None else outputs_root()
+    if what in compose.options("experiment"):
+        experiments = compose.expand([f"experiment={what}", f"budget={budget}", *overrides], multirun=multirun)
+        labels = {c.condition.id: c.label for e in experiments for c in e.conditions}
+        runs = [RunDirectory(root, condition_id) for condition_id in labels]
+        runs = [run for run in runs if run.completed() or run.failed()]
+        if not runs:
+            raise NothingStored(f"{what}: nothing stored in {root}; run it: evoexp run experiment={what}")
+    else:
+        run = resolve(root, what)
+        runs, labels = [run], {run.condition_id: run.hash12}
+    generations, summaries = read_generations(runs), read_summaries(runs)
+    for frame in (generations, summaries):
+        frame.insert(0, "label", frame["condition"].astype(str).map(labels))
+    return Frames(generations, summaries)

@@ -1,0 +1,1 @@
+"""Objectives: the papers' criteria as batched functions over arrays; named terms out."""

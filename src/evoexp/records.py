@@ -1,0 +1,93 @@
+"""What is written, and nothing else: the only schema of logs and tables.
+
+Records are flat. Quantities carry their unit in the name (`cpu_s`) unless the unit belongs to the scene, which then
+names it (`length_unit`). Costs are minimised; `inf` means infeasible or not evaluated.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+class Generation(NamedTuple):
+    """One generation of one replicate, as a planner yields it.
+
+    `costs` and `population` are views into the planner's memory: valid until the next generation is asked for, hashed
+    into the digest and not recorded.
+    """
+
+    index: int  # 0 is the initial population
+    best: FloatArray  # flat solution, best so far
+    best_cost: float  # best so far
+    best_cost_in_generation: float
+    mean_cost: float  # over the finite costs of this generation
+    std_cost: float  # over the finite costs of this generation, population standard deviation
+    num_feasible: int  # individuals of this generation that the planner's own model accepts
+    evaluations: int  # asked for by the algorithm since the start, skipped ones included
+    collision_queries: int  # configurations judged since the start
+    solved: bool  # whether the planner's own model accepts the best so far
+    terms: dict[str, float]  # the paper's own terms of the best so far; written as term_<name>
+    costs: FloatArray  # (individuals,)
+    population: FloatArray  # any shape
+
+
+class GenerationRow(NamedTuple):
+    """One generation as it is read back from a log: what was recorded of `Generation`, and its link of the chain."""
+
+    index: int
+    best_cost: float
+    best_cost_in_generation: float
+    mean_cost: float
+    std_cost: float
+    num_feasible: int
+    evaluations: int
+    collision_queries: int
+    solved: bool
+    terms: dict[str, float]
+    chain: str  # 32 hex digits: xxh3-128 over everything up to and including this generation
+
+
+class SolutionRow(NamedTuple):
+    """The best solution so far, logged whenever it improves and at the end."""
+
+    generation: int
+    cost: float
+    values: FloatArray  # flat
+
+
+class FrontRow(NamedTuple):
+    """A set of non-dominated solutions of one generation."""
+
+    generation: int
+    costs: FloatArray  # (members, criteria)
+
+
+class ReplicateSummary(NamedTuple):
+    """The one row that a finished or failed replicate leaves in `summary.parquet`."""
+
+    condition: str  # 64 hex digits
+    replicate: int
+    status: str  # "done" | "failed"
+    stop_reason: str  # why the planner ended; for a failed replicate the error in one line
+    num_generations: int  # generations after the initial one
+    best_cost: float
+    first_feasible_generation: int | None
+    evaluations: int
+    collision_queries: int
+    solved: bool  # by the paper's own collision model
+    length_unit: str  # of every clearance and length below
+    terms: dict[str, float]  # written as term_<name>
+    digest: str  # 32 hex digits: the end of the chain
+    cpu_s: float
+    wall_s: float
+
+
+def flatten(record: Any) -> dict[str, Any]:
+    """Return a record as one flat dict; its `terms` become `term_<name>`."""
+    row: dict[str, Any] = record._asdict()
+    terms = row.pop("terms", {})
+    row.update({f"term_{name}": value for name, value in terms.items()})
+    return row

@@ -1,0 +1,1 @@
+"""Report: reads outputs only; results, statistics, claims and figures. Never imports batch or planners."""

@@ -1,0 +1,113 @@
+"""What a robot description builds: one Pinocchio model, one configuration vector, arms as slices of it."""
+
+from typing import Any, NamedTuple
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from evoexp.records import FloatArray
+from evoexp.robots.kinematics import KinematicTable, kinematic_table
+from evoexp.validation import Component
+
+
+class Link(NamedTuple):
+    """A straight link: a line segment, thickened by a radius, that moves with one joint."""
+
+    arm: int
+    joint: int  # index of the Pinocchio joint that moves it
+    start: FloatArray  # (3,) in the frame of the joint [length unit of the scene]
+    end: FloatArray  # (3,)
+    radius: float  # 0 for a line
+
+
+class Assembly(NamedTuple):
+    """A robot, built. Shared and read-only: whoever needs `pin.Data` makes its own.
+
+    Attributes:
+        model: Pinocchio model of all arms together.
+        geometry: Exact link shapes as coal capsules (of radius 0 for line links), one per link, in order of `links`.
+        links: The same links as segments.
+        arm_slices: (arms, 2) first and one-past-last index of each arm in q.
+        table: The kinematic table of the model.
+    """
+
+    model: Any  # pin.Model
+    geometry: Any  # pin.GeometryModel
+    links: tuple[Link, ...]
+    arm_slices: np.ndarray
+    table: KinematicTable
+
+    @property
+    def num_arms(self) -> int:
+        """Number of arms."""
+        return len(self.arm_slices)
+
+
+class Robot(Component):
+    """Base of every robot description: gives its arms; building them together is the same for all."""
+
+    def chains(self) -> tuple["Chain", ...]:
+        """Return the arms, in the order of their slices of q."""
+        raise NotImplementedError
+
+    def build(self) -> Assembly:
+        """Append all arms to one model.
+
+        Returns:
+            The model with q = (arm 0, arm 1, …), its exact geometry and its kinematic table.
+        """
+        model, geometry = pin.Model(), pin.GeometryModel()
+        links: list[Link] = []
+        slices = []
+        for k, chain in enumerate(self.chains()):
+            first = model.nq
+            for link in chain.append_to(model, k):
+                links.append(link)
+                geometry.addGeometryObject(link_capsule(link, f"link_{len(links) - 1}"))
+            slices.append((first, model.nq))
+        return Assembly(model, geometry, tuple(links), np.array(slices, dtype=np.int64), kinematic_table(model))
+
+
+class Chain(Robot):
+    """Base of a single arm, which can stand as a robot of its own."""
+
+    def chains(self) -> tuple["Chain", ...]:
+        """Return the arm itself."""
+        return (self,)
+
+    def append_to(self, model: Any, arm: int) -> list[Link]:
+        """Add the arm's joints to a model; return its links."""
+        raise NotImplementedError
+
+
+def link_capsule(link: Link, name: str) -> Any:
+    """Return a link as a `pin.GeometryObject` with a coal capsule from its start to its end."""
+    shape = coal.Capsule(link.radius, float(np.linalg.norm(link.end - link.start)))
+    return pin.GeometryObject(name, link.joint, 0, _along(link.start, link.end), shape)
+
+
+def sphere_geometry(assembly: Assembly, centres: FloatArray, joints: np.ndarray, radii: FloatArray) -> Any:
+    """Return spheres fixed to joints as a `pin.GeometryModel`: the papers' own collision models, in coal.
+
+    Args:
+        assembly: The robot.
+        centres: (spheres, 3) in the frames of their joints.
+        joints: (spheres,) indices of Pinocchio joints.
+        radii: (spheres,).
+    """
+    geometry = pin.GeometryModel()
+    for k, (centre, joint, radius) in enumerate(zip(centres, joints, radii, strict=True)):
+        placement = pin.SE3(np.eye(3), centre)
+        geometry.addGeometryObject(pin.GeometryObject(f"sphere_{k}", int(joint), 0, placement, coal.Sphere(radius)))
+    return geometry
+
+
+def _along(start: FloatArray, end: FloatArray) -> Any:
+    """Return the placement of a capsule (coal draws it along z, centred) on a segment."""
+    direction = end - start
+    length = np.linalg.norm(direction)
+    rotation = np.eye(3)
+    if length > 0.0:
+        rotation = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), direction / length).toRotationMatrix()
+    return pin.SE3(rotation, 0.5 * (start + end))

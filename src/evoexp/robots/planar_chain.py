@@ -1,0 +1,44 @@
+"""A planar arm of revolute joints, given by its link lengths."""
+
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+import pinocchio as pin
+from pydantic import Field
+
+from evoexp.numerics import DEGREE, sincos
+from evoexp.robots.assembly import Chain, Link
+from evoexp.validation import Positive
+
+Point2 = tuple[float, float]
+
+
+class PlanarChain(Chain):
+    """Revolute joints about z in the x–y plane; every joint angle is relative to the link before.
+
+    Attributes:
+        link_lengths: Lengths from joint to joint, the last to the tip [length unit of the scene].
+        base_position: The first joint (x, y).
+        base_angle: Direction of the first link at q = 0, from +x [deg].
+        link_radius: Half the thickness of every link; 0: a line.
+    """
+
+    component: ClassVar[str] = "planar_chain"
+
+    link_lengths: Annotated[tuple[Positive, ...], Field(min_length=1)]
+    base_position: Point2
+    base_angle: float = 0.0
+    link_radius: Annotated[float, Field(ge=0.0)] = 0.0
+
+    def append_to(self, model: Any, arm: int) -> list[Link]:
+        """Add one revolute joint per link."""
+        parent = 0
+        s, c = sincos(DEGREE * self.base_angle)
+        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        placement = pin.SE3(turn, np.array([*self.base_position, 0.0]))
+        links = []
+        for k, length in enumerate(self.link_lengths):
+            parent = model.addJoint(parent, pin.JointModelRZ(), placement, f"arm_{arm}_joint_{k}")
+            links.append(Link(arm, parent, np.zeros(3), np.array([length, 0.0, 0.0]), self.link_radius))
+            placement = pin.SE3(np.eye(3), np.array([length, 0.0, 0.0]))
+        return links

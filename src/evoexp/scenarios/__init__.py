@@ -1,0 +1,1 @@
+"""Scenarios: obstacles, starts, goals, grids, as plain records."""

@@ -1,0 +1,44 @@
+"""Arms that shall move from one configuration to another among obstacles."""
+
+from typing import Annotated, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from evoexp.errors import SettingError
+from evoexp.records import FloatArray
+from evoexp.scenarios.obstacles import Obstacle
+from evoexp.validation import Component, NonNegative, Vector
+
+
+class ArmMotion(Component):
+    """Start and goal of every arm, and what stands around.
+
+    Attributes:
+        q_start: Configuration of every arm at the start, arm by arm [deg].
+        q_goal: At the goal [deg].
+        security_margin: Clearance between bodies that the task requires [length unit].
+        length_unit: Name of the scene's unit of length.
+        obstacles: What does not move.
+    """
+
+    component: ClassVar[str] = "arm_motion"
+
+    q_start: Annotated[tuple[Vector, ...], Field(min_length=1)]
+    q_goal: Annotated[tuple[Vector, ...], Field(min_length=1)]
+    security_margin: NonNegative
+    length_unit: str
+    obstacles: tuple[Obstacle, ...] = ()
+
+    def ends(self, arm_slices: np.ndarray) -> tuple[FloatArray, FloatArray]:
+        """Return start and goal of all arms together, each (nq,) [deg].
+
+        Raises:
+            SettingError: If they do not fit the robot's arms and joints.
+        """
+        sizes = [int(stop - first) for first, stop in arm_slices]
+        for name, given in (("q_start", self.q_start), ("q_goal", self.q_goal)):
+            if [len(arm) for arm in given] != sizes:
+                must = f"one list per arm of the robot, with {', '.join(map(str, sizes))} joint angles"
+                raise SettingError(f"scenario.{name}", must, [list(arm) for arm in given])
+        return np.concatenate(self.q_start), np.concatenate(self.q_goal)

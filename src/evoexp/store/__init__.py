@@ -1,0 +1,1 @@
+"""What is kept: run directories, self-contained logs, derived tables, and the digests that compare them."""

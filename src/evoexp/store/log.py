@@ -1,0 +1,198 @@
+"""One replicate as one self-contained MCAP, written in memory."""
+
+import io
+import struct
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import xxhash
+from mcap.writer import CompressionType, IndexType, Writer
+
+from evoexp.records import FrontRow, Generation, GenerationRow, ReplicateSummary, SolutionRow
+from evoexp.store.digests import Chain, array_bytes
+from evoexp.store.messages import (
+    TERM,
+    encode_front,
+    encode_generation,
+    encode_solution,
+    encode_summary,
+    encode_values,
+    json_schema,
+)
+
+LIBRARY = "evoexp"  # pinned, so that a log's bytes do not tell mcap's version
+SCHEMA_VERSION = 1  # of everything a log holds; raised when a reader of the old version would misunderstand
+RUN = "evoexp.run"
+SUMMARY = "evoexp.summary"
+ENVIRONMENT = "evoexp.environment"
+CONFIG = "config.json"
+CONTENT_DIGEST = "content_digest"
+GENERATION_TOPIC, SOLUTION_TOPIC, FRONT_TOPIC = "/generation", "/solution", "/front"
+
+_CHUNK_SIZE = 56 * 1024  # [B] a chunk ends with the message that passes this, hence within 64 KiB
+_MESSAGE = struct.Struct("<QIQ")  # log_time, sequence, bytes of data
+_TICK = 1_000_000_000  # [ns] the synthetic clock: one second per generation
+
+
+class Finished(NamedTuple):
+    """A finished log and the summary that it holds."""
+
+    content: bytes
+    summary: ReplicateSummary
+
+
+class ContentDigest:
+    """xxh3-128 over (topic, schema, encoding, log_time, sequence, data) of every message, in the order written."""
+
+    def __init__(self) -> None:
+        """Start with no message."""
+        self._hash = xxhash.xxh3_128()
+
+    def update(self, channel: bytes, log_time: int, sequence: int, data: bytes) -> None:
+        """Append one message; `channel` comes from `channel_identity`."""
+        self._hash.update(channel + _MESSAGE.pack(log_time, sequence, len(data)) + data)
+
+    def hexdigest(self) -> str:
+        """Return the digest so far as 32 hex digits."""
+        return self._hash.hexdigest()
+
+
+def channel_identity(topic: str, schema_name: str, message_encoding: str) -> bytes:
+    """Return what a channel contributes to the digest of each of its messages."""
+    return "\0".join((topic, schema_name, message_encoding, "")).encode()
+
+
+class _Channel:
+    """A channel of the log: its id, its identity in the content digest, and how many messages it has."""
+
+    def __init__(self, writer: Writer, topic: str, record: type, terms: Any = ()) -> None:
+        name = f"evoexp.{record.__name__.removesuffix('Row')}"
+        schema_id = writer.register_schema(name, "jsonschema", json_schema(record, terms))
+        self.id = writer.register_channel(topic, "json", schema_id)
+        self.identity = channel_identity(topic, name, "json")
+        self.num_messages = 0
+
+
+class Log:
+    """The log of one replicate: written generation by generation, finished into bytes.
+
+    The same content gives the same messages, chain and digests; wall and CPU times and the environment are metadata
+    and enter none of them.
+    """
+
+    def __init__(
+        self,
+        condition_id: str,
+        config_json: bytes,
+        replicate: int,
+        rng: np.random.Generator,
+        attachments: Mapping[str, bytes] | None = None,
+        environment: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Start a log.
+
+        Args:
+            condition_id: Full hash of the condition, 64 hex digits.
+            config_json: The condition's configuration, from which alone the replicate can be run again.
+            replicate: Index of the replicate.
+            rng: The replicate's generator, whose state enters the chain; never drawn from here.
+            attachments: Further files that the condition needs, by name.
+            environment: Versions, CPU features and what else may explain a difference; any JSON values.
+
+        Raises:
+            ValueError: An attachment called like the configuration.
+        """
+        self._condition_id = condition_id
+        self._replicate = replicate
+        self._environment = dict(environment or {})
+        self._chain = Chain(rng)
+        self._content = ContentDigest()
+        self._channels: dict[str, _Channel] = {}
+        self._terms: dict[str, str] = {}  # name → column, in the order of the columns
+        self._last: Generation | None = None
+        self._best = self._written = b""  # array_bytes of the best so far, and of the last solution written
+        self._best_cost = self._written_cost = np.inf
+        self._buffer = io.BytesIO()
+        self._writer = Writer(
+            self._buffer,
+            chunk_size=_CHUNK_SIZE,
+            compression=CompressionType.ZSTD,
+            index_types=IndexType.ALL,
+            use_summary_offsets=False,
+            enable_crcs=True,
+            enable_data_crcs=True,
+        )
+        self._writer.start(profile="", library=LIBRARY)
+        run = {"condition": condition_id, "replicate": str(replicate), "schema_version": str(SCHEMA_VERSION)}
+        self._writer.add_metadata(RUN, run)
+        self._attach(CONFIG, config_json)
+        for name, data in sorted((attachments or {}).items()):
+            if name == CONFIG:
+                raise ValueError(f"attachments: '{CONFIG}' is the configuration's own name")
+            self._attach(name, data)
+
+    def write(self, generation: Generation) -> None:
+        """Append a generation, and its best solution where that is strictly better than the last one written."""
+        self._best = array_bytes(np.asarray(generation.best, dtype=np.float64))
+        self._best_cost = float(generation.best_cost)
+        link = self._chain.update(generation.costs, self._best)
+        if generation.terms.keys() != self._terms.keys():
+            self._terms = {name: TERM + name for name in sorted(generation.terms)}
+        first = self._last is None
+        self._last = generation
+        data = encode_generation(generation, self._terms.items(), link)
+        self._add(GENERATION_TOPIC, GenerationRow, generation.index, data)
+        if first or self._best_cost < self._written_cost:
+            self._write_solution()
+
+    def write_front(self, front: FrontRow) -> None:
+        """Append the non-dominated set of the generation last written."""
+        self._add(FRONT_TOPIC, FrontRow, front.generation, encode_front(front))
+
+    def finish(self, summary: ReplicateSummary) -> Finished:
+        """Close the log.
+
+        Args:
+            summary: The replicate's row; its digest is filled in here.
+
+        Returns:
+            The log's bytes and the completed summary.
+
+        Raises:
+            ValueError: No generation was written, or the summary is of another replicate.
+        """
+        if self._last is None:
+            raise ValueError("finish: no generation was written")
+        if (summary.condition, summary.replicate) != (self._condition_id, self._replicate):
+            raise ValueError(f"finish: summary of {summary.condition[:12]} replicate {summary.replicate}, not of this")
+        if self._best != self._written or not self._best_cost == self._written_cost:
+            self._write_solution()
+        summary = summary._replace(digest=self._chain.finish(self._last.population))
+        self._writer.add_metadata(ENVIRONMENT, encode_values(self._environment))
+        content = encode_values({CONTENT_DIGEST: self._content.hexdigest()})
+        self._writer.add_metadata(SUMMARY, encode_summary(summary) | content)
+        self._writer.finish()  # type: ignore[no-untyped-call]
+        return Finished(self._buffer.getvalue(), summary)
+
+    def _attach(self, name: str, data: bytes) -> None:
+        media_type = "application/json" if name.endswith(".json") else "application/octet-stream"
+        self._writer.add_attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=data)
+
+    def _write_solution(self) -> None:
+        assert self._last is not None
+        self._written, self._written_cost = self._best, self._best_cost
+        index = self._last.index
+        data = encode_solution(index, self._best_cost, np.frombuffer(self._best))
+        self._add(SOLUTION_TOPIC, SolutionRow, index, data)
+
+    def _add(self, topic: str, record: type, generation: int, data: bytes) -> None:
+        channel = self._channels.get(topic)
+        if channel is None:  # registered with its first message, when the terms are known
+            terms = self._terms if record is GenerationRow else ()
+            channel = self._channels[topic] = _Channel(self._writer, topic, record, terms)
+        log_time = int(generation) * _TICK
+        sequence = channel.num_messages
+        channel.num_messages += 1
+        self._writer.add_message(channel.id, log_time, data, log_time, sequence)
+        self._content.update(channel.identity, log_time, sequence, data)

@@ -1,0 +1,230 @@
+"""Logs read back: whole and verified, or only the part that is asked for.
+
+Every reader first checks the whole file against its checksums (0.1 ms per log), so that none is ever silently wrong;
+only `read_log` also decodes every message and compares the content digest.
+"""
+
+from collections.abc import Iterable, Iterator
+from os import PathLike
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import orjson
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, ChunkIndex, Metadata, MetadataIndex, Schema
+from numpy.typing import NDArray
+
+from evoexp.errors import CorruptLog
+from evoexp.records import FrontRow, GenerationRow, ReplicateSummary, SolutionRow
+from evoexp.store import log as written
+from evoexp.store.container import Container, Message, check, chunk_messages, parse, unreadable_is_corrupt
+from evoexp.store.messages import (
+    NONFINITE,
+    TERM,
+    decode_front,
+    decode_generation,
+    decode_solution,
+    decode_summary,
+    decode_values,
+    field_types,
+    restore,
+)
+
+DTYPES: dict[Any, Any] = {int: np.int64, float: np.float64, bool: np.bool_, str: "U32"}  # of generation_columns
+Source = str | PathLike[str] | bytes
+
+
+class LogContents(NamedTuple):
+    """Everything that a log holds."""
+
+    condition_id: str  # 64 hex digits
+    config_json: bytes
+    replicate: int
+    generations: list[GenerationRow]
+    solutions: list[SolutionRow]
+    fronts: list[FrontRow]
+    summary: ReplicateSummary
+    environment: dict[str, Any]
+    attachments: dict[str, bytes]  # without the configuration
+    content_digest: str  # 32 hex digits, over all messages
+
+
+class _Index(NamedTuple):
+    """The summary section of a log: where everything is."""
+
+    metadata: dict[str, int]  # name → offset
+    channels: dict[str, Channel]  # by topic
+    schemas: dict[int, str]  # id → name
+    chunks: list[ChunkIndex]
+
+
+def read_log(source: Source) -> LogContents:
+    """Return everything that a log holds, verified.
+
+    Args:
+        source: Path of a log, or its bytes.
+
+    Raises:
+        CorruptLog: The log is empty, cut, altered, foreign, of a newer schema version, or cannot be opened.
+    """
+    container, name = _open(source)
+    with unreadable_is_corrupt(name):
+        index = _index(container)
+        run = _run(container, index, name)
+        attachments = {a.name: a.data for a in _bodies(container, Opcode.ATTACHMENT, Attachment)}
+        messages, content_digest = _messages(container, index)
+        metadata = _metadata(container, index, written.SUMMARY, name)
+        if content_digest != decode_values(metadata)[written.CONTENT_DIGEST]:
+            raise CorruptLog(f"{name}: altered: its messages do not give the content digest it carries")
+        summary = _summary(metadata, run, name)
+        return LogContents(
+            condition_id=run["condition"],
+            config_json=attachments.pop(written.CONFIG),
+            replicate=summary.replicate,
+            generations=[decode_generation(data) for data in messages.get(written.GENERATION_TOPIC, ())],
+            solutions=[decode_solution(data) for data in messages.get(written.SOLUTION_TOPIC, ())],
+            fronts=[decode_front(data) for data in messages.get(written.FRONT_TOPIC, ())],
+            summary=summary,
+            environment=decode_values(_metadata(container, index, written.ENVIRONMENT, name)),
+            attachments=attachments,
+            content_digest=content_digest,
+        )
+
+
+def read_summary(source: Source) -> ReplicateSummary:
+    """Return a log's summary; no message is decoded.
+
+    Raises:
+        CorruptLog: As `read_log`, except that the content digest is not compared.
+    """
+    container, name = _open(source)
+    with unreadable_is_corrupt(name):
+        index = _index(container)
+        run = _run(container, index, name)
+        return _summary(_metadata(container, index, written.SUMMARY, name), run, name)
+
+
+def read_solution(source: Source) -> SolutionRow:
+    """Return a log's last solution, the best of the replicate; only the chunk that holds it is decompressed.
+
+    Raises:
+        CorruptLog: As `read_log`, except that the content digest is not compared.
+    """
+    container, name = _open(source)
+    with unreadable_is_corrupt(name):
+        index = _index(container)
+        _run(container, index, name)
+        channel_id = index.channels[written.SOLUTION_TOPIC].id
+        last = [chunk for chunk in index.chunks if channel_id in chunk.message_index_offsets][-1]
+        solutions = [data for channel, _, _, data in container.messages_at(last) if channel == channel_id]
+        return decode_solution(solutions[-1])
+
+
+def generation_columns(source: Source) -> dict[str, NDArray[Any]]:
+    """Return the records on /generation as one array per field and term, each (generations,).
+
+    A term that a generation does not have is NaN there.
+
+    Raises:
+        CorruptLog: As `read_log`, except that the content digest is not compared.
+    """
+    container, name = _open(source)
+    with unreadable_is_corrupt(name):
+        index = _index(container)
+        _run(container, index, name)
+        channel_id = index.channels[written.GENERATION_TOPIC].id
+        data = [data for channel, _, _, data in _all_messages(container) if channel == channel_id]
+        return _columns(orjson.loads(b"[" + b",".join(data) + b"]"))
+
+
+def _columns(rows: list[dict[str, Any]]) -> dict[str, NDArray[Any]]:
+    names: set[str] = set()
+    for row in rows:
+        if NONFINITE in row:
+            restore(row)
+        if not row.keys() <= names:
+            names |= row.keys()
+    columns = {
+        name: np.array([row[name] for row in rows], dtype=DTYPES[kind])
+        for name, kind in field_types(GenerationRow).items()
+    }
+    for name in sorted(name for name in names if name.startswith(TERM)):
+        columns[name] = np.array([row.get(name, np.nan) for row in rows], dtype=np.float64)
+    return columns
+
+
+def _open(source: Source) -> tuple[Container, str]:
+    if isinstance(source, bytes):
+        return check(source, "log"), "log"
+    try:
+        return check(Path(source).read_bytes(), str(source)), str(source)
+    except OSError as error:
+        raise CorruptLog(f"{source}: cannot be read: {error.strerror or error}") from error
+
+
+def _index(container: Container) -> _Index:
+    index = _Index({}, {}, {}, [])
+    for opcode, body in container.summary_section():
+        if opcode == Opcode.METADATA_INDEX:
+            entry = parse(MetadataIndex, body)
+            index.metadata[entry.name] = entry.offset
+        elif opcode == Opcode.CHANNEL:
+            channel = parse(Channel, body)
+            index.channels[channel.topic] = channel
+        elif opcode == Opcode.SCHEMA:
+            schema = parse(Schema, body)
+            index.schemas[schema.id] = schema.name
+        elif opcode == Opcode.CHUNK_INDEX:
+            index.chunks.append(parse(ChunkIndex, body))
+    return index
+
+
+def _metadata(container: Container, index: _Index, record: str, name: str) -> dict[str, str]:
+    if record not in index.metadata:
+        raise CorruptLog(f"{name}: incomplete: no metadata record '{record}'")
+    metadata: dict[str, str] = parse(Metadata, container.record_at(index.metadata[record])).metadata
+    return metadata
+
+
+def _run(container: Container, index: _Index, name: str) -> dict[str, str]:
+    """Return the metadata that says whose log this is, or raise for a foreign or newer one."""
+    if written.RUN not in index.metadata:
+        raise CorruptLog(f"{name}: not a log of evoexp: an MCAP without metadata record '{written.RUN}'")
+    run = _metadata(container, index, written.RUN, name)
+    version = int(run["schema_version"])
+    if version > written.SCHEMA_VERSION:
+        known = written.SCHEMA_VERSION
+        raise CorruptLog(f"{name}: written by a newer evoexp: schema version {version}, known up to {known}")
+    return run
+
+
+def _summary(metadata: dict[str, str], run: dict[str, str], name: str) -> ReplicateSummary:
+    summary = decode_summary(metadata)
+    if (summary.condition, summary.replicate) != (run["condition"], int(run["replicate"])):
+        raise CorruptLog(f"{name}: altered: its summary is of another replicate")
+    return summary
+
+
+def _bodies(container: Container, opcode: int, record: Any) -> Iterator[Any]:
+    return (parse(record, body) for kind, body in container.data_section() if kind == opcode)
+
+
+def _all_messages(container: Container) -> Iterator[Message]:
+    chunks: Iterable[bytes] = (body for opcode, body in container.data_section() if opcode == Opcode.CHUNK)
+    return (message for chunk in chunks for message in chunk_messages(chunk))
+
+
+def _messages(container: Container, index: _Index) -> tuple[dict[str, list[bytes]], str]:
+    """Return the data of all messages by topic, and the content digest over them."""
+    digest = written.ContentDigest()
+    topics = {channel.id: topic for topic, channel in index.channels.items()}
+    identities = {
+        c.id: written.channel_identity(c.topic, index.schemas[c.schema_id], c.message_encoding)
+        for c in index.channels.values()
+    }
+    messages: dict[str, list[bytes]] = {}
+    for channel_id, sequence, log_time, data in _all_messages(container):
+        digest.update(identities[channel_id], log_time, sequence, data)
+        messages.setdefault(topics[channel_id], []).append(data)
+    return messages, digest.hexdigest()

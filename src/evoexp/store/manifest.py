@@ -1,0 +1,138 @@
+"""Where something was computed: versions, processor, code. Noted, compared, and never part of an identity."""
+
+import os
+import platform
+import subprocess
+from collections.abc import Iterator, Mapping
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+from typing import Any, NamedTuple
+
+_DISTRIBUTIONS = (
+    "evoexp",
+    "numpy",
+    "numba",
+    "llvmlite",
+    "scipy",
+    "pin",
+    "libpinocchio",
+    "coal",
+    "libcoal",
+    "hydra-core",
+    "omegaconf",
+    "pydantic",
+    "joblib",
+    "mcap",
+    "zstandard",
+    "orjson",
+    "xxhash",
+    "pandas",
+    "pyarrow",
+)
+
+# Those that decide which instructions a compiler may choose; the rest of the flags says nothing about numbers.
+_VECTOR_PREFIXES = ("sse", "ssse", "avx", "fma", "f16c", "bmi", "amx", "asimd", "sve", "neon", "fp")
+
+
+class Difference(NamedTuple):
+    """One entry in which two environments differ; None where one of them lacks it."""
+
+    name: str
+    was: Any
+    now: Any
+
+    def __str__(self) -> str:
+        """Return the difference in one line."""
+        return f"{self.name}: was {self.was}, now {self.now}"
+
+
+def manifest(condition_id: str) -> dict[str, Any]:
+    """Return what `manifest.json` says of a run: its full hash, the environment, the state of the code."""
+    return {"condition": condition_id, **environment(), "git": git_state()}
+
+
+@cache
+def environment() -> dict[str, Any]:
+    """Return versions, platform and processor, without importing any of the packages; 15 ms, once per process."""
+    return {
+        "versions": {"python": platform.python_version(), **_versions()},
+        "platform": {
+            "system": platform.system(),
+            "machine": platform.machine(),
+            "libc": " ".join(platform.libc_ver()).strip() or None,
+        },
+        "cpu": _cpu(),
+    }
+
+
+@cache
+def git_state() -> dict[str, Any] | None:
+    """Return commit and dirty flag of the checkout that this package is imported from; None where it is none."""
+    root = Path(__file__).resolve().parents[3]  # <root>/src/evoexp/store/manifest.py
+    if not (root / ".git").exists() or not (root / "pyproject.toml").exists():
+        return None
+    commit = _git(root, "rev-parse", "--verify", "--quiet", "HEAD")
+    status = _git(root, "status", "--porcelain", "--", "src", "conf", "pyproject.toml")
+    return {"commit": commit or None, "dirty": None if status is None else bool(status)}
+
+
+def differences(was: Mapping[str, Any], now: Mapping[str, Any]) -> list[Difference]:
+    """Return the entries in which two manifests or environments differ, in alphabetical order.
+
+    Only what both describe is compared section by section: a log's environment has no condition and no git state.
+    Of two lists (the features of processors) only what the other lacks is named.
+    """
+    shared = was.keys() & now.keys() - {"condition"}
+    before = dict(_leaves({name: was[name] for name in shared}))
+    after = dict(_leaves({name: now[name] for name in shared}))
+    found = []
+    for name in sorted(before.keys() | after.keys()):
+        old, new = before.get(name), after.get(name)
+        if old == new:
+            continue
+        if isinstance(old, list) and isinstance(new, list):
+            old, new = [x for x in old if x not in new], [x for x in new if x not in old]
+        found.append(Difference(name, old, new))
+    return found
+
+
+def _leaves(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from _leaves(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value
+
+
+def _versions() -> dict[str, str | None]:
+    versions: dict[str, str | None] = {}
+    for name in _DISTRIBUTIONS:
+        try:
+            versions[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            versions[name] = None
+    return versions
+
+
+def _cpu() -> dict[str, Any]:
+    """Return name and vector features of the processor, from /proc/cpuinfo where there is one."""
+    try:
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").split("\n\n")[0]
+    except OSError:
+        text = ""
+    pairs = (line.partition(":") for line in text.splitlines())
+    entries = {name.strip().lower(): value.strip() for name, _, value in pairs}
+    flags = (entries.get("flags") or entries.get("features") or "").split()
+    features = sorted(flag for flag in flags if flag.startswith(_VECTOR_PREFIXES) and not flag.startswith("fpu"))
+    return {"name": entries.get("model name") or platform.processor() or None, "features": features}
+
+
+def _git(root: Path, *arguments: str) -> str | None:
+    command = ["git", "--no-optional-locks", "-C", str(root), *arguments]
+    clean = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=False, env=clean)
+    except (OSError, subprocess.SubprocessError, ValueError):
+        return None
+    return done.stdout.strip() if done.returncode == 0 else None

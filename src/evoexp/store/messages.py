@@ -1,0 +1,185 @@
+"""Records as JSON and back: flat, fixed key order, and the non-finite numbers that JSON has no word for kept exactly.
+
+A non-finite number is written as null and named in `nonfinite`, a key that is there only when needed:
+`{"best_cost": "inf"}` for a field, `{"values": {"3": "nan"}}` for an element of an array.
+"""
+
+import math
+from collections.abc import Iterable, Mapping
+from functools import cache
+from typing import Any, get_type_hints
+
+import numpy as np
+import orjson
+
+from evoexp.records import FloatArray, FrontRow, Generation, GenerationRow, ReplicateSummary, SolutionRow, flatten
+
+TERM = "term_"
+NONFINITE = "nonfinite"
+
+_JSON_TYPES: dict[Any, dict[str, Any]] = {
+    int: {"type": "integer"},
+    float: {"type": "number"},
+    bool: {"type": "boolean"},
+    str: {"type": "string"},
+    FloatArray: {"type": "array", "items": {"type": "number"}},
+}
+
+
+@cache
+def field_types(record: type) -> dict[str, Any]:
+    """Return a record's fields and their types in order, without `terms`, which becomes one field per term."""
+    return {name: kind for name, kind in get_type_hints(record).items() if name != "terms"}
+
+
+def json_schema(record: type, terms: Iterable[str] = ()) -> bytes:
+    """Return the JSON Schema of a record's messages, in the subset that Foxglove reads (one type per field).
+
+    Any number may be null, which JSON Schema could only say with a union type; see the module's first lines.
+    """
+    properties = {name: _JSON_TYPES[kind] for name, kind in field_types(record).items()}
+    if record is FrontRow:  # a matrix travels flat
+        properties["criteria"] = _JSON_TYPES[int]
+    properties.update({TERM + name: _JSON_TYPES[float] for name in sorted(terms)})
+    title = f"evoexp.{record.__name__.removesuffix('Row')}"
+    return orjson.dumps({"title": title, "type": "object", "properties": properties})
+
+
+def encode_generation(generation: Generation, terms: Iterable[tuple[str, str]], chain: str) -> bytes:
+    """Return the message of one generation.
+
+    Args:
+        generation: What the planner yielded; its arrays are left out.
+        terms: (name, column) of every term, in the order of the columns.
+        chain: The generation's link, 32 hex digits.
+    """
+    row: dict[str, Any] = {
+        "index": int(generation.index),
+        "best_cost": float(generation.best_cost),
+        "best_cost_in_generation": float(generation.best_cost_in_generation),
+        "mean_cost": float(generation.mean_cost),
+        "std_cost": float(generation.std_cost),
+        "num_feasible": int(generation.num_feasible),
+        "evaluations": int(generation.evaluations),
+        "collision_queries": int(generation.collision_queries),
+        "solved": bool(generation.solved),
+    }
+    values = generation.terms
+    for name, column in terms:
+        row[column] = float(values[name])
+    # One addition per number decides the usual case; a sum that overflows only takes the longer way.
+    total = sum(row.values())
+    row["chain"] = chain
+    return orjson.dumps(row if math.isfinite(total) else _flagged(row))
+
+
+def encode_solution(generation: int, cost: float, values: FloatArray) -> bytes:
+    """Return the message of one solution; `values` is flat."""
+    row = {"generation": int(generation), "cost": float(cost), "values": values}
+    return _encode_with_array(row, "values")
+
+
+def encode_front(front: FrontRow) -> bytes:
+    """Return the message of one front; its costs travel flat, beside the number of criteria."""
+    flat = np.ascontiguousarray(front.costs, dtype=np.float64)
+    row = {"generation": int(front.generation), "costs": flat.reshape(-1), "criteria": int(flat.shape[1])}
+    return _encode_with_array(row, "costs")
+
+
+def encode_summary(summary: ReplicateSummary) -> dict[str, str]:
+    """Return the summary as metadata: every value one JSON text, terms in alphabetical order."""
+    row = flatten(summary._replace(terms=dict(sorted(summary.terms.items()))))
+    return encode_values(_flagged(row))
+
+
+def encode_values(values: Mapping[str, Any]) -> dict[str, str]:
+    """Return a mapping as metadata: every value one JSON text."""
+    options = orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_SORT_KEYS
+    return {name: orjson.dumps(value, option=options).decode() for name, value in values.items()}
+
+
+def decode_values(metadata: Mapping[str, str]) -> dict[str, Any]:
+    """Undo `encode_values`."""
+    return {name: orjson.loads(text) for name, text in metadata.items()}
+
+
+def decode_generation(data: bytes) -> GenerationRow:
+    """Undo `encode_generation`."""
+    fields, terms = _decode(GenerationRow, data)
+    return GenerationRow(**fields, terms=terms)
+
+
+def decode_summary(metadata: Mapping[str, str]) -> ReplicateSummary:
+    """Undo `encode_summary`; keys that are no field of the summary are left out."""
+    fields, terms = _typed(ReplicateSummary, decode_values(metadata))
+    return ReplicateSummary(**fields, terms=terms)
+
+
+def decode_solution(data: bytes) -> SolutionRow:
+    """Undo `encode_solution`."""
+    fields, _ = _decode(SolutionRow, data)
+    return SolutionRow(**fields)
+
+
+def decode_front(data: bytes) -> FrontRow:
+    """Undo `encode_front`."""
+    row = orjson.loads(data)
+    fields, _ = _typed(FrontRow, row)
+    return FrontRow(fields["generation"], fields["costs"].reshape(-1, row["criteria"]))
+
+
+def _encode_with_array(row: dict[str, Any], name: str) -> bytes:
+    array = row[name]
+    finite = math.isfinite(row.get("cost", 0.0))
+    if array.size and finite:  # argmin and argmax stop at NaN; cheaper than np.isfinite for arrays this short
+        finite = math.isfinite(array.item(array.argmin())) and math.isfinite(array.item(array.argmax()))
+    return orjson.dumps(row if finite else _flagged(row), option=orjson.OPT_SERIALIZE_NUMPY)
+
+
+def _flagged(row: dict[str, Any]) -> dict[str, Any]:
+    """Return the row with `nonfinite` appended where a number of it needs the flag."""
+    flags: dict[str, Any] = {}
+    for name, value in row.items():
+        if isinstance(value, float):
+            if not math.isfinite(value):
+                flags[name] = repr(float(value))
+        elif isinstance(value, np.ndarray):
+            where = np.flatnonzero(~np.isfinite(value))
+            if where.size:
+                flags[name] = {str(index): repr(float(value[index])) for index in where.tolist()}
+    return {**row, NONFINITE: flags} if flags else row
+
+
+def _decode(record: type, data: bytes) -> tuple[dict[str, Any], dict[str, float]]:
+    return _typed(record, orjson.loads(data))
+
+
+def _typed(record: type, row: dict[str, Any]) -> tuple[dict[str, Any], dict[str, float]]:
+    """Return a row's fields in the types of the record, and its terms by name.
+
+    Raises:
+        KeyError: A field is missing.
+        TypeError: A number is null and no flag says which one it was.
+        ValueError: A value is not of its field's type.
+    """
+    if NONFINITE in row:
+        restore(row)
+    fields: dict[str, Any] = {}
+    for name, kind in field_types(record).items():
+        value = row[name]
+        if kind is float or kind is int:
+            fields[name] = kind(value)
+        else:
+            fields[name] = np.array(value, dtype=np.float64) if kind == FloatArray else value
+    terms = {name[5:]: float(value) for name, value in row.items() if name[:5] == TERM}
+    return fields, terms
+
+
+def restore(row: dict[str, Any]) -> None:
+    """Put the non-finite numbers of a decoded row that has the flag back in place."""
+    for name, flag in row[NONFINITE].items():
+        if isinstance(flag, str):
+            row[name] = float(flag)
+        else:
+            for index, element in flag.items():
+                row[name][int(index)] = float(element)

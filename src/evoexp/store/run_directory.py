@@ -1,0 +1,258 @@
+"""The directory of one condition, `runs/<hash12>/`: where it is, what is finished in it, and who may write."""
+
+import hashlib
+import json
+import os
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+from filelock import FileLock, Timeout
+
+from evoexp.errors import AmbiguousHash, Busy, EvoexpError, UnknownHash, nearest
+from evoexp.store.files import remove_stale, sync_directory, write_file, write_files
+
+HASH_LENGTH = 12  # hex digits shown, and of a directory's name
+_LOG = re.compile(r"(\d{4,})\.mcap")
+_FAILED = re.compile(r"(\d{4,})\.failed\.json")
+
+
+class StoreError(EvoexpError):
+    """A run directory that is damaged, or that belongs to another condition."""
+
+
+class RunDirectory:
+    """One condition's run: `config.json`, `manifest.json`, `replicates/`, `summary.parquet`, `.lock`.
+
+    Reading needs no lock. Every writing method is for the one process that holds `lock()`.
+
+    Attributes:
+        condition_id: Full hash of the condition, 64 hex digits: the SHA-256 of `config.json`.
+        path: The directory.
+    """
+
+    def __init__(self, outputs: Path, condition_id: str) -> None:
+        """Name the directory; nothing is created or read.
+
+        Args:
+            outputs: Root of all outputs, see `outputs_root`.
+            condition_id: Full hash of the condition, 64 hex digits.
+        """
+        if not re.fullmatch("[0-9a-f]{64}", condition_id):
+            raise ValueError(f"condition_id: must be 64 hex digits, was {condition_id!r}")
+        self.condition_id = condition_id
+        self.path = Path(outputs) / "runs" / condition_id[:HASH_LENGTH]
+        self._lock = FileLock(self.path / ".lock", timeout=0)
+
+    @property
+    def hash12(self) -> str:
+        """The twelve hex digits that name the run."""
+        return self.condition_id[:HASH_LENGTH]
+
+    @property
+    def replicates(self) -> Path:
+        """Directory of the logs."""
+        return self.path / "replicates"
+
+    @property
+    def summary_path(self) -> Path:
+        """The table derived from the logs; see `tables`."""
+        return self.path / "summary.parquet"
+
+    def log_path(self, replicate: int) -> Path:
+        """Return where the finished log of a replicate is or will be."""
+        return self.replicates / f"{replicate:04d}.mcap"
+
+    def failure_path(self, replicate: int) -> Path:
+        """Return where the reason of a failed replicate is or will be."""
+        return self.replicates / f"{replicate:04d}.failed.json"
+
+    def create(self, config_json: bytes, manifest: Mapping[str, Any]) -> None:
+        """Create what is missing; a configuration and manifest already there stay as they are.
+
+        Args:
+            config_json: Canonical form of the condition.
+            manifest: See `manifest.manifest`.
+
+        Raises:
+            StoreError: The directory is damaged or belongs to another condition.
+        """
+        if hashlib.sha256(config_json).hexdigest() != self.condition_id:
+            raise ValueError(f"config_json: is not of condition {self.hash12}")
+        self.replicates.mkdir(parents=True, exist_ok=True)
+        if (self.path / "config.json").exists():
+            self.check()
+        else:
+            write_file(self.path / "config.json", config_json)
+            sync_directory(self.path.parent)
+        if not (self.path / "manifest.json").exists():
+            write_file(self.path / "manifest.json", json.dumps(manifest, indent=2, sort_keys=True).encode() + b"\n")
+
+    def check(self) -> None:
+        """Raise unless `config.json` is this very condition's.
+
+        Raises:
+            StoreError: It is missing, damaged, or of a condition that shares the first twelve digits.
+        """
+        stored = _stored_id(self.path)
+        if stored != self.condition_id:
+            raise StoreError(
+                f"{self.path}: holds condition {stored}, which shares its first {HASH_LENGTH} digits with "
+                f"{self.condition_id}; keep one of them in another EVOEXP_OUTPUTS"
+            )
+
+    def config_json(self) -> bytes:
+        """Return the canonical form of the condition, checked."""
+        self.check()
+        return (self.path / "config.json").read_bytes()
+
+    def manifest(self) -> dict[str, Any]:
+        """Return what was noted when the run was created.
+
+        Raises:
+            StoreError: `manifest.json` is missing or damaged.
+        """
+        return _read_object(self.path / "manifest.json")
+
+    def completed(self) -> set[int]:
+        """Return the replicates whose finished log is there."""
+        return self._matching(_LOG)
+
+    def failed(self) -> set[int]:
+        """Return the replicates that failed and were not completed since."""
+        return self._matching(_FAILED) - self.completed()
+
+    def failure(self, replicate: int) -> dict[str, Any]:
+        """Return `reason` and `traceback` of a failed replicate.
+
+        Raises:
+            StoreError: The file is missing or damaged.
+        """
+        failure = _read_object(self.failure_path(replicate))
+        if not (isinstance(failure.get("reason"), str) and isinstance(failure.get("traceback"), str)):
+            raise StoreError(f"{self.failure_path(replicate)}: damaged: no reason and traceback")
+        return failure
+
+    def write_log(self, replicate: int, content: bytes) -> None:
+        """Keep a finished log: from now on the replicate is completed, whatever failed before."""
+        self.write_logs({replicate: content})
+
+    def write_logs(self, contents: Mapping[int, bytes]) -> None:
+        """Keep several finished logs; cheaper than one by one."""
+        self.replicates.mkdir(parents=True, exist_ok=True)
+        write_files({self.log_path(replicate): content for replicate, content in contents.items()})
+        for replicate in contents:
+            self.failure_path(replicate).unlink(missing_ok=True)
+
+    def write_failure(self, replicate: int, reason: str, traceback: str) -> None:
+        """Keep why a replicate failed: one line, and the traceback."""
+        self.replicates.mkdir(parents=True, exist_ok=True)
+        failure = {"replicate": replicate, "reason": reason, "traceback": traceback}
+        write_file(self.failure_path(replicate), json.dumps(failure, indent=2).encode() + b"\n")
+
+    @contextmanager
+    def lock(self) -> Iterator[None]:
+        """Hold the run for writing; an operating-system lock that dies with its process.
+
+        The same object may lock again inside. Temporary files that a killed parent left are removed.
+
+        Raises:
+            Busy: Another process, or another object of this one, holds the run.
+        """
+        self.path.mkdir(parents=True, exist_ok=True)
+        try:
+            self._lock.acquire()
+        except Timeout as error:
+            raise Busy(f"run {self.hash12}: another process is writing it now ({self.path})") from error
+        try:
+            remove_stale((self.path, self.replicates))
+            yield
+        finally:
+            self._lock.release()
+
+    def _matching(self, pattern: re.Pattern[str]) -> set[int]:
+        try:
+            names = os.listdir(self.replicates)
+        except FileNotFoundError:
+            return set()
+        return {int(match[1]) for name in names if (match := pattern.fullmatch(name))}
+
+
+@contextmanager
+def lock_all(runs: Iterable[RunDirectory]) -> Iterator[None]:
+    """Hold several runs, taken in the order of their hashes so that two processes cannot wait for each other.
+
+    Raises:
+        Busy: One of them is held; none is then held from here.
+    """
+    with ExitStack() as stack:
+        for _, run in sorted({run.path: run for run in runs}.items(), key=lambda item: item[1].condition_id):
+            stack.enter_context(run.lock())
+        yield
+
+
+def outputs_root() -> Path:
+    """Return the root of all outputs: `EVOEXP_OUTPUTS`, or `outputs` in the current directory."""
+    return Path(os.environ.get("EVOEXP_OUTPUTS") or "outputs")
+
+
+def find_runs(outputs: Path) -> list[RunDirectory]:
+    """Return all stored runs in the order of their hashes.
+
+    Raises:
+        StoreError: The configuration of one is damaged.
+    """
+    return [RunDirectory(outputs, _stored_id(path)) for path in _run_paths(outputs)]
+
+
+def resolve(outputs: Path, prefix: str) -> RunDirectory:
+    """Return the one stored run whose hash begins with a prefix of 1 to 64 hex digits.
+
+    Raises:
+        UnknownHash: The text is no hash, or no run here begins with it.
+        AmbiguousHash: Several do.
+        StoreError: The configuration of the run is damaged.
+    """
+    digits = prefix.lower()
+    if not re.fullmatch("[0-9a-f]{1,64}", digits):
+        raise UnknownHash(f"hash: must be 1 to 64 hexadecimal digits, was '{prefix}'")
+    paths = _run_paths(outputs)
+    candidates = [path for path in paths if path.name.startswith(digits[:HASH_LENGTH])]
+    if len(candidates) > 1:
+        raise AmbiguousHash(prefix, [path.name for path in candidates])
+    if candidates and (condition_id := _stored_id(candidates[0])).startswith(digits):
+        return RunDirectory(outputs, condition_id)
+    hint = nearest(digits[:HASH_LENGTH], [path.name[: len(digits)] for path in paths])
+    raise UnknownHash(f"hash: no run '{prefix}' among the {len(paths)} in {outputs}{hint}")
+
+
+def _run_paths(outputs: Path) -> list[Path]:
+    """Return the directories that were created to the end, sorted."""
+    pattern = "[0-9a-f]" * HASH_LENGTH
+    return sorted(path.parent for path in (Path(outputs) / "runs").glob(f"{pattern}/config.json"))
+
+
+def _stored_id(path: Path) -> str:
+    """Return the full hash of the configuration that a run directory holds."""
+    config = path / "config.json"
+    try:
+        stored = hashlib.sha256(config.read_bytes()).hexdigest()
+    except OSError as error:
+        raise StoreError(f"{config}: cannot be read: {error.strerror or error}") from error
+    if not stored.startswith(path.name):
+        raise StoreError(f"{config}: damaged: its hash {stored[:HASH_LENGTH]} is not the directory's name")
+    return stored
+
+
+def _read_object(path: Path) -> dict[str, Any]:
+    try:
+        value = json.loads(path.read_bytes())
+    except OSError as error:
+        raise StoreError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except (ValueError, RecursionError) as error:
+        raise StoreError(f"{path}: damaged: {error}") from error
+    if not isinstance(value, dict):
+        raise StoreError(f"{path}: damaged: not a JSON object")
+    return value

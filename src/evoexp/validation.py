@@ -1,0 +1,153 @@
+"""The base of every component: typed, frozen, checked settings.
+
+A component is a class whose fields are its settings. Building one from plain data (what a YAML file or a log's
+`config.json` holds) checks every type and range and names the offending field as the user typed it; nothing is
+coerced but whole numbers into float fields and lists into tuples.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any, ClassVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from evoexp.errors import SettingError, UnknownSetting, nearest
+
+Count = Annotated[int, Field(ge=1)]
+NonNegativeCount = Annotated[int, Field(ge=0)]
+Rate = Annotated[float, Field(ge=0.0, le=1.0)]
+Positive = Annotated[float, Field(gt=0.0)]
+NonNegative = Annotated[float, Field(ge=0.0)]
+Vector = tuple[float, ...]
+
+TARGET = "_target_"
+
+
+class Settings(BaseModel):
+    """Frozen, strictly typed settings that are part of a component (an obstacle, say) but no component themselves."""
+
+    model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
+
+    def canonical(self) -> dict[str, Any]:
+        """Return the settings as plain data: the form that is hashed, stored and built from again.
+
+        A field that has a default was added after the first release, or is an extension that a paper's own
+        configuration leaves off; at its default it is left out, so that older identities stay as they were.
+        """
+        fields = type(self).model_fields
+        return {
+            name: _plain(getattr(self, name))
+            for name, field in fields.items()
+            if field.is_required() or getattr(self, name) != field.get_default()
+        }
+
+
+class Component(Settings):
+    """Settings with a registered name; what `_target_` in a YAML option refers to.
+
+    Attributes:
+        component: The registered name.
+        revision: Raised whenever the same settings give other results than before; part of every identity.
+    """
+
+    component: ClassVar[str]
+    revision: ClassVar[int] = 1
+
+    def canonical(self) -> dict[str, Any]:
+        """Return the settings with the component's name and revision."""
+        return {TARGET: self.component, "revision": self.revision} | super().canonical()
+
+
+def build(data: Any, lookup: Callable[[str, str], type[Component]], field: str) -> Any:
+    """Build plain data into components, the innermost first.
+
+    Args:
+        data: A mapping with `_target_`, or any nesting of mappings, lists and scalars around such mappings.
+        lookup: Gives the class of a registered name; its second argument is the field, for its error.
+        field: Dotted path of `data`, for errors.
+
+    Raises:
+        SettingError: If a setting is missing, of a wrong type, out of range or contradicts another.
+        UnknownSetting: If a component has no such setting.
+    """
+    if isinstance(data, Mapping):
+        children = {key: build(value, lookup, _join(field, str(key))) for key, value in data.items() if key != TARGET}
+        if TARGET not in data:
+            return children
+        return _construct(lookup(str(data[TARGET]), field), children, field)
+    if isinstance(data, list | tuple):
+        return tuple(build(value, lookup, f"{field}[{k}]") for k, value in enumerate(data))
+    return data + 0.0 if isinstance(data, float) else data  # -0.0 and 0.0 are one setting
+
+
+def _construct(kind: type[Component], settings: dict[str, Any], field: str) -> Component:
+    settings.pop("revision", None)  # what a stored configuration recorded; compared by whoever reads it
+    try:
+        return kind(**settings)
+    except ValidationError as error:
+        raise settings_error(kind, error, settings, field) from None
+    except SettingError as error:
+        raise SettingError(_join(field, error.field), error.must, error.was) from None
+
+
+def settings_error(
+    kind: type[Settings], error: ValidationError, settings: Any, field: str
+) -> SettingError | UnknownSetting:
+    """Say the first thing that is wrong with some settings in one line, with the field's path as it was typed."""
+    first = error.errors(include_url=False)[0]
+    path, here = field, settings
+    for part in first["loc"]:
+        if isinstance(part, int):
+            path, here = f"{path}[{part}]", here[part]
+        elif part in here or part == first["loc"][-1]:  # else: the tag of a union, which nobody typed
+            path, here = _join(path, part), here.get(part, {}) if isinstance(here, Mapping) else {}
+    if first["type"] == "extra_forbidden":
+        known = kind.model_fields if len(first["loc"]) == 1 else ()
+        return UnknownSetting(path, known)
+    if first["type"] == "missing":
+        return SettingError(path, "given", None)
+    must, hint = _must(first)
+    return SettingError(path, must, first["input"], hint)
+
+
+_MUST = {
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "float_type": "a number",
+    "finite_number": "a finite number",
+    "bool_type": "true or false",
+    "string_type": "text",
+    "tuple_type": "a list",
+    "greater_than_equal": "at least {ge}",
+    "greater_than": "greater than {gt}",
+    "less_than_equal": "at most {le}",
+    "less_than": "less than {lt}",
+    "too_short": "a list of at least {min_length}",
+    "too_long": "a list of at most {max_length}",
+    "literal_error": "one of {expected}",
+    "union_tag_invalid": "one of {expected_tags}",
+    "union_tag_not_found": "given with its {discriminator}",
+    "model_type": "a {class_name}",
+    "is_instance_of": "a {class}",
+}
+
+
+def _must(error: Any) -> tuple[str, str]:
+    context = error.get("ctx", {})
+    template = _MUST.get(error["type"])
+    must = template.format(**context) if template else str(error["msg"])
+    hint = nearest(error["input"], context["expected"].replace("'", "").replace(" or ", ", ").split(", ")) if (
+        error["type"] == "literal_error" and isinstance(error["input"], str)
+    ) else ""
+    return must, hint
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Settings):
+        return value.canonical()
+    if isinstance(value, tuple):
+        return [_plain(item) for item in value]
+    return value
+
+
+def _join(field: str, name: str) -> str:
+    return f"{field}.{name}" if field else name

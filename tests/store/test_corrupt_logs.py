@@ -1,0 +1,139 @@
+"""A damaged log is always recognised, by one line that names it, and never by another exception."""
+
+import struct
+import zlib
+from collections.abc import Callable
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.writer import Writer
+from store_samples import CONDITION, CONFIG, generations, summary, write
+
+from evoexp.errors import CorruptLog
+from evoexp.store import log as log_module
+from evoexp.store.log import Log
+from evoexp.store.log_reader import generation_columns, read_log, read_solution, read_summary
+
+READERS = [read_log, read_summary, read_solution, generation_columns]
+Reader = Callable[[bytes | Path], object]
+
+
+@pytest.fixture(scope="module")
+def content() -> bytes:
+    return write(generations(60)).content
+
+
+def refusal(reader: Reader, source: bytes | Path) -> str:
+    with pytest.raises(CorruptLog) as caught:
+        reader(source)
+    text = str(caught.value)
+    assert "\n" not in text
+    return text
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_cut_anywhere(reader: Reader, content: bytes) -> None:
+    step = 1 if reader is read_summary else 13
+    for size in range(0, len(content), step):
+        refusal(reader, content[:size])
+    assert "cut" in refusal(reader, content[:-1])
+    assert "empty" in refusal(reader, b"")
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_altered_anywhere(reader: Reader, content: bytes) -> None:
+    rng = np.random.default_rng(1)
+    damaged = bytearray(content)
+    positions = range(len(content)) if reader is read_summary else rng.integers(len(content), size=1500).tolist()
+    for position in positions:
+        flip = int(rng.integers(1, 256))
+        damaged[position] ^= flip
+        refusal(reader, bytes(damaged))
+        damaged[position] ^= flip
+    reader(bytes(damaged))
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_something_else(reader: Reader, content: bytes) -> None:
+    assert "not an MCAP" in refusal(reader, b"PAR1" * 100)
+    assert "cut or overwritten" in refusal(reader, content + b"\0")
+    refusal(reader, content + content)
+    refusal(reader, content[: len(content) // 2] + bytes(len(content) // 2))
+
+
+def foreign(checksums: bool) -> bytes:
+    buffer = BytesIO()
+    writer = Writer(buffer, enable_data_crcs=checksums)
+    writer.start()
+    channel = writer.register_channel("/generation", "json", writer.register_schema("other", "jsonschema", b"{}"))
+    writer.add_message(channel, 0, b"{}", 0)
+    writer.finish()
+    return buffer.getvalue()
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_foreign_mcap(reader: Reader) -> None:
+    assert "evoexp.run" in refusal(reader, foreign(checksums=True))
+    assert "not a log of evoexp" in refusal(reader, foreign(checksums=False))
+
+
+def test_the_file_is_named(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "0003.mcap"
+    assert refusal(read_log, path).startswith(f"{path}: cannot be read: No such file")
+    path.write_bytes(content[:100])
+    assert refusal(read_summary, path).startswith(f"{path}: cut")
+    assert refusal(read_log, tmp_path).startswith(f"{tmp_path}: cannot be read")
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_newer_schema_version(reader: Reader, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(log_module, "SCHEMA_VERSION", 2)
+    newer = write(generations(3)).content
+    reader(newer)
+    monkeypatch.undo()
+    assert "schema version 2, known up to 1" in refusal(reader, newer)
+
+
+def test_killed_before_finish() -> None:
+    log = Log(CONDITION, CONFIG, 7, np.random.default_rng(0))
+    for generation in generations(400):
+        log.write(generation)
+    unfinished = log._buffer.getvalue()
+    assert len(unfinished) > 10_000
+    assert "cut" in refusal(read_log, unfinished)
+
+
+def test_content_digest_sees_what_good_checksums_hide(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(log_module.ContentDigest, "hexdigest", lambda self: "0" * 32)
+    forged = write(generations(3)).content
+    monkeypatch.undo()
+    assert "content digest" in refusal(read_log, forged)
+
+
+def test_a_record_that_lies_about_its_length(content: bytes) -> None:
+    """With checksums made to fit, the walk over the records still ends in the one error."""
+    footer = len(content) - 37
+    start = struct.unpack_from("<Q", content, footer + 9)[0]
+    rng = np.random.default_rng(2)
+    for _ in range(300):
+        damaged = bytearray(content)
+        damaged[int(rng.integers(start, footer))] ^= int(rng.integers(1, 256))
+        struct.pack_into("<I", damaged, len(content) - 12, zlib.crc32(damaged[start:-12]))
+        for reader in READERS:
+            try:
+                reader(bytes(damaged))
+            except CorruptLog:
+                continue
+
+
+def test_a_summary_without_a_field(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(log_module, "encode_summary", lambda summary: {"replicate": "7"})
+    assert "unreadable: KeyError" in refusal(read_summary, write(generations(3)).content)
+
+
+def test_a_summary_of_another_replicate(monkeypatch: pytest.MonkeyPatch) -> None:
+    encode = log_module.encode_summary
+    monkeypatch.setattr(log_module, "encode_summary", lambda row: encode(summary(8)))
+    assert "another replicate" in refusal(read_log, write(generations(3)).content)

@@ -1,0 +1,177 @@
+"""What is written comes back as it was, and the same content gives the same digests."""
+
+import math
+import subprocess
+import sys
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import orjson
+import pytest
+from mcap.reader import make_reader
+from store_samples import CONDITION, CONFIG, ENVIRONMENT, generations, summary, write
+
+from evoexp.records import FrontRow, GenerationRow
+from evoexp.store.log import Log
+from evoexp.store.log_reader import generation_columns, read_log, read_solution, read_summary
+
+FRONT = FrontRow(4, np.array([[1.0, math.inf], [math.nan, -2.5], [-math.inf, 0.1]]))
+
+
+def same(one: object, other: object) -> bool:
+    """Compare to the bit of a sign, NaN being equal to itself."""
+    if isinstance(one, float) and isinstance(other, float):
+        return repr(one) == repr(other)
+    if isinstance(one, dict) and isinstance(other, dict):
+        return one.keys() == other.keys() and all(same(one[key], other[key]) for key in one)
+    if isinstance(one, tuple) and isinstance(other, tuple):
+        return len(one) == len(other) and all(map(same, one, other))
+    if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
+        return one.shape == other.shape and same(tuple(one.ravel().tolist()), tuple(other.ravel().tolist()))
+    return type(one) is type(other) and one == other
+
+
+def test_round_trip(tmp_path: Path) -> None:
+    given = generations(10)
+    finished = write(given, fronts=[FRONT, FrontRow(6, np.empty((0, 3)))])
+    path = tmp_path / "0007.mcap"
+    path.write_bytes(finished.content)
+    contents = read_log(path)
+    assert (contents.condition_id, contents.config_json, contents.replicate) == (CONDITION, CONFIG, 7)
+    assert (contents.attachments, contents.environment) == ({"map.txt": b"\x00\xff"}, ENVIRONMENT)
+    assert same(contents.summary, finished.summary)
+    assert len(contents.generations) == len(given)
+    for row, generation in zip(contents.generations, given, strict=True):
+        expected = [getattr(generation, name) for name in GenerationRow._fields if name != "chain"]
+        assert same(tuple(row)[:-1], tuple(expected))
+        assert len(bytes.fromhex(row.chain)) == 16
+    assert len({row.chain for row in contents.generations}) == len(given)
+    assert same(contents.fronts[0], FRONT) and contents.fronts[1].costs.shape == (0, 3)
+
+
+def test_summary_is_completed_with_the_digest() -> None:
+    finished = write(generations(10), first_feasible_generation=3)
+    assert same(finished.summary._replace(digest=""), summary(first_feasible_generation=3))
+    assert len(bytes.fromhex(finished.summary.digest)) == 16
+    assert same(read_summary(finished.content), finished.summary)
+
+
+def test_a_solution_is_written_for_the_first_and_each_strictly_better_one() -> None:
+    given = generations(30)
+    solutions = read_log(write(given).content).solutions
+    costs = [generation.best_cost for generation in given]
+    improved = [index for index, cost in enumerate(costs) if index == 0 or cost < min(costs[:index])]
+    assert [row.generation for row in solutions] == improved
+    assert all(same(row.values, given[row.generation].best) for row in solutions)
+    assert [row.cost for row in solutions] == [costs[index] for index in improved]
+
+
+@pytest.mark.parametrize("changes", [{"best": np.full(12, math.nan)}, {"best_cost": 1e6}])
+def test_the_last_solution_is_written_even_where_it_is_no_better(changes: dict[str, object]) -> None:
+    given = generations(10)
+    given[-1] = given[-1]._replace(**changes)  # type: ignore[arg-type]
+    finished = write(given)
+    last = read_solution(finished.content)
+    assert last.generation == 9 and last.cost == given[-1].best_cost and same(last.values, given[-1].best)
+    assert same(last, read_log(finished.content).solutions[-1])
+
+
+def test_generation_columns_agree_with_read_log() -> None:
+    given = generations(40)
+    given[20] = given[20]._replace(terms={"length": 1.0, "late": 2.0})
+    content = write(given).content
+    columns, rows = generation_columns(content), read_log(content).generations
+    assert sorted(name for name in columns if name.startswith("term_")) == [
+        "term_clearance",
+        "term_late",
+        "term_length",
+        "term_torque",
+    ]
+    for name in set(GenerationRow._fields) - {"terms"}:
+        assert same(tuple(columns[name].tolist()), tuple(getattr(row, name) for row in rows)), name
+    for name in ("late", "length", "clearance", "torque"):
+        expected = tuple(row.terms.get(name, math.nan) for row in rows)
+        assert same(tuple(columns[f"term_{name}"].tolist()), expected)
+
+
+def test_same_content_same_digests_whatever_the_order_of_terms_and_the_clock() -> None:
+    one = read_log(write(generations(12)).content)
+    other = read_log(write(generations(12, reverse_terms=True), cpu_s=9.0, wall_s=9.0).content)
+    assert one.content_digest == other.content_digest
+    assert one.summary.digest == other.summary.digest
+    assert [row.chain for row in one.generations] == [row.chain for row in other.generations]
+
+
+def test_same_content_same_bytes() -> None:
+    assert write(generations(12)).content == write(generations(12, reverse_terms=True)).content
+
+
+def test_a_hidden_difference_shows_in_the_chain_from_its_generation_on() -> None:
+    changed = generations(12)
+    costs = changed[5].costs.copy()
+    costs[3] = np.nextafter(costs[3], 2.0)
+    changed[5] = changed[5]._replace(costs=costs)
+    one, other = read_log(write(generations(12)).content), read_log(write(changed).content)
+    equal = [a.chain == b.chain for a, b in zip(one.generations, other.generations, strict=True)]
+    assert equal == [True] * 5 + [False] * 7
+    assert one.summary.digest != other.summary.digest
+
+
+def test_the_last_population_enters_the_digest_alone() -> None:
+    changed = generations(12)
+    changed[-1] = changed[-1]._replace(population=changed[-1].population + 1.0)
+    one, other = read_log(write(generations(12)).content), read_log(write(changed).content)
+    assert one.content_digest == other.content_digest
+    assert one.summary.digest != other.summary.digest
+
+
+def test_other_readers_of_mcap_find_their_way() -> None:
+    given = generations(400)
+    reader = make_reader(BytesIO(write(given, fronts=[FRONT]).content), validate_crcs=True)
+    assert reader.get_header().library == "evoexp"
+    index = reader.get_summary()
+    assert index is not None and len(index.chunk_indexes) > 1
+    assert max(chunk.uncompressed_size for chunk in index.chunk_indexes) <= 64 * 1024
+    assert {chunk.compression for chunk in index.chunk_indexes} == {"zstd"}
+    names = {index.schemas[channel.schema_id].name: channel.topic for channel in index.channels.values()}
+    assert names == {
+        "evoexp.Generation": "/generation",
+        "evoexp.Solution": "/solution",
+        "evoexp.Front": "/front",
+    }
+    for schema, _, message in reader.iter_messages():
+        assert schema is not None and schema.encoding == "jsonschema"
+        row = orjson.loads(message.data)
+        row.pop("nonfinite", None)
+        assert set(row) == set(orjson.loads(schema.data)["properties"])
+    ticks = [message.log_time for _, _, message in reader.iter_messages(topics="/generation")]
+    assert ticks == [index * 10**9 for index in range(400)]
+    assert [m.sequence for _, _, m in reader.iter_messages(topics="/generation")] == list(range(400))
+
+
+def test_nonfinite_is_there_only_when_needed() -> None:
+    reader = make_reader(BytesIO(write(generations(10)).content))
+    rows = [orjson.loads(message.data) for _, _, message in reader.iter_messages(topics="/generation")]
+    assert [index for index, row in enumerate(rows) if "nonfinite" in row] == [0, 1, 2]
+    assert rows[1]["nonfinite"]["term_torque"] == "nan" and rows[1]["term_torque"] is None
+    assert rows[1]["nonfinite"]["best_cost"] == "inf" and rows[1]["nonfinite"]["term_clearance"] == "-inf"
+
+
+def test_misuse_is_refused() -> None:
+    rng = np.random.default_rng(0)
+    with pytest.raises(ValueError, match="config.json"):
+        Log(CONDITION, CONFIG, 7, rng, {"config.json": b""})
+    with pytest.raises(ValueError, match="no generation"):
+        Log(CONDITION, CONFIG, 7, rng).finish(summary())
+    log = Log(CONDITION, CONFIG, 8, rng)
+    log.write(generations(1)[0])
+    with pytest.raises(ValueError, match="replicate 7"):
+        log.finish(summary(7))
+
+
+def test_log_imports_no_tables() -> None:
+    code = "import sys, evoexp.store.log, evoexp.store.log_reader, evoexp.store.run_directory, evoexp.store.manifest\n"
+    code += "assert not {'pandas', 'pyarrow', 'numba', 'scipy', 'pinocchio'} & set(sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,215 @@
+"""Run directories: whole files or none, one writer, and hashes that find their run."""
+
+import hashlib
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from store_samples import CONDITION, CONFIG
+
+from evoexp.errors import AmbiguousHash, Busy, EvoexpError, UnknownHash
+from evoexp.store.log import Finished
+from evoexp.store.log_reader import read_log
+from evoexp.store.run_directory import RunDirectory, StoreError, find_runs, lock_all, outputs_root, resolve
+
+HOLD = """
+    import sys, time
+    from pathlib import Path
+    from evoexp.store.run_directory import RunDirectory
+    with RunDirectory(Path(sys.argv[1]), sys.argv[2]).lock():
+        print("held", flush=True)
+        time.sleep(60)
+"""
+WRITE = """
+    import sys
+    from pathlib import Path
+    from evoexp.store.run_directory import RunDirectory
+    run = RunDirectory(Path(sys.argv[1]), sys.argv[2])
+    content = Path(sys.argv[3]).read_bytes()
+    with run.lock():
+        print("held", flush=True)
+        while True:
+            for replicate in range(50):
+                run.write_log(replicate, content)
+"""
+
+
+def start(code: str, *arguments: str) -> subprocess.Popen[str]:
+    command = [sys.executable, "-c", textwrap.dedent(code), *arguments]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None and process.stdout.readline() == "held\n"
+    return process
+
+
+def kill(process: subprocess.Popen[str]) -> None:
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    assert process.stdout is not None
+    process.stdout.close()
+
+
+def create(outputs: Path, config: bytes) -> RunDirectory:
+    run = RunDirectory(outputs, hashlib.sha256(config).hexdigest())
+    run.create(config, {})
+    return run
+
+
+def test_create_keeps_what_is_there(run: RunDirectory) -> None:
+    run.create(CONFIG, {"condition": "later"})
+    assert run.manifest() == {"condition": CONDITION}
+    assert run.config_json() == CONFIG
+    assert sorted(os.listdir(run.path)) == ["config.json", "manifest.json", "replicates"]
+    with pytest.raises(ValueError, match="config_json"):
+        run.create(b"{}", {})
+    with pytest.raises(ValueError, match="64 hex"):
+        RunDirectory(run.path, "abc")
+
+
+def test_completion_is_the_file_itself(run: RunDirectory, add: Callable[..., Finished]) -> None:
+    assert run.completed() == run.failed() == set()
+    run.write_failure(3, "no path", "Traceback …\n")
+    run.write_failure(12345, "no path", "")
+    assert run.failed() == {3, 12345}
+    assert run.failure(3)["reason"] == "no path" and run.failure(3)["traceback"] == "Traceback …\n"
+    finished = add(3)
+    assert (run.completed(), run.failed()) == ({3}, {12345})
+    assert not run.failure_path(3).exists()
+    assert (run.replicates / "0003.mcap").read_bytes() == finished.content
+    (run.replicates / ".0004.mcap.1.tmp").write_bytes(b"half")
+    (run.replicates / "4.mcap").write_bytes(b"")
+    assert run.completed() == {3}
+    run.write_logs({5: finished.content, 12345: finished.content})
+    assert (run.completed(), run.failed()) == ({3, 5, 12345}, set())
+
+
+def test_a_failed_write_leaves_nothing(run: RunDirectory, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space"):
+        run.write_log(0, b"x" * 1000)
+    assert os.listdir(run.replicates) == []
+
+
+def test_killed_while_writing_leaves_whole_files(
+    run: RunDirectory, add: Callable[..., Finished], tmp_path: Path
+) -> None:
+    content = add(0).content
+    source = tmp_path / "source"
+    source.write_bytes(content)
+    for attempt in range(5):
+        process = start(WRITE, str(tmp_path), CONDITION, str(source))
+        time.sleep(0.03 + 0.02 * attempt)
+        kill(process)
+        assert run.completed()
+        for replicate in run.completed():
+            assert run.log_path(replicate).read_bytes() == content
+    (run.replicates / ".0001.mcap.1.tmp").write_bytes(b"half")
+    (run.path / ".summary.parquet.1.tmp").write_bytes(b"half")
+    with run.lock():
+        assert not list(run.path.rglob("*.tmp"))
+    assert read_log(run.log_path(min(run.completed()))).config_json == CONFIG
+
+
+def test_the_lock_dies_with_its_process(run: RunDirectory, tmp_path: Path) -> None:
+    process = start(HOLD, str(tmp_path), CONDITION)
+    try:
+        with pytest.raises(Busy, match=f"run {CONDITION[:12]}"), run.lock():
+            pass
+    finally:
+        kill(process)
+    with run.lock(), run.lock():
+        with pytest.raises(Busy), RunDirectory(tmp_path, CONDITION).lock():
+            pass
+    with RunDirectory(tmp_path, CONDITION).lock():
+        pass
+
+
+def test_lock_all_releases_what_it_took(tmp_path: Path) -> None:
+    runs = sorted((create(tmp_path, bytes([65 + k])) for k in range(4)), key=lambda run: run.condition_id)
+    process = start(HOLD, str(tmp_path), runs[2].condition_id)
+    try:
+        with pytest.raises(Busy, match=runs[2].hash12), lock_all(reversed(runs)):
+            pass
+        for run in (runs[0], runs[1], runs[3]):
+            with RunDirectory(tmp_path, run.condition_id).lock():
+                pass
+    finally:
+        kill(process)
+    again = RunDirectory(tmp_path, runs[0].condition_id)
+    with lock_all([*runs, again]):
+        with pytest.raises(Busy), RunDirectory(tmp_path, runs[3].condition_id).lock():
+            pass
+
+
+def test_another_condition_with_the_same_twelve_digits(run: RunDirectory, tmp_path: Path) -> None:
+    other = RunDirectory(tmp_path, CONDITION[:12] + "0" * 52)
+    with pytest.raises(StoreError, match=f"{CONDITION}, which shares"):
+        other.check()
+    with pytest.raises(UnknownHash):
+        resolve(tmp_path, CONDITION[:12] + ("0" if CONDITION[12] != "0" else "1"))
+
+
+def test_damage_is_named(run: RunDirectory, tmp_path: Path) -> None:
+    assert issubclass(StoreError, EvoexpError)
+    run.write_failure(1, "x", "y")
+    run.failure_path(1).write_text("{}")
+    with pytest.raises(StoreError, match=r"0001\.failed\.json: damaged"):
+        run.failure(1)
+    (run.path / "manifest.json").write_text('{"condition": ')
+    with pytest.raises(StoreError, match=r"manifest\.json: damaged"):
+        run.manifest()
+    (run.path / "config.json").write_bytes(CONFIG[:-1])
+    damaged = r"config\.json: damaged"
+    for action in (run.check, run.config_json, lambda: run.create(CONFIG, {}), lambda: find_runs(tmp_path)):
+        with pytest.raises(StoreError, match=damaged):
+            action()
+    with pytest.raises(StoreError, match=damaged):
+        resolve(tmp_path, run.hash12)
+    (run.path / "config.json").unlink()
+    with pytest.raises(StoreError, match="cannot be read: No such file"):
+        run.check()
+
+
+def test_prefixes(tmp_path: Path) -> None:
+    runs = [create(tmp_path, str(number).encode()) for number in range(20)]
+    (tmp_path / "runs" / ("0" * 12)).mkdir()  # killed before it had a configuration
+    (tmp_path / "runs" / "notes").mkdir()
+    stored = find_runs(tmp_path)
+    assert [run.condition_id for run in stored] == sorted(run.condition_id for run in runs)
+    for run in runs:
+        for length in (12, 13, 64):
+            assert resolve(tmp_path, run.condition_id[:length].upper()).condition_id == run.condition_id
+    digits = [run.condition_id[0] for run in runs]
+    shared = next(digit for digit in digits if digits.count(digit) > 1)
+    alone = next(digit for digit in digits if digits.count(digit) == 1)
+    assert resolve(tmp_path, alone).condition_id[0] == alone
+    with pytest.raises(AmbiguousHash) as caught:
+        resolve(tmp_path, shared)
+    assert caught.value.candidates == sorted(run.hash12 for run in runs if run.condition_id[0] == shared)
+
+
+def test_unknown_prefixes_say_what_there_is(tmp_path: Path) -> None:
+    with pytest.raises(UnknownHash, match="no run 'abc' among the 0"):
+        resolve(tmp_path, "abc")
+    run = create(tmp_path, b"one")
+    wrong = run.hash12[:-1] + ("0" if run.hash12[-1] != "0" else "1")
+    with pytest.raises(UnknownHash, match=f"among the 1 .* did you mean '{run.hash12}'"):
+        resolve(tmp_path, wrong)
+    for text in ("", "xyz", "abc ", "../..", "0" * 65):
+        with pytest.raises(UnknownHash, match="hexadecimal"):
+            resolve(tmp_path, text)
+
+
+def test_outputs_root(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("EVOEXP_OUTPUTS", raising=False)
+    assert outputs_root() == Path("outputs")
+    monkeypatch.setenv("EVOEXP_OUTPUTS", "/data/evo")
+    assert outputs_root() == Path("/data/evo")

@@ -293,3 +293,9 @@ def _text(override: Override) -> str:
 
 def _first_line(error: Exception) -> str:
     return str(error).strip().splitlines()[0]
+
+
+def description(experiment: str) -> str:
+    """Return the line of an experiment file that says what it is: its third."""
+    lines = (config_directory() / "experiment" / f"{experiment}.yaml").read_text().splitlines()
+    return lines[2].removeprefix("# ")

@@ -87,7 +87,8 @@ class Condition(NamedTuple):
         seed = config.get("seed")
         if type(seed) is not int or seed < 0:
             raise SettingError("seed", "a whole number, at least 0", seed)
-        return cls(*parts, seed)
+        robot, scenario, planner = parts
+        return cls(robot, scenario, planner, seed)
 
     @classmethod
     def from_json(cls, text: bytes) -> "Condition":
@@ -159,6 +160,3 @@ def revisions(config: Any, field: str = "") -> list[tuple[str, Any, int]]:
         for k, value in enumerate(config):
             found += revisions(value, f"{field}[{k}]")
     return found
-
-
-

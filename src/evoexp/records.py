@@ -19,7 +19,7 @@ class Generation(NamedTuple):
     into the digest and not recorded.
     """
 
-    index: int  # 0 is the initial population
+    index: int  # type: ignore[assignment]  # 0 is the initial population
     best: FloatArray  # flat solution, best so far
     best_cost: float  # best so far
     best_cost_in_generation: float
@@ -37,7 +37,7 @@ class Generation(NamedTuple):
 class GenerationRow(NamedTuple):
     """One generation as it is read back from a log: what was recorded of `Generation`, and its link of the chain."""
 
-    index: int
+    index: int  # type: ignore[assignment]  # a tuple has a method of this name
     best_cost: float
     best_cost_in_generation: float
     mean_cost: float

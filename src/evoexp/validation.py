@@ -97,7 +97,7 @@ def settings_error(
     path, here = field, settings
     for part in first["loc"]:
         if isinstance(part, int):
-            path, here = f"{path}[{part}]", here[part]
+            path, here = f"{path}[{part}]", here[part] if part < len(here) else {}
         elif part in here or part == first["loc"][-1]:  # else: the tag of a union, which nobody typed
             path, here = _join(path, part), here.get(part, {}) if isinstance(here, Mapping) else {}
     if first["type"] == "extra_forbidden":
@@ -135,9 +135,11 @@ def _must(error: Any) -> tuple[str, str]:
     context = error.get("ctx", {})
     template = _MUST.get(error["type"])
     must = template.format(**context) if template else str(error["msg"])
-    hint = nearest(error["input"], context["expected"].replace("'", "").replace(" or ", ", ").split(", ")) if (
-        error["type"] == "literal_error" and isinstance(error["input"], str)
-    ) else ""
+    hint = (
+        nearest(error["input"], context["expected"].replace("'", "").replace(" or ", ", ").split(", "))
+        if (error["type"] == "literal_error" and isinstance(error["input"], str))
+        else ""
+    )
     return must, hint
 
 

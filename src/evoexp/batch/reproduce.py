@@ -55,7 +55,9 @@ def reproduce_log(path: Path) -> Comparison:
     stored = read_log(path)
     condition = Condition.from_json(stored.config_json)
     if condition.id != stored.condition_id:
-        raise CorruptLog(f"{path}: its configuration has hash {condition.id[:12]}, it claims {stored.condition_id[:12]}")
+        raise CorruptLog(
+            f"{path}: its configuration has hash {condition.id[:12]}, it claims {stored.condition_id[:12]}"
+        )
     return compare(stored, read_log(run_replicate(condition, stored.replicate).content))
 
 

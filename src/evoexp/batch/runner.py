@@ -6,11 +6,10 @@ so an interrupted batch is resumed by asking for it again.
 
 import contextlib
 import itertools
-import os
 import time
 import traceback
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -104,7 +103,7 @@ class Batch:
         for condition, _, _ in self._wanted.values():
             condition.prepare()
 
-    def run(self) -> Iterator[Outcome]:
+    def run(self) -> Generator[Outcome, None, None]:
         """Run what is missing; yield every outcome once it is stored. Closing the iterator keeps what is finished.
 
         Raises:
@@ -217,7 +216,8 @@ def _run_alone(job: Job) -> Outcome:
     """Run one job in a process of its own; a second death is a failure."""
     pool = joblib.Parallel(n_jobs=2, batch_size=1, inner_max_num_threads=1, backend="loky")
     try:
-        return next(itertools.chain.from_iterable(pool([joblib.delayed(run_jobs)([job])])))
+        outcome: Outcome = pool([joblib.delayed(run_jobs)([job])])[0][0]
+        return outcome
     except TerminatedWorkerError as error:
         return Outcome(job.condition_id, job.replicate, "worker process died twice", str(error), b"", 0.0)
 
@@ -230,4 +230,9 @@ def _warm(jobs: Sequence[Job], settings: RunnerSettings) -> int:
             planner, problem = condition.prepare()
             for generation in itertools.islice(planner.evolve(problem, condition.rng(0)), 2):
                 planner.evaluate(problem, generation.best)
-    return max(1, min(settings.num_workers or os.cpu_count() or 1, len(jobs)))
+    return max(1, min(settings.num_workers or num_cores(), len(jobs)))
+
+
+def num_cores() -> int:
+    """Return how many cores this process may use."""
+    return int(joblib.cpu_count())

@@ -13,7 +13,7 @@ import numpy as np
 from evoexp.numerics import DEGREE, kernel
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly, sphere_geometry
-from evoexp.robots.kinematics import BLOCK, block_frames, block_planar_frames
+from evoexp.robots.kinematics import BLOCK, PLANAR_ROWS, SPATIAL_ROWS, block_frames, block_planar_frames
 from evoexp.scenarios.obstacles import BOX, SPHERE, ObstacleTable, obstacle_table
 from evoexp.validation import Component, Count, Positive
 
@@ -135,33 +135,30 @@ class SphereCollision(NamedTuple):
         return Clearance(out[0], out[1])
 
 
-
-
-
 @kernel
 def _clearances(table, planar, spheres, obstacles, q, out):  # type: ignore[no-untyped-def]
     parent, index_q, prismatic, turned, rotation, translation = table
-    sphere_joint, sphere_local, arm_spheres, radius = spheres
-    num_joints, num_spheres, total = len(parent), len(sphere_joint), q.shape[1]
+    joint, local, arm_spheres, radius = spheres
+    total = q.shape[1]
     block_q = np.zeros((q.shape[0], BLOCK))
-    frames = np.empty((num_joints, 9, BLOCK))
-    points = np.empty((num_joints, 3, BLOCK))
-    sine, cosine = np.empty((num_joints, BLOCK)), np.empty((num_joints, BLOCK))
-    scratch = np.empty((11, BLOCK))
-    centers = np.empty((num_spheres, 3, BLOCK))
+    frames = np.empty((len(parent), PLANAR_ROWS if planar else SPATIAL_ROWS, BLOCK))
+    centers = np.empty((len(joint), 3, BLOCK))
+    scratch = np.empty((SPATIAL_ROWS, BLOCK))
     between, outside = np.empty(BLOCK), np.empty(BLOCK)
+    if planar:
+        _heights(parent, translation, joint, local, centers)
     for first in range(0, total, BLOCK):
         count = min(BLOCK, total - first)
         for k in range(q.shape[0]):
             for lane in range(count):
                 block_q[k, lane] = q[k, first + lane] * DEGREE
         if planar:
-            block_planar_frames(parent, index_q, turned, rotation, translation, block_q, points, sine, cosine)
-            _planar_centers(sphere_joint, sphere_local, sine, cosine, points, centers)
+            block_planar_frames(parent, index_q, rotation, translation, block_q, frames)
+            _planar_centers(joint, local, frames, centers)
         else:
-            block_frames(parent, index_q, prismatic, turned, rotation, translation, block_q, frames, points, scratch)
-            _spatial_centers(sphere_joint, sphere_local, frames, points, centers)
-        _between_arms(planar, arm_spheres, centers, scratch[0], between)
+            block_frames(parent, index_q, prismatic, turned, rotation, translation, block_q, frames, scratch)
+            _spatial_centers(joint, local, frames, centers)
+        _between_arms(planar, arm_spheres, centers, scratch, between)
         _to_obstacles(obstacles, centers, scratch, outside)
         for lane in range(count):
             out[0, first + lane] = between[lane] - 2.0 * radius
@@ -169,83 +166,101 @@ def _clearances(table, planar, spheres, obstacles, q, out):  # type: ignore[no-u
 
 
 @kernel
-def _planar_centers(joint, local, sine, cosine, points, centers):  # type: ignore[no-untyped-def]
+def _heights(parent, translation, joint, local, centers):  # type: ignore[no-untyped-def]
+    """In the plane no joint changes a height: z of all centres, once."""
     for k in range(len(joint)):
-        j = joint[k]
-        x, y, z = local[k]
+        height, j = local[k, 2], joint[k]
+        while j >= 0:
+            height += translation[j, 2]
+            j = parent[j]
+        centers[k, 2, :] = height
+
+
+@kernel
+def _planar_centers(joint, local, frames, centers):  # type: ignore[no-untyped-def]
+    for k in range(len(joint)):
+        own, j = np.uint64(k), np.uint64(joint[k])
+        x, y = local[k, 0], local[k, 1]
         for lane in range(BLOCK):
-            s, c = sine[j, lane], cosine[j, lane]
-            centers[k, 0, lane] = points[j, 0, lane] + (c * x - s * y)
-            centers[k, 1, lane] = points[j, 1, lane] + (s * x + c * y)
-            centers[k, 2, lane] = points[j, 2, lane] + z
+            s, c = frames[j, 0, lane], frames[j, 1, lane]
+            centers[own, 0, lane] = frames[j, 2, lane] + (c * x - s * y)
+            centers[own, 1, lane] = frames[j, 3, lane] + (s * x + c * y)
 
 
 @kernel
-def _spatial_centers(joint, local, frames, points, centers):  # type: ignore[no-untyped-def]
+def _spatial_centers(joint, local, frames, centers):  # type: ignore[no-untyped-def]
     for k in range(len(joint)):
-        j = joint[k]
-        x, y, z = local[k]
+        own, j = np.uint64(k), np.uint64(joint[k])
+        x, y, z = local[k, 0], local[k, 1], local[k, 2]
         for row in range(3):
-            a, b, c = frames[j, 3 * row], frames[j, 3 * row + 1], frames[j, 3 * row + 2]
+            a, o, e = np.uint64(3 * row), np.uint64(9 + row), np.uint64(row)
+            b, c = a + np.uint64(1), a + np.uint64(2)
             for lane in range(BLOCK):
-                centers[k, row, lane] = points[j, row, lane] + (a[lane] * x + b[lane] * y + c[lane] * z)
+                centers[own, e, lane] = frames[j, o, lane] + (
+                    frames[j, a, lane] * x + frames[j, b, lane] * y + frames[j, c, lane] * z
+                )
 
 
 @kernel
-def _between_arms(planar, arm_spheres, centers, least, out):  # type: ignore[no-untyped-def]
+def _between_arms(planar, arm_spheres, centers, scratch, out):  # type: ignore[no-untyped-def]
     """Least centre distance over all pairs of arms, (BLOCK,); +inf for a single arm."""
     out[:] = np.inf
     for a in range(len(arm_spheres)):
         for b in range(a + 1, len(arm_spheres)):
-            least[:] = np.inf
+            scratch[0, :] = np.inf
+            first, stop = np.uint64(arm_spheres[b, 0]), np.uint64(arm_spheres[b, 1])
             for i in range(arm_spheres[a, 0], arm_spheres[a, 1]):
                 if planar:
-                    _planar_pairs(centers, i, arm_spheres[b, 0], arm_spheres[b, 1], least)
+                    _planar_pairs(centers, np.uint64(i), first, stop, scratch)
                 else:
-                    _spatial_pairs(centers, i, arm_spheres[b, 0], arm_spheres[b, 1], least)
+                    _spatial_pairs(centers, np.uint64(i), first, stop, scratch)
             for lane in range(BLOCK):
-                distance = np.sqrt(least[lane])
-                out[lane] = distance if distance < out[lane] else out[lane]
+                distance, best = np.sqrt(scratch[0, lane]), out[lane]
+                out[lane] = distance if distance < best else best
 
 
 @kernel
 def _planar_pairs(centers, i, first, stop, least):  # type: ignore[no-untyped-def]
-    """Lower `least` to the squared distances of sphere i from a range of spheres; eight in registers at a time."""
-    x, y = centers[i, 0], centers[i, 1]
+    """Lower least[0] to the squared distances of sphere i from a range of spheres; four in registers at a time."""
     j = first
-    while j + 8 <= stop:
+    while j + np.uint64(4) <= stop:
         for lane in range(BLOCK):
-            best = least[lane]
-            for t in range(8):
-                dx, dy = x[lane] - centers[j + t, 0, lane], y[lane] - centers[j + t, 1, lane]
-                best = min(best, dx * dx + dy * dy)
-            least[lane] = best
-        j += 8
+            x, y, best = centers[i, 0, lane], centers[i, 1, lane], least[0, lane]
+            for t in range(4):
+                k = j + np.uint64(t)
+                dx, dy = x - centers[k, 0, lane], y - centers[k, 1, lane]
+                squared = dx * dx + dy * dy
+                best = squared if squared < best else best
+            least[0, lane] = best
+        j += np.uint64(4)
     while j < stop:
         for lane in range(BLOCK):
-            dx, dy = x[lane] - centers[j, 0, lane], y[lane] - centers[j, 1, lane]
-            least[lane] = min(least[lane], dx * dx + dy * dy)
-        j += 1
+            dx, dy = centers[i, 0, lane] - centers[j, 0, lane], centers[i, 1, lane] - centers[j, 1, lane]
+            squared, best = dx * dx + dy * dy, least[0, lane]
+            least[0, lane] = squared if squared < best else best
+        j += np.uint64(1)
 
 
 @kernel
 def _spatial_pairs(centers, i, first, stop, least):  # type: ignore[no-untyped-def]
-    x, y, z = centers[i, 0], centers[i, 1], centers[i, 2]
     j = first
-    while j + 4 <= stop:
+    while j + np.uint64(4) <= stop:
         for lane in range(BLOCK):
-            best = least[lane]
+            x, y, z, best = centers[i, 0, lane], centers[i, 1, lane], centers[i, 2, lane], least[0, lane]
             for t in range(4):
-                dx, dy = x[lane] - centers[j + t, 0, lane], y[lane] - centers[j + t, 1, lane]
-                dz = z[lane] - centers[j + t, 2, lane]
-                best = min(best, dx * dx + dy * dy + dz * dz)
-            least[lane] = best
-        j += 4
+                k = j + np.uint64(t)
+                dx, dy, dz = x - centers[k, 0, lane], y - centers[k, 1, lane], z - centers[k, 2, lane]
+                squared = dx * dx + dy * dy + dz * dz
+                best = squared if squared < best else best
+            least[0, lane] = best
+        j += np.uint64(4)
     while j < stop:
         for lane in range(BLOCK):
-            dx, dy, dz = x[lane] - centers[j, 0, lane], y[lane] - centers[j, 1, lane], z[lane] - centers[j, 2, lane]
-            least[lane] = min(least[lane], dx * dx + dy * dy + dz * dz)
-        j += 1
+            dx, dy = centers[i, 0, lane] - centers[j, 0, lane], centers[i, 1, lane] - centers[j, 1, lane]
+            dz = centers[i, 2, lane] - centers[j, 2, lane]
+            squared, best = dx * dx + dy * dy + dz * dz, least[0, lane]
+            least[0, lane] = squared if squared < best else best
+        j += np.uint64(1)
 
 
 @kernel
@@ -253,29 +268,35 @@ def _to_obstacles(obstacles, centers, scratch, out):  # type: ignore[no-untyped-
     """Least signed distance of any centre to any obstacle's surface, (BLOCK,); +inf without obstacles."""
     kind, center, rotation, size = obstacles
     out[:] = np.inf
-    u, v, w = scratch[0], scratch[1], scratch[2]
     for o in range(len(kind)):
-        cx, cy, cz = center[o]
-        r = rotation[o]
-        a, b, c = size[o]
-        for k in range(len(centers)):
-            for lane in range(BLOCK):
-                x, y, z = centers[k, 0, lane] - cx, centers[k, 1, lane] - cy, centers[k, 2, lane] - cz
-                u[lane] = r[0] * x + r[3] * y + r[6] * z
-                v[lane] = r[1] * x + r[4] * y + r[7] * z
-                w[lane] = r[2] * x + r[5] * y + r[8] * z
+        a, b, c = size[o, 0], size[o, 1], size[o, 2]
+        for i in range(len(centers)):
+            _into_frame(center[o], rotation[o], centers, np.uint64(i), scratch)
             if kind[o] == SPHERE:
                 for lane in range(BLOCK):
-                    out[lane] = min(out[lane], _length(u[lane], v[lane], w[lane]) - a)
+                    distance = _length(scratch[0, lane], scratch[1, lane], scratch[2, lane]) - a
+                    out[lane] = min(out[lane], distance)
             elif kind[o] == BOX:
                 for lane in range(BLOCK):
-                    x, y, z = abs(u[lane]) - a, abs(v[lane]) - b, abs(w[lane]) - c
+                    x, y, z = abs(scratch[0, lane]) - a, abs(scratch[1, lane]) - b, abs(scratch[2, lane]) - c
                     inside = min(max(x, max(y, z)), 0.0)
                     out[lane] = min(out[lane], _length(max(x, 0.0), max(y, 0.0), max(z, 0.0)) + inside)
             else:
                 for lane in range(BLOCK):
-                    along = min(max(w[lane], -b), b)
-                    out[lane] = min(out[lane], _length(u[lane], v[lane], w[lane] - along) - a)
+                    along = min(max(scratch[2, lane], -b), b)
+                    distance = _length(scratch[0, lane], scratch[1, lane], scratch[2, lane] - along) - a
+                    out[lane] = min(out[lane], distance)
+
+
+@kernel
+def _into_frame(center, rotation, centers, i, out):  # type: ignore[no-untyped-def]
+    """Centres of sphere i seen from a frame, out[:3]."""
+    cx, cy, cz = center[0], center[1], center[2]
+    for row in range(3):
+        a, b, c, e = rotation[row], rotation[3 + row], rotation[6 + row], np.uint64(row)
+        for lane in range(BLOCK):
+            x, y, z = centers[i, 0, lane] - cx, centers[i, 1, lane] - cy, centers[i, 2, lane] - cz
+            out[e, lane] = a * x + b * y + c * z
 
 
 @kernel

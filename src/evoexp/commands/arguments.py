@@ -11,7 +11,9 @@ def add_experiment_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="KEY=VALUE",
         help="experiment=NAME, budget=paper|quick|smoke, num_replicates=N, and any setting: ga.population_size=20",
     )
-    parser.add_argument("-m", "--multirun", action="store_true", help="sweep over values with commas: ga.num_elites=0,2")
+    parser.add_argument(
+        "-m", "--multirun", action="store_true", help="sweep over values with commas: ga.num_elites=0,2"
+    )
     parser.add_argument("--only", type=_labels, default=(), metavar="LABEL,...", help="only these conditions")
 
 

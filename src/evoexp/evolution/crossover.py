@@ -22,8 +22,8 @@ def site_crossover(
 ) -> None:
     """Cross strings at one site per arm, where the parents are close (Rana & Zalzala 1995, section 3.4b).
 
-    Parents 2k and 2k + 1 form a pair; an odd last one stays alone. A pair is crossed with probability `rate`, and only if
-    at the sites chosen in both arms' portions the two parents' via-points are closer than `max_distance`. Each child
+    Parents 2k and 2k + 1 form a pair; an odd last one stays alone. A pair is crossed with probability `rate`, and only
+    if at the sites chosen in both arms' portions the two parents' via-points are closer than `max_distance`. Each child
     takes the part before the site from one parent and the part from the site on from the other, arm by arm. What is not
     crossed is copied.
 

@@ -258,7 +258,14 @@ class _Strings:
         planner, problem = self.planner, self.problem
         uniforms = rng.random((len(lanes), num_uniforms(problem.arm_slices, planner.num_via_points)))
         walk(
-            population, lanes, uniforms, problem.start, problem.goal, problem.arm_slices, planner.walk_step, self.max_turn
+            population,
+            lanes,
+            uniforms,
+            problem.start,
+            problem.goal,
+            problem.arm_slices,
+            planner.walk_step,
+            self.max_turn,
         )
 
     def smooth(self, population: FloatArray, count: int) -> None:
@@ -358,5 +365,3 @@ def _least_distances(problem: Problem, at: Clearance, between: Clearance) -> dic
         distances["obstacle_distance_at_via_points"] = float(np.min(at.to_obstacles)) + radius
         distances["obstacle_distance_between_sampled"] = float(np.min(between.to_obstacles)) + radius
     return distances
-
-

@@ -4,6 +4,9 @@ The table is derived from any `pin.Model` whose joints have one degree of freedo
 the joint moves about (or along) its own z axis: the rotation of a revolute joint then mixes two columns only. Kernels
 keep the configurations innermost, in blocks of `BLOCK` lanes, and use evoexp's own sine and cosine: the result does not
 depend on the CPU's vector width.
+
+What makes the loops over lanes vector code: a block's frames are one array (with several, the checks that nothing
+overlaps become too many), indices are unsigned (no wrap-around), and no views are made inside (each counts references).
 """
 
 from typing import Any, NamedTuple
@@ -17,6 +20,12 @@ from evoexp.records import FloatArray
 
 BLOCK = 64
 """Configurations that a kernel carries through all its steps at once; its scratch stays in the first-level cache."""
+
+SPATIAL_ROWS = 12
+"""Rows of a joint's frame in space: nine of its rotation, three of its origin."""
+
+PLANAR_ROWS = 4
+"""Rows of a joint's frame in the plane: sine, cosine, x, y."""
 
 
 class UnsupportedJoint(EvoexpError):
@@ -108,20 +117,19 @@ def _forward_kinematics(  # type: ignore[no-untyped-def]
 ):
     num_joints, total = len(parent), q.shape[1]
     block_q = np.zeros((q.shape[0], BLOCK))
-    frames = np.empty((num_joints, 9, BLOCK))
-    points = np.empty((num_joints, 3, BLOCK))
-    scratch = np.empty((11, BLOCK))
+    frames = np.empty((num_joints, SPATIAL_ROWS, BLOCK))
+    scratch = np.empty((SPATIAL_ROWS, BLOCK))
     for first in range(0, total, BLOCK):
         count = min(BLOCK, total - first)
         block_q[:, :count] = q[:, first : first + count]
-        block_frames(parent, index_q, prismatic, turned, rotation, translation, block_q, frames, points, scratch)
-        rotations[:, :, first : first + count] = frames[:, :, :count]
-        origins[:, :, first : first + count] = points[:, :, :count]
+        block_frames(parent, index_q, prismatic, turned, rotation, translation, block_q, frames, scratch)
+        rotations[:, :, first : first + count] = frames[:, :9, :count]
+        origins[:, :, first : first + count] = frames[:, 9:, :count]
 
 
 @kernel
 def block_frames(  # type: ignore[no-untyped-def]
-    parent, index_q, prismatic, turned, rotation, translation, q, frames, points, scratch
+    parent, index_q, prismatic, turned, rotation, translation, q, frames, scratch
 ):
     """Frames of all joints for one block of configurations.
 
@@ -133,100 +141,104 @@ def block_frames(  # type: ignore[no-untyped-def]
         rotation: See `KinematicTable`.
         translation: See `KinematicTable`.
         q: (nq, BLOCK).
-        frames: (joints, 9, BLOCK), written: rotations row by row.
-        points: (joints, 3, BLOCK), written: origins.
-        scratch: (11, BLOCK).
+        frames: (joints, SPATIAL_ROWS, BLOCK), written: the rotation row by row, then the origin.
+        scratch: (SPATIAL_ROWS, BLOCK): the placed frame before the joint moves; then sine and cosine.
     """
     for k in range(len(parent)):
-        before = parent[k]
-        offset, matrix = translation[k], rotation[k]
-        if before < 0:
-            for row in range(3):
+        own, row = np.uint64(k), np.uint64(index_q[k])
+        _place(parent[k], turned[k], rotation[k], translation[k], frames, scratch)
+        if prismatic[k]:
+            for e in range(9):
                 for lane in range(BLOCK):
-                    points[k, row, lane] = offset[row]
-                for column in range(3):
-                    for lane in range(BLOCK):
-                        scratch[3 * row + column, lane] = matrix[3 * row + column]
+                    frames[own, np.uint64(e), lane] = scratch[np.uint64(e), lane]
+            for e in range(3):
+                z, o = np.uint64(3 * e + 2), np.uint64(9 + e)
+                for lane in range(BLOCK):
+                    frames[own, o, lane] = scratch[o, lane] + scratch[z, lane] * q[row, lane]
         else:
-            for row in range(3):
-                x, y, z = frames[before, 3 * row], frames[before, 3 * row + 1], frames[before, 3 * row + 2]
+            for e in range(3):
+                x, y, z, o = np.uint64(3 * e), np.uint64(3 * e + 1), np.uint64(3 * e + 2), np.uint64(9 + e)
                 for lane in range(BLOCK):
-                    points[k, row, lane] = points[before, row, lane] + (
-                        x[lane] * offset[0] + y[lane] * offset[1] + z[lane] * offset[2]
-                    )
-                for column in range(3):
-                    if turned[k]:
-                        for lane in range(BLOCK):
-                            scratch[3 * row + column, lane] = (
-                                x[lane] * matrix[column] + y[lane] * matrix[3 + column] + z[lane] * matrix[6 + column]
-                            )
-                    else:
-                        for lane in range(BLOCK):
-                            scratch[3 * row + column, lane] = frames[before, 3 * row + column, lane]
-        _move(prismatic[k], q[index_q[k]], scratch, frames[k], points[k], scratch[9], scratch[10])
+                    frames[own, z, lane] = scratch[z, lane]
+                    frames[own, o, lane] = scratch[o, lane]
+            for lane in range(BLOCK):
+                s, c = sincos(q[row, lane])
+                scratch[2, lane] = s
+                scratch[5, lane] = c
+            for e in range(3):
+                x, y = np.uint64(3 * e), np.uint64(3 * e + 1)
+                for lane in range(BLOCK):
+                    s, c = scratch[2, lane], scratch[5, lane]
+                    frames[own, x, lane] = scratch[x, lane] * c + scratch[y, lane] * s
+                    frames[own, y, lane] = scratch[y, lane] * c - scratch[x, lane] * s
 
 
 @kernel
-def block_planar_frames(parent, index_q, turned, rotation, translation, q, points, sine, cosine):  # type: ignore[no-untyped-def]
-    """The same for planar tables: every frame is a turn about z, kept as its sine and cosine.
+def _place(parent, turned, rotation, translation, frames, placed):  # type: ignore[no-untyped-def]
+    """A joint's frame before it moves: its placement behind its parent's frame."""
+    if parent < 0:
+        for e in range(9):
+            placed[e, :] = rotation[e]
+        for e in range(3):
+            placed[9 + e, :] = translation[e]
+        return
+    before = np.uint64(parent)
+    for e in range(3):
+        x, y, z, o = np.uint64(3 * e), np.uint64(3 * e + 1), np.uint64(3 * e + 2), np.uint64(9 + e)
+        dx, dy, dz = translation[0], translation[1], translation[2]
+        for lane in range(BLOCK):
+            placed[o, lane] = frames[before, o, lane] + (
+                frames[before, x, lane] * dx + frames[before, y, lane] * dy + frames[before, z, lane] * dz
+            )
+        for column in range(3):
+            c = np.uint64(3 * e + column)
+            if turned:
+                ax, ay, az = rotation[column], rotation[3 + column], rotation[6 + column]
+                for lane in range(BLOCK):
+                    placed[c, lane] = (
+                        frames[before, x, lane] * ax + frames[before, y, lane] * ay + frames[before, z, lane] * az
+                    )
+            else:
+                for lane in range(BLOCK):
+                    placed[c, lane] = frames[before, c, lane]
+
+
+@kernel
+def block_planar_frames(parent, index_q, rotation, translation, q, frames):  # type: ignore[no-untyped-def]
+    """The same for planar tables, where every frame is a turn about z and a point of the plane.
 
     Args:
-        parent: Of the table, as the next four.
+        parent: Of the table, as the next three.
         index_q: See `KinematicTable`.
-        turned: See `KinematicTable`.
         rotation: See `KinematicTable`.
         translation: See `KinematicTable`.
         q: (nq, BLOCK).
-        points: (joints, 3, BLOCK), written: origins.
-        sine: (joints, BLOCK), written: of the angle from the world's x axis.
-        cosine: (joints, BLOCK), written.
+        frames: (joints, PLANAR_ROWS, BLOCK), written: sine and cosine of the angle from the world's x axis, then x, y.
     """
     for k in range(len(parent)):
-        before = parent[k]
-        dx, dy, dz = translation[k]
+        own, row = np.uint64(k), np.uint64(index_q[k])
+        dx, dy = translation[k, 0], translation[k, 1]
         c0, s0 = rotation[k, 0], rotation[k, 3]
-        own_q = q[index_q[k]]
-        for lane in range(BLOCK):
-            s, c = sincos(own_q[lane])
-            sine[k, lane] = s
-            cosine[k, lane] = c
-        if turned[k]:
+        if parent[k] < 0:
             for lane in range(BLOCK):
-                s, c = sine[k, lane], cosine[k, lane]
-                sine[k, lane] = s0 * c + c0 * s
-                cosine[k, lane] = c0 * c - s0 * s
-        if before < 0:
-            points[k, 0], points[k, 1], points[k, 2] = dx, dy, dz
+                s, c = sincos(q[row, lane])
+                frames[own, 0, lane] = s0 * c + c0 * s
+                frames[own, 1, lane] = c0 * c - s0 * s
+            for lane in range(BLOCK):
+                frames[own, 2, lane] = dx
+                frames[own, 3, lane] = dy
         else:
+            before = np.uint64(parent[k])
             for lane in range(BLOCK):
-                sb, cb = sine[before, lane], cosine[before, lane]
-                s, c = sine[k, lane], cosine[k, lane]
-                sine[k, lane] = sb * c + cb * s
-                cosine[k, lane] = cb * c - sb * s
-                points[k, 0, lane] = points[before, 0, lane] + (cb * dx - sb * dy)
-                points[k, 1, lane] = points[before, 1, lane] + (sb * dx + cb * dy)
-                points[k, 2, lane] = points[before, 2, lane] + dz
-
-
-@kernel
-def _move(prismatic, q, placed, frame, point, sine, cosine):  # type: ignore[no-untyped-def]
-    """Turn a placed frame about its z axis by q, or slide its origin along it."""
-    if not prismatic:
-        for lane in range(BLOCK):
-            sine[lane], cosine[lane] = sincos(q[lane])
-    for row in range(3):
-        x, y, z = placed[3 * row], placed[3 * row + 1], placed[3 * row + 2]
-        for lane in range(BLOCK):
-            frame[3 * row + 2, lane] = z[lane]
-        if prismatic:
+                s, c = sincos(q[row, lane])
+                s1, c1 = s0 * c + c0 * s, c0 * c - s0 * s
+                sb, cb = frames[before, 0, lane], frames[before, 1, lane]
+                frames[own, 0, lane] = sb * c1 + cb * s1
+                frames[own, 1, lane] = cb * c1 - sb * s1
             for lane in range(BLOCK):
-                point[row, lane] += z[lane] * q[lane]
-                frame[3 * row, lane] = x[lane]
-                frame[3 * row + 1, lane] = y[lane]
-        else:
-            for lane in range(BLOCK):
-                frame[3 * row, lane] = x[lane] * cosine[lane] + y[lane] * sine[lane]
-                frame[3 * row + 1, lane] = y[lane] * cosine[lane] - x[lane] * sine[lane]
+                sb, cb = frames[before, 0, lane], frames[before, 1, lane]
+                frames[own, 2, lane] = frames[before, 2, lane] + (cb * dx - sb * dy)
+                frames[own, 3, lane] = frames[before, 3, lane] + (sb * dx + cb * dy)
 
 
 def _axis(model: Any, data: Any, neutral: FloatArray, joint: int) -> tuple[FloatArray, bool]:
@@ -235,7 +247,8 @@ def _axis(model: Any, data: Any, neutral: FloatArray, joint: int) -> tuple[Float
     if model.nqs[joint] != 1 or model.nvs[joint] != 1:
         kind = model.joints[joint].shortname()
         raise UnsupportedJoint(f"robot: joint '{name}' ({kind}) must have one coordinate, has {model.nqs[joint]}")
-    jacobian = pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.LOCAL)[:, model.idx_vs[joint]]
+    jacobian = pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.LOCAL)
+    jacobian = np.reshape(jacobian, (6, -1))[:, model.idx_vs[joint]]  # one joint alone comes as a vector
     linear, angular = jacobian[:3], jacobian[3:]
     slides = bool(np.linalg.norm(angular) < 0.5)
     if not slides and np.linalg.norm(linear) > 1e-12:

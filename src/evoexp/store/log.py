@@ -166,13 +166,13 @@ class Log:
             raise ValueError("finish: no generation was written")
         if (summary.condition, summary.replicate) != (self._condition_id, self._replicate):
             raise ValueError(f"finish: summary of {summary.condition[:12]} replicate {summary.replicate}, not of this")
-        if self._best != self._written or not self._best_cost == self._written_cost:
+        if self._best != self._written or self._best_cost != self._written_cost:
             self._write_solution()
         summary = summary._replace(digest=self._chain.finish(self._last.population))
         self._writer.add_metadata(ENVIRONMENT, encode_values(self._environment))
         content = encode_values({CONTENT_DIGEST: self._content.hexdigest()})
         self._writer.add_metadata(SUMMARY, encode_summary(summary) | content)
-        self._writer.finish()  # type: ignore[no-untyped-call]
+        self._writer.finish()
         return Finished(self._buffer.getvalue(), summary)
 
     def _attach(self, name: str, data: bytes) -> None:

@@ -1,0 +1,133 @@
+"""`evoexp evaluate`: judge a given motion by a configuration's criteria."""
+
+import argparse
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from evoexp import compose
+from evoexp.commands.arguments import add_experiment_arguments
+from evoexp.errors import MotionFileError
+from evoexp.records import FloatArray
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    add_experiment_arguments(parser)
+    parser.add_argument("--json", action="store_true", help="print flat JSON: one object per condition")
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Print the terms of the motion, one column per condition that it fits."""
+    overrides, path = _split(arguments.overrides)
+    values = read_motion(path)
+    rows: list[dict[str, Any]] = []
+    misfits = []
+    for experiment in compose.expand(overrides, multirun=arguments.multirun, only=arguments.only):
+        for label, condition in experiment.conditions:
+            planner, problem = condition.prepare()
+            shape = planner.shape(problem)
+            solution = flatten(values, shape)
+            if solution is None:
+                misfits.append(f"{label}: {_shape_text(shape)}")
+                continue
+            terms = planner.evaluate(problem, solution)
+            rows.append({"label": label, "condition": condition.id, "length_unit": condition.length_unit} | terms)
+    if not rows:
+        given = " and ".join(map(str, _shape_of(values)))
+        raise MotionFileError(
+            f"{path}: must be {'; '.join(dict.fromkeys(misfits))} (start and goal included), was {given}"
+        )
+    if arguments.json:
+        print(json.dumps(rows if len(rows) > 1 else rows[0], indent=2, allow_nan=False, default=_plain))
+    else:
+        Console().print(_table(rows))
+    return 0
+
+
+def read_motion(path: Path) -> Any:
+    """Read a motion as nested lists, or as an array from `.npy`.
+
+    Raises:
+        MotionFileError: If the file is missing, of another kind, or holds anything but finite numbers.
+    """
+    try:
+        if path.suffix == ".npy":
+            values: Any = np.load(path, allow_pickle=False).tolist()
+        elif path.suffix == ".json":
+            values = json.loads(path.read_text())
+        else:
+            raise MotionFileError(f"{path}: a motion file ends in .json or .npy")
+    except OSError as error:
+        raise MotionFileError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except (ValueError, EOFError, RecursionError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise MotionFileError(f"{path}: is no {path.suffix[1:]} of numbers: {reason}") from None
+    if not isinstance(values, list) or not _finite(values):
+        raise MotionFileError(f"{path}: must hold nested lists of finite numbers")
+    return values
+
+
+def flatten(values: list[Any], shape: Any) -> FloatArray | None:
+    """Return a motion as a flat solution of a planner's documented shape, None if it does not fit."""
+    if len(values) != len(shape):
+        return None
+    parts = []
+    for part, expected in zip(values, shape, strict=True):
+        try:
+            array = np.asarray(part, dtype=np.float64)
+        except ValueError:  # ragged
+            return None
+        if array.shape != tuple(expected):
+            return None
+        parts.append(array.ravel())
+    return np.concatenate(parts)
+
+
+def _split(words: list[str]) -> tuple[list[str], Path]:
+    """Tell the motion file from the overrides."""
+    files = [word for word in words if "=" not in word]
+    if len(files) != 1:
+        raise MotionFileError(
+            f"motion file: one is needed (.json or .npy), got {len(files)}: {' '.join(files) or 'none'}"
+        )
+    return [word for word in words if "=" in word], Path(files[0])
+
+
+def _finite(values: Any) -> bool:
+    if isinstance(values, list):
+        return all(map(_finite, values))
+    return isinstance(values, int | float) and not isinstance(values, bool) and math.isfinite(values)
+
+
+def _shape_text(shape: Any) -> str:
+    parts = [" × ".join(map(str, part)) for part in shape]
+    return f"{len(parts)} × {parts[0]}" if len(set(parts)) == 1 else f"{len(parts)} lists: {', '.join(parts)}"
+
+
+def _shape_of(values: Any) -> list[str]:
+    try:
+        return [" × ".join(map(str, np.asarray(values, dtype=np.float64).shape))]
+    except ValueError:
+        return [f"a ragged list of {len(values)}"]
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else str(value)
+
+
+def _table(rows: list[dict[str, Any]]) -> Table:
+    table = Table()
+    table.add_column("")
+    for row in rows:
+        table.add_column(f"{row['label']}\n{row['condition'][:12]}", justify="right")
+    names = dict.fromkeys(name for row in rows for name in row if name not in ("label", "condition", "length_unit"))
+    for name in names:
+        cells = [f"{row[name]:.6g}" if name in row else "–" for row in rows]
+        table.add_row(name, *cells)
+    return table

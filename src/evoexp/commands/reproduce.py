@@ -1,0 +1,98 @@
+"""`evoexp reproduce`: run replicates again and say MATCH, or the first generation that differs."""
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+import joblib
+from rich.console import Console
+from rich.table import Table
+
+from evoexp import compose, shipped
+from evoexp.batch.replicate import run_replicate
+from evoexp.batch.reproduce import Comparison, reproduce_log
+from evoexp.batch.runner import num_cores
+from evoexp.errors import AmbiguousHash, NothingStored, RevisionMismatch, UnknownHash
+from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
+
+FEW = 8  # replicates below this are run here, without worker processes
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.add_argument("what", metavar="HASH|LOG.mcap", help="any unique prefix of a run's hash, or a replicate's log")
+    parser.add_argument("--replicate", type=int, metavar="K", help="only this replicate of the run")
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Compare; exit code 1 if anything diverges, 2 if there is nothing to compare."""
+    console = Console()
+    path = Path(arguments.what)
+    if path.suffix == ".mcap" or path.is_file():
+        return _report(console, [reproduce_log(path)])
+    try:
+        run = resolve(outputs_root(), arguments.what)
+    except UnknownHash:
+        return _without_stored_run(console, arguments.what, arguments.replicate)
+    try:
+        return _report(console, _compare_all(_logs(run, arguments.replicate)))
+    except RevisionMismatch as error:
+        known = run.manifest().get("command", "evoexp run experiment=…")
+        text = f"run {run.hash12}: {error}; its results cannot be compared. Run it anew with what is installed: {known}"
+        raise RevisionMismatch(text) from None
+
+
+def _logs(run: RunDirectory, replicate: int | None) -> list[Path]:
+    done = sorted(run.completed())
+    if replicate is not None and replicate not in done:
+        there = ", ".join(map(str, done)) or "none"
+        raise NothingStored(f"run {run.hash12}: no finished replicate {replicate} (finished: {there})")
+    if not done:
+        raise NothingStored(f"run {run.hash12}: no finished replicate to compare with")
+    return [run.log_path(k) for k in ([replicate] if replicate is not None else done)]
+
+
+def _compare_all(paths: Sequence[Path]) -> list[Comparison]:
+    first = reproduce_log(paths[0])  # compiles, before any worker does
+    if len(paths) < FEW:
+        return [first, *map(reproduce_log, paths[1:])]
+    pool = joblib.Parallel(n_jobs=num_cores(), inner_max_num_threads=1, backend="loky")
+    return [first, *pool(joblib.delayed(reproduce_log)(path) for path in paths[1:])]
+
+
+def _report(console: Console, comparisons: Sequence[Comparison]) -> int:
+    table = Table()
+    table.add_column("run")
+    table.add_column("replicate", justify="right")
+    table.add_column("generations", justify="right")
+    table.add_column("verdict")
+    for comparison in comparisons:
+        style = "green" if comparison.matches else "red"
+        name, generations = comparison.condition_id[:12], str(comparison.num_generations)
+        table.add_row(name, str(comparison.replicate), generations, f"[{style}]{comparison.verdict}[/]")
+    console.print(table)
+    diverging = [comparison for comparison in comparisons if not comparison.matches]
+    if diverging:
+        lines = diverging[0].environment or ("none: the environment is the same",)
+        console.print("differences of environment:", *(f"  {line}" for line in lines), sep="\n", highlight=False)
+    console.print(f"{len(comparisons) - len(diverging)} of {len(comparisons)} MATCH", highlight=False)
+    return 1 if diverging else 0
+
+
+def _without_stored_run(console: Console, prefix: str, replicate: int | None) -> int:
+    """Compare replicate 0 of a shipped condition with the shipped table; nothing was ever run here."""
+    found = shipped.find(prefix)
+    if len(found) > 1:
+        raise AmbiguousHash(prefix, [row.condition_id[:12] for row in found])
+    if not found or replicate not in (None, 0):
+        what = f"replicate {replicate} of {prefix}" if found else f"'{prefix}'"
+        raise UnknownHash(f"NOTHING TO COMPARE: {what} is neither stored in {outputs_root()} nor in the shipped table")
+    row = found[0]
+    experiment = compose.expand([f"experiment={row.experiment}", f"budget={row.budget}"], only=[row.label])[0]
+    condition = experiment.conditions[0].condition
+    summary = run_replicate(condition, 0).summary
+    matches = summary.digest == row.digest and condition.id == row.condition_id
+    verdict = "[green]MATCH[/]" if matches else "[red]DIVERGES[/]"
+    console.print(f"{row.condition_id[:12]} replicate 0 against the shipped table: {verdict}", highlight=False)
+    console.print(f"({row.experiment}, {row.label}, budget {row.budget}; store it: {row.command})", highlight=False)
+    return 0 if matches else 1

@@ -1,0 +1,1 @@
+"""Geometry of strings of via-points, as compiled kernels over whole populations (lanes innermost)."""

@@ -1,0 +1,197 @@
+"""Redistribution: via-points moved to equal arc length along the spline through them (Rana & Zalzala 1995, Sect. 3.3).
+
+Per arm and block of 64 lanes: fit the splines, integrate the speed (`arc_length`), then find for the targets L·i/N
+their segment (every segment is entered in the bucket of the first target at or after its begin; a running maximum
+fills the gaps) and within it the sample, by a bisection without branches. Between two samples the speed is taken as
+linear, which inverts in closed form; the point is the spline's there.
+
+Accuracy, as deviation from the converged points in units of their spacing, on paths as the algorithm meets them (fresh
+random walks, and crossed-over ones): {ACCURACY}
+
+What limits it: {LIMITS}
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evoexp.numerics import kernel
+from evoexp.paths.arc_length import integrate_speed
+from evoexp.paths.layout import check_arm_slices, check_shape, check_via_points, padded
+from evoexp.paths.spline import fit_spline
+from evoexp.paths.workspace import R2, R3, R4, R5, R6, R7, R8, ROW, ROW_SHIFT, U0, U1, U3, U8, Redistribution
+
+_LONGEST = 1e300  # a path that is longer has overflowed (garbage in a padded lane) and stays as it is
+
+
+@kernel
+def enter_segments(w: Any, N: Any, S: Any, count: Any, samples: Any, work: Any, entered: Any, at: Any) -> None:
+    """Write to row i of `entered` the last segment that begins at or before target i, or an earlier one or 0.
+
+    Also writes the origin of L, the path's length and its N-th part's reciprocal to the work rows 5, 6 and 7.
+    """
+    end = samples + ROW + N * S * R2
+    n = np.float64(N)
+    for l in range(count):
+        origin = w[samples + ROW + l]
+        total = w[end + l] - origin
+        w[work + R5 + l] = origin
+        w[work + R6 + l] = total
+        w[work + R7 + l] = n / total
+    for x in range((N + U1) * ROW):
+        entered[x] = U0
+    for k in range(U1, N):
+        begin = samples + ROW + k * S * R2
+        for l in range(count):
+            target = np.ceil((w[begin + l] - w[work + R5 + l]) * w[work + R7 + l])
+            target = target if target < n else n  # so that NaN, too, becomes a valid index
+            target = target if target > 0.0 else 0.0
+            at[l] = np.uint64(np.int64(target)) * ROW + l
+        for l in range(count):
+            entered[at[l]] = k
+
+
+@kernel
+def find_samples(w: Any, fraction: float, S: Any, count: Any, samples: Any, work: Any, segment: Any, at: Any) -> None:
+    """Write the target lengths to work row 0 and to `at` where the last sample of each segment not beyond it stands."""
+    for l in range(count):
+        w[work + l] = w[work + R5 + l] + w[work + R6 + l] * fraction
+        at[l] = segment[l] * S * R2 + l
+    lengths = samples + ROW
+    step = S // np.uint64(2)
+    while step > np.uint64(4):
+        for l in range(count):
+            at[l] += np.uint64(w[lengths + at[l] + step * R2] <= w[work + l]) * (step * R2)
+        step //= np.uint64(2)
+    for l in range(count):
+        target = w[work + l]
+        f = at[l]
+        f += np.uint64(w[lengths + f + R8] <= target) * R8
+        f += np.uint64(w[lengths + f + R4] <= target) * R4
+        f += np.uint64(w[lengths + f + R2] <= target) * R2
+        at[l] = f
+
+
+@kernel
+def gather(w: Any, base: Any, work: Any, count: Any, at: Any) -> None:
+    """Copy four consecutive rows, each lane from its own place, to the work rows 1..4."""
+    for l in range(count):
+        f = base + at[l]
+        w[work + ROW + l] = w[f]
+        w[work + R2 + l] = w[f + ROW]
+        w[work + R3 + l] = w[f + R2]
+        w[work + R4 + l] = w[f + R3]
+
+
+@kernel
+def find_parameters(w: Any, S: Any, count: Any, work: Any, at: Any) -> None:
+    """Replace the target lengths by u in [0, 1] within their segments, from the gathered speeds and lengths."""
+    h = 1.0 / np.float64(S)
+    mask = S - U1
+    for l in range(count):
+        sample = np.float64(np.int64(((at[l] - l) >> (ROW_SHIFT + U1)) & mask))
+        v0, L0, v1 = w[work + ROW + l], w[work + R2 + l], w[work + R3 + l]
+        length = w[work + R4 + l] - L0
+        r = w[work + l] - L0
+        r = r if r > 0.0 else 0.0
+        r = r if r < length else length
+        both = v0 + v1
+        begin = length * v0
+        below = begin + np.sqrt(begin * begin + r * length * (v1 - v0) * both)
+        x = r * both / below
+        x = x if below > 0.0 else 0.0
+        x = x if x < 1.0 else 1.0
+        w[work + l] = (sample + x) * h
+
+
+@kernel
+def evaluate(via_points: Any, joint: Any, i: Any, lane: Any, w: Any, work: Any, count: Any) -> None:
+    """Move point i of one joint to the spline's value at u, except on paths without length (or overflowed ones)."""
+    for l in range(count):
+        a0, m0, a1, m1 = w[work + ROW + l], w[work + R2 + l], w[work + R3 + l], w[work + R4 + l]
+        u = w[work + l]
+        x = a0 + u * ((a1 - a0 - 2.0 * m0 - m1) + u * (3.0 * m0 + u * (m1 - m0)))
+        old = via_points[joint, i, lane + l]
+        total = w[work + R6 + l]
+        via_points[joint, i, lane + l] = x if (total > 0.0) & (total < _LONGEST) else old
+
+
+@kernel
+def move_points(
+    via_points: Any, first: Any, joints: Any, lane: Any, count: Any, N: Any, S: Any, w: Any, samples: Any, work: Any,
+    entered: Any, segment: Any, at: Any,
+) -> None:  # fmt: skip
+    """Move the points 1..N−1 of one arm in one block of lanes."""
+    pitch = (N + U1) * R2
+    for l in range(count):
+        segment[l] = U0
+    for i in range(U1, N):
+        for l in range(count):
+            k, new = segment[l], entered[i * ROW + l]
+            segment[l] = new if new > k else k
+        find_samples(w, np.float64(i) / np.float64(N), S, count, samples, work, segment, at)
+        gather(w, samples, work, count, at)
+        find_parameters(w, S, count, work, at)
+        for l in range(count):
+            at[l] = segment[l] * R2 + l
+        for joint in range(joints):
+            gather(w, joint * pitch, work, count, at)
+            evaluate(via_points, first + joint, i, lane, w, work, count)
+
+
+@kernel
+def redistribute_arms(
+    via_points: Any, arm_slices: Any, num_lanes: int, samples_per_segment: int, pivots: Any, w: Any, integers: Any
+) -> None:
+    """See `redistribute`; num_lanes is a multiple of eight here."""
+    N, S = np.uint64(via_points.shape[1] - 1), np.uint64(samples_per_segment)
+    entered = integers[: (N + U1) * ROW]
+    segment = integers[(N + U1) * ROW : (N + np.uint64(2)) * ROW]
+    at = integers[(N + np.uint64(2)) * ROW :]
+    groups = np.uint64(num_lanes) >> U3
+    blocks = (groups + np.uint64(7)) >> U3
+    size = ((groups + blocks - U1) // blocks) << U3
+    for arm in range(arm_slices.shape[0]):
+        first, joints = np.uint64(arm_slices[arm, 0]), np.uint64(arm_slices[arm, 1] - arm_slices[arm, 0])
+        pitch = (N + U1) * R2
+        samples = joints * pitch + R6
+        work = samples + (N * S + np.uint64(2)) * R2
+        for block in range(blocks):
+            lane = block * size
+            count = min(size, np.uint64(num_lanes) - lane)
+            for joint in range(joints):
+                fit_spline(via_points, first + joint, lane, count, N, pivots, w, joint * pitch)
+            integrate_speed(w, joints, N, S, count, samples, work)
+            enter_segments(w, N, S, count, samples, work, entered, at)
+            move_points(via_points, first, joints, lane, count, N, S, w, samples, work, entered, segment, at)
+
+
+def redistribute(
+    via_points: NDArray[np.float64], arm_slices: NDArray[np.int64], num_lanes: int, workspace: Redistribution
+) -> None:
+    """Move the via-points of every arm's path to equal arc length along the cubic spline through them, in place.
+
+    The spline runs over the index 0..N (Rana & Zalzala 1995, Sect. 3.3). The end points keep their bits; a path
+    without length keeps all of them. Lengths come from `samples_per_segment` speeds per segment by a rule of fourth
+    order: 8 are about as accurate as 16 chords, 16 about five times better.
+
+    Args:
+        via_points: Paths, any unit common to the joints of an arm.  # (nq, N + 1, lanes)
+        arm_slices: First and last-plus-one joint of each arm.  # (arms, 2) int64
+        num_lanes: Lanes that matter; those up to the next multiple of eight are treated too.
+        workspace: Of `prepare_redistribution`, for this N; not to be shared between threads.
+
+    Raises:
+        ValueError: Wrong shape, type or memory layout; nothing has been written then.
+    """
+    check_via_points(via_points)
+    nq, num_points, lanes = via_points.shape
+    check_arm_slices(arm_slices, nq, workspace.max_joints)
+    if num_points != workspace.num_via_points + 1:
+        raise ValueError(f"via_points: the workspace is for {workspace.num_via_points + 1} points, was {num_points}")
+    if num_points > 2:
+        redistribute_arms(
+            via_points, arm_slices, padded(num_lanes, lanes), workspace.samples_per_segment,
+            workspace.pivots, workspace.floats, workspace.integers,
+        )  # fmt: skip

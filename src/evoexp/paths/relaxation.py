@@ -1,0 +1,44 @@
+"""Relaxation: a path pulled tight like an elastic string (Rana & Zalzala 1995, Eqs 8 and 9)."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evoexp.numerics import kernel
+from evoexp.paths.layout import check_via_points, padded
+
+
+@kernel
+def relax_points(via_points: Any, delta: float, num_lanes: int) -> None:
+    """See `relax`; two loops per point, because one that reads and writes neighbouring rows does not vectorise."""
+    middle = np.empty(num_lanes)
+    for j in range(via_points.shape[0]):
+        for i in range(1, via_points.shape[1] - 1):
+            for l in range(num_lanes):
+                middle[l] = (via_points[j, i - 1, l] + via_points[j, i + 1, l]) / 2.0
+            for l in range(num_lanes):
+                a = via_points[j, i, l]
+                via_points[j, i, l] = a + delta * (middle[l] - a)  # (Eqs 8, 9)
+
+
+def relax(via_points: NDArray[np.float64], delta: float, num_lanes: int) -> None:
+    """Move every via-point by `delta` toward the middle of its neighbours, in place and in order (one sweep).
+
+    Point i sees point i−1 as already moved: the loop of Rana & Zalzala 1995, Eqs 8 and 9, as it is written. The ends
+    stay. delta = 0 changes nothing.
+
+    Args:
+        via_points: Paths.  # (nq, N + 1, lanes)
+        delta: Part of the way, in [0, 1].
+        num_lanes: Lanes that matter; those up to the next multiple of eight are treated too.
+
+    Raises:
+        ValueError: Wrong shape, type or memory layout, or delta out of range.
+    """
+    check_via_points(via_points)
+    if not 0.0 <= delta <= 1.0:
+        raise ValueError(f"delta: must be in [0, 1], was {delta}")
+    lanes = padded(num_lanes, via_points.shape[2])
+    if delta > 0.0:
+        relax_points(via_points, float(delta), lanes)

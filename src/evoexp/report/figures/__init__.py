@@ -1,0 +1,1 @@
+"""Figures: from results to a tidy table, from that table to a matplotlib Figure; no file access."""

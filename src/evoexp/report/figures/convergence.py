@@ -1,0 +1,125 @@
+"""Convergence: a quantity against generations and evaluations, over replicates."""
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from evoexp.report import style
+from evoexp.report.results import ConditionResults, Results
+from evoexp.report.statistics import quantile
+
+COLUMNS = ("best_cost", "mean_cost")
+NAMES = {"best_cost": "best so far", "mean_cost": "average"}
+
+
+def cost_table(results: Results) -> pd.DataFrame:
+    """Return median and quartiles of best and average cost over replicates, per condition and generation.
+
+    Returns:
+        Columns condition, position, quantity, generation, evaluations, median, lower, upper, replicates.
+    """
+    return pd.concat([_condition(results, condition, None) for condition in results.with_data], ignore_index=True)
+
+
+def fitness_table(results: Results) -> pd.DataFrame:
+    """Return the same of the paper's fitness, of conditions whose objective turns a cost into one."""
+    parts = [_condition(results, c, c.planner.objective) for c in results.with_data]
+    return pd.concat(parts, ignore_index=True)
+
+
+def draw_cost(table: pd.DataFrame) -> Figure:
+    """Draw best and average cost against generations."""
+    figure = style.figure(3.4)
+    axes = figure.subplots()
+    _curves(axes, table, tuple(NAMES))
+    axes.set_ylabel("cost")
+    style.legend_below(figure, axes, 2)
+    return figure
+
+
+def draw_fitness(table: pd.DataFrame) -> Figure:
+    """Draw best and average fitness against generations: over the whole range, and where the best ones are."""
+    figure = style.figure(4.1)
+    whole, close = figure.subplots(1, 2)
+    for axes in (whole, close):
+        _curves(axes, table, tuple(NAMES))
+        axes.set_ylabel("fitness F [-]")
+    whole.set_title("a  whole range")
+    close.set_title("b  best fitness")
+    best = table[table["quantity"] == NAMES["best_cost"]]
+    last = best.groupby("position")["median"].max()
+    first = best[best["generation"] > 0]["lower"].min() if (best["generation"] > 0).any() else best["lower"].min()
+    low = max(float(first), float(last.min()) - 2.0 * (float(last.max() - last.min()) + 5.0))
+    high = float(best["upper"].max())
+    if np.isfinite([low, high]).all() and high > low:
+        close.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))
+    style.legend_below(figure, whole, 2)
+    return figure
+
+
+def _condition(results: Results, condition: ConditionResults, objective: object) -> pd.DataFrame:
+    parts = []
+    for column in COLUMNS:
+        rows = condition.generations[["index", "evaluations", column]]
+        if objective is not None:
+            rows = rows.assign(**{column: objective.fitness(rows[column].to_numpy())})  # type: ignore[attr-defined]
+        groups = rows.groupby("index", sort=True)
+        values = [group.to_numpy() for _, group in groups[column]]
+        parts.append(
+            pd.DataFrame(
+                {
+                    "condition": condition.label,
+                    "position": results.position(condition.label),
+                    "quantity": NAMES[column],
+                    "generation": [int(generation) for generation, _ in groups],
+                    "evaluations": groups["evaluations"].median().to_numpy(),
+                    "median": [quantile(v, 0.5) for v in values],
+                    "lower": [quantile(v, 0.25) for v in values],
+                    "upper": [quantile(v, 0.75) for v in values],
+                    "replicates": [len(v) for v in values],
+                }
+            )
+        )
+    return pd.concat(parts, ignore_index=True)
+
+
+def _curves(axes: Axes, table: pd.DataFrame, columns: tuple[str, ...]) -> None:
+    """Draw medians as lines (the average dashed) and quartiles as bands."""
+    shared = table.groupby("generation")["evaluations"].nunique().max() == 1
+    across = "generation" if shared else "evaluations"
+    for (position, condition), rows in table.groupby(["position", "condition"], sort=True):
+        colour = style.condition_colour(int(position))
+        for column in columns:
+            curve = rows[rows["quantity"] == NAMES[column]].replace([np.inf, -np.inf], np.nan)
+            kind = "-" if column == "best_cost" else (0, (3, 1.5))
+            label = f"{condition}, {NAMES[column]} ({_counts(curve)})"
+            axes.fill_between(curve[across], curve["lower"], curve["upper"], color=colour, alpha=0.18, linewidth=0)
+            axes.plot(curve[across], curve["median"], linestyle=kind, color=colour, label=label)
+    axes.set_xlim(0, max(1, int(table[across].max())))
+    axes.set_xlabel(across if across == "generation" else "evaluations")
+    if shared:
+        _evaluations_above(axes, table)
+
+
+def _counts(curve: pd.DataFrame) -> str:
+    low, high = int(curve["replicates"].min()), int(curve["replicates"].max())
+    return f"n = {low}" if low == high else f"n = {low}…{high}"
+
+
+def _evaluations_above(axes: Axes, table: pd.DataFrame) -> None:
+    """Add evaluations as a second scale above."""
+    steps = table.groupby("generation")["evaluations"].first()
+    if len(steps) < 2:
+        return
+    slope = float(steps.iloc[-1] - steps.iloc[0]) / float(steps.index[-1] - steps.index[0])
+    offset = float(steps.iloc[0])
+
+    def forward(generation: np.ndarray) -> np.ndarray:
+        return offset + slope * np.asarray(generation, dtype=np.float64)
+
+    def backward(evaluations: np.ndarray) -> np.ndarray:
+        return (np.asarray(evaluations, dtype=np.float64) - offset) / slope
+
+    above = axes.secondary_xaxis("top", functions=(forward, backward))
+    above.set_xlabel("evaluations")

@@ -1,0 +1,230 @@
+"""Model drawings of planar arms: the arms and their angles, via-points, links as touching circles."""
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Arc, Circle
+
+from evoexp.numerics import DEGREE, sincos
+from evoexp.records import FloatArray
+from evoexp.report import motions, style
+from evoexp.report.results import ConditionResults
+
+NUMBERED = 5  # every fifth via-point carries its number
+
+
+def arms_table(condition: ConditionResults) -> pd.DataFrame:
+    """Return links and joint angles at start and goal.
+
+    Returns:
+        Columns posture, arm, joint, x, y, x_end, y_end [length unit], reference_deg (the direction an angle is
+        measured from), angle_deg, length_unit.
+    """
+    problem = condition.prepared.problem
+    rows = []
+    for posture, q in (("start", problem.start), ("goal", problem.goal)):
+        for arm, joint, start, end in motions.joint_positions(problem.assembly, q[:, None]):
+            angle = q[problem.arm_slices[arm, 0] + joint]
+            x, y = (end - start)[0, :2]
+            direction = np.degrees(np.arctan2(y, x))
+            rows.append((posture, arm, joint, *start[0, :2], *end[0, :2], direction - angle, angle))
+    names = ["posture", "arm", "joint", "x", "y", "x_end", "y_end", "reference_deg", "angle_deg"]
+    return _rounded(pd.DataFrame(rows, columns=names)).assign(length_unit=condition.condition.length_unit)
+
+
+def draw_arms(table: pd.DataFrame) -> Figure:
+    """Draw the arms at the start with their joint angles, and at the goal."""
+    figure = style.figure(4.6, 4.8)
+    axes = figure.subplots()
+    style.operational_axes(axes, table["length_unit"].iloc[0])
+    for (posture, arm), rows in table.groupby(["posture", "arm"], sort=True):
+        at_start = posture == "start"
+        draw_arm(axes, int(arm), rows, alpha=1.0 if at_start else 0.35, dashed=not at_start)
+        for row in rows.itertuples() if at_start else ():
+            _angle(axes, row)
+    for arm, rows in table[(table["joint"] == 0) & (table["posture"] == "start")].groupby("arm"):
+        _base(axes, rows["x"].iloc[0], rows["y"].iloc[0])
+        axes.annotate(
+            f"arm {int(str(arm)) + 1}",
+            (rows["x"].iloc[0], rows["y"].iloc[0]),
+            xytext=(0, -22),
+            textcoords="offset points",
+            ha="center",
+            color=style.arm_colour(int(str(arm))),
+        )
+    handles = [
+        Line2D([], [], color=style.NEUTRAL, linewidth=3, marker="o", markersize=4, label="start"),
+        Line2D([], [], color=style.NEUTRAL, linewidth=2, alpha=0.35, linestyle=(0, (2, 1)), label="goal"),
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=2)
+    axes.margins(0.12)
+    return figure
+
+
+def via_points_table(condition: ConditionResults) -> pd.DataFrame:
+    """Return via-points of the best replicate: the best of its initial population, and its final best.
+
+    Returns:
+        Columns stage, arm, instant, joint_1_deg, joint_2_deg.
+    """
+    assert condition.first_solution is not None
+    solutions = {
+        "best of the initial population": condition.first_solution,
+        "best at the end": condition.solutions[condition.best_replicate],
+    }
+    parts = [path_table(condition, solution).assign(stage=stage) for stage, solution in solutions.items()]
+    return pd.concat(parts, ignore_index=True)
+
+
+def draw_via_points(table: pd.DataFrame) -> Figure:
+    """Draw via-points in the arms' configuration planes, numbered by instant."""
+    arms = sorted(table["arm"].unique())
+    figure = style.figure(3.6)
+    planes = figure.subplots(1, len(arms), squeeze=False)[0]
+    stages = list(dict.fromkeys(table["stage"]))
+    for axes, arm in zip(planes, arms, strict=True):
+        style.configuration_axes(axes, arm)
+        for stage in stages:
+            rows = table[(table["arm"] == arm) & (table["stage"] == stage)]
+            final = stage == stages[-1]
+            colour = style.arm_colour(arm) if final else style.FAINT
+            x, y = rows["joint_1_deg"].to_numpy(), rows["joint_2_deg"].to_numpy()
+            marker = "o" if final else "s"
+            axes.plot(x, y, color=colour, linewidth=0.9, marker=marker, markersize=4 if final else 3)
+            if final:
+                _numbers(axes, x, y, rows["instant"].to_numpy())
+        axes.margins(0.1)
+    handles = [
+        Line2D([], [], color=style.FAINT, linewidth=0.9, marker="s", markersize=3, label=stages[0]),
+        Line2D([], [], color=style.NEUTRAL, linewidth=0.9, marker="o", markersize=4, label=f"{stages[-1]}, instants"),
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=2)
+    return figure
+
+
+def circles_table(condition: ConditionResults) -> pd.DataFrame:
+    """Return links and circles of the best replicate at its via-point of least centre distance.
+
+    Returns:
+        Columns element (link, circle, centres, bodies), arm, x, y, x_end, y_end, radius, distance [length unit],
+        safety_distance, instant, length_unit.
+    """
+    problem = condition.prepared.problem
+    q = motions.configurations(condition.prepared, condition.solutions[condition.best_replicate])
+    instant = int(np.argmin(motions.centre_distances(problem, q)))
+    at = q[:, instant]
+    rows: list[tuple[object, ...]] = [
+        ("link", arm, *start[0, :2], *end[0, :2], np.nan, np.nan)
+        for arm, _, start, end in motions.joint_positions(problem.assembly, at[:, None])
+    ]
+    centres = motions.sphere_centres(problem.collision, at)
+    for arm, points in enumerate(centres):
+        rows += [("circle", arm, *p[:2], *p[:2], problem.collision.radius, np.nan) for p in points]
+    a, b = _closest(centres)
+    rows.append(("centres", -1, *a[:2], *b[:2], np.nan, float(np.linalg.norm(a - b))))
+    nearest = motions.LinkDistance(problem.assembly).nearest(at)
+    rows.append(("bodies", -1, *nearest.points[0, :2], *nearest.points[1, :2], np.nan, nearest.distance))
+    names = ["element", "arm", "x", "y", "x_end", "y_end", "radius", "distance"]
+    return _rounded(pd.DataFrame(rows, columns=names)).assign(
+        safety_distance=condition.condition.scenario.security_margin,  # type: ignore[attr-defined]
+        instant=instant,
+        length_unit=condition.condition.length_unit,
+    )
+
+
+def draw_circles(table: pd.DataFrame) -> Figure:
+    """Draw links as lines, their circles, and the least distances of centres and of links."""
+    figure = style.figure(5.0, 5.2)
+    axes = figure.subplots()
+    unit, radius = table["length_unit"].iloc[0], table["radius"].max()
+    style.operational_axes(axes, unit)
+    for row in table[table["element"] == "circle"].itertuples():
+        colour = style.arm_colour(int(row.arm))
+        axes.add_patch(Circle((row.x, row.y), row.radius, facecolor=colour, alpha=0.14, linewidth=0))
+        axes.add_patch(Circle((row.x, row.y), row.radius, fill=False, edgecolor=colour, linewidth=0.8))
+        axes.plot(row.x, row.y, ".", color=colour, markersize=3)
+    for arm, rows in table[table["element"] == "link"].groupby("arm"):
+        draw_arm(axes, int(str(arm)), rows)
+        _base(axes, rows["x"].iloc[0], rows["y"].iloc[0])
+    for element, colour, kind in (("centres", "black", "-"), ("bodies", "#CC79A7", "-")):
+        row = table[table["element"] == element].iloc[0]
+        what = "least distance of centres" if element == "centres" else "least distance of links"
+        label = f"{what}: {row['distance']:.3f} {unit}"
+        axes.plot([row["x"], row["x_end"]], [row["y"], row["y_end"]], kind, color=colour, linewidth=2, label=label)
+    safety = table["safety_distance"].iloc[0]
+    axes.plot([], [], "o", color=style.FAINT, fillstyle="none", label=f"circles of radius r = {radius:g} {unit}")
+    axes.plot([], [], " ", label=f"collision below 2r = {2 * radius:g} {unit}; safety distance {safety:g} {unit}")
+    axes.set_title(f"instant {int(table['instant'].iloc[0])}")
+    axes.margins(0.08)
+    style.legend_below(figure, axes, 2)
+    return figure
+
+
+def path_table(condition: ConditionResults, solution: FloatArray) -> pd.DataFrame:
+    """Return a solution's via-points per arm: columns arm, instant, joint_1_deg, joint_2_deg."""
+    problem = condition.prepared.problem
+    shapes = condition.prepared.planner.shape(problem)
+    parts = np.split(solution, np.cumsum([rows * joints for rows, joints in shapes])[:-1])
+    frames = []
+    for arm, (values, shape) in enumerate(zip(parts, shapes, strict=True)):
+        points = values.reshape(shape)
+        columns = {"arm": arm, "instant": np.arange(shape[0])}
+        frames.append(pd.DataFrame(columns | {"joint_1_deg": points[:, 0], "joint_2_deg": points[:, 1]}))
+    return pd.concat(frames, ignore_index=True)
+
+
+def draw_arm(axes: Axes, arm: int, rows: pd.DataFrame, *, alpha: float = 1.0, dashed: bool = False) -> None:
+    """Draw an arm's links, given by rows with x, y, x_end, y_end in order."""
+    x = [*rows["x"], rows["x_end"].iloc[-1]]
+    y = [*rows["y"], rows["y_end"].iloc[-1]]
+    kind = (0, (2, 1)) if dashed else "-"
+    axes.plot(x, y, linestyle=kind, color=style.arm_colour(arm), linewidth=2 if dashed else 3, alpha=alpha, zorder=3)
+    axes.plot(x[:-1], y[:-1], "o", color="white", markeredgecolor=style.arm_colour(arm), alpha=alpha, zorder=4, ms=5)
+    axes.plot(x[-1], y[-1], "o", color=style.arm_colour(arm), alpha=alpha, markersize=4, zorder=4)
+
+
+def _base(axes: Axes, x: float, y: float) -> None:
+    axes.plot(x, y, "s", color=style.NEUTRAL, markersize=9, zorder=2)
+
+
+def _angle(axes: Axes, row: object) -> None:
+    """Draw one joint angle: the direction it is measured from, its arc and its value."""
+    x, y = row.x, row.y  # type: ignore[attr-defined]
+    reference, angle = row.reference_deg, row.angle_deg  # type: ignore[attr-defined]
+    arm, joint = int(row.arm), int(row.joint)  # type: ignore[attr-defined]
+    colour, radius = style.arm_colour(arm), 0.75 if joint == 0 else 0.55
+    s, c = sincos(DEGREE * reference)
+    axes.plot([x, x + 1.5 * c], [y, y + 1.5 * s], ":", color=style.NEUTRAL, linewidth=0.8, zorder=1)
+    first, last = sorted((reference, reference + angle))
+    axes.add_patch(Arc((x, y), 2 * radius, 2 * radius, theta1=first, theta2=last, color=colour, linewidth=1.0))
+    s, c = sincos(DEGREE * (reference + 0.5 * angle))
+    text = f"{style.joint_symbol(arm, joint)} = {angle:g}°"
+    place = (x + (radius + 0.25) * c, y + (radius + 0.25) * s)
+    axes.annotate(text, place, ha="left" if c >= 0 else "right", va="center", color=colour, zorder=5)
+
+
+def _numbers(axes: Axes, x: FloatArray, y: FloatArray, instants: np.ndarray) -> None:
+    """Write the number of every fifth via-point, the start and the goal beside it."""
+    for k, instant in enumerate(instants):
+        if instant % NUMBERED == 0 or k == len(instants) - 1:
+            axes.annotate(str(instant), (x[k], y[k]), xytext=(5, 5), textcoords="offset points", fontsize=7)
+
+
+def _closest(centres: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Return the two closest centres of different arms."""
+    found: list[tuple[float, FloatArray, FloatArray]] = []
+    for k, first in enumerate(centres):
+        for second in centres[k + 1 :]:
+            distances = np.linalg.norm(first[:, None] - second, axis=2)
+            i, j = np.unravel_index(int(np.argmin(distances)), distances.shape)
+            found.append((float(distances[i, j]), first[i], second[j]))
+    _, a, b = min(found, key=lambda item: item[0])
+    return a, b
+
+
+def _rounded(table: pd.DataFrame) -> pd.DataFrame:
+    """Round coordinates to 12 decimals, so that rounding errors beside 0 do not differ between machines."""
+    numbers = table.select_dtypes("float64").columns
+    return table.assign(**{name: table[name].round(12) + 0.0 for name in numbers})

@@ -1,0 +1,214 @@
+"""Parameters of conditions with unit and source, as the comments of the shipped options state them.
+
+A condition does not know which options it was composed of, so each of its components is compared with all shipped
+options of its group: the one that agrees in most settings is named, and settings that differ from it are overrides.
+"""
+
+import functools
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import yaml
+
+import evoexp
+from evoexp.condition import PARTS
+from evoexp.report.results import WRAPPED, ConditionResults, Results
+from evoexp.validation import TARGET
+
+OVERRIDE = "override"
+_COMMENT = re.compile(r"#\s*(?:\[(?P<unit>[^\]]*)\])?\s*(?P<source>.*)")
+_REFERENCE = re.compile(r"\$\{(\w+)\}")
+
+
+class Entry(NamedTuple):
+    """One value of an option file, and what its comment says."""
+
+    value: Any
+    unit: str
+    source: str
+
+
+class Parameter(NamedTuple):
+    """One setting of a condition.
+
+    Attributes:
+        name: As one types it: `ga.population_size`.
+        value: As text.
+        unit: Of the value; empty where the option states none.
+        source: "paper: …", "assumed: …", "override", "budget smoke", or the comment as it is.
+    """
+
+    name: str
+    value: str
+    unit: str
+    source: str
+
+
+def config_directory() -> Path:
+    """Return the shipped `conf`: in the wheel inside the package, in a checkout beside `src`."""
+    package = Path(evoexp.__file__).parent
+    inside = package / "conf"
+    return inside if inside.is_dir() else package.parents[1] / "conf"
+
+
+def parameters(results: Results, condition: ConditionResults) -> list[Parameter]:
+    """Return all settings of one condition, its seed and its number of replicates."""
+    config = {part: getattr(condition.condition, part).canonical() for part in PARTS}
+    preferred = _choices(results.experiment)
+    found = []
+    for part, value in config.items():
+        if WRAPPED in value:  # a control around the planner
+            outer = {key: v for key, v in value.items() if key != WRAPPED}
+            found += _component("control", outer, preferred)
+            value = value[WRAPPED]
+        found += _component(part, value, preferred)
+    root = option(config_directory() / "config.yaml")
+    found.append(_parameter("seed", condition.condition.seed, root.get("seed"), OVERRIDE))
+    planned = Entry(planned_replicates(results.experiment), *root["num_replicates"][1:])
+    found.append(_parameter("num_replicates", condition.planned, planned, OVERRIDE))
+    return [_capped(parameter, results.budget) for parameter in found]
+
+
+def planned_replicates(experiment: str) -> int:
+    """Return the number of replicates that an experiment has without any cap or override."""
+    path = config_directory() / "experiment" / f"{experiment}.yaml"
+    own = yaml.safe_load(path.read_text()).get("num_replicates") if path.is_file() else None
+    return int(own if own is not None else option(config_directory() / "config.yaml")["num_replicates"].value)
+
+
+def overridden(found: Iterable[Parameter]) -> list[str]:
+    """Return the names of settings that are no longer the paper's; another seed is as good as any."""
+    changed = (p for p in found if p.source == OVERRIDE or p.source.startswith("budget"))
+    return [p.name for p in changed if p.name != "seed"]
+
+
+@functools.cache
+def option(path: Path) -> dict[str, Entry]:
+    """Return the values of an option file with their comments, by dotted key; its defaults filled in."""
+    text = path.read_text()
+    node, entries = yaml.compose(text), {}
+    for base in yaml.safe_load(text).get("defaults", ()):
+        if isinstance(base, str) and base != "_self_":
+            entries |= option(path.parent / f"{base}.yaml")
+    for key, leaf in _leaves(node, ""):
+        entries[key] = Entry(yaml.safe_load(yaml.serialize(leaf)), *_comment(text.splitlines(), leaf))
+    return entries
+
+
+def _leaves(node: Any, prefix: str) -> Iterator[tuple[str, Any]]:
+    """Yield (dotted key, node) of every scalar and every list that is written in one line."""
+    if isinstance(node, yaml.MappingNode):
+        for key, value in node.value:
+            if prefix or key.value != "defaults":
+                yield from _leaves(value, f"{prefix}.{key.value}" if prefix else key.value)
+    elif isinstance(node, yaml.SequenceNode) and not node.flow_style:
+        for k, value in enumerate(node.value):
+            yield from _leaves(value, f"{prefix}[{k}]")
+    else:
+        yield prefix, node
+
+
+def _comment(lines: list[str], node: Any) -> tuple[str, str]:
+    line = lines[node.end_mark.line] if node.end_mark.line < len(lines) else ""
+    match = _COMMENT.match(line[node.end_mark.column :].strip())
+    if match is None:
+        return "", ""
+    return (match["unit"] or "").strip(), match["source"].strip()
+
+
+def _component(group: str, config: dict[str, Any], preferred: dict[str, str]) -> Iterator[Parameter]:
+    """Yield the settings of one component, and of the groups that its option takes in."""
+    name, entries = _option_of(group, config, preferred.get(group))
+    revision = config.get("revision")
+    where = f"conf/{group}/{name}.yaml" if name else OVERRIDE
+    yield Parameter(group, f"{config[TARGET]}, revision {revision}", "", where)
+    for key, value in config.items():
+        if key in (TARGET, "revision"):
+            continue
+        reference = _REFERENCE.fullmatch(str(entries[key].value)) if key in entries else None
+        if reference and isinstance(value, dict):
+            yield from _component(reference[1], value, preferred)
+            continue
+        for path, leaf in _flat(value, key):
+            yield _parameter(f"{group}.{path}", leaf, entries.get(path), OVERRIDE)
+
+
+def _option_of(group: str, config: dict[str, Any], preferred: str | None) -> tuple[str, dict[str, Entry]]:
+    """Return name and entries of the shipped option that a component agrees with most."""
+    leaves = dict(_flat(config, ""))
+    best: tuple[tuple[int, bool], str, dict[str, Entry]] = ((-1, False), "", {})
+    for path in sorted((config_directory() / group).glob("*.yaml")):
+        entries = option(path)
+        if TARGET not in entries or entries[TARGET].value != config[TARGET]:
+            continue
+        agreeing = sum(_same(value, entries[key].value) for key, value in leaves.items() if key in entries)
+        score = (agreeing, path.stem == preferred)
+        if score > best[0]:
+            best = (score, path.stem, entries)
+    return best[1:]
+
+
+@functools.cache
+def _choices(experiment: str) -> dict[str, str]:
+    """Return the option that an experiment file chooses for every group."""
+    path = config_directory() / "experiment" / f"{experiment}.yaml"
+    if not experiment or not path.is_file():
+        return {}
+    chosen = {}
+    for entry in yaml.safe_load(path.read_text()).get("defaults", ()):
+        for key, name in entry.items() if isinstance(entry, dict) else ():
+            chosen[key.removeprefix("override ").lstrip("/")] = name
+    return chosen
+
+
+def _flat(value: Any, prefix: str) -> Iterator[tuple[str, Any]]:
+    """Yield (dotted key, leaf) of canonical data; lists of plain values are leaves."""
+    if isinstance(value, dict):
+        for key, item in value.items():
+            if key != "revision" and not (prefix and key == TARGET):
+                yield from _flat(item, f"{prefix}.{key}" if prefix else key)
+    elif isinstance(value, list) and any(isinstance(item, dict | list) for item in value):
+        for k, item in enumerate(value):
+            yield from _flat(item, f"{prefix}[{k}]")
+    else:
+        yield prefix, value
+
+
+def _parameter(name: str, value: Any, entry: Entry | None, otherwise: str) -> Parameter:
+    if entry is None:
+        return Parameter(name, _text(value), "", otherwise)
+    source = entry.source if _same(value, entry.value) else otherwise
+    return Parameter(name, _text(value), entry.unit, source)
+
+
+def _capped(parameter: Parameter, budget: str) -> Parameter:
+    """Name the budget where it, and no override, made a setting what it is."""
+    path = config_directory() / "budget" / f"{budget}.yaml"
+    if parameter.source != OVERRIDE or not budget or not path.is_file():
+        return parameter
+    key = {"num_replicates": "max_replicates", "ga.num_generations": "max_generations"}.get(parameter.name)
+    caps = option(path)
+    if key in caps and str(caps[key].value) == parameter.value:
+        return parameter._replace(source=f"budget {budget}")
+    return parameter
+
+
+def _same(value: Any, shipped: Any) -> bool:
+    if isinstance(value, list) and isinstance(shipped, list):
+        return len(value) == len(shipped) and all(_same(a, b) for a, b in zip(value, shipped, strict=True))
+    if isinstance(shipped, str) and isinstance(value, float):  # 1e-3 is a text to YAML 1.1
+        try:
+            return float(shipped) == value
+        except ValueError:
+            return False
+    return bool(value == shipped)
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, list):
+        return "[" + ", ".join(_text(item) for item in value) + "]"
+    return repr(value) if isinstance(value, float) else str(value)

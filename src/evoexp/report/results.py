@@ -1,0 +1,193 @@
+"""What the outputs hold of the conditions that a report is asked for."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from evoexp.condition import Condition, Prepared
+from evoexp.errors import NothingStored
+from evoexp.records import FloatArray
+from evoexp.report.statistics import Spread, spread
+from evoexp.store.log_reader import read_log, read_solution
+from evoexp.store.messages import TERM
+from evoexp.store.run_directory import RunDirectory
+from evoexp.store.tables import read_generations, read_summaries
+
+WRAPPED = "planner"  # the field of a control (random search) that holds the planner it stands beside
+
+
+class ConditionResults(NamedTuple):
+    """One condition's replicates as far as they are stored and planned.
+
+    Attributes:
+        label: Its name in figures.
+        condition: What was run.
+        planned: Number of replicates; what is stored beyond is not looked at.
+        summaries: One row per finished replicate, indexed by replicate, in order.
+        failures: Replicate → why it failed.
+        generations: One row per generation of every finished replicate.
+        solutions: Replicate → its best solution, flat.
+        first_solution: Best of the initial population of the best replicate; None where nothing is finished.
+        code: Version, commit and dirty flag of the code that created the run.
+    """
+
+    label: str
+    condition: Condition
+    planned: int
+    summaries: pd.DataFrame
+    failures: dict[int, str]
+    generations: pd.DataFrame
+    solutions: dict[int, FloatArray]
+    first_solution: FloatArray | None
+    code: dict[str, Any]
+
+    @property
+    def hash12(self) -> str:
+        """The twelve hex digits that are shown."""
+        return self.condition.id[:12]
+
+    @property
+    def done(self) -> int:
+        """Number of finished replicates."""
+        return len(self.summaries)
+
+    @property
+    def failed(self) -> int:
+        """Number of failed replicates."""
+        return len(self.failures)
+
+    @property
+    def solved(self) -> int:
+        """Number of finished replicates whose best solution the paper's own model accepts."""
+        return int(self.summaries["solved"].sum())
+
+    @property
+    def best_replicate(self) -> int:
+        """Replicate of the lowest best cost; the first of equals."""
+        return int(self.summaries.index[int(np.argmin(self.column("best_cost")))])
+
+    @property
+    def prepared(self) -> Prepared:
+        """Planner and problem, to judge solutions with."""
+        return self.condition.prepare()
+
+    @property
+    def planner(self) -> Any:
+        """The paper's planner; of a control the one that it stands beside."""
+        return getattr(self.condition.planner, WRAPPED, self.condition.planner)
+
+    @property
+    def is_control(self) -> bool:
+        """Whether this is a control: a planner that stands beside the paper's."""
+        return hasattr(self.condition.planner, WRAPPED)
+
+    def column(self, name: str) -> FloatArray:
+        """Return a column of the summaries as floats, (done,); NaN where there is none."""
+        if name not in self.summaries:
+            return np.full(self.done, np.nan)
+        return self.summaries[name].to_numpy(dtype=np.float64, na_value=np.nan)
+
+    def spread(self, name: str) -> Spread:
+        """Return median and quartiles of a column of the summaries."""
+        return spread(self.column(name))
+
+
+class Results(NamedTuple):
+    """Everything that a report is drawn from.
+
+    Attributes:
+        experiment: Name of the experiment; empty for runs given by their hashes.
+        budget: Name of the budget; empty for runs given by their hashes.
+        conditions: In the order of the experiment.
+    """
+
+    experiment: str
+    budget: str
+    conditions: tuple[ConditionResults, ...]
+
+    @property
+    def with_data(self) -> tuple[ConditionResults, ...]:
+        """Conditions of which at least one replicate is finished."""
+        return tuple(condition for condition in self.conditions if condition.done)
+
+    @property
+    def main(self) -> tuple[ConditionResults, ...]:
+        """Those with data that are no controls; controls where there is nothing else."""
+        return tuple(c for c in self.with_data if not c.is_control) or self.with_data
+
+    @property
+    def terms(self) -> list[str]:
+        """Names of the terms that any summary has, in order."""
+        columns = {name: None for c in self.with_data for name in c.summaries if name.startswith(TERM)}
+        return sorted(name.removeprefix(TERM) for name in columns)
+
+    def position(self, label: str) -> int:
+        """Return a condition's place in the experiment, which gives it its colour."""
+        return [condition.label for condition in self.conditions].index(label)
+
+
+def gather(
+    outputs: Path,
+    conditions: Sequence[tuple[str, Condition]],
+    num_replicates: int | None,
+    experiment: str,
+    budget: str,
+    command: str,
+) -> Results:
+    """Read what is stored.
+
+    Args:
+        outputs: Root of all outputs.
+        conditions: (label, condition).
+        num_replicates: Planned for every condition; None: as many as each one has.
+        experiment: Its name.
+        budget: Its name.
+        command: What runs the conditions; for the error.
+
+    Raises:
+        NothingStored: If no replicate of any condition is there, done or failed.
+        CorruptLog: If a log cannot be trusted.
+    """
+    found = tuple(_read(outputs, label, condition, num_replicates) for label, condition in conditions)
+    if not any(condition.done or condition.failed for condition in found):
+        raise NothingStored(f"report: no replicate of {experiment or 'these runs'} in {outputs}; run it: {command}")
+    return Results(experiment, budget, found)
+
+
+def _read(outputs: Path, label: str, condition: Condition, num_replicates: int | None) -> ConditionResults:
+    run = RunDirectory(outputs, condition.id)
+    stored = run.completed() | run.failed()
+    planned = max(stored, default=-1) + 1 if num_replicates is None else num_replicates
+    if stored:
+        run.check()
+    rows = read_summaries(run)
+    rows = rows[rows["replicate"] < planned].sort_values("replicate", kind="stable").set_index("replicate")
+    done, failed = rows[rows["status"] == "done"], rows[rows["status"] == "failed"]
+    generations = read_generations(run)
+    generations = generations[generations["replicate"].isin(done.index)].reset_index(drop=True)
+    solutions = {int(k): read_solution(run.log_path(int(k))).values for k in done.index}
+    results = ConditionResults(
+        label,
+        condition,
+        planned,
+        done,
+        {int(k): str(reason) for k, reason in failed["stop_reason"].items()},
+        generations,
+        solutions,
+        None,
+        _code(run) if stored else {},
+    )
+    if not solutions:
+        return results
+    return results._replace(first_solution=read_log(run.log_path(results.best_replicate)).solutions[0].values)
+
+
+def _code(run: RunDirectory) -> dict[str, Any]:
+    """Return which code created a run, as its manifest notes it."""
+    manifest = run.manifest()
+    git = manifest.get("git") or {}
+    version = manifest.get("versions", {}).get("evoexp")
+    return {"version": version, "commit": git.get("commit"), "dirty": git.get("dirty")}

@@ -1,0 +1,175 @@
+"""Statistics over replicates: the seed is the unit, and replicates of two conditions with one index share a seed.
+
+Costs may be infinite (infeasible). Medians, ranks and effect sizes stay defined then; nothing here takes a mean.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import ndtr, ndtri
+
+from evoexp.records import FloatArray
+
+EXACT_PAIRS = 200  # up to here the signed-rank distribution is computed, beyond it approximated
+BOOTSTRAP_SEED = 20_250_419  # of the report's own generator; any fixed number
+
+
+class Interval(NamedTuple):
+    """An interval; `low` ≤ `high`."""
+
+    low: float
+    high: float
+
+
+class Spread(NamedTuple):
+    """Median and quartiles of some values.
+
+    Attributes:
+        median: NaN without values.
+        lower: First quartile.
+        upper: Third quartile.
+        count: Values that are not NaN.
+    """
+
+    median: float
+    lower: float
+    upper: float
+    count: int
+
+
+class SignedRank(NamedTuple):
+    """Wilcoxon's signed-rank test of paired values.
+
+    Attributes:
+        num_pairs: Pairs that differ; equal ones say nothing.
+        positive_ranks: W+, the sum of ranks of the positive differences.
+        p_value: Two-sided.
+    """
+
+    num_pairs: int
+    positive_ranks: float
+    p_value: float
+
+
+class Effect(NamedTuple):
+    """Vargha and Delaney's A12 = P(x > y) + P(x = y) / 2, with a bootstrap interval."""
+
+    a12: float
+    interval: Interval
+
+
+def quantile(values: FloatArray, share: float) -> float:
+    """Return a quantile by linear interpolation of order statistics; NaN is ignored, ±inf is a value.
+
+    Args:
+        values: (n,).
+        share: In [0, 1].
+    """
+    ordered = np.sort(values[~np.isnan(values)])
+    if not len(ordered):
+        return math.nan
+    position = share * (len(ordered) - 1)
+    below = math.floor(position)
+    low, high = float(ordered[below]), float(ordered[min(below + 1, len(ordered) - 1)])
+    fraction = position - below
+    return low if fraction == 0.0 or low == high else low + fraction * (high - low)
+
+
+def spread(values: FloatArray) -> Spread:
+    """Return median and quartiles of values (n,)."""
+    median, lower, upper = (quantile(values, share) for share in (0.5, 0.25, 0.75))
+    return Spread(median, lower, upper, int(np.count_nonzero(~np.isnan(values))))
+
+
+def wilson(successes: int, trials: int, confidence: float) -> Interval:
+    """Return Wilson's score interval of a proportion; [0, 1] without trials."""
+    if trials == 0:
+        return Interval(0.0, 1.0)
+    z = float(ndtri(0.5 + confidence / 2.0))
+    p, n = successes / trials, trials
+    center = (p + z * z / (2 * n)) / (1 + z * z / n)
+    half = z / (1 + z * z / n) * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
+    return Interval(
+        0.0 if successes == 0 else max(0.0, center - half), 1.0 if successes == n else min(1.0, center + half)
+    )
+
+
+def signed_rank(x: FloatArray, y: FloatArray) -> SignedRank:
+    """Test whether paired values differ (Wilcoxon 1945); equal pairs are left out, ties share their mean rank.
+
+    Args:
+        x: (pairs,); infinite values are compared as such.
+        y: (pairs,).
+    """
+    differing = x != y
+    difference = x[differing] - y[differing]
+    ranks = _doubled_midranks(np.abs(difference))
+    doubled = int(ranks[difference > 0.0].sum())
+    if not len(ranks):
+        return SignedRank(0, 0.0, 1.0)
+    test = _exact_p if len(ranks) <= EXACT_PAIRS else _normal_p
+    return SignedRank(len(ranks), doubled / 2.0, test(ranks, doubled))
+
+
+def holm(p_values: Sequence[float]) -> list[float]:
+    """Return p-values adjusted by Holm's step-down method, in the given order."""
+    adjusted, running = [0.0] * len(p_values), 0.0
+    for step, k in enumerate(sorted(range(len(p_values)), key=lambda k: p_values[k])):
+        running = max(running, min(1.0, (len(p_values) - step) * p_values[k]))
+        adjusted[k] = running
+    return adjusted
+
+
+def vargha_delaney(x: FloatArray, y: FloatArray) -> float:
+    """Return A12 = P(x > y) + P(x = y) / 2 of values (n,) and (m,); NaN if one is empty."""
+    if not len(x) or not len(y):
+        return math.nan
+    greater, equal = x[:, None] > y, x[:, None] == y
+    return float((np.count_nonzero(greater) + 0.5 * np.count_nonzero(equal)) / greater.size)
+
+
+def effect(x: FloatArray, y: FloatArray, confidence: float, num_resamples: int) -> Effect:
+    """Return A12 of paired values with a percentile interval over resampled pairs.
+
+    Args:
+        x: (pairs,).
+        y: (pairs,).
+        confidence: Level of the interval.
+        num_resamples: Of the bootstrap.
+    """
+    if not len(x):
+        return Effect(math.nan, Interval(math.nan, math.nan))
+    rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
+    wins = (x[:, None] > y) + 0.5 * (x[:, None] == y)  # (pairs, pairs)
+    weights = np.array([np.bincount(rng.integers(0, len(x), len(x)), minlength=len(x)) for _ in range(num_resamples)])
+    resampled = ((weights @ wins) * weights).sum(axis=1) / len(x) ** 2  # multiples of 1/2 are exact in any order
+    tail = 0.5 * (1.0 - confidence)
+    interval = Interval(quantile(resampled, tail), quantile(resampled, 1.0 - tail))
+    return Effect(vargha_delaney(x, y), interval)
+
+
+def _doubled_midranks(values: FloatArray) -> np.ndarray:
+    """Return twice the ranks of values (n,), whole numbers also where ties share a mean rank."""
+    _, group, counts = np.unique(values, return_inverse=True, return_counts=True)
+    last = np.cumsum(counts)
+    return np.asarray((2 * last - counts + 1)[group])
+
+
+def _exact_p(ranks: np.ndarray, doubled: int) -> float:
+    """Two-sided p over all assignments of signs to the ranks."""
+    probability = np.zeros(int(ranks.sum()) + 1)
+    probability[0] = 1.0
+    for rank in ranks:
+        shifted = np.zeros_like(probability)
+        shifted[rank:] = probability[: len(probability) - rank]
+        probability = 0.5 * (probability + shifted)
+    below, above = math.fsum(probability[: doubled + 1]), math.fsum(probability[doubled:])
+    return min(1.0, 2.0 * min(below, above))
+
+
+def _normal_p(ranks: np.ndarray, doubled: int) -> float:
+    """Two-sided p by the normal approximation, ties accounted for by the ranks themselves."""
+    mean, variance = ranks.sum() / 2.0, float((ranks.astype(np.float64) ** 2).sum()) / 4.0
+    return min(1.0, 2.0 * float(ndtr(-abs(doubled - mean) / math.sqrt(variance))))

@@ -1,0 +1,93 @@
+"""How figures look: one place for sizes, fonts and colours. No pyplot, no global state left behind."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+ARM_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")  # Okabe & Ito 2008
+CONDITION_COLOURS = ("#332288", "#CC6677", "#117733", "#DDAA33", "#88CCEE", "#882255", "#44AA99", "#999933")  # Tol
+NEUTRAL, FAINT, LIMIT = "#333333", "#9a9a9a", "#000000"
+ARM_SYMBOLS = ("θ", "α", "β", "γ", "δ", "ε")  # θ and α are the paper's
+SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+WIDTH = 7.2  # [inch] of a figure over the whole page
+
+_RC: dict[str, Any] = {
+    "svg.hashsalt": "evoexp",  # else ids in an SVG are random
+    "svg.fonttype": "path",
+    "pdf.fonttype": 42,
+    "font.family": "DejaVu Sans",  # comes with matplotlib
+    "font.size": 8.5,
+    "axes.titlesize": 9.0,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 8.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#e4e4e4",
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 1.4,
+    "lines.solid_capstyle": "round",
+    "legend.frameon": False,
+    "legend.fontsize": 7.5,
+    "legend.handlelength": 1.8,
+    "xtick.labelsize": 7.5,
+    "ytick.labelsize": 7.5,
+    "figure.facecolor": "white",
+    "savefig.facecolor": "white",
+}
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Draw and save inside of it in evoexp's style, whatever the user's own settings are."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_RC)
+        yield
+
+
+def figure(height: float, width: float = WIDTH) -> Figure:
+    """Return an empty figure that arranges itself [inch]."""
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def arm_colour(arm: int) -> str:
+    """Return the colour of an arm, counted from 0."""
+    return ARM_COLOURS[arm % len(ARM_COLOURS)]
+
+
+def condition_colour(position: int) -> str:
+    """Return the colour of a condition by its position in the experiment."""
+    return CONDITION_COLOURS[position % len(CONDITION_COLOURS)]
+
+
+def joint_symbol(arm: int, joint: int) -> str:
+    """Return the name of a joint angle: θ₁, α₂, …, both counted from 0."""
+    letter = ARM_SYMBOLS[arm] if arm < len(ARM_SYMBOLS) else f"q{arm + 1},"
+    return letter + str(joint + 1).translate(SUBSCRIPTS)
+
+
+def operational_axes(axes: Axes, unit: str) -> None:
+    """Set up axes as a plane of the operational space."""
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel(f"x [{unit}]")
+    axes.set_ylabel(f"y [{unit}]")
+
+
+def configuration_axes(axes: Axes, arm: int) -> None:
+    """Set up axes as an arm's plane of joint angles [deg]."""
+    axes.set_xlabel(f"{joint_symbol(arm, 0)} [deg]")
+    axes.set_ylabel(f"{joint_symbol(arm, 1)} [deg]")
+    axes.set_title(f"arm {arm + 1}")
+
+
+def legend_below(figure: Figure, axes: Axes, columns: int) -> None:
+    """Put the legend of some axes under the whole figure."""
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns)

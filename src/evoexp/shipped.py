@@ -1,0 +1,47 @@
+"""The shipped table: hashes of the shipped conditions and digests of their first replicate.
+
+It finds a shipped condition by its hash on a machine that never ran it, gives `reproduce` something to compare with,
+and makes a test fail when results change without a raised revision.
+"""
+
+import functools
+import json
+from importlib import resources
+from typing import NamedTuple
+
+
+class Shipped(NamedTuple):
+    """One shipped condition at one budget.
+
+    Attributes:
+        experiment: Name of the experiment file.
+        label: Of the condition.
+        budget: `paper` or `smoke`.
+        condition_id: 64 hex digits.
+        digest: Of replicate 0.
+    """
+
+    experiment: str
+    label: str
+    budget: str
+    condition_id: str
+    digest: str
+
+    @property
+    def command(self) -> str:
+        """The command that runs it."""
+        budget = "" if self.budget == "paper" else f" budget={self.budget}"
+        return f"evoexp run experiment={self.experiment}{budget} --only '{self.label}'"
+
+
+@functools.cache
+def shipped() -> tuple[Shipped, ...]:
+    """Return the table."""
+    text = resources.files("evoexp").joinpath("assets/shipped.json").read_text()
+    return tuple(Shipped(**row) for row in json.loads(text))
+
+
+def find(prefix: str) -> list[Shipped]:
+    """Return the shipped conditions whose hash begins with a prefix, each hash once."""
+    found = {row.condition_id: row for row in shipped() if row.condition_id.startswith(prefix.lower())}
+    return list(found.values())

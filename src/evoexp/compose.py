@@ -164,17 +164,17 @@ def _condition(config: DictConfig, budget: Budget) -> Condition:
         raise SettingError(error.full_key or "configuration", "resolvable", _first_line(error)) from None
     assert isinstance(plain, dict)
     for group in PLANNER_PARTS:
-        if plain[group] is not None:
+        if plain.get(group) is not None:
             if f"${{{group}" not in raw:
                 raise SettingError(group, "a part of the chosen planner", plain[group])
             build(plain[group], component_class, group)  # errors name the group, as it was typed
-    if plain["control"] is not None:
+    if plain.get("control") is not None:
         plain["planner"] = {**plain["control"], "planner": plain["planner"]}
     return Condition.from_config({part: plain[part] for part in (*PARTS, "seed")})
 
 
 def _cap_generations(config: DictConfig, budget: Budget) -> None:
-    cap, ga = budget.max_generations, config.ga
+    cap, ga = budget.max_generations, config.get("ga")
     if cap is not None and ga is not None and isinstance(ga.get("num_generations"), int):
         ga.num_generations = min(ga.num_generations, cap)
 

@@ -149,3 +149,17 @@ def test_a_wrong_number_of_joints_is_refused() -> None:
     collision = MODEL.bind(TWO_PLANAR.build(), ())
     with pytest.raises(ValueError, match=r"q must have shape \(4, configurations\)"):
         collision.clearance(np.zeros((3, 5)))
+
+
+@pytest.mark.parametrize("limit", [-0.3, 0.0, 0.4, 3.0])
+@pytest.mark.parametrize("robot", [TWO_PLANAR, THREE_PLANAR, TWO_SPATIAL], ids=["two planar", "three planar", "spatial"])
+def test_a_limit_skips_only_what_is_not_asked(robot: Robot, limit: float) -> None:
+    assembly = robot.build()
+    collision = MODEL.bind(assembly, OBSTACLES)
+    rng = np.random.default_rng(5)
+    near = rng.uniform(-180.0, 180.0, size=(assembly.model.nq, 1)) + rng.normal(size=(assembly.model.nq, 640))
+    for q in (near, rng.uniform(-180.0, 180.0, size=(assembly.model.nq, 640))):
+        for exact, limited in zip(collision.clearance(q), collision.clearance(q, limit), strict=True):
+            below = exact < limit
+            assert np.array_equal(limited[below], exact[below])
+            assert np.all(limited[~below] >= limit - 1e-15)

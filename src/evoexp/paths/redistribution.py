@@ -78,10 +78,11 @@ def gather(w: Any, base: Any, work: Any, count: Any, at: Any) -> None:
     """Copy four consecutive rows, each lane from its own place, to the work rows 1..4."""
     for l in range(count):
         f = base + at[l]
-        w[work + ROW + l] = w[f]
-        w[work + R2 + l] = w[f + ROW]
-        w[work + R3 + l] = w[f + R2]
-        w[work + R4 + l] = w[f + R3]
+        x0, x1, x2, x3 = w[f], w[f + ROW], w[f + R2], w[f + R3]  # all loads first: a store could alias
+        w[work + ROW + l] = x0
+        w[work + R2 + l] = x1
+        w[work + R3 + l] = x2
+        w[work + R4 + l] = x3
 
 
 @kernel

@@ -25,9 +25,10 @@ from evoexp.objectives.string_fitness import StringFitness, StringTerms, count_c
 from evoexp.paths.interpolation import interpolate_linear
 from evoexp.paths.lengths import path_lengths
 from evoexp.paths.motion import Motion
-from evoexp.paths.redistribution import Redistribution, prepare_redistribution, redistribute
+from evoexp.paths.redistribution import redistribute
 from evoexp.paths.relaxation import relax
 from evoexp.paths.walk import num_uniforms, walk
+from evoexp.paths.workspace import prepare_redistribution
 from evoexp.records import FloatArray, Generation
 from evoexp.robots.assembly import Assembly, Robot
 from evoexp.scenarios.arm_motion import ArmMotion
@@ -176,12 +177,12 @@ class ViaPointGa(Component):
             yield best.generation(index, strings, population, judged, costs, collisions, evaluations, queries)
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
-        """Return new trajectories as in the initial population, (nq, N + 1, ≥ count)."""
+        """Return new trajectories as in the initial population, (nq, N + 1, count)."""
         strings = _Strings(self, problem)
         population = strings.empty(count)
         strings.new_trajectories(rng, population, np.arange(count))
         strings.smooth(population, count)
-        return population
+        return population[:, :, :count]
 
     def cost(self, problem: Problem, population: FloatArray) -> Judgement:
         """Judge a population (nq, N + 1, individuals)."""
@@ -208,7 +209,8 @@ class ViaPointGa(Component):
         strings = self._strings_of(problem, solution)
         judged = self.cost(problem, strings[:, :, None])
         terms = judged.named_terms(0) | {"fitness": float(self.objective.fitness(judged.cost)[0])}
-        straight = sum(float(np.linalg.norm((problem.goal - problem.start)[a:b])) for a, b in problem.arm_slices)
+        squares = (problem.goal - problem.start) ** 2
+        straight = sum(float(np.sqrt(np.sum(squares[a:b]))) for a, b in problem.arm_slices)
         if straight > 0.0:
             terms["path_length_ratio"] = float(np.sum(judged.terms.lengths[:, 0])) / straight
         at = problem.collision.clearance(strings)
@@ -246,7 +248,10 @@ class _Strings:
         self.num_arms = len(problem.arm_slices)
         self.nq = len(problem.start)
         self.max_turn = DEGREE * planner.max_turn
-        self._spline: dict[int, Redistribution] = {}
+        joints = int(np.max(problem.arm_slices[:, 1] - problem.arm_slices[:, 0]))
+        self._spline = prepare_redistribution(
+            planner.num_via_points, joints, planner.spline_end, planner.samples_per_segment
+        )
 
     def empty(self, count: int) -> FloatArray:
         """Return memory for strings, padded to whole vectors and holding start, goal and zeros."""
@@ -271,8 +276,10 @@ class _Strings:
     def smooth(self, population: FloatArray, count: int) -> None:
         """Redistribute and relax the first `count` strings."""
         planner = self.planner
+        if count == 0:
+            return
         if planner.redistribution:
-            redistribute(population, self.problem.arm_slices, count, self._spline_of(population.shape[2]))
+            redistribute(population, self.problem.arm_slices, count, self._spline)
         relax(population, planner.relaxation_step, count)
 
     def judge(self, population: FloatArray, count: int) -> Judgement:
@@ -286,7 +293,7 @@ class _Strings:
             q = population[:, 1:].reshape(self.nq, -1)
         else:
             q = interpolate_linear(population, substeps).reshape(self.nq, -1)
-        clearance = self.problem.collision.clearance(q)
+        clearance = self.problem.collision.clearance(q, limit=0.0)
         count_collisions(clearance.least, planner.num_via_points, substeps, collisions)
         planner.objective.cost(lengths, unevenness, collisions, cost)
         return Judgement(
@@ -294,15 +301,6 @@ class _Strings:
             StringTerms(lengths, unevenness, collisions, cost),
             planner.num_via_points * substeps * count,
         )
-
-    def _spline_of(self, lanes: int) -> Redistribution:
-        if lanes not in self._spline:
-            planner = self.planner
-            joints = int(np.max(self.problem.arm_slices[:, 1] - self.problem.arm_slices[:, 0]))
-            self._spline[lanes] = prepare_redistribution(
-                planner.num_via_points, joints, lanes, planner.spline_end, planner.samples_per_segment
-            )
-        return self._spline[lanes]
 
 
 class _Best:

@@ -38,7 +38,7 @@ def percent(interval: Interval) -> str:
 
 def spread(values: Spread) -> str:
     """Return a median with its quartiles."""
-    if not values.count:
+    if not values.num_values:
         return "–"
     return f"{number(values.median)} [{number(values.lower)}, {number(values.upper)}]"
 

@@ -57,7 +57,7 @@ def parameters(results: Results, condition: ConditionResults) -> list[Parameter]
     """Return all settings of one condition, its seed and its number of replicates."""
     config = {part: getattr(condition.condition, part).canonical() for part in PARTS}
     preferred = _choices(results.experiment)
-    found = []
+    found: list[Parameter] = []
     for part, value in config.items():
         if WRAPPED in value:  # a control around the planner
             outer = {key: v for key, v in value.items() if key != WRAPPED}
@@ -88,7 +88,8 @@ def overridden(found: Iterable[Parameter]) -> list[str]:
 def option(path: Path) -> dict[str, Entry]:
     """Return the values of an option file with their comments, by dotted key; its defaults filled in."""
     text = path.read_text()
-    node, entries = yaml.compose(text), {}
+    node = yaml.compose(text)
+    entries: dict[str, Entry] = {}
     for base in yaml.safe_load(text).get("defaults", ()):
         if isinstance(base, str) and base != "_self_":
             entries |= option(path.parent / f"{base}.yaml")

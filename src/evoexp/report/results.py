@@ -121,8 +121,8 @@ class Results(NamedTuple):
     @property
     def terms(self) -> list[str]:
         """Names of the terms that any summary has, in order."""
-        columns = {name: None for c in self.with_data for name in c.summaries if name.startswith(TERM)}
-        return sorted(name.removeprefix(TERM) for name in columns)
+        columns = {str(name) for c in self.with_data for name in c.summaries}
+        return sorted(name.removeprefix(TERM) for name in columns if name.startswith(TERM))
 
     def position(self, label: str) -> int:
         """Return a condition's place in the experiment, which gives it its colour."""
@@ -145,7 +145,7 @@ def gather(
         num_replicates: Planned for every condition; None: as many as each one has.
         experiment: Its name.
         budget: Its name.
-        command: What runs the conditions; for the error.
+        command: What helps where nothing is stored.
 
     Raises:
         NothingStored: If no replicate of any condition is there, done or failed.
@@ -153,7 +153,7 @@ def gather(
     """
     found = tuple(_read(outputs, label, condition, num_replicates) for label, condition in conditions)
     if not any(condition.done or condition.failed for condition in found):
-        raise NothingStored(f"report: no replicate of {experiment or 'these runs'} in {outputs}; run it: {command}")
+        raise NothingStored(f"{experiment or 'report'}: nothing stored in {outputs}; try: {command}")
     return Results(experiment, budget, found)
 
 
@@ -174,7 +174,7 @@ def _read(outputs: Path, label: str, condition: Condition, num_replicates: int |
         condition,
         planned,
         done,
-        {int(k): str(reason) for k, reason in failed["stop_reason"].items()},
+        dict(zip(map(int, failed.index), map(str, failed["stop_reason"]), strict=True)),
         generations,
         solutions,
         None,

@@ -30,13 +30,13 @@ class Spread(NamedTuple):
         median: NaN without values.
         lower: First quartile.
         upper: Third quartile.
-        count: Values that are not NaN.
+        num_values: Values that are not NaN.
     """
 
     median: float
     lower: float
     upper: float
-    count: int
+    num_values: int
 
 
 class SignedRank(NamedTuple):

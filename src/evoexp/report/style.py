@@ -48,7 +48,8 @@ def styled() -> Iterator[None]:
     """Draw and save inside of it in evoexp's style, whatever the user's own settings are."""
     with mpl.rc_context():
         mpl.rcdefaults()
-        mpl.rcParams.update(_RC)
+        for name, value in _RC.items():
+            mpl.rcParams[name] = value  # type: ignore[index]
         yield
 
 

@@ -1,5 +1,7 @@
 """Convergence: a quantity against generations and evaluations, over replicates."""
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -8,6 +10,7 @@ from matplotlib.figure import Figure
 from evoexp.report import style
 from evoexp.report.results import ConditionResults, Results
 from evoexp.report.statistics import quantile
+from evoexp.report.tables import groups
 
 COLUMNS = ("best_cost", "mean_cost")
 NAMES = {"best_cost": "best so far", "mean_cost": "average"}
@@ -58,22 +61,24 @@ def draw_fitness(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _condition(results: Results, condition: ConditionResults, objective: object) -> pd.DataFrame:
+def _condition(results: Results, condition: ConditionResults, objective: Any) -> pd.DataFrame:
     parts = []
     for column in COLUMNS:
         rows = condition.generations[["index", "evaluations", column]]
         if objective is not None:
-            rows = rows.assign(**{column: objective.fitness(rows[column].to_numpy())})  # type: ignore[attr-defined]
-        groups = rows.groupby("index", sort=True)
-        values = [group.to_numpy() for _, group in groups[column]]
+            rows = rows.assign(**{column: objective.fitness(rows[column].to_numpy())})
+        generations = list(groups(rows, "index"))
+        values = [group[column].to_numpy() for _, group in generations]
         parts.append(
             pd.DataFrame(
                 {
                     "condition": condition.label,
                     "position": results.position(condition.label),
                     "quantity": NAMES[column],
-                    "generation": [int(generation) for generation, _ in groups],
-                    "evaluations": groups["evaluations"].median().to_numpy(),
+                    "generation": [index for index, _ in generations],
+                    "evaluations": [
+                        quantile(group["evaluations"].to_numpy(np.float64), 0.5) for _, group in generations
+                    ],
                     "median": [quantile(v, 0.5) for v in values],
                     "lower": [quantile(v, 0.25) for v in values],
                     "upper": [quantile(v, 0.75) for v in values],
@@ -88,8 +93,8 @@ def _curves(axes: Axes, table: pd.DataFrame, columns: tuple[str, ...]) -> None:
     """Draw medians as lines (the average dashed) and quartiles as bands."""
     shared = table.groupby("generation")["evaluations"].nunique().max() == 1
     across = "generation" if shared else "evaluations"
-    for (position, condition), rows in table.groupby(["position", "condition"], sort=True):
-        colour = style.condition_colour(int(position))
+    for (position, condition), rows in groups(table, ["position", "condition"]):
+        colour = style.condition_colour(position)
         for column in columns:
             curve = rows[rows["quantity"] == NAMES[column]].replace([np.inf, -np.inf], np.nan)
             kind = "-" if column == "best_cost" else (0, (3, 1.5))
@@ -115,10 +120,10 @@ def _evaluations_above(axes: Axes, table: pd.DataFrame) -> None:
     slope = float(steps.iloc[-1] - steps.iloc[0]) / float(steps.index[-1] - steps.index[0])
     offset = float(steps.iloc[0])
 
-    def forward(generation: np.ndarray) -> np.ndarray:
+    def forward(generation: Any) -> Any:
         return offset + slope * np.asarray(generation, dtype=np.float64)
 
-    def backward(evaluations: np.ndarray) -> np.ndarray:
+    def backward(evaluations: Any) -> Any:
         return (np.asarray(evaluations, dtype=np.float64) - offset) / slope
 
     above = axes.secondary_xaxis("top", functions=(forward, backward))

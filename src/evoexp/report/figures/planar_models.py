@@ -1,5 +1,7 @@
 """Model drawings of planar arms: the arms and their angles, via-points, links as touching circles."""
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -11,6 +13,7 @@ from evoexp.numerics import DEGREE, sincos
 from evoexp.records import FloatArray
 from evoexp.report import motions, style
 from evoexp.report.results import ConditionResults
+from evoexp.report.tables import groups, records, rounded
 
 NUMBERED = 5  # every fifth via-point carries its number
 
@@ -31,7 +34,7 @@ def arms_table(condition: ConditionResults) -> pd.DataFrame:
             direction = np.degrees(np.arctan2(y, x))
             rows.append((posture, arm, joint, *start[0, :2], *end[0, :2], direction - angle, angle))
     names = ["posture", "arm", "joint", "x", "y", "x_end", "y_end", "reference_deg", "angle_deg"]
-    return _rounded(pd.DataFrame(rows, columns=names)).assign(length_unit=condition.condition.length_unit)
+    return rounded(pd.DataFrame(rows, columns=names)).assign(length_unit=condition.condition.length_unit)
 
 
 def draw_arms(table: pd.DataFrame) -> Figure:
@@ -39,21 +42,15 @@ def draw_arms(table: pd.DataFrame) -> Figure:
     figure = style.figure(4.6, 4.8)
     axes = figure.subplots()
     style.operational_axes(axes, table["length_unit"].iloc[0])
-    for (posture, arm), rows in table.groupby(["posture", "arm"], sort=True):
+    for (posture, arm), links in groups(table, ["posture", "arm"]):
         at_start = posture == "start"
-        draw_arm(axes, int(arm), rows, alpha=1.0 if at_start else 0.35, dashed=not at_start)
-        for row in rows.itertuples() if at_start else ():
+        draw_arm(axes, arm, links, alpha=1.0 if at_start else 0.35, dashed=not at_start)
+        for row in records(links) if at_start else ():
             _angle(axes, row)
-    for arm, rows in table[(table["joint"] == 0) & (table["posture"] == "start")].groupby("arm"):
-        _base(axes, rows["x"].iloc[0], rows["y"].iloc[0])
-        axes.annotate(
-            f"arm {int(str(arm)) + 1}",
-            (rows["x"].iloc[0], rows["y"].iloc[0]),
-            xytext=(0, -22),
-            textcoords="offset points",
-            ha="center",
-            color=style.arm_colour(int(str(arm))),
-        )
+    for row in records(table[(table["joint"] == 0) & (table["posture"] == "start")]):
+        _base(axes, row.x, row.y)
+        below: dict[str, Any] = {"xytext": (0, -22), "textcoords": "offset points", "ha": "center"}
+        axes.annotate(f"arm {row.arm + 1}", (row.x, row.y), color=style.arm_colour(row.arm), **below)
     handles = [
         Line2D([], [], color=style.NEUTRAL, linewidth=3, marker="o", markersize=4, label="start"),
         Line2D([], [], color=style.NEUTRAL, linewidth=2, alpha=0.35, linestyle=(0, (2, 1)), label="goal"),
@@ -127,7 +124,7 @@ def circles_table(condition: ConditionResults) -> pd.DataFrame:
     nearest = motions.LinkDistance(problem.assembly).nearest(at)
     rows.append(("bodies", -1, *nearest.points[0, :2], *nearest.points[1, :2], np.nan, nearest.distance))
     names = ["element", "arm", "x", "y", "x_end", "y_end", "radius", "distance"]
-    return _rounded(pd.DataFrame(rows, columns=names)).assign(
+    return rounded(pd.DataFrame(rows, columns=names)).assign(
         safety_distance=condition.condition.scenario.security_margin,  # type: ignore[attr-defined]
         instant=instant,
         length_unit=condition.condition.length_unit,
@@ -140,19 +137,18 @@ def draw_circles(table: pd.DataFrame) -> Figure:
     axes = figure.subplots()
     unit, radius = table["length_unit"].iloc[0], table["radius"].max()
     style.operational_axes(axes, unit)
-    for row in table[table["element"] == "circle"].itertuples():
-        colour = style.arm_colour(int(row.arm))
+    for row in records(table[table["element"] == "circle"]):
+        colour = style.arm_colour(row.arm)
         axes.add_patch(Circle((row.x, row.y), row.radius, facecolor=colour, alpha=0.14, linewidth=0))
         axes.add_patch(Circle((row.x, row.y), row.radius, fill=False, edgecolor=colour, linewidth=0.8))
         axes.plot(row.x, row.y, ".", color=colour, markersize=3)
-    for arm, rows in table[table["element"] == "link"].groupby("arm"):
-        draw_arm(axes, int(str(arm)), rows)
-        _base(axes, rows["x"].iloc[0], rows["y"].iloc[0])
-    for element, colour, kind in (("centres", "black", "-"), ("bodies", "#CC79A7", "-")):
-        row = table[table["element"] == element].iloc[0]
-        what = "least distance of centres" if element == "centres" else "least distance of links"
-        label = f"{what}: {row['distance']:.3f} {unit}"
-        axes.plot([row["x"], row["x_end"]], [row["y"], row["y_end"]], kind, color=colour, linewidth=2, label=label)
+    for arm, links in groups(table[table["element"] == "link"], "arm"):
+        draw_arm(axes, arm, links)
+        _base(axes, links["x"].iloc[0], links["y"].iloc[0])
+    for row in records(table[table["distance"].notna()]):
+        what, colour = ("centres", "black") if row.element == "centres" else ("links", style.ARM_COLOURS[3])
+        label = f"least distance of {what}: {row.distance:.3f} {unit}"
+        axes.plot([row.x, row.x_end], [row.y, row.y_end], color=colour, linewidth=2, zorder=6, label=label)
     safety = table["safety_distance"].iloc[0]
     axes.plot([], [], "o", color=style.FAINT, fillstyle="none", label=f"circles of radius r = {radius:g} {unit}")
     axes.plot([], [], " ", label=f"collision below 2r = {2 * radius:g} {unit}; safety distance {safety:g} {unit}")
@@ -189,11 +185,10 @@ def _base(axes: Axes, x: float, y: float) -> None:
     axes.plot(x, y, "s", color=style.NEUTRAL, markersize=9, zorder=2)
 
 
-def _angle(axes: Axes, row: object) -> None:
+def _angle(axes: Axes, row: Any) -> None:
     """Draw one joint angle: the direction it is measured from, its arc and its value."""
-    x, y = row.x, row.y  # type: ignore[attr-defined]
-    reference, angle = row.reference_deg, row.angle_deg  # type: ignore[attr-defined]
-    arm, joint = int(row.arm), int(row.joint)  # type: ignore[attr-defined]
+    x, y, arm, joint = row.x, row.y, row.arm, row.joint
+    reference, angle = row.reference_deg, row.angle_deg
     colour, radius = style.arm_colour(arm), 0.75 if joint == 0 else 0.55
     s, c = sincos(DEGREE * reference)
     axes.plot([x, x + 1.5 * c], [y, y + 1.5 * s], ":", color=style.NEUTRAL, linewidth=0.8, zorder=1)
@@ -222,9 +217,3 @@ def _closest(centres: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
             found.append((float(distances[i, j]), first[i], second[j]))
     _, a, b = min(found, key=lambda item: item[0])
     return a, b
-
-
-def _rounded(table: pd.DataFrame) -> pd.DataFrame:
-    """Round coordinates to 12 decimals, so that rounding errors beside 0 do not differ between machines."""
-    numbers = table.select_dtypes("float64").columns
-    return table.assign(**{name: table[name].round(12) + 0.0 for name in numbers})

@@ -1,0 +1,94 @@
+"""`evoexp report`: figures, tables and verdicts again, from the outputs alone."""
+
+import argparse
+import hashlib
+import re
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from evoexp import compose
+from evoexp.commands.arguments import add_experiment_arguments
+from evoexp.condition import Condition
+from evoexp.errors import SettingError, UnknownOption
+from evoexp.report import build
+from evoexp.store.run_directory import outputs_root, resolve
+
+MAX_NAMED = 4  # runs whose hashes a report's name spells out
+_HASH = re.compile("[0-9a-fA-F]{4,64}")
+_SILENT = ("experiment", "budget", "runner")  # overrides that the command of a report need not repeat
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    add_experiment_arguments(parser)
+    for action in parser._actions:
+        if action.dest == "overrides":
+            action.metavar, action.nargs = "EXPERIMENT | HASH ... [KEY=VALUE ...]", "+"
+            action.help = "an experiment and overrides as for run, or prefixes of the hashes of stored runs"
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Draw; exit code 0."""
+    names = [word for word in arguments.overrides if "=" not in word and not word.startswith("~")]
+    overrides = [word for word in arguments.overrides if word not in names]
+    console = Console()
+    for page in _pages(names, overrides, arguments.multirun, arguments.only):
+        console.print(f"report: {page}", highlight=False, soft_wrap=True)
+    return 0
+
+
+def _pages(names: Sequence[str], overrides: Sequence[str], multirun: bool, only: Sequence[str]) -> list[Path]:
+    known = compose.options("experiment")
+    if names and not any(name in known for name in names):
+        for name in names:
+            if not _HASH.fullmatch(name):
+                raise UnknownOption("experiment", name, known)
+        if overrides or multirun or only:
+            must = "left out where runs are given by their hashes"
+            raise SettingError("overrides", must, " ".join([*overrides, *only]) or "-m")
+        return [_of_runs(names)]
+    chosen = [f"experiment={','.join(names)}"] if names else []
+    for name in names:
+        if name not in known:
+            raise UnknownOption("experiment", name, known)
+    experiments = compose.expand([*chosen, *overrides], multirun=multirun or len(names) > 1, only=only)
+    return [of_experiment(experiment, overrides, multirun, only) for experiment in experiments]
+
+
+def of_experiment(
+    experiment: compose.Experiment, overrides: Sequence[str], multirun: bool = False, only: Sequence[str] = ()
+) -> Path:
+    """Draw the report of one experiment; `run` ends with it, too.
+
+    Args:
+        experiment: As `compose.expand` gives it.
+        overrides: As typed; `experiment=` among them is not looked at.
+        multirun: Whether `-m` was given.
+        only: The labels of `--only`.
+
+    Returns:
+        Path of its `index.md`.
+    """
+    words = [experiment.name] if experiment.name in compose.options("experiment") else []
+    words += [f"budget={experiment.budget}"] if experiment.budget != "paper" else []
+    words += [word for word in overrides if word.split("=")[0] not in _SILENT]
+    words += ["--only", ",".join(only)] if only else []
+    words += ["-m"] if multirun else []
+    request = build.Request(
+        experiment.report_name, experiment.name, experiment.budget, experiment.conditions, shlex.join(words)
+    )
+    return build.report(request, experiment.report, outputs_root(), experiment.num_replicates)
+
+
+def _of_runs(prefixes: Sequence[str]) -> Path:
+    """Draw one report of several stored runs."""
+    runs = [resolve(outputs_root(), prefix) for prefix in prefixes]
+    found = {run.hash12: Condition.from_json(run.config_json()) for run in runs}
+    name = "+".join(found)
+    if len(found) > MAX_NAMED:
+        name = f"{len(found)}_runs+{hashlib.sha256(name.encode()).hexdigest()[:8]}"
+    settings = compose.expand([f"experiment={compose.options('experiment')[0]}", "report=paper"])[0].report
+    return build.report(build.Request(name, "", "", tuple(found.items())), settings, outputs_root(), None)

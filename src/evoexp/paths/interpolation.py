@@ -1,0 +1,41 @@
+"""Configurations between via-points."""
+
+import numpy as np
+
+from evoexp.numerics import kernel
+from evoexp.records import FloatArray
+
+
+def interpolate_linear(via_points: FloatArray, substeps: int) -> FloatArray:
+    """Return configurations at fractions 1/s, 2/s, … 1 of every segment.
+
+    Args:
+        via_points: (nq, N + 1, lanes).
+        substeps: s ≥ 1.
+
+    Returns:
+        (nq, N · s, lanes); every s-th is a via-point, bit for bit.
+
+    Raises:
+        ValueError: If `substeps` is less than 1.
+    """
+    if substeps < 1:
+        raise ValueError(f"substeps must be at least 1, was {substeps}")
+    nq, num_points, lanes = via_points.shape
+    out = np.empty((nq, (num_points - 1) * substeps, lanes))
+    _interpolate_linear(via_points, substeps, out)
+    return out
+
+
+@kernel
+def _interpolate_linear(via_points, substeps, out):  # type: ignore[no-untyped-def]
+    nq, num_points, lanes = via_points.shape
+    for joint in range(nq):
+        j = np.uint64(joint)
+        for k in range(num_points - 1):
+            before, after = np.uint64(k), np.uint64(k + 1)
+            for step in range(1, substeps + 1):
+                row, fraction = np.uint64(k * substeps + step - 1), step / substeps
+                for lane in range(lanes):
+                    a, b = via_points[j, before, lane], via_points[j, after, lane]
+                    out[j, row, lane] = b if step == substeps else a + fraction * (b - a)

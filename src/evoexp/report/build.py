@@ -1,0 +1,128 @@
+"""Builds a report: the one place of it that writes files."""
+
+import hashlib
+import io
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import evoexp
+from evoexp.condition import Condition
+from evoexp.report.index import render
+from evoexp.report.page import Drawing
+from evoexp.report.pages import page_of
+from evoexp.report.results import gather
+from evoexp.report.settings import ReportSettings
+from evoexp.report.style import styled
+from evoexp.store.files import write_files
+
+INDEX = "index.md"
+_METADATA: dict[str, dict[str, Any]] = {  # nothing that changes from one day, or one machine, to the next
+    "svg": {"Date": None, "Creator": "evoexp"},
+    "png": {"Software": "evoexp"},
+    "pdf": {"CreationDate": None, "Creator": "evoexp", "Producer": None},
+}
+
+
+class Request(NamedTuple):
+    """What a report is asked for.
+
+    Attributes:
+        report_name: Directory under `reports`.
+        experiment: Name of the experiment; empty for runs given by their hashes.
+        budget: Name of the budget; empty for runs given by their hashes.
+        conditions: (label, condition) in the order of the experiment.
+        arguments: What was asked for, as words of the command line: "rana_planar budget=smoke"; derived if empty.
+    """
+
+    report_name: str
+    experiment: str
+    budget: str
+    conditions: Sequence[tuple[str, Condition]]
+    arguments: str = ""
+
+    @property
+    def words(self) -> str:
+        """Words of the command line that ask for this report."""
+        if self.arguments:
+            return self.arguments
+        if self.experiment and "+" not in self.report_name:
+            return self.experiment if self.budget == "paper" else f"{self.experiment} budget={self.budget}"
+        return " ".join(dict.fromkeys(condition.id[:12] for _, condition in self.conditions))
+
+    @property
+    def hint(self) -> str:
+        """The command that helps where nothing is stored."""
+        if self.experiment and self.words.split(" ")[0] == self.experiment:
+            return f"evoexp run experiment={self.words}"
+        return f"evoexp run {self.words}" if self.arguments else f"evoexp show {self.words}"
+
+
+def report(request: Request, settings: ReportSettings, outputs: Path, num_replicates: int | None) -> Path:
+    """Write a report and return the path of its `index.md`.
+
+    Args:
+        request: What it is of.
+        settings: How it is drawn.
+        outputs: Root of all outputs.
+        num_replicates: Planned for every condition; None: as many as each one has.
+
+    Raises:
+        NothingStored: If nothing of it has been run.
+        UnknownOption: If the settings name a page that does not exist.
+        CorruptLog: If a log cannot be trusted.
+    """
+    found = gather(outputs, request.conditions, num_replicates, request.experiment, request.budget, request.hint)
+    page = page_of(found, settings)
+    directory = outputs / "reports" / request.report_name
+    files: dict[str, bytes] = {}
+    for drawing in page.drawings:
+        files |= _drawn(drawing, settings)
+    files[INDEX] = render(page, found, settings, f"evoexp report {request.words}").encode()
+    directory.mkdir(parents=True, exist_ok=True)
+    write_files({directory / name: content for name, content in files.items()})
+    for path in directory.iterdir():  # what an earlier report had and this one has not
+        if path.name not in files and not path.name.startswith("."):
+            path.unlink()
+    return directory / INDEX
+
+
+def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:
+    """Return the files of one figure: pictures, data rows, sidecar."""
+    with styled():
+        table = drawing.table()
+        figure = drawing.draw(table)
+        pictures = {}
+        for kind in settings.formats:
+            buffer = io.BytesIO()
+            figure.savefig(buffer, format=kind, dpi=settings.dpi, metadata=_METADATA[kind])
+            pictures[f"{drawing.stem}.{kind}"] = buffer.getvalue()
+    rows = table.to_csv(index=False, lineterminator="\n").encode()
+    sidecar = {
+        "figure": drawing.title,
+        "code_version": evoexp.__version__,
+        "conditions": _provenance(drawing),
+        "data": {"file": f"{drawing.stem}.csv", "rows": len(table), "sha256": _sha256(rows)},
+        "files": {name: _sha256(content) for name, content in pictures.items()},
+    }
+    text = json.dumps(sidecar, indent=2, sort_keys=True, ensure_ascii=False) + "\n"
+    return pictures | {f"{drawing.stem}.csv": rows, f"{drawing.stem}.json": text.encode()}
+
+
+def _provenance(drawing: Drawing) -> list[dict[str, Any]]:
+    return [
+        {
+            "label": c.label,
+            "run": c.condition.id,
+            "planned": c.planned,
+            "done": c.done,
+            "failed": c.failed,
+            "run_code": c.code,
+        }
+        for c in drawing.conditions
+    ]
+
+
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()

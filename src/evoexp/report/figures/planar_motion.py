@@ -1,0 +1,232 @@
+"""Motions of planar arms: snapshots, paths in configuration space, distances between the arms."""
+
+import itertools
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from evoexp.records import FloatArray
+from evoexp.report import motions, style
+from evoexp.report.figures.planar_models import draw_arm, path_table
+from evoexp.report.results import ConditionResults
+from evoexp.report.tables import groups, rounded
+
+STAGES = 5  # panels that a motion is cut into; the sixth holds all of it
+CENTRES, LINKS = "circle centres", "links"
+BEST, AT_VIA_POINTS, STRAIGHT = "best replicate", "best replicate, at via-points", "straight line"
+LOWEST, HIGHEST = "lowest of all replicates", "highest of all replicates"
+
+
+def snapshots_table(condition: ConditionResults) -> pd.DataFrame:
+    """Return all links at every instant of the best replicate's motion.
+
+    Returns:
+        Columns stage, first, last (instants of the stage), instant, arm, link, x, y, x_end, y_end [length unit],
+        length_unit. An instant between two stages belongs to both; the last stage holds all.
+    """
+    problem = condition.prepared.problem
+    q = motions.configurations(condition.prepared, condition.solutions[condition.best_replicate])
+    last = q.shape[1] - 1
+    cuts = np.unique(np.round(np.linspace(0, last, min(STAGES, last) + 1)).astype(np.int64))
+    stages = [*itertools.pairwise(cuts), (0, last)]
+    links = list(motions.joint_positions(problem.assembly, q))
+    rows = []
+    for stage, (first, stop) in enumerate(stages):
+        for instant in range(first, stop + 1):
+            for arm, link, start, end in links:
+                place = (*start[instant, :2], *end[instant, :2])
+                rows.append((stage, first, stop, instant, arm, link, *place))
+    names = ["stage", "first", "last", "instant", "arm", "link", "x", "y", "x_end", "y_end"]
+    return rounded(pd.DataFrame(rows, columns=names)).assign(length_unit=condition.condition.length_unit)
+
+
+def draw_snapshots(table: pd.DataFrame) -> Figure:
+    """Draw the motion stage by stage, older instants fainter, and all of it in the last panel."""
+    stages = sorted(table["stage"].unique())
+    columns = min(3, len(stages))
+    lines = -(-len(stages) // columns)
+    figure = style.figure(2.75 * lines + 0.2)
+    panels = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
+    unit = table["length_unit"].iloc[0]
+    for k, axes in enumerate(panels.ravel()):
+        if k >= len(stages):
+            axes.set_axis_off()
+            continue
+        rows = table[table["stage"] == stages[k]]
+        _snapshot(axes, rows, whole=k == len(stages) - 1)
+        style.operational_axes(axes, unit)
+        axes.label_outer()
+        first, last = rows["first"].iloc[0], rows["last"].iloc[0]
+        axes.set_title(f"all instants {first}–{last}" if k == len(stages) - 1 else f"instants {first}–{last}")
+    x, y = table[["x", "x_end"]].to_numpy(), table[["y", "y_end"]].to_numpy()
+    panels[0, 0].set_xlim(x.min() - 0.5, x.max() + 0.5)
+    panels[0, 0].set_ylim(y.min() - 0.5, y.max() + 0.5)
+    arms = sorted(table["arm"].unique())
+    handles = [Line2D([], [], color=style.arm_colour(a), linewidth=3, label=f"arm {a + 1}") for a in arms]
+    dashes = (0, (2, 1))
+    handles.append(Line2D([], [], color=style.FAINT, linewidth=1.4, linestyle=dashes, label="first instant of a panel"))
+    handles.append(Line2D([], [], color=style.NEUTRAL, linewidth=3, marker="o", ms=4, label="last instant of a panel"))
+    handles.append(Line2D([], [], color=style.NEUTRAL, linewidth=0.8, linestyle=":", label="trace of the tip"))
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    return figure
+
+
+def paths_table(condition: ConditionResults) -> pd.DataFrame:
+    """Return the paths of all replicates and the straight line, in configuration space.
+
+    Returns:
+        Columns series (replicate, best, straight line), replicate (−1: none), arm, instant, joint_1_deg, joint_2_deg.
+    """
+    parts = []
+    for replicate, solution in condition.solutions.items():
+        series = "best" if replicate == condition.best_replicate else "replicate"
+        parts.append(path_table(condition, solution).assign(series=series, replicate=replicate))
+    straight = motions.straight_line(condition.prepared)
+    parts.append(path_table(condition, straight).assign(series=STRAIGHT, replicate=-1))
+    return pd.concat(parts, ignore_index=True)
+
+
+def draw_paths(table: pd.DataFrame) -> Figure:
+    """Draw the paths in the arms' configuration planes."""
+    arms = sorted(table["arm"].unique())
+    figure = style.figure(3.7)
+    planes = figure.subplots(1, len(arms), squeeze=False)[0]
+    for axes, arm in zip(planes, arms, strict=True):
+        style.configuration_axes(axes, arm)
+        colour = style.arm_colour(arm)
+        for (series, _), rows in groups(table[table["arm"] == arm], ["series", "replicate"]):
+            x, y = rows["joint_1_deg"].to_numpy(), rows["joint_2_deg"].to_numpy()
+            if series == "best":
+                axes.plot(x, y, color=colour, linewidth=1.8, marker="o", markersize=3, zorder=4)
+                axes.plot(x[0], y[0], "s", color="white", markeredgecolor=style.NEUTRAL, markersize=7, zorder=5)
+                axes.plot(x[-1], y[-1], "*", color="white", markeredgecolor=style.NEUTRAL, markersize=11, zorder=5)
+            elif series == STRAIGHT:
+                axes.plot(x, y, ":", color=style.NEUTRAL, linewidth=1.1, zorder=3)
+            else:
+                axes.plot(x, y, color=colour, linewidth=0.8, alpha=0.3)
+        axes.margins(0.08)
+    count = table.loc[table["replicate"] >= 0, "replicate"].nunique()
+    grey = style.NEUTRAL
+    handles = [
+        Line2D([], [], color=grey, linewidth=1.8, marker="o", ms=3, label="best replicate, its via-points"),
+        Line2D([], [], color=grey, linewidth=0.8, alpha=0.4, label=f"all replicates (n = {count})"),
+        Line2D([], [], color=grey, linewidth=1.1, linestyle=":", label=STRAIGHT),
+        Line2D([], [], color="none", marker="s", mec=grey, mfc="white", ms=7, label="start"),
+        Line2D([], [], color="none", marker="*", mec=grey, mfc="white", ms=11, label="goal"),
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    return figure
+
+
+def sampled_distances(condition: ConditionResults, samples: int) -> pd.DataFrame:
+    """Return both distances between the arms along every replicate's motion and along the straight line.
+
+    Args:
+        condition: With data.
+        samples: Configurations per segment.
+
+    Returns:
+        Columns replicate (−1: the straight line), instant (a fraction between via-points), centres and links: least
+        distances of circle centres and of the links themselves [length unit].
+    """
+    prepared = condition.prepared
+    links = motions.LinkDistance(prepared.problem.assembly)
+    solutions = {-1: motions.straight_line(prepared), **condition.solutions}
+    parts = []
+    for replicate, solution in solutions.items():
+        instants, q = motions.dense(motions.configurations(prepared, solution), samples)
+        distances = {"centres": motions.centre_distances(prepared.problem, q), "links": links(q)}
+        parts.append(pd.DataFrame({"replicate": replicate, "instant": instants, **distances}))
+    return pd.concat(parts, ignore_index=True)
+
+
+def distances_table(condition: ConditionResults, sampled: pd.DataFrame) -> pd.DataFrame:
+    """Return the distances that Fig. 7 shows.
+
+    Args:
+        condition: With data.
+        sampled: Of `sampled_distances`.
+
+    Returns:
+        Columns measure (circle centres, links), series, instant, distance, safety_distance [length unit], length_unit.
+    """
+    best = sampled[sampled["replicate"] == condition.best_replicate]
+    straight = sampled[sampled["replicate"] == -1]
+    every = sampled[sampled["replicate"] >= 0].groupby("instant", sort=True)
+    at_via_points = best[best["instant"] == best["instant"].round()]
+    parts = []
+    for measure, column in ((CENTRES, "centres"), (LINKS, "links")):
+        for series, values in (
+            (BEST, best.set_index("instant")[column]),
+            (AT_VIA_POINTS, at_via_points.set_index("instant")[column]),
+            (LOWEST, every[column].min()),
+            (HIGHEST, every[column].max()),
+            (STRAIGHT, straight.set_index("instant")[column]),
+        ):
+            columns = {"measure": measure, "series": series, "instant": values.index, "distance": values.to_numpy()}
+            parts.append(pd.DataFrame(columns))
+    margin = condition.condition.scenario.security_margin  # type: ignore[attr-defined]
+    table = rounded(pd.concat(parts, ignore_index=True))
+    return table.assign(safety_distance=margin, length_unit=condition.condition.length_unit)
+
+
+def draw_distances(table: pd.DataFrame) -> Figure:
+    """Draw the least distance between the arms against the instant, in the paper's model and between the links."""
+    figure = style.figure(5.4)
+    panels = figure.subplots(2, 1, sharex=True)
+    unit, safety = table["length_unit"].iloc[0], float(table["safety_distance"].iloc[0])
+    titles = {CENTRES: "a  circle centres (the paper's model)", LINKS: "b  the links themselves (exact, coal)"}
+    for axes, measure in zip(panels, (CENTRES, LINKS), strict=True):
+        _distances(axes, table[table["measure"] == measure], safety, unit)
+        axes.set_title(titles[measure])
+        axes.set_ylabel(f"least distance [{unit}]")
+        axes.set_xlim(0, table["instant"].max())
+        axes.set_ylim(bottom=0)
+    panels[1].set_xlabel("instant (whole numbers: via-points)")
+    style.legend_below(figure, panels[0], 3)
+    return figure
+
+
+def _distances(axes: Axes, rows: pd.DataFrame, safety: float, unit: str) -> None:
+    series = dict(groups(rows, "series"))
+    low, high = series[LOWEST], series[HIGHEST]
+    colour = style.ARM_COLOURS[0]
+    axes.fill_between(
+        low["instant"],
+        low["distance"],
+        high["distance"],
+        color=colour,
+        alpha=0.18,
+        linewidth=0,
+        label="range over replicates",
+    )
+    axes.plot(series[STRAIGHT]["instant"], series[STRAIGHT]["distance"], ":", color=style.FAINT, lw=1.2, label=STRAIGHT)
+    axes.plot(series[BEST]["instant"], series[BEST]["distance"], color=colour, lw=1.3, label=f"{BEST}, between them")
+    points = series[AT_VIA_POINTS]
+    axes.plot(points["instant"], points["distance"], "o", color=colour, mec="white", mew=0.6, ms=5, label=AT_VIA_POINTS)
+    axes.axhline(
+        safety, color=style.LIMIT, linewidth=1.0, linestyle=(0, (5, 2)), label=f"safety distance {safety:g} {unit}"
+    )
+
+
+def _snapshot(axes: Axes, rows: pd.DataFrame, whole: bool) -> None:
+    """Draw the instants of one stage."""
+    first, last = rows["instant"].min(), rows["instant"].max()
+    for arm, own in groups(rows, "arm"):
+        colour = style.arm_colour(arm)
+        tips = own[own["link"] == own["link"].max()]
+        axes.plot(tips["x_end"], tips["y_end"], ":", color=colour, linewidth=0.8, zorder=2)
+        for instant, links in groups(own, "instant"):
+            x: FloatArray = np.append(links["x"].to_numpy(), links["x_end"].iloc[-1])
+            y: FloatArray = np.append(links["y"].to_numpy(), links["y_end"].iloc[-1])
+            if instant == last:
+                draw_arm(axes, arm, links)
+            elif instant == first:
+                axes.plot(x, y, linestyle=(0, (2, 1)), color=colour, linewidth=1.4, alpha=0.8, zorder=2)
+            else:
+                age = (last - instant) / max(1, last - first)
+                axes.plot(x, y, color=colour, linewidth=1.0, alpha=0.25 if whole else 0.7 - 0.5 * age, zorder=1)
+        axes.plot(own["x"].iloc[0], own["y"].iloc[0], "s", color=style.NEUTRAL, markersize=6, zorder=2)

@@ -1,0 +1,154 @@
+"""The text of a report: `index.md`."""
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from evoexp.report import markdown
+from evoexp.report.claims import Claim, Comparison
+from evoexp.report.page import Drawing, Page
+from evoexp.report.parameters import Parameter, parameters
+from evoexp.report.results import Results
+from evoexp.report.settings import ReportSettings
+from evoexp.report.statistics import wilson
+
+
+def render(page: Page, results: Results, settings: ReportSettings, command: str) -> str:
+    """Return the page as Markdown; the same results give the same text.
+
+    Args:
+        page: What it consists of.
+        results: What it was drawn from.
+        settings: Levels and formats.
+        command: What makes it.
+    """
+    parts = [
+        f"# {page.title}\n",
+        _made_by(results, command),
+        _incomplete(results),
+        f"{page.introduction}\n" if page.introduction else "",
+        _section("Conditions", _conditions(results, settings)),
+        _section("Results", _quantities(page, results)),
+        _section("Claims", _claims(page.claims)),
+        _section("Known defects and checks", _checks(page.checks)),
+        *(_section(heading, _comparison(rows, settings)) for heading, rows in page.comparisons),
+        _section("Figures", "\n".join(_figure(drawing, settings) for drawing in page.drawings)),
+        _section("Parameters", _parameters(results)),
+        _section("Failures", _failures(results)),
+    ]
+    return "\n".join(part for part in parts if part)
+
+
+def _section(heading: str, text: str) -> str:
+    return f"## {heading}\n\n{text}" if text else ""
+
+
+def _made_by(results: Results, command: str) -> str:
+    lines = [f"Made by `{command}`"]
+    if results.experiment:
+        lines.append(f"experiment `{results.experiment}`")
+    if results.budget:
+        lines.append(f"budget `{results.budget}`")
+    return ", ".join(lines) + ".\n"
+
+
+def _incomplete(results: Results) -> str:
+    """Say what is missing; empty where nothing is."""
+    missing = [
+        f"{c.label}: {c.done} of {c.planned} replicates done, {c.failed} failed"
+        for c in results.conditions
+        if c.done < c.planned
+    ]
+    return f"> **Partial results.** {'; '.join(missing)}. Everything below is drawn from what is there.\n" * bool(
+        missing
+    )
+
+
+def _conditions(results: Results, settings: ReportSettings) -> str:
+    rows = []
+    for c in results.conditions:
+        interval = markdown.percent(wilson(c.solved, c.done, settings.confidence)) if c.done else "–"
+        solved = f"{markdown.share(c.solved, c.done)} ({interval})" if c.done else "–"
+        rows.append((c.label, f"`{c.hash12}`", c.done, c.planned, c.failed, solved))
+    headers = ("condition", "hash", "done", "planned", "failed", "solved")
+    level = f"{100 * settings.confidence:g} %"
+    note = f"\"Solved\": the paper's own model accepts the best solution; in brackets Wilson's {level} interval.\n"
+    return f"{markdown.table(headers, rows)}\n{note}"
+
+
+def _quantities(page: Page, results: Results) -> str:
+    labels = [c.label for c in results.with_data]
+    if not labels or not page.quantities:
+        return ""
+    rows = [(q.name, q.unit, *(markdown.spread(q.spreads[label]) for label in labels)) for q in page.quantities]
+    heads = [f"{c.label} (n = {c.done})" for c in results.with_data]
+    note = "Median [first quartile, third quartile] over finished replicates.\n"
+    return f"{markdown.table(('quantity', 'unit', *heads), rows)}\n{note}"
+
+
+def _claims(claims: Sequence[Claim]) -> str:
+    if not claims:
+        return ""
+    rows = [(c.text, c.source, c.evidence, f"**{c.verdict}**") for c in claims]
+    return markdown.table(("claim", "paper", "what is found", "verdict"), rows)
+
+
+def _checks(checks: Sequence[tuple[str, str]]) -> str:
+    return markdown.table(("what", "found"), checks) if checks else ""
+
+
+def _comparison(rows: Iterable[Comparison], settings: ReportSettings) -> str:
+    cells = []
+    for c in rows:
+        low, high = c.better.interval
+        cells.append(
+            (
+                c.quantity,
+                c.num_seeds,
+                markdown.number(c.median_difference),
+                f"{c.better.a12:.3f} [{low:.3f}, {high:.3f}]",
+                markdown.p_value(c.test.p_value),
+                markdown.p_value(c.p_adjusted),
+            )
+        )
+    headers = ("quantity", "common seeds", "median difference", "A12 of being better", "p", "p adjusted")
+    note = (
+        "Difference: first minus second, seed by seed. A12 (Vargha and Delaney): probability that a run of the first is "
+        f"better than one of the second, ties count half; in brackets the {100 * settings.confidence:g} % percentile "
+        f"interval of {settings.num_resamples} resamples of seeds. p: Wilcoxon's signed-rank test, two-sided; adjusted: "
+        "Holm over the rows of this table.\n"
+    )
+    return f"{markdown.table(headers, cells)}\n{note}"
+
+
+def _figure(drawing: Drawing, settings: ReportSettings) -> str:
+    shown = next((kind for kind in ("png", "svg") if kind in settings.formats), None)
+    files = [*(f"{drawing.stem}.{kind}" for kind in settings.formats), f"{drawing.stem}.csv", f"{drawing.stem}.json"]
+    links = " · ".join(f"[{name.rsplit('.', 1)[1]}]({name})" for name in files)
+    picture = f"![{drawing.title}]({drawing.stem}.{shown})\n\n" if shown else ""
+    return f"### {drawing.title}\n\n{picture}{drawing.caption}\n\n{links}\n"
+
+
+def _parameters(results: Results) -> str:
+    """One row per setting; where conditions differ, one value per group of conditions that agree."""
+    by_name: dict[str, dict[Parameter, list[str]]] = {}
+    for condition in results.conditions:
+        for parameter in parameters(results, condition):
+            by_name.setdefault(parameter.name, {}).setdefault(parameter, []).append(condition.label)
+    rows = []
+    for name in _ordered(by_name):
+        for parameter, labels in by_name[name].items():
+            where = "" if len(labels) == len(results.conditions) else f" ({', '.join(labels)})"
+            rows.append((f"`{name}`{where}", parameter.value, parameter.unit or "–", parameter.source or "–"))
+    return markdown.table(("setting", "value", "unit", "source"), rows)
+
+
+def _ordered(by_name: dict[str, dict[Parameter, list[str]]]) -> Iterator[str]:
+    """Yield settings group by group, seed and number of replicates last."""
+    groups = list(dict.fromkeys(name.split(".")[0].split("[")[0] for name in by_name))
+    groups.sort(key=lambda group: group in ("seed", "num_replicates"))
+    for group in groups:
+        yield from (name for name in by_name if name.split(".")[0].split("[")[0] == group)
+
+
+def _failures(results: Results) -> str:
+    rows = [(c.label, replicate, reason) for c in results.conditions for replicate, reason in c.failures.items()]
+    return markdown.table(("condition", "replicate", "reason"), rows) if rows else ""

@@ -1,0 +1,61 @@
+"""What a page consists of, before it is written."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import pandas as pd
+from matplotlib.figure import Figure
+
+from evoexp.report.claims import Claim, Comparison
+from evoexp.report.results import ConditionResults
+from evoexp.report.statistics import Spread
+
+
+class Drawing(NamedTuple):
+    """One figure: from results to its table, from its table to a picture.
+
+    Attributes:
+        stem: Of its files.
+        title: Heading; names the paper's figure.
+        caption: What the paper states and what is found.
+        table: Gives the data.
+        draw: Draws the data.
+        conditions: Whose results it shows.
+    """
+
+    stem: str
+    title: str
+    caption: str
+    table: Callable[[], pd.DataFrame]
+    draw: Callable[[pd.DataFrame], Figure]
+    conditions: tuple[ConditionResults, ...]
+
+
+class Quantity(NamedTuple):
+    """A row of the table of results: a quantity of a finished replicate, median and quartiles per condition."""
+
+    name: str
+    unit: str
+    spreads: dict[str, Spread]  # by label
+
+
+class Page(NamedTuple):
+    """A report before it is written.
+
+    Attributes:
+        title: Heading.
+        introduction: One paragraph.
+        quantities: The table of results.
+        claims: With verdicts; empty where there is no paper to judge.
+        checks: (what, finding): known defects and checks of the scene, shown at every budget.
+        comparisons: Of conditions on common seeds, by heading.
+        drawings: The figures.
+    """
+
+    title: str
+    introduction: str
+    quantities: tuple[Quantity, ...] = ()
+    claims: tuple[Claim, ...] = ()
+    checks: tuple[tuple[str, str], ...] = ()
+    comparisons: tuple[tuple[str, tuple[Comparison, ...]], ...] = ()
+    drawings: tuple[Drawing, ...] = ()

@@ -1,0 +1,29 @@
+"""Pages: which figures, claims and checks a report of some experiment has."""
+
+import importlib
+from typing import Any, cast
+
+from evoexp.errors import UnknownOption
+from evoexp.report.page import Page
+from evoexp.report.results import Results
+from evoexp.report.settings import ReportSettings
+
+PAGES = {
+    "generic": "evoexp.report.pages.generic:page",
+    "planar_arms": "evoexp.report.pages.planar_arms:page",
+    "rana_planar": "evoexp.report.pages.rana_planar:page",
+}
+"""Name, as `report.figures` gives it → `module:function`."""
+
+
+def page_of(results: Results, settings: ReportSettings) -> Page:
+    """Return the page that the settings name, filled from results.
+
+    Raises:
+        UnknownOption: If there is none of this name.
+    """
+    name = settings.figures or "generic"
+    if name not in PAGES:
+        raise UnknownOption("report.figures", name, PAGES)
+    module, _, function = PAGES[name].partition(":")
+    return cast(Page, cast(Any, getattr(importlib.import_module(module), function))(results, settings))

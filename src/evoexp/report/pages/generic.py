@@ -1,0 +1,118 @@
+"""The page of whatever has no page of its own: results, convergence, and comparisons with the controls."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+
+from evoexp.records import FloatArray
+from evoexp.report.claims import Comparison, adjusted, compare
+from evoexp.report.figures import convergence
+from evoexp.report.page import Drawing, Page, Quantity
+from evoexp.report.results import ConditionResults, Results
+from evoexp.report.settings import ReportSettings
+from evoexp.report.statistics import spread
+from evoexp.store.messages import TERM
+
+Values = Callable[[ConditionResults], FloatArray]
+
+
+def page(results: Results, settings: ReportSettings) -> Page:
+    """Return the page."""
+    return Page(
+        title=results.experiment or "stored runs",
+        introduction="",
+        quantities=(*quantities(results), *term_quantities(results)),
+        comparisons=comparisons(results, settings, (("best cost", True, by_column("best_cost")),)),
+        drawings=(cost_drawing(results),) if results.with_data else (),
+    )
+
+
+def by_column(name: str) -> Values:
+    """Return the function that gives a condition's column of this name."""
+    return lambda condition: condition.column(name)
+
+
+def quantity(results: Results, name: str, unit: str, values: Values) -> Quantity:
+    """Return a row of the table of results."""
+    return Quantity(name, unit, {c.label: spread(values(c)) for c in results.with_data})
+
+
+def quantities(results: Results) -> tuple[Quantity, ...]:
+    """Return what every planner records."""
+    first = "first generation with a feasible individual (over the runs that have one)"
+    return (
+        quantity(results, "best cost", "–", by_column("best_cost")),
+        quantity(results, first, "generation", by_column("first_feasible_generation")),
+        quantity(results, "evaluations", "–", by_column("evaluations")),
+        quantity(results, "configurations judged for collision", "–", by_column("collision_queries")),
+    )
+
+
+def term_quantities(results: Results) -> tuple[Quantity, ...]:
+    """Return the planner's own terms of the best solutions."""
+    rows = []
+    for term in results.terms:
+        name, unit = term.replace("_", " "), "–"
+        if term.endswith("_deg"):
+            name, unit = name.removesuffix(" deg"), "deg"
+        elif "distance" in term or "clearance" in term:
+            unit = results.with_data[0].condition.length_unit or "–"
+        rows.append(quantity(results, name, unit, by_column(TERM + term)))
+    return tuple(rows)
+
+
+def cost_drawing(results: Results) -> Drawing:
+    """Return the figure of convergence."""
+    return Drawing(
+        stem="convergence",
+        title="Convergence",
+        caption="Best cost so far (full) and average cost of the finite individuals of a generation (dashed): median "
+        "and quartiles over replicates. Lower is better.",
+        table=partial(convergence.cost_table, results),
+        draw=convergence.draw_cost,
+        conditions=results.with_data,
+    )
+
+
+def comparisons(
+    results: Results, settings: ReportSettings, compared: Sequence[tuple[str, bool, Values]]
+) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
+    """Compare every condition with every control on their common seeds.
+
+    Args:
+        results: Of the experiment.
+        settings: Levels and resamples.
+        compared: (quantity, whether lower is better, its values).
+
+    Returns:
+        (heading, one comparison per quantity), p-values adjusted over the quantities.
+    """
+    found = []
+    for first in results.with_data:
+        for second in results.with_data:
+            if first.is_control or not second.is_control or first.condition.seed != second.condition.seed:
+                continue
+            rows = [compare_on_common_seeds(first, second, *what, settings) for what in compared]
+            kept = [row for row in rows if row is not None]
+            if kept:
+                found.append((f"{first.label} against {second.label}", tuple(adjusted(kept))))
+    return tuple(found)
+
+
+def compare_on_common_seeds(
+    first: ConditionResults,
+    second: ConditionResults,
+    quantity: str,
+    lower_is_better: bool,
+    values: Values,
+    settings: ReportSettings,
+) -> Comparison | None:
+    """Compare one quantity over the replicates that both have; None where there is none."""
+    common = first.summaries.index.intersection(second.summaries.index)
+    x = values(first)[first.summaries.index.get_indexer(common)]
+    y = values(second)[second.summaries.index.get_indexer(common)]
+    known = ~(np.isnan(x) | np.isnan(y))
+    if not known.any():
+        return None
+    return compare(quantity, x[known], y[known], lower_is_better, settings.confidence, settings.num_resamples)

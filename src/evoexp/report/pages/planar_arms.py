@@ -1,0 +1,90 @@
+"""The page of planar arms with two joints each: convergence, snapshots, paths, distances."""
+
+import re
+from collections.abc import Iterator
+from functools import partial
+
+import pandas as pd
+
+from evoexp.report.figures import planar_motion
+from evoexp.report.page import Drawing, Page
+from evoexp.report.pages import generic
+from evoexp.report.results import ConditionResults, Results
+from evoexp.report.settings import ReportSettings
+
+SNAPSHOTS = (
+    "Motion of the best replicate (lowest cost), stage by stage; links that cross on paper in one panel do so at "
+    "different instants unless both are drawn in the same shade."
+)
+PATHS = "Paths of all replicates in the planes of the joint angles; angles are not wrapped."
+DISTANCES = (
+    "Least distance between two arms against the instant: a) of circle centres, b) of the links themselves; at "
+    "via-points (dots) and sampled between them (line)."
+)
+
+
+def page(results: Results, settings: ReportSettings) -> Page:
+    """Return the page; without the drawings of what is not planar."""
+    base = generic.page(results, settings)
+    drawings = list(base.drawings)
+    for condition, suffix in suffixed(results):
+        if not drawable(condition):
+            continue
+        drawings += motion_drawings(condition, suffix)
+        if condition.prepared.problem.assembly.num_arms > 1:
+            sampled = planar_motion.sampled_distances(condition, settings.samples_per_segment)
+            drawings.append(distances_drawing(condition, suffix, sampled))
+    return base._replace(drawings=tuple(drawings))
+
+
+def drawable(condition: ConditionResults) -> bool:
+    """Whether a condition's robot moves in a plane, its arms having two joints each."""
+    assembly = getattr(condition.prepared.problem, "assembly", None)
+    if assembly is None or not assembly.table.planar:
+        return False
+    return all(stop - first == 2 for first, stop in assembly.arm_slices)
+
+
+def suffixed(results: Results) -> Iterator[tuple[ConditionResults, str]]:
+    """Yield the conditions whose motions are drawn, each with what tells its files apart."""
+    for k, condition in enumerate(results.main):
+        slug = re.sub(r"[^a-z0-9]+", "_", condition.label.lower()).strip("_") or str(k)
+        yield condition, "" if len(results.main) == 1 else f"_{k + 1}_{slug}"
+
+
+def motion_drawings(condition: ConditionResults, suffix: str) -> list[Drawing]:
+    """Return snapshots and paths of one condition."""
+    return [
+        Drawing(
+            f"snapshots{suffix}",
+            _title("Snapshots of the motion", condition, suffix),
+            SNAPSHOTS,
+            partial(planar_motion.snapshots_table, condition),
+            planar_motion.draw_snapshots,
+            (condition,),
+        ),
+        Drawing(
+            f"paths{suffix}",
+            _title("Paths in configuration space", condition, suffix),
+            PATHS,
+            partial(planar_motion.paths_table, condition),
+            planar_motion.draw_paths,
+            (condition,),
+        ),
+    ]
+
+
+def distances_drawing(condition: ConditionResults, suffix: str, sampled: pd.DataFrame) -> Drawing:
+    """Return the figure of distances between the arms of one condition."""
+    return Drawing(
+        f"distances{suffix}",
+        _title("Least distance between the arms", condition, suffix),
+        DISTANCES,
+        partial(planar_motion.distances_table, condition, sampled),
+        planar_motion.draw_distances,
+        (condition,),
+    )
+
+
+def _title(text: str, condition: ConditionResults, suffix: str) -> str:
+    return f"{text} ({condition.label})" if suffix else text

@@ -1,0 +1,134 @@
+"""Operators: what must hold whatever is drawn, and the statistics of what is."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from evoexp.errors import SettingError
+from evoexp.evolution.crossover import site_crossover
+from evoexp.evolution.selection import elites, roulette
+from evoexp.evolution.settings import GeneticSettings
+from evoexp.evolution.statistics import cost_statistics
+
+ARMS = np.array([[0, 2], [2, 5]])
+
+
+def population(seed: int, individuals: int = 12, points: int = 9) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(0.0, 50.0, size=(5, points, individuals))
+
+
+def crossed(seed: int, parents: np.ndarray, rate: float, distance: float, strings: np.ndarray) -> np.ndarray:
+    out = np.full((*strings.shape[:2], len(parents) + 4), np.nan)
+    site_crossover(np.random.default_rng(seed), strings, parents, ARMS, rate, distance, out)
+    return out[:, :, : len(parents)]
+
+
+def crossed_literally(
+    seed: int, parents: np.ndarray, rate: float, distance: float, strings: np.ndarray
+) -> np.ndarray:
+    """The same pair by pair, arm by arm, as one reads it in the paper."""
+    rng = np.random.default_rng(seed)
+    children = strings[:, :, parents].copy()
+    for pair in range(len(parents) // 2):
+        decide, *draws = rng.random(1 + len(ARMS))
+        sites = [1 + int(draw * (strings.shape[1] - 2)) for draw in draws]
+        a, b = strings[:, :, parents[2 * pair]], strings[:, :, parents[2 * pair + 1]]
+        gaps = [np.linalg.norm(a[f:s, i] - b[f:s, i]) for (f, s), i in zip(ARMS, sites, strict=True)]
+        if decide < rate and all(gap < distance for gap in gaps):
+            for (f, s), i in zip(ARMS, sites, strict=True):
+                children[f:s, i:, 2 * pair] = b[f:s, i:]
+                children[f:s, i:, 2 * pair + 1] = a[f:s, i:]
+    return children
+
+
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("count", [0, 1, 2, 11, 12])
+def test_crossover_is_what_the_paper_says(seed: int, count: int) -> None:
+    strings = population(seed)
+    parents = np.random.default_rng(seed + 100).integers(0, strings.shape[2], size=count)
+    fast = crossed(seed, parents, 0.9, 45.0, strings)
+    assert np.array_equal(fast, crossed_literally(seed, parents, 0.9, 45.0, strings))
+
+
+def test_crossover_of_rate_zero_or_far_parents_copies() -> None:
+    strings, parents = population(1), np.array([3, 4, 5, 6])
+    assert np.array_equal(crossed(0, parents, 0.0, 1e9, strings), strings[:, :, parents])
+    assert np.array_equal(crossed(0, parents, 1.0, 0.0, strings), strings[:, :, parents])
+    assert not np.array_equal(crossed(0, parents, 1.0, 1e9, strings), strings[:, :, parents])
+
+
+def test_crossover_keeps_the_ends_and_all_material() -> None:
+    strings, parents = population(2), np.array([0, 1, 2, 3])
+    strings[:, 0], strings[:, -1] = strings[:, 0, :1], strings[:, -1, :1]
+    children = crossed(3, parents, 1.0, 1e9, strings)
+    assert np.array_equal(children[:, 0], strings[:, 0, parents])
+    assert np.array_equal(children[:, -1], strings[:, -1, parents])
+    for pair in (slice(0, 2), slice(2, 4)):
+        assert np.array_equal(np.sort(children[:, :, pair], axis=2), np.sort(strings[:, :, parents[pair]], axis=2))
+
+
+def test_strings_without_inner_points_are_copied() -> None:
+    strings = population(4, points=2)
+    assert np.array_equal(crossed(0, np.array([1, 2]), 1.0, 1e9, strings), strings[:, :, [1, 2]])
+
+
+@given(
+    st.lists(st.one_of(st.just(0.0), st.floats(1e-300, 1e300)), min_size=1, max_size=20),
+    st.integers(0, 2**32 - 1),
+)
+def test_roulette_never_draws_a_weight_of_zero(weights: list[float], seed: int) -> None:
+    weights_array = np.array(weights)
+    chosen = roulette(np.random.default_rng(seed), weights_array, 50)
+    assert chosen.min() >= 0
+    assert chosen.max() < len(weights)
+    if weights_array.any():
+        assert np.all(weights_array[chosen] > 0.0)
+
+
+def test_roulette_draws_in_proportion_and_uniformly_where_all_are_zero() -> None:
+    rng = np.random.default_rng(0)
+    weights = np.array([1.0, 0.0, 2.0, 5.0])
+    shares = np.bincount(roulette(rng, weights, 80_000), minlength=4) / 80_000
+    assert shares == pytest.approx(weights / 8.0, abs=0.007)  # four standard errors
+    shares = np.bincount(roulette(rng, np.zeros(4), 80_000), minlength=4) / 80_000
+    assert shares == pytest.approx(np.full(4, 0.25), abs=0.007)
+
+
+def test_roulette_agrees_with_searchsorted() -> None:
+    weights = np.random.default_rng(1).uniform(0.0, 3.0, size=37)
+    pointers = np.random.default_rng(2).random(500) * np.cumsum(weights)[-1]
+    assert np.array_equal(
+        roulette(np.random.default_rng(2), weights, 500), np.searchsorted(np.cumsum(weights), pointers, side="right")
+    )
+
+
+def test_elites_are_the_lowest_costs_and_ties_keep_their_order() -> None:
+    assert elites(np.array([3.0, 1.0, np.inf, 1.0, 2.0]), 3).tolist() == [1, 3, 4]
+    assert elites(np.array([1.0]), 0).tolist() == []
+
+
+@given(st.lists(st.floats(-1e6, 1e6) | st.just(np.inf), min_size=1, max_size=30))
+def test_cost_statistics_agree_with_numpy(costs: list[float]) -> None:
+    array = np.array(costs)
+    finite = array[np.isfinite(array)]
+    best, mean, std = cost_statistics(array)
+    assert array[best] == array.min()
+    if len(finite):
+        assert mean == pytest.approx(finite.mean(), rel=1e-9, abs=1e-6)
+        assert std == pytest.approx(finite.std(), rel=1e-6, abs=1e-6)
+    else:
+        assert np.isnan(mean)
+        assert np.isnan(std)
+
+
+def test_evaluations_of_the_paper() -> None:
+    paper = GeneticSettings(
+        population_size=50, num_generations=500, num_elites=2, crossover_rate=0.9, mutation_rate=1.0
+    )
+    assert paper.num_evaluations == 24_050
+
+
+def test_more_elites_than_individuals_are_refused() -> None:
+    with pytest.raises(SettingError, match=r"num_elites: must be at most population_size \(5\), was 6"):
+        GeneticSettings(population_size=5, num_generations=1, num_elites=6, crossover_rate=0.9, mutation_rate=1.0)

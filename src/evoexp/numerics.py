@@ -31,6 +31,9 @@ DEGREE = 0.017453292519943295  # [rad] one degree
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
+KERNEL_ROOMS = ("numerics.py", *(f"{room}/*.py" for room in ("collision", "evolution", "objectives", "paths")))
+KERNEL_ROOMS += ("robots/*.py", "scenarios/*.py", "planners/*.py", "references/*.py")
+
 NUM_KEPT_CACHES = 4  # [-] states of the sources whose compiled kernels are kept
 
 _cache_claims: list[int] = []  # open descriptors: a shared lock on our cache directory for as long as we live
@@ -44,7 +47,7 @@ def _key_cache_on_sources() -> None:
     """
     digest = hashlib.sha256()
     package = Path(__file__).parent
-    for path in sorted(package.rglob("*.py")):
+    for path in sorted(p for room in KERNEL_ROOMS for p in package.glob(room)):
         digest.update(path.relative_to(package).as_posix().encode())
         digest.update(path.read_bytes())
     cache = Path(os.environ.get("EVOEXP_CACHE") or platformdirs.user_cache_dir("evoexp")) / "kernels"

@@ -24,7 +24,22 @@ def roulette(rng: np.random.Generator, weights: FloatArray, count: int) -> np.nd
 
 def elites(costs: FloatArray, count: int) -> np.ndarray:
     """Return the indices of the lowest costs, best first; among equals the lower index wins."""
-    return np.argsort(costs, kind="stable")[:count]
+    chosen = np.empty(count, dtype=np.int64)
+    _elites(costs, chosen)
+    return chosen
+
+
+def distinct(rng: np.random.Generator, num: int, count: int) -> np.ndarray:
+    """Draw `count` distinct indices out of 0 … num − 1, in random order: the head of a Fisher–Yates shuffle.
+
+    Args:
+        rng: Source of `count` uniform numbers.
+        num: How many there are.
+        count: How many to draw, at most `num`.
+    """
+    slots = np.arange(num)
+    _shuffle_head(rng.random(count), slots)
+    return slots[:count]
 
 
 @kernel
@@ -50,3 +65,26 @@ def _roulette(weights, uniforms, chosen):  # type: ignore[no-untyped-def]
             chosen[i] = low
         else:
             chosen[i] = min(int(uniforms[i] * num), num - 1)
+
+
+@kernel
+def _elites(costs, chosen):  # type: ignore[no-untyped-def]
+    """Insertion into a short sorted list; a later equal cost stays behind."""
+    count, filled = len(chosen), 0
+    for k in range(len(costs)):
+        if filled == count and (count == 0 or not costs[k] < costs[chosen[count - 1]]):
+            continue
+        place = filled if filled < count else count - 1
+        while place > 0 and costs[k] < costs[chosen[place - 1]]:
+            chosen[place] = chosen[place - 1]
+            place -= 1
+        chosen[place] = k
+        filled = min(filled + 1, count)
+
+
+@kernel
+def _shuffle_head(uniforms, slots):  # type: ignore[no-untyped-def]
+    num = len(slots)
+    for k in range(len(uniforms)):
+        other = k + min(int(uniforms[k] * (num - k)), num - k - 1)
+        slots[k], slots[other] = slots[other], slots[k]

@@ -15,11 +15,11 @@ def relax_points(via_points: Any, delta: float, num_lanes: int) -> None:
     middle = np.empty(num_lanes)
     for j in range(via_points.shape[0]):
         for i in range(1, via_points.shape[1] - 1):
-            for l in range(num_lanes):
-                middle[l] = (via_points[j, i - 1, l] + via_points[j, i + 1, l]) / 2.0
-            for l in range(num_lanes):
-                a = via_points[j, i, l]
-                via_points[j, i, l] = a + delta * (middle[l] - a)  # (Eqs 8, 9)
+            for lane in range(num_lanes):
+                middle[lane] = (via_points[j, i - 1, lane] + via_points[j, i + 1, lane]) / 2.0
+            for lane in range(num_lanes):
+                a = via_points[j, i, lane]
+                via_points[j, i, lane] = a + delta * (middle[lane] - a)  # (Eqs 8, 9)
 
 
 def relax(via_points: NDArray[np.float64], delta: float, num_lanes: int) -> None:

@@ -13,59 +13,59 @@ from evoexp.paths.workspace import R2, R3, R4, ROW, U1, U2
 
 
 @kernel
-def fit_spline(via_points: Any, joint: Any, lane: Any, count: Any, N: Any, pivots: Any, w: Any, knots: Any) -> None:
+def fit_spline(via_points: Any, joint: Any, lane0: Any, count: Any, N: Any, pivots: Any, w: Any, knots: Any) -> None:
     """Copy one joint's coordinates to the scratch w at `knots` and solve for m beside them (Thomas algorithm)."""
     pivot = pivots[0]
-    for l in range(count):
-        a, a_next = via_points[joint, 0, lane + l], via_points[joint, 1, lane + l]
-        w[knots + l] = a
-        w[knots + ROW + l] = (a_next - a) * pivot
+    for lane in range(count):
+        a, a_next = via_points[joint, 0, lane0 + lane], via_points[joint, 1, lane0 + lane]
+        w[knots + lane] = a
+        w[knots + ROW + lane] = (a_next - a) * pivot
     for i in range(U1, N):
         row = knots + i * R2
         pivot = pivots[i]
-        for l in range(count):
-            a_last, a = via_points[joint, i - U1, lane + l], via_points[joint, i, lane + l]
-            a_next = via_points[joint, i + U1, lane + l]
-            w[row + l] = a
-            w[row + ROW + l] = ((a_last - a) + (a_next - a) - w[row - ROW + l]) * pivot
+        for lane in range(count):
+            a_last, a = via_points[joint, i - U1, lane0 + lane], via_points[joint, i, lane0 + lane]
+            a_next = via_points[joint, i + U1, lane0 + lane]
+            w[row + lane] = a
+            w[row + ROW + lane] = ((a_last - a) + (a_next - a) - w[row - ROW + lane]) * pivot
     row = knots + N * R2
     pivot = pivots[N]
-    for l in range(count):
-        a_last, a = via_points[joint, N - U1, lane + l], via_points[joint, N, lane + l]
-        w[row + l] = a
-        w[row + ROW + l] = ((a_last - a) - w[row - ROW + l]) * pivot
+    for lane in range(count):
+        a_last, a = via_points[joint, N - U1, lane0 + lane], via_points[joint, N, lane0 + lane]
+        w[row + lane] = a
+        w[row + ROW + lane] = ((a_last - a) - w[row - ROW + lane]) * pivot
     for back in range(N):
         i = N - U1 - back
         row = knots + i * R2
         pivot = pivots[i]
-        for l in range(count):
-            w[row + ROW + l] -= pivot * w[row + R3 + l]
+        for lane in range(count):
+            w[row + ROW + lane] -= pivot * w[row + R3 + lane]
 
 
 @kernel
 def square_speed(w: Any, knot: Any, out: Any, count: Any) -> None:
     """Write the five coefficients of s'(u)² of one joint on the segment that begins at `knot`."""
-    for l in range(count):
-        a0, m0, a1, m1 = w[knot + l], w[knot + ROW + l], w[knot + R2 + l], w[knot + R3 + l]
+    for lane in range(count):
+        a0, m0, a1, m1 = w[knot + lane], w[knot + ROW + lane], w[knot + R2 + lane], w[knot + R3 + lane]
         b0, b1, b2 = a1 - a0 - 2.0 * m0 - m1, 6.0 * m0, 3.0 * (m1 - m0)
-        w[out + l] = b0 * b0
-        w[out + ROW + l] = 2.0 * b0 * b1
-        w[out + R2 + l] = b1 * b1 + 2.0 * b0 * b2
-        w[out + R3 + l] = 2.0 * b1 * b2
-        w[out + R4 + l] = b2 * b2
+        w[out + lane] = b0 * b0
+        w[out + ROW + lane] = 2.0 * b0 * b1
+        w[out + R2 + lane] = b1 * b1 + 2.0 * b0 * b2
+        w[out + R3 + lane] = 2.0 * b1 * b2
+        w[out + R4 + lane] = b2 * b2
 
 
 @kernel
 def add_square_speed(w: Any, knot: Any, given: Any, out: Any, count: Any) -> None:
     """Write to `out` the coefficients at `given` plus those of one joint more (in place would not vectorise)."""
-    for l in range(count):
-        a0, m0, a1, m1 = w[knot + l], w[knot + ROW + l], w[knot + R2 + l], w[knot + R3 + l]
+    for lane in range(count):
+        a0, m0, a1, m1 = w[knot + lane], w[knot + ROW + lane], w[knot + R2 + lane], w[knot + R3 + lane]
         b0, b1, b2 = a1 - a0 - 2.0 * m0 - m1, 6.0 * m0, 3.0 * (m1 - m0)
-        w[out + l] = w[given + l] + b0 * b0
-        w[out + ROW + l] = w[given + ROW + l] + 2.0 * b0 * b1
-        w[out + R2 + l] = w[given + R2 + l] + (b1 * b1 + 2.0 * b0 * b2)
-        w[out + R3 + l] = w[given + R3 + l] + 2.0 * b1 * b2
-        w[out + R4 + l] = w[given + R4 + l] + b2 * b2
+        w[out + lane] = w[given + lane] + b0 * b0
+        w[out + ROW + lane] = w[given + ROW + lane] + 2.0 * b0 * b1
+        w[out + R2 + lane] = w[given + R2 + lane] + (b1 * b1 + 2.0 * b0 * b2)
+        w[out + R3 + lane] = w[given + R3 + lane] + 2.0 * b1 * b2
+        w[out + R4 + lane] = w[given + R4 + lane] + b2 * b2
 
 
 @kernel

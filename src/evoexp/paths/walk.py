@@ -40,75 +40,74 @@ def walk(
     Raises:
         ValueError: If `uniforms` has another shape, or a lane lies outside.
     """
-    expected = (len(lanes), num_uniforms(arm_slices, via_points.shape[1] - 1))
-    if uniforms.shape != expected:
-        raise ValueError(f"uniforms must have shape {expected}, was {uniforms.shape}")
-    if len(lanes) and not 0 <= lanes.min() <= lanes.max() < via_points.shape[2]:
-        raise ValueError(f"lanes must lie within 0..{via_points.shape[2] - 1}")
-    _walk(via_points, lanes, uniforms, start, goal, arm_slices, step, max_turn)
+    if not _walk(via_points, lanes, uniforms, start, goal, arm_slices, step, max_turn):
+        expected = (len(lanes), num_uniforms(arm_slices, via_points.shape[1] - 1))
+        limit = via_points.shape[2]
+        raise ValueError(f"uniforms must have shape {expected}, was {uniforms.shape}; lanes must lie within 0..{limit - 1}")
 
 
 @kernel
 def _walk(via_points, lanes, uniforms, start, goal, arm_slices, step, max_turn):  # type: ignore[no-untyped-def]
     num = via_points.shape[1] - 1
-    most = np.max(arm_slices[:, 1] - arm_slices[:, 0])
-    here, direction = np.empty(most), np.empty(most)
+    needed = 0
+    for arm in range(len(arm_slices)):
+        needed += (num - 1) * (arm_slices[arm, 1] - arm_slices[arm, 0] - 1)
+    if uniforms.shape[0] != len(lanes) or uniforms.shape[1] != needed:
+        return False
+    for s in range(len(lanes)):
+        if not 0 <= lanes[s] < via_points.shape[2]:
+            return False
+    here, direction = np.empty(len(start)), np.empty(len(start))
     for s in range(len(lanes)):
         lane, taken = lanes[s], 0
         for arm in range(len(arm_slices)):
-            first, joints = arm_slices[arm, 0], arm_slices[arm, 1] - arm_slices[arm, 0]
+            first, stop = arm_slices[arm, 0], arm_slices[arm, 1]
             squared = 0.0
-            for j in range(joints):
-                here[j] = start[first + j]
-                squared += (goal[first + j] - here[j]) * (goal[first + j] - here[j])
-                via_points[first + j, 0, lane] = here[j]
-                via_points[first + j, num, lane] = goal[first + j]
+            for j in range(first, stop):
+                here[j] = start[j]
+                squared += (goal[j] - start[j]) * (goal[j] - start[j])
+                via_points[j, 0, lane] = start[j]
+                via_points[j, num, lane] = goal[j]
             length = step * np.sqrt(squared) / num
             for i in range(1, num):
-                for j in range(joints):
-                    direction[j] = goal[first + j] - here[j]
-                _turn(direction[:joints], uniforms[s, taken : taken + joints - 1], max_turn)
-                taken += joints - 1
-                for j in range(joints):
-                    here[j] += length * direction[j]
-                    via_points[first + j, i, lane] = here[j]
+                for j in range(first, stop):
+                    direction[j] = goal[j] - here[j]
+                scale = _turn(direction, first, stop, uniforms, s, taken, max_turn)
+                taken += stop - first - 1
+                for j in range(first, stop):
+                    here[j] += length * scale * direction[j]
+                    via_points[j, i, lane] = here[j]
+    return True
 
 
 @kernel
-def _turn(direction, uniforms, max_turn):  # type: ignore[no-untyped-def]
-    """Make a unit vector of a direction and turn its hyperspherical angles, the azimuth first.
+def _turn(direction, first, stop, uniforms, s, taken, max_turn):  # type: ignore[no-untyped-def]
+    """Turn the hyperspherical angles of a direction, the azimuth first; return what scales it to a unit vector.
 
-    The angle of coordinate k stands between the axis k and what coordinates 0 … k − 1 make up, of length `below`. Turning
-    it takes (below, direction[k]) around; the coordinates below keep their proportions.
+    The angle of coordinate k stands between the axis k and what the coordinates before it make up, of length `below`.
+    Turning it takes (below, direction[k]) around; the coordinates before keep their proportions. A direction straight
+    along a later axis has azimuth 0.
     """
-    if len(direction) == 1:
-        direction[0] = 1.0 if direction[0] > 0.0 else (-1.0 if direction[0] < 0.0 else 0.0)
-        return
-    squared = 0.0
-    for k in range(len(direction)):
-        squared += direction[k] * direction[k]
-    length = np.sqrt(squared)
-    if length == 0.0:
-        return
-    for k in range(len(direction)):
-        direction[k] /= length
-    s, c = sincos((2.0 * uniforms[0] - 1.0) * max_turn)
-    x, y = direction[0], direction[1]
+    x = direction[first]
+    if stop - first == 1:
+        return 0.0 if x == 0.0 else 1.0 / abs(x)
+    y = direction[first + 1]
+    sine, cosine = sincos((2.0 * uniforms[s, taken] - 1.0) * max_turn)
     below = np.sqrt(x * x + y * y)
-    if below == 0.0:  # straight along a later axis: its azimuth is taken as 0
-        x, y = 1.0, 0.0
+    direction[first], direction[first + 1] = x * cosine - y * sine, x * sine + y * cosine
+    if below == 0.0:
+        unit_x, unit_y = cosine, sine
     else:
-        x, y = x / below, y / below
-    unit_x, unit_y = x * c - y * s, x * s + y * c
-    direction[0], direction[1] = below * unit_x, below * unit_y
-    for k in range(2, len(direction)):
-        s, c = sincos((2.0 * uniforms[k - 1] - 1.0) * max_turn)
+        unit_x, unit_y = direction[first] / below, direction[first + 1] / below
+    for k in range(first + 2, stop):
+        sine, cosine = sincos((2.0 * uniforms[s, taken + k - first - 1] - 1.0) * max_turn)
         here = direction[k]
-        turned = below * c - here * s
-        direction[k] = below * s + here * c
+        turned = below * cosine - here * sine
+        direction[k] = below * sine + here * cosine
         if below == 0.0:
-            direction[0], direction[1] = turned * unit_x, turned * unit_y
+            direction[first], direction[first + 1] = turned * unit_x, turned * unit_y
         else:
-            for j in range(k):
+            for j in range(first, k):
                 direction[j] *= turned / below
         below = np.sqrt(turned * turned + direction[k] * direction[k])
+    return 0.0 if below == 0.0 else 1.0 / below

@@ -1,8 +1,8 @@
 """What redistribution needs besides the via-points: the constant factor of the splines and scratch memory.
 
-The scratch is one flat array of rows of 64 lanes; a kernel addresses it as `floats[base + r * ROW + lane]` with constant
-r. Only with such constant distances does LLVM see that rows do not overlap and vectorise loops that read and write
-several of them. Indices are unsigned: a signed one would be tested for wrap-around, which prevents vectorising too.
+The scratch is one flat array of rows of 64 lanes; a kernel addresses it as `floats[base + r * ROW + lane]` with a
+constant r. Only with such constant distances does LLVM see that rows do not overlap and vectorise loops that read and
+write several of them. Indices are unsigned: a signed one would be tested for wrap-around, which prevents vectorising.
 Rows, for J joints, N segments and S samples per segment:
 
 - knot i of joint j: a (the coordinate), then m (a sixth of the spline's second derivative there);
@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 ROW = np.uint64(64)  # lanes per block, and distance of two rows of scratch
-R2, R3, R4, R5, R6, R7, R8 = (np.uint64(r * 64) for r in range(2, 9))
+R2, R3, R4, R5, R6, R7, R8 = (np.uint64(rows * 64) for rows in range(2, 9))
 ROW_SHIFT = np.uint64(6)  # ROW = 2^6
-U0, U1, U2, U3, U4, U5, U6, U7, U8 = (np.uint64(u) for u in range(9))
+U0, U1, U2, U3, U4 = (np.uint64(u) for u in range(5))
 WORK_ROWS = 16
 MAX_SAMPLES = 1024
 
@@ -50,8 +50,8 @@ class Redistribution(NamedTuple):
 def spline_pivots(num_segments: int, end_condition: EndCondition) -> NDArray[np.float64]:
     """Return the reciprocal pivots (N + 1,) of the system for m, a sixth of a cubic spline's second derivatives.
 
-    Inside, m[i−1] + 4 m[i] + m[i+1] = a[i−1] − 2 a[i] + a[i+1]. Clamped ends (slope zero) add 2 m[0] + m[1] = a[1] − a[0]
-    and m[N−1] + 2 m[N] = a[N−1] − a[N]; natural ones have m[0] = m[N] = 0, that is, pivots whose reciprocal is zero.
+    Inside, m[i−1] + 4 m[i] + m[i+1] = a[i−1] − 2 a[i] + a[i+1]. Clamped ends (slope zero) add
+    2 m[0] + m[1] = a[1] − a[0] at the start and m[N−1] + 2 m[N] = a[N−1] − a[N] at the goal. Natural ones have m[0] = m[N] = 0: a reciprocal of zero.
     """
     clamped = end_condition == "clamped"
     pivots = np.zeros(num_segments + 1)

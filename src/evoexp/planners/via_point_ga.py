@@ -17,9 +17,10 @@ from pydantic import Field
 from evoexp.collision.touching_spheres import Clearance, SphereCollision, TouchingSpheres
 from evoexp.errors import SettingError
 from evoexp.evolution.crossover import site_crossover
-from evoexp.evolution.selection import elites, roulette
+from evoexp.evolution.selection import distinct, elites, roulette
 from evoexp.evolution.settings import GeneticSettings
 from evoexp.evolution.statistics import cost_statistics
+from evoexp.evolution.succession import succeed
 from evoexp.numerics import DEGREE
 from evoexp.objectives.string_fitness import StringFitness, StringTerms, count_collisions
 from evoexp.paths.interpolation import interpolate_linear
@@ -152,7 +153,6 @@ class ViaPointGa(Component):
         yield best.generation(0, strings, population, judged, costs, collisions, evaluations, queries)
 
         offspring = strings.empty(ga.num_offspring)
-        new, kept = slice(0, ga.num_offspring), slice(ga.num_offspring, ga.population_size)
         for index in range(1, ga.num_generations + 1):
             # (a) Reproduction; neighbours on the wheel are the random pairs of (b).
             best_kept = elites(costs, ga.num_elites)
@@ -168,10 +168,9 @@ class ViaPointGa(Component):
             judged = strings.judge(offspring, ga.num_offspring)
 
             # The elites stand behind the offspring, untouched and not evaluated again.
-            population[:, :, kept] = population[:, :, best_kept]
-            costs[kept], collisions[kept] = costs[best_kept], collisions[best_kept]
-            population[:, :, new] = offspring[:, :, new]
-            costs[new], collisions[new] = judged.cost, judged.terms.collisions[new]
+            succeed(population, offspring, ga.num_offspring, best_kept)
+            succeed(costs, judged.cost, ga.num_offspring, best_kept)
+            succeed(collisions, judged.terms.collisions, ga.num_offspring, best_kept)
             evaluations += ga.num_offspring
             queries += judged.collision_queries
             yield best.generation(index, strings, population, judged, costs, collisions, evaluations, queries)
@@ -231,13 +230,8 @@ class ViaPointGa(Component):
 
     def _mutated(self, rng: np.random.Generator) -> np.ndarray:
         """Draw the distinct offspring that new trajectories replace, each with probability `mutation_rate`."""
-        count, num = self.num_new_trajectories, self.ga.num_offspring
-        draws = rng.random(2 * count)
-        slots = np.arange(num)
-        for k in range(count):  # the head of a Fisher–Yates shuffle
-            other = k + min(int(draws[k] * (num - k)), num - k - 1)
-            slots[k], slots[other] = slots[other], slots[k]
-        return slots[:count][draws[count:] < self.ga.mutation_rate]
+        slots = distinct(rng, self.ga.num_offspring, self.num_new_trajectories)
+        return slots[rng.random(len(slots)) < self.ga.mutation_rate]
 
 
 class _Strings:
@@ -248,6 +242,7 @@ class _Strings:
         self.num_arms = len(problem.arm_slices)
         self.nq = len(problem.start)
         self.max_turn = DEGREE * planner.max_turn
+        self.num_uniforms = num_uniforms(problem.arm_slices, planner.num_via_points)
         joints = int(np.max(problem.arm_slices[:, 1] - problem.arm_slices[:, 0]))
         self._spline = prepare_redistribution(
             planner.num_via_points, joints, planner.spline_end, planner.samples_per_segment
@@ -261,7 +256,7 @@ class _Strings:
     def new_trajectories(self, rng: np.random.Generator, population: FloatArray, lanes: np.ndarray) -> None:
         """Write random walks from start to goal into some lanes (section 3.3)."""
         planner, problem = self.planner, self.problem
-        uniforms = rng.random((len(lanes), num_uniforms(problem.arm_slices, planner.num_via_points)))
+        uniforms = rng.random((len(lanes), self.num_uniforms))
         walk(
             population,
             lanes,

@@ -1,7 +1,6 @@
 """Builds a report: the one place of it that writes files."""
 
 import hashlib
-import io
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,15 +13,9 @@ from evoexp.report.page import Drawing
 from evoexp.report.pages import page_of
 from evoexp.report.results import gather
 from evoexp.report.settings import ReportSettings
-from evoexp.report.style import styled
 from evoexp.store.files import write_files
 
 INDEX = "index.md"
-_METADATA: dict[str, dict[str, Any]] = {  # nothing that changes from one day, or one machine, to the next
-    "svg": {"Date": None, "Creator": "evoexp"},
-    "png": {"Software": "evoexp"},
-    "pdf": {"CreationDate": None, "Creator": "evoexp", "Producer": None},
-}
 
 
 class Request(NamedTuple):
@@ -90,14 +83,11 @@ def report(request: Request, settings: ReportSettings, outputs: Path, num_replic
 
 def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:
     """Return the files of one figure: pictures, data rows, sidecar."""
-    with styled():
-        table = drawing.table()
-        figure = drawing.draw(table)
-        pictures = {}
-        for kind in settings.formats:
-            buffer = io.BytesIO()
-            figure.savefig(buffer, format=kind, dpi=settings.dpi, metadata=_METADATA[kind])
-            pictures[f"{drawing.stem}.{kind}"] = buffer.getvalue()
+    from evoexp.report.style import drawn  # matplotlib; `evoexp run` loads this file before anything is drawn
+
+    table = drawing.table()
+    images = drawn(lambda: drawing.draw(table), settings.formats, settings.dpi)
+    pictures = {f"{drawing.stem}.{kind}": image for kind, image in images.items()}
     rows = table.to_csv(index=False, lineterminator="\n").encode()
     sidecar = {
         "figure": drawing.title,

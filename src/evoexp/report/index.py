@@ -111,10 +111,10 @@ def _comparison(rows: Iterable[Comparison], settings: ReportSettings) -> str:
         )
     headers = ("quantity", "common seeds", "median difference", "A12 of being better", "p", "p adjusted")
     note = (
-        "Difference: first minus second, seed by seed. A12 (Vargha and Delaney): probability that a run of the first is "
-        f"better than one of the second, ties count half; in brackets the {100 * settings.confidence:g} % percentile "
-        f"interval of {settings.num_resamples} resamples of seeds. p: Wilcoxon's signed-rank test, two-sided; adjusted: "
-        "Holm over the rows of this table.\n"
+        "Difference: first minus second, seed by seed. A12 (Vargha and Delaney): probability that a run of the first "
+        f"is better than one of the second, ties count half; in brackets the {100 * settings.confidence:g} % "
+        f"percentile interval of {settings.num_resamples} resamples of seeds. p: Wilcoxon's signed-rank test, "
+        "two-sided; adjusted: Holm over the rows of this table.\n"
     )
     return f"{markdown.table(headers, cells)}\n{note}"
 

@@ -13,12 +13,13 @@ def table(headers: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 
 def number(value: float) -> str:
-    """Return a number with four significant digits; a dash for NaN."""
+    """Return a number with four significant digits, a whole one with all of its; a dash for NaN."""
     if math.isnan(value):
         return "–"
     if math.isinf(value):
         return "∞" if value > 0 else "−∞"
-    return f"{value:.4g}".replace("-", "−")
+    whole = value == round(value) and abs(value) < 1e9
+    return (f"{value:.0f}" if whole else f"{value:.4g}").replace("-", "−")
 
 
 def p_value(p: float) -> str:

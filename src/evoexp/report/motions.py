@@ -10,6 +10,9 @@ from evoexp.condition import Prepared
 from evoexp.numerics import DEGREE
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
+from evoexp.scenarios.obstacles import BOX, SPHERE, ObstacleTable
+
+OUTLINE_POINTS = 49  # of a round obstacle
 
 
 class Nearest(NamedTuple):
@@ -68,6 +71,27 @@ def joint_positions(assembly: Assembly, q: FloatArray) -> Iterator[tuple[int, in
         end = np.array([frame[link.joint] @ np.append(link.end, 1.0) for frame in frames])[:, :3]
         yield link.arm, numbers[link.arm], start, end
         numbers[link.arm] += 1
+
+
+def obstacle_outlines(table: ObstacleTable) -> list[FloatArray]:
+    """Return the outlines of obstacles as seen along z, each (points, 2), first and last point the same."""
+    turn = np.linspace(0.0, 2.0 * np.pi, OUTLINE_POINTS)
+    circle = np.column_stack([np.cos(turn), np.sin(turn)])
+    outlines = []
+    for kind, center, rotation, size in zip(*table, strict=True):
+        matrix = rotation.reshape(3, 3)
+        if kind == BOX:
+            corners = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0), (-1, -1, 0)]) * size
+            outline = (corners @ matrix.T)[:, :2]
+        else:
+            along = np.zeros(2) if kind == SPHERE else size[1] * matrix[:2, 2]
+            outline = size[0] * circle + np.where((circle @ along >= 0.0)[:, None], along, -along)
+            if kind != SPHERE and along.any():  # the outline begins where it turns from one end to the other
+                first = int(np.argmax(np.diff(circle @ along >= 0.0))) + 1
+                outline = np.roll(outline[:-1], -first, axis=0)
+                outline = np.vstack([outline, outline[:1]])
+        outlines.append(outline + center[:2])
+    return outlines
 
 
 def sphere_centres(collision: Any, q: FloatArray) -> list[FloatArray]:

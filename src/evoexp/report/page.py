@@ -1,14 +1,16 @@
 """What a page consists of, before it is written."""
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import pandas as pd
-from matplotlib.figure import Figure
 
 from evoexp.report.claims import Claim, Comparison
 from evoexp.report.results import ConditionResults
 from evoexp.report.statistics import Spread
+
+if TYPE_CHECKING:  # loaded only where something is drawn
+    from matplotlib.figure import Figure
 
 
 class Drawing(NamedTuple):
@@ -27,7 +29,7 @@ class Drawing(NamedTuple):
     title: str
     caption: str
     table: Callable[[], pd.DataFrame]
-    draw: Callable[[pd.DataFrame], Figure]
+    draw: "Callable[[pd.DataFrame], Figure]"
     conditions: tuple[ConditionResults, ...]
 
 

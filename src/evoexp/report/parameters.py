@@ -116,7 +116,8 @@ def _comment(lines: list[str], node: Any) -> tuple[str, str]:
     match = _COMMENT.match(line[node.end_mark.column :].strip())
     if match is None:
         return "", ""
-    return (match["unit"] or "").strip(), match["source"].strip()
+    unit = (match["unit"] or "").strip()
+    return "" if unit == "-" else unit, match["source"].strip()
 
 
 def _component(group: str, config: dict[str, Any], preferred: dict[str, str]) -> Iterator[Parameter]:

@@ -5,10 +5,10 @@ Costs may be infinite (infeasible). Medians, ranks and effect sizes stay defined
 
 import math
 from collections.abc import Sequence
+from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import ndtr, ndtri
 
 from evoexp.records import FloatArray
 
@@ -87,7 +87,7 @@ def wilson(successes: int, trials: int, confidence: float) -> Interval:
     """Return Wilson's score interval of a proportion; [0, 1] without trials."""
     if trials == 0:
         return Interval(0.0, 1.0)
-    z = float(ndtri(0.5 + confidence / 2.0))
+    z = NormalDist().inv_cdf(0.5 + confidence / 2.0)
     p, n = successes / trials, trials
     center = (p + z * z / (2 * n)) / (1 + z * z / n)
     half = z / (1 + z * z / n) * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
@@ -172,4 +172,4 @@ def _exact_p(ranks: np.ndarray, doubled: int) -> float:
 def _normal_p(ranks: np.ndarray, doubled: int) -> float:
     """Two-sided p by the normal approximation, ties accounted for by the ranks themselves."""
     mean, variance = ranks.sum() / 2.0, float((ranks.astype(np.float64) ** 2).sum()) / 4.0
-    return min(1.0, 2.0 * float(ndtr(-abs(doubled - mean) / math.sqrt(variance))))
+    return min(1.0, 2.0 * NormalDist().cdf(-abs(doubled - mean) / math.sqrt(variance)))

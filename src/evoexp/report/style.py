@@ -1,7 +1,7 @@
 """How figures look: one place for sizes, fonts and colours. No pyplot, no global state left behind."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+import io
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 ARM_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")  # Okabe & Ito 2008
 CONDITION_COLOURS = ("#332288", "#CC6677", "#117733", "#DDAA33", "#88CCEE", "#882255", "#44AA99", "#999933")  # Tol
-NEUTRAL, FAINT, LIMIT = "#333333", "#9a9a9a", "#000000"
+NEUTRAL, FAINT, FORBIDDEN = "#333333", "#9a9a9a", "#882255"
 ARM_SYMBOLS = ("θ", "α", "β", "γ", "δ", "ε")  # θ and α are the paper's
 SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 WIDTH = 7.2  # [inch] of a figure over the whole page
@@ -43,14 +43,34 @@ _RC: dict[str, Any] = {
 }
 
 
-@contextmanager
-def styled() -> Iterator[None]:
-    """Draw and save inside of it in evoexp's style, whatever the user's own settings are."""
+_METADATA: dict[str, dict[str, Any]] = {  # nothing that changes from one day, or one machine, to the next
+    "svg": {"Date": None, "Creator": "evoexp"},
+    "png": {"Software": "evoexp"},
+    "pdf": {"CreationDate": None, "Creator": "evoexp", "Producer": None},
+}
+
+
+def drawn(draw: Callable[[], Figure], formats: Sequence[str], dpi: int) -> dict[str, bytes]:
+    """Draw a figure in evoexp's style, whatever the user's own settings are.
+
+    Args:
+        draw: Gives the figure; called once.
+        formats: File formats.
+        dpi: Resolution of raster formats [1/inch].
+
+    Returns:
+        One file per format; the same figure gives the same bytes.
+    """
     with mpl.rc_context():
         mpl.rcdefaults()
         for name, value in _RC.items():
             mpl.rcParams[name] = value  # type: ignore[index]
-        yield
+        figure, images = draw(), {}
+        for kind in formats:
+            buffer = io.BytesIO()
+            figure.savefig(buffer, format=kind, dpi=dpi, metadata=_METADATA[kind])
+            images[kind] = buffer.getvalue()
+    return images
 
 
 def figure(height: float, width: float = WIDTH) -> Figure:
@@ -76,7 +96,7 @@ def joint_symbol(arm: int, joint: int) -> str:
 
 def operational_axes(axes: Axes, unit: str) -> None:
     """Set up axes as a plane of the operational space."""
-    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_aspect("equal", adjustable="box")
     axes.set_xlabel(f"x [{unit}]")
     axes.set_ylabel(f"y [{unit}]")
 
@@ -86,6 +106,7 @@ def configuration_axes(axes: Axes, arm: int) -> None:
     axes.set_xlabel(f"{joint_symbol(arm, 0)} [deg]")
     axes.set_ylabel(f"{joint_symbol(arm, 1)} [deg]")
     axes.set_title(f"arm {arm + 1}")
+    axes.set_aspect("equal", adjustable="datalim")  # lengths of paths are Euclidean in degrees
 
 
 def legend_below(figure: Figure, axes: Axes, columns: int) -> None:

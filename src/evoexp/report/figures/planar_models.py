@@ -39,7 +39,7 @@ def arms_table(condition: ConditionResults) -> pd.DataFrame:
 
 def draw_arms(table: pd.DataFrame) -> Figure:
     """Draw the arms at the start with their joint angles, and at the goal."""
-    figure = style.figure(4.6, 4.8)
+    figure = style.figure(4.7, 4.2)
     axes = figure.subplots()
     style.operational_axes(axes, table["length_unit"].iloc[0])
     for (posture, arm), links in groups(table, ["posture", "arm"]):
@@ -95,7 +95,15 @@ def draw_via_points(table: pd.DataFrame) -> Figure:
         axes.margins(0.1)
     handles = [
         Line2D([], [], color=style.FAINT, linewidth=0.9, marker="s", markersize=3, label=stages[0]),
-        Line2D([], [], color=style.NEUTRAL, linewidth=0.9, marker="o", markersize=4, label=f"{stages[-1]}, instants"),
+        Line2D(
+            [],
+            [],
+            color=style.NEUTRAL,
+            linewidth=0.9,
+            marker="o",
+            markersize=4,
+            label=f"{stages[-1]} (numbers: instants)",
+        ),
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=2)
     return figure
@@ -133,7 +141,7 @@ def circles_table(condition: ConditionResults) -> pd.DataFrame:
 
 def draw_circles(table: pd.DataFrame) -> Figure:
     """Draw links as lines, their circles, and the least distances of centres and of links."""
-    figure = style.figure(5.0, 5.2)
+    figure = style.figure(5.6, 4.4)
     axes = figure.subplots()
     unit, radius = table["length_unit"].iloc[0], table["radius"].max()
     style.operational_axes(axes, unit)
@@ -146,15 +154,16 @@ def draw_circles(table: pd.DataFrame) -> Figure:
         draw_arm(axes, arm, links)
         _base(axes, links["x"].iloc[0], links["y"].iloc[0])
     for row in records(table[table["distance"].notna()]):
-        what, colour = ("centres", "black") if row.element == "centres" else ("links", style.ARM_COLOURS[3])
-        label = f"least distance of {what}: {row.distance:.3f} {unit}"
-        axes.plot([row.x, row.x_end], [row.y, row.y_end], color=colour, linewidth=2, zorder=6, label=label)
+        centres = row.element == "centres"
+        label = f"least distance of {'circle centres' if centres else 'the links'}: {row.distance:.3f} {unit}"
+        look: dict[str, Any] = {"color": "black", "lw": 3} if centres else {"color": style.ARM_COLOURS[3], "ls": ":"}
+        axes.plot([row.x, row.x_end], [row.y, row.y_end], zorder=6, label=label, **look)
     safety = table["safety_distance"].iloc[0]
     axes.plot([], [], "o", color=style.FAINT, fillstyle="none", label=f"circles of radius r = {radius:g} {unit}")
     axes.plot([], [], " ", label=f"collision below 2r = {2 * radius:g} {unit}; safety distance {safety:g} {unit}")
     axes.set_title(f"instant {int(table['instant'].iloc[0])}")
     axes.margins(0.08)
-    style.legend_below(figure, axes, 2)
+    style.legend_below(figure, axes, 1)
     return figure
 
 
@@ -176,7 +185,9 @@ def draw_arm(axes: Axes, arm: int, rows: pd.DataFrame, *, alpha: float = 1.0, da
     x = [*rows["x"], rows["x_end"].iloc[-1]]
     y = [*rows["y"], rows["y_end"].iloc[-1]]
     kind = (0, (2, 1)) if dashed else "-"
-    axes.plot(x, y, linestyle=kind, color=style.arm_colour(arm), linewidth=2 if dashed else 3, alpha=alpha, zorder=3)
+    axes.plot(
+        x, y, linestyle=kind, color=style.arm_colour(arm), linewidth=2 if dashed else 3, alpha=alpha, zorder=3 + dashed
+    )
     axes.plot(x[:-1], y[:-1], "o", color="white", markeredgecolor=style.arm_colour(arm), alpha=alpha, zorder=4, ms=5)
     axes.plot(x[-1], y[-1], "o", color=style.arm_colour(arm), alpha=alpha, markersize=4, zorder=4)
 
@@ -204,7 +215,17 @@ def _numbers(axes: Axes, x: FloatArray, y: FloatArray, instants: np.ndarray) -> 
     """Write the number of every fifth via-point, the start and the goal beside it."""
     for k, instant in enumerate(instants):
         if instant % NUMBERED == 0 or k == len(instants) - 1:
-            axes.annotate(str(instant), (x[k], y[k]), xytext=(5, 5), textcoords="offset points", fontsize=7)
+            along = np.array(
+                [x[min(k + 1, len(x) - 1)] - x[max(k - 1, 0)], y[min(k + 1, len(y) - 1)] - y[max(k - 1, 0)]]
+            )
+            side = 9.0 * np.array([-along[1], along[0]]) / max(float(np.linalg.norm(along)), 1e-9)
+            place: dict[str, Any] = {
+                "xytext": tuple(side),
+                "textcoords": "offset points",
+                "ha": "center",
+                "va": "center",
+            }
+            axes.annotate(str(instant), (x[k], y[k]), fontsize=7, **place)
 
 
 def _closest(centres: list[FloatArray]) -> tuple[FloatArray, FloatArray]:

@@ -7,6 +7,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
 from evoexp.records import FloatArray
 from evoexp.report import motions, style
@@ -25,7 +26,8 @@ def snapshots_table(condition: ConditionResults) -> pd.DataFrame:
 
     Returns:
         Columns stage, first, last (instants of the stage), instant, arm, link, x, y, x_end, y_end [length unit],
-        length_unit. An instant between two stages belongs to both; the last stage holds all.
+        length_unit. An instant between two stages belongs to both; the last stage holds all. Obstacles are rows of
+        stage −1: arm is −1, link the obstacle, one row per edge of its outline.
     """
     problem = condition.prepared.problem
     q = motions.configurations(condition.prepared, condition.solutions[condition.best_replicate])
@@ -39,16 +41,19 @@ def snapshots_table(condition: ConditionResults) -> pd.DataFrame:
             for arm, link, start, end in links:
                 place = (*start[instant, :2], *end[instant, :2])
                 rows.append((stage, first, stop, instant, arm, link, *place))
+    for k, outline in enumerate(motions.obstacle_outlines(problem.collision.obstacles)):
+        rows += [(-1, 0, last, 0, -1, k, *a, *b) for a, b in itertools.pairwise(outline)]
     names = ["stage", "first", "last", "instant", "arm", "link", "x", "y", "x_end", "y_end"]
     return rounded(pd.DataFrame(rows, columns=names)).assign(length_unit=condition.condition.length_unit)
 
 
 def draw_snapshots(table: pd.DataFrame) -> Figure:
     """Draw the motion stage by stage, older instants fainter, and all of it in the last panel."""
+    obstacles, table = table[table["stage"] < 0], table[table["stage"] >= 0]
     stages = sorted(table["stage"].unique())
     columns = min(3, len(stages))
     lines = -(-len(stages) // columns)
-    figure = style.figure(2.75 * lines + 0.2)
+    figure = style.figure(2.75 * lines + 0.5, 6.2)
     panels = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
     unit = table["length_unit"].iloc[0]
     for k, axes in enumerate(panels.ravel()):
@@ -56,12 +61,15 @@ def draw_snapshots(table: pd.DataFrame) -> Figure:
             axes.set_axis_off()
             continue
         rows = table[table["stage"] == stages[k]]
+        for _, outline in groups(obstacles, "link"):
+            axes.fill(outline["x"], outline["y"], color=style.FAINT, linewidth=0)
         _snapshot(axes, rows, whole=k == len(stages) - 1)
         style.operational_axes(axes, unit)
         axes.label_outer()
         first, last = rows["first"].iloc[0], rows["last"].iloc[0]
         axes.set_title(f"all instants {first}–{last}" if k == len(stages) - 1 else f"instants {first}–{last}")
-    x, y = table[["x", "x_end"]].to_numpy(), table[["y", "y_end"]].to_numpy()
+    drawn = pd.concat([table, obstacles])
+    x, y = drawn[["x", "x_end"]].to_numpy(), drawn[["y", "y_end"]].to_numpy()
     panels[0, 0].set_xlim(x.min() - 0.5, x.max() + 0.5)
     panels[0, 0].set_ylim(y.min() - 0.5, y.max() + 0.5)
     arms = sorted(table["arm"].unique())
@@ -70,7 +78,7 @@ def draw_snapshots(table: pd.DataFrame) -> Figure:
     handles.append(Line2D([], [], color=style.FAINT, linewidth=1.4, linestyle=dashes, label="first instant of a panel"))
     handles.append(Line2D([], [], color=style.NEUTRAL, linewidth=3, marker="o", ms=4, label="last instant of a panel"))
     handles.append(Line2D([], [], color=style.NEUTRAL, linewidth=0.8, linestyle=":", label="trace of the tip"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
 
 
@@ -140,7 +148,7 @@ def sampled_distances(condition: ConditionResults, samples: int) -> pd.DataFrame
         instants, q = motions.dense(motions.configurations(prepared, solution), samples)
         distances = {"centres": motions.centre_distances(prepared.problem, q), "links": links(q)}
         parts.append(pd.DataFrame({"replicate": replicate, "instant": instants, **distances}))
-    return pd.concat(parts, ignore_index=True)
+    return rounded(pd.concat(parts, ignore_index=True))
 
 
 def distances_table(condition: ConditionResults, sampled: pd.DataFrame) -> pd.DataFrame:
@@ -185,6 +193,7 @@ def draw_distances(table: pd.DataFrame) -> Figure:
         axes.set_ylabel(f"least distance [{unit}]")
         axes.set_xlim(0, table["instant"].max())
         axes.set_ylim(bottom=0)
+    panels[1].xaxis.set_major_locator(MaxNLocator(integer=True, nbins=12))
     panels[1].set_xlabel("instant (whole numbers: via-points)")
     style.legend_below(figure, panels[0], 3)
     return figure
@@ -204,12 +213,25 @@ def _distances(axes: Axes, rows: pd.DataFrame, safety: float, unit: str) -> None
         label="range over replicates",
     )
     axes.plot(series[STRAIGHT]["instant"], series[STRAIGHT]["distance"], ":", color=style.FAINT, lw=1.2, label=STRAIGHT)
-    axes.plot(series[BEST]["instant"], series[BEST]["distance"], color=colour, lw=1.3, label=f"{BEST}, between them")
-    points = series[AT_VIA_POINTS]
-    axes.plot(points["instant"], points["distance"], "o", color=colour, mec="white", mew=0.6, ms=5, label=AT_VIA_POINTS)
-    axes.axhline(
-        safety, color=style.LIMIT, linewidth=1.0, linestyle=(0, (5, 2)), label=f"safety distance {safety:g} {unit}"
+    axes.plot(
+        series[BEST]["instant"], series[BEST]["distance"], color=colour, lw=1.3, label=f"{BEST}, between via-points too"
     )
+    points = series[AT_VIA_POINTS]
+    axes.plot(
+        points["instant"],
+        points["distance"],
+        "o",
+        color=colour,
+        mec="white",
+        mew=0.6,
+        ms=5,
+        label=AT_VIA_POINTS,
+        clip_on=False,
+        zorder=4,
+    )
+    label = f"below the safety distance of {safety:g} {unit}"
+    axes.axhspan(0.0, safety, color=style.FORBIDDEN, alpha=0.08, linewidth=0, label=label)
+    axes.axhline(safety, color=style.FORBIDDEN, linewidth=1.0, linestyle=(0, (5, 2)))
 
 
 def _snapshot(axes: Axes, rows: pd.DataFrame, whole: bool) -> None:

@@ -1,0 +1,85 @@
+"""What every planner of every shipped experiment keeps to."""
+
+import numpy as np
+import pytest
+
+from evoexp import compose
+from evoexp.batch.replicate import run_replicate
+from evoexp.compose import Labelled
+from evoexp.condition import Condition
+from evoexp.store.log_reader import read_log
+
+SHIPPED = [
+    pytest.param(labelled, id=f"{name}: {labelled.label}")
+    for name in compose.options("experiment")
+    for labelled in compose.expand([f"experiment={name}", "budget=smoke"])[0].conditions
+]
+
+
+@pytest.fixture(params=SHIPPED)
+def condition(request: pytest.FixtureRequest) -> Condition:
+    labelled: Labelled = request.param
+    return labelled.condition
+
+
+def test_same_seed_same_bits_other_replicate_other_bits(condition: Condition) -> None:
+    first, again, other = (run_replicate(condition, k) for k in (0, 0, 1))
+    assert first.summary.digest == again.summary.digest
+    assert first.summary.digest != other.summary.digest
+
+
+def test_records_are_consistent(condition: Condition) -> None:
+    log = read_log(run_replicate(condition, 0).content)
+    rows = log.generations
+    assert [row.index for row in rows] == list(range(len(rows)))
+    assert all(b.best_cost <= a.best_cost for a, b in zip(rows, rows[1:], strict=False)), "best so far is monotone"
+    assert all(row.best_cost <= row.best_cost_in_generation for row in rows)
+    assert all(row.best_cost_in_generation <= row.mean_cost for row in rows if np.isfinite(row.mean_cost))
+    assert all(b.evaluations > a.evaluations for a, b in zip(rows, rows[1:], strict=False))
+    assert log.summary.best_cost == rows[-1].best_cost == log.solutions[-1].cost
+    assert log.summary.evaluations == rows[-1].evaluations
+    assert log.summary.solved == rows[-1].solved
+
+
+def test_the_best_solution_is_worth_what_was_recorded(condition: Condition) -> None:
+    planner, problem = condition.prepare()
+    log = read_log(run_replicate(condition, 0).content)
+    terms = planner.evaluate(problem, log.solutions[-1].values)
+    recorded = log.generations[-1].terms
+    assert {name: terms[name] for name in recorded} == recorded
+    assert log.summary.terms == terms
+
+
+def test_costs_and_populations_are_views_that_hold_until_the_next_generation(condition: Condition) -> None:
+    planner, problem = condition.prepare()
+    best = np.inf
+    for generation in planner.evolve(problem, condition.rng(0)):
+        assert np.all(np.isfinite(generation.population))
+        assert generation.costs.min() == generation.best_cost_in_generation
+        best = min(best, generation.costs.min())
+        assert generation.best_cost == best
+        assert generation.num_feasible <= len(generation.costs)
+
+
+def test_the_last_population_is_left_alone_after_its_generation(condition: Condition) -> None:
+    planner, problem = condition.prepare()
+    generations = planner.evolve(problem, condition.rng(0))
+    last = None
+    for last in generations:
+        kept = last.population.copy()
+    assert last is not None
+    assert np.array_equal(last.population, kept)
+
+
+def test_motions_fit_the_robot(condition: Condition) -> None:
+    planner, problem = condition.prepare()
+    generation = next(planner.evolve(problem, condition.rng(0)))
+    motion = planner.motion(problem, generation.best)
+    assert motion.q.shape[1] == condition.robot.build().model.nq
+    assert np.all(np.isfinite(motion.q))
+
+
+def test_a_condition_survives_its_json(condition: Condition) -> None:
+    again = Condition.from_json(condition.to_json())
+    assert again == condition
+    assert again.id == condition.id

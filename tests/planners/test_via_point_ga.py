@@ -1,0 +1,176 @@
+"""The planner of Rana & Zalzala: its problem, its operators together, its degenerate cases."""
+
+import math
+
+import numpy as np
+import pytest
+
+from evoexp import compose
+from evoexp.condition import Condition
+from evoexp.errors import SettingError
+from evoexp.planners.via_point_ga import Problem, ViaPointGa
+
+
+def condition(*overrides: str, experiment: str = "rana_planar") -> Condition:
+    expanded = compose.expand([f"experiment={experiment}", "ga.num_generations=5", *overrides])
+    return expanded[0].conditions[0].condition
+
+
+def prepared(*overrides: str, experiment: str = "rana_planar") -> tuple[ViaPointGa, Problem]:
+    return condition(*overrides, experiment=experiment).prepare()
+
+
+def straight(problem: Problem, num: int) -> np.ndarray:
+    """The straight line from start to goal as strings (nq, N + 1)."""
+    return problem.start[:, None] + (problem.goal - problem.start)[:, None] * np.linspace(0.0, 1.0, num + 1)
+
+
+def terms_by_hand(strings: np.ndarray, arms: np.ndarray) -> dict[str, float]:
+    """Eqs. 2–6 for two arms of two links of 4 from (0, 0) and (0, 8), with circles of radius 0.5; in plain Python."""
+    terms: dict[str, float] = {}
+    for a, (first, stop) in enumerate(arms):
+        steps = [math.dist(p, q) for p, q in zip(strings[first:stop].T, strings[first:stop].T[1:], strict=False)]
+        mean = math.fsum(steps) / len(steps)
+        terms[f"length_arm_{a + 1}_deg"] = math.fsum(steps)
+        terms[f"unevenness_arm_{a + 1}_deg"] = math.fsum(abs(step - mean) for step in steps)
+    collisions = 0
+    for q in strings.T[1:]:
+        circles = []
+        for base, (one, two) in zip(((0.0, 0.0), (0.0, 8.0)), (q[:2], q[2:]), strict=True):
+            a, b = math.radians(one), math.radians(one + two)
+            elbow = (base[0] + 4 * math.cos(a), base[1] + 4 * math.sin(a))
+            tip = (elbow[0] + 4 * math.cos(b), elbow[1] + 4 * math.sin(b))
+            ends = [(base, elbow), (elbow, tip)]
+            circles.append([tuple(p + k / 4 * (r - p) for p, r in zip(s, e, strict=True)) for s, e in ends for k in range(5)])
+        collisions += min(math.dist(c, d) for c in circles[0] for d in circles[1]) < 1.0
+    return terms | {"collisions": float(collisions)}
+
+
+def test_terms_agree_with_plain_python() -> None:
+    planner, problem = prepared()
+    rng = np.random.default_rng(0)
+    population = planner.sample(problem, rng, 40)
+    judged = planner.cost(problem, population)
+    hits = 0
+    for k in range(40):
+        expected = terms_by_hand(population[:, :, k], problem.arm_slices)
+        assert judged.named_terms(k) == pytest.approx(expected, rel=1e-9)
+        lengths = expected["length_arm_1_deg"] + expected["length_arm_2_deg"]
+        uneven = expected["unevenness_arm_1_deg"] + expected["unevenness_arm_2_deg"]
+        assert judged.cost[k] == pytest.approx(0.5 * lengths + 0.005 * uneven + 100 * expected["collisions"], rel=1e-9)
+        hits += int(expected["collisions"])
+    assert hits > 0, "the sample meets collisions"
+
+
+def test_the_straight_line_collides() -> None:
+    """The scene is not trivial."""
+    planner, problem = prepared()
+    solution = planner.solution(problem, straight(problem, 20)[:, :, None], 0)
+    terms = planner.evaluate(problem, solution)
+    assert terms["collisions"] > 0
+    assert terms["path_length_ratio"] == pytest.approx(1.0)
+    assert terms["unevenness_arm_1_deg"] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_solutions_keep_the_documented_order() -> None:
+    planner, problem = prepared()
+    population = planner.sample(problem, np.random.default_rng(0), 3)
+    solution = planner.solution(problem, population, 1).reshape(2, 21, 2)
+    assert np.array_equal(solution[0, :, 0], population[0, :, 1])
+    assert np.array_equal(solution[1, :, 1], population[3, :, 1])
+    assert np.array_equal(solution[0, 0], [45.0, 225.0])
+    assert np.array_equal(solution[1, -1], [315.0, 315.0])
+    motion = planner.motion(problem, solution.ravel())
+    assert motion.q[7] == pytest.approx(np.deg2rad(population[:, 7, 1]))
+
+
+def test_elites_survive_untouched() -> None:
+    planner, problem = prepared()
+    previous = None
+    for generation in planner.evolve(problem, np.random.default_rng(1)):
+        population = generation.population[:, :, :50].copy()
+        if previous is not None:
+            costs, strings = previous
+            for place, elite in enumerate(np.argsort(costs, kind="stable")[:2]):
+                assert np.array_equal(population[:, :, 48 + place], strings[:, :, elite])
+                assert generation.costs[48 + place] == costs[elite]
+        previous = generation.costs.copy(), population
+
+
+def test_ends_never_move() -> None:
+    planner, problem = prepared(experiment="rana_three_arms")
+    for generation in planner.evolve(problem, np.random.default_rng(2)):
+        strings = generation.population[:, :, :50]
+        assert np.all(strings[:, 0] == problem.start[:, None])
+        assert np.all(strings[:, -1] == problem.goal[:, None])
+
+
+def test_substeps_find_more_collisions_and_never_fewer() -> None:
+    planner, problem = prepared()
+    finer, same = prepared("collision.collision_substeps=10")
+    population = planner.sample(problem, np.random.default_rng(3), 60)
+    coarse = planner.cost(problem, population).terms.collisions[:60]
+    fine = finer.cost(same, population).terms.collisions[:60]
+    assert np.all(fine >= coarse)
+    assert np.any(fine > coarse)
+
+
+def test_more_evaluations_than_the_papers_are_not_made() -> None:
+    planner, problem = prepared()
+    *_, last = planner.evolve(problem, np.random.default_rng(0))
+    assert last.evaluations == 50 + 5 * 48
+    assert last.collision_queries == last.evaluations * 20
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        ("ga.population_size=1", "ga.num_elites=0", "planner.num_new_trajectories=0"),
+        ("ga.population_size=1", "ga.num_elites=1", "planner.num_new_trajectories=0"),
+        ("ga.population_size=3", "ga.num_elites=0", "planner.num_new_trajectories=3"),
+        ("planner.num_via_points=1",),
+        ("planner.num_via_points=2",),
+        ("objective.fitness_offset=0",),
+        ("objective.length_weight=0", "objective.unevenness_weight=0", "objective.collision_weight=0"),
+        ("planner.redistribution=false", "planner.relaxation_step=0"),
+        ("planner.relaxation_step=1", "planner.max_turn=0"),
+        ("planner.spline_end=clamped", "planner.max_turn=180"),
+        ("ga.crossover_rate=0", "ga.mutation_rate=0"),
+        ("scenario.q_goal=[[45,225],[225,225]]",),
+        ("scenario.q_goal=[[45,225],[270,225]]",),
+        ("collision.spheres_per_link=1", "collision.sphere_radius=1.2"),
+    ],
+    ids=lambda o: " ".join(o),
+)
+def test_degenerate_settings_run(overrides: tuple[str, ...]) -> None:
+    planner, problem = prepared(*overrides)
+    for generation in planner.evolve(problem, np.random.default_rng(0)):
+        assert np.all(np.isfinite(generation.costs))
+        assert np.all(np.isfinite(generation.population))
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (("scenario.q_start=[[90,0],[270,0]]",), "scenario.q_start: must be free of collision (two arms overlap"),
+        (("scenario.q_goal=[[90,0],[270,0]]",), "scenario.q_goal: must be free of collision"),
+        (("scenario.q_start=[[45,225]]",), "scenario.q_start: must be one list per arm of the robot"),
+        (("scenario.q_start=[[45,225],[1,2,3]]",), "scenario.q_start: must be one list per arm of the robot"),
+        (("planner.num_new_trajectories=49",), "planner.num_new_trajectories: must be at most the offspring"),
+    ],
+)
+def test_problems_that_cannot_be_are_refused(overrides: tuple[str, ...], message: str) -> None:
+    with pytest.raises(SettingError) as caught:
+        prepared(*overrides)
+    assert message in str(caught.value)
+
+
+def test_a_start_inside_an_obstacle_is_refused() -> None:
+    with pytest.raises(SettingError, match="an arm and an obstacle overlap"):
+        prepared("scenario.obstacles=[{shape: sphere, center: [2.8, 2.8], radius: 0.5}]")
+
+
+def test_a_solution_of_another_size_is_refused() -> None:
+    planner, problem = prepared()
+    with pytest.raises(ValueError, match="a solution has 84 values"):
+        planner.evaluate(problem, np.zeros(83))

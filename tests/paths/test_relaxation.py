@@ -48,10 +48,10 @@ def test_a_lane_depends_neither_on_its_place_nor_on_the_padding():
 def test_repeated_sweeps_straighten_a_path():
     given = strings(3)
     ends = given[:, [0, -1]].copy()
-    for _ in range(2000):
+    for _ in range(5000):
         relax(given, 0.5, 24)
     line = np.linspace(ends[:, 0], ends[:, 1], 21, axis=1)
-    assert np.allclose(given, line, rtol=0.0, atol=1e-9)  # the slowest mode shrinks by 1 − 0.012 or more per sweep
+    assert np.allclose(given, line, rtol=0.0, atol=1e-9)  # the slowest mode shrinks by 0.8 % per sweep
     assert np.array_equal(given[:, [0, -1]], ends)
 
 

@@ -14,10 +14,11 @@ import numpy as np
 from evoexp.numerics import DEGREE, kernel
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly, sphere_geometry
-from evoexp.robots.kinematics import BLOCK, PLANAR_ROWS, SPATIAL_ROWS, block_frames, block_planar_frames
+from evoexp.robots.kinematics import BLOCK, PLANAR_ROWS, SPATIAL_ROWS, U, block_frames, block_planar_frames, load_block
 from evoexp.scenarios.obstacles import BOX, SPHERE, ObstacleTable, obstacle_table
 from evoexp.validation import Component, Count, Positive
 
+ROWS = 3 * BLOCK  # x, y, z of a point in a block
 MARGIN = 1.0 + 1e-9  # bounds are widened by it, so that rounding cannot skip what touches
 
 
@@ -180,20 +181,16 @@ def _clearances(table, planar, spheres, bounds, obstacles, limit, q, out):  # ty
     parent, index_q, prismatic, turned, rotation, translation = table
     joint, local, radius = spheres
     bound_joint, bound_local = bounds[0], bounds[1]
-    total = q.shape[1]
-    block_q = np.zeros((q.shape[0], BLOCK))
-    frames = np.empty((len(parent), PLANAR_ROWS if planar else SPATIAL_ROWS, BLOCK))
-    centers, middles = np.empty((len(joint), 3, BLOCK)), np.empty((len(bound_joint), 3, BLOCK))
-    scratch = np.empty((SPATIAL_ROWS, BLOCK))
-    between, outside = np.empty(BLOCK), np.empty(BLOCK)
+    block_q = np.zeros(q.shape[0] * BLOCK)
+    frames = np.empty(len(parent) * SPATIAL_ROWS * BLOCK)
+    centers, middles = np.empty(len(joint) * ROWS), np.empty(len(bound_joint) * ROWS)
+    scratch, between, outside = np.empty(SPATIAL_ROWS * BLOCK), np.empty(BLOCK), np.empty(BLOCK)
     if planar:
         _heights(parent, translation, joint, local, centers)
         _heights(parent, translation, bound_joint, bound_local, middles)
-    for first in range(0, total, BLOCK):
-        count = min(BLOCK, total - first)
-        for k in range(q.shape[0]):
-            for lane in range(count):
-                block_q[k, lane] = q[k, first + lane] * DEGREE
+    for first in range(0, q.shape[1], BLOCK):
+        count = min(BLOCK, q.shape[1] - first)
+        load_block(q, first, count, DEGREE, block_q)
         if planar:
             block_planar_frames(parent, index_q, rotation, translation, block_q, frames)
             _planar_centers(joint, local, frames, centers)
@@ -203,7 +200,9 @@ def _clearances(table, planar, spheres, bounds, obstacles, limit, q, out):  # ty
             _spatial_centers(joint, local, frames, centers)
             _spatial_centers(bound_joint, bound_local, frames, middles)
         _between_arms(planar, bounds, max(limit + 2.0 * radius, 0.0), centers, middles, scratch, between)
-        _to_obstacles(obstacles, bounds, limit + radius, centers, middles, scratch, outside)
+        outside[:] = limit + radius
+        if len(obstacles[0]) > 0:
+            _to_obstacles(obstacles, bounds, limit + radius, centers, middles, scratch, outside)
         for lane in range(count):
             out[0, first + lane] = between[lane] - 2.0 * radius
             out[1, first + lane] = outside[lane] - radius
@@ -217,162 +216,163 @@ def _heights(parent, translation, joint, local, centers):  # type: ignore[no-unt
         while j >= 0:
             height += translation[j, 2]
             j = parent[j]
-        centers[k, 2, :] = height
+        centers[k * ROWS + 2 * BLOCK : (k + 1) * ROWS] = height
 
 
 @kernel
 def _planar_centers(joint, local, frames, centers):  # type: ignore[no-untyped-def]
     for k in range(len(joint)):
-        own, j = np.uint64(k), np.uint64(joint[k])
+        own, j = U(k) * U(ROWS), U(joint[k]) * U(PLANAR_ROWS * BLOCK)
         x, y = local[k, 0], local[k, 1]
-        for lane in range(BLOCK):
-            s, c = frames[j, 0, lane], frames[j, 1, lane]
-            centers[own, 0, lane] = frames[j, 2, lane] + (c * x - s * y)
-            centers[own, 1, lane] = frames[j, 3, lane] + (s * x + c * y)
+        for n in range(BLOCK):
+            lane = U(n)
+            s, c = frames[j + lane], frames[j + U(BLOCK) + lane]
+            centers[own + lane] = frames[j + U(2 * BLOCK) + lane] + (c * x - s * y)
+            centers[own + U(BLOCK) + lane] = frames[j + U(3 * BLOCK) + lane] + (s * x + c * y)
 
 
 @kernel
 def _spatial_centers(joint, local, frames, centers):  # type: ignore[no-untyped-def]
     for k in range(len(joint)):
-        own, j = np.uint64(k), np.uint64(joint[k])
+        own, j = U(k) * U(ROWS), U(joint[k]) * U(SPATIAL_ROWS * BLOCK)
         x, y, z = local[k, 0], local[k, 1], local[k, 2]
-        for row in range(3):
-            a, o, e = np.uint64(3 * row), np.uint64(9 + row), np.uint64(row)
-            b, c = a + np.uint64(1), a + np.uint64(2)
-            for lane in range(BLOCK):
-                centers[own, e, lane] = frames[j, o, lane] + (
-                    frames[j, a, lane] * x + frames[j, b, lane] * y + frames[j, c, lane] * z
+        for n in range(BLOCK):
+            lane = U(n)
+            for row in range(3):
+                a, o = j + U(3 * row * BLOCK) + lane, j + U((9 + row) * BLOCK) + lane
+                centers[own + U(row * BLOCK) + lane] = frames[o] + (
+                    frames[a] * x + frames[a + U(BLOCK)] * y + frames[a + U(2 * BLOCK)] * z
                 )
 
 
 @kernel
-def _between_arms(planar, bounds, limit, centers, middles, scratch, out):  # type: ignore[no-untyped-def]
+def _between_arms(planar, bounds, limit, centers, middles, least, out):  # type: ignore[no-untyped-def]
     """Least centre distance over all pairs of arms, (BLOCK,), as far as it is below the limit."""
     _, _, reach, spheres, arm_links = bounds
     out[:] = limit
     for a in range(len(arm_links)):
         for b in range(a + 1, len(arm_links)):
-            scratch[0, :] = limit * limit
+            least[:BLOCK] = limit * limit
             for one in range(arm_links[a, 0], arm_links[a, 1]):
                 for two in range(arm_links[b, 0], arm_links[b, 1]):
                     within = (limit + reach[one] + reach[two]) * MARGIN
-                    if not _meet(middles, np.uint64(one), middles, np.uint64(two), within):
+                    if not _meet(middles, U(one) * U(ROWS), middles, U(two) * U(ROWS), within):
                         continue
-                    first, stop = np.uint64(spheres[two, 0]), np.uint64(spheres[two, 1])
+                    first, stop = U(spheres[two, 0]), U(spheres[two, 1])
                     for i in range(spheres[one, 0], spheres[one, 1]):
                         if planar:
-                            _planar_pairs(centers, np.uint64(i), first, stop, scratch)
+                            _planar_pairs(centers, U(i) * U(ROWS), first, stop, least)
                         else:
-                            _spatial_pairs(centers, np.uint64(i), first, stop, scratch)
-            for lane in range(BLOCK):
-                distance, best = np.sqrt(scratch[0, lane]), out[lane]
-                out[lane] = distance if distance < best else best
+                            _spatial_pairs(centers, U(i) * U(ROWS), first, stop, least)
+            for n in range(BLOCK):
+                distance, best = np.sqrt(least[U(n)]), out[U(n)]
+                out[U(n)] = distance if distance < best else best
 
 
 @kernel
 def _meet(one, i, two, j, within):  # type: ignore[no-untyped-def]
-    """Whether two points are closer than `within` in any lane."""
+    """Whether the points at offsets i and j are closer than `within` in any lane."""
     squared = within * within
     count = 0
-    for lane in range(BLOCK):
-        dx, dy = one[i, 0, lane] - two[j, 0, lane], one[i, 1, lane] - two[j, 1, lane]
-        dz = one[i, 2, lane] - two[j, 2, lane]
+    for n in range(BLOCK):
+        a, b = i + U(n), j + U(n)
+        dx, dy = one[a] - two[b], one[a + U(BLOCK)] - two[b + U(BLOCK)]
+        dz = one[a + U(2 * BLOCK)] - two[b + U(2 * BLOCK)]
         count += dx * dx + dy * dy + dz * dz < squared
     return count > 0
 
 
 @kernel
 def _planar_pairs(centers, i, first, stop, least):  # type: ignore[no-untyped-def]
-    """Lower least[0] to the squared distances of sphere i from a range of spheres; four in registers at a time."""
+    """Lower `least` to the squared distances of one sphere from a range of spheres; four in registers at a time."""
     j = first
-    while j + np.uint64(4) <= stop:
-        for lane in range(BLOCK):
-            x, y, best = centers[i, 0, lane], centers[i, 1, lane], least[0, lane]
+    while j + U(4) <= stop:
+        for n in range(BLOCK):
+            lane = U(n)
+            x, y, best = centers[i + lane], centers[i + U(BLOCK) + lane], least[lane]
             for t in range(4):
-                k = j + np.uint64(t)
-                dx, dy = x - centers[k, 0, lane], y - centers[k, 1, lane]
+                k = j * U(ROWS) + U(t * ROWS) + lane
+                dx, dy = x - centers[k], y - centers[k + U(BLOCK)]
                 squared = dx * dx + dy * dy
                 best = squared if squared < best else best
-            least[0, lane] = best
-        j += np.uint64(4)
+            least[lane] = best
+        j += U(4)
     while j < stop:
-        for lane in range(BLOCK):
-            dx, dy = centers[i, 0, lane] - centers[j, 0, lane], centers[i, 1, lane] - centers[j, 1, lane]
-            squared, best = dx * dx + dy * dy, least[0, lane]
-            least[0, lane] = squared if squared < best else best
-        j += np.uint64(1)
+        for n in range(BLOCK):
+            lane, k = U(n), j * U(ROWS) + U(n)
+            dx, dy = centers[i + lane] - centers[k], centers[i + U(BLOCK) + lane] - centers[k + U(BLOCK)]
+            squared, best = dx * dx + dy * dy, least[lane]
+            least[lane] = squared if squared < best else best
+        j += U(1)
 
 
 @kernel
 def _spatial_pairs(centers, i, first, stop, least):  # type: ignore[no-untyped-def]
     j = first
-    while j + np.uint64(4) <= stop:
-        for lane in range(BLOCK):
-            x, y, z, best = centers[i, 0, lane], centers[i, 1, lane], centers[i, 2, lane], least[0, lane]
+    while j + U(4) <= stop:
+        for n in range(BLOCK):
+            lane, best = U(n), least[U(n)]
+            x, y, z = centers[i + lane], centers[i + U(BLOCK) + lane], centers[i + U(2 * BLOCK) + lane]
             for t in range(4):
-                k = j + np.uint64(t)
-                dx, dy, dz = x - centers[k, 0, lane], y - centers[k, 1, lane], z - centers[k, 2, lane]
+                k = j * U(ROWS) + U(t * ROWS) + lane
+                dx, dy, dz = x - centers[k], y - centers[k + U(BLOCK)], z - centers[k + U(2 * BLOCK)]
                 squared = dx * dx + dy * dy + dz * dz
                 best = squared if squared < best else best
-            least[0, lane] = best
-        j += np.uint64(4)
+            least[lane] = best
+        j += U(4)
     while j < stop:
-        for lane in range(BLOCK):
-            dx, dy = centers[i, 0, lane] - centers[j, 0, lane], centers[i, 1, lane] - centers[j, 1, lane]
-            dz = centers[i, 2, lane] - centers[j, 2, lane]
-            squared, best = dx * dx + dy * dy + dz * dz, least[0, lane]
-            least[0, lane] = squared if squared < best else best
-        j += np.uint64(1)
+        for n in range(BLOCK):
+            lane, k = U(n), j * U(ROWS) + U(n)
+            dx, dy = centers[i + lane] - centers[k], centers[i + U(BLOCK) + lane] - centers[k + U(BLOCK)]
+            dz = centers[i + U(2 * BLOCK) + lane] - centers[k + U(2 * BLOCK)]
+            squared, best = dx * dx + dy * dy + dz * dz, least[lane]
+            least[lane] = squared if squared < best else best
+        j += U(1)
 
 
 @kernel
 def _to_obstacles(obstacles, bounds, limit, centers, middles, scratch, out):  # type: ignore[no-untyped-def]
-    """Least signed distance of any centre to any obstacle's surface, (BLOCK,), as far as it is below the limit."""
+    """Lower `out` (BLOCK,), the limit, to the signed distance of any centre to any obstacle's surface."""
     _, _, reach, spheres, _ = bounds
     kind, center, rotation, size = obstacles
-    out[:] = limit
-    place = np.empty((1, 3, BLOCK))
+    place = np.empty(ROWS)
     for o in range(len(kind)):
         for row in range(3):
-            place[0, row, :] = center[o, row]
-        extent = _length(size[o, 0], size[o, 1], size[o, 2])
-        if kind[o] != BOX:
-            extent = size[o, 0] + size[o, 1]
+            place[row * BLOCK : (row + 1) * BLOCK] = center[o, row]
+        extent = _length(size[o, 0], size[o, 1], size[o, 2]) if kind[o] == BOX else size[o, 0] + size[o, 1]
         for link in range(len(reach)):
-            if _meet(middles, np.uint64(link), place, np.uint64(0), (limit + reach[link] + extent) * MARGIN):
-                _to_obstacle(kind[o], center[o], rotation[o], size[o], centers, spheres[link], scratch, out)
+            if _meet(middles, U(link) * U(ROWS), place, U(0), (limit + reach[link] + extent) * MARGIN):
+                for i in range(spheres[link, 0], spheres[link, 1]):
+                    _into_frame(center[o], rotation[o], centers, U(i) * U(ROWS), scratch)
+                    _to_obstacle(kind[o], size[o, 0], size[o, 1], size[o, 2], scratch, out)
 
 
 @kernel
-def _to_obstacle(kind, center, rotation, size, centers, spheres, scratch, out):  # type: ignore[no-untyped-def]
-    a, b, c = size[0], size[1], size[2]
-    for i in range(spheres[0], spheres[1]):
-        _into_frame(center, rotation, centers, np.uint64(i), scratch)
+def _to_obstacle(kind, a, b, c, point, out):  # type: ignore[no-untyped-def]
+    """Lower `out` to the signed distance of points in an obstacle's frame to its surface."""
+    for n in range(BLOCK):
+        lane = U(n)
+        x, y, z = point[lane], point[U(BLOCK) + lane], point[U(2 * BLOCK) + lane]
         if kind == SPHERE:
-            for lane in range(BLOCK):
-                distance = _length(scratch[0, lane], scratch[1, lane], scratch[2, lane]) - a
-                out[lane] = min(out[lane], distance)
+            distance = _length(x, y, z) - a
         elif kind == BOX:
-            for lane in range(BLOCK):
-                x, y, z = abs(scratch[0, lane]) - a, abs(scratch[1, lane]) - b, abs(scratch[2, lane]) - c
-                inside = min(max(x, max(y, z)), 0.0)
-                out[lane] = min(out[lane], _length(max(x, 0.0), max(y, 0.0), max(z, 0.0)) + inside)
+            u, v, w = abs(x) - a, abs(y) - b, abs(z) - c
+            distance = _length(max(u, 0.0), max(v, 0.0), max(w, 0.0)) + min(max(u, max(v, w)), 0.0)
         else:
-            for lane in range(BLOCK):
-                along = min(max(scratch[2, lane], -b), b)
-                distance = _length(scratch[0, lane], scratch[1, lane], scratch[2, lane] - along) - a
-                out[lane] = min(out[lane], distance)
+            distance = _length(x, y, z - min(max(z, -b), b)) - a
+        out[lane] = min(out[lane], distance)
 
 
 @kernel
 def _into_frame(center, rotation, centers, i, out):  # type: ignore[no-untyped-def]
-    """Centres of sphere i seen from a frame, out[:3]."""
+    """Centres at offset i seen from a frame, (ROWS,)."""
     cx, cy, cz = center[0], center[1], center[2]
     for row in range(3):
-        a, b, c, e = rotation[row], rotation[3 + row], rotation[6 + row], np.uint64(row)
-        for lane in range(BLOCK):
-            x, y, z = centers[i, 0, lane] - cx, centers[i, 1, lane] - cy, centers[i, 2, lane] - cz
-            out[e, lane] = a * x + b * y + c * z
+        a, b, c, e = rotation[row], rotation[3 + row], rotation[6 + row], U(row * BLOCK)
+        for n in range(BLOCK):
+            lane = i + U(n)
+            x, y, z = centers[lane] - cx, centers[lane + U(BLOCK)] - cy, centers[lane + U(2 * BLOCK)] - cz
+            out[e + U(n)] = a * x + b * y + c * z
 
 
 @kernel

@@ -4,9 +4,9 @@ The length between the samples j and j + 1 is that of the cubic through four spe
 
     h/24 (13 (v[j] + v[j+1]) − v[j−1] − v[j+2]).
 
-The loops leave h/24 out and keep every length at or above a twelfth of the trapezoid's, so that L never falls where a
-path turns on the spot. The origin of L is arbitrary (not zero). Four samples per pass: with eight, LLVM meets more pairs
-of rows than it is willing to test for overlap, and does not vectorise (three times slower).
+The loops leave h/24 out and keep every length at or above a twelfth of the trapezoid's, so that L never falls where
+a path turns on the spot. The origin of L is arbitrary (not zero). Four samples per pass: with eight, LLVM meets more
+pairs of rows than it is willing to test for overlap, and does not vectorise (three times slower).
 """
 
 from typing import Any

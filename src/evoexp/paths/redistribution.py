@@ -15,7 +15,7 @@ points in the plane, fresh walks and populations just crossed over:
 Gauss's rule with a polynomial inverse needs as many roots for that: near a cusp, which crossed-over paths have, the
 speed is hardly smooth. What limits it (Xeon at 2.5 to 3 GHz, 50 lanes, 2 arms, 21 points, 2 joints, 8 samples: about
 70 µs): the speeds and their integral 30 µs, of which the square roots alone (3 cycles each) take 18; copying records
-from each lane's own place, which no loop can vectorise, 14 µs; the bisection 9 µs; splines 3 µs; the rest is arithmetic.
+from each lane's own place, which no loop can vectorise, 14 µs; the bisection 9 µs; splines 3 µs; and arithmetic.
 """
 
 from typing import Any

@@ -50,8 +50,9 @@ class Redistribution(NamedTuple):
 def spline_pivots(num_segments: int, end_condition: EndCondition) -> NDArray[np.float64]:
     """Return the reciprocal pivots (N + 1,) of the system for m, a sixth of a cubic spline's second derivatives.
 
-    Inside, m[i−1] + 4 m[i] + m[i+1] = a[i−1] − 2 a[i] + a[i+1]. Clamped ends (slope zero) add
-    2 m[0] + m[1] = a[1] − a[0] at the start and m[N−1] + 2 m[N] = a[N−1] − a[N] at the goal. Natural ones have m[0] = m[N] = 0: a reciprocal of zero.
+    Inside, m[i−1] + 4 m[i] + m[i+1] = a[i−1] − 2 a[i] + a[i+1]. Clamped ends (slope zero) add the first equation
+    2 m[0] + m[1] = a[1] − a[0] and the last, m[N−1] + 2 m[N] = a[N−1] − a[N]. Natural ones have m[0] = m[N] = 0, which
+    a reciprocal of zero achieves.
     """
     clamped = end_condition == "clamped"
     pivots = np.zeros(num_segments + 1)

@@ -138,15 +138,16 @@ def _component(group: str, config: dict[str, Any], preferred: dict[str, str]) ->
 
 
 def _option_of(group: str, config: dict[str, Any], preferred: str | None) -> tuple[str, dict[str, Entry]]:
-    """Return name and entries of the shipped option that a component agrees with most."""
+    """Return name and entries of the shipped option that a component agrees with most and lacks least of."""
     leaves = dict(_flat(config, ""))
-    best: tuple[tuple[int, bool], str, dict[str, Entry]] = ((-1, False), "", {})
+    best: tuple[tuple[int, bool], str, dict[str, Entry]] = ((-(10**9), False), "", {})
     for path in sorted((config_directory() / group).glob("*.yaml")):
         entries = option(path)
         if TARGET not in entries or entries[TARGET].value != config[TARGET]:
             continue
         agreeing = sum(_same(value, entries[key].value) for key, value in leaves.items() if key in entries)
-        score = (agreeing, path.stem == preferred)
+        lacking = sum(key not in leaves for key, entry in entries.items() if not _REFERENCE.match(str(entry.value)))
+        score = (agreeing - lacking, path.stem == preferred)
         if score > best[0]:
             best = (score, path.stem, entries)
     return best[1:]

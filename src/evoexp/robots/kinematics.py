@@ -5,8 +5,9 @@ the joint moves about (or along) its own z axis: the rotation of a revolute join
 keep the configurations innermost, in blocks of `BLOCK` lanes, and use evoexp's own sine and cosine: the result does not
 depend on the CPU's vector width.
 
-What makes the loops over lanes vector code: a block's frames are one array (with several, the checks that nothing
-overlaps become too many), indices are unsigned (no wrap-around), and no views are made inside (each counts references).
+What makes the loops over lanes vector code: a block's frames are one flat array, whose rows are constant distances
+apart (otherwise the checks that nothing overlaps become too many, and LLVM stays scalar); indices are unsigned (no
+wrap-around); and no views are made inside (each counts references).
 """
 
 from typing import Any, NamedTuple
@@ -20,6 +21,8 @@ from evoexp.records import FloatArray
 
 BLOCK = 64
 """Configurations that a kernel carries through all its steps at once; its scratch stays in the first-level cache."""
+
+U = np.uint64
 
 SPATIAL_ROWS = 12
 """Rows of a joint's frame in space: nine of its rotation, three of its origin."""
@@ -116,15 +119,24 @@ def _forward_kinematics(  # type: ignore[no-untyped-def]
     parent, index_q, prismatic, turned, rotation, translation, q, rotations, origins
 ):
     num_joints, total = len(parent), q.shape[1]
-    block_q = np.zeros((q.shape[0], BLOCK))
-    frames = np.empty((num_joints, SPATIAL_ROWS, BLOCK))
-    scratch = np.empty((SPATIAL_ROWS, BLOCK))
+    block_q = np.zeros(q.shape[0] * BLOCK)
+    frames, scratch = np.empty(num_joints * SPATIAL_ROWS * BLOCK), np.empty(SPATIAL_ROWS * BLOCK)
+    by_row = frames.reshape((num_joints, SPATIAL_ROWS, BLOCK))
     for first in range(0, total, BLOCK):
         count = min(BLOCK, total - first)
-        block_q[:, :count] = q[:, first : first + count]
+        load_block(q, first, count, 1.0, block_q)
         block_frames(parent, index_q, prismatic, turned, rotation, translation, block_q, frames, scratch)
-        rotations[:, :, first : first + count] = frames[:, :9, :count]
-        origins[:, :, first : first + count] = frames[:, 9:, :count]
+        rotations[:, :, first : first + count] = by_row[:, :9, :count]
+        origins[:, :, first : first + count] = by_row[:, 9:, :count]
+
+
+@kernel
+def load_block(q, first, count, unit, out):  # type: ignore[no-untyped-def]
+    """Copy `count` configurations of q (nq, configurations) from `first` on, times a unit, to a block (nq · BLOCK,)."""
+    for k in range(q.shape[0]):
+        row = U(k) * U(BLOCK)
+        for n in range(count):
+            out[row + U(n)] = q[U(k), U(first + n)] * unit
 
 
 @kernel
@@ -140,37 +152,33 @@ def block_frames(  # type: ignore[no-untyped-def]
         turned: See `KinematicTable`.
         rotation: See `KinematicTable`.
         translation: See `KinematicTable`.
-        q: (nq, BLOCK).
-        frames: (joints, SPATIAL_ROWS, BLOCK), written: the rotation row by row, then the origin.
-        scratch: (SPATIAL_ROWS, BLOCK): the placed frame before the joint moves; then sine and cosine.
+        q: (nq · BLOCK,).
+        frames: (joints · SPATIAL_ROWS · BLOCK,), written: the rotation row by row, then the origin.
+        scratch: (SPATIAL_ROWS · BLOCK,): the placed frame before the joint moves.
     """
     for k in range(len(parent)):
-        own, row = np.uint64(k), np.uint64(index_q[k])
+        own, row = U(k) * U(SPATIAL_ROWS * BLOCK), U(index_q[k]) * U(BLOCK)
         _place(parent[k], turned[k], rotation[k], translation[k], frames, scratch)
         if prismatic[k]:
-            for e in range(9):
-                for lane in range(BLOCK):
-                    frames[own, np.uint64(e), lane] = scratch[np.uint64(e), lane]
+            for lane in range(9 * BLOCK):
+                frames[own + U(lane)] = scratch[U(lane)]
             for e in range(3):
-                z, o = np.uint64(3 * e + 2), np.uint64(9 + e)
-                for lane in range(BLOCK):
-                    frames[own, o, lane] = scratch[o, lane] + scratch[z, lane] * q[row, lane]
+                o, z = U((9 + e) * BLOCK), U((3 * e + 2) * BLOCK)
+                for n in range(BLOCK):
+                    lane = U(n)
+                    frames[own + o + lane] = scratch[o + lane] + scratch[z + lane] * q[row + lane]
         else:
-            for e in range(3):
-                x, y, z, o = np.uint64(3 * e), np.uint64(3 * e + 1), np.uint64(3 * e + 2), np.uint64(9 + e)
-                for lane in range(BLOCK):
-                    frames[own, z, lane] = scratch[z, lane]
-                    frames[own, o, lane] = scratch[o, lane]
-            for lane in range(BLOCK):
-                s, c = sincos(q[row, lane])
-                scratch[2, lane] = s
-                scratch[5, lane] = c
-            for e in range(3):
-                x, y = np.uint64(3 * e), np.uint64(3 * e + 1)
-                for lane in range(BLOCK):
-                    s, c = scratch[2, lane], scratch[5, lane]
-                    frames[own, x, lane] = scratch[x, lane] * c + scratch[y, lane] * s
-                    frames[own, y, lane] = scratch[y, lane] * c - scratch[x, lane] * s
+            for n in range(BLOCK):
+                lane = U(n)
+                s, c = sincos(q[row + lane])
+                for e in range(3):
+                    x, y, z = U(3 * e * BLOCK) + lane, U((3 * e + 1) * BLOCK) + lane, U((3 * e + 2) * BLOCK) + lane
+                    frames[own + x] = scratch[x] * c + scratch[y] * s
+                    frames[own + y] = scratch[y] * c - scratch[x] * s
+                    frames[own + z] = scratch[z]
+            for n in range(3 * BLOCK):
+                lane = U(9 * BLOCK) + U(n)
+                frames[own + lane] = scratch[lane]
 
 
 @kernel
@@ -178,29 +186,30 @@ def _place(parent, turned, rotation, translation, frames, placed):  # type: igno
     """A joint's frame before it moves: its placement behind its parent's frame."""
     if parent < 0:
         for e in range(9):
-            placed[e, :] = rotation[e]
+            placed[e * BLOCK : (e + 1) * BLOCK] = rotation[e]
         for e in range(3):
-            placed[9 + e, :] = translation[e]
+            placed[(9 + e) * BLOCK : (10 + e) * BLOCK] = translation[e]
         return
-    before = np.uint64(parent)
+    before = U(parent) * U(SPATIAL_ROWS * BLOCK)
+    dx, dy, dz = translation[0], translation[1], translation[2]
     for e in range(3):
-        x, y, z, o = np.uint64(3 * e), np.uint64(3 * e + 1), np.uint64(3 * e + 2), np.uint64(9 + e)
-        dx, dy, dz = translation[0], translation[1], translation[2]
-        for lane in range(BLOCK):
-            placed[o, lane] = frames[before, o, lane] + (
-                frames[before, x, lane] * dx + frames[before, y, lane] * dy + frames[before, z, lane] * dz
+        x, o = before + U(3 * e * BLOCK), U((9 + e) * BLOCK)
+        y, z = x + U(BLOCK), x + U(2 * BLOCK)
+        for n in range(BLOCK):
+            lane = U(n)
+            placed[o + lane] = frames[before + o + lane] + (
+                frames[x + lane] * dx + frames[y + lane] * dy + frames[z + lane] * dz
             )
         for column in range(3):
-            c = np.uint64(3 * e + column)
+            c = U((3 * e + column) * BLOCK)
             if turned:
                 ax, ay, az = rotation[column], rotation[3 + column], rotation[6 + column]
-                for lane in range(BLOCK):
-                    placed[c, lane] = (
-                        frames[before, x, lane] * ax + frames[before, y, lane] * ay + frames[before, z, lane] * az
-                    )
+                for n in range(BLOCK):
+                    lane = U(n)
+                    placed[c + lane] = frames[x + lane] * ax + frames[y + lane] * ay + frames[z + lane] * az
             else:
-                for lane in range(BLOCK):
-                    placed[c, lane] = frames[before, c, lane]
+                for n in range(BLOCK):
+                    placed[c + U(n)] = frames[before + c + U(n)]
 
 
 @kernel
@@ -212,33 +221,37 @@ def block_planar_frames(parent, index_q, rotation, translation, q, frames):  # t
         index_q: See `KinematicTable`.
         rotation: See `KinematicTable`.
         translation: See `KinematicTable`.
-        q: (nq, BLOCK).
-        frames: (joints, PLANAR_ROWS, BLOCK), written: sine and cosine of the angle from the world's x axis, then x, y.
+        q: (nq · BLOCK,).
+        frames: (joints · PLANAR_ROWS · BLOCK,), written: sine and cosine of the angle from the world's x axis, then x, y.
     """
     for k in range(len(parent)):
-        own, row = np.uint64(k), np.uint64(index_q[k])
+        own, row = U(k) * U(PLANAR_ROWS * BLOCK), U(index_q[k]) * U(BLOCK)
         dx, dy = translation[k, 0], translation[k, 1]
         c0, s0 = rotation[k, 0], rotation[k, 3]
         if parent[k] < 0:
-            for lane in range(BLOCK):
-                s, c = sincos(q[row, lane])
-                frames[own, 0, lane] = s0 * c + c0 * s
-                frames[own, 1, lane] = c0 * c - s0 * s
-            for lane in range(BLOCK):
-                frames[own, 2, lane] = dx
-                frames[own, 3, lane] = dy
+            for n in range(BLOCK):
+                lane = U(n)
+                s, c = sincos(q[row + lane])
+                frames[own + lane] = s0 * c + c0 * s
+                frames[own + U(BLOCK) + lane] = c0 * c - s0 * s
+            for n in range(BLOCK):
+                frames[own + U(2 * BLOCK) + U(n)] = dx
+                frames[own + U(3 * BLOCK) + U(n)] = dy
         else:
-            before = np.uint64(parent[k])
-            for lane in range(BLOCK):
-                s, c = sincos(q[row, lane])
+            before = U(parent[k]) * U(PLANAR_ROWS * BLOCK)
+            for n in range(BLOCK):
+                lane = U(n)
+                s, c = sincos(q[row + lane])
                 s1, c1 = s0 * c + c0 * s, c0 * c - s0 * s
-                sb, cb = frames[before, 0, lane], frames[before, 1, lane]
-                frames[own, 0, lane] = sb * c1 + cb * s1
-                frames[own, 1, lane] = cb * c1 - sb * s1
-            for lane in range(BLOCK):
-                sb, cb = frames[before, 0, lane], frames[before, 1, lane]
-                frames[own, 2, lane] = frames[before, 2, lane] + (cb * dx - sb * dy)
-                frames[own, 3, lane] = frames[before, 3, lane] + (sb * dx + cb * dy)
+                sb, cb = frames[before + lane], frames[before + U(BLOCK) + lane]
+                frames[own + lane] = sb * c1 + cb * s1
+                frames[own + U(BLOCK) + lane] = cb * c1 - sb * s1
+            for n in range(BLOCK):
+                lane = U(n)
+                sb, cb = frames[before + lane], frames[before + U(BLOCK) + lane]
+                x, y = frames[before + U(2 * BLOCK) + lane], frames[before + U(3 * BLOCK) + lane]
+                frames[own + U(2 * BLOCK) + lane] = x + (cb * dx - sb * dy)
+                frames[own + U(3 * BLOCK) + lane] = y + (sb * dx + cb * dy)
 
 
 def _axis(model: Any, data: Any, neutral: FloatArray, joint: int) -> tuple[FloatArray, bool]:

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Arc, Circle
+from matplotlib.patheffects import withStroke
 
 from evoexp.numerics import DEGREE, sincos
 from evoexp.records import FloatArray
@@ -78,7 +79,7 @@ def via_points_table(condition: ConditionResults) -> pd.DataFrame:
 def draw_via_points(table: pd.DataFrame) -> Figure:
     """Draw via-points in the arms' configuration planes, numbered by instant."""
     arms = sorted(table["arm"].unique())
-    figure = style.figure(3.6)
+    figure = style.figure(3.6 if len(arms) < 3 else 3.0)
     planes = figure.subplots(1, len(arms), squeeze=False)[0]
     stages = list(dict.fromkeys(table["stage"]))
     for axes, arm in zip(planes, arms, strict=True):
@@ -213,6 +214,7 @@ def _angle(axes: Axes, row: Any) -> None:
 
 def _numbers(axes: Axes, x: FloatArray, y: FloatArray, instants: np.ndarray) -> None:
     """Write the number of every fifth via-point, the start and the goal beside it."""
+    halo = withStroke(linewidth=2.0, foreground="white")
     for k, instant in enumerate(instants):
         if instant % NUMBERED == 0 or k == len(instants) - 1:
             along = np.array(
@@ -225,7 +227,7 @@ def _numbers(axes: Axes, x: FloatArray, y: FloatArray, instants: np.ndarray) -> 
                 "ha": "center",
                 "va": "center",
             }
-            axes.annotate(str(instant), (x[k], y[k]), fontsize=7, **place)
+            axes.annotate(str(instant), (x[k], y[k]), fontsize=7, path_effects=[halo], zorder=6, **place)
 
 
 def _closest(centres: list[FloatArray]) -> tuple[FloatArray, FloatArray]:

@@ -53,7 +53,12 @@ def draw_snapshots(table: pd.DataFrame) -> Figure:
     stages = sorted(table["stage"].unique())
     columns = min(3, len(stages))
     lines = -(-len(stages) // columns)
-    figure = style.figure(2.75 * lines + 0.5, 6.2)
+    drawn = pd.concat([table, obstacles])
+    x, y = drawn[["x", "x_end"]].to_numpy(), drawn[["y", "y_end"]].to_numpy()
+    left, right, low, high = x.min() - 0.5, x.max() + 0.5, y.min() - 0.5, y.max() + 0.5
+    width = 6.2
+    panel = (width - 0.7) / columns * (high - low) / (right - left)
+    figure = style.figure(lines * (min(panel, 3.2) + 0.3) + 0.8, width)
     panels = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
     unit = table["length_unit"].iloc[0]
     for k, axes in enumerate(panels.ravel()):
@@ -68,10 +73,8 @@ def draw_snapshots(table: pd.DataFrame) -> Figure:
         axes.label_outer()
         first, last = rows["first"].iloc[0], rows["last"].iloc[0]
         axes.set_title(f"all instants {first}–{last}" if k == len(stages) - 1 else f"instants {first}–{last}")
-    drawn = pd.concat([table, obstacles])
-    x, y = drawn[["x", "x_end"]].to_numpy(), drawn[["y", "y_end"]].to_numpy()
-    panels[0, 0].set_xlim(x.min() - 0.5, x.max() + 0.5)
-    panels[0, 0].set_ylim(y.min() - 0.5, y.max() + 0.5)
+    panels[0, 0].set_xlim(left, right)
+    panels[0, 0].set_ylim(low, high)
     arms = sorted(table["arm"].unique())
     handles = [Line2D([], [], color=style.arm_colour(a), linewidth=3, label=f"arm {a + 1}") for a in arms]
     dashes = (0, (2, 1))
@@ -100,7 +103,7 @@ def paths_table(condition: ConditionResults) -> pd.DataFrame:
 def draw_paths(table: pd.DataFrame) -> Figure:
     """Draw the paths in the arms' configuration planes."""
     arms = sorted(table["arm"].unique())
-    figure = style.figure(3.7)
+    figure = style.figure(3.7 if len(arms) < 3 else 3.0)
     planes = figure.subplots(1, len(arms), squeeze=False)[0]
     for axes, arm in zip(planes, arms, strict=True):
         style.configuration_axes(axes, arm)

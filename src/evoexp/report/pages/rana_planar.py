@@ -189,14 +189,14 @@ def _checks(one: Measured) -> list[tuple[str, str]]:
     after = {name: colliding_after(c, relaxed) for name, relaxed in (("redistribution", False), ("both", True))}
     return [
         (
-            "The scene is not trivial: the straight line in configuration space collides",
+            "The scene is not trivial: colliding instants of the straight line in configuration space",
             f"C5 = {collisions:.0f} of {c.planner.num_via_points} instants; its least distance of circle centres is "
             f"{markdown.number(float(straight['centres'].min()))} {unit} (safety {one.margin:g} {unit})",
         ),
         (
-            "Between via-points the motion dips below the safety distance, which the algorithm does not test",
-            f"circle centres: {markdown.share(dips, c.done)} runs; the links themselves: {touching} of {c.done}; links "
-            f"in contact: {contact} of {c.done}",
+            "Runs that dip below the safety distance between via-points, where the algorithm does not test",
+            f"circle centres: {dips} of {c.done}; the links themselves: {touching} of {c.done}; links in contact: "
+            f"{contact} of {c.done}",
         ),
         (
             "Redistribution and relaxation are blind to collisions: applied once more to final, collision-free strings",

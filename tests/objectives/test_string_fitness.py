@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from evoexp.objectives.string_fitness import StringFitness, count_collisions
+from evoexp.objectives.string_fitness import StringFitness, count_collisions, weigh
 
 PAPER = StringFitness(length_weight=0.5, unevenness_weight=0.005, collision_weight=100.0, fitness_offset=500.0)
 
@@ -11,7 +11,7 @@ PAPER = StringFitness(length_weight=0.5, unevenness_weight=0.005, collision_weig
 def test_cost_is_the_bracket_of_equation_7() -> None:
     lengths, unevenness = np.array([[10.0, 1.0], [20.0, 2.0]]), np.array([[3.0, 0.0], [4.0, 0.0]])
     cost = np.empty(2)
-    PAPER.cost(lengths, unevenness, np.array([2.0, 0.0]), cost)
+    weigh(PAPER.weights, lengths, unevenness, np.array([2.0, 0.0]), cost)
     assert cost == pytest.approx([0.5 * 30.0 + 0.005 * 7.0 + 200.0, 1.5])
     assert PAPER.fitness(cost) == pytest.approx([500.0 - 215.035, 498.5])
 
@@ -34,5 +34,7 @@ def test_an_instant_collides_if_any_of_its_substeps_does() -> None:
         ]
     )  # (instants, substeps, lanes)
     out = np.empty(2)
-    count_collisions(clearance.ravel(), 3, 2, out)
+    count_collisions(clearance[None], out)
+    assert out.tolist() == [1.0, 2.0]
+    count_collisions(np.stack([np.full_like(clearance, np.inf), clearance]), out)
     assert out.tolist() == [1.0, 2.0]

@@ -171,13 +171,21 @@ class SphereCollision(NamedTuple):
         if q.ndim != 2 or q.shape[0] != len(table.parent):
             raise ValueError(f"q must have shape ({len(table.parent)}, configurations), was {q.shape}")
         out = np.empty((2, q.shape[1]))
-        spheres = (self.sphere_joint, self.sphere_local, self.radius)
-        _clearances(table[:6], table.planar, spheres, tuple(self.bounds), tuple(self.obstacles), limit, q, out)
+        clearances(self.tables, limit, q, out)
         return Clearance(out[0], out[1])
+
+    @property
+    def tables(self) -> tuple[Any, ...]:
+        """What the kernel `clearances` reads, as plain tuples of arrays."""
+        table = self.assembly.table
+        spheres = (self.sphere_joint, self.sphere_local, self.radius)
+        return table[:6], table.planar, spheres, tuple(self.bounds), tuple(self.obstacles)
 
 
 @kernel
-def _clearances(table, planar, spheres, bounds, obstacles, limit, q, out):  # type: ignore[no-untyped-def]
+def clearances(tables, limit, q, out):  # type: ignore[no-untyped-def]
+    """The kernel of `SphereCollision.clearance`, for other kernels; writes (2, configurations), q in degrees."""
+    table, planar, spheres, bounds, obstacles = tables
     parent, index_q, prismatic, turned, rotation, translation = table
     joint, local, radius = spheres
     bound_joint, bound_local = bounds[0], bounds[1]

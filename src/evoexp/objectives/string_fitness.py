@@ -42,16 +42,10 @@ class StringFitness(Component):
     collision_weight: NonNegative
     fitness_offset: NonNegative
 
-    def cost(self, lengths: FloatArray, unevenness: FloatArray, collisions: FloatArray, out: FloatArray) -> None:
-        """Write the cost of every individual: the bracket of Eq. 7.
-
-        Args:
-            lengths: (arms, ≥ individuals) [deg].
-            unevenness: (arms, ≥ individuals) [deg].
-            collisions: (≥ individuals,) colliding instants.
-            out: (individuals,), written.
-        """
-        _cost(lengths, unevenness, collisions, self.length_weight, self.unevenness_weight, self.collision_weight, out)
+    @property
+    def weights(self) -> tuple[float, float, float]:
+        """k1, k2, k3, as the kernel `weigh` takes them."""
+        return self.length_weight, self.unevenness_weight, self.collision_weight
 
     def fitness(self, cost: FloatArray) -> FloatArray:
         """Return the paper's fitness F of a cost, any shape."""
@@ -62,38 +56,44 @@ class StringFitness(Component):
         return np.maximum(self.fitness_offset - costs, 0.0)
 
 
-def count_collisions(clearance: FloatArray, num_instants: int, substeps: int, out: FloatArray) -> None:
-    """Count the instants at which each individual collides (Eq. 6).
+@kernel
+def weigh(weights, lengths, unevenness, collisions, cost):  # type: ignore[no-untyped-def]
+    """The bracket of Eq. 7 for every individual.
 
     Args:
-        clearance: (instants · substeps · lanes,) least clearances, lanes innermost; negative is a collision.
-        num_instants: N.
-        substeps: Configurations tested per instant; one colliding among them makes the instant collide.
-        out: (lanes,), written.
+        weights: k1, k2, k3.
+        lengths: (arms, ≥ individuals) [deg].
+        unevenness: (arms, ≥ individuals) [deg].
+        collisions: (≥ individuals,) colliding instants.
+        cost: (individuals,), written.
     """
-    _count_collisions(clearance.reshape(num_instants, substeps, -1), out)
-
-
-@kernel
-def _cost(lengths, unevenness, collisions, k1, k2, k3, out):  # type: ignore[no-untyped-def]
-    for k in range(len(out)):
+    k1, k2, k3 = weights
+    for k in range(len(cost)):
         length, uneven = 0.0, 0.0
         for arm in range(len(lengths)):
             length += lengths[arm, k]
             uneven += unevenness[arm, k]
-        out[k] = (k1 * length + k2 * uneven) + k3 * collisions[k]
+        cost[k] = (k1 * length + k2 * uneven) + k3 * collisions[k]
 
 
 @kernel
-def _count_collisions(clearance, out):  # type: ignore[no-untyped-def]
-    num_instants, substeps, lanes = clearance.shape
+def count_collisions(clearance, collisions):  # type: ignore[no-untyped-def]
+    """Count the instants at which each individual collides (Eq. 6).
+
+    Args:
+        clearance: (kinds, instants, substeps, lanes) clearances; an instant collides if any of its substeps has any
+            negative one.
+        collisions: (lanes,), written.
+    """
+    kinds, instants, substeps, lanes = clearance.shape
     hit = np.empty(lanes)
-    out[:] = 0.0
-    for i in range(num_instants):
+    collisions[:] = 0.0
+    for i in range(instants):
         hit[:] = 0.0
         for s in range(substeps):
-            row = clearance[i, s]
-            for lane in range(lanes):
-                hit[lane] = 1.0 if row[lane] < 0.0 else hit[lane]
+            for kind in range(kinds):
+                row = clearance[kind, i, s]
+                for lane in range(lanes):
+                    hit[lane] = 1.0 if row[lane] < 0.0 else hit[lane]
         for lane in range(lanes):
-            out[lane] += hit[lane]
+            collisions[lane] += hit[lane]

@@ -23,12 +23,13 @@ def interpolate_linear(via_points: FloatArray, substeps: int) -> FloatArray:
         raise ValueError(f"substeps must be at least 1, was {substeps}")
     nq, num_points, lanes = via_points.shape
     out = np.empty((nq, (num_points - 1) * substeps, lanes))
-    _interpolate_linear(via_points, substeps, out)
+    interpolate(via_points, substeps, out)
     return out
 
 
 @kernel
-def _interpolate_linear(via_points, substeps, out):  # type: ignore[no-untyped-def]
+def interpolate(via_points, substeps, out):  # type: ignore[no-untyped-def]
+    """The kernel of `interpolate_linear`, for other kernels; writes (nq, N · s, lanes)."""
     nq, num_points, lanes = via_points.shape
     for joint in range(nq):
         j = np.uint64(joint)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from evoexp.numerics import kernel
+from evoexp.paths.layout import check_arm_slices
 from evoexp.records import FloatArray
 
 
@@ -18,14 +19,16 @@ def path_lengths(via_points: FloatArray, arm_slices: np.ndarray, lengths: FloatA
     Raises:
         ValueError: If an output has another shape.
     """
+    check_arm_slices(arm_slices, len(via_points))
     expected = (len(arm_slices), via_points.shape[2])
     if lengths.shape != expected or unevenness.shape != expected:
         raise ValueError(f"outputs must have shape {expected}, were {lengths.shape} and {unevenness.shape}")
-    _path_lengths(via_points, arm_slices, lengths, unevenness)
+    measure_paths(via_points, arm_slices, lengths, unevenness)
 
 
 @kernel
-def _path_lengths(via_points, arm_slices, lengths, unevenness):  # type: ignore[no-untyped-def]
+def measure_paths(via_points, arm_slices, lengths, unevenness):  # type: ignore[no-untyped-def]
+    """The kernel of `path_lengths`, for other kernels."""
     num, lanes = via_points.shape[1] - 1, via_points.shape[2]
     steps = np.empty((num, lanes))
     for arm in range(len(arm_slices)):

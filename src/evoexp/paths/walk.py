@@ -25,7 +25,8 @@ def walk(
 
     Every arm takes N − 1 steps of length step · D / N, D its straight distance from start to goal. A step goes in the
     direction of the goal, each of whose angles is turned by a uniform random angle: in the plane of two joints the one
-    angle, in space azimuth and elevation, and so on. The goal itself is the last point. An arm of one joint has no angle.
+    angle, in space azimuth and elevation, and so on. The goal itself is the last point. An arm of one joint has no
+    angle to turn.
 
     Args:
         via_points: (nq, N + 1, lanes), written in the given lanes.
@@ -43,14 +44,21 @@ def walk(
     if not _walk(via_points, lanes, uniforms, start, goal, arm_slices, step, max_turn):
         expected = (len(lanes), num_uniforms(arm_slices, via_points.shape[1] - 1))
         limit = via_points.shape[2]
-        raise ValueError(f"uniforms must have shape {expected}, was {uniforms.shape}; lanes must lie within 0..{limit - 1}")
+        raise ValueError(
+            f"uniforms must have shape {expected}, was {uniforms.shape}; lanes must lie within 0..{limit - 1}; "
+            f"start, goal and arm_slices must be of {len(via_points)} joints"
+        )
 
 
 @kernel
 def _walk(via_points, lanes, uniforms, start, goal, arm_slices, step, max_turn):  # type: ignore[no-untyped-def]
     num = via_points.shape[1] - 1
     needed = 0
+    if len(start) != len(via_points) or len(goal) != len(via_points):
+        return False
     for arm in range(len(arm_slices)):
+        if not 0 <= arm_slices[arm, 0] < arm_slices[arm, 1] <= len(start):
+            return False
         needed += (num - 1) * (arm_slices[arm, 1] - arm_slices[arm, 0] - 1)
     if uniforms.shape[0] != len(lanes) or uniforms.shape[1] != needed:
         return False

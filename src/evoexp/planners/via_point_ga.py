@@ -9,22 +9,22 @@ instant, joint by joint (arms × (N + 1) × joints) [deg], start and goal includ
 """
 
 from collections.abc import Iterator
-from typing import Annotated, ClassVar, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from evoexp.collision.touching_spheres import Clearance, SphereCollision, TouchingSpheres
+from evoexp.collision.touching_spheres import Clearance, SphereCollision, TouchingSpheres, clearances
 from evoexp.errors import SettingError
 from evoexp.evolution.crossover import site_crossover
 from evoexp.evolution.selection import distinct, elites, roulette
 from evoexp.evolution.settings import GeneticSettings
 from evoexp.evolution.statistics import cost_statistics
 from evoexp.evolution.succession import succeed
-from evoexp.numerics import DEGREE
-from evoexp.objectives.string_fitness import StringFitness, StringTerms, count_collisions
-from evoexp.paths.interpolation import interpolate_linear
-from evoexp.paths.lengths import path_lengths
+from evoexp.numerics import DEGREE, kernel
+from evoexp.objectives.string_fitness import StringFitness, StringTerms, count_collisions, weigh
+from evoexp.paths.interpolation import interpolate, interpolate_linear
+from evoexp.paths.lengths import measure_paths
 from evoexp.paths.motion import Motion
 from evoexp.paths.redistribution import redistribute
 from evoexp.paths.relaxation import relax
@@ -35,6 +35,7 @@ from evoexp.robots.assembly import Assembly, Robot
 from evoexp.scenarios.arm_motion import ArmMotion
 from evoexp.validation import Component, Count, NonNegativeCount, Positive, Rate
 
+SAMPLES = tuple(2**k for k in range(3, 11))  # of the speed per segment that the redistribution can take
 LANES = 8  # individuals are padded to whole vectors
 SAMPLES_BETWEEN = 100  # configurations per segment where a clearance between via-points is sampled
 
@@ -118,6 +119,13 @@ class ViaPointGa(Component):
     ga: GeneticSettings
     objective: StringFitness
     collision: TouchingSpheres
+
+    @model_validator(mode="after")
+    def _samples_halve(self) -> Self:
+        count = self.samples_per_segment
+        if count not in SAMPLES:
+            raise SettingError("samples_per_segment", f"one of {', '.join(map(str, SAMPLES))}", count)
+        return self
 
     def prepare(self, robot: Robot, scenario: ArmMotion) -> Problem:
         """Build the robot and check that start and goal fit it and are free of collision.
@@ -244,6 +252,7 @@ class _Strings:
         self.max_turn = DEGREE * planner.max_turn
         self.num_uniforms = num_uniforms(problem.arm_slices, planner.num_via_points)
         joints = int(np.max(problem.arm_slices[:, 1] - problem.arm_slices[:, 0]))
+        self._tables = problem.collision.tables
         self._spline = prepare_redistribution(
             planner.num_via_points, joints, planner.spline_end, planner.samples_per_segment
         )
@@ -280,22 +289,25 @@ class _Strings:
     def judge(self, population: FloatArray, count: int) -> Judgement:
         """Return cost and terms of the first `count` strings; the arrays of terms keep the padding."""
         planner, lanes = self.planner, population.shape[2]
+        lengths, unevenness = np.empty((2, self.num_arms, lanes))
+        terms = StringTerms(lengths, unevenness, np.empty(lanes), np.empty(count))
         substeps = planner.collision.collision_substeps
-        lengths, unevenness = np.empty((self.num_arms, lanes)), np.empty((self.num_arms, lanes))
-        collisions, cost = np.empty(lanes), np.empty(count)
-        path_lengths(population, self.problem.arm_slices, lengths, unevenness)
-        if substeps == 1:
-            q = population[:, 1:].reshape(self.nq, -1)
-        else:
-            q = interpolate_linear(population, substeps).reshape(self.nq, -1)
-        clearance = self.problem.collision.clearance(q, limit=0.0)
-        count_collisions(clearance.least, planner.num_via_points, substeps, collisions)
-        planner.objective.cost(lengths, unevenness, collisions, cost)
-        return Judgement(
-            cost,
-            StringTerms(lengths, unevenness, collisions, cost),
-            planner.num_via_points * substeps * count,
-        )
+        _judge(population, self.problem.arm_slices, substeps, self._tables, planner.objective.weights, tuple(terms))
+        return Judgement(terms.cost, terms, planner.num_via_points * substeps * count)
+
+
+@kernel
+def _judge(population, arm_slices, substeps, tables, weights, terms):  # type: ignore[no-untyped-def]
+    """Eqs. 2–7 for all strings; the instants 1 … N are the configurations that may collide."""
+    lengths, unevenness, collisions, cost = terms
+    nq, num_points, lanes = population.shape
+    measure_paths(population, arm_slices, lengths, unevenness)
+    between = np.empty((nq, (num_points - 1) * substeps, lanes))
+    interpolate(population, substeps, between)
+    clearance = np.empty((2, (num_points - 1) * substeps * lanes))
+    clearances(tables, 0.0, between.reshape((nq, -1)), clearance)
+    count_collisions(clearance.reshape((2, num_points - 1, substeps, lanes)), collisions)
+    weigh(weights, lengths, unevenness, collisions, cost)
 
 
 class _Best:

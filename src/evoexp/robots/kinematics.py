@@ -222,7 +222,7 @@ def block_planar_frames(parent, index_q, rotation, translation, q, frames):  # t
         rotation: See `KinematicTable`.
         translation: See `KinematicTable`.
         q: (nq · BLOCK,).
-        frames: (joints · PLANAR_ROWS · BLOCK,), written: sine and cosine of the angle from the world's x axis, then x, y.
+        frames: (joints · PLANAR_ROWS · BLOCK,), written: sine and cosine of the angle from the world's x axis, x, y.
     """
     for k in range(len(parent)):
         own, row = U(k) * U(PLANAR_ROWS * BLOCK), U(index_q[k]) * U(BLOCK)

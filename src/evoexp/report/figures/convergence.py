@@ -51,12 +51,12 @@ def draw_fitness(table: pd.DataFrame) -> Figure:
     whole.set_title("a  whole range")
     close.set_title("b  best fitness")
     best = table[table["quantity"] == NAMES["best_cost"]]
-    last = best.groupby("position")["median"].max()
-    first = best[best["generation"] > 0]["lower"].min() if (best["generation"] > 0).any() else best["lower"].min()
-    low = max(float(first), float(last.min()) - 2.0 * (float(last.max() - last.min()) + 5.0))
-    high = float(best["upper"].max())
-    if np.isfinite([low, high]).all() and high > low:
-        close.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))
+    finite = best[np.isfinite(best[["median", "lower", "upper"]]).all(axis=1)]
+    if len(finite):
+        last = finite.groupby("position")["median"].max()
+        near = float(last.min()) - 2.0 * (float(last.max() - last.min()) + 5.0)
+        low, high = max(float(finite["lower"].min()), near), float(finite["upper"].max())
+        close.set_ylim(low - 0.05 * (high - low) - 0.5, high + 0.05 * (high - low) + 0.5)
     style.legend_below(figure, whole, 2)
     return figure
 

@@ -1,0 +1,186 @@
+import hashlib
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib as mpl
+import pandas as pd
+import pytest
+from report_samples import REPORT, expand, store
+
+from evoexp import compose
+from evoexp.errors import NothingStored, UnknownOption
+from evoexp.report import build
+from evoexp.report.pages import rana_planar
+from evoexp.report.results import Results
+from evoexp.report.settings import ReportSettings
+from evoexp.store.run_directory import RunDirectory
+
+SCRIPT = """
+import sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[2])
+from test_build import draw
+draw(Path(sys.argv[1]))
+"""
+FIGURES = [
+    "fig_1_arms",
+    "fig_2_via_points",
+    "fig_3_circles",
+    "fig_4_snapshots",
+    "fig_5_fitness",
+    "fig_6_paths",
+    "fig_7_distances",
+]
+
+
+def draw(outputs: Path, page: str | None = "rana_planar", name: str = "rana_planar", *overrides: str) -> Path:
+    experiment = expand(name, *overrides)
+    request = build.Request(experiment.report_name, experiment.name, experiment.budget, experiment.conditions)
+    return build.report(request, ReportSettings(**REPORT, figures=page), outputs, experiment.num_replicates)  # type: ignore[arg-type]
+
+
+def contents(page: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in sorted(page.parent.iterdir())}
+
+
+@pytest.fixture(scope="module")
+def page(stored: Path) -> Path:
+    return draw(stored)
+
+
+def test_a_report_is_seven_figures_with_data_and_sidecars(page: Path) -> None:
+    kinds = ("csv", "json", "png", "svg")
+    assert sorted(contents(page)) == sorted([f"{stem}.{kind}" for stem in FIGURES for kind in kinds] + ["index.md"])
+
+
+def test_sidecars_tell_what_a_figure_was_drawn_from(page: Path, results: Results) -> None:
+    for stem in FIGURES:
+        sidecar = json.loads((page.parent / f"{stem}.json").read_text())
+        assert sorted(sidecar["files"]) == [f"{stem}.png", f"{stem}.svg"]
+        data = sidecar["data"]
+        for name, digest in [*sidecar["files"].items(), (data["file"], data["sha256"])]:
+            assert hashlib.sha256((page.parent / name).read_bytes()).hexdigest() == digest
+        assert len(pd.read_csv(page.parent / data["file"])) == data["rows"]
+        shown = results.conditions if stem == "fig_5_fitness" else results.conditions[:1]
+        assert [c["run"] for c in sidecar["conditions"]] == [c.condition.id for c in shown]
+        assert [c["label"] for c in sidecar["conditions"]] == [c.label for c in shown]
+        assert all((c["planned"], c["done"], c["failed"]) == (2, 2, 0) for c in sidecar["conditions"])
+
+
+def test_a_report_is_the_same_in_another_process(page: Path, stored: Path, tmp_path: Path) -> None:
+    first = contents(page)
+    for path in page.parent.iterdir():
+        path.unlink()
+    other = os.environ | {"PYTHONHASHSEED": "12345", "MPLCONFIGDIR": str(tmp_path), "TZ": "Asia/Tokyo", "LANG": "C"}
+    command = [sys.executable, "-c", SCRIPT, str(stored), str(Path(__file__).parent)]
+    subprocess.run(command, check=True, env=other, cwd=tmp_path)
+    again = contents(page)
+    assert sorted(again) == sorted(first)
+    assert [name for name in first if first[name] != again[name]] == []
+
+
+def test_nothing_in_a_report_tells_where_or_when_it_was_made(page: Path, stored: Path) -> None:
+    for name, content in contents(page).items():
+        assert str(stored).encode() not in content, name
+        assert not re.search(rb"20\d\d-\d\d-\d\d", content), name
+
+
+def test_the_index_says_it_all(page: Path, results: Results) -> None:
+    text = page.read_text()
+    for condition in results.conditions:
+        assert f"| {condition.label} | `{condition.hash12}` | 2 | 2 | 0 |" in text
+    assert "| `ga.crossover_rate` | 0.9 | – | paper: Tab. 1, cross_over_probability |" in text
+    assert "| `ga.population_size` | 12 | – | override |" in text
+    assert text.count("not judged (budget smoke)") == 5
+    assert re.search(r"C5 = [1-9]\d* of 20 instants", text)
+    assert "via-point GA against random search" in text
+    for link in re.findall(r"\]\(([^)]+)\)", text):
+        assert (page.parent / link).is_file(), link
+    assert "Partial results" not in text
+    assert "nan" not in text.lower().replace("dominan", "")
+
+
+def test_the_command_in_the_index_makes_this_report(page: Path, stored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from evoexp import cli
+
+    hashes = re.search(r"Made by `evoexp report ([^`]+)`", page.read_text())
+    assert hashes
+    monkeypatch.setenv("EVOEXP_OUTPUTS", str(stored))
+    assert cli.main(["report", *hashes[1].split()]) == 0
+
+
+def test_partial_results_are_drawn_and_said(tmp_path: Path) -> None:
+    experiment = expand("rana_planar", "ga.num_generations=1")
+    store(tmp_path, experiment)
+    ga, search = (RunDirectory(tmp_path, c.condition.id) for c in experiment.conditions)
+    ga.log_path(1).unlink()
+    ga.write_failure(1, "ValueError: no luck | at all", "traceback")
+    for replicate in (0, 1):
+        search.log_path(replicate).unlink()
+    page = draw(tmp_path, "rana_planar", "rana_planar", "ga.num_generations=1")
+    text = page.read_text()
+    assert "**Partial results.** via-point GA: 1 of 2 replicates done, 1 failed; random search: 0 of 2" in text
+    assert "| via-point GA | 1 | ValueError: no luck \\| at all |" in text
+    assert "no random search beside it" in text
+    assert (page.parent / "fig_7_distances.svg").is_file()
+    sidecar = json.loads((page.parent / "fig_5_fitness.json").read_text())
+    assert [(c["done"], c["failed"]) for c in sidecar["conditions"]] == [(1, 1)]
+    ga.log_path(0).unlink()
+    text = draw(tmp_path, "rana_planar", "rana_planar", "ga.num_generations=1").read_text()
+    assert "0 of 2 replicates done, 1 failed" in text
+    assert sorted(contents(page)) == ["index.md"]  # the figures of before are gone
+
+
+def test_nothing_stored_names_the_command(tmp_path: Path) -> None:
+    experiment = compose.expand(["experiment=rana_planar", "budget=smoke"])[0]
+    request = build.Request(experiment.report_name, experiment.name, experiment.budget, experiment.conditions)
+    with pytest.raises(NothingStored, match=r"try: evoexp run experiment=rana_planar budget=smoke$"):
+        build.report(request, experiment.report, tmp_path, 2)
+    assert not (tmp_path / "reports").exists()
+
+
+def test_three_arms_have_figures_too(stored: Path) -> None:
+    page = draw(stored, "planar_arms", "rana_three_arms", "scenario=rana_three_arms")
+    assert {"snapshots.svg", "paths.svg", "distances.svg", "convergence.svg"} <= set(contents(page))
+    snapshots = pd.read_csv(page.parent / "snapshots.csv")
+    assert set(snapshots["arm"]) == {0, 1, 2}
+    text = page.read_text()
+    assert "| length arm 3 | deg |" in text
+
+
+def test_an_experiment_without_a_page_has_results_convergence_and_parameters(stored: Path) -> None:
+    page = draw(stored, None, "rana_three_arms", "scenario=rana_three_arms")
+    assert sorted(contents(page)) == [f"convergence.{kind}" for kind in ("csv", "json", "png", "svg")] + ["index.md"]
+    assert "## Claims" not in page.read_text()
+
+
+def test_an_unknown_page_is_named(stored: Path) -> None:
+    with pytest.raises(UnknownOption, match=r"report\.figures: no option 'rana_plan'; did you mean 'rana_planar'"):
+        draw(stored, "rana_plan")
+
+
+def test_claims_are_judged_only_on_the_papers_own_settings(results: Results) -> None:
+    paper = compose.expand(["experiment=rana_planar"])[0]
+    condition = results.conditions[0]._replace(condition=paper.conditions[0].condition, planned=20)
+    judged = results._replace(budget="paper")
+    assert rana_planar.not_judged(judged, condition) == ""
+    assert rana_planar.not_judged(results, condition) == "budget smoke"
+    assert rana_planar.not_judged(judged, condition._replace(planned=3)) == "3 of 20 replicates planned"
+    assert rana_planar.not_judged(judged, results.conditions[0]._replace(planned=20)).startswith("overridden: ga.")
+
+
+def test_redistribution_is_applied_to_solved_strings_only(results: Results) -> None:
+    search = results.conditions[1]
+    count = rana_planar.colliding_after(search, relaxed=False)
+    assert 0 <= count <= search.solved
+    none = search.summaries.assign(solved=False)
+    assert rana_planar.colliding_after(search._replace(summaries=none), relaxed=True) == 0
+
+
+def test_drawing_leaves_matplotlib_as_it_was(page: Path) -> None:
+    assert mpl.rcParams["svg.hashsalt"] == mpl.rcParamsDefault["svg.hashsalt"]
+    assert "matplotlib.pyplot" not in sys.modules

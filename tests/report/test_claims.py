@@ -1,0 +1,64 @@
+import numpy as np
+import pytest
+
+from evoexp.report.claims import (
+    CONTRADICTED,
+    INCONCLUSIVE,
+    NOT_JUDGED,
+    REPRODUCED,
+    adjusted,
+    compare,
+    judge_all,
+    judge_better,
+)
+
+LOW, HIGH = np.arange(12.0), np.arange(12.0) + 20.0
+
+
+@pytest.mark.parametrize(
+    ("reason", "holds", "done", "planned", "verdict"),
+    [
+        ("budget smoke", 2, 2, 2, NOT_JUDGED),
+        ("", 20, 20, 20, REPRODUCED),
+        ("", 19, 20, 20, CONTRADICTED),
+        ("", 0, 20, 20, CONTRADICTED),
+        ("", 3, 4, 20, CONTRADICTED),  # one counter-example is enough
+        ("", 4, 4, 20, INCONCLUSIVE),  # but only all runs reproduce
+        ("", 0, 0, 20, INCONCLUSIVE),
+        ("", 0, 0, 0, INCONCLUSIVE),
+    ],
+)
+def test_a_claim_about_every_run(reason: str, holds: int, done: int, planned: int, verdict: str) -> None:
+    assert judge_all(reason, holds, done, planned) == verdict
+
+
+def test_a_claim_about_being_better() -> None:
+    better, worse = (compare("cost", a, b, True, 0.95, 50) for a, b in ((LOW, HIGH), (HIGH, LOW)))
+    same = compare("cost", LOW, LOW, True, 0.95, 50)
+    assert judge_better("", better, 0.05) == REPRODUCED
+    assert judge_better("", worse, 0.05) == CONTRADICTED
+    assert judge_better("", same, 0.05) == INCONCLUSIVE
+    assert judge_better("", better, 1e-9) == INCONCLUSIVE
+    assert judge_better("", None, 0.05) == INCONCLUSIVE
+    assert judge_better("budget quick", better, 0.05) == NOT_JUDGED
+    assert judge_better("", better._replace(better=same.better), 0.05) == INCONCLUSIVE
+
+
+def test_a_comparison_knows_which_way_is_better() -> None:
+    lower, higher = (compare("x", LOW, HIGH, way, 0.95, 50) for way in (True, False))
+    assert (lower.better.a12, higher.better.a12) == (1.0, 0.0)
+    assert lower.median_difference == higher.median_difference == -20.0
+    assert lower.test == higher.test
+    assert lower.num_seeds == 12
+
+
+def test_two_infinite_costs_do_not_differ() -> None:
+    found = compare("cost", np.array([1.0, np.inf, np.inf]), np.array([2.0, np.inf, 3.0]), True, 0.95, 50)
+    assert found.median_difference == 0.0
+    assert found.test.num_pairs == 2
+
+
+def test_p_values_are_adjusted_over_all_comparisons() -> None:
+    one, other = compare("a", LOW, HIGH, True, 0.95, 50), compare("b", LOW, LOW, True, 0.95, 50)
+    first, second = adjusted([one, other])
+    assert (first.p_adjusted, second.p_adjusted) == (2.0 * one.test.p_value, 1.0)

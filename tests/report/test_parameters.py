@@ -1,0 +1,95 @@
+from pathlib import Path
+
+import pytest
+from report_samples import expand
+
+from evoexp import compose
+from evoexp.report import parameters
+from evoexp.report.parameters import Parameter, option, overridden
+from evoexp.report.results import ConditionResults, Results
+
+
+def of(*overrides: str, name: str = "rana_planar", budget: str = "paper", label: int = 0) -> dict[str, Parameter]:
+    """Return the parameters of a condition that nobody ran, by name."""
+    experiment = compose.expand([f"experiment={name}", f"budget={budget}", *overrides])[0]
+    text, condition = experiment.conditions[label]
+    found = ConditionResults(text, condition, experiment.num_replicates, None, {}, None, {}, None, {})  # type: ignore[arg-type]
+    rows = parameters.parameters(Results(name, budget, (found,)), found)
+    assert len({row.name for row in rows}) == len(rows)
+    return {row.name: row for row in rows}
+
+
+def test_the_directory_is_the_one_that_compose_reads() -> None:
+    assert parameters.config_directory() == compose.config_directory()
+
+
+def test_units_and_sources_come_from_the_comments() -> None:
+    rows = of()
+    assert rows["ga.population_size"] == ("ga.population_size", "50", "", "paper: Tab. 1, population")
+    assert rows["scenario.q_goal[0]"].unit == "deg"
+    assert rows["scenario.q_goal[0]"].value == "[135.0, 135.0]"
+    assert rows["objective.length_weight"][1:] == ("0.5", "1/deg", "paper: Tab. 1, k1")
+    assert rows["planner.num_via_points"].source.startswith("assumed: ")
+    assert rows["planner"] == ("planner", "via_point_ga, revision 1", "", "conf/planner/rana_planar.yaml")
+    assert rows["seed"].source.startswith("assumed")
+    assert rows["num_replicates"].value == "20"
+
+
+@pytest.mark.parametrize("name", compose.options("experiment"))
+def test_every_number_of_the_shipped_experiments_has_a_source(name: str) -> None:
+    rows = of(name=name)
+    numbers = [row for row in rows.values() if any(character.isdigit() for character in row.value)]
+    assert len(numbers) > 20
+    assert [row.name for row in numbers if not row.source] == []
+    assert overridden(rows.values()) == []
+
+
+def test_overrides_and_budgets_are_told_apart() -> None:
+    rows = of("ga.population_size=20", "seed=3", budget="smoke")
+    assert rows["ga.population_size"][1:] == ("20", "", "override")
+    assert rows["ga.num_generations"][1:] == ("10", "", "budget smoke")
+    assert rows["num_replicates"].source == "budget smoke"
+    assert rows["ga.crossover_rate"].source == "paper: Tab. 1, cross_over_probability"
+    assert rows["seed"].source == "override"
+    assert sorted(overridden(rows.values())) == ["ga.num_generations", "ga.population_size", "num_replicates"]
+
+
+def test_another_option_than_the_experiments_own_is_recognised() -> None:
+    rows = of("scenario=rana_obstacles")
+    assert rows["scenario"].source == "conf/scenario/rana_obstacles.yaml"
+    assert rows["scenario.obstacles[1].size"] == ("scenario.obstacles[1].size", "[0.8, 0.8]", "unit", "assumed")
+    assert rows["scenario.q_start[0]"].source.startswith("paper: Tab. 2")
+
+
+def test_options_are_recognised_without_an_experiment() -> None:
+    condition = compose.expand(["experiment=rana_three_arms"])[0].conditions[0].condition
+    found = ConditionResults("", condition, 20, None, {}, None, {}, None, {})  # type: ignore[arg-type]
+    rows = {row.name: row for row in parameters.parameters(Results("", "", (found,)), found)}
+    assert rows["robot"].source == "conf/robot/three_planar_2r.yaml"
+    assert rows["robot.arms[2].base_position"].unit == "unit"
+
+
+def test_a_control_is_a_component_of_its_own() -> None:
+    rows = of(label=1)
+    assert rows["control"].value.startswith("random_search")
+    assert rows["ga.population_size"].source.startswith("paper")
+    assert "planner.planner" not in rows
+
+
+def test_an_option_file_is_read_with_its_comments(tmp_path: Path) -> None:
+    (tmp_path / "base.yaml").write_text(
+        "_target_: x\nrate: 1e-3  # [1/s] paper: Tab. 1\nsize: 3  # [m] assumed: seen\n"
+    )
+    text = 'defaults:\n  - base\n  - _self_\nsize: 4  # [m] paper: p. 2\nname: "a # b"  # a note\nlist:\n  - [1, 2]\n'
+    (tmp_path / "own.yaml").write_text(text)
+    entries = option(tmp_path / "own.yaml")
+    assert entries["size"] == (4, "m", "paper: p. 2")
+    assert entries["rate"][1:] == ("1/s", "paper: Tab. 1")
+    assert entries["name"] == ("a # b", "", "a note")
+    assert entries["list[0]"] == ([1, 2], "", "")
+
+
+def test_planned_replicates_are_those_without_a_cap() -> None:
+    assert parameters.planned_replicates("rana_planar") == 20
+    assert parameters.planned_replicates("") == 20
+    assert expand("rana_planar").num_replicates == 2

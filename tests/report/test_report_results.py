@@ -1,0 +1,66 @@
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from report_samples import expand, store
+
+from evoexp.condition import Condition
+from evoexp.errors import NothingStored
+from evoexp.report.results import Results, gather
+from evoexp.store.log_reader import read_log
+from evoexp.store.run_directory import RunDirectory
+
+
+def gathered(outputs: Path, count: int | None, *overrides: str) -> Results:
+    return gather(outputs, expand("rana_planar", *overrides).conditions, count, "rana_planar", "smoke", "evoexp run it")
+
+
+def test_nothing_stored_is_one_line_with_the_command(tmp_path: Path) -> None:
+    with pytest.raises(NothingStored, match=r"^rana_planar: nothing stored in .*; try: evoexp run it$"):
+        gathered(tmp_path, 2)
+    assert not list(tmp_path.iterdir())
+
+
+def test_results_are_what_the_logs_hold(stored: Path, results: Results) -> None:
+    ga, search = results.conditions
+    assert [c.label for c in results.conditions] == ["via-point GA", "random search"]
+    assert (ga.done, ga.planned, ga.failed) == (2, 2, 0)
+    assert (ga.is_control, search.is_control) == (False, True)
+    assert results.main == (ga,)
+    run = RunDirectory(stored, ga.condition.id)
+    logs = [read_log(run.log_path(k)) for k in range(2)]
+    assert list(ga.column("best_cost")) == [log.summary.best_cost for log in logs]
+    best = ga.best_replicate
+    assert logs[best].summary.best_cost == ga.column("best_cost").min()
+    np.testing.assert_array_equal(ga.solutions[best], logs[best].solutions[-1].values)
+    np.testing.assert_array_equal(ga.first_solution, logs[best].solutions[0].values)
+    assert len(ga.generations) == sum(len(log.generations) for log in logs)
+    assert ga.code["version"] == run.manifest()["versions"]["evoexp"]
+    assert math.isnan(ga.spread("no such column").median)
+
+
+def test_only_planned_replicates_are_looked_at(stored: Path) -> None:
+    ga = gathered(stored, 1).conditions[0]
+    assert (ga.done, ga.planned, list(ga.solutions)) == (1, 1, [0])
+    assert set(ga.generations["replicate"]) == {0}
+    assert gathered(stored, None).conditions[0].planned == 2
+    assert gathered(stored, 5).conditions[0].done == 2
+
+
+def test_failed_and_missing_replicates_are_counted(tmp_path: Path) -> None:
+    experiment = expand("rana_planar", "num_replicates=1", "ga.num_generations=1")
+    store(tmp_path, experiment)
+    ga, search = (RunDirectory(tmp_path, c.condition.id) for c in experiment.conditions)
+    ga.write_failure(1, "worker died", "traceback")
+    search.log_path(0).unlink()
+    found = gather(tmp_path, experiment.conditions, 3, "rana_planar", "smoke", "")
+    first, second = found.conditions
+    assert (first.done, first.failed, first.failures) == (1, 1, {1: "worker died"})
+    assert (second.done, second.failed, second.first_solution) == (0, 0, None)
+    assert found.with_data == (first,)
+
+
+def test_a_condition_is_read_back_from_its_run(stored: Path, results: Results) -> None:
+    ga = results.conditions[0]
+    assert Condition.from_json(RunDirectory(stored, ga.condition.id).config_json()) == ga.condition

@@ -1,0 +1,118 @@
+import itertools
+import math
+
+import numpy as np
+import pytest
+import scipy.stats
+from hypothesis import given
+from hypothesis import strategies as st
+
+from evoexp.report.statistics import (
+    EXACT_PAIRS,
+    Interval,
+    effect,
+    holm,
+    quantile,
+    signed_rank,
+    spread,
+    vargha_delaney,
+    wilson,
+)
+
+FLOATS = st.floats(-1e3, 1e3)
+
+
+@given(st.lists(FLOATS, min_size=1, max_size=30), st.floats(0.0, 1.0))
+def test_quantiles_are_those_of_numpy(values: list[float], share: float) -> None:
+    assert quantile(np.array(values), share) == pytest.approx(np.quantile(values, share), abs=1e-9)
+
+
+def test_quantiles_of_infinite_and_missing_values() -> None:
+    values = np.array([1.0, np.nan, 3.0, np.inf, np.inf])
+    assert spread(values) == (math.inf, 2.5, math.inf, 4)
+    assert quantile(np.array([np.inf, 1.0]), 0.0) == 1.0
+    assert spread(np.array([np.inf, np.inf]))[:3] == (math.inf,) * 3
+    assert math.isnan(spread(np.array([np.nan])).median)
+    assert spread(np.array([np.nan])).num_values == 0
+
+
+@pytest.mark.parametrize(("successes", "trials"), [(0, 20), (1, 7), (13, 20), (20, 20), (998, 1000)])
+@pytest.mark.parametrize("confidence", [0.9, 0.95, 0.99])
+def test_wilson_is_that_of_scipy(successes: int, trials: int, confidence: float) -> None:
+    expected = scipy.stats.binomtest(successes, trials).proportion_ci(confidence, method="wilson")
+    assert wilson(successes, trials, confidence) == pytest.approx((expected.low, expected.high), abs=1e-9)
+
+
+def test_wilson_without_trials_knows_nothing() -> None:
+    assert wilson(0, 0, 0.95) == (0.0, 1.0)
+
+
+@pytest.mark.parametrize("size", [1, 5, 12, 40])
+def test_signed_rank_without_ties_is_the_exact_test_of_scipy(size: int) -> None:
+    rng = np.random.default_rng(size)
+    x, y = rng.normal(size=size), rng.normal(0.4, size=size)
+    expected = scipy.stats.wilcoxon(x, y, method="exact")
+    found = signed_rank(x, y)
+    assert found.num_pairs == size
+    assert min(found.positive_ranks, size * (size + 1) / 2 - found.positive_ranks) == expected.statistic
+    assert found.p_value == pytest.approx(expected.pvalue, rel=1e-12)
+
+
+def test_signed_rank_with_ties_counts_all_assignments_of_signs() -> None:
+    difference = np.array([1.0, -1.0, 2.0, 2.0, 2.0, -3.0, 5.0, 0.0])
+    ranks = scipy.stats.rankdata(np.abs(difference[:7]))
+    observed = ranks[difference[:7] > 0].sum()
+    sums = np.array([ranks[np.array(signs)].sum() for signs in itertools.product([False, True], repeat=7)])
+    expected = min(1.0, 2.0 * min(np.mean(sums <= observed), np.mean(sums >= observed)))
+    found = signed_rank(difference, np.zeros(8))
+    assert (found.num_pairs, found.positive_ranks) == (7, observed)
+    assert found.p_value == pytest.approx(expected, rel=1e-12)
+
+
+def test_signed_rank_of_many_pairs_is_the_normal_approximation_of_scipy() -> None:
+    rng = np.random.default_rng(3)
+    x, y = np.round(rng.normal(size=300), 1), np.round(rng.normal(0.1, size=300), 1)
+    expected = scipy.stats.wilcoxon(x, y, method="asymptotic", correction=False)
+    assert len(x) > EXACT_PAIRS
+    assert signed_rank(x, y).p_value == pytest.approx(expected.pvalue, rel=1e-9)
+
+
+def test_equal_pairs_say_nothing_also_where_both_are_infinite() -> None:
+    x = np.array([1.0, np.inf, np.inf])
+    assert signed_rank(x, x) == (0, 0.0, 1.0)
+    assert signed_rank(x, np.array([1.0, np.inf, 5.0])) == (1, 1.0, 1.0)
+    assert signed_rank(np.empty(0), np.empty(0)).p_value == 1.0
+
+
+def test_holm_by_hand() -> None:
+    assert holm([0.01, 0.04, 0.03]) == pytest.approx([0.03, 0.06, 0.06])
+    assert holm([0.5, 0.9]) == pytest.approx([1.0, 1.0])
+    assert holm([]) == []
+
+
+def test_a12_by_hand_and_by_the_u_statistic_of_scipy() -> None:
+    assert vargha_delaney(np.array([1.0, 2.0, 3.0]), np.array([2.0, 2.0])) == pytest.approx((2 * 0.5 + 2) / 6)
+    rng = np.random.default_rng(1)
+    x, y = np.round(rng.normal(size=17), 1), np.round(rng.normal(0.5, size=23), 1)
+    assert vargha_delaney(x, y) == pytest.approx(scipy.stats.mannwhitneyu(x, y).statistic / (17 * 23))
+    assert math.isnan(vargha_delaney(x, np.empty(0)))
+
+
+def test_effect_has_the_bootstrap_interval_of_its_pairs() -> None:
+    rng = np.random.default_rng(2)
+    x, y = rng.normal(0.5, size=30), rng.normal(size=30)
+    first = effect(x, y, 0.95, 400)
+    np.random.default_rng(99).random(10)
+    assert effect(x, y, 0.95, 400) == first
+    assert first.interval.low < first.a12 < first.interval.high
+    # Resampled by hand: the estimate of every resample of pairs, as the definition says.
+    own = np.random.Generator(np.random.PCG64(7))
+    picks = (own.integers(0, 30, 30) for _ in range(2000))
+    estimates = [vargha_delaney(x[pick], y[pick]) for pick in picks]
+    expected = Interval(*np.quantile(estimates, [0.025, 0.975]))
+    assert first.interval == pytest.approx(expected, abs=0.03)  # two bootstraps of 400 and 2000 resamples
+
+
+def test_effect_of_separated_and_of_no_values() -> None:
+    assert effect(np.arange(5.0) + 10.0, np.arange(5.0), 0.95, 50) == (1.0, (1.0, 1.0))
+    assert math.isnan(effect(np.empty(0), np.empty(0), 0.95, 50).a12)

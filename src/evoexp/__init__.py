@@ -1,5 +1,6 @@
 """evoexp: a laboratory for evolutionary robot motion planning."""
 
+import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -12,7 +13,5 @@ __all__ = ["Frames", "__version__", "load"]
 def __getattr__(name: str) -> Any:
     """Load what needs pandas only when it is asked for."""
     if name in ("load", "Frames"):
-        from evoexp import frames
-
-        return getattr(frames, name)
+        return getattr(importlib.import_module("evoexp.frames"), name)
     raise AttributeError(f"module 'evoexp' has no attribute '{name}'")

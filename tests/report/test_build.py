@@ -37,10 +37,18 @@ FIGURES = [
 ]
 
 
-def draw(outputs: Path, page: str | None = "rana_planar", name: str = "rana_planar", *overrides: str) -> Path:
+def draw(
+    outputs: Path,
+    page: str | None = "rana_planar",
+    name: str = "rana_planar",
+    *overrides: str,
+    formats: tuple[str, ...] = ("svg", "png"),
+) -> Path:
     experiment = expand(name, *overrides)
     request = build.Request(experiment.report_name, experiment.name, experiment.budget, experiment.conditions)
-    return build.report(request, ReportSettings(**REPORT, figures=page), outputs, experiment.num_replicates)  # type: ignore[arg-type]
+    return build.report(
+        request, ReportSettings(**REPORT | {"formats": formats, "figures": page}), outputs, experiment.num_replicates
+    )  # type: ignore[arg-type]
 
 
 def contents(page: Path) -> dict[str, bytes]:
@@ -121,7 +129,7 @@ def test_partial_results_are_drawn_and_said(tmp_path: Path) -> None:
     ga.write_failure(1, "ValueError: no luck | at all", "traceback")
     for replicate in (0, 1):
         search.log_path(replicate).unlink()
-    page = draw(tmp_path, "rana_planar", "rana_planar", "ga.num_generations=1")
+    page = draw(tmp_path, "rana_planar", "rana_planar", "ga.num_generations=1", formats=("svg",))
     text = page.read_text()
     assert "**Partial results.** via-point GA: 1 of 2 replicates done, 1 failed; random search: 0 of 2" in text
     assert "| via-point GA | 1 | ValueError: no luck \\| at all |" in text
@@ -130,7 +138,7 @@ def test_partial_results_are_drawn_and_said(tmp_path: Path) -> None:
     sidecar = json.loads((page.parent / "fig_5_fitness.json").read_text())
     assert [(c["done"], c["failed"]) for c in sidecar["conditions"]] == [(1, 1)]
     ga.log_path(0).unlink()
-    text = draw(tmp_path, "rana_planar", "rana_planar", "ga.num_generations=1").read_text()
+    text = draw(tmp_path, "rana_planar", "rana_planar", "ga.num_generations=1", formats=("svg",)).read_text()
     assert "0 of 2 replicates done, 1 failed" in text
     assert sorted(contents(page)) == ["index.md"]  # the figures of before are gone
 
@@ -144,7 +152,7 @@ def test_nothing_stored_names_the_command(tmp_path: Path) -> None:
 
 
 def test_three_arms_have_figures_too(stored: Path) -> None:
-    page = draw(stored, "planar_arms", "rana_three_arms", "scenario=rana_three_arms")
+    page = draw(stored, "planar_arms", "rana_three_arms", "scenario=rana_three_arms", formats=("svg",))
     assert {"snapshots.svg", "paths.svg", "distances.svg", "convergence.svg"} <= set(contents(page))
     snapshots = pd.read_csv(page.parent / "snapshots.csv")
     assert set(snapshots["arm"]) == {0, 1, 2}

@@ -160,8 +160,8 @@ def run_jobs(jobs: Sequence[Job]) -> list[Outcome]:
 def fan_out(jobs: Sequence[Job], num_workers: int) -> Iterator[list[Outcome]]:
     """Run jobs in worker processes; yield outcomes as they come.
 
-    A worker that dies takes the pool with it, and everything in flight: each of those jobs then runs alone, so that only
-    the one that kills its worker fails; the others go on in a new pool.
+    A worker that dies takes the pool with it, and everything in flight: each of those jobs then runs alone, so that
+    only the one that kills its worker fails; the others go on in a new pool.
     """
     waiting = deque(jobs)
     while waiting:

@@ -66,6 +66,8 @@ def drawn(draw: Callable[[], Figure], formats: Sequence[str], dpi: int) -> dict[
         for name, value in _RC.items():
             mpl.rcParams[name] = value  # type: ignore[index]
         figure, images = draw(), {}
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")  # arranged once, for all formats
         for kind in formats:
             buffer = io.BytesIO()
             figure.savefig(buffer, format=kind, dpi=dpi, metadata=_METADATA[kind])

@@ -160,8 +160,8 @@ def block_frames(  # type: ignore[no-untyped-def]
         own, row = U(k) * U(SPATIAL_ROWS * BLOCK), U(index_q[k]) * U(BLOCK)
         _place(parent[k], turned[k], rotation[k], translation[k], frames, scratch)
         if prismatic[k]:
-            for lane in range(9 * BLOCK):
-                frames[own + U(lane)] = scratch[U(lane)]
+            for n in range(9 * BLOCK):
+                frames[own + U(n)] = scratch[U(n)]
             for e in range(3):
                 o, z = U((9 + e) * BLOCK), U((3 * e + 2) * BLOCK)
                 for n in range(BLOCK):

@@ -1,0 +1,255 @@
+"""The planner of Rana & Zalzala 1995 for planar arms of two links, in numpy and scipy over whole populations.
+
+Written from the paper, without any kernel of evoexp: what a careful author would write without a compiler. It takes its
+uniform numbers in the order in which `via_point_ga` takes them, so that both can be compared generation by generation:
+walks of the initial population (individual by individual, arm by arm, step by step); then per generation the roulette,
+per pair of parents the decision and a site per arm, the distinct slots, the decision per slot, and the new walks.
+
+A population is an array (individuals, arms, N + 1, 2) [deg], joint angles relative to the link before.
+"""
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Rana:
+    """Scene and settings.
+
+    Attributes:
+        start: (arms, 2) [deg].
+        goal: (arms, 2) [deg].
+        bases: (arms, 2) [length unit].
+        link_lengths: (arms, 2) [length unit].
+        chords_per_segment: Of the polyline that measures the spline's arc length.
+        collision_substeps: Configurations tested per segment.
+
+    The others are the settings of `via_point_ga` and its parts, under the same names.
+    """
+
+    start: Array
+    goal: Array
+    bases: Array
+    link_lengths: Array
+    num_via_points: int = 20
+    walk_step: float = 2.5
+    max_turn: float = 120.0
+    num_new_trajectories: int = 5
+    crossover_distance: float = 100.0
+    relaxation_step: float = 0.5
+    redistribution: bool = True
+    spline_end: str = "natural"
+    chords_per_segment: int = 16
+    population_size: int = 50
+    num_generations: int = 500
+    num_elites: int = 2
+    crossover_rate: float = 0.9
+    mutation_rate: float = 1.0
+    length_weight: float = 0.5
+    unevenness_weight: float = 0.005
+    collision_weight: float = 100.0
+    fitness_offset: float = 500.0
+    spheres_per_link: int = 5
+    sphere_radius: float = 0.5
+    collision_substeps: int = 1
+
+
+class Judged(NamedTuple):
+    """Cost (individuals,) and the terms of Eq. 7: lengths and unevenness (individuals, arms), collisions."""
+
+    cost: Array
+    lengths: Array
+    unevenness: Array
+    collisions: Array
+
+
+class Population(NamedTuple):
+    """One generation: strings (individuals, arms, N + 1, 2), costs and collisions (individuals,)."""
+
+    strings: Array
+    costs: Array
+    collisions: Array
+
+
+def from_condition(condition: Any, **changes: Any) -> Rana:
+    """Return the same scene and settings as a condition of `via_point_ga` has, with changes.
+
+    Raises:
+        ValueError: If the scene is none of planar arms of two links, standing straight and free of obstacles.
+    """
+    robot, scenario, planner = condition.robot, condition.scenario, condition.planner
+    if scenario.obstacles or any(len(arm.link_lengths) != 2 or arm.base_angle for arm in robot.arms):
+        raise ValueError("the reference is for planar arms of two links without obstacles")
+    settings: dict[str, Any] = {}
+    for part in (planner, planner.ga, planner.objective, planner.collision):
+        settings |= {f.name: getattr(part, f.name) for f in fields(Rana) if hasattr(part, f.name)}
+    return Rana(
+        start=np.array(scenario.q_start),
+        goal=np.array(scenario.q_goal),
+        bases=np.array([arm.base_position for arm in robot.arms]),
+        link_lengths=np.array([arm.link_lengths for arm in robot.arms]),
+        **(settings | changes),
+    )
+
+
+def evolve(rana: Rana, rng: np.random.Generator) -> Iterator[Population]:
+    """Yield the initial population, then one generation after the other."""
+    strings = smooth(rana, walks(rana, rng, rana.population_size))
+    judged = judge(rana, strings)
+    population = Population(strings, judged.cost, judged.collisions)
+    yield population
+    for _ in range(rana.num_generations):
+        population = advance(rana, rng, population)
+        yield population
+
+
+def advance(rana: Rana, rng: np.random.Generator, population: Population) -> Population:
+    """Return the next generation: the offspring, then the elites, best first."""
+    num_offspring = rana.population_size - rana.num_elites
+    kept = np.argsort(population.costs, kind="stable")[: rana.num_elites]
+    parents = roulette(rng, np.maximum(rana.fitness_offset - population.costs, 0.0), num_offspring)
+    offspring = crossover(rana, rng, population.strings[parents])
+    slots = distinct(rng, num_offspring, rana.num_new_trajectories)
+    slots = slots[rng.random(len(slots)) < rana.mutation_rate]
+    offspring[slots] = walks(rana, rng, len(slots))
+    offspring = smooth(rana, offspring)
+    judged = judge(rana, offspring)
+    return Population(
+        np.concatenate([offspring, population.strings[kept]]),
+        np.concatenate([judged.cost, population.costs[kept]]),
+        np.concatenate([judged.collisions, population.collisions[kept]]),
+    )
+
+
+def walks(rana: Rana, rng: np.random.Generator, count: int) -> Array:
+    """Return random walks from start to goal (section 3.3)."""
+    num, arms = rana.num_via_points, len(rana.start)
+    turns = (2.0 * rng.random((count, arms, num - 1)) - 1.0) * np.deg2rad(rana.max_turn)
+    length = rana.walk_step * np.linalg.norm(rana.goal - rana.start, axis=1) / num
+    path = np.empty((count, arms, num + 1, 2))
+    path[:, :, 0], path[:, :, num] = rana.start, rana.goal
+    for i in range(1, num):
+        ahead = rana.goal - path[:, :, i - 1]
+        angle = np.arctan2(ahead[..., 1], ahead[..., 0]) + turns[:, :, i - 1]
+        path[:, :, i] = path[:, :, i - 1] + length[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    return path
+
+
+def smooth(rana: Rana, strings: Array) -> Array:
+    """Redistribute along splines at equal arc length, then relax once (Eqs. 8, 9)."""
+    paths = strings.reshape(-1, rana.num_via_points + 1, 2)
+    paths = redistributed(paths, rana.chords_per_segment, rana.spline_end) if rana.redistribution else paths.copy()
+    for i in range(1, rana.num_via_points):
+        paths[:, i] += rana.relaxation_step * ((paths[:, i - 1] + paths[:, i + 1]) / 2.0 - paths[:, i])
+    return paths.reshape(strings.shape)
+
+
+def redistributed(paths: Array, chords: int, spline_end: str) -> Array:
+    """Return points of paths (paths, N + 1, joints) at equal length along the splines, measured by chords."""
+    num = paths.shape[1] - 1
+    rows = np.arange(len(paths))[:, None]
+    spline: Any = CubicSpline(np.arange(num + 1), paths, axis=1, bc_type=spline_end)
+    steps = np.diff(spline(np.arange(num * chords + 1) / chords), axis=1)
+    length = np.zeros((len(paths), num * chords + 1))
+    np.cumsum(np.sqrt((steps * steps).sum(axis=2)), axis=1, out=length[:, 1:])
+    target = length[:, -1:] * (np.arange(1, num) / num)
+    k = np.array([np.searchsorted(of, at, side="right") - 1 for of, at in zip(length, target, strict=True)])
+    k = np.clip(k, 0, num * chords - 1)
+    begin, end = length[rows, k], length[rows, k + 1]
+    u = (k + (target - begin) / np.where(end > begin, end - begin, 1.0)) / chords
+    segment = np.minimum(u.astype(int), num - 1)
+    t = (u - segment)[:, :, None]
+    c3, c2, c1, c0 = spline.c[:, segment, rows]  # each (paths, N − 1, joints)
+    result = paths.copy()
+    result[:, 1:num] = np.where(length[:, -1, None, None] > 0.0, ((c3 * t + c2) * t + c1) * t + c0, paths[:, 1:num])
+    return result
+
+
+def judge(rana: Rana, strings: Array) -> Judged:
+    """Return Eqs. 2–7 for a population."""
+    steps = np.sqrt((np.diff(strings, axis=2) ** 2).sum(axis=3))  # (individuals, arms, N)
+    lengths = steps.sum(axis=2)
+    unevenness = np.abs(steps - lengths[:, :, None] / steps.shape[2]).sum(axis=2)
+    collisions = colliding(rana, between(strings, rana.collision_substeps)).any(axis=2).sum(axis=1).astype(float)
+    cost = (
+        rana.length_weight * lengths.sum(axis=1)
+        + rana.unevenness_weight * unevenness.sum(axis=1)
+        + rana.collision_weight * collisions
+    )
+    return Judged(cost, lengths, unevenness, collisions)
+
+
+def between(strings: Array, substeps: int) -> Array:
+    """Return the configurations at 1/s, 2/s … 1 of every segment, (individuals, arms, N, s, 2)."""
+    fractions = (np.arange(1, substeps + 1) / substeps)[:, None]
+    first, second = strings[:, :, :-1, None], strings[:, :, 1:, None]
+    return first + fractions * (second - first)
+
+
+def colliding(rana: Rana, q: Array) -> NDArray[np.bool_]:
+    """Return whether any two circles of different arms overlap, for q (individuals, arms, …, 2)."""
+    circles = [_centers(rana, a, q[:, a]) for a in range(len(rana.start))]
+    nearest = np.full(q.shape[:1] + q.shape[2:-1], np.inf)
+    for (xs, ys), (other_x, other_y) in itertools.combinations(circles, 2):
+        dx, dy = xs[..., :, None] - other_x[..., None, :], ys[..., :, None] - other_y[..., None, :]
+        np.minimum(nearest, (dx * dx + dy * dy).min(axis=(-2, -1)), out=nearest)
+    return np.sqrt(nearest) < 2.0 * rana.sphere_radius
+
+
+def _centers(rana: Rana, arm: int, q: Array) -> tuple[Array, Array]:
+    """Return x and y of the circles of one arm, joint to joint, the shared one once: (…, circles)."""
+    first, second = np.deg2rad(q[..., 0]), np.deg2rad(q[..., 0] + q[..., 1])
+    lengths, fractions = rana.link_lengths[arm], np.linspace(0.0, 1.0, rana.spheres_per_link)
+    coordinates = []
+    for base, one, two in zip(
+        rana.bases[arm], (np.cos(first), np.sin(first)), (np.cos(second), np.sin(second)), strict=True
+    ):
+        upper = base + lengths[0] * one[..., None] * fractions
+        lower = upper[..., -1:] + lengths[1] * two[..., None] * fractions[1:]
+        coordinates.append(np.concatenate([upper, lower], axis=-1))
+    return coordinates[0], coordinates[1]
+
+
+def roulette(rng: np.random.Generator, weights: Array, count: int) -> NDArray[np.int64]:
+    """Draw parents in proportion to their weights; uniformly where all are zero."""
+    uniforms, num = rng.random(count), len(weights)
+    wheel = np.cumsum(weights)
+    if wheel[-1] == 0.0:
+        return np.minimum((uniforms * num).astype(np.int64), num - 1)
+    last = int(np.flatnonzero(weights)[-1])
+    return np.minimum(np.searchsorted(wheel, uniforms * wheel[-1], side="right"), last)
+
+
+def crossover(rana: Rana, rng: np.random.Generator, parents: Array) -> Array:
+    """Cross neighbouring parents at one site per arm, where both are close (section 3.4b)."""
+    arms, num = parents.shape[1], rana.num_via_points
+    first, second = parents[0 : len(parents) // 2 * 2 : 2], parents[1::2]
+    uniforms = rng.random((len(first), 1 + arms))
+    children = parents.copy()
+    if num < 2:
+        return children
+    sites = 1 + np.minimum((uniforms[:, 1:] * (num - 1)).astype(int), num - 2)  # (pairs, arms), 1 … N − 1
+    pair, arm = np.arange(len(first))[:, None], np.arange(arms)
+    gap = np.linalg.norm(first[pair, arm, sites] - second[pair, arm, sites], axis=2)
+    crossed = (uniforms[:, 0] < rana.crossover_rate) & (gap < rana.crossover_distance).all(axis=1)
+    after = (np.arange(num + 1) >= sites[:, :, None]) & crossed[:, None, None]
+    children[0 : len(parents) // 2 * 2 : 2] = np.where(after[..., None], second, first)
+    children[1::2] = np.where(after[..., None], first, second)
+    return children
+
+
+def distinct(rng: np.random.Generator, num: int, count: int) -> NDArray[np.int64]:
+    """Draw distinct indices: the head of a Fisher–Yates shuffle."""
+    slots = np.arange(num)
+    for k, uniform in enumerate(rng.random(count)):
+        other = k + min(int(uniform * (num - k)), num - k - 1)
+        slots[[k, other]] = slots[[other, k]]
+    return slots[:count]

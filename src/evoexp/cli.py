@@ -9,7 +9,7 @@ import importlib
 import os
 import sys
 from collections.abc import Sequence
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from evoexp import __version__
 from evoexp.errors import EvoexpError, nearest
@@ -25,7 +25,10 @@ COMMANDS = {
 
 
 class _Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line."""
+    """Says what is wrong in one line; takes no abbreviated options, whose meaning changes when options are added."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(allow_abbrev=False, **settings)
 
     def error(self, message: str) -> NoReturn:
         hint = ""
@@ -33,7 +36,8 @@ class _Parser(argparse.ArgumentParser):
             word = message.split("'")[1]
             message = f"no command '{word}'{nearest(word, COMMANDS)} (commands: {', '.join(COMMANDS)})"
         elif "unrecognized arguments" in message:
-            word = message.rsplit(" ", 1)[-1]
+            words = message.split(": ", 1)[1].split(" ")
+            word = next((word for word in words if word.startswith("-")), words[0])
             known = [text for action in self._actions for text in action.option_strings]
             message = f"no option '{word}'{nearest(word, known)} (options: {', '.join(known)})"
         self.exit(2, f"evoexp: {message}{hint}\n")

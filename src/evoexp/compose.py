@@ -4,18 +4,19 @@ One function expands an experiment for every command. Whatever is wrong with a c
 anything is computed, and said in one line.
 """
 
+import difflib
 import hashlib
 import itertools
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 import hydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
-from hydra.core.override_parser.types import Override
+from hydra.core.override_parser.types import Override, ValueType
 from hydra.errors import HydraException
-from omegaconf import DictConfig, OmegaConf
+from omegaconf import DictConfig, ListConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 from pydantic import ValidationError
 
@@ -23,7 +24,7 @@ from evoexp.batch.settings import RunnerSettings
 from evoexp.condition import PARTS, Condition, component_class
 from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting
 from evoexp.report.settings import ReportSettings
-from evoexp.validation import Count, Settings, build, settings_error
+from evoexp.validation import TARGET, Count, Settings, build, settings_error
 
 PLANNER_PARTS = ("ga", "objective", "collision")  # groups that a planner's option takes in by interpolation
 JOIN = " · "
@@ -98,7 +99,7 @@ def expand(overrides: Sequence[str], *, multirun: bool = False, only: Sequence[s
     """Expand overrides into experiments, one per `experiment=` swept over.
 
     Args:
-        overrides: As typed: `experiment=rana_planar ga.population_size=20`.
+        overrides: As typed: `experiment=rana_planar ga.population_size=20`; their order does not matter.
         multirun: Whether values with commas are swept over.
         only: Labels to keep; empty keeps all.
 
@@ -106,40 +107,27 @@ def expand(overrides: Sequence[str], *, multirun: bool = False, only: Sequence[s
         EvoexpError: For whatever cannot be run; nothing has been computed then.
     """
     parsed = _parse(overrides)
-    if not multirun:
-        for override in parsed:
-            if override.is_sweep_override():
-                raise SettingError(_key(override), "one value (or add -m to sweep over several)", _value(override))
-    _check_groups(parsed)
-    chosen = [_value(o) for o in parsed if o.get_key_element() == "experiment"][-1:]
-    rest = [override for override in parsed if override.get_key_element() != "experiment"]
-    names = chosen[0].split(",") if chosen else [None]
+    for key, override in parsed.items():
+        if override.is_sweep_override():
+            if not multirun:
+                raise SettingError(key, "one value (or add -m to sweep over several)", _value(override))
+            if key != "experiment" and _root(key) in _NOT_IDENTITY:
+                raise SettingError(key, "one value: a sweep is over what changes a condition", _value(override))
+    chosen = parsed.pop("experiment", None)
+    names = [None if name == "null" else name for name in _choices(chosen)] if chosen is not None else [None]
+    if len(set(names)) < len(names):
+        raise SettingError("experiment", "names that differ", ",".join(map(str, names)))
     with hydra.initialize_config_dir(str(config_directory().resolve()), version_base="1.3"):
-        return [_expand_one(name, rest, only) for name in names]
+        return [_expand_one(name, parsed, only) for name in names]
 
 
-def _expand_one(name: str | None, overrides: Sequence[Override], only: Sequence[str]) -> Experiment:
-    choice = [f"experiment={name}"] if name else []
-    singles = [_text(override) for override in overrides if not override.is_sweep_override()]
-    base = _compose([*choice, *singles])
-    entries = OmegaConf.to_container(base.conditions) or {"": []}
-    if not isinstance(entries, dict):
-        raise SettingError("conditions", "a mapping of labels to lists of overrides", entries)
-    labels: dict[str, list[str]] = {}
-    for template, entry in entries.items():
-        for label, own in _entry(str(template), entry):
-            for suffix, swept in _sweep(overrides):
-                joined = JOIN.join(part for part in (label, suffix) if part) or (name or "custom")
-                if joined in labels:
-                    raise SettingError("conditions", "labels that differ", joined)
-                labels[joined] = [*choice, *own, *swept]
-    if unknown := [label for label in only if label not in labels]:
-        raise UnknownOption("--only", unknown[0], labels)
-    kept = {label: text for label, text in labels.items() if not only or label in only}
-    configs = {label: _compose(text) for label, text in kept.items()}
+_NOT_IDENTITY = ("experiment", "budget", "num_replicates", "runner", "report")
+
+
+def _expand_one(name: str | None, overrides: Mapping[str, Override], only: Sequence[str]) -> Experiment:
+    base, labelled = _conditions(name, overrides, only)
     budget = _settings(Budget, base.budget, "budget")
-    conditions = tuple(Labelled(label, _condition(config, budget)) for label, config in configs.items())
-    changes = [o for o in overrides if o.get_key_element().split(".")[0] not in _NOT_IDENTITY]
+    conditions = tuple(Labelled(label, _condition(config, budget)) for label, config in labelled.items())
     return Experiment(
         name or "custom",
         budget.name,
@@ -147,11 +135,39 @@ def _expand_one(name: str | None, overrides: Sequence[Override], only: Sequence[
         _num_replicates(base, budget),
         _settings(RunnerSettings, base.runner, "runner"),
         _settings(ReportSettings, base.report, "report"),
-        bool(changes or only or not name),
+        _changed(name, overrides, only, conditions),
     )
 
 
-_NOT_IDENTITY = {"experiment", "budget", "num_replicates", "runner", "report"}
+def _changed(
+    name: str | None, overrides: Mapping[str, Override], only: Sequence[str], conditions: tuple[Labelled, ...]
+) -> bool:
+    """Whether the conditions are others than those that the experiment has at this budget by itself."""
+    plain = {key: override for key, override in overrides.items() if key in _NOT_IDENTITY}
+    if name is None or (len(plain) == len(overrides) and not only):
+        return name is None
+    shipped = _expand_one(name, plain, ()).conditions
+    return [(label, c.id) for label, c in conditions] != [(label, c.id) for label, c in shipped]
+
+
+def _conditions(
+    name: str | None, overrides: Mapping[str, Override], only: Sequence[str]
+) -> tuple[DictConfig, dict[str, DictConfig]]:
+    """Return the first configuration without the experiment's own conditions, and all labelled ones with them."""
+    choice = {"experiment": f"experiment={name}"} if name else {}
+    swept = list(_sweep(overrides))
+    base = _compose(choice | swept[0][1])
+    labels: dict[str, dict[str, str]] = {}
+    for template, entry in (OmegaConf.to_container(base.conditions) or {"": []}).items():
+        for label, own in _entry(str(template), entry):
+            for suffix, texts in swept:
+                joined = JOIN.join(part for part in (label, suffix) if part) or (name or "custom")
+                if joined in labels:
+                    raise SettingError("conditions", "labels that differ", joined)
+                labels[joined] = choice | own | texts  # the command line wins
+    if unknown := [label for label in only if label not in labels]:
+        raise UnknownOption("--only", unknown[0], labels)
+    return base, {label: _compose(texts) for label, texts in labels.items() if not only or label in only}
 
 
 def _condition(config: DictConfig, budget: Budget) -> Condition:
@@ -169,6 +185,9 @@ def _condition(config: DictConfig, budget: Budget) -> Condition:
                 raise SettingError(group, "a part of the chosen planner", plain[group])
             build(plain[group], component_class, group)  # errors name the group, as it was typed
     if plain.get("control") is not None:
+        build(plain["planner"], component_class, "planner")  # likewise
+        if "planner" in plain["control"]:
+            raise SettingError("control.planner", "left out: it is the chosen planner", plain["control"]["planner"])
         plain["planner"] = {**plain["control"], "planner": plain["planner"]}
     return Condition.from_config({part: plain[part] for part in (*PARTS, "seed")})
 
@@ -196,99 +215,168 @@ def _settings(kind: type[AnySettings], config: Any, field: str) -> AnySettings:
         raise settings_error(kind, error, values, field) from None
 
 
-def _entry(template: str, entry: Any) -> Iterator[tuple[str, list[str]]]:
+def _entry(template: str, entry: Any) -> Iterator[tuple[str, dict[str, str]]]:
     """Expand one entry of `conditions`: its sweeps crossed, their values filled into its label."""
+    field = f"conditions.{template}"
     if not isinstance(entry, list) or not all(isinstance(text, str) for text in entry):
-        raise SettingError(f"conditions.{template}", "a list of overrides", entry)
+        raise SettingError(field, "a list of overrides", entry)
     parsed = _parse(entry)
-    _check_groups(parsed)
-    if template.count("{}") not in (0, sum(override.is_sweep_override() for override in parsed)):
-        raise SettingError(f"conditions.{template}", "a label with one {} per swept override, or none", template)
+    for key, override in parsed.items():
+        if _root(key) in _NOT_IDENTITY:
+            raise SettingError(field, f"free of {key}, which belongs to the whole experiment", override.input_line)
+    swept = [key for key, override in parsed.items() if override.is_sweep_override()]
+    if template.count("{}") not in (0, len(swept)):
+        raise SettingError(field, "a label with one {} per swept override, or none", template)
     for suffix, texts in _sweep(parsed):
         if "{}" in template:
-            values = [text.split("=", 1)[1] for text, o in zip(texts, parsed, strict=True) if o.is_sweep_override()]
-            yield template.format(*values), texts
+            values = [texts[key].split("=", 1)[1] for key in swept]
+            pieces = template.split("{}")
+            yield pieces[0] + "".join(v + piece for v, piece in zip(values, pieces[1:], strict=True)), texts
         else:
             yield JOIN.join(part for part in (template, suffix) if part), texts
 
 
-def _sweep(overrides: Sequence[Override]) -> Iterator[tuple[str, list[str]]]:
-    """Cross all swept overrides; yield a label of the swept ones and the list of single overrides."""
-    choices = []
-    for override in overrides:
-        if override.is_sweep_override():
-            choices.append([f"{override.get_key_element()}={value}" for value in override.sweep_string_iterator()])
-        else:
-            choices.append([_text(override)])
-    for texts in itertools.product(*choices):
-        swept = [text for text, o in zip(texts, overrides, strict=True) if o.is_sweep_override()]
-        yield JOIN.join(text.rsplit(".", 1)[-1] if "." in text.split("=")[0] else text for text in swept), list(texts)
+def _sweep(overrides: Mapping[str, Override]) -> Iterator[tuple[str, dict[str, str]]]:
+    """Cross all swept overrides; yield a label of the swept ones and all of them as single overrides, by key."""
+    swept = [key for key, override in overrides.items() if override.is_sweep_override()]
+    short = {key: key.rsplit(".", 1)[-1] for key in swept}
+    if len(set(short.values())) < len(short):
+        short = {key: key for key in swept}
+    for values in itertools.product(*map(_choices, overrides.values())):
+        chosen = dict(zip(overrides, values, strict=True))
+        label = JOIN.join(f"{short[key]}={chosen[key]}" for key in swept)
+        yield label, {key: _text(override, chosen[key]) for key, override in overrides.items()}
 
 
-def _compose(overrides: list[str]) -> DictConfig:
+def _compose(overrides: Mapping[str, str]) -> DictConfig:
     try:
-        return hydra.compose("config", overrides=overrides)
-    except (HydraException, OmegaConfBaseException) as error:
+        return hydra.compose("config", overrides=list(overrides.values()))
+    except (HydraException, OmegaConfBaseException, ValueError) as error:
         raise _said_in_one_line(error, overrides) from None
 
 
-def _said_in_one_line(error: Exception, overrides: list[str]) -> EvoexpError:
+def _said_in_one_line(error: Exception, overrides: Mapping[str, str]) -> EvoexpError:
     text = str(error)
     if missing := re.search(r"You must specify '([^']+)'", text):
         group = missing[1]
-        hint = f" (options: {', '.join(options(group))}), or choose an experiment: {', '.join(options('experiment'))}"
-        return SettingError(group, f"chosen{hint}", None)
+        experiments = ", ".join(options("experiment"))
+        if "experiment" not in overrides:
+            must = f"chosen: {experiments} (without one, every group is needed; the next is {group}"
+            return SettingError("experiment", f"{must}: {', '.join(options(group))})", None)
+        return SettingError(group, f"chosen: {', '.join(options(group))}", None)
     if unknown := re.search(r"Could not (?:override|delete)[^']*'([^']+)'", text):
-        return UnknownSetting(unknown[1], _known_beside(unknown[1], overrides))
+        return _unknown(unknown[1], overrides)
     if absent := re.search(r"Could not find '([^'/]+)/([^']+)'", text):
         return UnknownOption(absent[1], absent[2], options(absent[1]))
-    return SettingError("configuration", "composable", _first_line(error))
+    if merging := re.search(r"Error merging override \+*([^=\s]+)=(.*)", text):
+        return SettingError(merging[1], "a setting that is there and takes this value", merging[2])
+    return SettingError("configuration", "composable", f"{_first_line(error)} ({' '.join(overrides.values())})")
 
 
-def _known_beside(field: str, overrides: list[str]) -> list[str]:
-    """Return the keys that stand where an unknown one was given."""
-    groups = {path.name for path in config_directory().iterdir() if path.is_dir()}
-    node: Any = hydra.compose("config", overrides=[text for text in overrides if text.split("=")[0] in groups])
-    for part in field.split(".")[:-1]:
-        node = node.get(part) if isinstance(node, DictConfig) else None
-    return [str(key) for key in node] if isinstance(node, DictConfig) else []
+def _unknown(field: str, overrides: Mapping[str, str]) -> EvoexpError:
+    """Name the first part of an unknown key that does not exist, and what stands there instead."""
+    node: Any = hydra.compose("config", overrides=[text for key, text in overrides.items() if key in _groups()])
+    parts = field.split(".")
+    for k, part in enumerate(parts):
+        if isinstance(node, DictConfig) and part in node:
+            if OmegaConf.is_interpolation(node, part):
+                return SettingError(field, f"given as {'.'.join(parts[k:])}, the group that {part} is taken from", None)
+            node = node.get(part)
+        elif isinstance(node, ListConfig) and part.isdigit() and int(part) < len(node):
+            node = node[int(part)]
+        else:
+            known = [str(key) for key in node if key != TARGET] if isinstance(node, DictConfig) else []
+            return UnknownSetting(".".join(parts[: k + 1]), known + (_elsewhere(part, node) if k == 0 else []))
+    return UnknownSetting(field, [])
 
 
-def _parse(overrides: Sequence[str]) -> list[Override]:
+def _elsewhere(name: str, config: DictConfig) -> list[str]:
+    """Return the setting of a group whose own name is nearest to one that was given without its group."""
+    found = {str(key): f"{group}.{key}" for group in config for key in _keys(config, str(group))}
+    return [found[near] for near in difflib.get_close_matches(name, list(found), n=1, cutoff=0.8)]
+
+
+def _keys(config: DictConfig, group: str) -> list[Any]:
+    node = config.get(group)
+    return [key for key in node if key != TARGET] if isinstance(node, DictConfig) else []
+
+
+def _parse(overrides: Sequence[str]) -> dict[str, Override]:
+    """Parse overrides, each key once; refuse what can be refused before anything is composed."""
     parser = OverridesParser.create()
-    parsed = []
+    parsed: dict[str, Override] = {}
     for text in overrides:
         try:
-            parsed.append(parser.parse_override(text))
-        except HydraException:
+            override = parser.parse_override(text)
+        except (HydraException, ValueError):
             raise SettingError("override", "key=value", text) from None
-        if parsed[-1].get_key_element().startswith("hydra"):
-            raise SettingError("override", "a setting of evoexp (nothing of Hydra's own)", text)
+        key = override.key_or_group
+        _check_key(override, text)
+        if key in parsed and parsed[key].input_line != text:
+            raise SettingError(key, "given once", f"{parsed[key].input_line} {text}")
+        if key in _groups() and not override.is_delete():
+            _check_options(override)
+        parsed[key] = override
     return parsed
 
 
-def _check_groups(overrides: Sequence[Override]) -> None:
+def _check_key(override: Override, text: str) -> None:
+    """Refuse keys that no override can have."""
+    key = override.key_or_group
+    if not key or override.package is not None:
+        raise SettingError("override", "key=value", text)
+    if re.split("[./]", key)[0] == "hydra":
+        raise SettingError("override", "a setting of evoexp (nothing of Hydra's own)", text)
+    if _root(key) == "conditions":
+        raise SettingError("conditions", "left to the experiment's file (choose among them: --only LABEL)", text)
+    if key == "budget.name":
+        raise SettingError("budget.name", "left as it is: claims are judged by it", text)
+    roots = [*_groups(), "seed", "num_replicates"]
+    if (override.is_add() or override.is_force_add()) and _root(key) not in roots:
+        raise UnknownSetting(key, roots)
+    if override.is_delete() and key in roots and key not in _OPTIONAL:
+        raise SettingError(key, "given", text)
+
+
+_OPTIONAL = ("experiment", "control", *PLANNER_PARTS)  # groups without which a configuration may be complete
+
+
+def _check_options(override: Override) -> None:
     """Refuse group choices that do not exist, before composing anything."""
-    for override in overrides:
-        group = override.get_key_element()
-        if (config_directory() / group).is_dir():
-            known = options(group)
-            for name in _value(override).split(","):
-                if name not in known and not (name == "null" and group in ("experiment", "control", *PLANNER_PARTS)):
-                    raise UnknownOption(group, name, known)
+    group = override.key_or_group
+    for name in _choices(override):
+        if name not in options(group) and not (name == "null" and group in _OPTIONAL):
+            raise UnknownOption(group, name, options(group))
 
 
-def _key(override: Override) -> str:
-    return str(override.get_key_element())
+def _choices(override: Override) -> list[str]:
+    """Return the values of an override, several if it is swept."""
+    if not override.is_sweep_override():
+        return [_value(override)]
+    if override.value_type not in (ValueType.SIMPLE_CHOICE_SWEEP, ValueType.CHOICE_SWEEP, ValueType.RANGE_SWEEP):
+        raise SettingError(override.key_or_group, "values that can be enumerated: a,b,c or range(…)", _value(override))
+    return list(override.sweep_string_iterator())
+
+
+def _groups() -> list[str]:
+    return [path.name for path in config_directory().iterdir() if path.is_dir()]
+
+
+def _root(key: str) -> str:
+    return re.split("[./]", key)[0]
 
 
 def _value(override: Override) -> str:
-    return _text(override).split("=", 1)[-1]
+    return str(override.input_line).split("=", 1)[-1]
 
 
-def _text(override: Override) -> str:
-    assert override.input_line is not None
-    return override.input_line
+def _text(override: Override, value: str) -> str:
+    """Return an override with one value as Hydra takes it: `~group` for `group=null`."""
+    if override.is_delete():
+        return str(override.input_line)
+    if override.key_or_group in _groups() and value == "null":
+        return f"~{override.key_or_group}"
+    return f"{override.get_key_element()}={value}"
 
 
 def _first_line(error: Exception) -> str:

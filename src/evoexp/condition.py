@@ -9,7 +9,7 @@ import hashlib
 import importlib
 import importlib.metadata
 import json
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple, cast, get_type_hints
 
 import numpy as np
 
@@ -88,6 +88,7 @@ class Condition(NamedTuple):
         if type(seed) is not int or seed < 0:
             raise SettingError("seed", "a whole number, at least 0", seed)
         robot, scenario, planner = parts
+        _check_roles(robot, scenario, planner)
         return cls(robot, scenario, planner, seed)
 
     @classmethod
@@ -100,7 +101,7 @@ class Condition(NamedTuple):
         """
         try:
             config = json.loads(text)
-        except ValueError:
+        except (ValueError, RecursionError):
             raise SettingError("config.json", "a condition in JSON", text[:40]) from None
         if not isinstance(config, dict):
             raise SettingError("config.json", "a condition in JSON", config)
@@ -139,6 +140,20 @@ class Condition(NamedTuple):
             SettingError: If the parts contradict each other (a start in collision, say).
         """
         return _prepare(self)
+
+
+def _check_roles(robot: Component, scenario: Component, planner: Component) -> None:
+    """Refuse components that are no planner, or that this planner does not take as robot or scenario."""
+    inner: Any = planner
+    while hasattr(inner, "planner"):  # a control stands around the planner
+        inner = inner.planner
+    if not (isinstance(inner, Component) and hasattr(inner, "prepare")):
+        raise SettingError("planner", "a planner", getattr(inner, "component", inner))
+    hints = get_type_hints(inner.prepare)
+    for part, value in (("robot", robot), ("scenario", scenario)):
+        kind = hints.get(part, Any)
+        if isinstance(kind, type) and not isinstance(value, kind):
+            raise SettingError(part, f"what {inner.component} takes, a {kind.__name__}", value.component)
 
 
 @functools.lru_cache(maxsize=64)

@@ -1,12 +1,13 @@
 """The Python door: stored results as pandas frames."""
 
+import re
 from pathlib import Path
 from typing import NamedTuple
 
 import pandas as pd
 
 from evoexp import compose
-from evoexp.errors import NothingStored
+from evoexp.errors import NothingStored, UnknownHash, UnknownOption
 from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
 from evoexp.store.tables import read_generations, read_summaries
 
@@ -39,22 +40,36 @@ def load(
         Frames whose column `label` names the condition as the figures do; a hash is its own label.
 
     Raises:
-        UnknownHash: If `what` is neither.
+        UnknownOption: If `what` is neither.
+        UnknownHash: If it is a hash of nothing that is stored.
         AmbiguousHash: If several runs begin with it.
         NothingStored: If nothing of it has been run.
     """
     root = Path(outputs) if outputs is not None else outputs_root()
     if what in compose.options("experiment"):
         experiments = compose.expand([f"experiment={what}", f"budget={budget}", *overrides], multirun=multirun)
-        labels = {c.condition.id: c.label for e in experiments for c in e.conditions}
-        runs = [RunDirectory(root, condition_id) for condition_id in labels]
+        labels = [(c.label, c.condition.id) for e in experiments for c in e.conditions]
+        runs = [RunDirectory(root, condition_id) for condition_id in dict.fromkeys(key for _, key in labels)]
         runs = [run for run in runs if run.completed() or run.failed()]
         if not runs:
             raise NothingStored(f"{what}: nothing stored in {root}; run it: evoexp run experiment={what}")
     else:
-        run = resolve(root, what)
-        runs, labels = [run], {run.condition_id: run.hash12}
-    generations, summaries = read_generations(runs), read_summaries(runs)
-    for frame in (generations, summaries):
-        frame.insert(0, "label", frame["condition"].astype(str).map(labels))
-    return Frames(generations, summaries)
+        run = _run(root, what)
+        runs, labels = [run], [(run.hash12, run.condition_id)]
+    return Frames(_labelled(read_generations(runs), labels), _labelled(read_summaries(runs), labels))
+
+
+def _run(outputs: Path, what: str) -> RunDirectory:
+    try:
+        return resolve(outputs, what)
+    except UnknownHash:
+        if re.fullmatch("[0-9a-fA-F]{1,64}", what):
+            raise
+        raise UnknownOption("experiment or hash", what, compose.options("experiment")) from None
+
+
+def _labelled(frame: pd.DataFrame, labels: list[tuple[str, str]]) -> pd.DataFrame:
+    """Add the label in front; labels that share a condition have its rows each."""
+    parts = [frame[frame["condition"] == condition_id].assign(label=label) for label, condition_id in labels]
+    whole = pd.concat(parts, ignore_index=True)
+    return whole[["label", *frame.columns]]

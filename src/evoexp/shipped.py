@@ -6,6 +6,7 @@ and makes a test fail when results change without a raised revision.
 
 import functools
 import json
+import shlex
 from importlib import resources
 from typing import NamedTuple
 
@@ -31,13 +32,13 @@ class Shipped(NamedTuple):
     def command(self) -> str:
         """The command that runs it."""
         budget = "" if self.budget == "paper" else f" budget={self.budget}"
-        return f"evoexp run experiment={self.experiment}{budget} --only '{self.label}'"
+        return f"evoexp run experiment={self.experiment}{budget} --only {shlex.quote(self.label)}"
 
 
 @functools.cache
 def shipped() -> tuple[Shipped, ...]:
     """Return the table."""
-    text = resources.files("evoexp").joinpath("assets/shipped.json").read_text()
+    text = resources.files("evoexp").joinpath("assets/shipped.json").read_text(encoding="utf-8")
     return tuple(Shipped(**row) for row in json.loads(text))
 
 

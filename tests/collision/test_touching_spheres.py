@@ -80,7 +80,9 @@ def coal_obstacle(obstacle: object) -> coal.CollisionObject:
     return coal.CollisionObject(coal.Capsule(obstacle.radius, length), turn, 0.5 * (start + end))
 
 
-@pytest.mark.parametrize("robot", [TWO_PLANAR, THREE_PLANAR, TWO_SPATIAL], ids=["two planar", "three planar", "spatial"])
+@pytest.mark.parametrize(
+    "robot", [TWO_PLANAR, THREE_PLANAR, TWO_SPATIAL], ids=["two planar", "three planar", "spatial"]
+)
 def test_clearance_agrees_with_coal(robot: Robot) -> None:
     assembly = robot.build()
     collision = MODEL.bind(assembly, OBSTACLES)
@@ -152,7 +154,9 @@ def test_a_wrong_number_of_joints_is_refused() -> None:
 
 
 @pytest.mark.parametrize("limit", [-0.3, 0.0, 0.4, 3.0])
-@pytest.mark.parametrize("robot", [TWO_PLANAR, THREE_PLANAR, TWO_SPATIAL], ids=["two planar", "three planar", "spatial"])
+@pytest.mark.parametrize(
+    "robot", [TWO_PLANAR, THREE_PLANAR, TWO_SPATIAL], ids=["two planar", "three planar", "spatial"]
+)
 def test_a_limit_skips_only_what_is_not_asked(robot: Robot, limit: float) -> None:
     assembly = robot.build()
     collision = MODEL.bind(assembly, OBSTACLES)

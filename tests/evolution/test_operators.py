@@ -24,9 +24,7 @@ def crossed(seed: int, parents: np.ndarray, rate: float, distance: float, string
     return out[:, :, : len(parents)]
 
 
-def crossed_literally(
-    seed: int, parents: np.ndarray, rate: float, distance: float, strings: np.ndarray
-) -> np.ndarray:
+def crossed_literally(seed: int, parents: np.ndarray, rate: float, distance: float, strings: np.ndarray) -> np.ndarray:
     """The same pair by pair, arm by arm, as one reads it in the paper."""
     rng = np.random.default_rng(seed)
     children = strings[:, :, parents].copy()

@@ -1,18 +1,18 @@
 """The compiled planner against the same algorithm in plain numpy and scipy, from the same uniform numbers.
 
 As long as both take the same discrete decisions (who is drawn, which sites, who collides), a generation differs by no
-more than the arithmetic. A decision flips only if a number comes closer to its threshold than that, which with the seeds
-below never happens; were one to flip, the strings would differ by degrees and the test would fail.
+more than the arithmetic. A decision flips only if a number comes closer to its threshold than that, which with the
+seeds below never happens; were one to flip, the strings would differ by degrees and the test would fail.
 """
 
 from typing import Any
 
 import numpy as np
 import pytest
-from references import rana_numpy
 
 from evoexp import compose
 from evoexp.condition import Condition
+from references import rana_numpy
 
 ROUNDING = 1e-9  # [deg] measured: 7e-13
 

@@ -3,16 +3,21 @@
 import math
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from evoexp import compose
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.planners.via_point_ga import Problem, ViaPointGa
+from evoexp.robots.arms import Arms
+from evoexp.robots.assembly import Chain, Link
+from evoexp.scenarios.arm_motion import ArmMotion
 
 
 def condition(*overrides: str, experiment: str = "rana_planar") -> Condition:
-    expanded = compose.expand([f"experiment={experiment}", "ga.num_generations=5", *overrides])
+    short = () if any("num_generations" in text for text in overrides) else ("ga.num_generations=5",)
+    expanded = compose.expand([f"experiment={experiment}", *short, *overrides])
     return expanded[0].conditions[0].condition
 
 
@@ -41,7 +46,9 @@ def terms_by_hand(strings: np.ndarray, arms: np.ndarray) -> dict[str, float]:
             elbow = (base[0] + 4 * math.cos(a), base[1] + 4 * math.sin(a))
             tip = (elbow[0] + 4 * math.cos(b), elbow[1] + 4 * math.sin(b))
             ends = [(base, elbow), (elbow, tip)]
-            circles.append([tuple(p + k / 4 * (r - p) for p, r in zip(s, e, strict=True)) for s, e in ends for k in range(5)])
+            circles.append(
+                [tuple(p + k / 4 * (r - p) for p, r in zip(s, e, strict=True)) for s, e in ends for k in range(5)]
+            )
         collisions += min(math.dist(c, d) for c in circles[0] for d in circles[1]) < 1.0
     return terms | {"collisions": float(collisions)}
 
@@ -82,6 +89,38 @@ def test_solutions_keep_the_documented_order() -> None:
     assert np.array_equal(solution[1, -1], [315.0, 315.0])
     motion = planner.motion(problem, solution.ravel())
     assert motion.q[7] == pytest.approx(np.deg2rad(population[:, 7, 1]))
+
+
+class SpatialArm(Chain):
+    """A 3R arm in space: the planner must not know the difference."""
+
+    component = "spatial_arm"
+    base: tuple[float, float, float]
+
+    def append_to(self, model: pin.Model, arm: int) -> list[Link]:
+        first = model.addJoint(0, pin.JointModelRZ(), pin.SE3(np.eye(3), np.array(self.base)), f"{arm}_a")
+        second = model.addJoint(first, pin.JointModelRY(), pin.SE3(np.eye(3), np.array([0.0, 0.0, 1.0])), f"{arm}_b")
+        third = model.addJoint(second, pin.JointModelRY(), pin.SE3(np.eye(3), np.array([1.0, 0.0, 0.0])), f"{arm}_c")
+        x = np.array([1.0, 0.0, 0.0])
+        return [Link(arm, joint, np.zeros(3), x, 0.0) for joint in (second, third)]
+
+
+def test_arms_in_space_are_planned_by_the_same_planner() -> None:
+    planner, _ = prepared("collision.sphere_radius=0.125", "ga.num_generations=30")
+    robot = Arms(arms=(SpatialArm(base=(0.0, 0.0, 0.0)), SpatialArm(base=(0.0, 2.5, 0.0))))
+    scenario = ArmMotion(
+        q_start=((15.0, -15.0, -30.0), (-150.0, -15.0, 30.0)),
+        q_goal=((150.0, -15.0, 30.0), (-15.0, -15.0, -30.0)),
+        security_margin=0.25,
+        length_unit="unit",
+    )
+    problem = planner.prepare(robot, scenario)
+    *_, last = planner.evolve(problem, np.random.default_rng(0))
+    assert last.best.shape == (2 * 21 * 3,)
+    assert planner.motion(problem, last.best).q.shape == (21, 6)
+    terms = planner.evaluate(problem, last.best)
+    assert terms["collisions"] == last.terms["collisions"]
+    assert last.best_cost < 2.0 * last.mean_cost
 
 
 def test_elites_survive_untouched() -> None:

@@ -192,3 +192,19 @@ def test_redistribution_is_applied_to_solved_strings_only(results: Results) -> N
 def test_drawing_leaves_matplotlib_as_it_was(page: Path) -> None:
     assert mpl.rcParams["svg.hashsalt"] == mpl.rcParamsDefault["svg.hashsalt"]
     assert "matplotlib.pyplot" not in sys.modules
+
+
+def test_swept_conditions_are_told_apart_and_compared_with_their_own_control(tmp_path: Path) -> None:
+    words = ["experiment=rana_planar", "budget=smoke", "ga.num_generations=1", "ga.population_size=8,10"]
+    experiment = compose.expand(words, multirun=True)[0]
+    store(tmp_path, experiment)
+    request = build.Request("swept", experiment.name, experiment.budget, experiment.conditions)
+    settings = ReportSettings(**REPORT | {"formats": ("svg",), "figures": "rana_planar"})  # type: ignore[arg-type]
+    page = build.report(request, settings, tmp_path, 2)
+    text = page.read_text()
+    assert sorted(re.findall(r"^## (.* against .*)$", text, re.MULTILINE)) == [
+        f"via-point GA · population_size={size} against random search · population_size={size}" for size in (10, 8)
+    ]
+    assert "### Fig. 4: snapshots of the motion in operational space (via-point GA · population_size=8)" in text
+    assert (page.parent / "fig_7_distances_2_via_point_ga_population_size_10.svg").is_file()
+    assert "| `ga.population_size` (via-point GA · population_size=8, random search · population_size=8) | 8 |" in text

@@ -1,4 +1,4 @@
-"""A process of its own: compiles a real kernel afresh and prints which vector registers its assembly names.
+"""A process of its own: compiles real kernels afresh and prints which vector registers their assembly names.
 
 EVOEXP_CACHE must be a new directory: numba has no assembly of functions that come from its cache.
 """
@@ -8,20 +8,17 @@ import re
 
 import numpy as np
 
-from evoexp.paths import redistribution
-from evoexp.paths.workspace import prepare_redistribution
+from evoexp.paths import lengths, relaxation
 
 
 def main() -> None:
-    num_via_points, lanes = 20, 8
-    arms = np.array([[0, 2], [2, 4]])
-    population = np.linspace(0.0, 1.0, 4 * (num_via_points + 1) * lanes).reshape(4, num_via_points + 1, lanes) ** 2
-    workspace = prepare_redistribution(num_via_points, 2, "natural", 8)
-    redistribution.redistribute(population, arms, lanes, workspace)
-    compiled = [value for value in vars(redistribution).values() if getattr(value, "nopython_signatures", None)]
-    assembly = "\n".join(text for function in compiled for text in function.inspect_asm().values())
-    found = {name: len(re.findall(rf"%{name}\d", assembly)) for name in ("xmm", "ymm", "zmm")}
-    print(json.dumps(found | {"kernels": len(compiled)}))
+    via_points, arms = np.zeros((4, 21, 8)), np.array([[0, 2], [2, 4]])
+    lengths.path_lengths(via_points, arms, np.empty((2, 8)), np.empty((2, 8)))
+    relaxation.relax(via_points, 0.5, 8)
+    values = [value for module in (lengths, relaxation) for value in vars(module).values()]
+    kernels = [value for value in values if getattr(value, "nopython_signatures", None)]
+    assembly = "\n".join(text for kernel in kernels for text in kernel.inspect_asm().values())
+    print(json.dumps({name: len(re.findall(rf"%{name}\d", assembly)) for name in ("xmm", "ymm", "zmm")}))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """Arguments that several commands share."""
 
 import argparse
+import re
 
 
 def add_experiment_arguments(parser: argparse.ArgumentParser) -> None:
@@ -18,4 +19,8 @@ def add_experiment_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _labels(text: str) -> tuple[str, ...]:
-    return tuple(label.strip() for label in text.split(",") if label.strip())
+    """Split labels at their commas, but for those inside brackets: `q=[0,1]` is one label."""
+    labels = tuple(label.strip() for label in re.split(r",(?![^\[\](){}]*[\])}])", text) if label.strip())
+    if not labels:
+        raise argparse.ArgumentTypeError(f"must name a condition, was '{text}'")
+    return labels

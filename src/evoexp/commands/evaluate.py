@@ -7,19 +7,30 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
 from evoexp import compose
 from evoexp.commands.arguments import add_experiment_arguments
+from evoexp.commands.console import add_columns, new_table, plain_console
 from evoexp.errors import MotionFileError
 from evoexp.records import FloatArray
+
+HEAD = ("label", "condition", "length_unit")  # what a row says of its condition; everything else is a term
+LARGEST = float(np.finfo(np.float64).max)
+MAX_DEPTH = 16  # nested lists; no planner's shape comes near
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     add_experiment_arguments(parser)
-    parser.add_argument("--json", action="store_true", help="print flat JSON: one object per condition")
+    for action in parser._actions:
+        if action.dest == "overrides":
+            action.metavar, action.nargs = "MOTION | KEY=VALUE", "+"
+            action.help = (
+                "a motion file (.json: nested lists, .npy: an array) in the shape that the planner documents, start and "
+                "goal included, and an experiment with overrides as for run"
+            )
+    parser.add_argument("--json", action="store_true", help="print flat JSON: one object, or a list of them")
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -37,7 +48,7 @@ def main(arguments: argparse.Namespace) -> int:
                 misfits.append(f"{label}: {_shape_text(shape)}")
                 continue
             terms = planner.evaluate(problem, solution)
-            rows.append({"label": label, "condition": condition.id, "length_unit": condition.length_unit} | terms)
+            rows.append(dict(zip(HEAD, (label, condition.id, condition.length_unit), strict=True)) | terms)
     if not rows:
         given = " and ".join(map(str, _shape_of(values)))
         raise MotionFileError(
@@ -46,7 +57,9 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print(json.dumps(rows if len(rows) > 1 else rows[0], indent=2, allow_nan=False, default=_plain))
     else:
-        Console().print(_table(rows))
+        console = plain_console()
+        for table in _tables(rows, console.width):
+            console.print(table)
     return 0
 
 
@@ -58,18 +71,19 @@ def read_motion(path: Path) -> Any:
     """
     try:
         if path.suffix == ".npy":
-            values: Any = np.load(path, allow_pickle=False).tolist()
+            with open(path, "rb") as file:
+                values: Any = np.lib.format.read_array(file, allow_pickle=False).tolist()
         elif path.suffix == ".json":
             values = json.loads(path.read_text())
         else:
             raise MotionFileError(f"{path}: a motion file ends in .json or .npy")
     except OSError as error:
         raise MotionFileError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except (ValueError, EOFError, RecursionError) as error:
+    except (ValueError, EOFError, RecursionError, MemoryError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise MotionFileError(f"{path}: is no {path.suffix[1:]} of numbers: {reason}") from None
-    if not isinstance(values, list) or not _finite(values):
-        raise MotionFileError(f"{path}: must hold nested lists of finite numbers")
+    if wrong := _not_finite(values, ""):
+        raise MotionFileError(f"{path}: must hold nested lists of finite numbers, {wrong}")
     return values
 
 
@@ -99,10 +113,13 @@ def _split(words: list[str]) -> tuple[list[str], Path]:
     return [word for word in words if "=" in word], Path(files[0])
 
 
-def _finite(values: Any) -> bool:
-    if isinstance(values, list):
-        return all(map(_finite, values))
-    return isinstance(values, int | float) and not isinstance(values, bool) and math.isfinite(values)
+def _not_finite(values: Any, place: str) -> str:
+    """Return the first thing that is no finite number, and where; nothing if there is none."""
+    if isinstance(values, list) and place.count("[") <= MAX_DEPTH:
+        return next((wrong for k, value in enumerate(values) if (wrong := _not_finite(value, f"{place}[{k}]"))), "")
+    if place and type(values) in (int, float) and abs(values) < math.inf and abs(values) <= LARGEST:
+        return ""
+    return f"was {str(values)[:40]} at {place or 'its top'}"
 
 
 def _shape_text(shape: Any) -> str:
@@ -121,13 +138,20 @@ def _plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else str(value)
 
 
-def _table(rows: list[dict[str, Any]]) -> Table:
-    table = Table()
-    table.add_column("")
+def _tables(rows: list[dict[str, Any]], width: int) -> list[Table]:
+    """Return a table with one column per condition; several where the terminal is too narrow for one."""
+    names = list(dict.fromkeys(name for row in rows for name in row if name not in HEAD))
+    longest_word = max(len(word) for row in rows for word in row["label"].split())
+    column = min(max(12, longest_word), 40) + 3
+    count = max(1, (width - max(map(len, names)) - 4) // column)
+    return [_table(rows[k : k + count], names) for k in range(0, len(rows), count)]
+
+
+def _table(rows: list[dict[str, Any]], names: list[str]) -> Table:
+    table = new_table()
+    table.add_column("", no_wrap=True)
     for row in rows:
-        table.add_column(f"{row['label']}\n{row['condition'][:12]}", justify="right")
-    names = dict.fromkeys(name for row in rows for name in row if name not in ("label", "condition", "length_unit"))
+        add_columns(table, f"{row['label']}\n{row['condition'][:12]}", right=True)
     for name in names:
-        cells = [f"{row[name]:.6g}" if name in row else "–" for row in rows]
-        table.add_row(name, *cells)
+        table.add_row(name, *(f"{row[name]:.6g}" if name in row else "–" for row in rows))
     return table

@@ -3,12 +3,14 @@
 import argparse
 
 import pandas as pd
-from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from evoexp import compose, shipped
+from evoexp.commands.console import add_columns, add_hash_column, new_table, plain_console
+from evoexp.commands.hashes import stored_runs
 from evoexp.errors import EvoexpError
-from evoexp.store.run_directory import RunDirectory, find_runs, outputs_root
+from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.tables import read_summaries
 
 
@@ -18,42 +20,42 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Print both lists."""
-    console = Console()
+    console = plain_console()
     console.print(_experiments())
-    runs = find_runs(outputs_root())
+    runs = stored_runs(outputs_root())
     if runs:
         console.print(_runs(runs))
     else:
-        console.print(f"no runs stored in {outputs_root()}", highlight=False)
+        console.print(f"no runs stored in {outputs_root()}", soft_wrap=True)
     return 0
 
 
 def _experiments() -> Table:
-    table = Table(title="experiments", title_justify="left")
-    table.add_column("run experiment=")
-    table.add_column("what it is")
+    table = new_table("experiments")
+    add_columns(table, "run experiment=", "what it is")
     for name in compose.options("experiment"):
         table.add_row(name, compose.description(name))
     return table
 
 
-def _runs(runs: list[RunDirectory]) -> Table:
+def _runs(runs: list[tuple[str, RunDirectory | EvoexpError]]) -> Table:
     names = {row.condition_id: f"{row.experiment}, {row.label}, {row.budget}" for row in shipped.shipped()}
-    table = Table(title=f"runs stored in {outputs_root()}", title_justify="left")
-    table.add_column("hash")
-    table.add_column("condition")
-    for column in ("done", "failed", "solved", "median best cost"):
-        table.add_column(column, justify="right")
-    for run in runs:
+    table = new_table(f"runs stored in {outputs_root()}")
+    add_hash_column(table)
+    add_columns(table, "condition")
+    add_columns(table, "done", "failed", "solved", "median best cost", right=True)
+    for name, run in runs:
         try:
+            if isinstance(run, EvoexpError):
+                raise run
             rows = read_summaries(run)
         except EvoexpError as error:
-            table.add_row(run.hash12, f"[red]{error}[/]", "–", "–", "–", "–")
+            table.add_row(name, Text(str(error), "red"), "–", "–", "–", "–")
             continue
         done = rows[rows["status"] == "done"]
         cost = done["best_cost"].median() if len(done) else pd.NA
         table.add_row(
-            run.hash12,
+            name,
             names.get(run.condition_id) or _noted(run),
             str(len(done)),
             str(len(rows) - len(done)),

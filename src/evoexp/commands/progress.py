@@ -61,7 +61,7 @@ class BatchProgress:
 
     def _plain(self) -> None:
         text = f"replicates: {self._done} of {self._total} done, {self._failed} failed, ETA {self._eta()}"
-        self._console.print(text, highlight=False, soft_wrap=True)
+        self._console.print(text, soft_wrap=True)
 
     def _eta(self) -> str:
         ended = self._done + self._failed

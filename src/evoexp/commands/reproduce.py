@@ -6,12 +6,14 @@ from pathlib import Path
 
 import joblib
 from rich.console import Console
-from rich.table import Table
+from rich.text import Text
 
 from evoexp import compose, shipped
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.reproduce import Comparison, reproduce_log
 from evoexp.batch.runner import num_cores
+from evoexp.commands.console import add_columns, add_hash_column, new_table, plain_console
+from evoexp.commands.hashes import with_candidates
 from evoexp.errors import AmbiguousHash, NothingStored, RevisionMismatch, UnknownHash
 from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
 
@@ -26,14 +28,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Compare; exit code 1 if anything diverges, 2 if there is nothing to compare."""
-    console = Console()
+    console = plain_console()
     path = Path(arguments.what)
     if path.suffix == ".mcap" or path.is_file():
         return _report(console, [reproduce_log(path)])
     try:
         run = resolve(outputs_root(), arguments.what)
-    except UnknownHash:
-        return _without_stored_run(console, arguments.what, arguments.replicate)
+    except UnknownHash as error:
+        return _without_stored_run(console, arguments.what, arguments.replicate, error)
     try:
         return _report(console, _compare_all(_logs(run, arguments.replicate)))
     except RevisionMismatch as error:
@@ -61,38 +63,39 @@ def _compare_all(paths: Sequence[Path]) -> list[Comparison]:
 
 
 def _report(console: Console, comparisons: Sequence[Comparison]) -> int:
-    table = Table()
-    table.add_column("run")
-    table.add_column("replicate", justify="right")
-    table.add_column("generations", justify="right")
-    table.add_column("verdict")
+    table = new_table()
+    add_hash_column(table, "run")
+    add_columns(table, "replicate", "generations", right=True)
+    add_columns(table, "verdict")
     for comparison in comparisons:
         style = "green" if comparison.matches else "red"
         name, generations = comparison.condition_id[:12], str(comparison.num_generations)
-        table.add_row(name, str(comparison.replicate), generations, f"[{style}]{comparison.verdict}[/]")
+        table.add_row(name, str(comparison.replicate), generations, Text(comparison.verdict, style))
     console.print(table)
     diverging = [comparison for comparison in comparisons if not comparison.matches]
     if diverging:
         lines = diverging[0].environment or ("none: the environment is the same",)
-        console.print("differences of environment:", *(f"  {line}" for line in lines), sep="\n", highlight=False)
-    console.print(f"{len(comparisons) - len(diverging)} of {len(comparisons)} MATCH", highlight=False)
+        console.print("differences of environment:", *(f"  {line}" for line in lines), sep="\n", soft_wrap=True)
+    console.print(f"{len(comparisons) - len(diverging)} of {len(comparisons)} MATCH")
     return 1 if diverging else 0
 
 
-def _without_stored_run(console: Console, prefix: str, replicate: int | None) -> int:
+def _without_stored_run(console: Console, prefix: str, replicate: int | None, error: UnknownHash) -> int:
     """Compare replicate 0 of a shipped condition with the shipped table; nothing was ever run here."""
     found = shipped.find(prefix)
     if len(found) > 1:
         raise AmbiguousHash(prefix, [row.condition_id[:12] for row in found])
-    if not found or replicate not in (None, 0):
-        what = f"replicate {replicate} of {prefix}" if found else f"'{prefix}'"
-        raise UnknownHash(f"NOTHING TO COMPARE: {what} is neither stored in {outputs_root()} nor in the shipped table")
+    if not found:
+        raise UnknownHash(f"NOTHING TO COMPARE: {with_candidates(error, outputs_root())}")
+    if replicate not in (None, 0):
+        where = f"is neither stored in {outputs_root()} nor in the shipped table, which holds replicate 0"
+        raise UnknownHash(f"NOTHING TO COMPARE: replicate {replicate} of {prefix} {where}")
     row = found[0]
     experiment = compose.expand([f"experiment={row.experiment}", f"budget={row.budget}"], only=[row.label])[0]
     condition = experiment.conditions[0].condition
     summary = run_replicate(condition, 0).summary
     matches = summary.digest == row.digest and condition.id == row.condition_id
-    verdict = "[green]MATCH[/]" if matches else "[red]DIVERGES[/]"
-    console.print(f"{row.condition_id[:12]} replicate 0 against the shipped table: {verdict}", highlight=False)
-    console.print(f"({row.experiment}, {row.label}, budget {row.budget}; store it: {row.command})", highlight=False)
+    verdict = Text("MATCH", "green") if matches else Text("DIVERGES", "red")
+    console.print(f"{row.condition_id[:12]} replicate 0 against the shipped table:", verdict)
+    console.print(f"({row.experiment}, {row.label}, budget {row.budget}; store it: {row.command})", soft_wrap=True)
     return 0 if matches else 1

@@ -2,6 +2,7 @@
 
 import argparse
 import contextlib
+import shlex
 import sys
 from typing import Any
 
@@ -11,9 +12,12 @@ from rich.table import Table
 from evoexp import compose
 from evoexp.batch.runner import Batch, Outcome
 from evoexp.commands.arguments import add_experiment_arguments
+from evoexp.commands.console import add_columns, add_hash_column, new_table, plain_console
 from evoexp.commands.progress import BatchProgress
-from evoexp.report import build
-from evoexp.store.run_directory import outputs_root
+from evoexp.commands.report import of_experiment
+from evoexp.errors import UnknownOption
+from evoexp.report.pages import PAGES
+from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.tables import read_summaries
 
 
@@ -25,9 +29,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Run; exit code 1 if a replicate failed."""
-    console = Console()
+    console = plain_console()
     experiments = compose.expand(arguments.overrides, multirun=arguments.multirun, only=arguments.only)
-    command = "evoexp run " + " ".join([*arguments.overrides, *(["-m"] if arguments.multirun else [])])
+    for experiment in experiments:
+        if (page := experiment.report.figures) not in (None, *PAGES):
+            raise UnknownOption("report.figures", str(page), PAGES)
+    command = _command(arguments)
     wanted = [
         (labelled.condition, experiment.num_replicates, _notes(experiment, labelled.label, command))
         for experiment in experiments
@@ -36,25 +43,27 @@ def main(arguments: argparse.Namespace) -> int:
     batch = Batch(wanted, experiments[0].runner, outputs_root())
     batch.prepare()
     failures = _run(batch, console)
-    for experiment in experiments:
-        console.print(summary_table(experiment))
-        if not arguments.no_report:
-            with contextlib.suppress(BrokenPipeError):
-                page = build.report(
-                    build.Request(experiment.report_name, experiment.name, experiment.budget, experiment.conditions),
-                    experiment.report,
-                    outputs_root(),
-                    experiment.num_replicates,
-                )
-                console.print(f"report: {page}", highlight=False, soft_wrap=True)
-    if failures:
-        console.print(_failure_table(batch, failures))
+    try:
+        for experiment in experiments:
+            console.print(summary_table(experiment))
+            if not arguments.no_report:
+                page = of_experiment(experiment, arguments.overrides, arguments.multirun, arguments.only)
+                console.print(f"report: {page}", soft_wrap=True)
+    finally:
+        if failures:
+            console.print(_failure_table(batch, failures))
     return 1 if failures else 0
+
+
+def _command(arguments: argparse.Namespace) -> str:
+    """Return the command as it could be typed again."""
+    only = ["--only", ",".join(arguments.only)] if arguments.only else []
+    return shlex.join(["evoexp", "run", *(["-m"] if arguments.multirun else []), *arguments.overrides, *only])
 
 
 def _run(batch: Batch, console: Console) -> list[Outcome]:
     if not batch.jobs:
-        console.print("nothing to run: every replicate is there", highlight=False)
+        console.print("nothing to run: every replicate is there")
         return []
     failures = []
     with BatchProgress(console, len(batch.jobs)) as progress, contextlib.closing(batch.run()) as outcomes:
@@ -73,14 +82,12 @@ def _notes(experiment: compose.Experiment, label: str, command: str) -> dict[str
 
 def summary_table(experiment: compose.Experiment) -> Table:
     """Return one row per condition: what is there, and how good."""
-    table = Table(title=experiment.report_name, title_justify="left")
-    table.add_column("condition")
-    table.add_column("hash")
-    for column in ("replicates", "solved", "median best cost", "CPU s each"):
-        table.add_column(column, justify="right")
+    table = new_table(experiment.report_name)
+    add_columns(table, "condition")
+    add_hash_column(table)
+    add_columns(table, "replicates", "solved", "median best cost", "CPU s each", right=True)
     for label, condition in experiment.conditions:
-        run = Batch([(condition, 0, {})], experiment.runner, outputs_root()).runs[condition.id]
-        rows = read_summaries(run)
+        rows = read_summaries(RunDirectory(outputs_root(), condition.id))
         done = rows[(rows["status"] == "done") & (rows["replicate"] < experiment.num_replicates)]
         table.add_row(
             label,
@@ -94,11 +101,10 @@ def summary_table(experiment: compose.Experiment) -> Table:
 
 
 def _failure_table(batch: Batch, failures: list[Outcome]) -> Table:
-    table = Table(title=f"{len(failures)} failed", title_justify="left")
-    table.add_column("hash")
-    table.add_column("replicate", justify="right")
-    table.add_column("reason")
-    table.add_column("traceback in")
+    table = new_table(f"{len(failures)} failed")
+    add_hash_column(table)
+    add_columns(table, "#", right=True)
+    add_columns(table, "reason", "traceback in")
     for outcome in failures:
         path = batch.runs[outcome.condition_id].failure_path(outcome.replicate)
         table.add_row(outcome.condition_id[:12], str(outcome.replicate), outcome.reason, str(path))

@@ -38,6 +38,8 @@ _RC: dict[str, Any] = {
     "legend.handlelength": 1.8,
     "xtick.labelsize": 7.5,
     "ytick.labelsize": 7.5,
+    "figure.constrained_layout.w_pad": 0.08,  # [inch]
+    "figure.constrained_layout.h_pad": 0.06,
     "figure.facecolor": "white",
     "savefig.facecolor": "white",
 }

@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
@@ -244,6 +245,7 @@ def _snapshot(axes: Axes, rows: pd.DataFrame, whole: bool) -> None:
         colour = style.arm_colour(arm)
         tips = own[own["link"] == own["link"].max()]
         axes.plot(tips["x_end"], tips["y_end"], ":", color=colour, linewidth=0.8, zorder=2)
+        between, shades = [], []
         for instant, links in groups(own, "instant"):
             x: FloatArray = np.append(links["x"].to_numpy(), links["x_end"].iloc[-1])
             y: FloatArray = np.append(links["y"].to_numpy(), links["y_end"].iloc[-1])
@@ -252,6 +254,7 @@ def _snapshot(axes: Axes, rows: pd.DataFrame, whole: bool) -> None:
             elif instant == first:
                 axes.plot(x, y, linestyle=(0, (2, 1)), color=colour, linewidth=1.4, alpha=0.8, zorder=2)
             else:
-                age = (last - instant) / max(1, last - first)
-                axes.plot(x, y, color=colour, linewidth=1.0, alpha=0.25 if whole else 0.7 - 0.5 * age, zorder=1)
+                between.append(np.column_stack([x, y]))
+                shades.append(0.25 if whole else 0.7 - 0.5 * (last - instant) / (last - first))
+        axes.add_collection(LineCollection(between, colors=colour, linewidths=1.0, alpha=shades or None, zorder=1))
         axes.plot(own["x"].iloc[0], own["y"].iloc[0], "s", color=style.NEUTRAL, markersize=6, zorder=2)

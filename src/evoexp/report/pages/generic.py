@@ -5,11 +5,12 @@ from functools import partial
 
 import numpy as np
 
+from evoexp.condition import Condition
 from evoexp.records import FloatArray
 from evoexp.report.claims import Comparison, adjusted, compare
 from evoexp.report.figures import convergence
 from evoexp.report.page import Drawing, Page, Quantity
-from evoexp.report.results import ConditionResults, Results
+from evoexp.report.results import WRAPPED, ConditionResults, Results
 from evoexp.report.settings import ReportSettings
 from evoexp.report.statistics import spread
 from evoexp.store.messages import TERM
@@ -78,7 +79,7 @@ def cost_drawing(results: Results) -> Drawing:
 def comparisons(
     results: Results, settings: ReportSettings, compared: Sequence[tuple[str, bool, Values]]
 ) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
-    """Compare every condition with every control on their common seeds.
+    """Compare every condition with the controls that stand beside it, on their common seeds.
 
     Args:
         results: Of the experiment.
@@ -91,13 +92,18 @@ def comparisons(
     found = []
     for first in results.with_data:
         for second in results.with_data:
-            if first.is_control or not second.is_control or first.condition.seed != second.condition.seed:
+            if first.is_control or not second.is_control or not _beside(first.condition, second.condition):
                 continue
             rows = [compare_on_common_seeds(first, second, *what, settings) for what in compared]
             kept = [row for row in rows if row is not None]
             if kept:
                 found.append((f"{first.label} against {second.label}", tuple(adjusted(kept))))
     return tuple(found)
+
+
+def _beside(first: Condition, control: Condition) -> bool:
+    """Whether a control wraps this very planner in the same scene: equal evaluations and common seeds."""
+    return control._replace(planner=getattr(control.planner, WRAPPED)) == first
 
 
 def compare_on_common_seeds(

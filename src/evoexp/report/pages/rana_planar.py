@@ -67,10 +67,11 @@ def page(results: Results, settings: ReportSettings) -> Page:
     comparisons = generic.comparisons(results, settings, COMPARED)
     drawn = [measured[condition.label] for condition in results.main]
     found = [claim for one in drawn for claim in _claims(results, settings, one, comparisons)]
-    checks = [check for one in drawn for check in _checks(one)]
+    checks = [(f"{_who(results, one)}{what}", finding) for one in drawn for what, finding in _checks(one)]
     drawings = [_fitness(results)]
     for one in drawn:
-        drawings = [*_models(one), *drawings, *_motions(one)]
+        own = [*_models(one), *_motions(one)]
+        drawings += [d._replace(title=f"{d.title} ({one.condition.label})") for d in own] if one.suffix else own
     return Page(
         "Rana & Zalzala 1995: two planar arms",
         INTRODUCTION,
@@ -124,7 +125,7 @@ def _claims(
 ) -> list[claims.Claim]:
     """Return the paper's claims with verdicts on one condition."""
     c, unit, reason = one.condition, one.condition.condition.length_unit, not_judged(results, one.condition)
-    who = f"{c.label}: " if len(results.main) > 1 else ""
+    who = _who(results, one)
     every = partial(claims.judge_all, reason, done=c.done, planned=c.planned)
     at, between, links = c.column(AT), c.column(BETWEEN), one.link_distances
     found = [
@@ -166,6 +167,11 @@ def _claims(
     if reason:
         found = [claim._replace(verdict=f"{claims.NOT_JUDGED} ({reason})") for claim in found]
     return found
+
+
+def _who(results: Results, one: Measured) -> str:
+    """Return what begins a line about one condition where there are several."""
+    return f"{one.condition.label}: " if len(results.main) > 1 else ""
 
 
 def _evidence(comparison: claims.Comparison) -> str:

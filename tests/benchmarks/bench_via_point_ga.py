@@ -1,0 +1,150 @@
+"""The planner of Rana & Zalzala: its steps, a generation and a whole replicate, beside the same planner in numpy.
+
+Both measure arc length equally well: 8 speeds per segment are about as accurate as 16 chords (`paths.redistribution`).
+"""
+
+from itertools import islice
+from typing import Any
+
+import numpy as np
+import pytest
+
+from evoexp import compose
+from evoexp.batch.replicate import run_replicate
+from evoexp.condition import Condition
+from evoexp.paths.redistribution import redistribute
+from evoexp.paths.relaxation import relax
+from evoexp.paths.workspace import prepare_redistribution
+from evoexp.store.log import Log
+from references import rana_numpy
+
+LATER = 50  # generation from which on single generations are measured: collisions have become rare
+
+
+def condition(*overrides: str) -> Condition:
+    return compose.expand(["experiment=rana_planar", *overrides])[0].conditions[0].condition
+
+
+def crossed(given: Condition, count: int) -> Any:
+    """Return strings as redistribution meets them, (individuals, arms, N + 1, joints): smooth ones, once crossed."""
+    rana, rng = rana_numpy.from_condition(given, crossover_rate=1.0), np.random.default_rng(0)
+    return rana_numpy.crossover(rana, rng, rana_numpy.smooth(rana, rana_numpy.walks(rana, rng, count)))
+
+
+def bench_redistribution_and_relaxation(beside: Any) -> None:
+    given = condition()
+    rana, strings = rana_numpy.from_condition(given), crossed(given, 50)
+    arms = np.array([[0, 2], [2, 4]])
+    fresh = np.zeros((4, 21, 56))
+    fresh[:, :, :50] = strings.transpose(1, 3, 2, 0).reshape(4, 21, 50)
+    via_points, workspace = fresh.copy(), prepare_redistribution(20, 2)
+
+    def ours() -> None:
+        np.copyto(via_points, fresh)
+        redistribute(via_points, arms, 50, workspace)
+        relax(via_points, 0.5, 50)
+
+    ours()
+    found = via_points[:, :, :50].reshape(2, 2, 21, 50).transpose(3, 0, 2, 1)
+    assert np.abs(found - rana_numpy.smooth(rana, strings)).max() < 1.0  # [deg], spacing about 10
+    beside(
+        "redistribution + relaxation of 100 paths of 21 points",
+        ours,
+        {"numpy + scipy": (lambda: rana_numpy.smooth(rana, strings), 100, 1)},
+        unit="path",
+        amount=100,
+        repeat=10,
+        rounds=100,
+    )
+
+
+def bench_walks(beside: Any) -> None:
+    given = condition()
+    planner, problem = given.prepare()
+    rana = rana_numpy.from_condition(given)
+    rng, other = np.random.default_rng(0), np.random.default_rng(0)
+    found = planner.sample(problem, np.random.default_rng(0), 50)
+    expected = rana_numpy.smooth(rana, rana_numpy.walks(rana, np.random.default_rng(0), 50))
+    assert np.abs(found[:2].transpose(2, 1, 0) - expected[:, 0]).max() < 1.0
+    beside(
+        "50 new trajectories: walk, redistribution, relaxation",
+        lambda: planner.sample(problem, rng, 50),
+        {"numpy + scipy": (lambda: rana_numpy.smooth(rana, rana_numpy.walks(rana, other, 50)), 50, 1)},
+        unit="individual",
+        amount=50,
+        repeat=5,
+        rounds=100,
+    )
+
+
+def bench_generation(beside: Any) -> None:
+    """One generation after another of one long run each, no log."""
+    given = condition("ga.num_generations=1000000")
+    planner, problem = given.prepare()
+    ours = planner.evolve(problem, np.random.default_rng(0))
+    theirs = rana_numpy.evolve(rana_numpy.from_condition(given), np.random.default_rng(0))
+    for run in (ours, theirs):
+        next(islice(run, LATER, None))
+    beside(
+        "a generation of the GA (population 50, 48 evaluated), no log",
+        lambda: next(ours),
+        {"numpy + scipy": (lambda: next(theirs), 1, 2)},
+        unit="generation",
+        repeat=20,
+        rounds=100,
+    )
+
+
+@pytest.mark.parametrize("label", ["via-point GA", "random search"])
+def bench_replicate(beside: Any, benchmark: Any, label: str) -> None:
+    """A replicate of the paper's budget with its log, and its CPU seconds as the summary has them."""
+    conditions = compose.expand(["experiment=rana_planar"])[0].conditions
+    given = next(one.condition for one in conditions if one.label == label)
+    cpu: list[float] = []
+
+    def ours() -> None:
+        cpu.append(run_replicate(given, len(cpu)).summary.cpu_s)
+
+    references = {}
+    if label == "via-point GA":
+        rana = rana_numpy.from_condition(given, num_generations=50)
+
+        def tenth() -> None:
+            for _ in rana_numpy.evolve(rana, np.random.default_rng(0)):
+                pass
+
+        references["numpy + scipy, a tenth of the generations, no log"] = (tenth, 0.1, 1)
+    ours()
+    cpu.clear()
+    beside(f"a replicate with its log, {label} (500 generations)", ours, references, unit="replicate", rounds=20)
+    benchmark.extra_info["cpu_s"] = {"min": min(cpu), "median": float(np.median(cpu)), "replicates": len(cpu)}
+
+
+def bench_log(beside: Any) -> None:
+    """The log's share: the messages of all generations of a replicate, recorded beforehand, beside the run itself."""
+    given = condition()
+    planner, problem = given.prepare()
+    recorded = []
+    for generation in planner.evolve(problem, given.rng(0)):
+        views = {"costs": generation.costs.copy(), "population": generation.population}
+        recorded.append(generation._replace(best=generation.best.copy(), **views))
+    rng = given.rng(0)
+    finished = run_replicate(given, 0).summary
+
+    def ours() -> None:
+        log = Log(given.id, given.to_json(), 0, rng)
+        for generation in recorded:
+            log.write(generation)
+        log.finish(finished)
+
+    def run() -> None:
+        for _ in planner.evolve(problem, given.rng(0)):
+            pass
+
+    beside(
+        "the log of a replicate (501 generations)",
+        ours,
+        {"the replicate without log": (run, 1, 1)},
+        unit="replicate",
+        rounds=20,
+    )

@@ -1,0 +1,152 @@
+"""`reproduce` names the very generation at which a run was changed, were it by the last bit of one number."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from evoexp import compose
+from evoexp.batch.replicate import run_replicate
+from evoexp.batch.reproduce import Comparison, reproduce_log
+from evoexp.condition import Condition
+from evoexp.objectives.string_fitness import StringFitness
+from evoexp.records import Generation
+
+LAST = 10  # generations of the smoke budget
+REPLICATE = 1
+LABELLED = [
+    labelled
+    for name in ("rana_planar", "rana_obstacles")
+    for labelled in compose.expand([f"experiment={name}", "budget=smoke"])[0].conditions
+]
+
+Change = Callable[[Iterator[Generation], np.random.Generator], Iterator[Generation]]
+
+
+@pytest.fixture(params=LABELLED, ids=lambda labelled: labelled.label)
+def condition(request: pytest.FixtureRequest) -> Condition:
+    return request.param.condition
+
+
+def one_ulp_more(values: Any, index: Any) -> None:
+    values[index] = np.nextafter(values[index], np.inf)
+
+
+def record(condition: Condition, directory: Path) -> Path:
+    """Run the replicate as this process is now; return its log."""
+    path = directory / f"{REPLICATE:04d}.mcap"
+    path.write_bytes(run_replicate(condition, REPLICATE).content)
+    return path
+
+
+def compare_changed(condition: Condition, directory: Path, change: Change) -> Comparison:
+    """Record a run whose generations are changed on their way to the log, and compare it with the true one."""
+    kind = type(condition.planner)
+    evolve = kind.evolve
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(kind, "evolve", lambda planner, problem, rng: change(evolve(planner, problem, rng), rng))
+        path = record(condition, directory)
+    return reproduce_log(path)
+
+
+def record_nudged(condition: Condition, directory: Path, generation: int, individual: int = 7) -> Path:
+    """Record a run in which the cost of one individual of one generation was computed one ulp higher."""
+    cost = StringFitness.cost
+    calls = 0
+
+    def nudged(objective: StringFitness, lengths: Any, unevenness: Any, collisions: Any, out: Any) -> None:
+        nonlocal calls
+        cost(objective, lengths, unevenness, collisions, out)
+        if calls == generation:
+            one_ulp_more(out, individual)
+        calls += 1
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(StringFitness, "cost", nudged)
+        path = record(condition, directory)
+    assert calls > LAST
+    return path
+
+
+def test_an_unchanged_run_matches(condition: Condition, tmp_path: Path) -> None:
+    comparison = reproduce_log(record(condition, tmp_path))
+    assert comparison.verdict == "MATCH"
+    assert (comparison.condition_id, comparison.replicate) == (condition.id, REPLICATE)
+    assert comparison.num_generations == LAST + 1
+
+
+@pytest.mark.parametrize("generation", [0, 1, 6, LAST])
+def test_one_ulp_in_one_cost(condition: Condition, tmp_path: Path, generation: int) -> None:
+    comparison = reproduce_log(record_nudged(condition, tmp_path, generation))
+    assert comparison.verdict == f"DIVERGES at generation {generation}"
+    assert comparison.diverged_at == generation
+    assert not comparison.matches
+
+
+@pytest.mark.parametrize("generation", [0, 4, LAST])
+def test_one_ulp_in_the_best_solution(condition: Condition, tmp_path: Path, generation: int) -> None:
+    def change(generations: Iterator[Generation], rng: np.random.Generator) -> Iterator[Generation]:
+        for row in generations:
+            best = row.best.copy()
+            if row.index == generation:
+                one_ulp_more(best, 5)
+            yield row._replace(best=best)
+
+    assert compare_changed(condition, tmp_path, change).verdict == f"DIVERGES at generation {generation}"
+
+
+@pytest.mark.parametrize("generation", [0, 4, LAST])
+def test_one_number_drawn_from_the_generator(condition: Condition, tmp_path: Path, generation: int) -> None:
+    def change(generations: Iterator[Generation], rng: np.random.Generator) -> Iterator[Generation]:
+        for row in generations:
+            if row.index == generation:
+                rng.random()
+            yield row
+
+    assert compare_changed(condition, tmp_path, change).verdict == f"DIVERGES at generation {generation}"
+
+
+def test_one_ulp_in_the_last_population(condition: Condition, tmp_path: Path) -> None:
+    def change(generations: Iterator[Generation], rng: np.random.Generator) -> Iterator[Generation]:
+        for row in generations:
+            population = row.population.copy()
+            if row.index == LAST:
+                one_ulp_more(population, (1, 8, 3))
+            yield row._replace(population=population)
+
+    comparison = compare_changed(condition, tmp_path, change)
+    assert comparison.verdict == "DIVERGES in the last population"
+    assert comparison.diverged_at is None
+    assert not comparison.matches
+
+
+def test_a_shorter_run(condition: Condition, tmp_path: Path) -> None:
+    def change(generations: Iterator[Generation], rng: np.random.Generator) -> Iterator[Generation]:
+        return (row for row in generations if row.index <= 6)
+
+    assert compare_changed(condition, tmp_path, change).verdict == "DIVERGES at generation 7"
+
+
+def test_a_longer_run(condition: Condition, tmp_path: Path) -> None:
+    def change(generations: Iterator[Generation], rng: np.random.Generator) -> Iterator[Generation]:
+        for row in generations:
+            yield row
+        yield row._replace(index=LAST + 1)
+
+    assert compare_changed(condition, tmp_path, change).verdict == f"DIVERGES at generation {LAST + 1}"
+
+
+def test_the_command_says_it_in_another_process(tmp_path: Path) -> None:
+    path = record_nudged(LABELLED[0].condition, tmp_path, generation=3)
+    command = [sys.executable, "-m", "evoexp", "reproduce", str(path)]
+    environment = os.environ | {"COLUMNS": "120", "EVOEXP_OUTPUTS": str(tmp_path / "none")}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (1, "")
+    assert "DIVERGES at generation 3" in done.stdout
+    assert "0 of 1 MATCH" in done.stdout
+    assert "the environment is the same" in done.stdout

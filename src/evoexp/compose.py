@@ -22,7 +22,7 @@ from pydantic import ValidationError
 
 from evoexp.batch.settings import RunnerSettings
 from evoexp.condition import PARTS, Condition, component_class
-from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting
+from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting, nearest
 from evoexp.report.settings import ReportSettings
 from evoexp.validation import TARGET, Count, Settings, build, settings_error
 
@@ -158,7 +158,8 @@ def _conditions(
     swept = list(_sweep(overrides))
     base = _compose(choice | swept[0][1])
     labels: dict[str, dict[str, str]] = {}
-    for template, entry in (OmegaConf.to_container(base.conditions) or {"": []}).items():
+    entries: Any = OmegaConf.to_container(base.conditions) or {"": []}
+    for template, entry in entries.items():
         for label, own in _entry(str(template), entry):
             for suffix, texts in swept:
                 joined = JOIN.join(part for part in (label, suffix) if part) or (name or "custom")
@@ -177,15 +178,22 @@ def _condition(config: DictConfig, budget: Budget) -> Condition:
     try:
         plain = OmegaConf.to_container(config, resolve=True)
     except OmegaConfBaseException as error:
+        if absent := [group for group in PLANNER_PARTS if f"key '{group}' not found" in str(error)]:
+            raise SettingError(absent[0], f"chosen: {', '.join(options(absent[0]))}", None) from None
         raise SettingError(error.full_key or "configuration", "resolvable", _first_line(error)) from None
     assert isinstance(plain, dict)
     for group in PLANNER_PARTS:
+        if plain.get(group) is not None and group in plain["planner"] and f"${{{group}" not in raw:
+            must = f"left as it is; set {group}, the group that it is taken from"
+            raise SettingError(f"planner.{group}", must, plain["planner"][group])
         if plain.get(group) is not None:
             if f"${{{group}" not in raw:
                 raise SettingError(group, "a part of the chosen planner", plain[group])
             build(plain[group], component_class, group)  # errors name the group, as it was typed
     if plain.get("control") is not None:
         build(plain["planner"], component_class, "planner")  # likewise
+        if TARGET not in plain["control"]:
+            raise SettingError("control", f"chosen: {', '.join(options('control'))}", plain["control"])
         if "planner" in plain["control"]:
             raise SettingError("control.planner", "left out: it is the chosen planner", plain["control"]["planner"])
         plain["planner"] = {**plain["control"], "planner": plain["planner"]}
@@ -268,6 +276,8 @@ def _said_in_one_line(error: Exception, overrides: Mapping[str, str]) -> EvoexpE
         return _unknown(unknown[1], overrides)
     if absent := re.search(r"Could not find '([^'/]+)/([^']+)'", text):
         return UnknownOption(absent[1], absent[2], options(absent[1]))
+    if there := re.search(r"An item is already at '([^']+)'", text):
+        return SettingError(there[1], "given without +, it is there already", overrides.get(there[1]))
     if merging := re.search(r"Error merging override \+*([^=\s]+)=(.*)", text):
         return SettingError(merging[1], "a setting that is there and takes this value", merging[2])
     return SettingError("configuration", "composable", f"{_first_line(error)} ({' '.join(overrides.values())})")
@@ -286,19 +296,17 @@ def _unknown(field: str, overrides: Mapping[str, str]) -> EvoexpError:
             node = node[int(part)]
         else:
             known = [str(key) for key in node if key != TARGET] if isinstance(node, DictConfig) else []
-            return UnknownSetting(".".join(parts[: k + 1]), known + (_elsewhere(part, node) if k == 0 else []))
-    return UnknownSetting(field, [])
+            return UnknownSetting(".".join(parts[: k + 1]), known + (_in_groups(part, node) if k == 0 else []))
+    return SettingError(field, "left in place", None)
 
 
-def _elsewhere(name: str, config: DictConfig) -> list[str]:
-    """Return the setting of a group whose own name is nearest to one that was given without its group."""
-    found = {str(key): f"{group}.{key}" for group in config for key in _keys(config, str(group))}
+def _in_groups(name: str, config: DictConfig) -> list[str]:
+    """Return the setting of a group that was perhaps meant by a name given without its group."""
+    if nearest(name, map(str, config)):
+        return []
+    plain: Any = OmegaConf.to_container(config, resolve=False)
+    found = {key: f"{group}.{key}" for group, node in plain.items() if isinstance(node, dict) for key in node}
     return [found[near] for near in difflib.get_close_matches(name, list(found), n=1, cutoff=0.8)]
-
-
-def _keys(config: DictConfig, group: str) -> list[Any]:
-    node = config.get(group)
-    return [key for key in node if key != TARGET] if isinstance(node, DictConfig) else []
 
 
 def _parse(overrides: Sequence[str]) -> dict[str, Override]:
@@ -323,7 +331,7 @@ def _parse(overrides: Sequence[str]) -> dict[str, Override]:
 def _check_key(override: Override, text: str) -> None:
     """Refuse keys that no override can have."""
     key = override.key_or_group
-    if not key or override.package is not None:
+    if not key or override.package is not None or override.input_line is None:
         raise SettingError("override", "key=value", text)
     if re.split("[./]", key)[0] == "hydra":
         raise SettingError("override", "a setting of evoexp (nothing of Hydra's own)", text)

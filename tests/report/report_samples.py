@@ -20,7 +20,8 @@ REPORT = {
 
 def expand(name: str, *overrides: str) -> compose.Experiment:
     """Return an experiment, small."""
-    return compose.expand([f"experiment={name}", *SMALL, *overrides])[0]
+    words = {word.split("=")[0]: word for word in (*SMALL, *overrides)}
+    return compose.expand([f"experiment={name}", *words.values()])[0]
 
 
 def store(outputs: Path, experiment: compose.Experiment) -> None:

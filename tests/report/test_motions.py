@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 from report_samples import expand
 
-from evoexp import compose
 from evoexp.condition import Prepared
 from evoexp.records import FloatArray
 from evoexp.report import motions
 from evoexp.report.results import Results
+from evoexp.scenarios.obstacles import BoxObstacle, CapsuleObstacle, SphereObstacle, obstacle_table
 
 
 @pytest.fixture(scope="module")
@@ -102,8 +102,14 @@ def test_distances_agree_with_the_recorded_terms(results: Results) -> None:
 
 
 def test_outlines_lie_on_the_surfaces_of_obstacles() -> None:
-    obstacles = compose.expand(["experiment=rana_obstacles"])[0].conditions[0].condition.prepare().problem.collision
-    ball, box, capsule = motions.obstacle_outlines(obstacles.obstacles)
+    table = obstacle_table(
+        (
+            SphereObstacle(shape="sphere", center=(5.2, 4.0), radius=0.4),
+            BoxObstacle(shape="box", center=(-5.5, 4.0), size=(0.8, 0.8), rotation=(0.0, 0.0, 30.0)),
+            CapsuleObstacle(shape="capsule", start=(-1.0, -5.0), end=(1.0, -5.0), radius=0.2),
+        )
+    )
+    ball, box, capsule = motions.obstacle_outlines(table)
     np.testing.assert_allclose(np.linalg.norm(ball - [5.2, 4.0], axis=1), 0.4)
     np.testing.assert_allclose(np.linalg.norm(box - [-5.5, 4.0], axis=1), 0.4 * np.sqrt(2.0))
     first = np.degrees(np.arctan2(*(box[1] - box[0])[::-1]))

@@ -27,8 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         if action.dest == "overrides":
             action.metavar, action.nargs = "MOTION | KEY=VALUE", "+"
             action.help = (
-                "a motion file (.json: nested lists, .npy: an array) in the shape that the planner documents, start and "
-                "goal included, and an experiment with overrides as for run"
+                "a motion file (.json: nested lists, .npy: an array) in the planner's documented shape, start and goal "
+                "included, and an experiment with overrides as for run"
             )
     parser.add_argument("--json", action="store_true", help="print flat JSON: one object, or a list of them")
 

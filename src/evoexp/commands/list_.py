@@ -43,7 +43,7 @@ def _runs(runs: list[tuple[str, RunDirectory | EvoexpError]]) -> Table:
     table = new_table(f"runs stored in {outputs_root()}")
     add_hash_column(table)
     add_columns(table, "condition")
-    add_columns(table, "done", "failed", "solved", "median best cost", right=True)
+    add_columns(table, "done", "failed", "solved", "median\nbest cost", right=True)
     for name, run in runs:
         try:
             if isinstance(run, EvoexpError):

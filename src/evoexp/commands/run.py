@@ -32,8 +32,8 @@ def main(arguments: argparse.Namespace) -> int:
     console = plain_console()
     experiments = compose.expand(arguments.overrides, multirun=arguments.multirun, only=arguments.only)
     for experiment in experiments:
-        if (page := experiment.report.figures) not in (None, *PAGES):
-            raise UnknownOption("report.figures", str(page), PAGES)
+        if (figures := experiment.report.figures) not in (None, *PAGES):
+            raise UnknownOption("report.figures", str(figures), PAGES)
     command = _command(arguments)
     wanted = [
         (labelled.condition, experiment.num_replicates, _notes(experiment, labelled.label, command))
@@ -85,7 +85,7 @@ def summary_table(experiment: compose.Experiment) -> Table:
     table = new_table(experiment.report_name)
     add_columns(table, "condition")
     add_hash_column(table)
-    add_columns(table, "replicates", "solved", "median best cost", "CPU s each", right=True)
+    add_columns(table, "replicates", "solved", "median\nbest cost", "CPU s\neach", right=True)
     for label, condition in experiment.conditions:
         rows = read_summaries(RunDirectory(outputs_root(), condition.id))
         done = rows[(rows["status"] == "done") & (rows["replicate"] < experiment.num_replicates)]

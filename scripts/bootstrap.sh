@@ -37,7 +37,8 @@ install() {
   if command -v uv >/dev/null 2>&1; then
     echo "evoexp: creating $venv with uv (once, about a minute)" >&2
     uv venv --quiet --python "$base" "$venv" || return
-    tool=(uv pip install --quiet --compile-bytecode --python "$PYTHON")
+    # Bytecode ahead of use only where Python may not write it on first use; every start would take seconds longer.
+    tool=(uv pip install --quiet ${PYTHONDONTWRITEBYTECODE:+--compile-bytecode} --python "$PYTHON")
   else
     echo "evoexp: creating $venv with pip (once, some minutes; uv is faster)" >&2
     "$base" -m venv "$venv" || return

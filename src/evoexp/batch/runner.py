@@ -18,6 +18,7 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.settings import RunnerSettings
+from evoexp.batch.workers import in_workers
 from evoexp.condition import Condition
 from evoexp.store.manifest import manifest
 from evoexp.store.run_directory import RunDirectory, lock_all
@@ -169,17 +170,9 @@ def fan_out(jobs: Sequence[Job], num_workers: int) -> Iterator[list[Outcome]]:
             yield run_jobs([waiting.popleft()])
             continue
         in_flight: dict[tuple[str, int], Job] = {}
-        pool = joblib.Parallel(
-            n_jobs=num_workers,
-            batch_size=1,
-            pre_dispatch=2 * num_workers,
-            return_as="generator_unordered",
-            inner_max_num_threads=1,
-            backend="loky",
-        )
         bundles = _Bundles(waiting, in_flight, num_workers)
         try:
-            for outcomes in pool(joblib.delayed(run_jobs)(bundle) for bundle in bundles):
+            for outcomes in in_workers(num_workers, (joblib.delayed(run_jobs)(bundle) for bundle in bundles)):
                 bundles.took(outcomes)
                 yield outcomes
         except TerminatedWorkerError:
@@ -214,9 +207,8 @@ class _Bundles:
 
 def _run_alone(job: Job) -> Outcome:
     """Run one job in a process of its own; a second death is a failure."""
-    pool = joblib.Parallel(n_jobs=2, batch_size=1, inner_max_num_threads=1, backend="loky")
     try:
-        outcome: Outcome = pool([joblib.delayed(run_jobs)([job])])[0][0]
+        outcome: Outcome = next(in_workers(2, [joblib.delayed(run_jobs)([job])]))[0]
         return outcome
     except TerminatedWorkerError as error:
         return Outcome(job.condition_id, job.replicate, "worker process died twice", str(error), b"", 0.0)

@@ -12,6 +12,7 @@ from evoexp import compose, shipped
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.reproduce import Comparison, reproduce_log
 from evoexp.batch.runner import num_cores
+from evoexp.batch.workers import in_workers
 from evoexp.commands.console import add_columns, add_hash_column, new_table, plain_console
 from evoexp.commands.hashes import with_candidates
 from evoexp.errors import AmbiguousHash, NothingStored, RevisionMismatch, UnknownHash
@@ -58,8 +59,8 @@ def _compare_all(paths: Sequence[Path]) -> list[Comparison]:
     first = reproduce_log(paths[0])  # compiles, before any worker does
     if len(paths) < FEW:
         return [first, *map(reproduce_log, paths[1:])]
-    pool = joblib.Parallel(n_jobs=num_cores(), inner_max_num_threads=1, backend="loky")
-    return [first, *pool(joblib.delayed(reproduce_log)(path) for path in paths[1:])]
+    tasks = (joblib.delayed(reproduce_log)(path) for path in paths[1:])
+    return [first, *in_workers(num_cores(), tasks, ordered=True)]
 
 
 def _report(console: Console, comparisons: Sequence[Comparison]) -> int:

@@ -37,11 +37,12 @@ def site_crossover(
         out: (nq, N + 1, ≥ offspring), written: the offspring.
     """
     uniforms = rng.random(num_uniforms(len(arm_slices), len(parents) // 2))
-    _site_crossover(uniforms, population, parents, arm_slices, rate, max_distance, out)
+    cross_at_sites(uniforms, population, parents, arm_slices, rate, max_distance, out)
 
 
 @kernel
-def _site_crossover(uniforms, population, parents, arm_slices, rate, max_distance, out):  # type: ignore[no-untyped-def]
+def cross_at_sites(uniforms, population, parents, arm_slices, rate, max_distance, out):  # type: ignore[no-untyped-def]
+    """The kernel of `site_crossover`, for other kernels."""
     num_points, num_arms = population.shape[1], len(arm_slices)
     num_offspring = len(parents)
     mates = parents.copy()

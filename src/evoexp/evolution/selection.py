@@ -18,7 +18,7 @@ def roulette(rng: np.random.Generator, weights: FloatArray, count: int) -> np.nd
         (count,) indices, in the order drawn: neighbours are a random pairing.
     """
     chosen = np.empty(count, dtype=np.int64)
-    _roulette(weights, rng.random(count), chosen)
+    spin_roulette(weights, rng.random(count), chosen)
     return chosen
 
 
@@ -38,12 +38,13 @@ def distinct(rng: np.random.Generator, num: int, count: int) -> np.ndarray:
         count: How many to draw, at most `num`.
     """
     slots = np.arange(num)
-    _shuffle_head(rng.random(count), slots)
+    shuffle_head(rng.random(count), slots)
     return slots[:count]
 
 
 @kernel
-def _roulette(weights, uniforms, chosen):  # type: ignore[no-untyped-def]
+def spin_roulette(weights, uniforms, chosen):  # type: ignore[no-untyped-def]
+    """The kernel of `roulette`, for other kernels; writes one index per uniform number."""
     num = len(weights)
     wheel = np.empty(num)
     total = 0.0
@@ -83,7 +84,8 @@ def _elites(costs, chosen):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _shuffle_head(uniforms, slots):  # type: ignore[no-untyped-def]
+def shuffle_head(uniforms, slots):  # type: ignore[no-untyped-def]
+    """The kernel of `distinct`, for other kernels; the first len(uniforms) of `slots` are the draw."""
     num = len(slots)
     for k in range(len(uniforms)):
         other = k + min(int(uniforms[k] * (num - k)), num - k - 1)

@@ -41,7 +41,7 @@ def walk(
     Raises:
         ValueError: If `uniforms` has another shape, or a lane lies outside.
     """
-    if not _walk(via_points, lanes, uniforms, start, goal, arm_slices, step, max_turn):
+    if not walk_strings(via_points, lanes, uniforms, start, goal, arm_slices, step, max_turn):
         expected = (len(lanes), num_uniforms(arm_slices, via_points.shape[1] - 1))
         limit = via_points.shape[2]
         raise ValueError(
@@ -51,7 +51,8 @@ def walk(
 
 
 @kernel
-def _walk(via_points, lanes, uniforms, start, goal, arm_slices, step, max_turn):  # type: ignore[no-untyped-def]
+def walk_strings(via_points, lanes, uniforms, start, goal, arm_slices, step, max_turn):  # type: ignore[no-untyped-def]
+    """The kernel of `walk`, for other kernels; returns false, and writes nothing, if the arrays do not fit."""
     num = via_points.shape[1] - 1
     needed = 0
     if len(start) != len(via_points) or len(goal) != len(via_points):

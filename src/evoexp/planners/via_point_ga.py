@@ -16,8 +16,9 @@ from pydantic import Field, model_validator
 
 from evoexp.collision.touching_spheres import Clearance, SphereCollision, TouchingSpheres, clearances
 from evoexp.errors import SettingError
-from evoexp.evolution.crossover import site_crossover
-from evoexp.evolution.selection import distinct, elites, roulette
+from evoexp.evolution import crossover
+from evoexp.evolution.crossover import cross_at_sites
+from evoexp.evolution.selection import elites, shuffle_head, spin_roulette
 from evoexp.evolution.settings import GeneticSettings
 from evoexp.evolution.statistics import cost_statistics
 from evoexp.evolution.succession import succeed
@@ -28,8 +29,8 @@ from evoexp.paths.lengths import measure_paths
 from evoexp.paths.motion import Motion
 from evoexp.paths.redistribution import redistribute
 from evoexp.paths.relaxation import relax
-from evoexp.paths.walk import num_uniforms, walk
-from evoexp.paths.workspace import prepare_redistribution
+from evoexp.paths.walk import num_uniforms, walk, walk_strings
+from evoexp.paths.workspace import Redistribution, prepare_redistribution
 from evoexp.records import FloatArray, Generation
 from evoexp.robots.assembly import Assembly, Robot
 from evoexp.scenarios.arm_motion import ArmMotion
@@ -48,12 +49,14 @@ class Problem(NamedTuple):
         collision: The paper's collision model on it.
         start: (nq,) [deg].
         goal: (nq,) [deg].
+        spline: Factor and memory of the redistribution; for one thread at a time.
     """
 
     assembly: Assembly
     collision: SphereCollision
     start: FloatArray
     goal: FloatArray
+    spline: Redistribution
 
     @property
     def arm_slices(self) -> np.ndarray:
@@ -145,7 +148,9 @@ class ViaPointGa(Component):
                 what = "two arms" if clearance.between_arms[0] < 0.0 else "an arm and an obstacle"
                 must = f"free of collision ({what} overlap by {-clearance.least[0]:.3g} {scenario.length_unit})"
                 raise SettingError(f"scenario.{name}", must, [list(arm) for arm in getattr(scenario, name)])
-        return Problem(assembly, collision, start, goal)
+        joints = int(np.max(assembly.arm_slices[:, 1] - assembly.arm_slices[:, 0]))
+        spline = prepare_redistribution(self.num_via_points, joints, self.spline_end, self.samples_per_segment)
+        return Problem(assembly, collision, start, goal, spline)
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield the initial population, then one generation after the other."""
@@ -162,15 +167,10 @@ class ViaPointGa(Component):
 
         offspring = strings.empty(ga.num_offspring)
         for index in range(1, ga.num_generations + 1):
-            # (a) Reproduction; neighbours on the wheel are the random pairs of (b).
+            # (a) Reproduction, (b) cross-over, and (d) mutation before (c): a new trajectory, too, is redistributed and
+            # relaxed once.
             best_kept = elites(costs, ga.num_elites)
-            parents = roulette(rng, self.objective.roulette_weights(costs), ga.num_offspring)
-            # (b) Cross-over.
-            site_crossover(
-                rng, population, parents, problem.arm_slices, ga.crossover_rate, self.crossover_distance, offspring
-            )
-            # (d) Mutation before (c): a new trajectory is redistributed and relaxed once, like everything else.
-            strings.new_trajectories(rng, offspring, self._mutated(rng))
+            strings.breed(rng, population, costs, offspring)
             # (c) Redistribution and relaxation.
             strings.smooth(offspring, ga.num_offspring)
             judged = strings.judge(offspring, ga.num_offspring)
@@ -236,11 +236,6 @@ class ViaPointGa(Component):
         parts = np.split(solution, np.cumsum(sizes)[:-1])
         return np.vstack([p.reshape(shape).T for p, shape in zip(parts, self.shape(problem), strict=True)])
 
-    def _mutated(self, rng: np.random.Generator) -> np.ndarray:
-        """Draw the distinct offspring that new trajectories replace, each with probability `mutation_rate`."""
-        slots = distinct(rng, self.ga.num_offspring, self.num_new_trajectories)
-        return slots[rng.random(len(slots)) < self.ga.mutation_rate]
-
 
 class _Strings:
     """The population-wide steps of one planner on one problem, with their memory."""
@@ -251,11 +246,7 @@ class _Strings:
         self.nq = len(problem.start)
         self.max_turn = DEGREE * planner.max_turn
         self.num_uniforms = num_uniforms(problem.arm_slices, planner.num_via_points)
-        joints = int(np.max(problem.arm_slices[:, 1] - problem.arm_slices[:, 0]))
-        self._tables = problem.collision.tables
-        self._spline = prepare_redistribution(
-            planner.num_via_points, joints, planner.spline_end, planner.samples_per_segment
-        )
+        self.tables = problem.collision.tables
 
     def empty(self, count: int) -> FloatArray:
         """Return memory for strings, padded to whole vectors and holding start, goal and zeros."""
@@ -277,13 +268,24 @@ class _Strings:
             self.max_turn,
         )
 
+    def breed(self, rng: np.random.Generator, population: FloatArray, costs: FloatArray, offspring: FloatArray) -> None:
+        """Write offspring of a population: reproduced, crossed and mutated (section 3.4 a, b, d)."""
+        planner, problem, ga = self.planner, self.problem, self.planner.ga
+        pairs = crossover.num_uniforms(self.num_arms, ga.num_offspring // 2)
+        draws = (ga.num_offspring, pairs, planner.num_new_trajectories, planner.num_new_trajectories)
+        uniforms = rng.random(sum(draws) + planner.num_new_trajectories * self.num_uniforms)
+        weights = planner.objective.roulette_weights(costs)
+        rates = (ga.crossover_rate, planner.crossover_distance, ga.mutation_rate, planner.walk_step, self.max_turn)
+        ends = (problem.start, problem.goal)
+        _breed(uniforms, draws, population, weights, problem.arm_slices, rates, ends, offspring)
+
     def smooth(self, population: FloatArray, count: int) -> None:
         """Redistribute and relax the first `count` strings."""
         planner = self.planner
         if count == 0:
             return
         if planner.redistribution:
-            redistribute(population, self.problem.arm_slices, count, self._spline)
+            redistribute(population, self.problem.arm_slices, count, self.problem.spline)
         relax(population, planner.relaxation_step, count)
 
     def judge(self, population: FloatArray, count: int) -> Judgement:
@@ -292,8 +294,32 @@ class _Strings:
         lengths, unevenness = np.empty((2, self.num_arms, lanes))
         terms = StringTerms(lengths, unevenness, np.empty(lanes), np.empty(count))
         substeps = planner.collision.collision_substeps
-        _judge(population, self.problem.arm_slices, substeps, self._tables, planner.objective.weights, tuple(terms))
+        _judge(population, self.problem.arm_slices, substeps, self.tables, planner.objective.weights, tuple(terms))
         return Judgement(terms.cost, terms, planner.num_via_points * substeps * count)
+
+
+@kernel
+def _breed(uniforms, draws, population, weights, arm_slices, rates, ends, offspring):  # type: ignore[no-untyped-def]
+    """Section 3.4 a, b, d. `draws` says how many uniform numbers each step takes, the rest is for new trajectories."""
+    crossover_rate, crossover_distance, mutation_rate, walk_step, max_turn = rates
+    first, second = draws[0], draws[0] + draws[1]
+    third, last = second + draws[2], second + draws[2] + draws[3]
+    # (a) Weighted roulette wheel; neighbours in the order drawn are the random pairs of (b).
+    parents = np.empty(draws[0], dtype=np.int64)
+    spin_roulette(weights, uniforms[:first], parents)
+    # (b) One site per arm, at the same index in both parents.
+    cross_at_sites(
+        uniforms[first:second], population, parents, arm_slices, crossover_rate, crossover_distance, offspring
+    )
+    # (d) New trajectories in distinct places, each with the mutation's probability.
+    slots = np.arange(draws[0])
+    shuffle_head(uniforms[second:third], slots)
+    walks = uniforms[last:].reshape((draws[2], -1)) if draws[2] else np.empty((0, 0))
+    for k in range(draws[2]):
+        if uniforms[third + k] < mutation_rate:
+            walk_strings(
+                offspring, slots[k : k + 1], walks[k : k + 1], ends[0], ends[1], arm_slices, walk_step, max_turn
+            )
 
 
 @kernel

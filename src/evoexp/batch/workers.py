@@ -1,0 +1,58 @@
+"""Worker processes: silent when Ctrl-C reaches all processes of a terminal, and gone when their parent is."""
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import joblib
+
+WATCH_S = 1.0  # [s] between two looks whether the parent is alive
+
+
+def in_workers(num_workers: int, tasks: Iterable[Any], ordered: bool = False) -> Iterator[Any]:
+    """Run delayed calls in worker processes; yield what they return, as it comes or in order.
+
+    Raises:
+        TerminatedWorkerError: If a worker dies.
+    """
+    pool = joblib.Parallel(
+        n_jobs=num_workers,
+        batch_size=1,
+        pre_dispatch=2 * num_workers,
+        return_as="generator" if ordered else "generator_unordered",
+        inner_max_num_threads=1,
+        backend="loky",
+        initializer=leave_with_parent,
+        initargs=(os.getpid(),),
+    )
+    with _children_ignore_interrupts():
+        results = pool(tasks)  # starts the workers
+    yield from results
+
+
+def leave_with_parent(parent: int) -> None:
+    """End this process soon after its parent died: nobody takes its results any more."""
+    threading.Thread(target=_watch, args=(parent,), daemon=True).start()
+
+
+def _watch(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(WATCH_S)
+    os._exit(1)
+
+
+@contextmanager
+def _children_ignore_interrupts() -> Iterator[None]:
+    """Start processes that ignore Ctrl-C from their first instruction on: a process inherits what is ignored."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -1,13 +1,16 @@
 """From overrides to conditions: identities, labels, budgets, and what makes a report another one."""
 
-import itertools
+import copy
+import functools
 import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+import hydra
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from omegaconf import DictConfig
 
 from evoexp import compose
 from evoexp.compose import Experiment, expand
@@ -15,6 +18,7 @@ from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetti
 
 PLAIN = ("experiment=rana_obstacles",)  # one condition
 BUDGETS = ("paper", "quick", "smoke")
+COMPOSED: dict[tuple[str, ...], DictConfig] = {}
 
 
 def ids(*overrides: str, multirun: bool = False, only: tuple[str, ...] = ()) -> dict[str, str]:
@@ -23,21 +27,36 @@ def ids(*overrides: str, multirun: bool = False, only: tuple[str, ...] = ()) -> 
     return {label: condition.id for e in experiments for label, condition in e.conditions}
 
 
+@functools.cache
 def one(*overrides: str) -> str:
     """Return the hash of the first condition."""
     return next(iter(ids(*overrides).values()))
 
 
+@pytest.fixture(autouse=True)
+def remember(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compose nothing twice: these tests ask for the same configurations again and again."""
+
+    def remembered(name: str, overrides: list[str]) -> DictConfig:
+        key = (str(compose.config_directory()), *overrides)
+        if key not in COMPOSED:
+            COMPOSED[key] = hydra_compose(name, overrides=overrides)
+        return copy.deepcopy(COMPOSED[key])
+
+    hydra_compose = hydra.compose
+    monkeypatch.setattr(hydra, "compose", remembered)
+
+
 @pytest.fixture
 def write_experiment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """Return what writes an experiment file into a copy of `conf`, which then is the one in use."""
-    copy = tmp_path / "conf"
-    shutil.copytree(compose.config_directory(), copy)
-    monkeypatch.setattr(compose, "config_directory", lambda: copy)
-    head = (copy / "experiment/rana_obstacles.yaml").read_text().replace("rana_obstacles", "rana_planar")
+    conf = tmp_path / "conf"
+    shutil.copytree(compose.config_directory(), conf)
+    monkeypatch.setattr(compose, "config_directory", lambda: conf)
+    head = (conf / "experiment/rana_obstacles.yaml").read_text().replace("rana_obstacles", "rana_planar")
 
     def write(name: str, conditions: str, extra: str = "") -> None:
-        (copy / f"experiment/{name}.yaml").write_text(f"{head}\n{extra}\nconditions:\n{conditions}\n")
+        (conf / f"experiment/{name}.yaml").write_text(f"{head}\n{extra}\nconditions:\n{conditions}\n")
 
     return write
 
@@ -78,12 +97,13 @@ def test_an_experiment_file_says_how_it_is_run_and_what_it_is(experiment: str) -
         ("++ga.population_size=50",),
         ("ga=rana_planar",),
         ("robot.arms.1.base_position=[0,8]",),
-        ("planner.redistribution=yes",),
+        ("planner.redistribution=True",),
     ],
 )
 def test_what_changes_no_result_changes_no_hash(overrides: tuple[str, ...]) -> None:
-    assert one(*PLAIN, *overrides) == one(*PLAIN)
-    assert not expand([*PLAIN, *overrides])[0].changed
+    (experiment,) = expand([*PLAIN, *overrides])
+    assert experiment.conditions[0].condition.id == one(*PLAIN)
+    assert not experiment.changed
 
 
 @pytest.mark.parametrize(
@@ -91,40 +111,18 @@ def test_what_changes_no_result_changes_no_hash(overrides: tuple[str, ...]) -> N
     [
         "seed=1",
         "ga.population_size=51",
-        "ga.num_generations=499",
-        "ga.num_elites=3",
-        "ga.crossover_rate=0.8",
-        "ga.mutation_rate=0.5",
-        "objective.length_weight=0.25",
-        "objective.unevenness_weight=0.25",
-        "objective.collision_weight=50",
-        "objective.fitness_offset=100",
-        "collision.spheres_per_link=4",
-        "collision.sphere_radius=0.25",
-        "collision.collision_substeps=2",
-        "planner.num_via_points=10",
-        "planner.walk_step=2",
-        "planner.max_turn=90",
-        "planner.num_new_trajectories=4",
-        "planner.crossover_distance=50",
-        "planner.relaxation_step=0.25",
         "planner.redistribution=false",
-        "planner.spline_end=clamped",
-        "planner.samples_per_segment=4",
         "robot.arms.0.link_lengths=[4,3.5]",
-        "robot.arms.1.base_position=[0,8.5]",
-        "scenario.q_start=[[45,225],[225,226]]",
         "scenario.q_goal=[[135,135],[315,316]]",
-        "scenario.security_margin=0.5",
-        "scenario.length_unit=m",
         "scenario.obstacles=[]",
         "control=random_search",
         "budget=smoke",
     ],
 )
 def test_what_changes_results_changes_the_hash(override: str) -> None:
-    assert one(*PLAIN, override) != one(*PLAIN)
+    """One of each kind; `test_condition` changes every setting there is."""
     (changed,) = expand([*PLAIN, override])
+    assert changed.conditions[0].condition.id != one(*PLAIN)
     assert changed.changed is (override != "budget=smoke")
     assert ("+" in changed.report_name) is changed.changed
 
@@ -138,17 +136,18 @@ def test_the_same_condition_under_another_experiment_and_label_has_the_same_hash
 
 def test_one_hash_from_a_single_run_and_from_a_multirun() -> None:
     swept = ids(*PLAIN, "ga.population_size=20,30", "seed=0,1", multirun=True)
-    assert list(swept) == [f"rana_obstacles · population_size={p} · seed={s}" for p in (20, 30) for s in (0, 1)]
+    assert swept == {
+        f"population_size={size} · seed={seed}": one(*PLAIN, f"ga.population_size={size}", f"seed={seed}")
+        for size in (20, 30)
+        for seed in (0, 1)
+    }
     assert len(set(swept.values())) == 4
-    for population_size, seed in itertools.product((20, 30), (0, 1)):
-        label = f"rana_obstacles · population_size={population_size} · seed={seed}"
-        assert swept[label] == one(*PLAIN, f"ga.population_size={population_size}", f"seed={seed}")
 
 
 SETTINGS = ("seed=3", "ga.population_size=20", "scenario=rana_planar", "scenario.security_margin=2", "control=null")
 
 
-@settings(max_examples=12)
+@settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.permutations([*PLAIN, "budget=smoke", "num_replicates=2", *SETTINGS]))
 def test_any_order_of_overrides_gives_one_hash(overrides: list[str]) -> None:
     (experiment,) = expand(overrides)
@@ -170,20 +169,22 @@ def test_labels_are_templates_over_sweeps(write_experiment: Callable[..., None])
   "0.5": []
 """,
     )
-    assert ids("experiment=mine") == {
-        "λ = 10": one(*PLAIN, "scenario=rana_planar", "ga.population_size=10"),
-        "λ = 20": one(*PLAIN, "scenario=rana_planar", "ga.population_size=20"),
-        **{
-            f"{e} elites of {p}": one(
-                *PLAIN, "scenario=rana_planar", f"ga.num_elites={e}", f"ga.population_size={p}", "seed=4"
-            )
-            for e in (0, 2)
-            for p in (30, 31)
-        },
-        "at {rate}": one(*PLAIN, "scenario=rana_planar", "ga.crossover_rate=0.25"),
-        "plain · crossover_rate=0.5": one(*PLAIN, "scenario=rana_planar", "ga.crossover_rate=0.5"),
-        "plain · crossover_rate=0.75": one(*PLAIN, "scenario=rana_planar", "ga.crossover_rate=0.75"),
-        "0.5": one(*PLAIN, "scenario=rana_planar"),
+    (experiment,) = expand(["experiment=mine"])
+    found = {
+        label: (c.planner.ga.num_elites, c.planner.ga.population_size, c.planner.ga.crossover_rate, c.seed)
+        for label, c in experiment.conditions
+    }
+    assert found == {
+        "λ = 10": (2, 10, 0.9, 0),
+        "λ = 20": (2, 20, 0.9, 0),
+        "0 elites of 30": (0, 30, 0.9, 4),
+        "0 elites of 31": (0, 31, 0.9, 4),
+        "2 elites of 30": (2, 30, 0.9, 4),
+        "2 elites of 31": (2, 31, 0.9, 4),
+        "at {rate}": (2, 50, 0.25, 0),
+        "plain · crossover_rate=0.5": (2, 50, 0.5, 0),
+        "plain · crossover_rate=0.75": (2, 50, 0.75, 0),
+        "0.5": (2, 50, 0.9, 0),
     }
 
 
@@ -194,10 +195,7 @@ def test_the_command_line_wins_over_an_entry_which_wins_over_the_file(write_expe
     both = one(*base, "ga.population_size=30")
     assert ids("experiment=mine", "ga.population_size=30") == {"a": both, "b": both}
     swept = ids("experiment=mine", "ga.population_size=30,50", multirun=True)
-    assert list(swept) == ["a · population_size=30", "a · population_size=50"] + [
-        "b · population_size=30",
-        "b · population_size=50",
-    ]
+    assert list(swept) == [f"{label} · population_size={size}" for label in "ab" for size in (30, 50)]
     assert swept["a · population_size=30"] == swept["b · population_size=30"] == both
 
 
@@ -213,10 +211,8 @@ def test_groups_of_an_entry_can_be_taken_back_on_the_command_line() -> None:
 
 
 def test_two_swept_settings_of_one_name_are_told_apart() -> None:
-    swept = ids(
-        *PLAIN, "robot.arms.0.link_lengths=[4,4],[3,3]", "robot.arms.1.link_lengths=[4,4],[3,3]", multirun=True
-    )
-    label = "rana_obstacles · robot.arms.0.link_lengths=[4,4] · robot.arms.1.link_lengths=[3,3]"
+    swept = ids(*PLAIN, "robot.arms.0.link_lengths=[4,4],[3,3]", "robot.arms.1.link_lengths=[4,4],[3,3]", multirun=True)
+    label = "robot.arms.0.link_lengths=[4,4] · robot.arms.1.link_lengths=[3,3]"
     assert len(swept) == 4
     assert swept[label] == one(*PLAIN, "robot.arms.1.link_lengths=[3,3]")
 
@@ -243,11 +239,14 @@ def test_a_multirun_drops_no_experiment_and_no_condition() -> None:
 @pytest.mark.parametrize(
     ("overrides", "message"),
     [
-        (["ga.population_size=20,20"], "conditions: must be labels that differ, was 'rana_obstacles · population_si"),
+        (["ga.population_size=20,20"], "conditions: must be labels that differ, was 'population_size=20'"),
         (["budget=smoke,paper"], "budget: must be one value: a sweep is over what changes a condition"),
         (["num_replicates=2,3"], "num_replicates: must be one value"),
         (["runner.num_workers=1,2"], "runner.num_workers: must be one value"),
-        (["ga.population_size=glob(*)"], "ga.population_size: must be values that can be enumerated: a,b,c or range(…)"),
+        (
+            ["ga.population_size=glob(*)"],
+            "ga.population_size: must be values that can be enumerated: a,b,c or range(…)",
+        ),
         (["ga.crossover_rate=interval(0,1)"], "ga.crossover_rate: must be values that can be enumerated"),
         (["planner=rana_planar,rana_plan"], "planner: no option 'rana_plan'; did you mean 'rana_planar'?"),
     ],
@@ -370,7 +369,11 @@ def test_a_group_that_the_planner_does_not_take_is_refused(
 @pytest.mark.parametrize(
     ("overrides", "kind", "message"),
     [
-        (["planner.ga.population_size=20"], SettingError, "planner.ga.population_size: must be given as ga.population_"),
+        (
+            ["planner.ga.population_size=20"],
+            SettingError,
+            "planner.ga.population_size: must be given as ga.population_",
+        ),
         (["planner.ga=3"], SettingError, "planner.ga: must be left as it is; set ga"),
         (["ga=null"], SettingError, "ga: must be chosen: rana_planar"),
         (["~objective"], SettingError, "objective: must be chosen: rana_planar"),

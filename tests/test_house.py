@@ -61,7 +61,9 @@ def test_no_global_randomness_and_nothing_irreproducible(path: Path) -> None:
     assert all(name in allowed for name in re.findall(r"np\.random\.(\w+)", text) if name != "default_rng")
     assert not re.search(r"fastmath *= *True", text)
     if any(room in path.parts for room in ("planners", "evolution", "paths", "objectives", "collision")):
-        assert not re.search(r"np\.(sin|cos|tan|exp|log|power|arc\w+|linalg\.norm|dot|random\.default_rng)\(", text), path
+        assert not re.search(r"np\.(sin|cos|tan|exp|log|power|arc\w+|linalg\.norm|dot|random\.default_rng)\(", text), (
+            path
+        )
 
 
 @pytest.mark.parametrize(

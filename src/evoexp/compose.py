@@ -9,7 +9,6 @@ import hashlib
 import itertools
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 import hydra
@@ -24,6 +23,7 @@ from evoexp.batch.settings import RunnerSettings
 from evoexp.condition import PARTS, Condition, component_class
 from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting, nearest
 from evoexp.report.settings import ReportSettings
+from evoexp.shipped import config_directory
 from evoexp.validation import TARGET, Count, Settings, build, settings_error
 
 PLANNER_PARTS = ("ga", "objective", "collision")  # groups that a planner's option takes in by interpolation
@@ -82,12 +82,6 @@ class Experiment(NamedTuple):
             return name
         text = "\n".join(f"{label}\t{condition.id}" for label, condition in self.conditions)
         return f"{name}+{hashlib.sha256(text.encode()).hexdigest()[:8]}"
-
-
-def config_directory() -> Path:
-    """Return the shipped `conf`: in the wheel inside the package, in a checkout beside `src`."""
-    inside = Path(__file__).parent / "conf"
-    return inside if inside.is_dir() else Path(__file__).parents[2] / "conf"
 
 
 def options(group: str) -> list[str]:
@@ -156,7 +150,8 @@ def _conditions(
     """Return the first configuration without the experiment's own conditions, and all labelled ones with them."""
     choice = {"experiment": f"experiment={name}"} if name else {}
     swept = list(_sweep(overrides))
-    base = _compose(choice | swept[0][1])
+    first = choice | swept[0][1]
+    base = _compose(first)
     labels: dict[str, dict[str, str]] = {}
     entries: Any = OmegaConf.to_container(base.conditions) or {"": []}
     for template, entry in entries.items():
@@ -168,7 +163,9 @@ def _conditions(
                 labels[joined] = choice | own | texts  # the command line wins
     if unknown := [label for label in only if label not in labels]:
         raise UnknownOption("--only", unknown[0], labels)
-    return base, {label: _compose(texts) for label, texts in labels.items() if not only or label in only}
+    kept = {label: texts for label, texts in labels.items() if not only or label in only}
+    # Composing is most of the work: what is there already is not composed again.
+    return base, {label: base if texts == first else _compose(texts) for label, texts in kept.items()}
 
 
 def _condition(config: DictConfig, budget: Budget) -> Condition:
@@ -258,7 +255,8 @@ def _sweep(overrides: Mapping[str, Override]) -> Iterator[tuple[str, dict[str, s
 
 def _compose(overrides: Mapping[str, str]) -> DictConfig:
     try:
-        return hydra.compose("config", overrides=list(overrides.values()))
+        # In the order of the keys, so that the order in which they were typed does not matter (a.b comes before a.b.c).
+        return hydra.compose("config", overrides=[overrides[key] for key in sorted(overrides)])
     except (HydraException, OmegaConfBaseException, ValueError) as error:
         raise _said_in_one_line(error, overrides) from None
 

@@ -1,6 +1,6 @@
-"""The shipped table: hashes of the shipped conditions and digests of their first replicate.
+"""What is shipped beside the code: `conf`, and a table of hashes and digests.
 
-It finds a shipped condition by its hash on a machine that never ran it, gives `reproduce` something to compare with,
+The table has the hash of every shipped condition and the digest of its first replicate. It finds a shipped condition by its hash on a machine that never ran it, gives `reproduce` something to compare with,
 and makes a test fail when results change without a raised revision.
 """
 
@@ -8,7 +8,14 @@ import functools
 import json
 import shlex
 from importlib import resources
+from pathlib import Path
 from typing import NamedTuple
+
+
+def config_directory() -> Path:
+    """Return the shipped `conf`: in the wheel inside the package, in a checkout beside `src`."""
+    inside = Path(__file__).parent / "conf"
+    return inside if inside.is_dir() else Path(__file__).parents[2] / "conf"
 
 
 class Shipped(NamedTuple):

@@ -118,8 +118,8 @@ def advance(rana: Rana, rng: np.random.Generator, population: Population) -> Pop
     parents = roulette(rng, np.maximum(rana.fitness_offset - population.costs, 0.0), num_offspring)
     offspring = crossover(rana, rng, population.strings[parents])
     slots = distinct(rng, num_offspring, rana.num_new_trajectories)
-    slots = slots[rng.random(len(slots)) < rana.mutation_rate]
-    offspring[slots] = walks(rana, rng, len(slots))
+    mutated = rng.random(len(slots)) < rana.mutation_rate
+    offspring[slots[mutated]] = walks(rana, rng, len(slots))[mutated]
     offspring = smooth(rana, offspring)
     judged = judge(rana, offspring)
     return Population(

@@ -19,10 +19,6 @@ def of(*overrides: str, name: str = "rana_planar", budget: str = "paper", label:
     return {row.name: row for row in rows}
 
 
-def test_the_directory_is_the_one_that_compose_reads() -> None:
-    assert parameters.config_directory() == compose.config_directory()
-
-
 def test_units_and_sources_come_from_the_comments() -> None:
     rows = of()
     assert rows["ga.population_size"] == ("ga.population_size", "50", "", "paper: Tab. 1, population")

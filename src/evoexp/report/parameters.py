@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 
 import yaml
 
-import evoexp
 from evoexp.condition import PARTS
 from evoexp.report.results import WRAPPED, ConditionResults, Results
+from evoexp.shipped import config_directory
 from evoexp.validation import TARGET
 
 OVERRIDE = "override"
@@ -44,13 +44,6 @@ class Parameter(NamedTuple):
     value: str
     unit: str
     source: str
-
-
-def config_directory() -> Path:
-    """Return the shipped `conf`: in the wheel inside the package, in a checkout beside `src`."""
-    package = Path(evoexp.__file__).parent
-    inside = package / "conf"
-    return inside if inside.is_dir() else package.parents[1] / "conf"
 
 
 def parameters(results: Results, condition: ConditionResults) -> list[Parameter]:

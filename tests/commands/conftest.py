@@ -1,0 +1,93 @@
+"""Run commands in this process, and small stored runs to run them on."""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from evoexp.cli import main
+
+SMALL = ("budget=smoke", "ga.population_size=8", "ga.num_generations=2", "planner.num_new_trajectories=1")
+SERIAL = (*SMALL, "runner=serial")
+
+
+class Said(NamedTuple):
+    """What a command did."""
+
+    code: int
+    out: str
+    err: str
+
+
+Evoexp = Callable[..., Said]
+
+
+def exit_code(*words: str) -> int:
+    """Run a command; return its exit code."""
+    try:
+        return main(words)
+    except SystemExit as left:
+        assert isinstance(left.code, int)
+        return left.code
+
+
+@pytest.fixture
+def outputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return where the commands of this test write; not there yet."""
+    monkeypatch.setenv("EVOEXP_OUTPUTS", str(tmp_path / "outputs"))
+    return tmp_path / "outputs"
+
+
+@pytest.fixture
+def evoexp(outputs: Path, capsys: pytest.CaptureFixture[str]) -> Evoexp:
+    """Return what runs a command."""
+
+    def run(*words: str) -> Said:
+        capsys.readouterr()
+        code = exit_code(*words)
+        return Said(code, *capsys.readouterr())
+
+    return run
+
+
+@pytest.fixture
+def refused(evoexp: Evoexp, outputs: Path) -> Callable[..., str]:
+    """Return what runs a command that cannot be done: one line, exit code 2, nothing written."""
+
+    def run(*words: str) -> str:
+        before = content(outputs)
+        said = evoexp(*words)
+        assert said.code == 2, said
+        assert said.out == ""
+        assert said.err.startswith("evoexp: ")
+        assert said.err.endswith("\n")
+        assert said.err.count("\n") == 1
+        assert "Traceback" not in said.err
+        assert content(outputs) == before
+        return said.err.removeprefix("evoexp: ").rstrip("\n")
+
+    return run
+
+
+def content(directory: Path) -> dict[Path, bytes]:
+    """Return every file under a directory but the locks, which are empty."""
+    return {p: p.read_bytes() for p in directory.rglob("*") if p.is_file() and p.name != ".lock"}
+
+
+@pytest.fixture(scope="session")
+def stored_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return outputs with a small run of both conditions of `rana_planar`, two replicates each; not to be changed."""
+    root = tmp_path_factory.mktemp("stored") / "outputs"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("EVOEXP_OUTPUTS", str(root))
+        assert exit_code("run", "experiment=rana_planar", *SERIAL, "--no-report") == 0
+    return root
+
+
+@pytest.fixture
+def stored(stored_once: Path, outputs: Path) -> Path:
+    """Return a copy of those outputs for this test."""
+    shutil.copytree(stored_once, outputs)
+    return outputs

@@ -1,0 +1,227 @@
+"""A condition: canonical form, hash, what it refuses, and the names it may use."""
+
+import copy
+import importlib.metadata
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from evoexp import compose, condition
+from evoexp.condition import REGISTRY, Condition, component_class, revisions
+from evoexp.errors import EvoexpError, RevisionMismatch, SettingError, UnknownSetting
+from evoexp.validation import Component
+
+Path_ = tuple[str | int, ...]
+
+SHIPPED = {
+    f"{name}: {label}": c
+    for name in compose.options("experiment")
+    for label, c in compose.expand([f"experiment={name}"])[0].conditions
+}
+
+
+@pytest.fixture(params=SHIPPED)
+def shipped(request: pytest.FixtureRequest) -> Condition:
+    return SHIPPED[request.param]
+
+
+@pytest.fixture
+def config() -> dict[str, Any]:
+    """Return one condition as plain data that a test may spoil."""
+    return json.loads(SHIPPED["rana_obstacles: rana_obstacles"].to_json())
+
+
+def leaves(data: Any, path: Path_ = ()) -> Iterator[tuple[Path_, Any]]:
+    """Yield every setting of plain configuration data and where it stands."""
+    items = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    for key, value in items:
+        yield from leaves(value, (*path, key))
+    if not isinstance(data, dict | list):
+        yield path, data
+
+
+def with_value(data: Any, path: Path_, value: Any) -> Any:
+    changed = copy.deepcopy(data)
+    here = changed
+    for key in path[:-1]:
+        here = here[key]
+    here[path[-1]] = value
+    return changed
+
+
+def refusal(config: Any) -> str:
+    with pytest.raises(EvoexpError) as caught:
+        Condition.from_json(config if isinstance(config, bytes) else json.dumps(config).encode())
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def test_the_canonical_form_is_read_back_as_the_same_condition(shipped: Condition) -> None:
+    text = shipped.to_json()
+    again = Condition.from_json(text)
+    assert again == shipped
+    assert (again.to_json(), again.id) == (text, shipped.id)
+    assert text == json.dumps(json.loads(text), sort_keys=True, separators=(",", ":")).encode()
+
+
+def test_every_shipped_condition_has_a_hash_of_its_own() -> None:
+    assert len({c.id for c in SHIPPED.values()}) == len(SHIPPED)
+
+
+def test_every_setting_is_part_of_the_hash(shipped: Condition) -> None:
+    """Change each setting by the smallest step that stays valid: another hash, or it is refused; never ignored."""
+    config = json.loads(shipped.to_json())
+    others = {shipped.id}
+    count = 0
+    for path, value in leaves(config):
+        if path[-1] in ("_target_", "revision", "shape"):
+            continue
+        count += 1
+        steps: list[Any] = [not value] if isinstance(value, bool) else []
+        if isinstance(value, str):
+            steps = ["clamped" if value == "natural" else "m"]
+        elif not steps:
+            steps = [value + 1, value - 1, value * 0.5]
+        for step in steps:
+            try:
+                changed = Condition.from_config(with_value(config, path, step))
+            except SettingError as error:
+                assert str(path[-1]) in error.field or isinstance(path[-1], int), error
+                continue
+            assert changed.id not in others, path
+            others.add(changed.id)
+            break
+        else:
+            pytest.fail(f"no other value of {path} is accepted")
+    assert count > 20
+
+
+def test_whole_numbers_and_floats_are_one_setting(shipped: Condition) -> None:
+    config = json.loads(shipped.to_json())
+    for path, value in leaves(config):
+        if isinstance(value, float) and value.is_integer():
+            assert Condition.from_config(with_value(config, path, int(value))).id == shipped.id
+        if value == 0.0 and isinstance(value, float):
+            assert Condition.from_config(with_value(config, path, -0.0)).id == shipped.id
+
+
+@pytest.mark.parametrize(
+    ("part", "value", "message"),
+    [
+        (
+            "robot",
+            {"_target_": "os.system", "command": "true"},
+            "robot._target_: must be a registered component, was 'os",
+        ),
+        (
+            "robot",
+            {"_target_": "armz"},
+            "robot._target_: must be a registered component, was 'armz'; did you mean 'arms'?",
+        ),
+        ("robot", {}, "robot: must be a component, given by its _target_, was {}"),
+        ("robot", None, "robot: must be a component, given by its _target_, was None"),
+        ("robot", [1], "robot: must be a component, given by its _target_, was [1]"),
+        ("seed", "0", "seed: must be a whole number, at least 0, was '0'"),
+        ("seed", True, "seed: must be a whole number, at least 0, was True"),
+        ("seed", -1, "seed: must be a whole number, at least 0, was -1"),
+        ("seed", None, "seed: must be a whole number, at least 0, was None"),
+        ("sead", 1, "sead: unknown setting; did you mean 'seed'?"),
+    ],
+)
+def test_parts_that_cannot_be(config: dict[str, Any], part: str, value: Any, message: str) -> None:
+    assert message in refusal(config | {part: value})
+
+
+def test_components_in_the_wrong_place_are_refused(config: dict[str, Any]) -> None:
+    robot, scenario, planner = config["robot"], config["scenario"], config["planner"]
+    assert refusal(config | {"robot": scenario}) == "robot: must be what via_point_ga takes, a Robot, was 'arm_motion'"
+    assert refusal(config | {"scenario": robot}) == "scenario: must be what via_point_ga takes, a ArmMotion, was 'arms'"
+    assert refusal(config | {"planner": robot}) == "planner: must be a planner, was 'arms'"
+    search = {"_target_": "random_search", "revision": 1}
+    assert refusal(config | {"planner": search | {"planner": 3}}) == "planner: must be a planner, was 3"
+    assert "scenario: must be what via_point_ga" in refusal(
+        config | {"planner": search | {"planner": planner}, "scenario": robot}
+    )
+    assert refusal(config | {"planner": planner | {"ga": robot}}).startswith("planner.ga: must be a GeneticSettings")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [b"", b"{", b"[]", b"3", b"null", b"\xff\xfe", b"[" * 100_000, b'{"robot": ' * 100_000],
+    ids=["empty", "cut", "list", "number", "null", "no text", "deep list", "deep mapping"],
+)
+def test_a_text_that_is_no_condition_is_refused(text: bytes) -> None:
+    assert "config.json: must be a condition in JSON" in refusal(text)
+
+
+@pytest.mark.parametrize("value", ["NaN", "Infinity", "-Infinity"])
+def test_numbers_that_are_none_are_refused(config: dict[str, Any], value: str) -> None:
+    text = json.dumps(with_value(config, ("planner", "walk_step"), float(value.replace("Infinity", "inf"))))
+    assert value in text
+    assert refusal(text.encode()).startswith("planner.walk_step: must be a finite number")
+
+
+def test_another_revision_is_refused_and_names_both(config: dict[str, Any]) -> None:
+    config["planner"]["ga"]["revision"] = 7
+    with pytest.raises(RevisionMismatch, match=r"planner.ga was revision 7, installed is 1"):
+        Condition.from_json(json.dumps(config).encode())
+
+
+def test_revisions_are_listed_for_every_component(shipped: Condition) -> None:
+    found = {field: (stored, installed) for field, stored, installed in revisions(json.loads(shipped.to_json()))}
+    assert {"robot", "robot.arms[0]", "scenario", "planner"} <= set(found)
+    assert all(stored == installed for stored, installed in found.values())
+
+
+def test_an_unknown_setting_in_a_stored_configuration_is_refused(config: dict[str, Any]) -> None:
+    config["planner"]["ga"]["population_sise"] = 3
+    with pytest.raises(
+        UnknownSetting, match="planner.ga.population_sise: unknown setting; did you mean 'population_si"
+    ):
+        Condition.from_json(json.dumps(config).encode())
+
+
+def test_replicates_have_streams_of_their_own_that_conditions_share() -> None:
+    first, other = (SHIPPED[key] for key in ("rana_planar: via-point GA", "rana_planar: random search"))
+    draws = [condition.rng(k).random(3).tolist() for condition in (first, other) for k in (0, 1)]
+    assert draws[:2] == draws[2:]
+    assert draws[0] != draws[1]
+    assert first._replace(seed=1).rng(0).random() != draws[0][0]
+
+
+# The registry
+
+
+@pytest.mark.parametrize("name", REGISTRY)
+def test_registered_names_are_the_components_own(name: str) -> None:
+    kind = component_class(name)
+    assert issubclass(kind, Component)
+    assert kind.component == name
+
+
+def test_an_installed_plug_in_registers_components(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, config: dict[str, Any]
+) -> None:
+    (tmp_path / "plug_in_of_a_test.py").write_text(
+        "from evoexp.evolution.settings import GeneticSettings\n"
+        "class Mine(GeneticSettings):\n    component = 'mine'\n"
+        "class Impostor(GeneticSettings):\n    component = 'genetic'\n"
+    )
+    information = tmp_path / "plug_in-1.0.dist-info"
+    information.mkdir()
+    (information / "METADATA").write_text("Metadata-Version: 2.1\nName: plug-in\nVersion: 1.0\n")
+    points = "mine = plug_in_of_a_test:Mine\ngenetic = plug_in_of_a_test:Impostor\n"
+    (information / "entry_points.txt").write_text(f"[evoexp.components]\n{points}")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    condition._registry.cache_clear()
+    try:
+        assert importlib.metadata.entry_points(group="evoexp.components", name="mine")
+        config["planner"]["ga"]["_target_"] = "mine"
+        mine = Condition.from_config(config)
+        assert type(mine.planner.ga).__name__ == "Mine"  # type: ignore[attr-defined]
+        assert component_class("genetic").__name__ == "GeneticSettings", "a plug-in cannot replace evoexp's own"
+    finally:
+        condition._registry.cache_clear()

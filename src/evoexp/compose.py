@@ -153,6 +153,7 @@ def _conditions(
     first = choice | swept[0][1]
     base = _compose(first)
     labels: dict[str, dict[str, str]] = {}
+    owner: dict[str, str] = {}  # the file's own label of a condition that the command line sweeps over
     entries: Any = OmegaConf.to_container(base.conditions) or {"": []}
     for template, entry in entries.items():
         for label, own in _entry(str(template), entry):
@@ -160,10 +161,10 @@ def _conditions(
                 joined = JOIN.join(part for part in (label, suffix) if part) or (name or "custom")
                 if joined in labels:
                     raise SettingError("conditions", "labels that differ", joined)
-                labels[joined] = choice | own | texts  # the command line wins
-    if unknown := [label for label in only if label not in labels]:
+                labels[joined], owner[joined] = choice | own | texts, label  # the command line wins
+    if unknown := [label for label in only if label not in {*labels, *owner.values()}]:
         raise UnknownOption("--only", unknown[0], labels)
-    kept = {label: texts for label, texts in labels.items() if not only or label in only}
+    kept = {label: texts for label, texts in labels.items() if not only or {label, owner[label]} & set(only)}
     # Composing is most of the work: what is there already is not composed again.
     return base, {label: base if texts == first else _compose(texts) for label, texts in kept.items()}
 
@@ -257,7 +258,7 @@ def _compose(overrides: Mapping[str, str]) -> DictConfig:
     try:
         # In the order of the keys, so that the order in which they were typed does not matter (a.b comes before a.b.c).
         return hydra.compose("config", overrides=[overrides[key] for key in sorted(overrides)])
-    except (HydraException, OmegaConfBaseException, ValueError) as error:
+    except (HydraException, OmegaConfBaseException, ValueError, TypeError) as error:
         raise _said_in_one_line(error, overrides) from None
 
 

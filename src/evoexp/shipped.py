@@ -1,7 +1,8 @@
 """What is shipped beside the code: `conf`, and a table of hashes and digests.
 
-The table has the hash of every shipped condition and the digest of its first replicate. It finds a shipped condition by its hash on a machine that never ran it, gives `reproduce` something to compare with,
-and makes a test fail when results change without a raised revision.
+The table has the hash of every shipped condition and the digest of its first replicate. It finds a shipped condition by
+its hash on a machine that never ran it, gives `reproduce` something to compare with, and makes a test fail when results
+change without a raised revision.
 """
 
 import functools

@@ -3,34 +3,9 @@
 import shutil
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
-
-from evoexp.cli import main
-
-SMALL = ("budget=smoke", "ga.population_size=8", "ga.num_generations=2", "planner.num_new_trajectories=1")
-SERIAL = (*SMALL, "runner=serial")
-
-
-class Said(NamedTuple):
-    """What a command did."""
-
-    code: int
-    out: str
-    err: str
-
-
-Evoexp = Callable[..., Said]
-
-
-def exit_code(*words: str) -> int:
-    """Run a command; return its exit code."""
-    try:
-        return main(words)
-    except SystemExit as left:
-        assert isinstance(left.code, int)
-        return left.code
+from command_samples import SERIAL, Evoexp, Said, content, exit_code
 
 
 @pytest.fixture
@@ -69,11 +44,6 @@ def refused(evoexp: Evoexp, outputs: Path) -> Callable[..., str]:
         return said.err.removeprefix("evoexp: ").rstrip("\n")
 
     return run
-
-
-def content(directory: Path) -> dict[Path, bytes]:
-    """Return every file under a directory but the locks, which are empty."""
-    return {p: p.read_bytes() for p in directory.rglob("*") if p.is_file() and p.name != ".lock"}
 
 
 @pytest.fixture(scope="session")

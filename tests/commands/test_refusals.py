@@ -5,10 +5,12 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
-from conftest import SERIAL, Evoexp
+from command_samples import SERIAL, Evoexp
 
+from evoexp import compose
+from evoexp.condition import Condition
+from evoexp.evolution.settings import GeneticSettings
 from evoexp.store.log import Log
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory, find_runs
@@ -33,7 +35,7 @@ OPTIONS = "(options: rana_obstacles, rana_planar, rana_three_arms)"
         ("++temperature=1", "temperature: unknown setting (known here:"),
         ("+reference=x", "reference: unknown setting"),
         ("robot.arms.0.length=1", "robot.arms.0.length: unknown setting; did you mean 'link_lengths'?"),
-        ("robot.arms.x.length=1", "must be composable, was \"invalid literal for int() with base 10: 'x'"),
+        ("robot.arms.x.length=1", "configuration: must be composable, was \"Index 'x' (str) is not an int"),
         (
             "scenario.obstacles.0.radius=3",
             "scenario.obstacles.0.radius: must be a setting that is there and takes this",
@@ -60,10 +62,7 @@ OPTIONS = "(options: rana_obstacles, rana_planar, rana_three_arms)"
         ("~ga.mutation_rate", "ga.mutation_rate: must be given, was None"),
         # pairs
         ("ga.num_elites=9", "ga.num_elites: must be at most population_size (8), was 9"),
-        (
-            "planner.num_new_trajectories=9",
-            "planner.num_new_trajectories: must be at most the offspring of a generation (6)",
-        ),
+        ("ga.num_elites=8", "planner.num_new_trajectories: must be at most the offspring of a generation (0), was 1"),
         (
             "scenario.q_start=[[90,0],[270,0]]",
             "scenario.q_start: must be free of collision (two arms overlap by 1 unit)",
@@ -104,9 +103,7 @@ OPTIONS = "(options: rana_obstacles, rana_planar, rana_three_arms)"
     ],
 )
 def test_overrides(refused: Refused, override: str, message: str) -> None:
-    said = refused("run", *PLANAR, override)
-    assert message in said
-    assert override.split("=")[0].lstrip("+~") in said or "override" in said or "scenario" in said or "gaa" in said
+    assert message in refused("run", *PLANAR, override)
 
 
 @pytest.mark.parametrize(
@@ -143,7 +140,6 @@ def test_overrides(refused: Refused, override: str, message: str) -> None:
             ("evaluate", "a.json", "b.json", "experiment=rana_planar"),
             "motion file: one is needed (.json or .npy), got 2: a",
         ),
-        (("evaluate", "a.json", "experiment=rana_planr"), "experiment: no option 'rana_planr'"),
         (("reproduce", "no/such.mcap"), "no/such.mcap: cannot be read: No such file or directory"),
         (("reproduce", "abc"), "NOTHING TO COMPARE: hash: no run 'abc' among the 0 in"),
         (("reproduce", "xyz"), "NOTHING TO COMPARE: hash: must be 1 to 64 hexadecimal digits, was 'xyz'"),
@@ -153,9 +149,7 @@ def test_overrides(refused: Refused, override: str, message: str) -> None:
         ),
     ],
 )
-def test_commands(refused: Refused, words: tuple[str, ...], message: str, tmp_path: Path) -> None:
-    if words[0] == "evaluate" and words[-1].endswith("r"):
-        (tmp_path / "a.json").write_text("[]")
+def test_commands(refused: Refused, words: tuple[str, ...], message: str) -> None:
     assert message in refused(*words)
 
 
@@ -174,8 +168,6 @@ def test_an_unknown_hash_lists_what_is_stored(refused: Refused, stored: Path) ->
 
 def test_an_ambiguous_hash_lists_the_candidates(refused: Refused, stored: Path) -> None:
     for k in range(16):  # seeds until two runs share their first digit
-        from evoexp import compose
-
         condition = compose.expand([*PLANAR, f"seed={k + 1}"])[0].conditions[0].condition
         RunDirectory(stored, condition.id).create(condition.to_json(), {})
         names = [run.hash12 for run in find_runs(stored)]
@@ -208,15 +200,19 @@ def test_a_damaged_log_is_named(refused: Refused, stored: Path) -> None:
         assert refused("reproduce", str(log)).startswith(f"{log}: ")
         assert refused("reproduce", run.hash12).startswith(f"{log}: ")
     log.write_bytes(whole[:middle])
-    assert refused("show", run.hash12).startswith(f"{log}: cut") if False else True
+    assert refused("show", run.hash12).startswith(f"{log}: cut")
     log.unlink()
     assert refused("reproduce", str(log)) == f"{log}: cannot be read: No such file or directory"
 
 
 def crafted(config: bytes, path: Path, source: Path) -> Path:
     """Write a log that is whole, but whose configuration says something else."""
-    stored = read_log(source)
-    log = Log(stored.condition_id, config, 0, np.random.default_rng(0), environment={})
+    stored, condition = read_log(source), Condition.from_json(read_log(source).config_json)
+    rng = condition.rng(0)
+    log = Log(stored.condition_id, config, 0, rng, environment={})
+    planner, problem = condition.prepare()
+    for generation in planner.evolve(problem, rng):
+        log.write(generation)
     path.write_bytes(log.finish(stored.summary).content)
     return path
 
@@ -226,7 +222,7 @@ def crafted(config: bytes, path: Path, source: Path) -> Path:
     [
         ("os.system", "planner.ga._target_: must be a registered component, was 'os.system'"),
         ("subprocess:Popen", "planner.ga._target_: must be a registered component, was 'subprocess:Popen'"),
-        ("arms", "planner.ga.population_size: unknown setting"),
+        ("arms", "planner.ga.arms: must be given, was None"),
     ],
 )
 def test_a_log_cannot_name_other_code(
@@ -251,8 +247,6 @@ def test_a_log_whose_configuration_is_another_one_is_refused(refused: Refused, s
 
 
 def test_another_revision_says_how_to_run_anew(refused: Refused, stored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from evoexp.evolution.settings import GeneticSettings
-
     run = find_runs(stored)[0]
     monkeypatch.setattr(GeneticSettings, "revision", 2)
     said = refused("reproduce", run.hash12)

@@ -14,7 +14,6 @@ from evoexp import compose
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.reproduce import Comparison, reproduce_log
 from evoexp.condition import Condition
-from evoexp.objectives.string_fitness import StringFitness
 from evoexp.records import Generation
 
 LAST = 10  # generations of the smoke budget
@@ -44,33 +43,30 @@ def record(condition: Condition, directory: Path) -> Path:
     return path
 
 
-def compare_changed(condition: Condition, directory: Path, change: Change) -> Comparison:
-    """Record a run whose generations are changed on their way to the log, and compare it with the true one."""
-    kind = type(condition.planner)
+def record_changed(condition: Condition, directory: Path, change: Change) -> Path:
+    """Record a run whose generations are changed on their way out of the planner."""
+    kind: Any = type(condition.planner)
     evolve = kind.evolve
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(kind, "evolve", lambda planner, problem, rng: change(evolve(planner, problem, rng), rng))
-        path = record(condition, directory)
-    return reproduce_log(path)
+        return record(condition, directory)
 
 
-def record_nudged(condition: Condition, directory: Path, generation: int, individual: int = 7) -> Path:
-    """Record a run in which the cost of one individual of one generation was computed one ulp higher."""
-    cost = StringFitness.cost
-    calls = 0
+def compare_changed(condition: Condition, directory: Path, change: Change) -> Comparison:
+    """Compare a changed run with the true one."""
+    return reproduce_log(record_changed(condition, directory, change))
 
-    def nudged(objective: StringFitness, lengths: Any, unevenness: Any, collisions: Any, out: Any) -> None:
-        nonlocal calls
-        cost(objective, lengths, unevenness, collisions, out)
-        if calls == generation:
-            one_ulp_more(out, individual)
-        calls += 1
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(StringFitness, "cost", nudged)
-        path = record(condition, directory)
-    assert calls > LAST
-    return path
+def nudged_at(generation: int) -> Change:
+    """Raise one cost of one generation by one ulp, in the planner's own memory: what follows builds on it."""
+
+    def change(generations: Iterator[Generation], rng: np.random.Generator) -> Iterator[Generation]:
+        for row in generations:
+            if row.index == generation:
+                one_ulp_more(row.costs, 7)
+            yield row
+
+    return change
 
 
 def test_an_unchanged_run_matches(condition: Condition, tmp_path: Path) -> None:
@@ -82,7 +78,7 @@ def test_an_unchanged_run_matches(condition: Condition, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("generation", [0, 1, 6, LAST])
 def test_one_ulp_in_one_cost(condition: Condition, tmp_path: Path, generation: int) -> None:
-    comparison = reproduce_log(record_nudged(condition, tmp_path, generation))
+    comparison = compare_changed(condition, tmp_path, nudged_at(generation))
     assert comparison.verdict == f"DIVERGES at generation {generation}"
     assert comparison.diverged_at == generation
     assert not comparison.matches
@@ -142,7 +138,7 @@ def test_a_longer_run(condition: Condition, tmp_path: Path) -> None:
 
 
 def test_the_command_says_it_in_another_process(tmp_path: Path) -> None:
-    path = record_nudged(LABELLED[0].condition, tmp_path, generation=3)
+    path = record_changed(LABELLED[0].condition, tmp_path, nudged_at(3))
     command = [sys.executable, "-m", "evoexp", "reproduce", str(path)]
     environment = os.environ | {"COLUMNS": "120", "EVOEXP_OUTPUTS": str(tmp_path / "none")}
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment, cwd=tmp_path)

@@ -9,10 +9,18 @@ from rich.table import Table
 PIPED_WIDTH = 160  # columns of a table in a pipe, where nobody has to read it on a narrow screen
 
 
+class _Console(Console):
+    """Goes on in silence where the reader of a pipe has left: the work and its exit code are the same."""
+
+    def on_broken_pipe(self) -> None:
+        self.quiet = True
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
 def plain_console() -> Console:
     """Return a console on stdout that prints text as it is: a label like `[4, 4]` is no markup."""
     piped = not sys.stdout.isatty() and "COLUMNS" not in os.environ
-    return Console(markup=False, highlight=False, width=PIPED_WIDTH if piped else None)
+    return _Console(markup=False, highlight=False, width=PIPED_WIDTH if piped else None)
 
 
 def new_table(title: str = "") -> Table:

@@ -29,10 +29,11 @@ def main(arguments: argparse.Namespace) -> int:
         run = resolve(outputs_root(), arguments.hash)
     except UnknownHash as error:
         return _show_shipped(console, arguments.hash, error)
+    config, replicates, manifest = json.loads(run.config_json()), _replicates(run), run.manifest()
     _print_head(console, run.condition_id)
-    _print_config(console, json.loads(run.config_json()))
-    console.print(_replicates(run))
-    _print_config(console, {"manifest": {k: v for k, v in run.manifest().items() if k != "condition"}})
+    _print_config(console, config)
+    console.print(replicates)
+    _print_config(console, {"manifest": {k: v for k, v in manifest.items() if k != "condition"}})
     return 0
 
 

@@ -1,0 +1,156 @@
+"""`evoexp list` and `evoexp show`: what is stored, what is shipped, what failed, what is damaged."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from command_samples import SMALL, Evoexp
+
+from evoexp import compose, shipped
+from evoexp.batch.replicate import run_replicate
+from evoexp.shipped import Shipped
+from evoexp.store.run_directory import RunDirectory, find_runs
+from evoexp.store.tables import read_summaries
+
+PLANAR = ("experiment=rana_planar", *SMALL)
+
+
+@pytest.fixture(params=[80, 140])
+def width(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> int:
+    monkeypatch.setenv("COLUMNS", str(request.param))
+    return int(request.param)
+
+
+def cells(out: str) -> dict[str, list[str]]:
+    """Return hash → the other cells of the first line of its row."""
+    rows = [[cell.strip() for cell in line.strip("│").split("│")] for line in out.splitlines() if line.startswith("│")]
+    return {row[0]: row[1:] for row in rows if re.fullmatch("[0-9a-f]{12}", row[0])}
+
+
+def test_without_runs(evoexp: Evoexp, outputs: Path) -> None:
+    said = evoexp("list")
+    assert said.code == 0
+    assert f"no runs stored in {outputs}" in said.out
+    for name in compose.options("experiment"):
+        assert f"│ {name} " in said.out
+        assert compose.description(name).split(" ")[0] in said.out
+    assert not outputs.exists()
+
+
+def test_stored_runs(evoexp: Evoexp, stored: Path, width: int) -> None:
+    runs = find_runs(stored)
+    runs[0].write_failure(7, "ArithmeticError: [/] is told to fail", "Traceback …")
+    said = evoexp("list")
+    assert said.code == 0
+    assert "…" not in said.out
+    assert max(map(len, said.out.splitlines())) <= width
+    rows = cells(said.out)
+    assert list(rows) == [run.hash12 for run in runs]
+    assert [row[1:3] for row in rows.values()] == [["2", "1"], ["2", "0"]]
+    assert "(changed)" in said.out
+    assert "via-point GA" in " ".join(said.out.split())
+
+
+def test_damaged_runs_are_listed_beside_the_others(evoexp: Evoexp, stored: Path) -> None:
+    condition = compose.expand(["experiment=rana_planar", "budget=smoke", "seed=5"])[0].conditions[0].condition
+    first, second = find_runs(stored)
+    without_manifest = RunDirectory(stored, condition.id)
+    without_manifest.create(condition.to_json(), {})
+    (without_manifest.path / "manifest.json").unlink()
+    (first.path / "config.json").write_text("{}")
+    log = second.log_path(1)
+    log.write_bytes(log.read_bytes()[:-10])
+    (stored / "runs/0123456789ab").mkdir()  # made, and killed before anything was written
+    (stored / "runs/notes").mkdir()
+    said = evoexp("list")
+    assert said.code == 0
+    rows = cells(said.out)
+    assert list(rows) == sorted([first.hash12, second.hash12, without_manifest.hash12])
+    assert rows[first.hash12][1:] == rows[second.hash12][1:] == ["–", "–", "–", "–"]
+    assert rows[without_manifest.hash12] == ["(no manifest)", "0", "0", "0", "–"]
+    flat = re.sub(r"[\s│]+", "", said.out)
+    assert "config.json:damaged:itshash44136fa355b3isnotthedirectory'sname" in flat
+    assert "0001.mcap:cut" in flat
+
+
+def test_a_damaged_run_is_refused_by_show(refused: Callable[..., str], stored: Path) -> None:
+    first, second = find_runs(stored)
+    (first.path / "config.json").write_text("{}")
+    assert f"{first.path}/config.json: damaged" in refused("show", first.hash12)
+    (second.path / "manifest.json").write_text("[")
+    assert f"{second.path}/manifest.json: damaged" in refused("show", second.hash12)
+
+
+def test_show(evoexp: Evoexp, stored: Path, width: int) -> None:
+    for run in find_runs(stored):
+        run.write_failure(7, "ArithmeticError: [/] is told to fail", "Traceback …")
+        said = evoexp("show", run.condition_id[:5].upper())
+        assert said.code == 0
+        assert said.out.startswith(f"condition {run.condition_id}\n")
+        assert "population_size: 8" in said.out
+        assert "  label: " in said.out
+        assert "command: evoexp run experiment=rana_planar budget=smoke" in said.out
+        table = [line for line in said.out.splitlines() if line.startswith(("│", "┃", "┏", "└"))]
+        assert max(map(len, table)) <= width
+        flat = re.sub(r"[\s│]+", "", "".join(table))
+        assert "7failed–––" in flat
+        assert "ArithmeticError" in flat
+        assert "…" not in "".join(table)
+
+
+def test_digests_are_whole(evoexp: Evoexp, stored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "140")
+    run = find_runs(stored)[0]
+    out = evoexp("show", run.hash12).out
+    assert all(digest in out for digest in read_summaries(run)["digest"])
+
+
+def test_a_pipe_gets_wide_tables(evoexp: Evoexp, stored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("COLUMNS", raising=False)
+    lines = [line for line in evoexp("list").out.splitlines() if "rana_planar, " in line]
+    assert len(lines) == 2
+    assert all("smoke" in line for line in lines), "a row is a line, for grep"
+
+
+@pytest.fixture
+def one_shipped(monkeypatch: pytest.MonkeyPatch) -> Shipped:
+    condition = compose.expand(["experiment=rana_planar", "budget=smoke"])[0].conditions[1].condition
+    row = Shipped("rana_planar", "random search", "smoke", condition.id, "0" * 32)
+    monkeypatch.setattr(shipped, "shipped", lambda: (row,))
+    return row
+
+
+def test_a_shipped_condition_that_never_ran_here(evoexp: Evoexp, outputs: Path, one_shipped: Shipped) -> None:
+    said = evoexp("show", one_shipped.condition_id[:6])
+    assert said.code == 0
+    assert said.out.startswith(
+        f"condition {one_shipped.condition_id}\nshipped as rana_planar, random search, budget smoke"
+    )
+    assert "not run here; run it: evoexp run experiment=rana_planar budget=smoke --only 'random search'\n" in said.out
+    assert "_target_: random_search" in said.out
+    assert not outputs.exists()
+
+
+def test_reproduce_compares_with_the_shipped_table(
+    evoexp: Evoexp, one_shipped: Shipped, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said = evoexp("reproduce", one_shipped.condition_id[:6])
+    assert (said.code, "DIVERGES" in said.out, "MATCH" in said.out) == (1, True, False)
+    said = evoexp("reproduce", one_shipped.condition_id[:6], "--replicate", "1")
+    assert said.code == 2
+    assert said.err.startswith("evoexp: NOTHING TO COMPARE: replicate 1 of ")
+    condition = compose.expand(["experiment=rana_planar", "budget=smoke"])[0].conditions[1].condition
+    right = one_shipped._replace(digest=run_replicate(condition, 0).summary.digest)
+    monkeypatch.setattr(shipped, "shipped", lambda: (right,))
+    said = evoexp("reproduce", one_shipped.condition_id[:6], "--replicate", "0")
+    assert (said.code, "replicate 0 against the shipped table: MATCH" in said.out) == (0, True)
+
+
+def test_an_ambiguous_shipped_hash_lists_the_candidates(
+    refused: Callable[..., str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows = tuple(Shipped("rana_planar", k, "smoke", f"abc{k}" * 16, "0" * 32) for k in "01")
+    monkeypatch.setattr(shipped, "shipped", lambda: rows)
+    for command in ("show", "reproduce"):
+        assert refused(command, "abc") == "hash: 'abc' is ambiguous: abc0abc0abc0, abc1abc1abc1"

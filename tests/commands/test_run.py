@@ -1,0 +1,115 @@
+"""`evoexp run` and `evoexp reproduce` on small experiments."""
+
+import json
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from command_samples import SERIAL, SMALL, Evoexp
+
+from evoexp import compose
+from evoexp.store.run_directory import RunDirectory, find_runs
+
+PLANAR = ("experiment=rana_planar", *SERIAL)
+
+
+def test_a_run_says_what_is_there_and_runs_nothing_twice(
+    evoexp: Evoexp, outputs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    first = evoexp("run", *PLANAR, "--no-report")
+    assert (first.code, first.err) == (0, "")
+    assert re.search(r"^replicates: 4 of 4 done, 0 failed, ETA 0 s$", first.out, re.MULTILINE)
+    for label, condition in compose.expand(PLANAR)[0].conditions:
+        assert condition.id[:12] in first.out
+        assert label.split(" ")[0] in first.out
+    assert first.out.count("2 of 2") == 2
+    assert "…" not in first.out
+    assert max(map(len, first.out.splitlines())) <= 80
+    again = evoexp("run", *PLANAR, "--no-report")
+    assert again.code == 0
+    assert again.out.startswith("nothing to run: every replicate is there\n")
+    assert again.out.split("\n", 1)[1] == first.out[first.out.index("rana_planar@smoke") :]
+    assert not (outputs / "reports").exists()
+
+
+def test_a_run_ends_with_its_report(evoexp: Evoexp, outputs: Path) -> None:
+    said = evoexp("run", *PLANAR, "num_replicates=1", "report=paper", "report.formats=[png]", "report.dpi=20")
+    assert said.code == 0
+    (line,) = [line for line in said.out.splitlines() if line.startswith("report: ")]
+    page = Path(line.removeprefix("report: "))
+    assert page.name == "index.md"
+    assert page.parent.parent == outputs / "reports"
+    assert page.parent.name == compose.expand(PLANAR)[0].report_name
+    assert "ga.population_size=8" in page.read_text()
+
+
+def test_several_experiments_share_a_batch_and_a_condition_runs_once(evoexp: Evoexp, outputs: Path) -> None:
+    words = ("-m", "experiment=rana_planar,rana_three_arms", *SERIAL, "num_replicates=1", "control=null", "--no-report")
+    said = evoexp("run", *words)
+    assert said.code == 0
+    assert "replicates: 2 of 2 done" in said.out, "both labels of rana_planar are one condition without its control"
+    assert len(find_runs(outputs)) == 2
+    assert "rana_planar@smoke+" in said.out
+    assert "rana_three_arms@smoke+" in said.out
+
+
+def test_the_manifest_holds_a_command_that_runs_it_again(evoexp: Evoexp, outputs: Path) -> None:
+    assert (
+        evoexp(
+            "run", *PLANAR, "num_replicates=1", "-m", "seed=0,1", "--only", "random search · seed=1", "--no-report"
+        ).code
+        == 0
+    )
+    (run,) = find_runs(outputs)
+    manifest = run.manifest()
+    assert (manifest["experiment"], manifest["label"]) == ("rana_planar", "random search · seed=1")
+    words = shlex.split(manifest["command"])
+    assert words[:2] == ["evoexp", "run"]
+    said = evoexp(*words[1:], "--no-report")
+    assert "nothing to run: every replicate is there" in said.out
+    assert len(find_runs(outputs)) == 1
+
+
+def test_the_command_line_has_no_say_in_the_identity(evoexp: Evoexp, stored: Path) -> None:
+    before = {run.hash12 for run in find_runs(stored)}
+    for words in (
+        (*reversed(PLANAR),),
+        (*SMALL, "experiment=rana_planar", "runner.num_workers=1", "num_replicates=1"),
+        (*PLANAR, "scenario.security_margin=1", "report.dpi=50", "seed=0"),
+        (*PLANAR, "--only", "via-point GA"),
+        (*PLANAR, "-m"),
+    ):
+        said = evoexp("run", *words, "--no-report")
+        assert said.out.startswith("nothing to run: every replicate is there\n"), words
+    assert {run.hash12 for run in find_runs(stored)} == before
+
+
+def test_reproduce_matches(evoexp: Evoexp, stored: Path) -> None:
+    for run in find_runs(stored):
+        said = evoexp("reproduce", run.hash12[:8])
+        assert (said.code, said.err) == (0, "")
+        assert said.out.count("MATCH") == 3
+        assert said.out.endswith("2 of 2 MATCH\n")
+        one = evoexp("reproduce", run.hash12, "--replicate", "1")
+        assert (one.code, one.out.splitlines()[-1]) == (0, "1 of 1 MATCH")
+        log = evoexp("reproduce", str(run.log_path(0)))
+        assert (log.code, log.out.splitlines()[-1]) == (0, "1 of 1 MATCH")
+
+
+def test_a_corrupt_log_stops_the_summary_but_is_named(evoexp: Evoexp, stored: Path) -> None:
+    run = RunDirectory(stored, compose.expand(PLANAR)[0].conditions[0].condition.id)
+    log = run.log_path(0)
+    log.write_bytes(log.read_bytes()[:100])
+    said = evoexp("run", *PLANAR, "--no-report")
+    assert said.code == 2
+    assert said.err.startswith(f"evoexp: {log}: cut")
+    log.unlink()
+    assert evoexp("run", *PLANAR, "--no-report").code == 0
+
+
+def test_a_stored_configuration_is_the_canonical_form(stored: Path) -> None:
+    for run in find_runs(stored):
+        text = run.config_json()
+        assert json.dumps(json.loads(text), sort_keys=True, separators=(",", ":")).encode() == text

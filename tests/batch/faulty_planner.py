@@ -1,7 +1,7 @@
 """A plug-in for tests: Rana & Zalzala's planner, which misbehaves where the environment tells it to.
 
-`FAULTY` is `<what>:<replicates>`: `raise:1,3`, `kill:2`, `kill_once:2`, `slow:0,1,2`. It is no part of the condition, so
-that results can be compared with those of an undisturbed run.
+`FAULTY` holds `<what>:<replicates>`, several with `;`: `raise:1,3`, `kill:2`, `kill_once:4`, `slow:0,1,2`. It is no part
+of the condition, so that results can be compared with those of an undisturbed run.
 """
 
 import multiprocessing
@@ -24,19 +24,32 @@ class Faulty(ViaPointGa):
     component: ClassVar[str] = "faulty"
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
-        what, _, replicates = os.environ.get("FAULTY", "").partition(":")
-        (replicate,) = rng.bit_generator.seed_seq.spawn_key
-        concerned = str(replicate) in replicates.split(",")
-        worker = multiprocessing.parent_process() is not None
+        seed = rng.bit_generator.seed_seq
+        assert isinstance(seed, np.random.SeedSequence)
+        faults = faults_of(seed.spawn_key[0])
         for generation in super().evolve(problem, rng):
-            if concerned and what == "slow" and worker:
+            if "slow" in faults and in_worker():
                 time.sleep(SLOW_S)
-            if concerned and what == "raise" and generation.index == 1:
-                raise ArithmeticError(f"replicate {replicate} is [bold]told[/] to fail")
-            if concerned and what in ("kill", "kill_once") and generation.index == 1 and worker:
-                deaths = Path(os.environ["FAULTY_FLAGS"]) / str(replicate)
-                count = int(deaths.read_text()) if deaths.exists() else 0
-                if what == "kill" or count == 0:
-                    deaths.write_text(str(count + 1))
-                    os.kill(os.getpid(), signal.SIGKILL)
+            if "raise" in faults and generation.index == 1:
+                raise ArithmeticError(f"replicate {seed.spawn_key[0]} is [bold]told[/] to fail\nand says why")
+            if faults & {"kill", "kill_once"} and generation.index == 1 and in_worker():
+                die(seed.spawn_key[0], once="kill_once" in faults)
             yield generation
+
+
+def faults_of(replicate: int) -> set[str]:
+    parts = [part.partition(":") for part in os.environ.get("FAULTY", "").split(";") if part]
+    return {what for what, _, replicates in parts if str(replicate) in replicates.split(",")}
+
+
+def in_worker() -> bool:
+    return multiprocessing.parent_process() is not None
+
+
+def die(replicate: int, once: bool) -> None:
+    """Kill this process, and note it in a file; with `once`, not again."""
+    flag = Path(os.environ["FAULTY_FLAGS"]) / str(replicate)
+    deaths = int(flag.read_text()) if flag.exists() else 0
+    if not once or deaths == 0:
+        flag.write_text(str(deaths + 1))
+        os.kill(os.getpid(), signal.SIGKILL)

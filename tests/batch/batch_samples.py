@@ -1,0 +1,34 @@
+"""Small batches."""
+
+from pathlib import Path
+
+from evoexp.batch.runner import Batch, Outcome
+from evoexp.batch.settings import RunnerSettings
+from evoexp.condition import Condition
+from evoexp.store.log_reader import read_log
+from evoexp.store.run_directory import RunDirectory
+
+WORDS = (
+    "experiment=rana_obstacles",
+    "scenario=rana_planar",
+    "planner._target_=faulty",
+    "ga.population_size=8",
+    "ga.num_generations=3",
+    "planner.num_new_trajectories=1",
+    "num_replicates=12",
+)
+
+
+def new_batch(outputs: Path, *wanted: tuple[Condition, int], num_workers: int = 1) -> Batch:
+    settings = RunnerSettings(num_workers=num_workers)
+    return Batch([(condition, count, {"label": "test"}) for condition, count in wanted], settings, outputs)
+
+
+def run(outputs: Path, *wanted: tuple[Condition, int], num_workers: int = 1) -> list[Outcome]:
+    return list(new_batch(outputs, *wanted, num_workers=num_workers).run())
+
+
+def digests(outputs: Path, condition: Condition) -> dict[int, str]:
+    """Return replicate → digest of what is stored, every log verified."""
+    directory = RunDirectory(outputs, condition.id)
+    return {k: read_log(directory.log_path(k)).summary.digest for k in sorted(directory.completed())}

@@ -1,0 +1,246 @@
+"""A batch runs what is missing, keeps what is there, and survives what fails."""
+
+import json
+import os
+from collections import deque
+from pathlib import Path
+
+import pytest
+from batch_samples import WORDS, digests, new_batch, run
+from hypothesis import given
+from hypothesis import strategies as st
+
+from evoexp import compose
+from evoexp.batch.runner import MAX_BUNDLE, TASK_S, Job, Outcome, _Bundles, fan_out
+from evoexp.cli import main
+from evoexp.condition import Condition
+from evoexp.errors import Busy, SettingError
+from evoexp.store.run_directory import RunDirectory
+from evoexp.store.tables import read_summaries
+
+
+def stamps(directory: RunDirectory) -> dict[str, tuple[int, bytes]]:
+    """Return name → modification time and content of every log."""
+    return {path.name: (path.stat().st_mtime_ns, path.read_bytes()) for path in directory.replicates.glob("*.mcap")}
+
+
+def test_only_what_is_missing_runs(faulty: Condition, tmp_path: Path) -> None:
+    outcomes = run(tmp_path, (faulty, 5))
+    assert [(o.condition_id, o.replicate, o.reason) for o in outcomes] == [(faulty.id, k, "") for k in range(5)]
+    directory = RunDirectory(tmp_path, faulty.id)
+    before, first = digests(tmp_path, faulty), stamps(directory)
+    assert len(set(before.values())) == 5
+    for replicate in (1, 3):
+        directory.log_path(replicate).unlink()
+    directory.summary_path.unlink()
+    assert [outcome.replicate for outcome in run(tmp_path, (faulty, 5))] == [1, 3]
+    assert digests(tmp_path, faulty) == before
+    again = stamps(directory)
+    assert all(again[name] == first[name] for name in ("0000.mcap", "0002.mcap", "0004.mcap"))
+    assert directory.summary_path.exists()
+    summaries = read_summaries(directory)
+    assert summaries["replicate"].tolist() == list(range(5))
+    assert summaries["digest"].tolist() == list(before.values())
+    assert run(tmp_path, (faulty, 5)) == []
+
+
+def test_more_replicates_leave_the_earlier_ones_alone(faulty: Condition, tmp_path: Path) -> None:
+    run(tmp_path, (faulty, 2))
+    directory = RunDirectory(tmp_path, faulty.id)
+    before = stamps(directory) | {"": (0, (directory.path / "manifest.json").read_bytes())}
+    assert [outcome.replicate for outcome in run(tmp_path, (faulty, 4))] == [2, 3]
+    after = stamps(directory) | {"": (0, (directory.path / "manifest.json").read_bytes())}
+    assert {name: after[name] for name in before} == before
+    assert read_summaries(directory)["replicate"].tolist() == [0, 1, 2, 3]
+    assert run(tmp_path, (faulty, 1)) == []
+    assert sorted(directory.completed()) == [0, 1, 2, 3], "fewer replicates take nothing away"
+
+
+def test_a_condition_wanted_twice_runs_once(faulty: Condition, tmp_path: Path) -> None:
+    other = faulty._replace(seed=1)
+    batch = new_batch(tmp_path, (faulty, 1), (other, 1), (faulty, 3))
+    assert [(job.condition_id, job.replicate) for job in batch.jobs] == [
+        *((faulty.id, k) for k in range(3)),
+        (other.id, 0),
+    ]
+    assert len(list(batch.run())) == 4
+    assert len(batch.runs) == 2
+
+
+def test_planning_and_preparing_write_nothing(faulty: Condition, tmp_path: Path) -> None:
+    batch = new_batch(tmp_path / "outputs", (faulty, 2))
+    batch.prepare()
+    assert len(batch.jobs) == 2
+    assert not (tmp_path / "outputs").exists()
+    bad = compose.expand([*WORDS, "scenario.q_start=[[90,0],[270,0]]"])[0].conditions[0].condition
+    with pytest.raises(SettingError, match="scenario.q_start: must be free of collision"):
+        new_batch(tmp_path / "outputs", (faulty, 2), (bad, 2)).prepare()
+    assert not (tmp_path / "outputs").exists()
+
+
+def test_a_failed_replicate_is_a_row_and_a_file_and_the_others_go_on(
+    faulty: Condition, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FAULTY", "raise:0,2")
+    outcomes = run(tmp_path, (faulty, 4))
+    assert [(o.replicate, o.failed) for o in outcomes] == [(0, True), (1, False), (2, True), (3, False)]
+    assert outcomes[2].reason == "ArithmeticError: replicate 2 is [bold]told[/] to fail"
+    directory = RunDirectory(tmp_path, faulty.id)
+    assert (directory.completed(), directory.failed()) == ({1, 3}, {0, 2})
+    failure = json.loads(directory.failure_path(2).read_bytes())
+    assert failure["reason"] == outcomes[2].reason
+    assert failure["traceback"].startswith("Traceback (most recent call last):\n")
+    assert failure["traceback"].endswith("to fail\nand says why\n")
+    assert "in evolve" in failure["traceback"]
+    rows = read_summaries(directory)
+    assert rows["status"].tolist() == ["failed", "done", "failed", "done"]
+    assert rows["stop_reason"][2] == outcomes[2].reason
+
+    monkeypatch.setenv("FAULTY", "raise:2")
+    assert [(o.replicate, o.failed) for o in run(tmp_path, (faulty, 4))] == [(0, False), (2, True)]
+    monkeypatch.delenv("FAULTY")
+    assert [(o.replicate, o.failed) for o in run(tmp_path, (faulty, 4))] == [(2, False)]
+    assert directory.failed() == set()
+    assert not list(directory.replicates.glob("*.failed.json"))
+    assert (read_summaries(directory)["status"] == "done").all()
+
+
+def test_failures_on_the_command_line(
+    faulty: Condition, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("EVOEXP_OUTPUTS", str(tmp_path))
+    monkeypatch.setenv("FAULTY", "raise:1")
+    monkeypatch.setenv("COLUMNS", "200")
+    words = ["run", *WORDS[:-1], "num_replicates=3", "runner=serial", "--no-report"]
+    assert main(words) == 1
+    out, err = capsys.readouterr()
+    assert err == f"failed: {faulty.id[:12]} #1: ArithmeticError: replicate 1 is [bold]told[/] to fail\n"
+    assert "replicates: 2 of 3 done, 1 failed, ETA 0 s" in out
+    table = out[out.index("1 failed\n") :]
+    assert all(f"┃ {column} " in table for column in ("hash", "reason", "traceback in"))
+    assert f"│ {faulty.id[:12]} │ 1 │ ArithmeticError: replicate 1 is [bold]told[/] to fail │ " in table
+    assert "2 of 3" in out[: out.index("1 failed\n")]
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main(words) == 1
+    narrow = capsys.readouterr().out
+    assert max(map(len, narrow[narrow.index("1 failed\n") :].splitlines())) <= 80
+    assert "…" not in narrow
+
+    monkeypatch.delenv("FAULTY")
+    assert main(words) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    assert "replicates: 1 of 1 done, 0 failed" in out
+    assert "3 of 3" in out
+
+
+def test_where_every_replicate_failed_there_is_still_a_table_and_exit_code_1(
+    faulty: Condition, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("EVOEXP_OUTPUTS", str(tmp_path))
+    monkeypatch.setenv("FAULTY", "raise:0,1")
+    code = main(["run", *WORDS[:-1], "num_replicates=2", "runner=serial", "report=paper", "report.formats=[svg]"])
+    out = capsys.readouterr().out
+    assert code == 1
+    assert "2 failed\n" in out
+    assert "report: " in out
+
+
+def test_stopping_keeps_what_is_finished_and_leaves_no_lock(faulty: Condition, tmp_path: Path) -> None:
+    batch = new_batch(tmp_path, (faulty, 4))
+    outcomes = batch.run()
+    assert [next(outcomes).replicate, next(outcomes).replicate] == [0, 1]
+    with pytest.raises(Busy, match=f"run {faulty.id[:12]}: another process is writing it now"):
+        next(new_batch(tmp_path, (faulty, 5)).run())
+    outcomes.close()
+    directory = RunDirectory(tmp_path, faulty.id)
+    with directory.lock():
+        assert directory.completed() == {0, 1}
+    assert directory.summary_path.exists()
+    assert [outcome.replicate for outcome in run(tmp_path, (faulty, 4))] == [2, 3]
+
+
+def test_what_a_killed_writer_left_is_cleared_away(faulty: Condition, tmp_path: Path) -> None:
+    run(tmp_path, (faulty, 2))
+    directory = RunDirectory(tmp_path, faulty.id)
+    whole = directory.log_path(1).read_bytes()
+    directory.log_path(1).unlink()
+    left = directory.replicates / f".0001.mcap.{os.getpid()}.tmp"
+    left.write_bytes(whole[: len(whole) // 2])
+    assert read_summaries(directory)["replicate"].tolist() == [0]
+    assert [outcome.replicate for outcome in run(tmp_path, (faulty, 2))] == [1]
+    assert not left.exists()
+
+
+# Workers
+
+
+def test_workers_give_the_same_digests(
+    faulty: Condition, undisturbed: dict[int, str], tmp_path: Path, fresh_workers: None
+) -> None:
+    outcomes = run(tmp_path / "two", (faulty, 12), num_workers=2)
+    assert sorted(outcome.replicate for outcome in outcomes) == list(range(12))
+    assert all(outcome.content == b"" for outcome in outcomes), "logs are written and let go"
+    assert digests(tmp_path / "two", faulty) == undisturbed
+
+
+def test_a_killed_worker_costs_its_own_replicate_a_retry(
+    faulty: Condition,
+    undisturbed: dict[int, str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    fresh_workers: None,
+) -> None:
+    monkeypatch.setenv("FAULTY", "kill_once:3;kill:7;raise:9")
+    monkeypatch.setenv("FAULTY_FLAGS", str(tmp_path))
+    outcomes = run(tmp_path / "outputs", (faulty, 12), num_workers=2)
+    assert sorted(outcome.replicate for outcome in outcomes) == list(range(12)), "each ends once"
+    reasons = {outcome.replicate: outcome.reason for outcome in outcomes if outcome.failed}
+    assert reasons == {
+        7: "worker process died twice",
+        9: "ArithmeticError: replicate 9 is [bold]told[/] to fail",
+    }
+    assert ((tmp_path / "3").read_text(), (tmp_path / "7").read_text()) == ("1", "2")
+    expected = {k: digest for k, digest in undisturbed.items() if k not in reasons}
+    assert digests(tmp_path / "outputs", faulty) == expected
+    assert "terminated" in RunDirectory(tmp_path / "outputs", faulty.id).failure(7)["traceback"]
+
+
+# Bundles
+
+
+@given(
+    st.integers(0, 300),
+    st.integers(2, 8),
+    st.lists(st.floats(1e-5, 1.0), min_size=1, max_size=20),
+)
+def test_every_job_is_bundled_once(num_jobs: int, num_workers: int, walls: list[float]) -> None:
+    jobs = [Job("0" * 64, b"", k) for k in range(num_jobs)]
+    in_flight: dict[tuple[str, int], Job] = {}
+    bundles = _Bundles(deque(jobs), in_flight, num_workers)
+    seen: list[Job] = []
+    for count, bundle in enumerate(bundles):
+        assert 1 <= len(bundle) <= MAX_BUNDLE
+        assert len(bundle) <= max(1, -(-(num_jobs - len(seen)) // (2 * num_workers))), "nobody waits for one worker"
+        assert all(in_flight[job.key] == job for job in bundle)
+        seen += bundle
+        wall = walls[count % len(walls)]
+        bundles.took([Outcome(job.condition_id, job.replicate, "", "", b"", wall) for job in bundle])
+        assert not in_flight
+    assert seen == jobs
+
+
+def test_bundles_are_as_long_as_a_task() -> None:
+    jobs = [Job("0" * 64, b"", k) for k in range(1000)]
+    bundles = _Bundles(deque(jobs), {}, 2)
+    iterator = iter(bundles)
+    assert len(next(iterator)) == 1, "nothing is known yet"
+    bundles.took([Outcome("0" * 64, 0, "", "", b"", TASK_S / 10)])
+    assert len(next(iterator)) == 10
+    bundles.took([Outcome("0" * 64, k, "", "", b"", 1.0) for k in range(10)])
+    assert len(next(iterator)) == 1
+
+
+def test_no_jobs_are_no_outcomes() -> None:
+    assert list(fan_out([], 1)) == []
+    assert list(fan_out([], 4)) == []

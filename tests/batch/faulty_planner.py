@@ -1,7 +1,7 @@
 """A plug-in for tests: Rana & Zalzala's planner, which misbehaves where the environment tells it to.
 
-`FAULTY` holds `<what>:<replicates>`, several with `;`: `raise:1,3`, `kill:2`, `kill_once:4`, `slow:0,1,2`. It is no part
-of the condition, so that results can be compared with those of an undisturbed run.
+`FAULTY` holds `<what>:<replicates>`, several with `;`: `raise:1,3`, `kill:2`, `kill_once:4`, `slow:0,1,2`. It is no
+part of the condition, so that results can be compared with those of an undisturbed run.
 """
 
 import multiprocessing

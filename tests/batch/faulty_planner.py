@@ -1,6 +1,6 @@
 """A plug-in for tests: Rana & Zalzala's planner, which misbehaves where the environment tells it to.
 
-`FAULTY` holds `<what>:<replicates>`, several with `;`: `raise:1,3`, `kill:2`, `kill_once:4`, `slow:0,1,2`. It is no
+`FAULTY` holds `<what>:<replicates>`, several with `;`: `raise:1,3`, `kill:2`, `kill_once:4`, `hang:5,6`. It is no
 part of the condition, so that results can be compared with those of an undisturbed run.
 """
 
@@ -17,7 +17,7 @@ import numpy as np
 from evoexp.planners.via_point_ga import Problem, ViaPointGa
 from evoexp.records import Generation
 
-SLOW_S = 0.05  # [s] per generation
+HANG_S = 3600.0  # [s] until somebody ends the process
 
 
 class Faulty(ViaPointGa):
@@ -28,8 +28,8 @@ class Faulty(ViaPointGa):
         assert isinstance(seed, np.random.SeedSequence)
         faults = faults_of(seed.spawn_key[0])
         for generation in super().evolve(problem, rng):
-            if "slow" in faults and in_worker():
-                time.sleep(SLOW_S)
+            if "hang" in faults and generation.index == 1 and in_worker():
+                time.sleep(HANG_S)
             if "raise" in faults and generation.index == 1:
                 raise ArithmeticError(f"replicate {seed.spawn_key[0]} is [bold]told[/] to fail\nand says why")
             if faults & {"kill", "kill_once"} and generation.index == 1 and in_worker():

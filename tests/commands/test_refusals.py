@@ -18,6 +18,7 @@ from evoexp.store.run_directory import RunDirectory, find_runs
 Refused = Callable[..., str]
 
 PLANAR = ("experiment=rana_planar", *SERIAL)
+ARMS = ("experiment=rana_obstacles", *SERIAL)
 OPTIONS = "(options: rana_obstacles, rana_planar, rana_three_arms)"
 
 
@@ -37,8 +38,8 @@ OPTIONS = "(options: rana_obstacles, rana_planar, rana_three_arms)"
         ("robot.arms.0.length=1", "robot.arms.0.length: unknown setting; did you mean 'link_lengths'?"),
         ("robot.arms.x.length=1", "configuration: must be composable, was \"Index 'x' (str) is not an int"),
         (
-            "scenario.obstacles.0.radius=3",
-            "scenario.obstacles.0.radius: must be a setting that is there and takes this",
+            "scenario.obstacles.7.radius=3",
+            "scenario.obstacles.7.radius: must be a setting that is there and takes this",
         ),
         ("ga=rana_plana", "ga: no option 'rana_plana'; did you mean 'rana_planar'? (options: rana_planar)"),
         ("robot=../robot/two_planar_2r", "robot: no option '../robot/two_planar_2r'"),
@@ -96,14 +97,14 @@ OPTIONS = "(options: rana_obstacles, rana_planar, rana_three_arms)"
             "ga.population_size=9",
             "ga.population_size: must be given once, was 'ga.population_size=8 ga.population_size=9'",
         ),
-        ("experiment=rana_obstacles", "experiment: must be given once"),
+        ("experiment=rana_planar", "experiment: must be given once"),
         ("ga.mutation_rate=${nothing}", "ga.mutation_rate: must be resolvable, was \"Interpolation key 'nothing' not"),
         ("~robot", "robot: must be given, was '~robot'"),
         ("~seed", "seed: must be given, was '~seed'"),
     ],
 )
 def test_overrides(refused: Refused, override: str, message: str) -> None:
-    assert message in refused("run", *PLANAR, override)
+    assert message in refused("run", *ARMS, override)
 
 
 @pytest.mark.parametrize(

@@ -75,8 +75,7 @@ def test_the_manifest_holds_a_command_that_runs_it_again(evoexp: Evoexp, outputs
 def test_the_command_line_has_no_say_in_the_identity(evoexp: Evoexp, stored: Path) -> None:
     before = {run.hash12 for run in find_runs(stored)}
     for words in (
-        (*reversed(PLANAR),),
-        (*SMALL, "experiment=rana_planar", "runner.num_workers=1", "num_replicates=1"),
+        (*reversed(SMALL), "experiment=rana_planar", "runner.num_workers=1", "num_replicates=1"),
         (*PLANAR, "scenario.security_margin=1", "report.dpi=50", "seed=0"),
         (*PLANAR, "--only", "via-point GA"),
         (*PLANAR, "-m"),

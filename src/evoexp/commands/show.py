@@ -68,7 +68,7 @@ def _replicates(run: RunDirectory) -> Table:
     add_columns(table, "#", right=True)
     add_columns(table, "status")
     add_columns(table, "best cost", "solved", "evaluations", "CPU s", right=True)
-    add_columns(table, "digest")
+    add_columns(table, "digest, or why it failed")
     for row in read_summaries(run).to_dict("records"):
         if row["status"] == "done":
             cells = [f"{row['best_cost']:.6g}", str(row["solved"]), str(row["evaluations"]), f"{row['cpu_s']:.3f}"]

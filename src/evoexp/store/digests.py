@@ -30,18 +30,20 @@ class Chain:
         self._state = state_reader(rng.bit_generator)
         self.link = b""
 
-    def update(self, costs: NDArray[Any], best: bytes) -> str:
+    def state(self) -> bytes:
+        """Return the state of the generator now, for `update`."""
+        return self._state()
+
+    def update(self, costs: NDArray[Any], best: bytes, state: bytes | None = None) -> str:
         """Append one generation and return its link in hex.
 
         Args:
             costs: Costs of the generation, (individuals,).
             best: `array_bytes` of the best solution so far.
+            state: What `state` returned at that generation; None: as it is now.
         """
-        digest = xxhash.xxh3_128(self.link)
-        digest.update(array_bytes(costs))
-        digest.update(best)
-        digest.update(self._state())
-        self.link = digest.digest()
+        generator = self._state() if state is None else state
+        self.link = xxhash.xxh3_128(b"".join((self.link, array_bytes(costs), best, generator))).digest()
         return self.link.hex()
 
     def finish(self, population: NDArray[Any]) -> str:

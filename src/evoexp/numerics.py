@@ -11,74 +11,23 @@ Coefficients and exact-sum tricks: Sun's fdlibm 5.3 (k_sin.c, k_cos.c, s_atan.c,
 provided that this notice is preserved"), here without branches and with short chains of dependent operations.
 """
 
-import contextlib
-import hashlib
 import math
-import os
-import shutil
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
 import numpy as np
-import platformdirs
 from numba.core import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
+
+from evoexp.kernel_cache import use_keyed_cache
 
 DEGREE = 0.017453292519943295  # [rad] one degree
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-KERNEL_ROOMS = ("numerics.py", *(f"{room}/*.py" for room in ("collision", "evolution", "objectives", "paths")))
-KERNEL_ROOMS += ("robots/*.py", "scenarios/*.py", "planners/*.py", "references/*.py")
-
-NUM_KEPT_CACHES = 4  # [-] states of the sources whose compiled kernels are kept
-
-_cache_claims: list[int] = []  # open descriptors: a shared lock on our cache directory for as long as we live
-
-
-def _key_cache_on_sources() -> None:
-    """Give numba a cache directory of its own per state of the sources.
-
-    numba's cache notices an edit in the file of a kernel but not in the files of the functions it calls; keyed on all
-    of evoexp's sources, a stale kernel cannot be loaded.
-    """
-    digest = hashlib.sha256()
-    package = Path(__file__).parent
-    for path in sorted(p for room in KERNEL_ROOMS for p in package.glob(room)):
-        digest.update(path.relative_to(package).as_posix().encode())
-        digest.update(path.read_bytes())
-    cache = Path(os.environ.get("EVOEXP_CACHE") or platformdirs.user_cache_dir("evoexp")) / "kernels"
-    directory = cache / digest.hexdigest()[:16]
-    numba.config.CACHE_DIR = str(directory)  # type: ignore[attr-defined]
-    _prune_caches(directory)
-
-
-def _prune_caches(current: Path) -> None:
-    """Remove the cache directories of older states of the sources; silent where that cannot be done.
-
-    The newest `NUM_KEPT_CACHES` stay (an import renews the time stamp), and so does any that a living process uses:
-    each holds a shared lock on its own directory, and only one without can be locked exclusively.
-    """
-    with contextlib.suppress(ImportError, OSError):
-        import fcntl  # not on Windows: nothing is pruned there
-
-        current.mkdir(parents=True, exist_ok=True)
-        _cache_claims.append(os.open(current, os.O_RDONLY))
-        fcntl.flock(_cache_claims[-1], fcntl.LOCK_SH | fcntl.LOCK_NB)
-        os.utime(current)
-        states = [path for path in current.parent.iterdir() if len(path.name) == 16 and path.is_dir()]
-        for path in sorted(states, key=lambda path: path.stat().st_mtime, reverse=True)[NUM_KEPT_CACHES:]:
-            descriptor = os.open(path, os.O_RDONLY)
-            with contextlib.suppress(OSError):  # in use
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                shutil.rmtree(path, ignore_errors=True)
-            os.close(descriptor)
-
-
-_key_cache_on_sources()
+use_keyed_cache()
 
 
 def kernel(function: Any) -> Any:

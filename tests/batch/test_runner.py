@@ -192,7 +192,8 @@ def test_a_killed_worker_costs_its_own_replicate_a_retry(
         7: "worker process died twice",
         9: "ArithmeticError: replicate 9 is [bold]told[/] to fail",
     }
-    assert ((tmp_path / "3").read_text(), (tmp_path / "7").read_text()) == ("1", "2")
+    assert (tmp_path / "3").read_text() == "1"
+    assert (tmp_path / "7").read_text() in ("2", "3"), "twice alone, and before that perhaps in the pool"
     expected = {k: digest for k, digest in undisturbed.items() if k not in reasons}
     assert digests(tmp_path / "outputs", faulty) == expected
     assert "terminated" in RunDirectory(tmp_path / "outputs", faulty.id).failure(7)["traceback"]

@@ -206,12 +206,15 @@ class _Bundles:
 
 
 def _run_alone(job: Job) -> Outcome:
-    """Run one job in a process of its own; a second death is a failure."""
-    try:
-        outcome: Outcome = next(in_workers(2, [joblib.delayed(run_jobs)([job])]))[0]
-        return outcome
-    except TerminatedWorkerError as error:
-        return Outcome(job.condition_id, job.replicate, "worker process died twice", str(error), b"", 0.0)
+    """Run one job in a process of its own; where that dies, once more (who had brought the pool down is not known)."""
+    trace = ""
+    for _ in range(2):
+        try:
+            outcome: Outcome = next(in_workers(2, [joblib.delayed(run_jobs)([job])]))[0]
+            return outcome
+        except TerminatedWorkerError as error:
+            trace = str(error)
+    return Outcome(job.condition_id, job.replicate, "worker process died twice", trace, b"", 0.0)
 
 
 def _warm(jobs: Sequence[Job], settings: RunnerSettings) -> int:

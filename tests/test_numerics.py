@@ -18,7 +18,7 @@ import pytest
 import scipy.stats
 from numpy.typing import NDArray
 
-from evoexp import numerics
+from evoexp import kernel_cache, numerics
 from evoexp.numerics import acos, asin, atan2, cos, exp, kernel, log, pow_int, sin, sincos, standard_normal
 
 Array = NDArray[Any]
@@ -375,7 +375,7 @@ def test_old_caches_go_but_recent_and_claimed_ones_stay(tmp_path: Path, monkeypa
     monkeypatch.setattr(numerics, "_cache_claims", claims)
     used = os.open(states[6], os.O_RDONLY)
     fcntl.flock(used, fcntl.LOCK_SH)
-    numerics._prune_caches(states[7])  # imported just now: the newest
+    kernel_cache._prune_caches(states[7])  # imported just now: the newest
     kept = {path.name for path in tmp_path.iterdir()}
     for descriptor in (used, *claims):
         os.close(descriptor)
@@ -385,5 +385,5 @@ def test_old_caches_go_but_recent_and_claimed_ones_stay(tmp_path: Path, monkeypa
 def test_pruning_is_silent_where_it_cannot_write(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.touch()
-    numerics._prune_caches(blocked / "0123456789abcdef")
+    kernel_cache._prune_caches(blocked / "0123456789abcdef")
     assert blocked.is_file()

@@ -372,7 +372,7 @@ def test_old_caches_go_but_recent_and_claimed_ones_stay(tmp_path: Path, monkeypa
     other.mkdir()
     os.utime(other, (0, 0))
     claims: list[int] = []
-    monkeypatch.setattr(numerics, "_cache_claims", claims)
+    monkeypatch.setattr(kernel_cache, "_cache_claims", claims)
     used = os.open(states[6], os.O_RDONLY)
     fcntl.flock(used, fcntl.LOCK_SH)
     kernel_cache._prune_caches(states[7])  # imported just now: the newest

@@ -127,6 +127,7 @@ _MUST = {
     "union_tag_invalid": "one of {expected_tags}",
     "union_tag_not_found": "given with its {discriminator}",
     "model_type": "a {class_name}",
+    "model_attributes_type": "a mapping",
     "is_instance_of": "a {class}",
 }
 

@@ -11,7 +11,7 @@ import traceback
 from collections import deque
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import joblib
 from joblib.externals.loky.process_executor import TerminatedWorkerError
@@ -210,8 +210,8 @@ def _run_alone(job: Job) -> Outcome:
     trace = ""
     for _ in range(2):
         try:
-            outcome: Outcome = next(in_workers(2, [joblib.delayed(run_jobs)([job])]))[0]
-            return outcome
+            ((outcome,),) = in_workers(2, [joblib.delayed(run_jobs)([job])])
+            return cast(Outcome, outcome)
         except TerminatedWorkerError as error:
             trace = str(error)
     return Outcome(job.condition_id, job.replicate, "worker process died twice", trace, b"", 0.0)

@@ -14,7 +14,8 @@ from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from evoexp.collision.touching_spheres import Clearance, SphereCollision, TouchingSpheres, clearances
+from evoexp.collision.sphere_kernels import clearances
+from evoexp.collision.touching_spheres import Clearance, SphereCollision, TouchingSpheres
 from evoexp.errors import SettingError
 from evoexp.evolution import crossover
 from evoexp.evolution.crossover import cross_at_sites

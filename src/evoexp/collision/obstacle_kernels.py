@@ -1,0 +1,73 @@
+"""Kernels of static obstacles: signed distances of points of a robot to their surfaces, a block at a time."""
+
+import numpy as np
+
+from evoexp.numerics import kernel
+from evoexp.robots.kinematics import BLOCK, U
+from evoexp.scenarios.obstacles import BOX, SPHERE
+
+ROWS = 3 * BLOCK  # x, y, z of a point in a block
+MARGIN = 1.0 + 1e-9  # bounds are widened by it, so that rounding cannot skip what touches
+
+
+@kernel
+def meet(one, i, two, j, within):  # type: ignore[no-untyped-def]
+    """Whether the points at offsets i and j are closer than `within` in any lane."""
+    squared = within * within
+    count = 0
+    for n in range(BLOCK):
+        a, b = i + U(n), j + U(n)
+        dx, dy = one[a] - two[b], one[a + U(BLOCK)] - two[b + U(BLOCK)]
+        dz = one[a + U(2 * BLOCK)] - two[b + U(2 * BLOCK)]
+        count += dx * dx + dy * dy + dz * dz < squared
+    return count > 0
+
+
+@kernel
+def to_obstacles(obstacles, bounds, limit, centers, middles, scratch, out):  # type: ignore[no-untyped-def]
+    """Lower `out` (BLOCK,), the limit, to the signed distance of any centre to any obstacle's surface."""
+    _, _, reach, spheres, _ = bounds
+    kind, center, rotation, size = obstacles
+    place = np.empty(ROWS)
+    for o in range(len(kind)):
+        for row in range(3):
+            place[row * BLOCK : (row + 1) * BLOCK] = center[o, row]
+        extent = _length(size[o, 0], size[o, 1], size[o, 2]) if kind[o] == BOX else size[o, 0] + size[o, 1]
+        for link in range(len(reach)):
+            if meet(middles, U(link) * U(ROWS), place, U(0), (limit + reach[link] + extent) * MARGIN):
+                for i in range(spheres[link, 0], spheres[link, 1]):
+                    _into_frame(center[o], rotation[o], centers, U(i) * U(ROWS), scratch)
+                    _to_obstacle(kind[o], size[o, 0], size[o, 1], size[o, 2], scratch, out)
+
+
+@kernel
+def _to_obstacle(kind, a, b, c, point, out):  # type: ignore[no-untyped-def]
+    """Lower `out` to the signed distance of points in an obstacle's frame to its surface."""
+    for n in range(BLOCK):
+        lane = U(n)
+        x, y, z = point[lane], point[U(BLOCK) + lane], point[U(2 * BLOCK) + lane]
+        if kind == SPHERE:
+            distance = _length(x, y, z) - a
+        elif kind == BOX:
+            u, v, w = abs(x) - a, abs(y) - b, abs(z) - c
+            distance = _length(max(u, 0.0), max(v, 0.0), max(w, 0.0)) + min(max(u, max(v, w)), 0.0)
+        else:
+            distance = _length(x, y, z - min(max(z, -b), b)) - a
+        out[lane] = min(out[lane], distance)
+
+
+@kernel
+def _into_frame(center, rotation, centers, i, out):  # type: ignore[no-untyped-def]
+    """Centres at offset i seen from a frame, (ROWS,)."""
+    cx, cy, cz = center[0], center[1], center[2]
+    for row in range(3):
+        a, b, c, e = rotation[row], rotation[3 + row], rotation[6 + row], U(row * BLOCK)
+        for n in range(BLOCK):
+            lane = i + U(n)
+            x, y, z = centers[lane] - cx, centers[lane + U(BLOCK)] - cy, centers[lane + U(2 * BLOCK)] - cz
+            out[e + U(n)] = a * x + b * y + c * z
+
+
+@kernel
+def _length(x, y, z):  # type: ignore[no-untyped-def]
+    return np.sqrt(x * x + y * y + z * z)

@@ -5,6 +5,8 @@ arms and all obstacles; the configuration is innermost. What limits it is the ar
 operations in the plane and nine in space, on values that stay in the first-level cache; square roots are taken once per
 pair of arms, of the least squared distance. Who only asks for collisions (`limit` 0) is spared the pairs of links that
 are far apart in a whole block.
+
+`space` is None for what moves in a plane, else true: by its type numba compiles one of the two branches only.
 """
 
 import numpy as np
@@ -17,29 +19,22 @@ from evoexp.robots.kinematics import BLOCK, PLANAR_ROWS, SPATIAL_ROWS, U, block_
 @kernel
 def clearances(tables, limit, q, out):  # type: ignore[no-untyped-def]
     """The kernel of `SphereCollision.clearance`, for other kernels; writes (2, configurations), q in degrees."""
-    table, planar, spheres, bounds, obstacles = tables
-    parent, index_q, prismatic, turned, rotation, translation = table
+    table, space, spheres, bounds, obstacles = tables
     joint, local, radius = spheres
     bound_joint, bound_local = bounds[0], bounds[1]
     block_q = np.zeros(q.shape[0] * BLOCK)
-    frames = np.empty(len(parent) * SPATIAL_ROWS * BLOCK)
+    frames = np.empty(len(table[0]) * SPATIAL_ROWS * BLOCK)
     centers, middles = np.empty(len(joint) * ROWS), np.empty(len(bound_joint) * ROWS)
     scratch, between, outside = np.empty(SPATIAL_ROWS * BLOCK), np.empty(BLOCK), np.empty(BLOCK)
-    if planar:
-        _heights(parent, translation, joint, local, centers)
-        _heights(parent, translation, bound_joint, bound_local, middles)
+    _heights(space, table, joint, local, centers)
+    _heights(space, table, bound_joint, bound_local, middles)
     for first in range(0, q.shape[1], BLOCK):
         count = min(BLOCK, q.shape[1] - first)
         load_block(q, first, count, DEGREE, block_q)
-        if planar:
-            block_planar_frames(parent, index_q, rotation, translation, block_q, frames)
-            _planar_centers(joint, local, frames, centers)
-            _planar_centers(bound_joint, bound_local, frames, middles)
-        else:
-            block_frames(parent, index_q, prismatic, turned, rotation, translation, block_q, frames, scratch)
-            _spatial_centers(joint, local, frames, centers)
-            _spatial_centers(bound_joint, bound_local, frames, middles)
-        _between_arms(planar, bounds, max(limit + 2.0 * radius, 0.0), centers, middles, scratch, between)
+        _frames(space, table, block_q, frames, scratch)
+        _centers(space, joint, local, frames, centers)
+        _centers(space, bound_joint, bound_local, frames, middles)
+        _between_arms(space, bounds, max(limit + 2.0 * radius, 0.0), centers, middles, scratch, between)
         outside[:] = limit + radius
         if len(obstacles[0]) > 0:
             to_obstacles(obstacles, bounds, limit + radius, centers, middles, scratch, outside)
@@ -49,14 +44,33 @@ def clearances(tables, limit, q, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _heights(parent, translation, joint, local, centers):  # type: ignore[no-untyped-def]
+def _heights(space, table, joint, local, centers):  # type: ignore[no-untyped-def]
     """In the plane no joint changes a height: z of all centres, once."""
-    for k in range(len(joint)):
-        height, j = local[k, 2], joint[k]
-        while j >= 0:
-            height += translation[j, 2]
-            j = parent[j]
-        centers[k * ROWS + 2 * BLOCK : (k + 1) * ROWS] = height
+    if space is None:
+        parent, translation = table[0], table[5]
+        for k in range(len(joint)):
+            height, j = local[k, 2], joint[k]
+            while j >= 0:
+                height += translation[j, 2]
+                j = parent[j]
+            centers[k * ROWS + 2 * BLOCK : (k + 1) * ROWS] = height
+
+
+@kernel
+def _frames(space, table, q, frames, scratch):  # type: ignore[no-untyped-def]
+    parent, index_q, prismatic, turned, rotation, translation = table
+    if space is None:
+        block_planar_frames(parent, index_q, rotation, translation, q, frames)
+    else:
+        block_frames(parent, index_q, prismatic, turned, rotation, translation, q, frames, scratch)
+
+
+@kernel
+def _centers(space, joint, local, frames, centers):  # type: ignore[no-untyped-def]
+    if space is None:
+        _planar_centers(joint, local, frames, centers)
+    else:
+        _spatial_centers(joint, local, frames, centers)
 
 
 @kernel
@@ -86,7 +100,7 @@ def _spatial_centers(joint, local, frames, centers):  # type: ignore[no-untyped-
 
 
 @kernel
-def _between_arms(planar, bounds, limit, centers, middles, least, out):  # type: ignore[no-untyped-def]
+def _between_arms(space, bounds, limit, centers, middles, least, out):  # type: ignore[no-untyped-def]
     """Least centre distance over all pairs of arms, (BLOCK,), as far as it is below the limit."""
     _, _, reach, spheres, arm_links = bounds
     out[:] = limit
@@ -100,13 +114,18 @@ def _between_arms(planar, bounds, limit, centers, middles, least, out):  # type:
                         continue
                     first, stop = U(spheres[two, 0]), U(spheres[two, 1])
                     for i in range(spheres[one, 0], spheres[one, 1]):
-                        if planar:
-                            _planar_pairs(centers, U(i) * U(ROWS), first, stop, least)
-                        else:
-                            _spatial_pairs(centers, U(i) * U(ROWS), first, stop, least)
+                        _pairs(space, centers, U(i) * U(ROWS), first, stop, least)
             for n in range(BLOCK):
                 distance, best = np.sqrt(least[U(n)]), out[U(n)]
                 out[U(n)] = distance if distance < best else best
+
+
+@kernel
+def _pairs(space, centers, i, first, stop, least):  # type: ignore[no-untyped-def]
+    if space is None:
+        _planar_pairs(centers, i, first, stop, least)
+    else:
+        _spatial_pairs(centers, i, first, stop, least)
 
 
 @kernel

@@ -171,4 +171,4 @@ class SphereCollision(NamedTuple):
         """What the kernel `clearances` reads, as plain tuples of arrays."""
         table = self.assembly.table
         spheres = (self.sphere_joint, self.sphere_local, self.radius)
-        return table[:6], table.planar, spheres, tuple(self.bounds), tuple(self.obstacles)
+        return table[:6], None if table.planar else True, spheres, tuple(self.bounds), tuple(self.obstacles)

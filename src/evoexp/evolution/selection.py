@@ -25,7 +25,7 @@ def roulette(rng: np.random.Generator, weights: FloatArray, count: int) -> np.nd
 def elites(costs: FloatArray, count: int) -> np.ndarray:
     """Return the indices of the lowest costs, best first; among equals the lower index wins."""
     chosen = np.empty(count, dtype=np.int64)
-    _elites(costs, chosen)
+    choose_elites(costs, chosen)
     return chosen
 
 
@@ -69,8 +69,8 @@ def spin_roulette(weights, uniforms, chosen):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _elites(costs, chosen):  # type: ignore[no-untyped-def]
-    """Insertion into a short sorted list; a later equal cost stays behind."""
+def choose_elites(costs, chosen):  # type: ignore[no-untyped-def]
+    """The kernel of `elites`, for other kernels: insertion into a short list; a later equal cost stays behind."""
     count, filled = len(chosen), 0
     for k in range(len(costs)):
         if filled == count and (count == 0 or not costs[k] < costs[chosen[count - 1]]):

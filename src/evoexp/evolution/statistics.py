@@ -24,11 +24,12 @@ class CostStatistics(NamedTuple):
 
 def cost_statistics(costs: FloatArray) -> CostStatistics:
     """Return best, mean and standard deviation of costs (individuals,)."""
-    return CostStatistics(*_cost_statistics(costs))
+    return CostStatistics(*summarise(costs))
 
 
 @kernel
-def _cost_statistics(costs):  # type: ignore[no-untyped-def]
+def summarise(costs):  # type: ignore[no-untyped-def]
+    """The kernel of `cost_statistics`, for other kernels."""
     best, count, total = 0, 0, 0.0
     for k in range(len(costs)):
         if costs[k] < costs[best]:

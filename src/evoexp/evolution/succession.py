@@ -24,11 +24,12 @@ def succeed(population: FloatArray, offspring: FloatArray, num_offspring: int, e
     lanes = offspring.reshape(math.prod(offspring.shape[:-1]), offspring.shape[-1])
     if len(rows) != len(lanes) or num_offspring > lanes.shape[1] or num_offspring + len(elites) > rows.shape[1]:
         raise ValueError(f"{num_offspring} of {offspring.shape} and {len(elites)} do not fit {population.shape}")
-    _succeed(rows, lanes, num_offspring, elites)
+    succeed_rows(rows, lanes, num_offspring, elites)
 
 
 @kernel
-def _succeed(population, offspring, num_offspring, elites):  # type: ignore[no-untyped-def]
+def succeed_rows(population, offspring, num_offspring, elites):  # type: ignore[no-untyped-def]
+    """The kernel of `succeed`, for other kernels; populations as (rows, individuals)."""
     kept = np.empty(len(elites))
     for row in range(len(population)):
         for k in range(len(elites)):

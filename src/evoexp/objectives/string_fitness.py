@@ -53,7 +53,9 @@ class StringFitness(Component):
 
     def roulette_weights(self, costs: FloatArray) -> FloatArray:
         """Return max(F, 0) of costs (individuals,)."""
-        return np.maximum(self.fitness_offset - costs, 0.0)
+        weights = np.empty(len(costs))
+        fill_wheel(self.fitness_offset, costs, weights)
+        return weights
 
 
 @kernel
@@ -74,6 +76,14 @@ def weigh(weights, lengths, unevenness, collisions, cost):  # type: ignore[no-un
             length += lengths[arm, k]
             uneven += unevenness[arm, k]
         cost[k] = (k1 * length + k2 * uneven) + k3 * collisions[k]
+
+
+@kernel
+def fill_wheel(fitness_offset, costs, weights):  # type: ignore[no-untyped-def]
+    """The kernel of `roulette_weights`, for other kernels."""
+    for k in range(len(costs)):
+        fitness = fitness_offset - costs[k]
+        weights[k] = fitness if fitness > 0.0 else 0.0
 
 
 @kernel

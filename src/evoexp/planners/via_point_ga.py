@@ -9,29 +9,23 @@ instant, joint by joint (arms × (N + 1) × joints) [deg], start and goal includ
 """
 
 from collections.abc import Iterator
-from typing import Annotated, ClassVar, Literal, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from evoexp.collision.sphere_kernels import clearances
 from evoexp.collision.touching_spheres import Clearance, SphereCollision, TouchingSpheres
 from evoexp.errors import SettingError
 from evoexp.evolution import crossover
-from evoexp.evolution.crossover import cross_at_sites
-from evoexp.evolution.selection import elites, shuffle_head, spin_roulette
 from evoexp.evolution.settings import GeneticSettings
-from evoexp.evolution.statistics import cost_statistics
-from evoexp.evolution.succession import succeed
-from evoexp.numerics import DEGREE, kernel
-from evoexp.objectives.string_fitness import StringFitness, StringTerms, count_collisions, weigh
-from evoexp.paths.interpolation import interpolate, interpolate_linear
-from evoexp.paths.lengths import measure_paths
+from evoexp.evolution.statistics import CostStatistics, cost_statistics
+from evoexp.numerics import DEGREE
+from evoexp.objectives.string_fitness import StringFitness, StringTerms
+from evoexp.paths.interpolation import interpolate_linear
 from evoexp.paths.motion import Motion
-from evoexp.paths.redistribution import redistribute
-from evoexp.paths.relaxation import relax
-from evoexp.paths.walk import num_uniforms, walk, walk_strings
+from evoexp.paths.walk import num_uniforms, walk
 from evoexp.paths.workspace import Redistribution, prepare_redistribution
+from evoexp.planners import string_kernels
 from evoexp.records import FloatArray, Generation
 from evoexp.robots.assembly import Assembly, Robot
 from evoexp.scenarios.arm_motion import ArmMotion
@@ -162,27 +156,20 @@ class ViaPointGa(Component):
         strings.smooth(population, ga.population_size)
         judged = strings.judge(population, ga.population_size)
         costs, collisions = judged.cost.copy(), judged.terms.collisions[: ga.population_size].copy()
-        best = _Best()
+        found = _Found(cost_statistics(costs), int(np.count_nonzero(collisions == 0.0)))
         evaluations, queries = ga.population_size, judged.collision_queries
-        yield best.generation(0, strings, population, judged, costs, collisions, evaluations, queries)
+        best = _Best(strings)
+        yield best.generation(0, population, judged, costs, found, evaluations, queries)
 
         offspring = strings.empty(ga.num_offspring)
+        judged = strings.unjudged(offspring, ga.num_offspring)
+        elites = np.empty(ga.num_elites, dtype=np.int64)
+        memory = (population, costs, collisions, offspring, tuple(judged.terms), elites)
         for index in range(1, ga.num_generations + 1):
-            # (a) Reproduction, (b) cross-over, and (d) mutation before (c): a new trajectory, too, is redistributed and
-            # relaxed once.
-            best_kept = elites(costs, ga.num_elites)
-            strings.breed(rng, population, costs, offspring)
-            # (c) Redistribution and relaxation.
-            strings.smooth(offspring, ga.num_offspring)
-            judged = strings.judge(offspring, ga.num_offspring)
-
-            # The elites stand behind the offspring, untouched and not evaluated again.
-            succeed(population, offspring, ga.num_offspring, best_kept)
-            succeed(costs, judged.cost, ga.num_offspring, best_kept)
-            succeed(collisions, judged.terms.collisions, ga.num_offspring, best_kept)
+            found = strings.advance(rng, memory)  # section 3.4 (a)–(d); the elites stay, untouched
             evaluations += ga.num_offspring
             queries += judged.collision_queries
-            yield best.generation(index, strings, population, judged, costs, collisions, evaluations, queries)
+            yield best.generation(index, population, judged, costs, found, evaluations, queries)
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
         """Return new trajectories as in the initial population, (nq, N + 1, count)."""
@@ -238,109 +225,71 @@ class ViaPointGa(Component):
         return np.vstack([p.reshape(shape).T for p, shape in zip(parts, self.shape(problem), strict=True)])
 
 
+class _Found(NamedTuple):
+    """What a generation's costs and collisions say."""
+
+    costs: CostStatistics
+    num_feasible: int
+
+
 class _Strings:
-    """The population-wide steps of one planner on one problem, with their memory."""
+    """The population-wide steps of one planner on one problem, with their settings as kernels take them."""
 
     def __init__(self, planner: ViaPointGa, problem: Problem) -> None:
-        self.planner, self.problem = planner, problem
-        self.num_arms = len(problem.arm_slices)
-        self.nq = len(problem.start)
+        self.planner, self.problem, ga, spline = planner, problem, planner.ga, problem.spline
+        self.num_arms, self.nq = len(problem.arm_slices), len(problem.start)
         self.max_turn = DEGREE * planner.max_turn
         self.num_uniforms = num_uniforms(problem.arm_slices, planner.num_via_points)
-        self.tables = problem.collision.tables
+        pairs = crossover.num_uniforms(self.num_arms, ga.num_offspring // 2)
+        self.draws = (ga.num_offspring, pairs, planner.num_new_trajectories)
+        self.num_drawn = sum(self.draws) + planner.num_new_trajectories * (1 + self.num_uniforms)
+        rates = (ga.crossover_rate, planner.crossover_distance, ga.mutation_rate, planner.walk_step, self.max_turn)
+        self.breeding = (planner.objective.fitness_offset, *rates, problem.start, problem.goal)
+        factor = (spline.samples_per_segment, spline.pivots, spline.floats, spline.integers)
+        self.smoothing = (planner.redistribution, *factor, planner.relaxation_step)
+        self.judging = (planner.collision.collision_substeps, planner.objective.weights, problem.collision.tables)
 
     def empty(self, count: int) -> FloatArray:
-        """Return memory for strings, padded to whole vectors and holding start, goal and zeros."""
+        """Return memory for strings, padded to whole vectors and holding zeros."""
         lanes = max(LANES, -(-count // LANES) * LANES)
         return np.zeros((self.nq, self.planner.num_via_points + 1, lanes))
 
     def new_trajectories(self, rng: np.random.Generator, population: FloatArray, lanes: np.ndarray) -> None:
         """Write random walks from start to goal into some lanes (section 3.3)."""
-        planner, problem = self.planner, self.problem
+        problem, step = self.problem, self.planner.walk_step
         uniforms = rng.random((len(lanes), self.num_uniforms))
-        walk(
-            population,
-            lanes,
-            uniforms,
-            problem.start,
-            problem.goal,
-            problem.arm_slices,
-            planner.walk_step,
-            self.max_turn,
-        )
-
-    def breed(self, rng: np.random.Generator, population: FloatArray, costs: FloatArray, offspring: FloatArray) -> None:
-        """Write offspring of a population: reproduced, crossed and mutated (section 3.4 a, b, d)."""
-        planner, problem, ga = self.planner, self.problem, self.planner.ga
-        pairs = crossover.num_uniforms(self.num_arms, ga.num_offspring // 2)
-        draws = (ga.num_offspring, pairs, planner.num_new_trajectories, planner.num_new_trajectories)
-        uniforms = rng.random(sum(draws) + planner.num_new_trajectories * self.num_uniforms)
-        weights = planner.objective.roulette_weights(costs)
-        rates = (ga.crossover_rate, planner.crossover_distance, ga.mutation_rate, planner.walk_step, self.max_turn)
-        ends = (problem.start, problem.goal)
-        _breed(uniforms, draws, population, weights, problem.arm_slices, rates, ends, offspring)
+        walk(population, lanes, uniforms, problem.start, problem.goal, problem.arm_slices, step, self.max_turn)
 
     def smooth(self, population: FloatArray, count: int) -> None:
         """Redistribute and relax the first `count` strings."""
-        planner = self.planner
-        if count == 0:
-            return
-        if planner.redistribution:
-            redistribute(population, self.problem.arm_slices, count, self.problem.spline)
-        relax(population, planner.relaxation_step, count)
+        string_kernels.smooth(population, count, self.problem.arm_slices, self.smoothing)
 
     def judge(self, population: FloatArray, count: int) -> Judgement:
         """Return cost and terms of the first `count` strings; the arrays of terms keep the padding."""
-        planner, lanes = self.planner, population.shape[2]
+        judged = self.unjudged(population, count)
+        string_kernels.judge(population, self.problem.arm_slices, self.judging, tuple(judged.terms))
+        return judged
+
+    def unjudged(self, population: FloatArray, count: int) -> Judgement:
+        """Return memory for a judgement."""
+        lanes = population.shape[2]
         lengths, unevenness = np.empty((2, self.num_arms, lanes))
         terms = StringTerms(lengths, unevenness, np.empty(lanes), np.empty(count))
-        substeps = planner.collision.collision_substeps
-        _judge(population, self.problem.arm_slices, substeps, self.tables, planner.objective.weights, tuple(terms))
-        return Judgement(terms.cost, terms, planner.num_via_points * substeps * count)
+        return Judgement(terms.cost, terms, self.planner.num_via_points * self.judging[0] * count)
 
-
-@kernel
-def _breed(uniforms, draws, population, weights, arm_slices, rates, ends, offspring):  # type: ignore[no-untyped-def]
-    """Section 3.4 a, b, d. `draws` says how many uniform numbers each step takes, the rest is for new trajectories."""
-    crossover_rate, crossover_distance, mutation_rate, walk_step, max_turn = rates
-    first, second = draws[0], draws[0] + draws[1]
-    third, last = second + draws[2], second + draws[2] + draws[3]
-    # (a) Weighted roulette wheel; neighbours in the order drawn are the random pairs of (b).
-    parents = np.empty(draws[0], dtype=np.int64)
-    spin_roulette(weights, uniforms[:first], parents)
-    # (b) One site per arm, at the same index in both parents.
-    cross_at_sites(
-        uniforms[first:second], population, parents, arm_slices, crossover_rate, crossover_distance, offspring
-    )
-    # (d) New trajectories in distinct places, each with the mutation's probability.
-    slots = np.arange(draws[0])
-    shuffle_head(uniforms[second:third], slots)
-    walks = uniforms[last:].reshape((draws[2], -1)) if draws[2] else np.empty((0, 0))
-    for k in range(draws[2]):
-        if uniforms[third + k] < mutation_rate:
-            walk_strings(
-                offspring, slots[k : k + 1], walks[k : k + 1], ends[0], ends[1], arm_slices, walk_step, max_turn
-            )
-
-
-@kernel
-def _judge(population, arm_slices, substeps, tables, weights, terms):  # type: ignore[no-untyped-def]
-    """Eqs. 2–7 for all strings; the instants 1 … N are the configurations that may collide."""
-    lengths, unevenness, collisions, cost = terms
-    nq, num_points, lanes = population.shape
-    measure_paths(population, arm_slices, lengths, unevenness)
-    between = np.empty((nq, (num_points - 1) * substeps, lanes))
-    interpolate(population, substeps, between)
-    clearance = np.empty((2, (num_points - 1) * substeps * lanes))
-    clearances(tables, 0.0, between.reshape((nq, -1)), clearance)
-    count_collisions(clearance.reshape((2, num_points - 1, substeps, lanes)), collisions)
-    weigh(weights, lengths, unevenness, collisions, cost)
+    def advance(self, rng: np.random.Generator, memory: tuple[Any, ...]) -> _Found:
+        """Replace the population in `memory` by the next one; offspring and their terms are there afterwards."""
+        uniforms = rng.random(self.num_drawn)
+        settings = (self.breeding, self.smoothing, self.judging)
+        *found, feasible = string_kernels.advance(uniforms, self.draws, self.problem.arm_slices, *settings, memory)
+        return _Found(CostStatistics(*found), feasible)
 
 
 class _Best:
     """The best solution so far, and the records of generations that carry it."""
 
-    def __init__(self) -> None:
+    def __init__(self, strings: _Strings) -> None:
+        self.strings = strings
         self.cost = np.inf
         self.solution: FloatArray | None = None
         self.terms: dict[str, float] = {}
@@ -348,29 +297,28 @@ class _Best:
     def generation(
         self,
         index: int,
-        strings: _Strings,
         population: FloatArray,
         judged: Judgement,
         costs: FloatArray,
-        collisions: FloatArray,
+        found: _Found,
         evaluations: int,
         queries: int,
     ) -> Generation:
         """Update the best by a population (judged in its first lanes) and return the generation's record."""
-        statistics = cost_statistics(costs)
-        k = statistics.best
-        if costs[k] < self.cost or self.solution is None:
-            self.cost = float(costs[k])
-            self.solution = strings.planner.solution(strings.problem, population, k)
+        k, mean, std = found.costs
+        cost = float(costs[k])
+        if cost < self.cost or self.solution is None:
+            self.cost = cost
+            self.solution = self.strings.planner.solution(self.strings.problem, population, k)
             self.terms = judged.named_terms(k)
         return Generation(
             index=index,
             best=self.solution,
             best_cost=self.cost,
-            best_cost_in_generation=float(costs[k]),
-            mean_cost=statistics.mean,
-            std_cost=statistics.std,
-            num_feasible=int(np.count_nonzero(collisions == 0.0)),
+            best_cost_in_generation=cost,
+            mean_cost=mean,
+            std_cost=std,
+            num_feasible=found.num_feasible,
             evaluations=evaluations,
             collision_queries=queries,
             solved=self.terms["collisions"] == 0.0,

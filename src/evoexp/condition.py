@@ -19,6 +19,7 @@ from evoexp.validation import TARGET, Component, build
 REGISTRY = {
     "arms": "evoexp.robots.arms:Arms",
     "planar_chain": "evoexp.robots.planar_chain:PlanarChain",
+    "serial_chain": "evoexp.robots.serial_chain:SerialChain",
     "arm_motion": "evoexp.scenarios.arm_motion:ArmMotion",
     "via_point_ga": "evoexp.planners.via_point_ga:ViaPointGa",
     "random_search": "evoexp.planners.random_search:RandomSearch",

@@ -15,7 +15,7 @@ from evoexp.validation import Component, Count, Positive
 
 
 class TouchingSpheres(Component):
-    """The collision model of Rana & Zalzala.
+    """The collision model of Rana & Zalzala: spheres on every link that moves (section 4.1 leaves out the columns).
 
     Attributes:
         spheres_per_link: Centres at equal distances from joint to joint, both ends included.
@@ -31,7 +31,7 @@ class TouchingSpheres(Component):
 
     def bind(self, assembly: Assembly, obstacles: tuple[Any, ...]) -> "SphereCollision":
         """Return the model of a robot among obstacles, ready for batches."""
-        spheres = [sphere for link in assembly.links for sphere in self._of_link(assembly, link)]
+        spheres = [sphere for link in assembly.links if link.joint > 0 for sphere in self._of_link(assembly, link)]
         kept = _without_repetitions(spheres)
         joint = np.array([sphere.joint - 1 for sphere in kept], dtype=np.int64)
         local = np.array([assembly.table.local(sphere.joint, sphere.center) for sphere in kept])

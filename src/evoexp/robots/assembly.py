@@ -15,7 +15,7 @@ class Link(NamedTuple):
     """A straight link: a line segment, thickened by a radius, that moves with one joint."""
 
     arm: int
-    joint: int  # index of the Pinocchio joint that moves it
+    joint: int  # index of the Pinocchio joint that moves it; 0: it stands still
     start: FloatArray  # (3,) in the frame of the joint [length unit of the scene]
     end: FloatArray  # (3,)
     radius: float  # 0 for a line

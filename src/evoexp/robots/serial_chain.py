@@ -1,0 +1,77 @@
+"""An arm in space, given joint by joint: where each joint stands behind the one before, and its axis."""
+
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+import numpy as np
+import pinocchio as pin
+from pydantic import Field, model_validator
+
+from evoexp.errors import SettingError
+from evoexp.numerics import DEGREE, sincos
+from evoexp.robots.assembly import Chain, Link
+from evoexp.validation import NonNegative, Settings
+
+Point3 = tuple[float, float, float]
+
+
+class SerialJoint(Settings):
+    """One joint.
+
+    Attributes:
+        axis: Direction that it turns about or slides along, in the frame of the joint before; any length but 0.
+        offset: From the joint before (from the base for the first one), at q = 0 [length unit of the scene].
+        kind: Whether it turns or slides.
+    """
+
+    axis: Point3
+    offset: Point3
+    kind: Literal["revolute", "prismatic"] = "revolute"
+
+    @model_validator(mode="after")
+    def _points_somewhere(self) -> Self:
+        if not any(self.axis):
+            raise SettingError("axis", "a direction, not (0, 0, 0)", list(self.axis))
+        return self
+
+    def model(self) -> Any:
+        """Return Pinocchio's joint model."""
+        axis = np.array(self.axis)
+        unit = axis / np.sqrt(np.sum(axis * axis))
+        return (pin.JointModelPrismaticUnaligned if self.kind == "prismatic" else pin.JointModelRevoluteUnaligned)(unit)
+
+
+class SerialChain(Chain):
+    """Joints one behind the other; at q = 0 all frames are parallel to the base's.
+
+    A link is the straight segment from one joint to the next, the last one to the tip; joints that stand in the same
+    place have none between them. The segment from the base to the first joint is a link that does not move.
+
+    Attributes:
+        joints: From the base to the tip.
+        tip: From the last joint [length unit of the scene].
+        base_position: In the world.
+        base_angle: Turn of the whole arm about the world's z [deg].
+        link_radius: Half the thickness of every link; 0: a line.
+    """
+
+    component: ClassVar[str] = "serial_chain"
+
+    joints: Annotated[tuple[SerialJoint, ...], Field(min_length=1)]
+    tip: Point3
+    base_position: Point3
+    base_angle: float = 0.0
+    link_radius: NonNegative = 0.0
+
+    def append_to(self, model: Any, arm: int) -> list[Link]:
+        """Add the joints; links of no length are left out."""
+        s, c = sincos(DEGREE * self.base_angle)
+        turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        base, parent, links = np.array(self.base_position), 0, []
+        for k, joint in enumerate(self.joints):
+            offset = np.array(joint.offset)
+            placement = pin.SE3(turn, base + turn @ offset) if k == 0 else pin.SE3(np.eye(3), offset)
+            start, end = (base, base + turn @ offset) if k == 0 else (np.zeros(3), offset)
+            links.append(Link(arm, parent, start, end, self.link_radius))
+            parent = model.addJoint(parent, joint.model(), placement, f"arm_{arm}_joint_{k}")
+        links.append(Link(arm, parent, np.zeros(3), np.array(self.tip), self.link_radius))
+        return [link for link in links if not np.array_equal(link.start, link.end)]

@@ -78,9 +78,18 @@ class ReplicateSummary(NamedTuple):
     evaluations: int
     collision_queries: int
     solved: bool  # by the paper's own collision model
+    certified: bool | None  # by the exact certifier, over the whole motion; None: undecided, or there is no motion
+    certified_margin: bool | None  # the same of the clearance that the scenario requires
+    clearance: float  # [length_unit] least distance of the bodies over the motion; 0 in contact, NaN without motion
+    clearance_at: float | None  # [instant] where the bodies are that close
+    clearance_pair: str  # which bodies
+    refuted_at: float | None  # [instant] of the first contact
+    refuted_pair: str  # the bodies that touch
     length_unit: str  # of every clearance and length below
     terms: dict[str, float]  # written as term_<name>
     digest: str  # 32 hex digits: the end of the chain
+    certificate_queries: int  # exact distances that the certifier asked for
+    certificate_s: float  # its CPU time, part of cpu_s
     cpu_s: float
     wall_s: float
 

@@ -88,12 +88,13 @@ def test_the_file_is_named(tmp_path: Path, content: bytes) -> None:
 
 
 @pytest.mark.parametrize("reader", READERS)
-def test_newer_schema_version(reader: Reader, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(log_module, "SCHEMA_VERSION", 2)
-    newer = write(generations(3)).content
-    reader(newer)
+@pytest.mark.parametrize(("other", "age"), [(1, "an older"), (3, "a newer")])
+def test_other_schema_version(reader: Reader, monkeypatch: pytest.MonkeyPatch, other: int, age: str) -> None:
+    monkeypatch.setattr(log_module, "SCHEMA_VERSION", other)
+    foreign = write(generations(3)).content
+    reader(foreign)
     monkeypatch.undo()
-    assert "schema version 2, known up to 1" in refusal(reader, newer)
+    assert f"written by {age} evoexp: schema version {other}, this one reads 2" in refusal(reader, foreign)
 
 
 def test_killed_before_finish() -> None:

@@ -1,7 +1,8 @@
-"""The one loop: a planner yields generations, a log takes them."""
+"""The one loop: a planner yields generations, a log takes them, the certifier judges the best motion."""
 
 import time
 
+from evoexp.collision.certificate import certificate
 from evoexp.condition import Condition
 from evoexp.records import Generation, ReplicateSummary
 from evoexp.store.log import Finished, Log
@@ -21,6 +22,9 @@ def run_replicate(condition: Condition, index: int) -> Finished:
         if first_feasible is None and last.num_feasible > 0:
             first_feasible = last.index
     assert last is not None, "a planner yields its initial population at least"
+    evolved = time.process_time()
+    verdict = certificate(problem, planner.motion(problem, last.best))
+    certified = time.process_time()
     summary = ReplicateSummary(
         condition=condition.id,
         replicate=index,
@@ -32,9 +36,11 @@ def run_replicate(condition: Condition, index: int) -> Finished:
         evaluations=last.evaluations,
         collision_queries=last.collision_queries,
         solved=last.solved,
+        **verdict._asdict(),
         length_unit=condition.length_unit,
         terms=planner.evaluate(problem, last.best),
         digest="",
+        certificate_s=certified - evolved,
         cpu_s=time.process_time() - cpu,
         wall_s=time.perf_counter() - wall,
     )

@@ -10,6 +10,7 @@ import numpy as np
 from rich.table import Table
 
 from evoexp import compose
+from evoexp.collision.certificate import PAIR, certificate
 from evoexp.commands.arguments import add_experiment_arguments
 from evoexp.commands.console import add_columns, new_table, plain_console
 from evoexp.errors import MotionFileError
@@ -34,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def main(arguments: argparse.Namespace) -> int:
-    """Print the terms of the motion, one column per condition that it fits."""
+    """Print terms and exact verdict of the motion, one column per condition that it fits."""
     overrides, path = _split(arguments.overrides)
     values = read_motion(path)
     rows: list[dict[str, Any]] = []
@@ -47,15 +48,17 @@ def main(arguments: argparse.Namespace) -> int:
             if solution is None:
                 misfits.append(f"{label}: {_shape_text(shape)}")
                 continue
-            terms = planner.evaluate(problem, solution)
-            rows.append(dict(zip(HEAD, (label, condition.id, condition.length_unit), strict=True)) | terms)
+            verdict = certificate(problem, planner.motion(problem, solution))._asdict()
+            head = dict(zip(HEAD, (label, condition.id, condition.length_unit), strict=True))
+            rows.append(head | planner.evaluate(problem, solution) | verdict)
     if not rows:
         given = " and ".join(map(str, _shape_of(values)))
         raise MotionFileError(
             f"{path}: must be {'; '.join(dict.fromkeys(misfits))} (start and goal included), was {given}"
         )
     if arguments.json:
-        print(json.dumps(rows if len(rows) > 1 else rows[0], indent=2, allow_nan=False, default=_plain))
+        plain = [{name: _finite(value) for name, value in row.items()} for row in rows]
+        print(json.dumps(plain if len(rows) > 1 else plain[0], indent=2, allow_nan=False, default=_plain))
     else:
         console = plain_console()
         for table in _tables(rows, console.width):
@@ -134,6 +137,11 @@ def _shape_of(values: Any) -> list[str]:
         return [f"a ragged list of {len(values)}"]
 
 
+def _finite(value: Any) -> Any:
+    """Return null for the clearance of what nothing is near, which JSON has no number for."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
 def _plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else str(value)
 
@@ -153,5 +161,13 @@ def _table(rows: list[dict[str, Any]], names: list[str]) -> Table:
     for row in rows:
         add_columns(table, f"{row['label']}\n{row['condition'][:12]}", right=True)
     for name in names:
-        table.add_row(name, *(f"{row[name]:.6g}" if name in row else "–" for row in rows))
+        table.add_row(name, *(_cell(row.get(name)) for row in rows))
     return table
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if value is None or value == "":
+        return "–"
+    return value.replace(PAIR, PAIR + "\n") if isinstance(value, str) else f"{value:.6g}"

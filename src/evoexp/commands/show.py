@@ -4,6 +4,7 @@ import argparse
 import json
 from typing import Any
 
+import pandas as pd
 import yaml
 from rich.console import Console
 from rich.table import Table
@@ -67,12 +68,14 @@ def _replicates(run: RunDirectory) -> Table:
     table = new_table(f"replicates in {run.path}")
     add_columns(table, "#", right=True)
     add_columns(table, "status")
-    add_columns(table, "best cost", "solved", "evaluations", "CPU s", right=True)
+    add_columns(table, "best cost", "solved", "certified", "clearance", "evaluations", "CPU s", right=True)
     add_columns(table, "digest, or why it failed")
     for row in read_summaries(run).to_dict("records"):
         if row["status"] == "done":
-            cells = [f"{row['best_cost']:.6g}", str(row["solved"]), str(row["evaluations"]), f"{row['cpu_s']:.3f}"]
+            verdict = ["–" if pd.isna(row[name]) else str(row[name]) for name in ("solved", "certified")]
+            numbers = [f"{row['clearance']:.4g}", str(row["evaluations"]), f"{row['cpu_s']:.3f}"]
+            cells = [f"{row['best_cost']:.6g}", *verdict, *numbers]
             table.add_row(str(row["replicate"]), "done", *cells, str(row["digest"]))
         else:
-            table.add_row(str(row["replicate"]), Text("failed", "red"), "–", "–", "–", "–", str(row["stop_reason"]))
+            table.add_row(str(row["replicate"]), Text("failed", "red"), *6 * ["–"], str(row["stop_reason"]))
     return table

@@ -14,6 +14,7 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from evoexp.collision.scene import Scene, scene
 from evoexp.collision.touching_spheres import Clearance, SphereCollision, TouchingSpheres
 from evoexp.errors import SettingError
 from evoexp.evolution import crossover
@@ -45,6 +46,8 @@ class Problem(NamedTuple):
         start: (nq,) [deg].
         goal: (nq,) [deg].
         spline: Factor and memory of the redistribution; for one thread at a time.
+        scene: The bodies themselves, for the exact verdict on a motion.
+        security_margin: Clearance that the task requires [length unit].
     """
 
     assembly: Assembly
@@ -52,6 +55,8 @@ class Problem(NamedTuple):
     start: FloatArray
     goal: FloatArray
     spline: Redistribution
+    scene: Scene
+    security_margin: float
 
     @property
     def arm_slices(self) -> np.ndarray:
@@ -145,7 +150,8 @@ class ViaPointGa(Component):
                 raise SettingError(f"scenario.{name}", must, [list(arm) for arm in getattr(scenario, name)])
         joints = int(np.max(assembly.arm_slices[:, 1] - assembly.arm_slices[:, 0]))
         spline = prepare_redistribution(self.num_via_points, joints, self.spline_end, self.samples_per_segment)
-        return Problem(assembly, collision, start, goal, spline)
+        bodies = scene(assembly, collision.obstacles)
+        return Problem(assembly, collision, start, goal, spline, bodies, scenario.security_margin)
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield the initial population, then one generation after the other."""

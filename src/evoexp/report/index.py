@@ -6,7 +6,7 @@ from evoexp.report import markdown
 from evoexp.report.claims import Claim, Comparison
 from evoexp.report.page import Drawing, Page
 from evoexp.report.parameters import Parameter, parameters
-from evoexp.report.results import Results
+from evoexp.report.results import Results, Verdicts
 from evoexp.report.settings import ReportSettings
 from evoexp.report.statistics import wilson
 
@@ -67,11 +67,24 @@ def _conditions(results: Results, settings: ReportSettings) -> str:
     for c in results.conditions:
         interval = markdown.percent(wilson(c.solved, c.done, settings.confidence)) if c.done else "–"
         solved = f"{markdown.share(c.solved, c.done)} ({interval})" if c.done else "–"
-        rows.append((c.label, f"`{c.hash12}`", c.done, c.planned, c.failed, solved))
-    headers = ("condition", "hash", "done", "planned", "failed", "solved")
+        verdicts = c.verdicts
+        margin = f"{markdown.share(verdicts.with_margin, verdicts.judged)}" if verdicts.judged else "–"
+        rows.append((c.label, f"`{c.hash12}`", c.done, c.planned, c.failed, solved, *_verdicts(verdicts), margin))
+    exact = ("certified", "refuted", "undecided", "solved, yet refuted", "margin certified")
+    headers = ("condition", "hash", "done", "planned", "failed", "solved", *exact)
     level = f"{100 * settings.confidence:g} %"
-    note = f"\"Solved\": the paper's own model accepts the best solution; in brackets Wilson's {level} interval.\n"
+    note = (
+        f"\"Solved\": the paper's own model accepts the best solution; in brackets Wilson's {level} interval. "
+        '"Certified", "refuted": the exact verdict on the whole continuous motion, by the distance of the bodies '
+        'themselves; "margin certified": they never come closer than the scenario\'s security margin.\n'
+    )
     return f"{markdown.table(headers, rows)}\n{note}"
+
+
+def _verdicts(verdicts: Verdicts) -> tuple[object, ...]:
+    if not verdicts.judged:
+        return ("–",) * 4
+    return verdicts.certified, verdicts.refuted, verdicts.undecided, verdicts.solved_refuted
 
 
 def _quantities(page: Page, results: Results) -> str:

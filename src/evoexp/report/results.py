@@ -19,6 +19,26 @@ from evoexp.store.tables import read_generations, read_summaries
 WRAPPED = "planner"  # the field of a control (random search) that holds the planner it stands beside
 
 
+class Verdicts(NamedTuple):
+    """How many motions of a condition's finished replicates the exact certifier judged, and how.
+
+    Attributes:
+        judged: Motions.
+        certified: Free of contact.
+        refuted: In contact somewhere.
+        undecided: Neither proven.
+        solved_refuted: Accepted by the paper's own model and refuted.
+        with_margin: That never come closer than the security margin.
+    """
+
+    judged: int
+    certified: int
+    refuted: int
+    undecided: int
+    solved_refuted: int
+    with_margin: int
+
+
 class ConditionResults(NamedTuple):
     """One condition's replicates as far as they are stored and planned.
 
@@ -63,6 +83,21 @@ class ConditionResults(NamedTuple):
     def solved(self) -> int:
         """Number of finished replicates whose best solution the paper's own model accepts."""
         return int(self.summaries["solved"].sum())
+
+    @property
+    def verdicts(self) -> Verdicts:
+        """Count of the exact verdicts."""
+        motions = self.summaries[self.summaries["clearance"].notna() & ~np.isnan(self.column("clearance"))]
+        certified, margin = motions["certified"], motions["certified_margin"]
+        refuted = certified.eq(False).fillna(False)
+        return Verdicts(
+            len(motions),
+            int(certified.eq(True).sum()),
+            int(refuted.sum()),
+            int(certified.isna().sum()),
+            int((refuted & motions["solved"]).sum()),
+            int(margin.eq(True).sum()),
+        )
 
     @property
     def best_replicate(self) -> int:

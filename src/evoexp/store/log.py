@@ -22,7 +22,7 @@ from evoexp.store.messages import (
 )
 
 LIBRARY = "evoexp"  # pinned, so that a log's bytes do not tell mcap's version
-SCHEMA_VERSION = 1  # of everything a log holds; raised when a reader of the old version would misunderstand
+SCHEMA_VERSION = 2  # of everything a log holds; raised when a reader of the old version would misunderstand
 RUN = "evoexp.run"
 SUMMARY = "evoexp.summary"
 ENVIRONMENT = "evoexp.environment"

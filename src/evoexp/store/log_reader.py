@@ -188,14 +188,16 @@ def _metadata(container: Container, index: _Index, record: str, name: str) -> di
 
 
 def _run(container: Container, index: _Index, name: str) -> dict[str, str]:
-    """Return the metadata that says whose log this is, or raise for a foreign or newer one."""
+    """Return the metadata that says whose log this is, or raise for a foreign one or one of another version."""
     if written.RUN not in index.metadata:
         raise CorruptLog(f"{name}: not a log of evoexp: an MCAP without metadata record '{written.RUN}'")
     run = _metadata(container, index, written.RUN, name)
     version = int(run["schema_version"])
-    if version > written.SCHEMA_VERSION:
-        known = written.SCHEMA_VERSION
-        raise CorruptLog(f"{name}: written by a newer evoexp: schema version {version}, known up to {known}")
+    if version != written.SCHEMA_VERSION:
+        age = "a newer" if version > written.SCHEMA_VERSION else "an older"
+        raise CorruptLog(
+            f"{name}: written by {age} evoexp: schema version {version}, this one reads {written.SCHEMA_VERSION}"
+        )
     return run
 
 

@@ -20,9 +20,10 @@ from evoexp.store.run_directory import RunDirectory
 Runs = RunDirectory | Iterable[RunDirectory]
 Stamps = dict[str, list[int]]  # file name → size [B], modification time [ns]
 
-_VERSION = 1  # of the table's columns; another one is rebuilt
+_VERSION = 2  # of the table's columns; another one is rebuilt
 _KEY = b"evoexp"
-_ARROW = {str: pa.string(), int: pa.int64(), int | None: pa.int64(), float: pa.float64(), bool: pa.bool_()}
+_PLAIN: dict[Any, pa.DataType] = {str: pa.string(), int: pa.int64(), float: pa.float64(), bool: pa.bool_()}
+_ARROW = _PLAIN | {kind | None: arrow for kind, arrow in _PLAIN.items()}
 _BASE = [pa.field(name, _ARROW[kind]) for name, kind in field_types(ReplicateSummary).items()]
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 ARM_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")  # Okabe & Ito 2008
 CONDITION_COLOURS = ("#332288", "#CC6677", "#117733", "#DDAA33", "#88CCEE", "#882255", "#44AA99", "#999933")  # Tol
@@ -96,6 +97,11 @@ def joint_symbol(arm: int, joint: int) -> str:
     """Return the name of a joint angle: θ₁, α₂, …, both counted from 0."""
     letter = ARM_SYMBOLS[arm] if arm < len(ARM_SYMBOLS) else f"q{arm + 1},"
     return letter + str(joint + 1).translate(SUBSCRIPTS)
+
+
+def few_ticks() -> MaxNLocator:
+    """Return ticks that leave room in a small panel."""
+    return MaxNLocator(nbins=4)
 
 
 def operational_axes(axes: Axes, unit: str) -> None:

@@ -1,6 +1,7 @@
 """Motions of planar arms: snapshots, paths in configuration space, distances between the arms."""
 
 import itertools
+from collections.abc import Iterator
 
 import numpy as np
 import pandas as pd
@@ -19,6 +20,7 @@ from evoexp.report.tables import groups, rounded
 STAGES = 5  # panels that a motion is cut into; the sixth holds all of it
 CENTRES, LINKS = "circle centres", "links"
 BEST, AT_VIA_POINTS, STRAIGHT = "best replicate", "best replicate, at via-points", "straight line"
+CLOSEST, REFUTED = "closest over the whole motion, every replicate (exact)", "refuted: first contact of bodies"
 LOWEST, HIGHEST = "lowest of all replicates", "highest of all replicates"
 
 
@@ -181,8 +183,21 @@ def distances_table(condition: ConditionResults, sampled: pd.DataFrame) -> pd.Da
             columns = {"measure": measure, "series": series, "instant": values.index, "distance": values.to_numpy()}
             parts.append(pd.DataFrame(columns))
     margin = condition.condition.scenario.security_margin  # type: ignore[attr-defined]
-    table = rounded(pd.concat(parts, ignore_index=True))
+    table = rounded(pd.concat([*parts, *_exact(condition)], ignore_index=True))
     return table.assign(safety_distance=margin, length_unit=condition.condition.length_unit)
+
+
+def _exact(condition: ConditionResults) -> Iterator[pd.DataFrame]:
+    """Yield what the exact certifier found: where the arms of every replicate are closest, and where bodies touch."""
+    rows = condition.summaries
+    between = rows["clearance_pair"].str.count("arm_").eq(2) & rows["clearance_at"].notna()
+    for series, kept, at, distance in (
+        (CLOSEST, rows[between], "clearance_at", "clearance"),
+        (REFUTED, rows[rows["refuted_at"].notna()], "refuted_at", None),
+    ):
+        found = np.zeros(len(kept)) if distance is None else kept[distance].to_numpy(np.float64)
+        instants = kept[at].to_numpy(np.float64)
+        yield pd.DataFrame({"measure": LINKS, "series": series, "instant": instants, "distance": found})
 
 
 def draw_distances(table: pd.DataFrame) -> Figure:
@@ -190,7 +205,10 @@ def draw_distances(table: pd.DataFrame) -> Figure:
     figure = style.figure(5.4)
     panels = figure.subplots(2, 1, sharex=True)
     unit, safety = table["length_unit"].iloc[0], float(table["safety_distance"].iloc[0])
-    titles = {CENTRES: "a  circle centres (the paper's model)", LINKS: "b  the links themselves (exact, coal)"}
+    titles = {
+        CENTRES: "a  centres of circles or spheres (the paper's model)",
+        LINKS: "b  the bodies themselves (exact)",
+    }
     for axes, measure in zip(panels, (CENTRES, LINKS), strict=True):
         _distances(axes, table[table["measure"] == measure], safety, unit)
         axes.set_title(titles[measure])
@@ -199,7 +217,7 @@ def draw_distances(table: pd.DataFrame) -> Figure:
         axes.set_ylim(bottom=0)
     panels[1].xaxis.set_major_locator(MaxNLocator(integer=True, nbins=12))
     panels[1].set_xlabel("instant (whole numbers: via-points)")
-    style.legend_below(figure, panels[0], 3)
+    style.legend_below(figure, panels[1], 2)
     return figure
 
 
@@ -233,6 +251,19 @@ def _distances(axes: Axes, rows: pd.DataFrame, safety: float, unit: str) -> None
         clip_on=False,
         zorder=4,
     )
+    for name, look in ((CLOSEST, {"marker": "D", "ms": 3.2}), (REFUTED, {"marker": "X", "ms": 8, "mec": "white"})):
+        if name in series:
+            red = style.FORBIDDEN if name == REFUTED else style.NEUTRAL
+            axes.plot(
+                series[name]["instant"],
+                series[name]["distance"],
+                color=red,
+                linestyle="none",
+                label=name,
+                clip_on=False,
+                zorder=5,
+                **look,  # type: ignore[arg-type]
+            )
     label = f"below the safety distance of {safety:g} {unit}"
     axes.axhspan(0.0, safety, color=style.FORBIDDEN, alpha=0.08, linewidth=0, label=label)
     axes.axhline(safety, color=style.FORBIDDEN, linewidth=1.0, linestyle=(0, (5, 2)))

@@ -11,7 +11,7 @@ from evoexp.report.settings import ReportSettings
 PAGES = {
     "generic": "evoexp.report.pages.generic:page",
     "planar_arms": "evoexp.report.pages.planar_arms:page",
-    "rana_planar": "evoexp.report.pages.rana_planar:page",
+    "rana": "evoexp.report.pages.rana:page",
 }
 """Name, as `report.figures` gives it → `module:function`."""
 

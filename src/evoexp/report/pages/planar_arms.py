@@ -18,8 +18,8 @@ SNAPSHOTS = (
 )
 PATHS = "Paths of all replicates in the planes of the joint angles; angles are not wrapped."
 DISTANCES = (
-    "Least distance between two arms against the instant: a) of circle centres, b) of the links themselves; at "
-    "via-points (dots) and sampled between them (line)."
+    "Least distance between two arms against the instant: a) of the centres of circles or spheres, b) of the bodies "
+    "themselves; at via-points (dots) and sampled between them (line); diamonds and crosses: the exact verdict."
 )
 
 

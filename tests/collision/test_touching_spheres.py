@@ -7,8 +7,9 @@ import pytest
 
 from evoexp.collision.touching_spheres import SphereCollision, TouchingSpheres
 from evoexp.robots.arms import Arms
-from evoexp.robots.assembly import Chain, Link, Robot
+from evoexp.robots.assembly import Robot
 from evoexp.robots.planar_chain import PlanarChain
+from evoexp.robots.serial_chain import SerialChain, SerialJoint
 from evoexp.scenarios.obstacles import BoxObstacle, CapsuleObstacle, SphereObstacle, rotation_matrix
 
 MODEL = TouchingSpheres(spheres_per_link=5, sphere_radius=0.5, collision_substeps=1)
@@ -21,18 +22,12 @@ OBSTACLES = (
 )
 
 
-class Elbow(Chain):
-    """A spatial 3R arm, for the kernel in space."""
-
-    component = "elbow"
-    base: tuple[float, float, float]
-
-    def append_to(self, model: pin.Model, arm: int) -> list[Link]:
-        first = model.addJoint(0, pin.JointModelRZ(), pin.SE3(np.eye(3), np.array(self.base)), f"{arm}_a")
-        second = model.addJoint(first, pin.JointModelRY(), pin.SE3(np.eye(3), np.array([0.0, 0.0, 1.0])), f"{arm}_b")
-        third = model.addJoint(second, pin.JointModelRY(), pin.SE3(np.eye(3), np.array([1.5, 0.0, 0.0])), f"{arm}_c")
-        up, out, tip = np.array([0.0, 0.0, 1.0]), np.array([1.5, 0.0, 0.0]), np.array([1.2, 0.1, 0.0])
-        return [Link(arm, joint, np.zeros(3), end, 0.0) for joint, end in ((first, up), (second, out), (third, tip))]
+def elbow(base: tuple[float, float, float]) -> SerialChain:
+    """Return a spatial 3R arm, for the kernel in space."""
+    waist = SerialJoint(axis=(0.0, 0.0, 1.0), offset=(0.0, 0.0, 0.0))
+    shoulder = SerialJoint(axis=(0.0, 1.0, 0.0), offset=(0.0, 0.0, 1.0))
+    joints = (waist, shoulder, SerialJoint(axis=(0.0, 1.0, 0.0), offset=(1.5, 0.0, 0.0)))
+    return SerialChain(joints=joints, tip=(1.2, 0.1, 0.0), base_position=base)
 
 
 TWO_PLANAR = Arms(
@@ -42,7 +37,7 @@ TWO_PLANAR = Arms(
     )
 )
 THREE_PLANAR = Arms(arms=(*TWO_PLANAR.arms, PlanarChain(link_lengths=(3.0, 2.0, 2.0), base_position=(9.0, 4.0))))
-TWO_SPATIAL = Arms(arms=(Elbow(base=(0.0, 0.0, 0.0)), Elbow(base=(0.0, 2.5, 0.0))))
+TWO_SPATIAL = Arms(arms=(elbow((0.0, 0.0, 0.0)), elbow((0.0, 2.5, 0.0))))
 ONE_PLANAR = PlanarChain(link_lengths=(4.0, 4.0), base_position=(0.0, 4.0))
 
 

@@ -11,7 +11,7 @@ from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.planners.via_point_ga import Problem, ViaPointGa
 from evoexp.robots.arms import Arms
-from evoexp.robots.assembly import Chain, Link
+from evoexp.robots.serial_chain import SerialChain, SerialJoint
 from evoexp.scenarios.arm_motion import ArmMotion
 
 
@@ -91,36 +91,65 @@ def test_solutions_keep_the_documented_order() -> None:
     assert motion.q[7] == pytest.approx(np.deg2rad(population[:, 7, 1]))
 
 
-class SpatialArm(Chain):
-    """A 3R arm in space: the planner must not know the difference."""
-
-    component = "spatial_arm"
-    base: tuple[float, float, float]
-
-    def append_to(self, model: pin.Model, arm: int) -> list[Link]:
-        first = model.addJoint(0, pin.JointModelRZ(), pin.SE3(np.eye(3), np.array(self.base)), f"{arm}_a")
-        second = model.addJoint(first, pin.JointModelRY(), pin.SE3(np.eye(3), np.array([0.0, 0.0, 1.0])), f"{arm}_b")
-        third = model.addJoint(second, pin.JointModelRY(), pin.SE3(np.eye(3), np.array([1.0, 0.0, 0.0])), f"{arm}_c")
-        x = np.array([1.0, 0.0, 0.0])
-        return [Link(arm, joint, np.zeros(3), x, 0.0) for joint in (second, third)]
+SIX = ((0, 6), (6, 12))
 
 
-def test_arms_in_space_are_planned_by_the_same_planner() -> None:
-    planner, _ = prepared("collision.sphere_radius=0.125", "ga.num_generations=30")
-    robot = Arms(arms=(SpatialArm(base=(0.0, 0.0, 0.0)), SpatialArm(base=(0.0, 2.5, 0.0))))
+def six_axes(base: tuple[float, float, float]) -> SerialChain:
+    """Return a 6R arm of a PUMA's build: waist, shoulder, elbow, and a wrist of three axes."""
+    axes = ((0, 0, 1), (0, -1, 0), (0, -1, 0), (1, 0, 0), (0, -1, 0), (1, 0, 0))
+    offsets = ((0, 0, 1), (0, 0, 0), (1, 0, 0), (0.8, 0, 0), (0, 0, 0), (0, 0, 0))
+    joints = tuple(
+        SerialJoint(axis=tuple(map(float, axis)), offset=tuple(map(float, offset)))  # type: ignore[arg-type]
+        for axis, offset in zip(axes, offsets, strict=True)
+    )
+    return SerialChain(joints=joints, tip=(0.2, 0.0, 0.0), base_position=base)
+
+
+def test_two_arms_of_six_joints_are_planned_by_the_same_planner() -> None:
+    """With the wrists held straight they are the paper's arms; the straight line collides, the plan does not."""
+    planner, _ = prepared("ga.num_generations=60", "objective.collision_weight=100.0", experiment="rana_puma")
+    robot = Arms(arms=(six_axes((0.0, 0.0, 0.0)), six_axes((0.0, 2.5, 0.0))))
     scenario = ArmMotion(
-        q_start=((15.0, -15.0, -30.0), (-150.0, -15.0, 30.0)),
-        q_goal=((150.0, -15.0, 30.0), (-15.0, -15.0, -30.0)),
+        q_start=((15.0, -15.0, -30.0, 0.0, 0.0, 0.0), (-150.0, -15.0, 30.0, 0.0, 0.0, 0.0)),
+        q_goal=((150.0, -15.0, 30.0, 0.0, 0.0, 0.0), (-15.0, -15.0, -30.0, 0.0, 0.0, 0.0)),
         security_margin=0.25,
         length_unit="unit",
     )
     problem = planner.prepare(robot, scenario)
-    *_, last = planner.evolve(problem, np.random.default_rng(0))
-    assert last.best.shape == (2 * 21 * 3,)
-    assert planner.motion(problem, last.best).q.shape == (21, 6)
-    terms = planner.evaluate(problem, last.best)
-    assert terms["collisions"] == last.terms["collisions"]
-    assert last.best_cost < 2.0 * last.mean_cost
+    share = np.linspace(0.0, 1.0, 41)[:, None]
+    straight = np.concatenate([((1 - share) * problem.start[a:b] + share * problem.goal[a:b]).ravel() for a, b in SIX])
+    assert planner.evaluate(problem, straight)["collisions"] > 0.0
+    first, *_, last = planner.evolve(problem, np.random.default_rng(0))
+    assert last.best.shape == (2 * 41 * 6,)
+    assert planner.shape(problem) == ((41, 6), (41, 6))
+    assert planner.motion(problem, last.best).q.shape == (41, 12)
+    assert last.solved
+    assert planner.evaluate(problem, last.best)["collisions"] == 0.0
+    assert last.best_cost < 0.8 * first.best_cost
+
+
+def test_puma_like_arms_move_by_eq_10_and_their_straight_line_collides() -> None:
+    planner, problem = prepared(experiment="rana_puma")
+    q = np.array([[20.0, 30.0, -40.0, -70.0, 10.0, 55.0]]).T
+    spheres = problem.collision
+    data = problem.assembly.model.createData()
+    pin.updateGeometryPlacements(
+        problem.assembly.model, data, spheres.geometry, placed := spheres.geometry.createData(), np.deg2rad(q[:, 0])
+    )
+    found = np.array([place.translation for place in placed.oMg])
+    assert [stop - first for first, stop in spheres.arm_spheres] == [9, 9]  # none on the columns
+    for arm, (first, stop) in enumerate(spheres.arm_spheres):
+        one, two, three = np.deg2rad(q[3 * arm : 3 * arm + 3, 0])
+        shoulder = np.array([0.0, 2.5 * arm, 1.0])
+        elbow = shoulder + np.array([np.cos(one) * np.cos(two), np.sin(one) * np.cos(two), np.sin(two)])
+        reach = two + three
+        tip = elbow + np.array([np.cos(one) * np.cos(reach), np.sin(one) * np.cos(reach), np.sin(reach)])
+        expected = [shoulder + f * (elbow - shoulder) for f in np.linspace(0.0, 1.0, 5)]
+        expected += [elbow + f * (tip - elbow) for f in np.linspace(0.25, 1.0, 4)]
+        assert found[first:stop] == pytest.approx(np.array(expected), abs=1e-12)
+    share = np.linspace(0.0, 1.0, 41)[:, None]
+    straight = [((1 - share) * problem.start[a:b] + share * problem.goal[a:b]).ravel() for a, b in ((0, 3), (3, 6))]
+    assert planner.evaluate(problem, np.concatenate(straight))["collisions"] == 3.0
 
 
 def test_elites_survive_untouched() -> None:

@@ -28,4 +28,4 @@ def results(stored: Path) -> Results:
 @pytest.fixture
 def settings() -> ReportSettings:
     """Return settings of the paper's own page."""
-    return ReportSettings(**REPORT, figures="rana_planar")
+    return ReportSettings(**REPORT, figures="rana")

@@ -14,7 +14,7 @@ from report_samples import REPORT, expand, store
 from evoexp import compose
 from evoexp.errors import NothingStored, UnknownOption
 from evoexp.report import build
-from evoexp.report.pages import rana_planar
+from evoexp.report.pages import rana
 from evoexp.report.results import Results
 from evoexp.report.settings import ReportSettings
 from evoexp.store.run_directory import RunDirectory
@@ -35,11 +35,20 @@ FIGURES = [
     "fig_6_paths",
     "fig_7_distances",
 ]
+SPATIAL = [
+    "fig_8_arm",
+    "fig_9_two_arms",
+    "fig_11_snapshots",
+    "fig_12a_fitness",
+    "fig_12b_configuration_space",
+    "fig_12b_operational_space",
+    "fig_13_distances",
+]
 
 
 def draw(
     outputs: Path,
-    page: str | None = "rana_planar",
+    page: str | None = "rana",
     name: str = "rana_planar",
     *overrides: str,
     formats: tuple[str, ...] = ("svg", "png"),
@@ -101,6 +110,7 @@ def test_the_index_says_it_all(page: Path, results: Results) -> None:
     text = page.read_text()
     for condition in results.conditions:
         assert f"| {condition.label} | `{condition.hash12}` | 2 | 2 | 0 |" in text
+    assert "| solved | certified | refuted | undecided | solved, yet refuted | margin certified |" in text
     assert "| `ga.crossover_rate` | 0.9 | – | paper: Tab. 1, cross_over_probability |" in text
     assert "| `ga.population_size` | 12 | – | override |" in text
     assert text.count("not judged (budget smoke)") == 5
@@ -129,7 +139,7 @@ def test_partial_results_are_drawn_and_said(tmp_path: Path) -> None:
     ga.write_failure(1, "ValueError: no luck | at all", "traceback")
     for replicate in (0, 1):
         search.log_path(replicate).unlink()
-    page = draw(tmp_path, "rana_planar", "rana_planar", "ga.num_generations=1", formats=("svg",))
+    page = draw(tmp_path, "rana", "rana_planar", "ga.num_generations=1", formats=("svg",))
     text = page.read_text()
     assert "**Partial results.** via-point GA: 1 of 2 replicates done, 1 failed; random search: 0 of 2" in text
     assert "| via-point GA | 1 | ValueError: no luck \\| at all |" in text
@@ -138,9 +148,56 @@ def test_partial_results_are_drawn_and_said(tmp_path: Path) -> None:
     sidecar = json.loads((page.parent / "fig_5_fitness.json").read_text())
     assert [(c["done"], c["failed"]) for c in sidecar["conditions"]] == [(1, 1)]
     ga.log_path(0).unlink()
-    text = draw(tmp_path, "rana_planar", "rana_planar", "ga.num_generations=1", formats=("svg",)).read_text()
+    text = draw(tmp_path, "rana", "rana_planar", "ga.num_generations=1", formats=("svg",)).read_text()
     assert "0 of 2 replicates done, 1 failed" in text
     assert sorted(contents(page)) == ["index.md"]  # the figures of before are gone
+
+
+def test_arms_in_space_have_the_papers_other_figures(tmp_path: Path) -> None:
+    store(tmp_path, expand("rana_puma", "ga.num_generations=2"))
+    page = draw(tmp_path, "rana", "rana_puma", "ga.num_generations=2", formats=("svg",))
+    assert sorted(path.stem for path in page.parent.glob("*.svg")) == sorted(SPATIAL)
+    text = page.read_text()
+    assert [text.index(f"### Fig. {number}:") for number in ("8", "9", "11", "12a", "12b", "13")] == sorted(
+        text.index(f"### Fig. {number}:") for number in ("8", "9", "11", "12a", "12b", "13")
+    )
+    assert "C5 = 3 of 40 instants" in text
+    both = pd.read_csv(page.parent / "fig_9_two_arms.csv")
+    assert set(both["reach"]) == {2.0}
+    assert len(both) == 2 * 2 * 3
+    paths = pd.read_csv(page.parent / "fig_12b_operational_space.csv")
+    assert {"x", "y", "z", "joint_3_deg"} <= set(paths)
+    ends = paths[(paths["instant"] == 40) & (paths["arm"] == 0)]
+    assert len(ends.round(9)[["x", "y", "z"]].drop_duplicates()) == 1
+
+
+def test_one_page_holds_the_whole_paper(tmp_path: Path) -> None:
+    words = ("ga.num_generations=1", "num_replicates=1")
+    store(tmp_path, expand("rana", *words))
+    page = draw(tmp_path, "rana", "rana", *words, formats=("svg",))
+    stems = {path.stem for path in page.parent.glob("*.svg")}
+    assert len(stems) == len(FIGURES) + len(SPATIAL)
+    assert {f"{stem}_1_planar_arms" for stem in FIGURES} <= stems
+    text = page.read_text()
+    assert text.startswith("# Rana & Zalzala 1995: two planar arms and two PUMA-like arms")
+    assert "PUMA-like arms against PUMA-like arms, random search" in text
+
+
+def test_ablations_are_compared_with_the_first_condition(tmp_path: Path) -> None:
+    words = ("ga.num_generations=2", "num_replicates=2")
+    experiment = expand("rana_planar_ablations", *words)
+    assert len(experiment.conditions) == 11
+    store(tmp_path, experiment)
+    page = draw(tmp_path, "ablations", "rana_planar_ablations", *words, formats=("svg",))
+    assert {path.stem for path in page.parent.glob("*.svg")} == {"values", "effects", "convergence"}
+    text = page.read_text()
+    assert "## best cost: as printed against …" in text
+    assert text.count("Relaxation and redistribution improve the search: against") == 3
+    effects = pd.read_csv(page.parent / "effects.csv")
+    assert len(effects) == 2 * 10
+    assert effects["a12"].between(0.0, 1.0).all()
+    values = pd.read_csv(page.parent / "values.csv")
+    assert len(values) == 2 * 11 * 2
 
 
 def test_nothing_stored_names_the_command(tmp_path: Path) -> None:
@@ -167,31 +224,32 @@ def test_an_experiment_without_a_page_has_results_convergence_and_parameters(sto
 
 
 def test_an_unknown_page_is_named(stored: Path) -> None:
-    with pytest.raises(UnknownOption, match=r"report\.figures: no option 'rana_plan'; did you mean 'rana_planar'"):
-        draw(stored, "rana_plan")
+    with pytest.raises(UnknownOption, match=r"report\.figures: no option 'ranna'; did you mean 'rana'"):
+        draw(stored, "ranna")
 
 
 def test_claims_are_judged_only_on_the_papers_own_settings(results: Results) -> None:
     paper = compose.expand(["experiment=rana_planar"])[0]
     condition = results.conditions[0]._replace(condition=paper.conditions[0].condition, planned=20)
     judged = results._replace(budget="paper")
-    assert rana_planar.not_judged(judged, condition) == ""
-    assert rana_planar.not_judged(results, condition) == "budget smoke"
-    assert rana_planar.not_judged(judged, condition._replace(planned=3)) == "3 of 20 replicates planned"
-    assert rana_planar.not_judged(judged, results.conditions[0]._replace(planned=20)).startswith("overridden: ga.")
+    assert rana.not_judged(judged, condition) == ""
+    assert rana.not_judged(results, condition) == "budget smoke"
+    assert rana.not_judged(judged, condition._replace(planned=3)) == "3 of 20 replicates planned"
+    assert rana.not_judged(judged, results.conditions[0]._replace(planned=20)).startswith("overridden: ga.")
 
 
 def test_redistribution_is_applied_to_solved_strings_only(results: Results) -> None:
     search = results.conditions[1]
-    count = rana_planar.colliding_after(search, relaxed=False)
+    count = rana.colliding_after(search, relaxed=False)
     assert 0 <= count <= search.solved
     none = search.summaries.assign(solved=False)
-    assert rana_planar.colliding_after(search._replace(summaries=none), relaxed=True) == 0
+    assert rana.colliding_after(search._replace(summaries=none), relaxed=True) == 0
 
 
 def test_drawing_leaves_matplotlib_as_it_was(page: Path) -> None:
     assert mpl.rcParams["svg.hashsalt"] == mpl.rcParamsDefault["svg.hashsalt"]
-    assert "matplotlib.pyplot" not in sys.modules
+    pyplot = sys.modules.get("matplotlib.pyplot")  # axes in space import it
+    assert pyplot is None or pyplot.get_fignums() == []
 
 
 def test_swept_conditions_are_told_apart_and_compared_with_their_own_control(tmp_path: Path) -> None:
@@ -199,7 +257,7 @@ def test_swept_conditions_are_told_apart_and_compared_with_their_own_control(tmp
     experiment = compose.expand(words, multirun=True)[0]
     store(tmp_path, experiment)
     request = build.Request("swept", experiment.name, experiment.budget, experiment.conditions)
-    settings = ReportSettings(**REPORT | {"formats": ("svg",), "figures": "rana_planar"})  # type: ignore[arg-type]
+    settings = ReportSettings(**REPORT | {"formats": ("svg",), "figures": "rana"})  # type: ignore[arg-type]
     page = build.report(request, settings, tmp_path, 2)
     text = page.read_text()
     assert sorted(re.findall(r"^## (.* against .*)$", text, re.MULTILINE)) == [

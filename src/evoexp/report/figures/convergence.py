@@ -41,6 +41,23 @@ def draw_cost(table: pd.DataFrame) -> Figure:
     return figure
 
 
+def draw_best(table: pd.DataFrame) -> Figure:
+    """Draw medians of the best cost only, for many conditions at once."""
+    figure = style.figure(4.4)
+    axes = figure.subplots()
+    best = table[table["quantity"] == NAMES["best_cost"]].replace([np.inf, -np.inf], np.nan)
+    across = _across(best)
+    for (position, condition), curve in groups(best, ["position", "condition"]):
+        kind = "-" if position < len(style.CONDITION_COLOURS) else (0, (4, 1.5))
+        label = f"{condition} ({_counts(curve)})"
+        axes.plot(curve[across], curve["median"], linestyle=kind, color=style.condition_colour(position), label=label)
+    axes.set_xlim(0, max(1, int(best[across].max())))
+    axes.set_xlabel(across)
+    axes.set_ylabel("best cost so far (median)")
+    style.legend_below(figure, axes, 3)
+    return figure
+
+
 def draw_fitness(table: pd.DataFrame) -> Figure:
     """Draw best and average fitness against generations: over the whole range, and where the best ones are."""
     figure = style.figure(4.1)
@@ -91,8 +108,7 @@ def _condition(results: Results, condition: ConditionResults, objective: Any) ->
 
 def _curves(axes: Axes, table: pd.DataFrame, columns: tuple[str, ...]) -> None:
     """Draw medians as lines (the average dashed) and quartiles as bands."""
-    shared = table.groupby("generation")["evaluations"].nunique().max() == 1
-    across = "generation" if shared else "evaluations"
+    across = _across(table)
     for (position, condition), rows in groups(table, ["position", "condition"]):
         colour = style.condition_colour(position)
         for column in columns:
@@ -102,9 +118,14 @@ def _curves(axes: Axes, table: pd.DataFrame, columns: tuple[str, ...]) -> None:
             axes.fill_between(curve[across], curve["lower"], curve["upper"], color=colour, alpha=0.18, linewidth=0)
             axes.plot(curve[across], curve["median"], linestyle=kind, color=colour, label=label)
     axes.set_xlim(0, max(1, int(table[across].max())))
-    axes.set_xlabel(across if across == "generation" else "evaluations")
-    if shared:
+    axes.set_xlabel(across)
+    if across == "generation":
         _evaluations_above(axes, table)
+
+
+def _across(table: pd.DataFrame) -> str:
+    """Return the common axis: generations where all conditions spend the same in each, else evaluations."""
+    return "generation" if table.groupby("generation")["evaluations"].nunique().max() == 1 else "evaluations"
 
 
 def _counts(curve: pd.DataFrame) -> str:

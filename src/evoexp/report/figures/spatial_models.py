@@ -80,8 +80,9 @@ def two_arms_table(condition: ConditionResults) -> pd.DataFrame:
     lengths = np.sqrt(sum((table[f"{axis}_end"] - table[axis]) ** 2 for axis in "xyz"))
     moving = np.array([link.joint > 0 for link in problem.assembly.links])
     own = moving[table["link"].to_numpy() + _offsets(problem.assembly)[table["arm"].to_numpy()]]
-    reach = lengths.where(own, 0.0)[table["instant"] == 0].groupby(table["arm"]).sum()
-    return table.assign(reach=table["arm"].map(reach))
+    counted = table.assign(reach=np.where(own, lengths, 0.0))
+    reach = counted[counted["instant"] == 0].groupby("arm")["reach"].sum()
+    return table.assign(reach=table["arm"].map(reach).round(9))
 
 
 def draw_two_arms(table: pd.DataFrame) -> Figure:
@@ -163,8 +164,9 @@ def _space(
         pad = 0.05 + 0.5 * max(0.0, 0.5 - (high - low))
         getattr(axes, f"set_{name}lim")(low - pad, high + pad)
         box.append(high - low + 2.0 * pad)
-        getattr(axes, f"set_{name}label")(f"{name} [{unit}]", labelpad=-4)
+        getattr(axes, f"set_{name}label")(f"{name} [{unit}]", labelpad=-7, fontsize=7)
     axes.set_box_aspect(box, zoom=zoom)
+    axes.patch.set_visible(False)  # else it hides the labels of the panel beside it
     axes.tick_params(labelsize=6, pad=-2)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_major_locator(style.few_ticks())

@@ -9,6 +9,7 @@ from evoexp.report.results import Results
 from evoexp.report.settings import ReportSettings
 
 PAGES = {
+    "ablations": "evoexp.report.pages.ablations:page",
     "generic": "evoexp.report.pages.generic:page",
     "planar_arms": "evoexp.report.pages.planar_arms:page",
     "rana": "evoexp.report.pages.rana:page",

@@ -40,10 +40,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
     drawn = [measure(c, suffix, settings) for c, suffix in planar_arms.suffixed(results)]
     found = [claim for one in drawn for claim in _claims(results, settings, one, comparisons)]
     checks = [(f"{_who(results, one)}{what}", finding) for one in drawn for what, finding in _checks(one)]
-    drawings = []
-    for one in drawn:
-        own = rana_figures.drawings(results, one)
-        drawings += [d._replace(title=f"{d.title} ({one.condition.label})") for d in own] if one.suffix else own
+    drawings = [*rana_figures.fitness(results, drawn), *(d for one in drawn for d in rana_figures.drawings(one))]
     planar = {one.planar for one in drawn}
     return Page(
         f"Rana & Zalzala 1995: {' and '.join(WHAT[flat] for flat in sorted(planar, reverse=True))}",

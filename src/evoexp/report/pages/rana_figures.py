@@ -1,8 +1,9 @@
 """The figures of Rana & Zalzala 1995: 1–7 of arms in the plane, 8–13 of arms in space."""
 
 import re
+from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -40,9 +41,10 @@ def measure(condition: ConditionResults, suffix: str, settings: ReportSettings) 
     return Measured(condition, suffix, planar_motion.sampled_distances(condition, settings.samples_per_segment))
 
 
-def drawings(results: Results, one: Measured) -> list[Drawing]:
-    """Return the paper's figures of one condition and of the controls in its scene."""
-    return [*(_planar(one) if one.planar else _spatial(one)), _fitness(results, one), _distances(one)]
+def drawings(one: Measured) -> list[Drawing]:
+    """Return the paper's figures of one condition, without those of its fitness."""
+    own = [*(_planar(one) if one.planar else _spatial(one)), _distances(one)]
+    return [drawing._replace(title=f"{drawing.title}{_of(one)}") for drawing in own] if one.suffix else own
 
 
 def order(drawing: Drawing) -> tuple[int, str]:
@@ -151,25 +153,32 @@ def _ratio(condition: ConditionResults) -> str:
     return f"Median length over that of the straight line: {markdown.number(median)}."
 
 
-def _fitness(results: Results, one: Measured) -> Drawing:
-    scene = results._replace(conditions=tuple(c for c in results.conditions if _same_scene(c, one.condition)))
-    stem, number = ("fig_5_fitness", "5") if one.planar else ("fig_12a_fitness", "12a")
-    return Drawing(
-        f"{stem}{one.suffix}",
-        f"Fig. {number}: best and average fitness against generation",
-        "The paper shows one run; its fitness is F = C_max − cost (Eq. 7 with the sign that punishes collisions). Here "
-        "medians and quartiles over replicates; the average is over a generation's individuals, elites included.",
-        partial(convergence.fitness_table, scene),
-        convergence.draw_fitness,
-        scene.with_data,
-    )
+def fitness(results: Results, drawn: Sequence[Measured]) -> Iterator[Drawing]:
+    """Yield Figs. 5 and 12a: one figure per scene, of all conditions and controls in it."""
+    scenes = list(dict.fromkeys(_scene(one.condition) for one in drawn))
+    for scene in scenes:
+        first = next(one for one in drawn if _scene(one.condition) == scene)
+        within = results._replace(conditions=tuple(c for c in results.conditions if _scene(c) == scene))
+        stem, number = ("fig_5_fitness", "5") if first.planar else ("fig_12a_fitness", "12a")
+        several = len(scenes) > 1
+        yield Drawing(
+            f"{stem}{first.suffix}" if several else stem,
+            f"Fig. {number}: best and average fitness against generation{_of(first) if several else ''}",
+            "The paper shows one run; its fitness is F = C_max − cost (Eq. 7 with the sign that punishes collisions). "
+            "Here medians and quartiles over replicates; the average is over a generation's individuals, elites "
+            "included.",
+            partial(convergence.fitness_table, within),
+            convergence.draw_fitness,
+            within.with_data,
+        )
 
 
-def _same_scene(first: ConditionResults, second: ConditionResults) -> bool:
-    return (
-        first.planner == second.planner
-        and first.condition._replace(planner=second.condition.planner) == second.condition
-    )
+def _scene(condition: ConditionResults) -> tuple[Any, Any]:
+    return condition.condition.robot, condition.condition.scenario
+
+
+def _of(one: Measured) -> str:
+    return f" ({one.condition.label})"
 
 
 def _distances(one: Measured) -> Drawing:

@@ -1,0 +1,131 @@
+"""Ablations: one quantity of every condition side by side, and how much better the first condition is."""
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from evoexp.records import FloatArray
+from evoexp.report import style
+from evoexp.report.claims import Comparison
+from evoexp.report.results import Results
+from evoexp.report.tables import groups
+
+JITTER = 0.16  # [rows] half the width over which points are spread
+POINTS = 50  # up to so many replicates every one is shown
+
+
+def values_table(results: Results, names: dict[str, str]) -> pd.DataFrame:
+    """Return quantities of every finished replicate.
+
+    Args:
+        results: With data.
+        names: Column of the summaries → its name with unit.
+
+    Returns:
+        Columns quantity, position, condition, replicate, value, failed (replicates of the condition).
+    """
+    parts = []
+    for column, name in names.items():
+        for position, c in enumerate(results.with_data):
+            given = {"quantity": name, "position": position, "condition": c.label}
+            parts.append(
+                pd.DataFrame(given | {"replicate": c.summaries.index, "value": c.column(column), "failed": c.failed})
+            )
+    return pd.concat(parts, ignore_index=True)
+
+
+def draw_values(table: pd.DataFrame) -> Figure:
+    """Draw Tukey's boxes with every replicate's point, the first condition on top."""
+    quantities = list(dict.fromkeys(table["quantity"]))
+    labels = dict(zip(table["position"], table["condition"], strict=True))
+    figure = style.figure(0.32 * len(labels) + 1.1)
+    panels = figure.subplots(1, len(quantities), sharey=True, squeeze=False)[0]
+    for axes, quantity in zip(panels, quantities, strict=True):
+        rows = table[table["quantity"] == quantity]
+        for position, own in groups(rows, "position"):
+            values = own["value"].to_numpy()
+            finite = values[np.isfinite(values)]
+            _box(axes, position, finite)
+        middle = rows.loc[rows["position"] == 0, "value"].median()
+        axes.axvline(middle, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
+        axes.set_xlabel(quantity)
+        axes.margins(x=0.06)
+    counts = (
+        table[table["quantity"] == quantities[0]].groupby("position").agg(n=("value", "size"), failed=("failed", "max"))
+    )
+    names = [f"{labels[k]}  (n = {n}{f', {failed} failed' if failed else ''})" for k, n, failed in counts.itertuples()]
+    panels[0].set_yticks(list(counts.index), names)
+    panels[0].set_ylim(len(labels) - 0.4, -0.6)
+    return figure
+
+
+def effects_table(comparisons: dict[str, tuple[Comparison, ...]]) -> pd.DataFrame:
+    """Return how often the first condition is better.
+
+    Args:
+        comparisons: Name of a quantity → the first condition against each other one.
+
+    Returns:
+        Columns quantity, condition (the other one), a12, lower, upper, p_adjusted, seeds.
+    """
+    rows = [
+        (quantity, c.quantity, c.better.a12, *c.better.interval, c.p_adjusted, c.num_seeds)
+        for quantity, found in comparisons.items()
+        for c in found
+    ]
+    return pd.DataFrame(rows, columns=["quantity", "condition", "a12", "lower", "upper", "p_adjusted", "seeds"])
+
+
+def draw_effects(table: pd.DataFrame) -> Figure:
+    """Draw A12 with its interval, one row per other condition, one panel per quantity."""
+    quantities = list(dict.fromkeys(table["quantity"]))
+    labels = list(dict.fromkeys(table["condition"]))
+    figure = style.figure(0.3 * len(labels) + 1.2)
+    panels = figure.subplots(1, len(quantities), sharey=True, squeeze=False)[0]
+    for axes, quantity in zip(panels, quantities, strict=True):
+        rows = table[table["quantity"] == quantity]
+        y = np.array([labels.index(label) for label in rows["condition"]])
+        a12, low, high = (rows[name].to_numpy(np.float64) for name in ("a12", "lower", "upper"))
+        axes.axvline(0.5, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
+        axes.hlines(y, low, high, color=style.ARM_COLOURS[0], linewidth=1.4)
+        clear = rows["p_adjusted"].to_numpy(np.float64) < 0.05
+        axes.plot(a12[clear], y[clear], "o", color=style.ARM_COLOURS[0], markersize=5, label="adjusted p < 0.05")
+        axes.plot(
+            a12[~clear],
+            y[~clear],
+            "o",
+            color=style.ARM_COLOURS[0],
+            mfc="white",
+            markersize=5,
+            label="adjusted p ≥ 0.05",
+        )
+        axes.set_xlim(-0.03, 1.03)
+        axes.set_title(quantity)
+        axes.set_xlabel("A12: the first condition is better")
+    panels[0].set_yticks(range(len(labels)), [f"against {label}" for label in labels])
+    panels[0].set_ylim(len(labels) - 0.5, -0.5)
+    style.legend_below(figure, panels[0], 2)
+    return figure
+
+
+def _box(axes: Axes, position: int, values: FloatArray) -> None:
+    """Draw one condition."""
+    if not len(values):
+        return
+    colour = style.condition_colour(position)
+    axes.boxplot(
+        values,
+        positions=[position],
+        orientation="horizontal",
+        widths=0.55,
+        manage_ticks=False,
+        showfliers=len(values) > POINTS,
+        boxprops={"color": colour},
+        whiskerprops={"color": colour},
+        capprops={"color": colour},
+        medianprops={"color": colour, "linewidth": 2.0},
+    )
+    if len(values) <= POINTS:
+        spread = JITTER * (2.0 * ((np.arange(len(values)) * 0.618034) % 1.0) - 1.0)
+        axes.plot(values, position + spread, "o", color=colour, markersize=2.6, alpha=0.5, mec="none")

@@ -56,10 +56,10 @@ def certificate(problem: Any, motion: Motion | None) -> Certificate:
     return Certificate(
         certified=_ANSWER[verdict.status],
         certified_margin=_ANSWER[verdict.margin_status],
-        clearance=verdict.clearance,
-        clearance_at=verdict.clearance_at if verdict.clearance_pair else None,
+        clearance=float(verdict.clearance),
+        clearance_at=float(verdict.clearance_at) if verdict.clearance_pair else None,
         clearance_pair=PAIR.join(verdict.clearance_pair or ()),
-        refuted_at=verdict.refuted_at if touching else None,
+        refuted_at=float(verdict.refuted_at) if touching else None,
         refuted_pair=PAIR.join(verdict.refuted_pair or ()),
         certificate_queries=verdict.queries,
     )

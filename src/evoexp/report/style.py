@@ -68,6 +68,7 @@ def drawn(draw: Callable[[], Figure], formats: Sequence[str], dpi: int) -> dict[
         mpl.rcdefaults()
         for name, value in _RC.items():
             mpl.rcParams[name] = value  # type: ignore[index]
+        mpl.rcParams["figure.dpi"] = dpi  # arranged with the widths that text has when it is saved
         figure, images = draw(), {}
         figure.draw_without_rendering()
         figure.set_layout_engine("none")  # arranged once, for all formats

@@ -4,7 +4,7 @@ import numpy as np
 
 from evoexp.numerics import kernel
 from evoexp.robots.kinematics import BLOCK, U
-from evoexp.scenarios.obstacles import BOX, SPHERE
+from evoexp.scenarios.obstacles import BOX, CAPSULE, CYLINDER, HALF_SPACE, SPHERE
 
 ROWS = 3 * BLOCK  # x, y, z of a point in a block
 MARGIN = 1.0 + 1e-9  # bounds are widened by it, so that rounding cannot skip what touches
@@ -24,6 +24,19 @@ def meet(one, i, two, j, within):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def _below(rotation, origin, points, i, within):  # type: ignore[no-untyped-def]
+    """Whether the point at offset i is lower than `within` above a frame's plane z = 0 in any lane."""
+    x, y, z = rotation[2], rotation[5], rotation[8]
+    level = x * origin[0] + y * origin[1] + z * origin[2]
+    level += within + (abs(within) + abs(level)) * (MARGIN - 1.0)
+    count = 0
+    for n in range(BLOCK):
+        a = i + U(n)
+        count += x * points[a] + y * points[a + U(BLOCK)] + z * points[a + U(2 * BLOCK)] < level
+    return count > 0
+
+
+@kernel
 def to_obstacles(obstacles, bounds, limit, centers, middles, scratch, out):  # type: ignore[no-untyped-def]
     """Lower `out` (BLOCK,), the limit, to the signed distance of any centre to any obstacle's surface."""
     _, _, reach, spheres, _ = bounds
@@ -32,9 +45,13 @@ def to_obstacles(obstacles, bounds, limit, centers, middles, scratch, out):  # t
     for o in range(len(kind)):
         for row in range(3):
             place[row * BLOCK : (row + 1) * BLOCK] = center[o, row]
-        extent = _length(size[o, 0], size[o, 1], size[o, 2]) if kind[o] == BOX else size[o, 0] + size[o, 1]
+        extent = size[o, 0] + size[o, 1] if kind[o] == CAPSULE else _length(size[o, 0], size[o, 1], size[o, 2])
         for link in range(len(reach)):
-            if meet(middles, U(link) * U(ROWS), place, U(0), (limit + reach[link] + extent) * MARGIN):
+            if kind[o] == HALF_SPACE:
+                near = _below(rotation[o], center[o], middles, U(link) * U(ROWS), limit + reach[link])
+            else:
+                near = meet(middles, U(link) * U(ROWS), place, U(0), (limit + reach[link] + extent) * MARGIN)
+            if near:
                 for i in range(spheres[link, 0], spheres[link, 1]):
                     _into_frame(center[o], rotation[o], centers, U(i) * U(ROWS), scratch)
                     _to_obstacle(kind[o], size[o, 0], size[o, 1], size[o, 2], scratch, out)
@@ -51,8 +68,13 @@ def _to_obstacle(kind, a, b, c, point, out):  # type: ignore[no-untyped-def]
         elif kind == BOX:
             u, v, w = abs(x) - a, abs(y) - b, abs(z) - c
             distance = _length(max(u, 0.0), max(v, 0.0), max(w, 0.0)) + min(max(u, max(v, w)), 0.0)
-        else:
+        elif kind == CAPSULE:
             distance = _length(x, y, z - min(max(z, -b), b)) - a
+        elif kind == CYLINDER:
+            u, v = np.sqrt(x * x + y * y) - a, abs(z) - b
+            distance = _length(max(u, 0.0), max(v, 0.0), 0.0) + min(max(u, v), 0.0)
+        else:
+            distance = z
         out[lane] = min(out[lane], distance)
 
 

@@ -1,15 +1,106 @@
-"""A motion through configuration space."""
+"""A motion through configuration space: straight or cubic between its instants."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import numpy as np
+
+from evoexp.numerics import kernel
 from evoexp.records import FloatArray
 
 
 class Motion(NamedTuple):
-    """Configurations passed at instants 0, 1, …, each reached from the one before along a straight line.
+    """Configurations passed at instants 0, 1, …, each reached from the one before along a straight line or a cubic.
+
+    Time t is counted in instants: segment i covers [i, i + 1], on which u = t − i runs from 0 to 1.
 
     Attributes:
         q: (instants, nq) [rad], lengths for prismatic joints.
+        coefficients: (segments, 4, nq) of q(u) = c0 + c1 u + c2 u² + c3 u³ on every segment; None: straight lines.
     """
 
     q: FloatArray
+    coefficients: FloatArray | None = None
+
+    @property
+    def num_segments(self) -> int:
+        """Number of segments: one less than there are instants."""
+        return len(self.q) - 1
+
+    @property
+    def polynomials(self) -> FloatArray:
+        """(segments, 4, nq) coefficients in powers of u, of straight motions, too."""
+        if self.coefficients is not None:
+            return self.coefficients
+        coefficients = np.zeros((self.num_segments, 4, self.q.shape[1]))
+        coefficients[:, 0] = self.q[:-1]
+        coefficients[:, 1] = self.q[1:] - self.q[:-1]
+        return coefficients
+
+    def at(self, t: float) -> FloatArray:
+        """Return q (nq,) at t in [0, segments].
+
+        Raises:
+            ValueError: If t lies outside.
+        """
+        if not 0.0 <= t <= self.num_segments:
+            raise ValueError(f"t must lie in [0, {self.num_segments}], was {t}")
+        segment = min(int(t), max(self.num_segments - 1, 0))
+        u = t - segment
+        if self.coefficients is None:
+            step = self.q[segment + 1] - self.q[segment] if u > 0.0 else 0.0
+            return np.asarray(self.q[segment] + u * step)
+        c0, c1, c2, c3 = self.coefficients[segment]
+        return np.asarray(c0 + u * (c1 + u * (c2 + u * c3)))
+
+    @property
+    def greatest(self) -> FloatArray:
+        """An upper bound (nq,) of |q|: the Bézier points of all segments."""
+        if self.coefficients is None:
+            return np.asarray(np.abs(self.q).max(axis=0))
+        c0, c1, c2, c3 = self.coefficients.transpose(1, 0, 2)
+        points = np.stack([c0, c0 + c1 / 3.0, c0 + (2.0 * c1 + c2) / 3.0, c0 + c1 + c2 + c3])
+        return np.asarray(np.abs(points).max(axis=(0, 1)))
+
+    def speed_bound(self, segment: int, begin: float = 0.0, end: float = 1.0) -> FloatArray:
+        """Return an upper bound (nq,) of |dq/du| on a segment's u in [begin, end].
+
+        The derivative's Bézier coefficients on the interval; its values lie between the least and the greatest of them.
+        """
+        if self.coefficients is None:
+            return np.asarray(np.abs(self.q[segment + 1] - self.q[segment]))
+        coefficients = np.ascontiguousarray(self.coefficients[segment])
+        return np.array([speed_bound(coefficients, joint, begin, end) for joint in range(coefficients.shape[1])])
+
+
+def cubic_motion(coefficients: FloatArray) -> Motion:
+    """Return a motion from power coefficients (segments, 4, nq), lowest power first.
+
+    Raises:
+        ValueError: If their shape is another, or a segment does not begin where the one before ends (to 1e-9).
+    """
+    coefficients = np.ascontiguousarray(coefficients, dtype=np.float64)
+    if coefficients.ndim != 3 or coefficients.shape[0] == 0 or coefficients.shape[1] != 4:
+        raise ValueError(f"coefficients must have shape (segments, 4, nq), was {coefficients.shape}")
+    ends = coefficients.sum(axis=1)
+    jumps = np.abs(ends[:-1] - coefficients[1:, 0])
+    if jumps.size and jumps.max() > 1e-9 * max(1.0, float(np.abs(coefficients).max())):
+        segment = int(jumps.max(axis=1).argmax())
+        raise ValueError(f"coefficients must be continuous, jump by {jumps.max()} behind segment {segment}")
+    return Motion(np.vstack([coefficients[:, 0], ends[-1:]]), coefficients)
+
+
+def spline_motion(spline: Any) -> Motion:
+    """Return the motion of a `scipy.interpolate.CubicSpline` over (nq,) values; its knots become the instants."""
+    widths = np.diff(spline.x)  # scipy counts powers of (x − knot), highest first: (4, segments, nq)
+    powers = np.stack([spline.c[3 - p] * (widths**p)[:, None] for p in range(4)], axis=1)
+    return cubic_motion(powers)
+
+
+@kernel
+def speed_bound(coefficients, joint, begin, end):  # type: ignore[no-untyped-def]
+    """Greatest |dq/du| of a joint on [begin, end] of a segment with `coefficients` (4, nq), or more."""
+    c1, c2, c3 = coefficients[1, joint], 2.0 * coefficients[2, joint], 3.0 * coefficients[3, joint]
+    first = abs(c1 + begin * (c2 + begin * c3))
+    last = abs(c1 + end * (c2 + end * c3))
+    middle = abs(c1 + 0.5 * c2 * (begin + end) + c3 * begin * end)
+    return max(first, max(middle, last))

@@ -15,7 +15,7 @@ Point = Annotated[tuple[float, ...], Field(min_length=2, max_length=3)]
 
 Angles = tuple[float, float, float]
 
-SPHERE, BOX, CAPSULE = 0, 1, 2
+SPHERE, BOX, CAPSULE, CYLINDER, HALF_SPACE = range(5)
 
 
 class SphereObstacle(Settings):
@@ -44,17 +44,43 @@ class CapsuleObstacle(Settings):
     radius: Positive
 
 
-Obstacle = Annotated[SphereObstacle | BoxObstacle | CapsuleObstacle, Field(discriminator="shape")]
+class CylinderObstacle(Settings):
+    """A solid cylinder with flat ends, its axis from `start` to `end`."""
+
+    shape: Literal["cylinder"]
+    start: Point
+    end: Point
+    radius: Positive
+
+
+class HalfSpaceObstacle(Settings):
+    """All points on one side of a plane (in the plane: of a line): a floor, a wall.
+
+    Attributes:
+        point: Any point of the boundary.
+        normal: Points out of the solid, of any length but 0.
+    """
+
+    shape: Literal["half_space"]
+    point: Point
+    normal: Point
+
+
+Obstacle = Annotated[
+    SphereObstacle | BoxObstacle | CapsuleObstacle | CylinderObstacle | HalfSpaceObstacle, Field(discriminator="shape")
+]
 
 
 class ObstacleTable(NamedTuple):
     """Obstacles as arrays.
 
     Attributes:
-        kind: (obstacles,) SPHERE, BOX or CAPSULE.
-        center: (obstacles, 3).
-        rotation: (obstacles, 9) from the obstacle's frame to the world, row by row; a capsule lies along its z axis.
-        size: (obstacles, 3): radius | half the edges | radius, half the length, unused.
+        kind: (obstacles,) SPHERE, BOX, CAPSULE, CYLINDER or HALF_SPACE.
+        center: (obstacles, 3); of a half-space a point of its boundary.
+        rotation: (obstacles, 9) from the obstacle's frame to the world, row by row; capsules and cylinders lie along
+            their z axis, a half-space is all points with z ≤ 0.
+        size: (obstacles, 3): radius | half the edges | radius, half the length, 0 (capsules and cylinders; the length
+            of a capsule is that of its segment) | unused.
     """
 
     kind: np.ndarray
@@ -67,7 +93,7 @@ def obstacle_table(obstacles: tuple[Any, ...]) -> ObstacleTable:
     """Return obstacles as arrays.
 
     Raises:
-        SettingError: If a capsule's ends coincide.
+        SettingError: If the ends of a capsule or cylinder coincide, or a normal is zero.
     """
     table = ObstacleTable(
         np.zeros(len(obstacles), dtype=np.int64),
@@ -82,15 +108,21 @@ def obstacle_table(obstacles: tuple[Any, ...]) -> ObstacleTable:
             table.kind[k], table.center[k] = BOX, _point(obstacle.center)
             table.size[k] = 0.5 * np.array([*obstacle.size, 1.0][:3])
             table.rotation[k] = rotation_matrix(obstacle.rotation).ravel()
+        elif isinstance(obstacle, HalfSpaceObstacle):
+            axis, length = _direction(_point(obstacle.normal))
+            if length == 0.0:
+                raise SettingError(f"scenario.obstacles[{k}].normal", "a direction", list(obstacle.normal))
+            table.kind[k], table.center[k] = HALF_SPACE, _point(obstacle.point)
+            table.rotation[k] = _z_along(axis).ravel()
         else:
             start, end = _point(obstacle.start), _point(obstacle.end)
-            axis = end - start
-            length = float(np.sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]))
+            axis, length = _direction(end - start)
             if length == 0.0:
                 raise SettingError(f"scenario.obstacles[{k}].end", "another point than start", list(obstacle.end))
-            table.kind[k], table.center[k] = CAPSULE, 0.5 * (start + end)
+            table.kind[k] = CYLINDER if isinstance(obstacle, CylinderObstacle) else CAPSULE
+            table.center[k] = 0.5 * (start + end)
             table.size[k, :2] = obstacle.radius, 0.5 * length
-            table.rotation[k] = _z_along(axis / length).ravel()
+            table.rotation[k] = _z_along(axis).ravel()
     return table
 
 
@@ -108,6 +140,12 @@ def rotation_matrix(angles: Angles) -> FloatArray:
 
 def _point(coordinates: tuple[float, ...]) -> FloatArray:
     return np.array([*coordinates, 0.0][:3])
+
+
+def _direction(vector: FloatArray) -> tuple[FloatArray, float]:
+    """Return a vector's unit vector, and its length; the zero vector itself, and 0."""
+    length = float(np.sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2]))
+    return (vector / length if length > 0.0 else vector), length
 
 
 def _z_along(axis: FloatArray) -> FloatArray:

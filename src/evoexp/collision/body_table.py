@@ -1,0 +1,190 @@
+"""Bodies as arrays: what the certifier's kernels know of coal's shapes.
+
+Every shape is a core, swept by a ball: a sphere is a point and a radius, a capsule a segment and a radius. The core is
+given by its support function (the farthest point in a direction), see `convex_distance`.
+"""
+
+from itertools import product
+from typing import Any, NamedTuple
+
+import coal
+import numpy as np
+
+from evoexp.errors import EvoexpError
+from evoexp.records import FloatArray
+from evoexp.robots.kinematics import KinematicTable
+
+SEGMENT, BOX, CYLINDER, CONE, ELLIPSOID, HULL, HALF_SPACE = range(7)
+"""Cores: a segment along z, of length 0 for a point, …; a half-space holds all points with z ≤ 0."""
+
+FLAT_TOLERANCE = 1e-10
+"""[-] of the scene's size: where coal's distances are closed forms, or end after finitely many steps (err ≤ 1e-13)."""
+
+ROUND_TOLERANCE = 1e-6
+"""[-] of the scene's size: where coal approaches a curved surface by steps (errors up to 4e-8 were seen)."""
+
+
+class UnsupportedShape(EvoexpError):
+    """A body that the certifier cannot bound."""
+
+
+class BodyTable(NamedTuple):
+    """Bodies as arrays.
+
+    Attributes:
+        joint: (bodies,) index into the kinematic table, −1 for the world.
+        kind: (bodies,) the core.
+        exact: (bodies,) false where the arrays describe a larger body than coal's: the convex hull of a mesh.
+        rotation: (bodies, 9) from the core's frame to the joint's frame in the table, row by row.
+        translation: (bodies, 3).
+        size: (bodies, 3) half a segment's length | half the edges | radius, half the height | semi-axes.
+        radius: (bodies,) of the ball that sweeps the core.
+        corners: (bodies, 2) first and one-past-last corner of a hull.
+        corner_points: (corners, 3) in the frames of their hulls.
+        from_origin: (bodies,) greatest distance of a body's points from its joint's origin; inf for half-spaces.
+        from_axis: (bodies,) the same from its joint's axis.
+        ball: (bodies,) radius of a ball around the core's origin that holds the body; inf for half-spaces.
+    """
+
+    joint: np.ndarray
+    kind: np.ndarray
+    exact: np.ndarray
+    rotation: FloatArray
+    translation: FloatArray
+    size: FloatArray
+    radius: FloatArray
+    corners: np.ndarray
+    corner_points: FloatArray
+    from_origin: FloatArray
+    from_axis: FloatArray
+    ball: FloatArray
+
+    def tolerance(self, one: int, two: int) -> float:
+        """Return the distance, relative to the scene's size, that counts as contact of two bodies."""
+        flat = all(self.exact[k] and self.kind[k] in (SEGMENT, BOX, HULL, HALF_SPACE) for k in (one, two))
+        closed = any(self._is_ball(k) or self.kind[k] == HALF_SPACE for k in (one, two))
+        plain = all(self.kind[k] in (SEGMENT, BOX, CYLINDER, HALF_SPACE) for k in (one, two))
+        half_space = HALF_SPACE in (self.kind[one], self.kind[two]) and self.exact[one] and self.exact[two]
+        return FLAT_TOLERANCE if flat or half_space or (closed and plain) else ROUND_TOLERANCE
+
+    def _is_ball(self, body: int) -> bool:
+        return bool(self.kind[body] == SEGMENT and self.size[body, 0] == 0.0)
+
+
+class _Core(NamedTuple):
+    kind: int
+    size: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    radius: float = 0.0
+    corners: FloatArray = np.empty((0, 3))
+    exact: bool = True
+
+
+def body_table(table: KinematicTable, items: list[Any]) -> BodyTable:
+    """Return geometry objects as arrays.
+
+    Raises:
+        UnsupportedShape: If a shape is neither convex nor a mesh, or a half-space moves.
+    """
+    count = len(items)
+    bodies = BodyTable(
+        joint=np.array([item.parentJoint - 1 for item in items], dtype=np.int64),
+        kind=np.zeros(count, dtype=np.int64),
+        exact=np.ones(count, dtype=np.bool_),
+        rotation=np.zeros((count, 9)),
+        translation=np.zeros((count, 3)),
+        size=np.zeros((count, 3)),
+        radius=np.zeros(count),
+        corners=np.zeros((count, 2), dtype=np.int64),
+        corner_points=np.empty((0, 3)),
+        from_origin=np.full(count, np.inf),
+        from_axis=np.full(count, np.inf),
+        ball=np.full(count, np.inf),
+    )
+    corners = [np.empty((0, 3))]
+    for k, item in enumerate(items):
+        core, rotation, translation = _core(item)
+        if item.parentJoint > 0:
+            alignment = table.alignment[item.parentJoint - 1].T
+            rotation, translation = alignment @ rotation, alignment @ translation
+            if core.kind == HALF_SPACE:
+                raise UnsupportedShape(f"scene: half-space '{item.name}' must stand still, moves with a joint")
+        begin = sum(map(len, corners))
+        corners.append(core.corners)
+        bodies.kind[k], bodies.size[k], bodies.radius[k], bodies.exact[k] = (
+            core.kind,
+            core.size,
+            core.radius,
+            core.exact,
+        )
+        bodies.rotation[k], bodies.translation[k] = rotation.ravel(), translation
+        bodies.corners[k] = begin, begin + len(core.corners)
+        if core.kind != HALF_SPACE:
+            bodies.from_origin[k], bodies.from_axis[k] = _reach(core, rotation, translation)
+            bodies.ball[k], _ = _reach(core, rotation, np.zeros(3))
+    return bodies._replace(corner_points=np.ascontiguousarray(np.vstack(corners)))
+
+
+def _core(item: Any) -> tuple[_Core, FloatArray, FloatArray]:
+    """Return a geometry object's core, and its frame in the joint's."""
+    shape, placement = item.geometry, item.placement
+    rotation, translation = np.array(placement.rotation), np.array(placement.translation)
+    swept = float(shape.getSweptSphereRadius()) if isinstance(shape, coal.ShapeBase) else 0.0
+    if isinstance(shape, coal.Halfspace):
+        normal = rotation @ shape.n
+        turn = _with_z(normal)
+        return _Core(HALF_SPACE, radius=swept), turn, translation + normal * shape.d
+    if isinstance(shape, coal.Sphere):
+        core = _Core(SEGMENT, radius=shape.radius + swept)
+    elif isinstance(shape, coal.Capsule):
+        core = _Core(SEGMENT, (shape.halfLength, 0.0, 0.0), shape.radius + swept)
+    elif isinstance(shape, coal.Box):
+        core = _Core(BOX, tuple(shape.halfSide), swept)
+    elif isinstance(shape, coal.Cylinder):
+        core = _Core(CYLINDER, (shape.radius, shape.halfLength, 0.0), swept)
+    elif isinstance(shape, coal.Cone):
+        core = _Core(CONE, (shape.radius, shape.halfLength, 0.0), swept)
+    elif isinstance(shape, coal.Ellipsoid):
+        core = _Core(ELLIPSOID, tuple(shape.radii), swept)
+    elif isinstance(shape, coal.ConvexBase):
+        core = _Core(HULL, radius=swept, corners=np.array([shape.point(i) for i in range(shape.num_points)]))
+    elif isinstance(shape, coal.TriangleP):
+        core = _Core(HULL, radius=swept, corners=np.array([shape.a, shape.b, shape.c]))
+    elif isinstance(shape, coal.BVHModelBase):
+        corners = np.array([shape.vertex(i) for i in range(shape.num_vertices)])
+        core = _Core(HULL, corners=corners, exact=False)
+    else:
+        raise UnsupportedShape(
+            f"scene: '{item.name}' must be a convex shape, a half-space or a mesh, was a {type(shape).__name__}"
+        )
+    return core, rotation, translation
+
+
+def _reach(core: _Core, rotation: FloatArray, translation: FloatArray) -> tuple[float, float]:
+    """Return the greatest distances of a body's points from the origin and the z axis of its joint's frame.
+
+    From the corners of the core or of a box around it, or from a ball around it, whichever is less.
+    """
+    a, b, c = core.size
+    ball = np.inf
+    if core.kind == HULL:
+        corners = core.corners
+    else:
+        half = {SEGMENT: (0.0, 0.0, a), CYLINDER: (a, a, b), CONE: (a, a, b)}.get(core.kind, core.size)
+        corners = np.array(list(product(*((-e, e) for e in half))))
+        if core.kind == ELLIPSOID:
+            ball = max(a, b, c)
+        elif core.kind in (CYLINDER, CONE):
+            ball = float(np.sqrt(a * a + b * b))
+    squares = (corners @ rotation.T + translation) ** 2
+    x, y, z = translation**2
+    from_origin = min(float(np.sqrt(squares.sum(axis=1).max())), float(np.sqrt(x + y + z)) + ball)
+    from_axis = min(float(np.sqrt(squares[:, :2].sum(axis=1).max())), float(np.sqrt(x + y)) + ball)
+    return from_origin + core.radius, from_axis + core.radius
+
+
+def _with_z(normal: FloatArray) -> FloatArray:
+    """Return a rotation whose third column is the unit vector `normal`."""
+    helper = np.eye(3)[np.argmin(np.abs(normal))]
+    x = np.cross(helper, normal)
+    x /= np.sqrt((x * x).sum())
+    return np.column_stack([x, np.cross(normal, x), normal])

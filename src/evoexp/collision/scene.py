@@ -1,0 +1,129 @@
+"""A scene: a robot's exact bodies and what stands around it, as coal shapes, with the pairs that must not touch.
+
+`Scene` holds coal's shapes, which have the last word, and the same bodies as plain arrays, from which the kernels of
+the certifier bound their distances. It is read-only: one scene serves many motions and threads.
+"""
+
+from typing import Any, NamedTuple
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from evoexp.collision.body_table import BodyTable, body_table
+from evoexp.records import FloatArray
+from evoexp.robots.assembly import Assembly
+from evoexp.robots.kinematics import KinematicTable, kinematic_table
+from evoexp.scenarios.obstacles import BOX, CAPSULE, CYLINDER, SPHERE, ObstacleTable, obstacle_table
+
+
+class Scene(NamedTuple):
+    """Bodies on a Pinocchio model, and the pairs of them that are watched.
+
+    Attributes:
+        model: The `pin.Model`.
+        geometry: The `pin.GeometryModel` with one object per body and one collision pair per pair.
+        table: The kinematic table of the model.
+        names: (bodies) of the geometry objects.
+        shapes: (bodies) coal's shape, index of its Pinocchio joint, placement in it.
+        pairs: (pairs, 2) indices of bodies.
+        bodies: The bodies as arrays.
+        size: Greatest distance of a body's points from the world's origin at the neutral configuration [length unit].
+        tolerances: (pairs,) at or below which a distance counts as contact [length unit]: above coal's own error.
+    """
+
+    model: Any
+    geometry: Any
+    table: KinematicTable
+    names: tuple[str, ...]
+    shapes: tuple[tuple[Any, int, Any], ...]
+    pairs: np.ndarray
+    bodies: BodyTable
+    size: float
+    tolerances: FloatArray
+
+    def pair_names(self, pair: int) -> tuple[str, str]:
+        """Return the names of a pair's bodies."""
+        one, two = self.pairs[pair]
+        return self.names[one], self.names[two]
+
+
+def scene(assembly: Assembly, obstacles: ObstacleTable | tuple[Any, ...] = (), self_pairs: bool = False) -> Scene:
+    """Return a robot among obstacles: links of different arms, and every link with every obstacle.
+
+    Args:
+        assembly: The robot; its links are named `arm_1_link_1` and so on.
+        obstacles: Settings of obstacles, or their table; named `obstacle_1` and so on.
+        self_pairs: Whether links of one arm are watched, too, unless one joint carries both or they meet at a joint.
+    """
+    table = obstacles if isinstance(obstacles, ObstacleTable) else obstacle_table(obstacles)
+    geometry = pin.GeometryModel()
+    counts = [0] * assembly.num_arms
+    for link, item in zip(assembly.links, assembly.geometry.geometryObjects, strict=True):
+        counts[link.arm] += 1
+        name = f"arm_{link.arm + 1}_link_{counts[link.arm]}"
+        geometry.addGeometryObject(pin.GeometryObject(name, link.joint, 0, item.placement, item.geometry))
+    for k, (shape, placement) in enumerate(obstacle_shapes(table)):
+        geometry.addGeometryObject(pin.GeometryObject(f"obstacle_{k + 1}", 0, 0, placement, shape))
+    parents, links = assembly.model.parents, assembly.links
+    for a, one in enumerate(links):
+        for b, two in enumerate(links[a + 1 :], start=a + 1):
+            neighbours = one.joint in (two.joint, parents[two.joint]) or two.joint == parents[one.joint]
+            if one.arm != two.arm or (self_pairs and not neighbours):
+                geometry.addCollisionPair(pin.CollisionPair(a, b))
+        for k in range(len(table.kind)):
+            geometry.addCollisionPair(pin.CollisionPair(a, len(links) + k))
+    return geometry_scene(assembly.model, geometry, assembly.table)
+
+
+def geometry_scene(model: Any, geometry: Any, table: KinematicTable | None = None) -> Scene:
+    """Return a scene of any convex coal shapes or meshes on a model, with the collision pairs of the geometry model.
+
+    Args:
+        model: A `pin.Model` whose joints have one coordinate each.
+        geometry: A `pin.GeometryModel`; its objects' names are the bodies' names.
+        table: The kinematic table of the model, if there is one.
+
+    Raises:
+        UnsupportedShape: If the certifier cannot bound a body.
+        UnsupportedJoint: If the model has a joint of several coordinates.
+    """
+    table = kinematic_table(model) if table is None else table
+    items = list(geometry.geometryObjects)
+    bodies = body_table(table, items)
+    pairs = np.array([(pair.first, pair.second) for pair in geometry.collisionPairs], dtype=np.int64).reshape(-1, 2)
+    size = _size(model, bodies)
+    tolerances = np.array([bodies.tolerance(one, two) for one, two in pairs]) * size
+    names = tuple(item.name for item in items)
+    shapes = tuple((item.geometry, int(item.parentJoint), item.placement) for item in items)
+    return Scene(model, geometry, table, names, shapes, pairs, bodies, size, tolerances.reshape(len(pairs)))
+
+
+def obstacle_shapes(table: ObstacleTable) -> list[tuple[Any, Any]]:
+    """Return every obstacle as a coal shape and its placement, a `pin.SE3`."""
+    shapes = []
+    for kind, center, rotation, (a, b, c) in zip(*table, strict=True):
+        if kind == SPHERE:
+            shape = coal.Sphere(a)
+        elif kind == BOX:
+            shape = coal.Box(2.0 * a, 2.0 * b, 2.0 * c)
+        elif kind == CAPSULE:
+            shape = coal.Capsule(a, 2.0 * b)
+        elif kind == CYLINDER:
+            shape = coal.Cylinder(a, 2.0 * b)
+        else:
+            shape = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
+        shapes.append((shape, pin.SE3(rotation.reshape(3, 3), center)))
+    return shapes
+
+
+def _size(model: Any, bodies: BodyTable) -> float:
+    """Return how far bodies reach from the world's origin at the neutral configuration; 1 if there is nothing."""
+    data = model.createData()
+    pin.forwardKinematics(model, data, pin.neutral(model))
+    far = [0.0]
+    for joint, reach in zip(bodies.joint, bodies.from_origin, strict=True):
+        x, y, z = data.oMi[int(joint) + 1].translation
+        if np.isfinite(reach):
+            far.append(float(np.sqrt(x * x + y * y + z * z) + reach))
+    return max(far) or 1.0

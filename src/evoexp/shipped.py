@@ -8,6 +8,7 @@ change without a raised revision.
 import functools
 import json
 import shlex
+from collections import Counter
 from importlib import resources
 from pathlib import Path
 from typing import NamedTuple
@@ -51,6 +52,7 @@ def shipped() -> tuple[Shipped, ...]:
 
 
 def find(prefix: str) -> list[Shipped]:
-    """Return the shipped conditions whose hash begins with a prefix, each hash once."""
-    found = {row.condition_id: row for row in shipped() if row.condition_id.startswith(prefix.lower())}
-    return list(found.values())
+    """Return the shipped conditions whose hash begins with a prefix, each hash once: in its smallest experiment."""
+    sizes = Counter((row.experiment, row.budget) for row in shipped())
+    rows = sorted(shipped(), key=lambda row: -sizes[row.experiment, row.budget])
+    return list({row.condition_id: row for row in rows if row.condition_id.startswith(prefix.lower())}.values())

@@ -11,6 +11,7 @@ import pytest
 from command_samples import SMALL, Evoexp
 
 from evoexp import compose
+from evoexp.collision.certificate import Certificate
 from evoexp.commands.evaluate import flatten
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
@@ -54,6 +55,8 @@ def test_the_best_of_a_stored_run_is_worth_what_is_recorded(
     said = json.loads(answers[0].out)
     head = {name: said.pop(name) for name in ("label", "condition", "length_unit")}
     assert head == {"label": label, "condition": runs[label].condition_id, "length_unit": "unit"}
+    verdict = {name: said.pop(name) for name in Certificate._fields}
+    assert verdict == {name: getattr(log.summary, name) for name in Certificate._fields}
     assert said == log.summary.terms
     columns = read_summaries(runs[label]).columns
     assert {f"term_{name}" for name in said} == {name for name in columns if name.startswith("term_")}

@@ -6,7 +6,14 @@ from evoexp.condition import Prepared
 from evoexp.records import FloatArray
 from evoexp.report import motions
 from evoexp.report.results import Results
-from evoexp.scenarios.obstacles import BoxObstacle, CapsuleObstacle, SphereObstacle, obstacle_table
+from evoexp.scenarios.obstacles import (
+    BoxObstacle,
+    CapsuleObstacle,
+    CylinderObstacle,
+    HalfSpaceObstacle,
+    SphereObstacle,
+    obstacle_table,
+)
 
 
 @pytest.fixture(scope="module")
@@ -107,9 +114,12 @@ def test_outlines_lie_on_the_surfaces_of_obstacles() -> None:
             SphereObstacle(shape="sphere", center=(5.2, 4.0), radius=0.4),
             BoxObstacle(shape="box", center=(-5.5, 4.0), size=(0.8, 0.8), rotation=(0.0, 0.0, 30.0)),
             CapsuleObstacle(shape="capsule", start=(-1.0, -5.0), end=(1.0, -5.0), radius=0.2),
+            CylinderObstacle(shape="cylinder", start=(2.0, 3.0, -1.0), end=(2.0, 3.0, 1.0), radius=0.3),
+            CylinderObstacle(shape="cylinder", start=(2.0, 3.0), end=(4.0, 3.0), radius=0.3),
+            HalfSpaceObstacle(shape="half_space", point=(0.0, -2.0), normal=(0.0, 1.0)),
         )
     )
-    ball, box, capsule = motions.obstacle_outlines(table)
+    ball, box, capsule, tin, lying, wall = motions.obstacle_outlines(table, 8.0)
     np.testing.assert_allclose(np.linalg.norm(ball - [5.2, 4.0], axis=1), 0.4)
     np.testing.assert_allclose(np.linalg.norm(box - [-5.5, 4.0], axis=1), 0.4 * np.sqrt(2.0))
     first = np.degrees(np.arctan2(*(box[1] - box[0])[::-1]))
@@ -118,5 +128,8 @@ def test_outlines_lie_on_the_surfaces_of_obstacles() -> None:
     np.testing.assert_allclose(np.linalg.norm(capsule - on_axis, axis=1), 0.2, atol=1e-12)
     edges = np.linalg.norm(np.diff(capsule, axis=0), axis=1)
     assert (edges > 1.0).sum() == 2  # two long sides, walked once each
-    for outline in (ball, box, capsule):
+    np.testing.assert_allclose(np.linalg.norm(tin - [2.0, 3.0], axis=1), 0.3)
+    assert (lying.min(axis=0).tolist(), lying.max(axis=0).tolist()) == ([2.0, 2.7], [4.0, 3.3])
+    assert (wall.min(axis=0).round(9).tolist(), wall.max(axis=0).round(9).tolist()) == ([-8.0, -2.8], [8.0, -2.0])
+    for outline in (ball, box, capsule, tin, lying, wall):
         np.testing.assert_allclose(outline[0], outline[-1], atol=1e-12)

@@ -5,12 +5,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from scipy.spatial import ConvexHull
 
 from evoexp.condition import Prepared
 from evoexp.numerics import DEGREE
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
-from evoexp.scenarios.obstacles import BOX, SPHERE, ObstacleTable
+from evoexp.scenarios.obstacles import BOX, CYLINDER, HALF_SPACE, SPHERE, ObstacleTable
 
 OUTLINE_POINTS = 49  # of a round obstacle
 
@@ -73,8 +74,13 @@ def joint_positions(assembly: Assembly, q: FloatArray) -> Iterator[tuple[int, in
         numbers[link.arm] += 1
 
 
-def obstacle_outlines(table: ObstacleTable) -> list[FloatArray]:
-    """Return the outlines of obstacles as seen along z, each (points, 2), first and last point the same."""
+def obstacle_outlines(table: ObstacleTable, reach: float = 1.0) -> list[FloatArray]:
+    """Return the outlines of obstacles as seen along z, each (points, 2), first and last point the same.
+
+    Args:
+        table: The obstacles.
+        reach: A half-space is drawn as a strip of this length to both sides of its point, a tenth of it deep.
+    """
     turn = np.linspace(0.0, 2.0 * np.pi, OUTLINE_POINTS)
     circle = np.column_stack([np.cos(turn), np.sin(turn)])
     outlines = []
@@ -83,6 +89,15 @@ def obstacle_outlines(table: ObstacleTable) -> list[FloatArray]:
         if kind == BOX:
             corners = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0), (-1, -1, 0)]) * size
             outline = (corners @ matrix.T)[:, :2]
+        elif kind == CYLINDER:
+            ends = [np.column_stack([size[0] * circle, np.full(len(circle), z)]) for z in (-size[1], size[1])]
+            points = (np.vstack(ends) @ matrix.T)[:, :2]
+            hull = ConvexHull(points).vertices
+            outline = points[[*hull, hull[0]]]
+        elif kind == HALF_SPACE:
+            inward = -matrix[:2, 2]
+            along, depth = reach * np.array([-inward[1], inward[0]]), 0.1 * reach * inward
+            outline = np.array([along, -along, depth - along, depth + along, along])
         else:
             along = np.zeros(2) if kind == SPHERE else size[1] * matrix[:2, 2]
             outline = size[0] * circle + np.where((circle @ along >= 0.0)[:, None], along, -along)

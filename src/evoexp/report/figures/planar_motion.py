@@ -44,7 +44,8 @@ def snapshots_table(condition: ConditionResults) -> pd.DataFrame:
             for arm, link, start, end in links:
                 place = (*start[instant, :2], *end[instant, :2])
                 rows.append((stage, first, stop, instant, arm, link, *place))
-    for k, outline in enumerate(motions.obstacle_outlines(problem.collision.obstacles)):
+    reach = 2.0 * max(float(np.abs(end - start).sum(axis=1).max()) for _, _, start, end in links)
+    for k, outline in enumerate(motions.obstacle_outlines(problem.collision.obstacles, reach)):
         rows += [(-1, 0, last, 0, -1, k, *a, *b) for a, b in itertools.pairwise(outline)]
     names = ["stage", "first", "last", "instant", "arm", "link", "x", "y", "x_end", "y_end"]
     return rounded(pd.DataFrame(rows, columns=names)).assign(length_unit=condition.condition.length_unit)

@@ -20,11 +20,16 @@ REGISTRY = {
     "arms": "evoexp.robots.arms:Arms",
     "planar_chain": "evoexp.robots.planar_chain:PlanarChain",
     "serial_chain": "evoexp.robots.serial_chain:SerialChain",
+    "link_motion": "evoexp.scenarios.link_motion:LinkMotion",
     "arm_motion": "evoexp.scenarios.arm_motion:ArmMotion",
     "via_point_ga": "evoexp.planners.via_point_ga:ViaPointGa",
+    "coevolution": "evoexp.planners.coevolution:Coevolution",
     "random_search": "evoexp.planners.random_search:RandomSearch",
     "genetic": "evoexp.evolution.settings:GeneticSettings",
+    "coevolutionary": "evoexp.evolution.coevolution_settings:CoevolutionSettings",
+    "motion_criteria": "evoexp.objectives.motion_criteria:MotionCriteria",
     "string_fitness": "evoexp.objectives.string_fitness:StringFitness",
+    "link_crossings": "evoexp.collision.link_collision:LinkCrossings",
     "touching_spheres": "evoexp.collision.touching_spheres:TouchingSpheres",
 }
 """Registered name → `module:class`. Installed plug-ins add to it through the entry-point group `evoexp.components`."""

@@ -1,0 +1,124 @@
+"""Planar robots of two links that move from one posture to another; angles of links are absolute, from +x.
+
+A posture is given by its two link angles or, as in Curkovic et al. 2013, by where the end-effector is; of the two
+elbows that reach it, the one asked for is taken.
+"""
+
+from typing import Annotated, ClassVar, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from evoexp.errors import SettingError
+from evoexp.numerics import DEGREE, acos, atan2
+from evoexp.records import FloatArray
+from evoexp.scenarios.obstacles import Obstacle
+from evoexp.validation import Component, NonNegative, Settings, Vector
+
+HALF_TURN = 180.0  # [deg] genes live in [0, π)
+
+
+class Posture(Settings):
+    """A posture of one robot: link angles, or the end-effector's place with an elbow.
+
+    Attributes:
+        angles: Of the links, absolute, from +x [deg].
+        tip: Of the end-effector (x, y) [length unit of the scene].
+        elbow: Which of the two elbows that reach `tip`: the one to its left or to its right, seen from the base.
+    """
+
+    angles: Annotated[Vector, Field(min_length=2, max_length=2)] | None = None
+    tip: tuple[float, float] | None = None
+    elbow: Literal["left", "right"] | None = None
+
+    @model_validator(mode="after")
+    def _one_of_both(self) -> Self:
+        if (self.angles is None) == (self.tip is None):
+            raise SettingError("angles", "given, or else tip with elbow", None if self.angles is None else "both")
+        if (self.tip is None) != (self.elbow is None):
+            raise SettingError("elbow", "given with tip, and only then (left or right)", self.elbow)
+        return self
+
+    def link_angles(self, field: str, base: FloatArray, lengths: FloatArray) -> FloatArray:
+        """Return the link angles (2,) [deg].
+
+        Args:
+            field: Name, for errors.
+            base: (2,) of the robot.
+            lengths: (2,) of its links.
+
+        Raises:
+            SettingError: If the tip is out of reach, or an angle lies outside [0, 180).
+        """
+        if self.angles is not None:
+            angles = np.array(self.angles)
+        else:
+            assert self.tip is not None
+            angles = _reach(f"{field}.tip", np.array(self.tip), base, lengths, 1.0 if self.elbow == "left" else -1.0)
+        for k, angle in enumerate(angles):
+            if not 0.0 <= angle <= HALF_TURN:
+                must = "within [0, 180] deg, where the genes live"
+                raise SettingError(f"{field}.angles[{k}]", must, float(angle))
+        return angles
+
+
+class LinkMotion(Component):
+    """Start and goal of every robot, and what stands around.
+
+    Attributes:
+        q_start: Posture of every robot at the start.
+        q_goal: At the goal.
+        stationary: Robots (counted from 0) that keep their start posture; their goal must be the same.
+        security_margin: Clearance between bodies that the task requires [length unit].
+        length_unit: Name of the scene's unit of length.
+        obstacles: What does not move.
+    """
+
+    component: ClassVar[str] = "link_motion"
+
+    q_start: Annotated[tuple[Posture, ...], Field(min_length=2)]
+    q_goal: Annotated[tuple[Posture, ...], Field(min_length=2)]
+    stationary: tuple[int, ...] = ()
+    security_margin: NonNegative
+    length_unit: str
+    obstacles: tuple[Obstacle, ...] = ()
+
+    def ends(self, bases: FloatArray, lengths: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return link angles of all robots at start and goal, each (robots, 2) [deg].
+
+        Args:
+            bases: (robots, 2).
+            lengths: (robots, 2) of the links.
+
+        Raises:
+            SettingError: If their number is not the robots', or a posture cannot be.
+        """
+        found = []
+        for name, postures in (("q_start", self.q_start), ("q_goal", self.q_goal)):
+            if len(postures) != len(bases):
+                raise SettingError(f"scenario.{name}", f"one posture per robot ({len(bases)})", len(postures))
+            rows = [p.link_angles(f"scenario.{name}[{r}]", bases[r], lengths[r]) for r, p in enumerate(postures)]
+            found.append(np.array(rows))
+        for robot in self.stationary:
+            if not 0 <= robot < len(bases):
+                raise SettingError("scenario.stationary", f"robots 0 … {len(bases) - 1}", robot)
+            if not np.array_equal(found[0][robot], found[1][robot]):
+                must = "the same as its start, since the robot is stationary"
+                raise SettingError(f"scenario.q_goal[{robot}]", must, list(found[1][robot]))
+        return found[0], found[1]
+
+
+def _reach(field: str, tip: FloatArray, base: FloatArray, lengths: FloatArray, side: float) -> FloatArray:
+    """Return the link angles (2,) [deg] in [−180, 360) that bring the end-effector to a place."""
+    x, y = tip - base
+    squared = float(x * x + y * y)
+    first, second = (float(length) for length in lengths)
+    cosine = (squared - first * first - second * second) / (2.0 * first * second)
+    if not -1.0 <= cosine <= 1.0:
+        least, most = abs(first - second), first + second
+        must = f"{least:g} to {most:g} away from the robot's base"
+        raise SettingError(field, must, f"{float(np.sqrt(squared)):g} away")
+    bend = -side * acos(cosine)  # of the second link against the first: an elbow on the left bends to the right
+    sine_bend = -side * np.sqrt(max(0.0, 1.0 - cosine * cosine))
+    one = atan2(float(y), float(x)) - atan2(second * sine_bend, first + second * cosine)
+    return np.array([one, one + bend]) / DEGREE

@@ -73,3 +73,51 @@ def cross_at_sites(uniforms, population, parents, arm_slices, rate, max_distance
                 for k in range(num_offspring):
                     own, other = source[parents[k]], source[mates[k]]
                     target[k] = own if i < site[k] else other
+
+
+def num_single_point_uniforms(num_pairs: int) -> int:
+    """Return how many uniform numbers `single_point_crossover` takes: per pair a decision and a site."""
+    return 2 * num_pairs
+
+
+def single_point_crossover(
+    rng: np.random.Generator, genomes: FloatArray, parents: np.ndarray, rate: float, out: FloatArray
+) -> None:
+    """Cut pairs of parents at one site and exchange what follows (Curkovic et al. 2013, section 3).
+
+    Parents 2k and 2k + 1 form a pair; an odd last one stays alone. A pair is cut with probability `rate`, before one of
+    the genes 1 … genes − 1, each equally likely. What is not cut is copied.
+
+    Args:
+        rng: Source of `num_single_point_uniforms` uniform numbers, whatever the rate.
+        genomes: (genes, individuals, padding allowed).
+        parents: (offspring,) indices of individuals.
+        rate: Probability in [0, 1].
+        out: (genes, ≥ offspring), written: the offspring.
+
+    Raises:
+        ValueError: If the offspring do not fit.
+    """
+    if genomes.ndim != 2 or out.ndim != 2 or len(out) != len(genomes) or out.shape[1] < len(parents):
+        raise ValueError(f"{len(parents)} offspring of {genomes.shape} do not fit {out.shape}")
+    cross_single_point(rng.random(num_single_point_uniforms(len(parents) // 2)), genomes, parents, rate, out)
+
+
+@kernel
+def cross_single_point(uniforms, genomes, parents, rate, out):  # type: ignore[no-untyped-def]
+    """The kernel of `single_point_crossover`, for other kernels; per pair: decision, site."""
+    num_genes, num_offspring = len(genomes), len(parents)
+    mates = parents.copy()
+    sites = np.full(num_offspring, num_genes)  # beyond the end: a copy
+    for pair in range(num_offspring // 2):
+        if num_genes < 2 or not uniforms[2 * pair] < rate:
+            continue
+        first, second = 2 * pair, 2 * pair + 1
+        site = 1 + min(int(uniforms[second] * (num_genes - 1)), num_genes - 2)  # 1 … genes − 1
+        sites[first], sites[second] = site, site
+        mates[first], mates[second] = parents[second], parents[first]
+    for gene in range(num_genes):
+        source, target = genomes[gene], out[gene]
+        for k in range(num_offspring):
+            own, other = source[parents[k]], source[mates[k]]
+            target[k] = own if gene < sites[k] else other

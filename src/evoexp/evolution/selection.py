@@ -90,3 +90,43 @@ def shuffle_head(uniforms, slots):  # type: ignore[no-untyped-def]
     for k in range(len(uniforms)):
         other = k + min(int(uniforms[k] * (num - k)), num - k - 1)
         slots[k], slots[other] = slots[other], slots[k]
+
+
+@kernel
+def inverse_weights(costs, out):  # type: ignore[no-untyped-def]
+    """Weigh individuals by 1/cost for the roulette wheel (Curkovic et al. 2013, methods I–VIII).
+
+    A cost of inf or NaN weighs 0. If any cost is 0, only those of cost 0 can be drawn: they weigh 1, all others 0.
+
+    Args:
+        costs: (individuals,) ≥ 0; below 1e-300 counts as 0: a sum of inverses would overflow.
+        out: (individuals,), written.
+    """
+    any_zero = False
+    for k in range(len(costs)):
+        any_zero |= costs[k] < 1e-300
+    for k in range(len(costs)):
+        inverse = 1.0 / costs[k] if costs[k] < np.inf else 0.0
+        free = 1.0 if costs[k] < 1e-300 else 0.0
+        out[k] = free if any_zero else inverse
+
+
+@kernel
+def difference_weights(costs, out):  # type: ignore[no-untyped-def]
+    """Weigh individuals by how far they are below the highest finite cost.
+
+    A cost that is not finite weighs 0. If all finite costs are equal, each of them weighs 1: they are equally likely,
+    and what is infeasible is still not drawn.
+
+    Args:
+        costs: (individuals,).
+        out: (individuals,), written.
+    """
+    highest, lowest = -np.inf, np.inf
+    for k in range(len(costs)):
+        if np.isfinite(costs[k]):
+            highest = max(highest, costs[k])
+            lowest = min(lowest, costs[k])
+    for k in range(len(costs)):
+        weight = highest - costs[k] if highest > lowest else 1.0
+        out[k] = weight if np.isfinite(costs[k]) else 0.0

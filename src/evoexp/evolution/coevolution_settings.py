@@ -1,0 +1,85 @@
+"""The hyperparameters of co-evolving populations."""
+
+import math
+from typing import ClassVar, Literal, Self
+
+from pydantic import model_validator
+
+from evoexp.errors import SettingError
+from evoexp.validation import Component, Count, NonNegativeCount, Positive, Rate
+
+_FLOOR_GUARD = 1e-9  # [-] 0.29 × 100 is 28.999999999999996
+
+
+class CoevolutionSettings(Component):
+    """Settings of co-evolving populations, the same for each of them (Curkovic et al. 2013, section 3).
+
+    Attributes:
+        population_size: Individuals per population and generation [-].
+        num_generations: Generations after the initial one [-].
+        crossover_rate: Probability that a pair of parents is crossed [-].
+        mutation_rate: Probability that one allele of an individual is mutated, at the first generation [-].
+        mutation_decay: What `mutation_rate` has lost at the last generation (Eq. 10) [-]; 0: it is constant.
+        mutation_step: Largest change of an allele (Eq. 9) [deg].
+        mutation_direction: `one_sided` as Eq. 9 is printed (alleles only grow), or `symmetric`.
+        selection: Weight on the roulette wheel: the `inverse` of the cost, or its `difference` to the highest.
+        num_elites: Best individuals of each population copied untouched into the next generation [-].
+        hall_depth: Share of a population that the hall of fame may hold [-]; 0: no hall.
+        hall_memory: Generations after which a team of the hall gives way to any new one [-]; None: never.
+        hall_frozen: Whether a full hall stays as it is (an ablation).
+        restart_after: Generations without a feasible team before fresh populations are drawn [-]; None: never.
+    """
+
+    component: ClassVar[str] = "coevolutionary"
+
+    population_size: Count
+    num_generations: NonNegativeCount
+    crossover_rate: Rate
+    mutation_rate: Rate
+    mutation_decay: Rate
+    mutation_step: Positive
+    mutation_direction: Literal["one_sided", "symmetric"]
+    selection: Literal["inverse", "difference"]
+    num_elites: NonNegativeCount
+    hall_depth: Rate
+    hall_memory: Count | None
+    hall_frozen: bool
+    restart_after: Count | None
+
+    @model_validator(mode="after")
+    def _rate_stays_a_probability(self) -> Self:
+        if self.mutation_decay > self.mutation_rate:
+            raise SettingError("mutation_decay", f"at most mutation_rate ({self.mutation_rate})", self.mutation_decay)
+        return self
+
+    @model_validator(mode="after")
+    def _hall_is_one(self) -> Self:
+        if self.hall_depth > 0.0 and self.num_hall_teams == 0:
+            must = "0, or large enough for one pair (at least 1/population_size)"
+            raise SettingError("hall_depth", must, self.hall_depth)
+        if self.hall_depth == 0.0 and self.hall_memory is not None:
+            raise SettingError("hall_memory", "null where there is no hall (hall_depth is 0)", self.hall_memory)
+        if self.hall_depth == 0.0 and self.hall_frozen:
+            raise SettingError("hall_frozen", "false where there is no hall (hall_depth is 0)", self.hall_frozen)
+        if self.hall_frozen and self.hall_memory is not None:
+            raise SettingError("hall_memory", "null where the hall is frozen (hall_frozen)", self.hall_memory)
+        return self
+
+    @model_validator(mode="after")
+    def _copies_fit(self) -> Self:
+        if self.num_elites > self.population_size:
+            raise SettingError("num_elites", f"at most population_size ({self.population_size})", self.num_elites)
+        if self.num_offspring < 0:
+            most = self.population_size - self.num_hall_teams
+            raise SettingError("num_elites", f"at most population_size less the hall's teams ({most})", self.num_elites)
+        return self
+
+    @property
+    def num_hall_teams(self) -> int:
+        """Teams that the hall of fame may hold; each takes one individual of every population."""
+        return math.floor(self.hall_depth * self.population_size + _FLOOR_GUARD)
+
+    @property
+    def num_offspring(self) -> int:
+        """Individuals of a population that are new in a generation, beside the elites and a full hall."""
+        return self.population_size - self.num_elites - self.num_hall_teams

@@ -1,0 +1,59 @@
+"""Pareto dominance: which individuals no other is better than in every respect."""
+
+import numpy as np
+
+from evoexp.numerics import kernel
+from evoexp.records import FloatArray
+
+
+def pareto_front(criteria: FloatArray) -> np.ndarray:
+    """Return which individuals are not dominated (Curkovic et al. 2013, section 3: the front of four criteria).
+
+    One dominates another if it is no worse in every criterion and better in at least one. Exact ties are all kept. An
+    individual with a NaN neither dominates nor is on the front.
+
+    Args:
+        criteria: (criteria, individuals), all minimised; ±inf are allowed.
+
+    Returns:
+        (individuals,) bool.
+
+    Raises:
+        ValueError: If there is no criterion.
+    """
+    if criteria.ndim != 2 or not len(criteria):
+        raise ValueError(f"criteria are (criteria, individuals), were {criteria.shape}")
+    front = np.empty(criteria.shape[1], dtype=np.bool_)
+    non_dominated(criteria, len(front), front)
+    return front
+
+
+@kernel
+def non_dominated(criteria, count, out):  # type: ignore[no-untyped-def]
+    """The kernel of `pareto_front`, for other kernels: of the first `count` individuals; writes out (≥ count,) bool.
+
+    Whom a dominated individual dominates, its own dominator dominates too: only those not dominated so far are compared
+    with all. Four criteria per pass stay in registers; where fewer are left the last is repeated: no matter.
+    """
+    last = len(criteria) - 1
+    dominated = np.zeros(count, dtype=np.int64)
+    verdicts = np.empty(count, dtype=np.int64)  # on i beside j: bit 0 better in some criterion, bit 1 worse in some
+    for m in range(last + 1):
+        for i in range(count):
+            dominated[i] |= 1 if criteria[m, i] != criteria[m, i] else 0  # NaN
+    for j in range(count):
+        if dominated[j] != 0:
+            continue
+        verdicts[:] = 0
+        for m in range(0, last + 1, 4):
+            a, b = criteria[m], criteria[min(m + 1, last)]
+            c, d = criteria[min(m + 2, last)], criteria[min(m + 3, last)]
+            p, q, r, s = a[j], b[j], c[j], d[j]
+            for i in range(count):
+                better = (a[i] < p) | (b[i] < q) | (c[i] < r) | (d[i] < s)
+                worse = (a[i] > p) | (b[i] > q) | (c[i] > r) | (d[i] > s)
+                verdicts[i] |= (1 if better else 0) | (2 if worse else 0)
+        for i in range(count):
+            dominated[i] |= 1 if verdicts[i] == 2 else 0
+    for i in range(count):
+        out[i] = dominated[i] == 0

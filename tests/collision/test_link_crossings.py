@@ -1,0 +1,348 @@
+"""Crossing links against rational arithmetic, numpy, the paper's closed form, and themselves seen in a mirror."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from evoexp.collision.link_crossings import (
+    Arm,
+    Crossings,
+    closed_form,
+    count_crossings,
+    path_configurations,
+    update_crossings,
+)
+from evoexp.collision.segment_predicates import orientation, touching
+from references import link_crossings_numpy as plain
+
+SCENE_A = Arm((0.0, 0.0), (0.25, 0.25)), Arm((0.3, 0.0), (0.25, 0.25))
+UNEQUAL = Arm((-0.2, 0.1), (0.4, 0.1)), Arm((0.3, -0.05), (0.15, 0.35))
+
+
+def populations(rng: np.random.Generator, arms: Any, num_1: int, num_2: int, size: int = 4) -> tuple[Any, Any]:
+    return tuple(arm.points(rng.uniform(0.0, np.pi, (size, 2, n))) for arm, n in zip(arms, (num_1, num_2), strict=True))
+
+
+def check_sums(found: Crossings) -> None:
+    assert np.array_equal(found.sums_1, found.counts.sum(axis=1))
+    assert np.array_equal(found.sums_2, found.counts.sum(axis=0))
+
+
+def test_points_are_the_links_ends() -> None:
+    q = np.random.default_rng(0).uniform(-7.0, 7.0, (3, 2, 5))
+    one = UNEQUAL[0]
+    ends = one.points(q).reshape(3, 2, 2, 5)  # (K, elbow and tip, x and y, N)
+    steps = np.stack([np.cos(q), np.sin(q)], axis=2) * np.array(one.lengths)[:, None, None]
+    assert np.allclose(ends[:, 0], np.array(one.base)[:, None] + steps[:, 0], rtol=0.0, atol=1e-15)
+    assert np.allclose(ends[:, 1], ends[:, 0] + steps[:, 1], rtol=0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize("arms", [SCENE_A, UNEQUAL])
+@pytest.mark.parametrize(("num_1", "num_2"), [(1, 1), (8, 3), (55, 57), (56, 113), (100, 100)])
+def test_counts_are_numpy_s(arms: Any, num_1: int, num_2: int) -> None:
+    points_1, points_2 = populations(np.random.default_rng(num_2), arms, num_1, num_2)
+    found = count_crossings(arms[0], points_1, arms[1], points_2)
+    assert np.array_equal(
+        found.counts, plain.counts_of_populations(arms[0].base, points_1, arms[1].base, points_2)
+    )  # random links are far from touching
+    assert found.counts.shape == (num_1, num_2)
+    assert num_1 < 10 or 0 < found.counts.mean() < 4
+    check_sums(found)
+
+
+def test_all_four_pairs_of_links_count() -> None:
+    """The top links alone miss most of the collisions."""
+    rng = np.random.default_rng(3)
+    q_1, q_2 = rng.uniform(0.0, np.pi, (2, 2, 20000))
+    found = closed_form(SCENE_A[0], q_1, SCENE_A[1], q_2)
+    assert 0.3 < found.crossing[3].sum() / found.colliding.sum() < 0.45
+    assert found.crossing.any(axis=1).all()
+
+
+def random_points(kind: str, rng: np.random.Generator, size: int) -> tuple[Any, Any, Any, Any]:
+    """Bases and points (5, 4, size) of arms, many of which touch, are parallel, on one line, or of length 0."""
+    if kind == "grid":
+        points = rng.integers(-2, 3, (2, 5, 4, size)).astype(np.float64)
+        return (0.0, 0.0), points[0], (1.0, 0.0), points[1]
+    if kind == "thirds":  # a grid whose points are rounded: nearly on one line
+        points = rng.integers(-2, 3, (2, 5, 4, size)) / 3.0 + 0.1
+        return (0.1, 0.1), points[0], (1.0 / 3.0 + 0.1, 0.1), points[1]
+    if kind == "close":  # touching but for less than, and more than, single precision resolves
+        points = rng.integers(-2, 3, (2, 5, 4, size)) / 3.0
+        points += rng.uniform(-1.0, 1.0, points.shape) * 10.0 ** rng.uniform(-9.0, -5.0, points.shape)
+        return (0.0, 0.0), points[0], (1.0 / 3.0, 0.0), points[1]
+    if kind == "far":  # rounded coarsely, far away from the origin
+        points = 1e6 + rng.integers(-2, 3, (2, 5, 4, size)) / 7.0
+        return (1e6, 1e6), points[0], (1e6 + 1.0 / 7.0, 1e6), points[1]
+    if kind == "ulps":  # on one line but for the last places
+        base = np.array([0.1, 0.3])
+        t = rng.uniform(-1.0, 1.0, (2, 5, 2, 1, size))
+        points = (base + np.array([0.7, 0.2]) * np.moveaxis(t, 3, 4)).transpose(0, 1, 2, 4, 3).reshape(2, 5, 4, size)
+        points = points * (1.0 + rng.integers(-2, 3, points.shape) * 2.0**-52)
+        return tuple(base), points[0], tuple(base + np.array([0.7, 0.2]) / 3.0), points[1]
+    scale = {"tiny": 1e-120, "huge": 1e100, "mixed": 1.0}[kind]
+    points = rng.integers(-2, 3, (2, 5, 4, size)) * scale
+    if kind == "mixed":
+        points = points * 10.0 ** rng.choice([0, 0, -40, -90], points.shape)
+    return (0.0, 0.0), points[0], (scale, 0.0), points[1]
+
+
+@pytest.mark.parametrize("kind", ["grid", "thirds", "close", "far", "ulps", "tiny", "huge", "mixed"])
+def test_counts_are_exact_where_links_touch(kind: str) -> None:
+    rng = np.random.default_rng(11)
+    base_1, points_1, base_2, points_2 = random_points(kind, rng, 30)
+    found = count_crossings(Arm(base_1, (1.0, 1.0)), points_1, Arm(base_2, (1.0, 1.0)), points_2)
+    exact = plain.exact_counts(base_1, points_1, base_2, points_2)
+    assert np.array_equal(found.counts, exact)
+    assert 0 < exact.mean() < 5
+    check_sums(found)
+
+
+def test_counts_of_random_links_are_exact() -> None:
+    points_1, points_2 = populations(np.random.default_rng(5), UNEQUAL, 40, 30, 3)
+    found = count_crossings(UNEQUAL[0], points_1, UNEQUAL[1], points_2)
+    assert np.array_equal(found.counts, plain.exact_counts(UNEQUAL[0].base, points_1, UNEQUAL[1].base, points_2))
+
+
+def test_right_angles_are_exact() -> None:
+    """Link angles of multiples of 30 degrees, bases a link apart: touching, parallel and collinear by the thousand."""
+    arms = Arm((0.0, 0.0), (0.25, 0.25)), Arm((0.25, 0.0), (0.25, 0.25))
+    grid = np.array(np.meshgrid(*[np.arange(7)] * 2)).reshape(1, 2, -1) * (np.pi / 6.0)
+    points = [arm.points(grid) for arm in arms]
+    found = count_crossings(arms[0], points[0], arms[1], points[1])
+    assert np.array_equal(found.counts, plain.exact_counts(arms[0].base, points[0], arms[1].base, points[1]))
+
+
+def test_a_link_between_two_others_by_the_last_place() -> None:
+    """A tip is moved across another link one float at a time."""
+    one, two = Arm((0.0, 0.0), (1.0, 1.0)), Arm((0.3, 1.0), (1.0, 1.0))
+    tips = [0.1]
+    for _ in range(40):
+        tips.append(float(np.nextafter(tips[-1], 1.0)))
+    points_1 = np.array([[[0.9], [0.3], [1.0], [0.3]]])
+    points_2 = np.array([[[0.3] * 41, [0.5] * 41, [0.3] * 41, tips[::-1]]])
+    points_2[0, 3] += 0.3 * (0.3 / 0.9) - 0.1 - 20 * 2.0**-56
+    found = count_crossings(one, points_1, two, points_2)
+    exact = plain.exact_counts(one.base, points_1, two.base, points_2)
+    assert np.array_equal(found.counts, exact)
+    assert 0 < exact.sum() < 41
+
+
+coordinate = st.one_of(
+    st.integers(-3, 3).map(float), st.floats(-1.0, 1.0).map(lambda x: x if abs(x) > 1e-80 else 0.0), st.just(1e-9)
+)
+point = st.tuples(coordinate, coordinate)
+
+
+@given(st.lists(point, min_size=4, max_size=4))
+@settings(max_examples=400)
+def test_predicates_are_rational_arithmetic(points: Any) -> None:
+    a, b, c, d = points
+    assert touching(*a, *b, *c, *d) == plain.segments_touch(a, b, c, d)
+    rational = [tuple(map(plain.Fraction, p)) for p in points]
+    assert np.sign(orientation(*a, *b, *c)) == plain.side(*rational[:3])
+
+
+@given(point, point, point, st.integers(0, 3), st.integers(-2, 2))
+@settings(max_examples=300)
+def test_orientation_of_points_almost_on_a_line(a: Any, b: Any, c: Any, what: int, places: int) -> None:
+    t = (0.0, 0.5, 1.0 / 3.0, 1.7)[what]
+    x, y = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])
+    near = (x * (1.0 + places * 2.0**-52), y)
+    for turn in ((a, b, near), (b, near, a), (near, a, b), (near, b, a)):
+        rational = [tuple(map(plain.Fraction, p)) for p in turn]
+        assert np.sign(orientation(*turn[0], *turn[1], *turn[2])) == plain.side(*rational)
+    assert touching(*a, *b, *near, *c) == plain.segments_touch(a, b, near, c)
+
+
+@pytest.mark.parametrize("kind", ["random", "grid", "thirds"])
+def test_mirror_and_exchange_change_nothing(kind: str) -> None:
+    rng = np.random.default_rng(8)
+    if kind == "random":
+        base_1, base_2 = SCENE_A[0].base, SCENE_A[1].base
+        points_1, points_2 = populations(rng, SCENE_A, 70, 61)
+    else:
+        base_1, points_1, base_2, points_2 = random_points(kind, rng, 64)
+    one, two = Arm(base_1, (1.0, 1.0)), Arm(base_2, (1.0, 1.0))
+    found = count_crossings(one, points_1, two, points_2)
+    flip = np.array([-1.0, 1.0, -1.0, 1.0])[:, None]
+    left, right = (Arm((-arm.base[0], arm.base[1]), arm.lengths) for arm in (one, two))
+    exchanged = count_crossings(right, points_2 * flip, left, points_1 * flip)
+    assert np.array_equal(exchanged.counts.T, found.counts)
+    assert np.array_equal(exchanged.sums_1, found.sums_2)
+    assert np.array_equal(exchanged.sums_2, found.sums_1)
+
+
+def test_upside_down_in_angles() -> None:
+    q_1, q_2 = np.random.default_rng(9).uniform(0.0, np.pi, (2, 4, 2, 30))
+    one, two = SCENE_A
+    found = count_crossings(one, one.points(q_1), two, two.points(q_2))
+    assert np.array_equal(found.counts, count_crossings(one, one.points(-q_1), two, two.points(-q_2)).counts)
+
+
+@given(st.integers(0, 2**32), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
+@settings(max_examples=40)
+def test_updates_are_full_counts(seed: int, rate_1: float, rate_2: float) -> None:
+    rng = np.random.default_rng(seed)
+    num_1, num_2 = rng.integers(1, 120, 2)
+    points = [p.copy() for p in populations(rng, SCENE_A, num_1, num_2, 2)]
+    found = count_crossings(SCENE_A[0], points[0], SCENE_A[1], points[1])
+    changed = [rng.random(num_1) < rate_1, rng.random(num_2) < rate_2]
+    for old, new, which in zip(points, populations(rng, SCENE_A, num_1, num_2, 2), changed, strict=True):
+        old[:, :, which] = new[:, :, which]
+    update_crossings(found, SCENE_A[0], points[0], SCENE_A[1], points[1], *changed)
+    full = count_crossings(SCENE_A[0], points[0], SCENE_A[1], points[1])
+    for mine, theirs in zip(found, full, strict=True):
+        assert np.array_equal(mine, theirs)
+
+
+def test_unchanged_pairs_are_not_looked_at() -> None:
+    points_1, points_2 = populations(np.random.default_rng(1), SCENE_A, 60, 70)
+    found = count_crossings(SCENE_A[0], points_1, SCENE_A[1], points_2)
+    found.counts[3, 5] = 77
+    changed_1, changed_2 = np.arange(60) == 4, np.arange(70) == 6
+    update_crossings(found, SCENE_A[0], points_1, SCENE_A[1], points_2, changed_1, changed_2)
+    assert found.counts[3, 5] == 77
+    check_sums(found)
+
+
+@pytest.mark.parametrize("arms", [SCENE_A, UNEQUAL, (SCENE_A[1], SCENE_A[0])])
+def test_the_closed_form_decides_the_same(arms: Any) -> None:
+    rng, size = np.random.default_rng(2), 350_000
+    q_1, q_2 = rng.uniform(0.0, np.pi, (2, 2, size))
+    q_2[:, : size // 10] = q_1[:, : size // 10]  # parallel links
+    q_2[:, size // 10 : size // 5] = q_1[::-1, size // 10 : size // 5]
+    found = closed_form(arms[0], q_1, arms[1], q_2)
+    points_1, points_2 = arms[0].points(q_1[None]), arms[1].points(q_2[None])
+    one = [np.array(arms[0].base)[:, None], points_1[0, :2], points_1[0, 2:]]
+    two = [np.array(arms[1].base)[:, None], points_2[0, :2], points_2[0, 2:]]
+    for pair, (m, n) in enumerate(np.ndindex(2, 2)):
+        expected = plain.crossing(one[m], one[m + 1], two[n], two[n + 1])
+        met = np.isfinite(found.mu[pair])
+        meeting = one[m] + found.mu[pair] * (one[m + 1] - one[m])
+        other = two[n] + found.nu[pair] * (two[n + 1] - two[n])
+        near = np.abs(found.mu[pair]) + np.abs(found.nu[pair]) < 1e3
+        assert np.allclose(meeting[:, met & near], other[:, met & near], rtol=0.0, atol=1e-9)
+        assert np.array_equal(found.crossing[pair, met], expected[met])
+        assert not found.crossing[pair, ~met].any()  # parallel, and not on one line
+
+
+def test_the_closed_form_is_equation_12() -> None:
+    """The paper's formula, symbol by symbol: top links, equal lengths, xi = d / L."""
+    rng = np.random.default_rng(4)
+    f1, f2, f3, f4 = rng.uniform(0.0, np.pi, (4, 1000))
+    xi = 0.3 / 0.25
+    mu = (np.sin(f3 - f4) - np.sin(f1 - f4) - xi * np.sin(f4)) / np.sin(f2 - f4)
+    nu = (np.sin(f2 - f1) + np.sin(f3 - f2) - xi * np.sin(f2)) / np.sin(f2 - f4)
+    found = closed_form(SCENE_A[0], np.array([f1, f2]), SCENE_A[1], np.array([f3, f4]))
+    assert np.allclose(found.mu[3], mu, rtol=1e-9, atol=1e-9)
+    assert np.allclose(found.nu[3], nu, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("base", "length", "angle", "expected"),
+    [
+        ((0.5, 0.0), 1.0, 0.0, True),  # overlapping
+        ((0.5, 0.0), 1.0, np.pi, True),
+        ((0.25, 0.0), 0.5, 0.0, True),  # one within the other
+        ((1.0, 0.0), 1.0, 0.0, True),  # end to end
+        ((2.0, 0.0), 1.0, np.pi, True),
+        ((-1.0, 0.0), 1.0, 0.0, True),
+        ((3.0, 0.0), 1.0, 0.0, False),  # on one line, apart
+        ((-0.5, 0.0), 1.0, np.pi, False),
+        ((0.5, 0.1), 1.0, 0.0, False),  # side by side
+        ((0.5, 1e-9), 1.0, np.pi, False),
+        ((0.5, 0.0), 0.0, 0.7, True),  # a point on the link
+        ((0.5, 0.1), 0.0, 0.7, False),
+        ((1.1, 0.0), 0.0, 0.7, False),
+    ],
+)
+def test_the_closed_form_has_a_branch_for_parallel_links(
+    base: Any, length: float, angle: float, expected: bool
+) -> None:
+    one, two = Arm((0.0, 0.0), (1.0, 1.0)), Arm(base, (length, 1.0))
+    q_1, q_2 = np.array([[0.0], [1.0]]), np.array([[angle], [2.0]])
+    for found in (closed_form(one, q_1, two, q_2), closed_form(two, q_2, one, q_1)):
+        assert np.isnan(found.mu[0, 0])
+        assert np.isnan(found.nu[0, 0])
+        assert found.crossing[0, 0] == expected
+
+
+def test_two_points_meet_where_they_are_one() -> None:
+    one, apart = Arm((0.0, 0.0), (0.0, 0.0)), Arm((0.1, 0.0), (0.0, 0.0))
+    q = np.array([[0.3], [1.0]])
+    assert closed_form(one, q, one, q).crossing.all()
+    assert not closed_form(one, q, apart, q).crossing.any()
+
+
+def test_one_substep_tests_the_genes_alone() -> None:
+    genes = np.random.default_rng(0).uniform(0.0, np.pi, (4, 2, 10))
+    assert np.array_equal(path_configurations(genes, np.zeros(2), np.ones(2), 1), genes)
+
+
+@pytest.mark.parametrize("steps", [2, 5])
+@pytest.mark.parametrize("size", [0, 1, 4])
+def test_substeps_divide_every_segment(steps: int, size: int) -> None:
+    genes = np.random.default_rng(0).uniform(0.0, np.pi, (size, 2, 10))
+    start, goal = np.array([2.0, 1.0]), np.array([0.5, -0.5])
+    tested = path_configurations(genes, start, goal, steps)
+    ends = np.concatenate(
+        [np.broadcast_to(start[:, None], (1, 2, 10)), genes, np.broadcast_to(goal[:, None], (1, 2, 10))]
+    )
+    t = np.arange(1, (size + 1) * steps) / steps
+    expected = [np.array([np.interp(t, np.arange(size + 2), ends[:, j, n]) for n in range(10)]) for j in (0, 1)]
+    assert tested.shape == ((size + 1) * steps - 1, 2, 10)
+    assert np.allclose(tested, np.array(expected).transpose(2, 0, 1), rtol=0.0, atol=1e-14)
+    assert np.array_equal(tested[steps - 1 :: steps], genes)
+
+
+def test_many_configurations_and_all_colliding() -> None:
+    q = np.zeros((300, 2, 3))
+    found = count_crossings(SCENE_A[0], SCENE_A[0].points(q), SCENE_A[1], SCENE_A[1].points(q))
+    assert (found.counts == 300).all()
+    assert (found.sums_1 == 900).all()
+
+
+def test_empty_populations() -> None:
+    found = count_crossings(SCENE_A[0], np.empty((4, 4, 0)), SCENE_A[1], SCENE_A[1].points(np.zeros((4, 2, 3))))
+    assert found.counts.shape == (0, 3)
+    assert np.array_equal(found.sums_2, np.zeros(3))
+    none = count_crossings(SCENE_A[0], np.empty((0, 4, 2)), SCENE_A[1], np.empty((0, 4, 3)))
+    assert not none.counts.any()
+
+
+def test_what_does_not_fit_is_refused() -> None:
+    one, two = SCENE_A
+    points_1, points_2 = populations(np.random.default_rng(0), SCENE_A, 5, 6)
+    with pytest.raises(ValueError, match=r"q must have shape \(configurations, 2, individuals\), was \(3, 4\)"):
+        one.points(np.zeros((3, 4)))
+    with pytest.raises(ValueError, match=r"points_2 must have shape \(configurations, 4, individuals\)"):
+        count_crossings(one, points_1, two, points_2[:, :3])
+    with pytest.raises(ValueError, match="as many configurations, had 4 and 3"):
+        count_crossings(one, points_1, two, points_2[:3])
+    with pytest.raises(ValueError, match="at most 32767 configurations, were 32768"):
+        count_crossings(one, np.zeros((32768, 4, 1)), two, np.zeros((32768, 4, 1)))
+    found = count_crossings(one, points_1, two, points_2)
+    everyone = np.ones(5, dtype=np.bool_), np.ones(6, dtype=np.bool_)
+    with pytest.raises(ValueError, match=r"crossings.counts must have shape \(4, 6\), was \(5, 6\)"):
+        update_crossings(found, one, points_1[:, :, :4], two, points_2, *everyone)
+    with pytest.raises(ValueError, match=r"changed_1 must be bool of shape \(5,\), was bool of shape \(6,\)"):
+        update_crossings(found, one, points_1, two, points_2, everyone[1], everyone[1])
+    with pytest.raises(ValueError, match="changed_2 must be bool"):
+        update_crossings(found, one, points_1, two, points_2, everyone[0], np.arange(6))  # type: ignore[arg-type]
+    for value in (np.nan, np.inf, 1e200):
+        wrong = points_2.copy()
+        wrong[2, 1, 3] = value
+        with pytest.raises(ValueError, match="finite and below 1e150"):
+            count_crossings(one, points_1, two, wrong)
+    with pytest.raises(ValueError, match="finite"):
+        count_crossings(Arm((np.nan, 0.0), (1.0, 1.0)), points_1, two, points_2)
+    with pytest.raises(ValueError, match=r"both have shape \(2, n\), were \(2, 3\) and \(2, 4\)"):
+        closed_form(one, np.zeros((2, 3)), two, np.zeros((2, 4)))
+    with pytest.raises(ValueError, match="collision_substeps must be at least 1, was 0"):
+        path_configurations(np.zeros((4, 2, 3)), np.zeros(2), np.zeros(2), 0)
+    with pytest.raises(ValueError, match=r"goal must have shape \(2,\), was \(3,\)"):
+        path_configurations(np.zeros((4, 2, 3)), np.zeros(2), np.zeros(3), 1)

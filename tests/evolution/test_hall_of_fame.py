@@ -1,0 +1,346 @@
+"""Teams and the hall of fame, beside the same by enumeration."""
+
+import itertools
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from evoexp.evolution.hall_of_fame import (
+    BestTeam,
+    Hall,
+    best_team,
+    find_best_team,
+    form_teams,
+    gather_teams,
+    renew_hall,
+    update_hall,
+)
+
+Key = tuple[int, float]
+
+
+class World(NamedTuple):
+    """Collisions, own costs and fronts of one generation."""
+
+    collisions: np.ndarray
+    own: np.ndarray
+    front: np.ndarray
+
+    @property
+    def pairs(self) -> list[tuple[int, int]]:
+        return list(itertools.combinations(range(len(self.own)), 2))
+
+    def hits(self, r: int, i: int, s: int, j: int) -> int:
+        if r > s:
+            r, i, s, j = s, j, r, i
+        return int(self.collisions[self.pairs.index((r, s)), i, j])
+
+    def key(self, team: tuple[int, ...]) -> Key:
+        hits = sum(self.hits(r, team[r], s, team[s]) for r, s in self.pairs)
+        return hits, float(sum(self.own[p, i] for p, i in enumerate(team)))
+
+
+def world(seed: int, num: int, size: int, free: float = 0.4, ties: bool = False) -> World:
+    """Draw a generation; `ties` makes many costs and sums of costs equal."""
+    rng = np.random.default_rng(seed)
+    num_pairs = num * (num - 1) // 2
+    collisions = rng.integers(1, 5, size=(num_pairs, size, size)) * (rng.random((num_pairs, size, size)) > free)
+    own = rng.integers(1, 5, size=(num, size)).astype(float) if ties else rng.uniform(1.0, 5.0, size=(num, size))
+    return World(collisions, own, rng.random((num, size)) < 0.4)
+
+
+def teams_by_definition(w: World) -> list[tuple[int, ...]]:
+    num, size = w.own.shape
+    teams = []
+    for p, i in itertools.product(range(num), range(size)):
+        if w.front[p, i]:
+            members = {p: i}
+            for s in range(num):
+                if s != p:
+                    ranked = [
+                        (sum(w.hits(q, m, s, j) for q, m in members.items()), w.own[s, j], j) for j in range(size)
+                    ]
+                    members[s] = min(ranked)[2]
+            teams.append(tuple(members[q] for q in range(num)))
+    return teams
+
+
+def hall_by_definition(w: World, hall: Hall, depth: int, memory: int | None, frozen: bool) -> list[tuple[int, ...]]:
+    old = [tuple(map(int, team)) for team in hall.teams]
+    ranked = []
+    for k, team in enumerate(old):
+        expired = memory is not None and hall.ages[k] + 1 > memory
+        ranked.append(((-1, 0, 0.0, k) if frozen else (int(expired), *w.key(team), k), team))
+    new = [team for team in teams_by_definition(w) if team not in old]
+    ranked += [((0, *w.key(team), len(old) + k), team) for k, team in enumerate(new)]
+    chosen: list[tuple[int, ...]] = []
+    for _, team in sorted(ranked):
+        if len(chosen) < depth and not any(a == b for other in chosen for a, b in zip(team, other, strict=True)):
+            chosen.append(team)
+    return chosen
+
+
+def best_by_definition(w: World) -> tuple[tuple[int, ...], float]:
+    num, size = w.own.shape
+    free = [(w.key(team)[1], team) for team in itertools.product(range(size), repeat=num) if w.key(team)[0] == 0]
+    cost, team = min(free, default=(np.inf, (-1,) * num))
+    return (team, cost) if cost < np.inf else ((-1,) * num, np.inf)
+
+
+def some_hall(seed: int, num: int, size: int, count: int) -> Hall:
+    """A hall of disjoint teams that nobody formed."""
+    rng = np.random.default_rng(seed)
+    teams = np.stack([rng.permutation(size)[:count] for _ in range(num)], axis=1)
+    return Hall.empty(num)._replace(teams=teams, ages=rng.integers(0, 6, size=count))
+
+
+cases = given(st.integers(0, 10_000), st.sampled_from([2, 3, 4]), st.integers(1, 7), st.booleans())
+
+
+@cases
+@settings(deadline=None)
+def test_teams_are_formed_as_defined(seed: int, num: int, size: int, ties: bool) -> None:
+    w = world(seed, num, size, ties=ties)
+    formed = form_teams(*w)
+    expected = teams_by_definition(w)
+    assert [tuple(team) for team in formed.teams] == expected
+    assert list(zip(formed.collisions, formed.costs, strict=True)) == [w.key(team) for team in expected]
+
+
+@cases
+@settings(deadline=None)
+def test_best_team_is_the_best_of_all(seed: int, num: int, size: int, ties: bool) -> None:
+    w = world(seed, num, min(size, 5), free=(0.0, 0.1, 0.5, 1.0)[seed % 4], ties=ties)
+    found, (team, cost) = best_team(w.collisions, w.own), best_by_definition(w)
+    assert (tuple(found.individuals), found.cost) == (team, cost)
+    assert found.found == (cost < np.inf)
+
+
+@pytest.mark.parametrize("size", [1, 4, 5, 37, 100])
+@pytest.mark.parametrize("free", [0.0, 0.002, 0.05, 0.6])
+@pytest.mark.parametrize("ties", [False, True])
+def test_best_pair_of_large_populations(size: int, free: float, ties: bool) -> None:
+    w = world(size, 2, size, free=free, ties=ties)
+    sums = np.where(w.collisions[0] == 0, w.own[0][:, None] + w.own[1], np.inf)
+    i, j = np.unravel_index(np.argmin(sums), sums.shape)  # the first in lexicographic order
+    expected = (int(i), int(j)) if np.isfinite(sums[i, j]) else (-1, -1)
+    found = best_team(w.collisions, w.own)
+    assert (tuple(found.individuals), found.cost) == (expected, sums[i, j])
+
+
+def test_sums_that_only_rounding_makes_equal_keep_their_order() -> None:
+    small = 2.0**-53  # 1 + small == 1
+    own = np.array([[small, 0.0, 1.0], [1.0, 3.0, 3.0]])
+    assert best_team(np.zeros((1, 3, 3), dtype=int), own).individuals.tolist() == [0, 0]
+    own = np.array([[small, 0.0], [0.0, small], [1.0, 1.0]])
+    assert best_team(np.zeros((3, 2, 2), dtype=int), own).individuals.tolist() == [0, 0, 0]
+
+
+def test_without_a_free_team_there_is_none() -> None:
+    for num in (2, 3):
+        none = best_team(np.ones((num * (num - 1) // 2, 4, 4), dtype=int), np.ones((num, 4)))
+        assert none.individuals.tolist() == [-1] * num
+        assert none.cost == np.inf
+        assert not none.found
+        assert not best_team(np.zeros((num * (num - 1) // 2, 4, 4), dtype=int), np.full((num, 4), np.inf)).found
+    own = np.array([[np.inf, 2.0], [1.0, np.inf]])
+    assert best_team(np.zeros((1, 2, 2), dtype=int), own).individuals.tolist() == [1, 0]
+
+
+@given(
+    st.integers(0, 10_000),
+    st.sampled_from([2, 3]),
+    st.integers(1, 8),
+    st.integers(0, 5),
+    st.sampled_from([None, 1, 3]),
+    st.booleans(),
+    st.booleans(),
+)
+@settings(deadline=None)
+def test_hall_is_chosen_as_defined(
+    seed: int, num: int, size: int, depth: int, memory: int | None, frozen: bool, ties: bool
+) -> None:
+    w = world(seed, num, size, ties=ties)
+    hall = some_hall(seed, num, size, seed % (min(depth, size) + 1))
+    chosen = update_hall(*w, hall, depth, memory, frozen)
+    expected = hall_by_definition(w, hall, depth, memory, frozen)
+    assert [tuple(team) for team in chosen.teams] == expected
+    assert list(zip(chosen.collisions, chosen.costs, strict=True)) == [w.key(team) for team in expected]
+    ages = {tuple(team): age + 1 for team, age in zip(hall.teams, hall.ages, strict=True)}
+    assert chosen.ages.tolist() == [ages.get(team, 0) for team in expected]
+
+
+def shares_a_member(a: np.ndarray, b: np.ndarray) -> bool:
+    return bool(np.any(a == b))
+
+
+@pytest.mark.parametrize("seed", range(25))
+@pytest.mark.parametrize("num", [2, 3])
+def test_teams_give_way_to_better_ones_only(seed: int, num: int) -> None:
+    w = world(seed, num, 12, ties=seed % 2 == 0)
+    hall = update_hall(*w._replace(front=w.front & (w.own > 2.0)), Hall.empty(num), 4)
+    chosen = update_hall(*w, hall, 4)
+    assert chosen.num_teams <= 4
+    assert all(len(set(column)) == len(column) for column in chosen.teams.T)
+    entered = chosen.ages == 0
+    for team in hall.teams:
+        if not np.any(np.all(chosen.teams == team, axis=1)):
+            rivals = np.array([shares_a_member(team, other) for other in chosen.teams])
+            better = [w.key(tuple(other)) < w.key(tuple(team)) for other in chosen.teams[entered]]
+            full = chosen.num_teams == 4 and all(better)
+            assert full or any(w.key(tuple(other)) < w.key(tuple(team)) for other in chosen.teams[rivals & entered])
+
+
+class Evolution:
+    """Populations whose members are drawn from a pool of known pairs, so that the hall can be copied unchanged."""
+
+    def __init__(self, seed: int, num: int, size: int, depth: int) -> None:
+        self.rng = np.random.default_rng(seed)
+        self.pool = world(seed, num, 60, free=0.3)
+        self.num, self.size, self.depth = num, size, depth
+        self.members = self.rng.integers(0, 60, size=(num, size))
+        self.hall = Hall.empty(num)
+
+    def step(self, memory: int | None = None, frozen: bool = False) -> list[tuple[int, ...]]:
+        """Make a generation that ends with the hall; return who is in the next hall, by their numbers in the pool."""
+        rows = np.arange(self.num)
+        kept = self.members[rows, self.hall.teams]  # (teams, P)
+        self.members = self.rng.integers(0, 60, size=(self.num, self.size))
+        first = self.size - len(kept)
+        self.members[:, first:] = kept.T
+        own = self.pool.own[rows[:, None], self.members]
+        pairs = itertools.combinations(range(self.num), 2)
+        tables = zip(self.pool.collisions, pairs, strict=True)
+        collisions = np.stack([table[np.ix_(self.members[r], self.members[s])] for table, (r, s) in tables])
+        front = self.rng.random(own.shape) < 0.3
+        self.hall = update_hall(collisions, own, front, self.hall.moved(first), self.depth, memory, frozen)
+        return [tuple(map(int, team)) for team in self.members[rows, self.hall.teams]]
+
+
+@pytest.mark.parametrize("num", [2, 3])
+def test_best_key_never_worsens_over_generations(num: int) -> None:
+    evolution, best = Evolution(3, num, 20, 5), (99, np.inf)
+    improvements = 0
+    for _ in range(40):
+        evolution.step()
+        hall = evolution.hall
+        keys = list(zip(hall.collisions, hall.costs, strict=True))
+        assert keys == sorted(keys)
+        assert keys[0] <= best
+        improvements += keys[0] < best
+        best = keys[0]
+    assert improvements > 2
+    assert hall.ages.max() > 1
+
+
+def test_a_frozen_hall_fills_up_and_then_never_changes() -> None:
+    evolution, before, sizes = Evolution(4, 2, 9, 6), [], set()
+    for _ in range(30):
+        now = evolution.step(frozen=True)
+        assert now[: len(before)] == before
+        before = now
+        sizes.add(len(now))
+    assert len(now) == 6
+    assert len(sizes) > 1  # it did not fill up at once
+    assert evolution.hall.ages.min() > 5
+
+
+def test_memory_lets_the_best_go_in_time() -> None:
+    forgetting, keeping = Evolution(3, 2, 20, 5), Evolution(3, 2, 20, 5)
+    worsened, best = 0, (99, np.inf)
+    for _ in range(40):
+        forgetting.step(memory=3)
+        keeping.step()
+        key = (int(forgetting.hall.collisions[0]), float(forgetting.hall.costs[0]))
+        worsened += key > best
+        best = key
+        assert forgetting.hall.ages.max() <= 4  # there always is somebody new
+    assert worsened > 0
+    assert keeping.hall.ages.max() > 4
+
+
+def test_memory_counts_generations_and_needs_somebody_new() -> None:
+    own = np.array([[1.0, 2.0], [1.0, 2.0]])
+    collisions = np.array([[[0, 1], [1, 0]]])
+    front = np.array([[False, True], [False, False]])  # forms (1, 1) of key (0, 4); in the hall is (0, 0) of (0, 2)
+    hall = Hall.empty(2)._replace(teams=np.zeros((1, 2), dtype=np.int64), ages=np.zeros(1, dtype=np.int64))
+    firsts = []
+    for _ in range(4):
+        hall = update_hall(collisions, own, front, hall, 1, memory=2)
+        firsts.append(hall.teams[0].tolist())
+    assert firsts == [[0, 0], [0, 0], [1, 1], [1, 1]]
+    old = hall._replace(teams=np.zeros((1, 2), dtype=np.int64), ages=np.array([9]))
+    again = np.array([[True, False], [True, False]])  # forms the very team that must give way: nobody new
+    for nobody in (again, np.zeros((2, 2), dtype=bool)):
+        stayed = update_hall(collisions, own, nobody, old, 1, memory=2)
+        assert stayed.teams.tolist() == [[0, 0]]
+        assert stayed.ages.tolist() == [10]
+
+
+def test_equal_keys_keep_the_old_then_the_first_formed() -> None:
+    own, collisions = np.ones((2, 4)), np.zeros((1, 4, 4), dtype=int)
+    everybody = np.ones((2, 4), dtype=bool)
+    old = Hall.empty(2)._replace(teams=np.array([[3, 2]]), ages=np.array([7]))
+    chosen = update_hall(collisions, own, everybody, old, 3)
+    assert chosen.teams.tolist() == [[3, 2], [0, 0]]  # all new pairs have member 0 of one population
+    assert chosen.ages.tolist() == [8, 0]
+
+
+@pytest.mark.parametrize("num", [2, 3])
+@pytest.mark.parametrize("dtype", [np.uint8, np.int32, np.float64])
+def test_kernels_ignore_padding_and_take_any_number_type(num: int, dtype: type) -> None:
+    w = world(5, num, 13)
+    hall = some_hall(1, num, 13, 3)
+    own, front = np.full((num, 16), -9.0), np.ones((num, 16), dtype=bool)
+    collisions = np.zeros((len(w.collisions), 16, 24), dtype=dtype)
+    own[:, :13], front[:, :13], collisions[:, :13, :13] = w.own, w.front, w.collisions
+    team = np.empty(num, dtype=np.int64)
+    cost = find_best_team(collisions, own, 13, team)
+    best = best_team(w.collisions, w.own)
+    assert (cost, team.tolist()) == (best.cost, best.individuals.tolist())
+    teams, hits, costs = np.empty((num * 13, num), dtype=np.int64), np.empty(num * 13, dtype=np.int64), np.empty(39)
+    count = gather_teams(collisions, own, front, 13, teams, hits, costs)
+    assert np.array_equal(teams[:count], form_teams(*w).teams)
+    teams, ages = np.zeros((6, num), dtype=np.int64), np.zeros(6, dtype=np.int64)
+    teams[:3], ages[:3] = hall.teams, hall.ages
+    held = renew_hall(collisions, own, front, 13, teams, ages, 3, 2, False, hits[:6], costs[:6])
+    chosen = update_hall(*w, hall, 6, memory=2)
+    for mine, theirs in zip((teams, ages, hits, costs), chosen, strict=True):
+        assert np.array_equal(mine[:held], theirs)
+
+
+def test_nothing_is_random_and_inputs_are_left_alone() -> None:
+    w, hall = world(6, 2, 30), some_hall(2, 2, 30, 4)
+    copies = [array.copy() for array in (*w, *hall)]
+    first, second = (update_hall(*w, hall, 5, memory=2) for _ in range(2))
+    assert all(np.array_equal(a, b) for a, b in zip(first, second, strict=True))
+    assert all(np.array_equal(a, b) for a, b in zip((*w, *hall), copies, strict=True))
+
+
+def test_moved_hall_lies_behind_the_offspring() -> None:
+    hall = some_hall(0, 3, 10, 2).moved(8)
+    assert hall.teams.tolist() == [[8, 8, 8], [9, 9, 9]]
+    assert hall.num_teams == 2
+    assert Hall.empty(3).moved(8).teams.shape == (0, 3)
+
+
+def test_arrays_that_do_not_match_are_errors() -> None:
+    w = world(0, 2, 5)
+    with pytest.raises(ValueError, match="do not match"):
+        best_team(w.collisions[:, :4], w.own)
+    with pytest.raises(ValueError, match="do not match"):
+        best_team(w.collisions, np.ones((3, 5)))
+    with pytest.raises(ValueError, match="do not match"):
+        form_teams(w.collisions, w.own, w.front[:, :4])
+    with pytest.raises(ValueError, match="do not match"):
+        best_team(np.zeros((0, 5, 5), dtype=int), np.ones((1, 5)))
+    with pytest.raises(ValueError, match=r"a hall of \(3, 2\) is not one of at most 2 teams of 2"):
+        update_hall(*w, some_hall(0, 2, 5, 3), 2)
+
+
+def test_best_team_is_read_by_name() -> None:
+    assert BestTeam(np.array([1, 2]), 3.0).found
+    assert not BestTeam(np.array([-1, -1]), np.inf).found

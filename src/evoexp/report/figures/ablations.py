@@ -2,18 +2,13 @@
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from evoexp.records import FloatArray
 from evoexp.report import style
 from evoexp.report.claims import Comparison
+from evoexp.report.figures.boxes import draw_box
 from evoexp.report.results import Results
 from evoexp.report.tables import groups
-
-JITTER = 0.16  # [rows] half the width over which points are spread
-POINTS = 50  # up to so many replicates every one is shown
-
 
 def values_table(results: Results, names: dict[str, str]) -> pd.DataFrame:
     """Return quantities of every finished replicate.
@@ -44,9 +39,7 @@ def draw_values(table: pd.DataFrame) -> Figure:
     for axes, quantity in zip(panels, quantities, strict=True):
         rows = table[table["quantity"] == quantity]
         for position, own in groups(rows, "position"):
-            values = own["value"].to_numpy()
-            finite = values[np.isfinite(values)]
-            _box(axes, position, finite)
+            draw_box(axes, position, own["value"].to_numpy(), style.condition_colour(position))
         middle = rows.loc[rows["position"] == 0, "value"].median()
         axes.axvline(middle, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
         axes.set_xlabel(quantity)
@@ -107,25 +100,3 @@ def draw_effects(table: pd.DataFrame) -> Figure:
     panels[0].set_ylim(len(labels) - 0.5, -0.5)
     style.legend_below(figure, panels[0], 2)
     return figure
-
-
-def _box(axes: Axes, position: int, values: FloatArray) -> None:
-    """Draw one condition."""
-    if not len(values):
-        return
-    colour = style.condition_colour(position)
-    axes.boxplot(
-        values,
-        positions=[position],
-        orientation="horizontal",
-        widths=0.55,
-        manage_ticks=False,
-        showfliers=len(values) > POINTS,
-        boxprops={"color": colour},
-        whiskerprops={"color": colour},
-        capprops={"color": colour},
-        medianprops={"color": colour, "linewidth": 2.0},
-    )
-    if len(values) <= POINTS:
-        spread = JITTER * (2.0 * ((np.arange(len(values)) * 0.618034) % 1.0) - 1.0)
-        axes.plot(values, position + spread, "o", color=colour, markersize=2.6, alpha=0.5, mec="none")

@@ -1,4 +1,4 @@
-"""Crossover of individuals that are strings of via-points."""
+"""Crossover of individuals: strings of via-points, and plain genomes."""
 
 import numpy as np
 

@@ -15,6 +15,7 @@ REPORT = {
     "significance": 0.05,
     "num_resamples": 200,
     "samples_per_segment": 10,
+    "threshold_ratio": 1.25,
 }
 
 

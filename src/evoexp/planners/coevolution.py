@@ -147,10 +147,10 @@ class Coevolution(Component):
         found = self.evaluated(problem, populations)
         yield record.generation(0, populations, found)
         for index in range(1, ga.num_generations + 1):
-            hall = self._renewed(found, hall)
+            hall = self._renewed(populations, found, hall)
             waiting = 0 if record.feasible else waiting + 1
             if ga.restart_after is not None and waiting >= ga.restart_after:
-                # "If no convergence has occurred …, the algorithm generates new populations and the search starts again."
+                # "If no convergence has occurred, …, the algorithm generates new populations" (section 3).
                 populations, waiting = self.sample(problem, rng, ga.population_size), 0
                 hall = Hall.empty(len(problem.start))
             else:
@@ -159,12 +159,13 @@ class Coevolution(Component):
             found = self.evaluated(problem, populations)
             yield record.generation(index, populations, found)
 
-    def _renewed(self, found: Evaluated, hall: Hall) -> Hall:
-        """Return the hall of fame: pairs of the Pareto fronts with their best collaborators, replaced by better ones."""
+    def _renewed(self, populations: FloatArray, found: Evaluated, hall: Hall) -> Hall:
+        """Return the hall of fame: members of the Pareto fronts with their best collaborators."""
         depth = self.ga.num_hall_teams
         if not depth:
             return hall
         fronts = np.array([pareto_front(criteria) for criteria in found.criteria])
+        _drop_copies(populations, fronts, hall)
         memory, frozen = self.ga.hall_memory, self.ga.hall_frozen
         return update_hall(found.collisions, found.teamable, fronts, hall, depth, memory, frozen)
 
@@ -322,6 +323,16 @@ class _Record:
             costs=found.costs,
             population=populations,
         )
+
+
+def _drop_copies(populations: FloatArray, fronts: np.ndarray, hall: Hall) -> None:
+    """Take copies of other members, and of the hall's, off the fronts: they would fill the hall with one pair."""
+    for robot, genes in enumerate(populations):
+        known = {genes[:, member].tobytes() for member in hall.teams[:, robot]}
+        for member in np.flatnonzero(fronts[robot]):
+            genome = genes[:, member].tobytes()
+            fronts[robot, member] = genome not in known
+            known.add(genome)
 
 
 def _num_feasible(found: Evaluated) -> int:

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from evoexp.validation import Count, Settings
+from evoexp.validation import Count, Positive, Settings
 
 Share = Annotated[float, Field(gt=0.0, lt=1.0)]
 
@@ -19,6 +19,7 @@ class ReportSettings(Settings):
         significance: Below this adjusted p-value a difference counts in a verdict.
         num_resamples: Of every bootstrap interval.
         samples_per_segment: Configurations per segment of a path at which figures measure distances.
+        threshold_ratio: Cost that "effort to a threshold" means, in units of the scene's lower bound.
         figures: Name of the page that draws the experiment; None: conditions, convergence and parameters only.
     """
 
@@ -28,4 +29,5 @@ class ReportSettings(Settings):
     significance: Share
     num_resamples: Count
     samples_per_segment: Count
+    threshold_ratio: Positive
     figures: str | None

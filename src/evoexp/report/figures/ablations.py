@@ -10,6 +10,7 @@ from evoexp.report.figures.boxes import draw_box
 from evoexp.report.results import Results
 from evoexp.report.tables import groups
 
+
 def values_table(results: Results, names: dict[str, str]) -> pd.DataFrame:
     """Return quantities of every finished replicate.
 

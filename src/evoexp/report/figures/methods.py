@@ -77,7 +77,7 @@ def _curves(axes: Axes, table: pd.DataFrame) -> dict[float, str]:
         colour = style.condition_colour(int(position))
         names[position] = str(method)
         x, mean, deviation = (rows[name].to_numpy(np.float64) for name in ("generation", "value", "deviation"))
-        kind = "-" if position * 2 >= table["position"].max() else (0, (4, 1.5))
+        kind = "-" if position * 2 > table["position"].max() else (0, (4, 1.5))
         axes.fill_between(x, mean - deviation, mean + deviation, color=colour, alpha=0.10, linewidth=0)
         axes.plot(x, mean, color=colour, linestyle=kind, label=str(method))
     axes.set_xlim(0, max(1.0, float(table["generation"].max())))

@@ -9,6 +9,7 @@ from evoexp.report.results import Results
 from evoexp.report.settings import ReportSettings
 
 PAGES = {
+    "curkovic": "evoexp.report.pages.curkovic:page",
     "ablations": "evoexp.report.pages.ablations:page",
     "generic": "evoexp.report.pages.generic:page",
     "planar_arms": "evoexp.report.pages.planar_arms:page",

@@ -14,12 +14,15 @@ from pathlib import Path
 from typing import Any, NamedTuple, cast
 
 import joblib
+import numpy as np
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.settings import RunnerSettings
 from evoexp.batch.workers import in_workers
+from evoexp.collision.certificate import certificate
 from evoexp.condition import Condition
+from evoexp.paths.motion import Motion
 from evoexp.store.manifest import manifest
 from evoexp.store.run_directory import RunDirectory, lock_all
 from evoexp.store.tables import write_summary
@@ -225,6 +228,10 @@ def _warm(jobs: Sequence[Job], settings: RunnerSettings) -> int:
             planner, problem = condition.prepare()
             for generation in itertools.islice(planner.evolve(problem, condition.rng(0)), 2):
                 planner.evaluate(problem, generation.best)
+                motion = planner.motion(problem, generation.best)
+                certificate(problem, motion)
+                if motion is not None:  # and one that touches nothing, whose closest approach is sought
+                    certificate(problem, Motion(np.repeat(motion.q[:1], 2, axis=0)))
     return max(1, min(settings.num_workers or num_cores(), len(jobs)))
 
 

@@ -30,7 +30,7 @@ class Generation(NamedTuple):
     collision_queries: int  # configurations judged since the start
     solved: bool  # whether the planner's own model accepts the best so far
     terms: dict[str, float]  # the paper's own terms of the best so far; written as term_<name>
-    costs: FloatArray  # (individuals,)
+    costs: FloatArray  # (individuals,), with a leading axis for co-evolving populations, whose best cost is a team's
     population: FloatArray  # any shape
 
 

@@ -200,6 +200,33 @@ def test_ablations_are_compared_with_the_first_condition(tmp_path: Path) -> None
     assert len(values) == 2 * 11 * 2
 
 
+def test_methods_of_co_evolution_are_drawn_and_paired(tmp_path: Path) -> None:
+    words = ("ga.population_size=8", "ga.hall_depth=0.25", "ga.num_generations=3", "num_replicates=3")
+    methods = [f"experiment=curkovic_methods budget=smoke {' '.join(words)}"]
+    experiment = compose.expand(methods[0].split(), only=["V", "VI"])[0]
+    plain = compose.expand([w for w in methods[0].split() if "hall" not in w], only=["I", "II"])[0]
+    together = experiment._replace(conditions=plain.conditions + experiment.conditions)
+    store(tmp_path, together)
+    request = build.Request("methods", together.name, together.budget, together.conditions)
+    settings = ReportSettings(**REPORT | {"formats": ("svg",), "figures": "curkovic"})  # type: ignore[arg-type]
+    page = build.report(request, settings, tmp_path, 3)
+    text = page.read_text()
+    assert "V against I |" in text
+    assert "VI against II |" in text
+    assert "VII against III" not in text
+    table = pd.read_csv(page.parent / "fig_6_methods.csv")
+    assert set(table["series"]) == {"best so far", "final", "lower bound"}
+    bound = table.loc[table["series"] == "lower bound", "value"].item()
+    assert bound == pytest.approx(7.48, abs=0.005)
+    final = table[table["series"] == "final"]
+    assert (final["value"] >= bound).all()
+    curves = table[(table["series"] == "best so far") & (table["method"] == "V")]
+    assert curves["value"].is_monotonic_decreasing
+    last = final.loc[final["method"] == "V", "value"]
+    assert curves["value"].iloc[-1] == pytest.approx(last.mean())
+    assert curves["deviation"].iloc[-1] == pytest.approx(last.std())
+
+
 def test_nothing_stored_names_the_command(tmp_path: Path) -> None:
     experiment = compose.expand(["experiment=rana_planar", "budget=smoke"])[0]
     request = build.Request(experiment.report_name, experiment.name, experiment.budget, experiment.conditions)

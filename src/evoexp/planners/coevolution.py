@@ -10,6 +10,7 @@ goal included.
 """
 
 from collections.abc import Iterator
+from itertools import combinations
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -217,12 +218,11 @@ class Coevolution(Component):
             lines.append(collision.outlines(r, path[1:-1], problem.start[r], problem.goal[r]))
             blocked[r] = collision.with_obstacles(r, lines[r])
         hits, sums = [], blocked * count  # an obstacle is in the way whoever the collaborator is
-        for a in range(robots):
-            for b in range(a + 1, robots):
-                crossings = collision.between(a, lines[a], b, lines[b])
-                hits.append(crossings.counts)
-                sums[a] += crossings.sums_1
-                sums[b] += crossings.sums_2
+        for a, b in combinations(range(robots), 2):
+            crossings = collision.between(a, lines[a], b, lines[b])
+            hits.append(crossings.counts)
+            sums[a] += crossings.sums_1
+            sums[b] += crossings.sums_2
         criteria[:, 0] = sums
         return Evaluated(self.objective.collision_weight * sums + own, criteria, own, np.array(hits), blocked)
 
@@ -260,7 +260,7 @@ class Coevolution(Component):
         return Motion(np.ascontiguousarray(relative.transpose(1, 0, 2).reshape(paths.shape[1], -1)))
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
-        """Return the criteria C1 … C4 of every robot of one team.
+        """Return the criteria C1 … C4 of every robot of one team; C1 against the team's other robots only.
 
         Raises:
             ValueError: If the solution has another size than robots × (K + 2) × 2.
@@ -269,7 +269,7 @@ class Coevolution(Component):
         ends = problem._replace(start=paths[:, 0], goal=paths[:, -1])
         genes = np.ascontiguousarray(paths[:, 1:-1].reshape(len(paths), -1, 1))
         found = self.evaluated(ends, genes)
-        return _terms(found, np.zeros(len(paths), dtype=np.int64)) | {"team_cost": float(found.own.sum())}
+        return _terms(found, np.zeros(len(paths), dtype=np.int64))
 
     def shape(self, problem: Problem) -> tuple[tuple[int, int], ...]:
         """Return the documented shape of a solution: per robot, (K + 2, 2)."""
@@ -306,7 +306,7 @@ class _Record:
             self.cost = best.cost
             team = best.individuals if best.found else np.array([int(np.argmin(costs)) for costs in found.costs])
             self.solution = planner.team_solution(self.problem, populations, team)
-            self.terms = _terms(found, team)
+            self.terms = planner.evaluate(self.problem, self.solution)
         statistics = cost_statistics(found.costs.ravel())
         return Generation(
             index=index,
@@ -370,20 +370,23 @@ def _cost_of(found: Evaluated, team: np.ndarray) -> float:
 
 def _team_collisions(found: Evaluated, team: np.ndarray) -> int:
     """Return the colliding configurations within a team and with obstacles."""
-    robots, pair, hits = len(team), 0, 0
-    for a in range(robots):
-        hits += int(found.blocked[a, team[a]])
-        for b in range(a + 1, robots):
-            hits += int(found.collisions[pair, team[a], team[b]])
-            pair += 1
-    return hits
+    pairs = enumerate(combinations(range(len(team)), 2))
+    hits = sum(int(found.collisions[pair, team[a], team[b]]) for pair, (a, b) in pairs)
+    return hits + sum(int(found.blocked[r, i]) for r, i in enumerate(team))
 
 
 def _terms(found: Evaluated, team: np.ndarray) -> dict[str, float]:
-    terms = {"team_collisions": float(_team_collisions(found, team))}
+    """Return a team's terms by name."""
+    robots, met = len(team), np.array([found.blocked[r, team[r]] for r in range(len(team))])
+    for pair, (a, b) in enumerate(combinations(range(robots), 2)):
+        met[[a, b]] += found.collisions[pair, team[a], team[b]]
+    terms = {
+        "team_cost": float(sum(found.own[r, i] for r, i in enumerate(team))),
+        "team_collisions": float(_team_collisions(found, team)),
+    }
     for r, individual in enumerate(team):
-        collisions, path, rotation, evenness = found.criteria[r, :, individual]
-        terms[f"collisions_robot_{r + 1}"] = float(collisions)
+        _, path, rotation, evenness = found.criteria[r, :, individual]
+        terms[f"collisions_robot_{r + 1}"] = float(met[r])
         terms[f"tip_path_robot_{r + 1}"] = float(path)
         terms[f"rotation_robot_{r + 1}_rad"] = float(rotation)
         terms[f"tip_unevenness_robot_{r + 1}"] = float(evenness)

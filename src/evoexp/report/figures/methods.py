@@ -22,9 +22,9 @@ def methods_table(results: Results, bound: float) -> pd.DataFrame:
         bound: Lower bound of the cost.
 
     Returns:
-        Columns series (best so far: one row per method and generation; final: one per replicate; lower bound), position,
-        method, generation, replicate, value (the mean over the replicates that have a solution by then, or the
-        replicate's own), deviation (standard), replicates (that have a solution).
+        Columns series (best so far: one row per method and generation; final: one per replicate; lower bound),
+        position, method, generation, replicate, value (the mean over the replicates that have a solution by then, or
+        the replicate's own), deviation (standard), replicates (that have a solution).
     """
     parts = []
     for position, c in enumerate(results.with_data):

@@ -17,10 +17,11 @@ from evoexp.report.statistics import spread
 
 PAIRS = (("V", "I"), ("VI", "II"), ("VII", "III"), ("VIII", "IV"))
 INTRODUCTION = (
-    "One population of paths per robot; a path's cost is C1 + C2 + C3 + C4, where C1 counts collisions with all paths of "
-    "the other populations. The answer is a team: one path per robot, free of collision with each other; its cost is "
-    "C2 + C3 + C4 (end-effector paths, turns of the links, unevenness) summed over the robots, lower is better. Methods "
-    "I–IV are generational with a roulette wheel, V–VIII keep a hall of fame of pairs and lower the mutation rate."
+    "One population of paths per robot; a path's cost is C1 + C2 + C3 + C4, where C1 counts collisions with all paths "
+    "of the other populations. The answer is a team: one path per robot, free of collision with each other; its cost "
+    "is C2 + C3 + C4 (end-effector paths, turns of the links, unevenness) summed over the robots, lower is better. "
+    "Methods I–IV are generational with a roulette wheel, V–VIII keep a hall of fame of pairs and lower the mutation "
+    "rate."
 )
 
 
@@ -71,7 +72,7 @@ def generations_to(condition: ConditionResults, threshold: float) -> FloatArray:
 
 
 def expected_evaluations(condition: ConditionResults, threshold: float) -> float:
-    """Return the expected running time in evaluations: all that were spent, over the runs that got there (Auger 2005)."""
+    """Return the expected running time in evaluations: all that were spent, over the runs that got there."""
     first = generations_to(condition, threshold)
     spent = 0.0
     for replicate, generation in zip(condition.summaries.index, first, strict=True):
@@ -141,7 +142,7 @@ def _claims(
         claims.Claim(
             "A collision-free solution in less than 10 s",
             "section 3",
-            f"{markdown.share(solved, done)} runs found one; the slowest whole run took {markdown.number(slowest)} s of CPU",
+            f"{markdown.share(solved, done)} runs found one; the slowest run took {markdown.number(slowest)} s of CPU",
             f"{within} ({reason})" if reason else within,
         )
     )

@@ -86,6 +86,19 @@ class LinkCollision(NamedTuple):
         """Return the same of configurations (K, 2, N) as they are."""
         return self._enveloped(robot).outlines(q) if self.enveloped else self.arms[robot].points(q)
 
+    def contact(self, posture: FloatArray) -> str:
+        """Return what touches what at link angles (robots, 2) [rad]; empty if nothing does."""
+        lines = [
+            self.of_configurations(r, np.ascontiguousarray(angles.reshape(1, 2, 1))) for r, angles in enumerate(posture)
+        ]
+        for r, own in enumerate(lines):
+            if self.with_obstacles(r, own)[0]:
+                return f"robot {r + 1} touches an obstacle"
+            for s in range(r + 1, len(lines)):
+                if self.between(r, own, s, lines[s]).counts[0, 0]:
+                    return f"robots {r + 1} and {s + 1} touch"
+        return ""
+
     def between(self, one: int, first: FloatArray, two: int, second: FloatArray) -> Crossings:
         """Count colliding configurations for every pair of individuals of two robots' populations."""
         if self.enveloped:

@@ -137,7 +137,9 @@ class Coevolution(Component):
         bodies = scene(assembly, scenario.obstacles)
         problem = Problem(assembly, collision, start, goal, moving, bodies, scenario.security_margin)
         for name, posture in (("q_start", start), ("q_goal", goal)):
-            _refuse_collision(problem, name, posture)
+            if contact := collision.contact(posture):
+                given = (posture / DEGREE).round(9).tolist()
+                raise SettingError(f"scenario.{name}", f"free of collision ({contact})", given)
         return problem
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
@@ -391,17 +393,3 @@ def _terms(found: Evaluated, team: np.ndarray) -> dict[str, float]:
         terms[f"rotation_robot_{r + 1}_rad"] = float(rotation)
         terms[f"tip_unevenness_robot_{r + 1}"] = float(evenness)
     return terms
-
-
-def _refuse_collision(problem: Problem, name: str, posture: FloatArray) -> None:
-    """Raise for a start or goal at which robots touch each other or an obstacle."""
-    collision, robots = problem.collision, len(posture)
-    lines = [collision.of_configurations(r, np.ascontiguousarray(posture[r].reshape(1, 2, 1))) for r in range(robots)]
-    given = [[float(a) for a in row] for row in (posture / DEGREE).round(9)]
-    for r in range(robots):
-        if collision.with_obstacles(r, lines[r])[0]:
-            raise SettingError(f"scenario.{name}", f"free of collision (robot {r + 1} touches an obstacle)", given)
-        for s in range(r + 1, robots):
-            if collision.between(r, lines[r], s, lines[s]).counts[0, 0]:
-                must = f"free of collision (robots {r + 1} and {s + 1} touch)"
-                raise SettingError(f"scenario.{name}", must, given)

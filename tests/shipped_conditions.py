@@ -1,0 +1,29 @@
+"""Every condition of every shipped experiment, composed once per test process: composing is what takes long."""
+
+import functools
+
+from evoexp import compose
+from evoexp.condition import Condition
+
+
+@functools.cache
+def shipped_conditions(budget: str) -> dict[tuple[str, str], Condition]:
+    """Return (experiment, label) → condition."""
+    return {
+        (name, label): condition
+        for name in compose.options("experiment")
+        for label, condition in compose.expand([f"experiment={name}", f"budget={budget}"])[0].conditions
+    }
+
+
+def different_conditions(budget: str) -> dict[str, Condition]:
+    """Return "experiment: label" → condition, each condition once: experiments share some."""
+    found = {condition.id: (f"{name}: {label}", condition) for (name, label), condition in _smallest_last(budget)}
+    return dict(found.values())
+
+
+def _smallest_last(budget: str) -> list[tuple[tuple[str, str], Condition]]:
+    """Return all conditions, those of the experiments with the fewest last, in a fixed order."""
+    rows = list(shipped_conditions(budget).items())
+    sizes = {name: sum(other == name for (other, _), _ in rows) for (name, _), _ in rows}
+    return sorted(rows, key=lambda row: -sizes[row[0][0]])

@@ -87,7 +87,7 @@ def test_every_setting_is_part_of_the_hash(shipped: Condition) -> None:
         elif value is None:
             steps = [3]
         elif not steps:
-            steps = [value + 1, value - 1, value * 2, value * 0.5, value + 0.05]
+            steps = [value + 1, value - 1, value * 2, value * 0.5, value + 0.05, value * 0.95]
         for step in steps:
             if step == value:
                 continue

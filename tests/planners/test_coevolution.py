@@ -101,7 +101,7 @@ def test_the_best_team_is_what_it_says() -> None:
     assert np.rad2deg(motion.q[:, 0] + motion.q[:, 1]) == pytest.approx(paths[0, :, 1])  # relative to the link before
 
 
-def test_the_hall_is_carried_on_unchanged_and_never_gets_worse() -> None:
+def test_what_stands_where_the_hall_does_is_soon_free_of_collision() -> None:
     planner, problem = prepared(*SMALL)
     keys: list[tuple[int, float]] = []
     for generation in planner.evolve(problem, np.random.default_rng(3)):

@@ -33,13 +33,6 @@ class Certificate(NamedTuple):
     refuted_pair: str = ""
     certificate_queries: int = 0
 
-    @property
-    def word(self) -> str:
-        """The verdict in a word; empty without a motion."""
-        if math.isnan(self.clearance):
-            return ""
-        return next(word for word, answer in _ANSWER.items() if answer is self.certified)
-
 
 def certificate(problem: Any, motion: Motion | None) -> Certificate:
     """Judge a motion by the bodies of a planner's problem.

@@ -48,7 +48,7 @@ class Posture(Settings):
             lengths: (2,) of its links.
 
         Raises:
-            SettingError: If the tip is out of reach, or an angle lies outside [0, 180).
+            SettingError: If the tip is out of reach, or an angle lies outside [0, 180].
         """
         if self.angles is not None:
             angles = np.array(self.angles)

@@ -54,21 +54,24 @@ def draw_values(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def effects_table(comparisons: dict[str, tuple[Comparison, ...]]) -> pd.DataFrame:
+def effects_table(comparisons: dict[str, tuple[Comparison, ...]], significance: float) -> pd.DataFrame:
     """Return how often the first condition is better.
 
     Args:
         comparisons: Name of a quantity → the first condition against each other one.
+        significance: Below this adjusted p-value a difference counts.
 
     Returns:
-        Columns quantity, condition (the other one), a12, lower, upper, p_adjusted, seeds.
+        Columns quantity, condition (the other one), a12, lower, upper, p_adjusted, seeds, significance.
     """
     rows = [
         (quantity, c.quantity, c.better.a12, *c.better.interval, c.p_adjusted, c.num_seeds)
         for quantity, found in comparisons.items()
         for c in found
     ]
-    return pd.DataFrame(rows, columns=["quantity", "condition", "a12", "lower", "upper", "p_adjusted", "seeds"])
+    return pd.DataFrame(rows, columns=["quantity", "condition", "a12", "lower", "upper", "p_adjusted", "seeds"]).assign(
+        significance=significance
+    )
 
 
 def draw_effects(table: pd.DataFrame) -> Figure:
@@ -83,8 +86,9 @@ def draw_effects(table: pd.DataFrame) -> Figure:
         a12, low, high = (rows[name].to_numpy(np.float64) for name in ("a12", "lower", "upper"))
         axes.axvline(0.5, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
         axes.hlines(y, low, high, color=style.ARM_COLOURS[0], linewidth=1.4)
-        clear = rows["p_adjusted"].to_numpy(np.float64) < 0.05
-        axes.plot(a12[clear], y[clear], "o", color=style.ARM_COLOURS[0], markersize=5, label="adjusted p < 0.05")
+        level = float(rows["significance"].iloc[0])
+        clear = rows["p_adjusted"].to_numpy(np.float64) < level
+        axes.plot(a12[clear], y[clear], "o", color=style.ARM_COLOURS[0], markersize=5, label=f"adjusted p < {level:g}")
         axes.plot(
             a12[~clear],
             y[~clear],
@@ -92,7 +96,7 @@ def draw_effects(table: pd.DataFrame) -> Figure:
             color=style.ARM_COLOURS[0],
             mfc="white",
             markersize=5,
-            label="adjusted p ≥ 0.05",
+            label=f"adjusted p ≥ {level:g}",
         )
         axes.set_xlim(-0.03, 1.03)
         axes.set_title(quantity)

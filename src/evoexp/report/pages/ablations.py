@@ -51,7 +51,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
                 "effects",
                 f"How often {first} is better",
                 EFFECTS,
-                partial(ablations.effects_table, effects),
+                partial(ablations.effects_table, effects, settings.significance),
             ),
             _drawing(results, "convergence", "Convergence", CONVERGENCE, partial(convergence.cost_table, results)),
         ),

@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evoexp import compose
-from evoexp.batch.runner import MAX_BUNDLE, TASK_S, Job, Outcome, _Bundles, fan_out
+from evoexp.batch.jobs import Job, Outcome
+from evoexp.batch.runner import MAX_BUNDLE, TASK_S, _Bundles, fan_out
 from evoexp.cli import main
 from evoexp.condition import Condition
 from evoexp.errors import Busy, SettingError

@@ -6,18 +6,16 @@ so an interrupted batch is resumed by asking for it again.
 
 import contextlib
 import itertools
-import time
-import traceback
 from collections import deque
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
 
 import joblib
 import numpy as np
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-from evoexp.batch.replicate import run_replicate
+from evoexp.batch.jobs import Job, Outcome, run_jobs
 from evoexp.batch.settings import RunnerSettings
 from evoexp.batch.workers import in_workers
 from evoexp.collision.certificate import certificate
@@ -29,44 +27,6 @@ from evoexp.store.tables import write_summary
 
 TASK_S = 0.05  # [s] replicates are bundled into tasks of about this length
 MAX_BUNDLE = 64  # replicates per task at most, so that results keep streaming
-
-
-class Job(NamedTuple):
-    """One replicate to run."""
-
-    condition_id: str
-    condition_json: bytes
-    replicate: int
-
-    @property
-    def key(self) -> tuple[str, int]:
-        """Names it among all jobs."""
-        return self.condition_id, self.replicate
-
-
-class Outcome(NamedTuple):
-    """One replicate that ended.
-
-    Attributes:
-        condition_id: 64 hex digits.
-        replicate: Its index.
-        reason: Why it failed, in one line; empty when done.
-        traceback: Of the failure.
-        content: The finished log; dropped once it is written.
-        wall_s: How long it took.
-    """
-
-    condition_id: str
-    replicate: int
-    reason: str
-    traceback: str
-    content: bytes
-    wall_s: float
-
-    @property
-    def failed(self) -> bool:
-        """Whether it ended without a log."""
-        return bool(self.reason)
 
 
 class Batch:
@@ -128,8 +88,8 @@ class Batch:
     def _missing(self) -> list[Job]:
         jobs = []
         for key, (condition, count, _) in self._wanted.items():
-            done = self.runs[key].completed()
-            jobs += [Job(key, condition.to_json(), index) for index in range(count) if index not in done]
+            config_json, done = condition.to_json(), self.runs[key].completed()
+            jobs += [Job(key, config_json, index) for index in range(count) if index not in done]
         return jobs
 
     def _store(self, outcomes: Sequence[Outcome]) -> list[Outcome]:
@@ -143,22 +103,6 @@ class Batch:
         for key, contents in by_run.items():
             self.runs[key].write_logs(contents)
         return [outcome._replace(content=b"") for outcome in outcomes]
-
-
-def run_jobs(jobs: Sequence[Job]) -> list[Outcome]:
-    """Run some replicates, here; a failure is an outcome."""
-    outcomes = []
-    for job in jobs:
-        start = time.perf_counter()
-        try:
-            condition = Condition.from_json(job.condition_json)
-            content, reason, trace = run_replicate(condition, job.replicate).content, "", ""
-        except Exception as error:
-            content, trace = b"", traceback.format_exc()
-            reason = f"{type(error).__name__}: {error}".splitlines()[0]
-        seconds = time.perf_counter() - start
-        outcomes.append(Outcome(job.condition_id, job.replicate, reason, trace, content, seconds))
-    return outcomes
 
 
 def fan_out(jobs: Sequence[Job], num_workers: int) -> Iterator[list[Outcome]]:

@@ -10,7 +10,8 @@ from rich.console import Console
 from rich.table import Table
 
 from evoexp import compose
-from evoexp.batch.runner import Batch, Outcome
+from evoexp.batch.jobs import Outcome
+from evoexp.batch.runner import Batch
 from evoexp.commands.arguments import add_experiment_arguments
 from evoexp.commands.console import add_columns, add_hash_column, new_table, plain_console
 from evoexp.commands.progress import BatchProgress

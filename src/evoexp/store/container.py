@@ -19,12 +19,12 @@ from mcap.stream_reader import get_chunk_data_stream
 
 from evoexp.errors import CorruptLog
 
-_MAGIC = b"\x89MCAP0\r\n"
-_HEAD = struct.Struct("<BQ")  # opcode, length
-_MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log_time, publish_time
-_FOOTER = struct.Struct("<BQQQI")  # opcode, length, summary start, summary offset start, CRC
-_DATA_END = struct.Struct("<BQI")  # opcode, length, CRC
-_TAIL = _FOOTER.size + len(_MAGIC)
+MAGIC = b"\x89MCAP0\r\n"
+HEAD = struct.Struct("<BQ")  # opcode, length
+MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log_time, publish_time
+FOOTER = struct.Struct("<BQQQI")  # opcode, length, summary start, summary offset start, CRC
+DATA_END = struct.Struct("<BQI")  # opcode, length, CRC
+_TAIL = FOOTER.size + len(MAGIC)
 
 _UNREADABLE = (
     McapError,
@@ -50,7 +50,7 @@ class Container(NamedTuple):
 
     def data_section(self) -> Iterator[tuple[int, bytes]]:
         """Yield (opcode, body) of every record of the data section."""
-        return _records(self.content, len(_MAGIC), self.summary_start)
+        return _records(self.content, len(MAGIC), self.summary_start)
 
     def summary_section(self) -> Iterator[tuple[int, bytes]]:
         """Yield (opcode, body) of every record of the summary section, the index of the file."""
@@ -84,20 +84,20 @@ def check(content: bytes, name: str) -> Container:
     """
     if not content:
         raise CorruptLog(f"{name}: empty file")
-    if content[: len(_MAGIC)] != _MAGIC[: len(content)]:
+    if content[: len(MAGIC)] != MAGIC[: len(content)]:
         raise CorruptLog(f"{name}: not an MCAP file")
-    smallest = len(_MAGIC) + _DATA_END.size + _TAIL
-    if len(content) < smallest or content[-len(_MAGIC) :] != _MAGIC:
+    smallest = len(MAGIC) + DATA_END.size + _TAIL
+    if len(content) < smallest or content[-len(MAGIC) :] != MAGIC:
         raise CorruptLog(f"{name}: cut or overwritten: {len(content)} bytes that do not end as an MCAP ends")
-    opcode, length, summary_start, _, summary_crc = _FOOTER.unpack_from(content, len(content) - _TAIL)
-    data_end = summary_start - _DATA_END.size
-    if (opcode, length) != (Opcode.FOOTER, 20) or not len(_MAGIC) <= data_end <= len(content) - smallest + len(_MAGIC):
+    opcode, length, summary_start, _, summary_crc = FOOTER.unpack_from(content, len(content) - _TAIL)
+    data_end = summary_start - DATA_END.size
+    if (opcode, length) != (Opcode.FOOTER, 20) or not len(MAGIC) <= data_end <= len(content) - smallest + len(MAGIC):
         raise CorruptLog(f"{name}: altered: its footer is damaged")
     view = memoryview(content)
-    opcode, length, data_crc = _DATA_END.unpack_from(content, data_end)
+    opcode, length, data_crc = DATA_END.unpack_from(content, data_end)
     if not (data_crc and summary_crc) and (opcode, length) == (Opcode.DATA_END, 4):
         raise CorruptLog(f"{name}: not a log of evoexp: an MCAP without checksums")
-    if zlib.crc32(view[summary_start : -len(_MAGIC) - 4]) != summary_crc:
+    if zlib.crc32(view[summary_start : -len(MAGIC) - 4]) != summary_crc:
         raise CorruptLog(f"{name}: altered: the checksum of its summary section is wrong")
     if (opcode, length) != (Opcode.DATA_END, 4) or zlib.crc32(view[:data_end]) != data_crc:
         raise CorruptLog(f"{name}: altered: the checksum of its data section is wrong")
@@ -115,20 +115,20 @@ def chunk_messages(body: bytes) -> Iterator[Message]:
     content = stream.read(end)
     start, kind = 0, int(Opcode.MESSAGE)
     while start < end:
-        opcode, length = _HEAD.unpack_from(content, start)
-        stop = start + _HEAD.size + length
+        opcode, length = HEAD.unpack_from(content, start)
+        stop = start + HEAD.size + length
         if stop > end:
             raise ValueError(f"a message ends at byte {stop} of a chunk of {end}")
         if opcode == kind:
-            _, _, channel_id, sequence, log_time, _ = _MESSAGE.unpack_from(content, start)
-            yield channel_id, sequence, log_time, content[start + _MESSAGE.size : stop]
+            _, _, channel_id, sequence, log_time, _ = MESSAGE.unpack_from(content, start)
+            yield channel_id, sequence, log_time, content[start + MESSAGE.size : stop]
         start = stop
 
 
 def _records(content: bytes, start: int, end: int) -> Iterator[tuple[int, bytes]]:
     while start < end:
-        opcode, length = _HEAD.unpack_from(content, start)
-        body = start + _HEAD.size
+        opcode, length = HEAD.unpack_from(content, start)
+        body = start + HEAD.size
         start = body + length
         if start > end:
             raise ValueError(f"a record ends at byte {start}, beyond {end}")

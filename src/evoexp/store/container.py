@@ -7,17 +7,13 @@ import struct
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from io import BytesIO
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import zstandard
-from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Chunk, ChunkIndex
-from mcap.stream_reader import get_chunk_data_stream
 
 from evoexp.errors import CorruptLog
+from evoexp.store.container_records import read_chunk
 
 MAGIC = b"\x89MCAP0\r\n"
 HEAD = struct.Struct("<BQ")  # opcode, length
@@ -27,7 +23,6 @@ DATA_END = struct.Struct("<BQI")  # opcode, length, CRC
 _TAIL = FOOTER.size + len(MAGIC)
 
 _UNREADABLE = (
-    McapError,
     zstandard.ZstdError,
     struct.error,
     ArithmeticError,
@@ -62,9 +57,9 @@ class Container(NamedTuple):
             return body
         raise ValueError(f"no record at byte {offset}")
 
-    def messages_at(self, index: ChunkIndex) -> Iterator[Message]:
+    def messages_at(self, offset: int) -> Iterator[Message]:
         """Yield the messages of one chunk that the summary section points to."""
-        return chunk_messages(self.record_at(index.chunk_start_offset))
+        return chunk_messages(self.record_at(offset))
 
 
 @contextmanager
@@ -104,16 +99,10 @@ def check(content: bytes, name: str) -> Container:
     return Container(content, summary_start)
 
 
-def parse(record: Any, body: bytes) -> Any:
-    """Return the record of mcap's class `record` that a body holds."""
-    return record.read(ReadDataStream(BytesIO(body)))
-
-
 def chunk_messages(body: bytes) -> Iterator[Message]:
     """Yield the messages of a chunk record, its checksum verified."""
-    stream, end = get_chunk_data_stream(parse(Chunk, body), validate_crc=True)
-    content = stream.read(end)
-    start, kind = 0, int(Opcode.MESSAGE)
+    content = read_chunk(body)
+    start, end, kind = 0, len(content), int(Opcode.MESSAGE)
     while start < end:
         opcode, length = HEAD.unpack_from(content, start)
         stop = start + HEAD.size + length

@@ -1,5 +1,6 @@
 """Replicates as tasks: a description goes out, what became of it comes back. All that a worker process loads."""
 
+import contextlib
 import functools
 import time
 import traceback
@@ -62,6 +63,13 @@ def run_jobs(jobs: Sequence[Job]) -> list[Outcome]:
         seconds = time.perf_counter() - start
         outcomes.append(Outcome(job.condition_id, job.replicate, reason, trace, content, seconds))
     return outcomes
+
+
+def load(config_jsons: Sequence[bytes]) -> None:
+    """Load the code that some conditions need; what is wrong with one is said by its jobs."""
+    for config_json in config_jsons:
+        with contextlib.suppress(Exception):
+            _condition(config_json)
 
 
 @functools.lru_cache(maxsize=64)

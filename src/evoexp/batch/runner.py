@@ -15,9 +15,9 @@ import joblib
 import numpy as np
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-from evoexp.batch.jobs import Job, Outcome, run_jobs
+from evoexp.batch.jobs import Job, Outcome, load, run_jobs
 from evoexp.batch.settings import RunnerSettings
-from evoexp.batch.workers import in_workers
+from evoexp.batch.workers import in_workers, loading
 from evoexp.collision.certificate import certificate
 from evoexp.condition import Condition
 from evoexp.paths.motion import Motion
@@ -78,8 +78,12 @@ class Batch:
                 condition, _, notes = self._wanted[key]
                 run.create(condition.to_json(), manifest(key) | notes)
             self.jobs = self._missing()
+            num_workers = max(1, min(self._settings.num_workers or num_cores(), len(self.jobs)))
+            config_jsons = list(dict.fromkeys(job.condition_json for job in self.jobs))
             try:
-                for outcomes in fan_out(self.jobs, _warm(self.jobs, self._settings)):
+                with loading(num_workers, load, config_jsons):
+                    _warm(config_jsons)
+                for outcomes in fan_out(self.jobs, num_workers):
                     yield from self._store(outcomes)
             finally:
                 for run in self.runs.values():
@@ -164,9 +168,9 @@ def _run_alone(job: Job) -> Outcome:
     return Outcome(job.condition_id, job.replicate, "worker process died twice", trace, b"", 0.0)
 
 
-def _warm(jobs: Sequence[Job], settings: RunnerSettings) -> int:
-    """Compile every kernel the jobs need, once and here; return the number of workers that make sense."""
-    for text in dict.fromkeys(job.condition_json for job in jobs):
+def _warm(config_jsons: Iterable[bytes]) -> None:
+    """Compile every kernel that some conditions need, once and here."""
+    for text in config_jsons:
         with contextlib.suppress(Exception):  # a planner that fails does so again in its replicate, and is noted there
             condition = Condition.from_json(text)
             planner, problem = condition.prepare()
@@ -176,7 +180,6 @@ def _warm(jobs: Sequence[Job], settings: RunnerSettings) -> int:
                 certificate(problem, motion)
                 if motion is not None:  # and one that touches nothing, whose closest approach is sought
                     certificate(problem, Motion(np.repeat(motion.q[:1], 2, axis=0)))
-    return max(1, min(settings.num_workers or num_cores(), len(jobs)))
 
 
 def num_cores() -> int:

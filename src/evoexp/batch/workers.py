@@ -4,7 +4,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -14,7 +14,7 @@ WATCH_S = 1.0  # [s] between two looks whether the parent is alive
 
 
 def in_workers(num_workers: int, tasks: Iterable[Any], ordered: bool = False) -> Iterator[Any]:
-    """Run delayed calls in worker processes; yield what they return, as it comes or in order.
+    """Run delayed calls in worker processes, from now on; yield what they return, as it comes or in order.
 
     Raises:
         TerminatedWorkerError: If a worker dies.
@@ -30,8 +30,20 @@ def in_workers(num_workers: int, tasks: Iterable[Any], ordered: bool = False) ->
         initargs=(os.getpid(),),
     )
     with _children_ignore_interrupts():
-        results = pool(tasks)  # starts the workers
-    yield from results
+        results: Iterator[Any] = pool(tasks)  # starts the workers
+    return results
+
+
+@contextmanager
+def loading(num_workers: int, load: Callable[..., None], *arguments: Any) -> Iterator[None]:
+    """Have worker processes load what they will need, while the body does something else; wait for them at its end."""
+    if num_workers == 1:
+        yield
+        return
+    loaded = in_workers(num_workers, (joblib.delayed(load)(*arguments) for _ in range(num_workers)))
+    yield
+    for _ in loaded:
+        pass
 
 
 def leave_with_parent(parent: int) -> None:

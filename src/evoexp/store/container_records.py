@@ -11,7 +11,9 @@ import zstandard
 
 _U16, _U32, _U64 = struct.Struct("<H"), struct.Struct("<I"), struct.Struct("<Q")
 _CHUNK = struct.Struct("<QQQI")  # first and last log_time, size and CRC of the plain content
-_PLACE = struct.Struct("<QQQQI")  # first and last log_time, offset and length of the chunk, bytes of the map that follows
+_PLACE = struct.Struct(
+    "<QQQQI"
+)  # first and last log_time, offset and length of the chunk, bytes of the map that follows
 _PAIR = struct.Struct("<HQ")  # channel, offset of its index
 
 
@@ -90,7 +92,9 @@ def read_chunk(body: bytes) -> bytes:
 def _text(body: bytes, start: int) -> tuple[str, int]:
     """Return a text and where it ends."""
     end = start + 4 + _U32.unpack_from(body, start)[0]
-    return str(_piece(body, start + 4, end - start - 4), "utf-8"), end
+    if end > len(body):
+        raise ValueError(f"a text ends at byte {end} of a record of {len(body)}")
+    return str(body[start + 4 : end], "utf-8"), end
 
 
 def _piece(body: bytes, start: int, length: int) -> bytes:

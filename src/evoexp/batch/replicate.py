@@ -16,7 +16,7 @@ def run_replicate(condition: Condition, index: int, config_json: bytes | None = 
     Args:
         condition: What to run.
         index: Of the replicate.
-        config_json: The condition's canonical form, from whoever has it at hand: making it takes as long as a short run.
+        config_json: The condition's canonical form, where it is at hand; making it takes as long as a short run.
     """
     cpu, wall = time.process_time(), time.perf_counter()
     rng = condition.rng(index)

@@ -4,11 +4,13 @@ import os
 import signal
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import joblib
+from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 WATCH_S = 1.0  # [s] between two looks whether the parent is alive
 
@@ -36,14 +38,19 @@ def in_workers(num_workers: int, tasks: Iterable[Any], ordered: bool = False) ->
 
 @contextmanager
 def loading(num_workers: int, load: Callable[..., None], *arguments: Any) -> Iterator[None]:
-    """Have worker processes load what they will need, while the body does something else; wait for them at its end."""
+    """Have worker processes load what they will need, while the body does something else; wait for them at its end.
+
+    A worker that dies meanwhile is no error: whoever gives work to workers starts new ones.
+    """
     if num_workers == 1:
         yield
         return
     loaded = in_workers(num_workers, (joblib.delayed(load)(*arguments) for _ in range(num_workers)))
-    yield
-    for _ in loaded:
-        pass
+    try:
+        yield
+    finally:
+        with suppress(TerminatedWorkerError):
+            deque(loaded, maxlen=0)
 
 
 def leave_with_parent(parent: int) -> None:

@@ -126,7 +126,8 @@ class ContainerWriter:
         checked = (size, _U32.pack(zlib.crc32(plain)))
         chunk = _record(Opcode.CHUNK, *times, *checked, compression, _U64.pack(len(data)), data)
         self._write(chunk)
-        end, offsets = self._size, []
+        end = self._size
+        offsets: list[bytes] = []
         for channel, entries in self._messages.items():
             offsets += (_U16.pack(channel), _U64.pack(self._size))
             packed = struct.pack(f"<{len(entries)}Q", *entries)

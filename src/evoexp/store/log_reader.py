@@ -4,7 +4,6 @@ Every reader first checks the whole file against its checksums (0.1 ms per log),
 only `read_log` also decodes every message and compares the content digest.
 """
 
-import itertools
 import operator
 from collections.abc import Iterator
 from os import PathLike
@@ -42,7 +41,7 @@ from evoexp.store.messages import (
     restore,
 )
 
-DTYPES: dict[Any, Any] = {int: np.int64, float: np.float64, bool: np.bool_, str: "U32"}  # of generation_columns
+DTYPES: dict[Any, Any] = {int: np.int64, float: np.float64, bool: np.bool_}  # of generation_columns
 Source = str | PathLike[str] | bytes
 
 
@@ -160,11 +159,9 @@ def _columns(rows: list[dict[str, Any]]) -> dict[str, NDArray[Any]]:
         names = {name for row in rows for name in row}
         absent = dict.fromkeys((name for name in names if name.startswith(TERM)), np.nan)
         rows = [absent | row for row in rows]
-    terms = sorted(name for name in names if name.startswith(TERM))
-    read = operator.itemgetter(*kinds, *terms)
-    values = zip(*map(read, rows), strict=True) if rows else itertools.repeat(())
-    types = itertools.chain(kinds.values(), itertools.repeat(np.float64))
-    return {name: np.array(value, dtype=kind) for name, value, kind in zip([*kinds, *terms], values, types)}
+    kinds |= dict.fromkeys(sorted(name for name in names if name.startswith(TERM)), np.float64)
+    values = zip(*map(operator.itemgetter(*kinds), rows), strict=True) if rows else [()] * len(kinds)
+    return {name: np.array(column, dtype=kinds[name]) for name, column in zip(kinds, values, strict=True)}
 
 
 def _open(source: Source) -> tuple[Container, str]:

@@ -101,7 +101,7 @@ def read_generations(runs: Runs, replicates: Collection[int] | None = None) -> p
         "replicate": np.repeat(np.array(indices, dtype=np.int64), lengths),
     }
     kinds = {name: DTYPES[kind] for name, kind in field_types(GenerationRow).items() if name != "chain"}
-    kinds |= {name: np.float64 for name in sorted({name for columns in parts for name in columns} - set(kinds))}
+    kinds |= dict.fromkeys(sorted({name for columns in parts for name in columns} - set(kinds)), np.float64)
     for name, kind in kinds.items():  # a column leaves the parts when it is in the frame: nothing is there twice
         pieces = (columns.pop(name, None) for columns in parts)
         filled = (

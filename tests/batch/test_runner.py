@@ -286,6 +286,9 @@ def test_bundles_are_as_long_as_a_task() -> None:
     assert len(next(iterator)) == 10
     bundles.took([Outcome("0" * 64, k, "", "", b"", 1.0) for k in range(10)])
     assert len(next(iterator)) == 1
+    for _ in range(12):
+        bundles.took([Outcome("0" * 64, k, "", "", b"", TASK_S / 10) for k in range(10)])
+    assert len(next(iterator)) == 9, "slow ones are forgotten"
 
 
 def test_no_jobs_are_no_outcomes() -> None:

@@ -66,10 +66,10 @@ def run_jobs(jobs: Sequence[Job]) -> list[Outcome]:
 
 
 def load(config_jsons: Sequence[bytes]) -> None:
-    """Load the code that some conditions need; what is wrong with one is said by its jobs."""
+    """Load what some conditions need, code and compiled kernels; what is wrong with one is said by its jobs."""
     for config_json in config_jsons:
         with contextlib.suppress(Exception):
-            _condition(config_json)
+            _condition(config_json).prepare()
 
 
 @functools.lru_cache(maxsize=64)

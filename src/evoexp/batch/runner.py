@@ -23,7 +23,6 @@ from evoexp.condition import Condition
 from evoexp.paths.motion import Motion
 from evoexp.store.manifest import manifest
 from evoexp.store.run_directory import RunDirectory, lock_all
-from evoexp.store.tables import write_summary
 
 TASK_S = 0.05  # [s] replicates are bundled into tasks of about this length
 MAX_BUNDLE = 64  # replicates per task at most, so that results keep streaming
@@ -80,9 +79,10 @@ class Batch:
             self.jobs = self._missing()
             num_workers = max(1, min(self._settings.num_workers or num_cores(), len(self.jobs)))
             config_jsons = list(dict.fromkeys(job.condition_json for job in self.jobs))
+            with loading(num_workers, load, config_jsons):
+                _warm(config_jsons)
+                from evoexp.store.tables import write_summary  # and pandas: now there is time
             try:
-                with loading(num_workers, load, config_jsons):
-                    _warm(config_jsons)
                 for outcomes in fan_out(self.jobs, num_workers):
                     yield from self._store(outcomes)
             finally:
@@ -132,11 +132,11 @@ def fan_out(jobs: Sequence[Job], num_workers: int) -> Iterator[list[Outcome]]:
 
 
 class _Bundles:
-    """Takes waiting jobs into tasks of about `TASK_S`, by the times seen so far."""
+    """Takes waiting jobs into tasks of about `TASK_S`, by the times seen of late."""
 
     def __init__(self, waiting: deque[Job], in_flight: dict[tuple[str, int], Job], num_workers: int) -> None:
         self._waiting, self._in_flight, self._num_workers = waiting, in_flight, num_workers
-        self._seconds, self._count = 0.0, 0
+        self._seconds, self._count = 0.0, 0.0
 
     def __iter__(self) -> Iterator[list[Job]]:
         while self._waiting:
@@ -149,7 +149,8 @@ class _Bundles:
             yield bundle
 
     def took(self, outcomes: Sequence[Outcome]) -> None:
-        """Note what came back."""
+        """Note what came back; what came before counts half from now on, so that slow first jobs are soon forgotten."""
+        self._seconds, self._count = self._seconds / 2.0, self._count / 2.0
         for outcome in outcomes:
             self._seconds += outcome.wall_s
             self._count += 1

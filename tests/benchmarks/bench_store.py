@@ -1,4 +1,4 @@
-"""What a replicate costs besides its planner: its log beside mcap's own writer and reader, and its place on the disk."""
+"""What a replicate costs besides its planner: its log beside mcap's own writer and reader, and its way to the disk."""
 
 import io
 import json

@@ -1,7 +1,6 @@
 """The bytes of an MCAP, written in memory: compressed chunks, an index, and everything under a checksum.
 
-mcap's own writer gives the same bytes (a test compares them) at several times the cost, which per message is more than
-a small planner's generation.
+mcap's own writer gives the same bytes (a test compares them) in twice the time; thousands of short replicates notice.
 """
 
 import struct

@@ -17,7 +17,13 @@ from shipped_conditions import different_conditions, shipped_conditions
 
 Path_ = tuple[str | int, ...]
 
-OTHER_WORDS = {"natural": "clamped", "one_sided": "symmetric", "inverse": "difference"}
+OTHER_WORDS = {
+    "natural": "clamped",
+    "one_sided": "symmetric",
+    "inverse": "difference",
+    "linear": "cubic",
+    "cubic": "linear",
+}
 SHIPPED = different_conditions("paper")
 
 

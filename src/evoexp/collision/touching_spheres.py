@@ -31,6 +31,8 @@ class TouchingSpheres(Component):
 
     def bind(self, assembly: Assembly, obstacles: tuple[Any, ...]) -> "SphereCollision":
         """Return the model of a robot among obstacles, ready for batches."""
+        if any(link.is_tool for link in assembly.links):
+            raise SettingError("robot", "without tools: circles of one size cannot show them", "tool_radius above 0")
         spheres = [sphere for link in assembly.links if link.joint > 0 for sphere in self._of_link(assembly, link)]
         kept = _without_repetitions(spheres)
         joint = np.array([sphere.joint - 1 for sphere in kept], dtype=np.int64)

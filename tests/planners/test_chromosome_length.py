@@ -36,5 +36,5 @@ def test_notes_tell_formula_print_and_violation() -> None:
     notes = "\n".join(length_notes(PAPER, [(0.25, 0.25)], start, goal, 8))
     assert "5.73 and 11.46 deg (printed: 11.5 and 23)" in notes
     assert "L = 42 here (120 deg), for L = 64 over 180 deg (printed: 32)" in notes
-    assert "L = 8 (K = 4) takes steps of 24.00 deg at best, which violates it 4.2 times over" in notes
+    assert "L = 8 (K = 4) takes steps of 24.00 deg at best, which violates it 4.19 times over" in notes
     assert "is within it" in "\n".join(length_notes(PAPER, [(0.25, 0.25)], start, goal, 42))

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from evoexp.collision.sphere_kernels import clearances
+from evoexp.errors import SettingError
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly, sphere_geometry
 from evoexp.scenarios.obstacles import ObstacleTable, obstacle_table

@@ -131,7 +131,8 @@ def top_speeds(motion: Motion) -> FloatArray:
     _, c1, c2, c3 = motion.polynomials.transpose(1, 0, 2)
     u = np.divide(-c2, 3.0 * c3, out=np.zeros_like(c2), where=c3 != 0.0)  # where the acceleration vanishes
     instants = np.zeros_like(c1), np.ones_like(c1), np.minimum(np.maximum(u, 0.0), 1.0)
-    return np.concatenate([np.abs(c1 + u * (2.0 * c2 + 3.0 * u * c3)) for u in instants]).max(axis=0)
+    speeds = np.concatenate([np.abs(c1 + u * (2.0 * c2 + 3.0 * u * c3)) for u in instants])
+    return np.asarray(speeds.max(axis=0))
 
 
 @kernel

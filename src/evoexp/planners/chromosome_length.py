@@ -62,7 +62,7 @@ def length_notes(
         first, second = limit.greatest_steps(links)
         turn = float(abs(goal[r] - start[r]).max()) / DEGREE
         asked, worst, step = needed_length(turn, first), needed_length(HALF_TURN, first), turn / segments
-        verdict = f"violates it {step / first:.1f} times over" if step > first else "is within it"
+        verdict = f"violates it {step / first:.3g} times over" if step > first else "is within it"
         notes += [
             f"robot {r + 1}: Eq. 2 allows steps of {first:.2f} and {second:.2f} deg "
             f"(printed: {PRINTED_STEPS[0]:g} and {PRINTED_STEPS[1]:g})",

@@ -22,8 +22,8 @@ OTHER_WORDS = {
     "one_sided": "symmetric",
     "inverse": "difference",
     "linear": "cubic",
-    "cubic": "linear",
 }
+OTHER_WORDS |= {other: word for word, other in OTHER_WORDS.items()}
 SHIPPED = different_conditions("paper")
 
 

@@ -211,7 +211,7 @@ def test_no_team_is_cheaper_than_the_lower_bound() -> None:
 
     condition = compose.expand(["experiment=curkovic_methods"], only=["V"])[0].conditions[0].condition
     nothing: Any = None
-    bound = lower_bound(ConditionResults("V", condition, 1, nothing, {}, nothing, {}, None, {}))
+    bound = lower_bound(ConditionResults("V", condition, 1, nothing, {}, None, {}))
     planner, problem = prepared(*SMALL)
     *_, last = planner.evolve(problem, np.random.default_rng(6))
     assert last.best_cost > bound

@@ -30,7 +30,11 @@ class TouchingSpheres(Component):
     collision_substeps: Count
 
     def bind(self, assembly: Assembly, obstacles: tuple[Any, ...]) -> "SphereCollision":
-        """Return the model of a robot among obstacles, ready for batches."""
+        """Return the model of a robot among obstacles, ready for batches.
+
+        Raises:
+            SettingError: If an obstacle is an ellipse.
+        """
         spheres = [sphere for link in assembly.links if link.joint > 0 for sphere in self._of_link(assembly, link)]
         kept = _without_repetitions(spheres)
         joint = np.array([sphere.joint - 1 for sphere in kept], dtype=np.int64)
@@ -45,7 +49,7 @@ class TouchingSpheres(Component):
             _ranges(arms, assembly.num_arms),
             _bounds(joint, local, _ranges(links, links[-1] + 1), _ranges(link_arms, assembly.num_arms)),
             self.sphere_radius,
-            obstacle_table(obstacles),
+            obstacle_table(obstacles).without_ellipses(),
             sphere_geometry(
                 assembly,
                 np.array([sphere.center for sphere in kept]),

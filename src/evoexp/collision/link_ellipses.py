@@ -12,6 +12,8 @@ from evoexp.robots.planar_ends import PlanarArm, planar_arm
 from evoexp.scenarios.obstacles import ELLIPSE, ObstacleTable
 from evoexp.validation import Component, Count
 
+NUM_FIRST = 2  # positions tested before chords are swept; measured
+
 
 class LinkEllipses(Component):
     """Positions and chords along a straight joint-space path, tested exactly; contact is collision.
@@ -38,10 +40,11 @@ class LinkEllipses(Component):
         for k, (kind, center) in enumerate(zip(obstacles.kind, obstacles.center, strict=True)):
             if kind != ELLIPSE or center[2] != 0.0:
                 raise SettingError(f"scenario.obstacles[{k}].shape", "an ellipse in the plane z = 0", int(kind))
-        maps = np.array([_to_unit_circle(*row) for row in zip(*obstacles[1:], strict=True)]).reshape(-1, 5)
-        reached = np.array([_first_link(arm, *row) for row in zip(*obstacles[1:], strict=True)], dtype=np.int64)
-        ellipses = (maps[:0], reached[:0]) if self.blind else (maps, reached)
-        return EllipseCollision(arm, ellipses, self.num_positions, self.swept == "chords", obstacles)
+        seen = 0 if self.blind else len(obstacles.kind)
+        rows = list(zip(*obstacles[1:], strict=True))[:seen]
+        maps = np.array([_to_unit_circle(*row) for row in rows]).reshape(-1, 5)
+        reached = np.array([_first_link(arm, *row) for row in rows], dtype=np.int64)
+        return EllipseCollision(arm, (maps, reached), self.num_positions, self.swept == "chords", obstacles)
 
 
 class Contact(NamedTuple):
@@ -65,7 +68,7 @@ class EllipseCollision(NamedTuple):
 
     Attributes:
         arm: Link lengths and base.
-        ellipses: (E, 5) maps to the unit circle; (E,) the first link that reaches each.
+        ellipses: See `ellipse_kernels.paths_collide`.
         num_positions: M.
         chords: Whether chords are swept.
         obstacles: The obstacle table.
@@ -78,9 +81,10 @@ class EllipseCollision(NamedTuple):
     obstacles: ObstacleTable
 
     @property
-    def path(self) -> tuple[np.ndarray, bool]:
-        """Order in which positions are tested, the end first, then halves, quarters, …; whether chords are swept."""
-        return _spread(self.num_positions), self.chords
+    def path(self) -> tuple[int, np.ndarray, bool]:
+        """M; the positions tested first, the end, then halves, quarters, …; whether all follow, with chords swept."""
+        first = _spread(self.num_positions)
+        return self.num_positions, first[:NUM_FIRST] if self.chords else first, self.chords
 
     @property
     def queries(self) -> int:
@@ -112,18 +116,18 @@ class EllipseCollision(NamedTuple):
         position, obstacle, link, swept = first_contact(
             start, end, self.arm, self.ellipses, self.num_positions, self.chords
         )
-        return None if position < 0 else Contact(position, obstacle + 1, link + 1, bool(swept))
+        return None if position < 0 else Contact(position, obstacle + 1, link, bool(swept))
 
 
 def _to_unit_circle(center: FloatArray, rotation: FloatArray, size: FloatArray) -> tuple[float, ...]:
-    """Return center and matrix (a, b, d) of (x, y) → (a x + b y, d y), which maps an ellipse to the unit circle.
+    """Return a, b, c, d, e of (x, y) → (a x + b y + c, d y + e), which maps an ellipse to the unit circle.
 
     The Cholesky factor of R diag(1/a², 1/b²) Rᵀ; d follows from its determinant, without cancellation.
     """
-    (c, s), one, two = (rotation[0], rotation[3]), 1.0 / size[0], 1.0 / size[1]
-    xx, xy = c * one * c * one + s * two * s * two, c * s * (one * one - two * two)
-    first = float(np.sqrt(xx))
-    return float(center[0]), float(center[1]), first, float(xy / first), float(one * two / first)
+    (cosine, sine), one, two = (rotation[0], rotation[3]), 1.0 / size[0], 1.0 / size[1]
+    a = float(np.sqrt(cosine * one * cosine * one + sine * two * sine * two))
+    b, d = float(cosine * sine * (one * one - two * two) / a), float(one * two / a)
+    return a, b, float(-(a * center[0] + b * center[1])), d, float(-d * center[1])
 
 
 def _first_link(arm: PlanarArm, center: FloatArray, rotation: FloatArray, size: FloatArray) -> int:

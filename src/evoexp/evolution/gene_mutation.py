@@ -13,9 +13,9 @@ GENE, INDIVIDUAL = range(2)
 def num_mutation_uniforms(num_genes: int, count: int, scope: int) -> int:
     """Return how many uniform numbers `mutate_genes` takes.
 
-    Per gene a decision and an amount, or per individual a decision, a gene and an amount.
+    One per gene, or per individual a decision, a gene and an amount.
     """
-    return 2 * num_genes * count if scope == GENE else 3 * count
+    return num_genes * count if scope == GENE else 3 * count
 
 
 @kernel
@@ -31,7 +31,8 @@ def mutate_genes(  # type: ignore[no-untyped-def]
 
     Args:
         kind: NON_UNIFORM, GAUSSIAN or UNIFORM_RESET.
-        scope: GENE: every gene is mutated with probability `rate`; INDIVIDUAL: every individual is, in one gene.
+        scope: GENE: every gene is mutated with probability `rate`; INDIVIDUAL: every individual is, in one gene. A
+            gene's number decides; where it is below the rate, their ratio is the amount, uniform again.
         uniforms: As many as `num_mutation_uniforms`.
         normals: (genes, ≥ count) normal deviates, read by the Gaussian kind only.
         genomes: (genes, ≥ count), changed.
@@ -43,22 +44,22 @@ def mutate_genes(  # type: ignore[no-untyped-def]
     num_genes = len(genomes)
     if scope == GENE:
         for gene in range(num_genes):
+            own, first, low, high = genomes[gene], gene * count, limits[gene, 0], limits[gene, 1]
             for k in range(count):
-                draw = 2 * (gene * count + k)
-                if uniforms[draw] < rate:
-                    z = normals[gene, k] if kind == GAUSSIAN else 0.0
-                    genomes[gene, k] = _mutant(kind, genomes[gene, k], uniforms[draw + 1], z, spread, limits[gene])
+                draw, x = uniforms[first + k], own[k]
+                z = normals[gene, k] if kind == GAUSSIAN else 0.0
+                mutant = _mutant(kind, x, draw / rate, z, spread, low, high)
+                own[k] = mutant if draw < rate else x
     else:
         for k in range(count):
             if uniforms[3 * k] < rate:
                 gene = min(int(uniforms[3 * k + 1] * num_genes), num_genes - 1)
                 z = normals[gene, k] if kind == GAUSSIAN else 0.0
-                genomes[gene, k] = _mutant(kind, genomes[gene, k], uniforms[3 * k + 2], z, spread, limits[gene])
+                genomes[gene, k] = _mutant(kind, genomes[gene, k], uniforms[3 * k + 2], z, spread, limits[gene, 0], limits[gene, 1])
 
 
 @kernel
-def _mutant(kind, x, w, z, spread, limits):  # type: ignore[no-untyped-def]
-    low, high = limits[0], limits[1]
+def _mutant(kind, x, w, z, spread, low, high):  # type: ignore[no-untyped-def]
     if kind == NON_UNIFORM:
         mutant = x + (high - x) * (2.0 * w) * spread if w < 0.5 else x - (x - low) * (2.0 * w - 1.0) * spread
     elif kind == GAUSSIAN:

@@ -5,6 +5,7 @@ from typing import ClassVar
 import numpy as np
 
 from evoexp.numerics import kernel
+from evoexp.robots.kinematics import U
 from evoexp.robots.planar_ends import LANES, block_ends, load_lanes
 from evoexp.validation import Component, NonNegative
 
@@ -37,7 +38,7 @@ def measure_reach(  # type: ignore[no-untyped-def]
     Args:
         starts: (N, individuals) relative joint angles [rad].
         ends: (N, individuals).
-        lanes: (≥ count) indices of the individuals.
+        lanes: (≥ count + LANES) indices of the individuals; those behind `count` are overwritten.
         count: How many.
         arm: See `planar_ends.block_ends`.
         target: Desired place of the tip (x, y).
@@ -48,22 +49,27 @@ def measure_reach(  # type: ignore[no-untyped-def]
         displacement: (individuals,) written: Eq. 2 [rad].
     """
     num, rows = len(starts), len(starts) * LANES
-    begin, end, angle, total = np.empty(rows), np.empty(rows), np.empty(LANES), np.empty(LANES)
+    begin, end = np.empty(rows), np.empty(rows)
     x, y = np.empty(rows + LANES), np.empty(rows + LANES)
+    value, off, turned = np.empty(LANES), np.empty(LANES), np.empty(LANES)
     for first in range(0, count, LANES):
         load_lanes(starts, lanes, first, count, begin)
         load_lanes(ends, lanes, first, count, end)
-        block_ends(begin, end, arm, 1, 1, angle, x, y)
-        total[:] = 0.0
+        block_ends(begin, end, arm, 1, 1, value, off, turned, x, y)
+        turned[:] = 0.0
         for k in range(num):
             for n in range(LANES):
-                turn = begin[k * LANES + n] - end[k * LANES + n]
-                total[n] += turn * turn
-        for n in range(min(LANES, count - first)):
-            individual, tip_x, tip_y = lanes[first + n], x[rows + n], y[rows + n]
+                turn = begin[U(k) * U(LANES) + U(n)] - end[U(k) * U(LANES) + U(n)]
+                turned[n] += turn * turn
+        for n in range(LANES):
+            tip_x, tip_y = x[U(rows) + U(n)], y[U(rows) + U(n)]
             off_x, off_y = tip_x - target[0], tip_y - target[1]
-            error[individual] = np.sqrt(off_x * off_x + off_y * off_y)
-            displacement[individual] = np.sqrt(total[n])
-            inside = box[0] <= tip_x <= box[1] and box[2] <= tip_y <= box[3]
-            value = weights[0] * error[individual] + weights[1] * displacement[individual]
-            cost[individual] = value if inside else np.inf
+            off[n], turned[n] = np.sqrt(off_x * off_x + off_y * off_y), np.sqrt(turned[n])
+            worth = weights[0] * off[n] + weights[1] * turned[n]
+            worth = worth if box[0] <= tip_x else np.inf
+            worth = worth if tip_x <= box[1] else np.inf
+            worth = worth if box[2] <= tip_y else np.inf
+            value[n] = worth if tip_y <= box[3] else np.inf
+        for n in range(min(LANES, count - first)):
+            individual = lanes[first + n]
+            cost[individual], error[individual], displacement[individual] = value[n], off[n], turned[n]

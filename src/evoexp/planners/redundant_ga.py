@@ -30,6 +30,7 @@ from evoexp.planners.redundant_kernels import RESULTS
 from evoexp.planners.redundant_search import Found, Search
 from evoexp.records import FloatArray, Generation
 from evoexp.robots.assembly import Assembly, Robot
+from evoexp.robots.planar_ends import LANES
 from evoexp.scenarios.pick_and_place import PickAndPlace
 from evoexp.validation import Component, Count, Positive
 
@@ -191,10 +192,11 @@ class RedundantGa(Component):
 
     def _judge(self, problem: Problem, path: int, starts: FloatArray, ends: FloatArray) -> FloatArray:
         """Return cost, position error and joint displacement of sub-paths, (3, individuals)."""
-        lanes, results = np.arange(starts.shape[1]), np.empty((RESULTS, starts.shape[1]))
+        count = starts.shape[1]
+        lanes, results = np.arange(count + LANES), np.empty((RESULTS, count))
         starts, ends = np.ascontiguousarray(starts), np.ascontiguousarray(ends)
-        hit = np.zeros(len(lanes), dtype=np.bool_)
-        redundant_kernels.judge(starts, ends, lanes, len(lanes), self._judging(problem, path), results, hit)
+        hit = np.zeros(count, dtype=np.bool_)
+        redundant_kernels.judge(starts, ends, lanes, count, self._judging(problem, path), results, hit)
         return results
 
     def _judging(self, problem: Problem, path: int) -> tuple[Any, ...]:

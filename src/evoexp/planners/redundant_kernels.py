@@ -32,7 +32,7 @@ def advance(draws, breeding, judging, starts, memory):  # type: ignore[no-untype
         judging: See `judge`.
         starts: (joints, ≥ offspring) start of the sub-path, the same for all [rad].
         memory: Tables of the population and of its offspring; parents (offspring,), places of the elites, scratch
-            (offspring,) for indices and for hits.
+            (individuals + LANES,) for indices, (individuals,) for hits.
 
     Returns:
         Index of the best, mean and standard deviation of the finite costs, number of finite costs, collision-free best.
@@ -124,7 +124,7 @@ def judge(starts, ends, lanes, count, judging, results, hit):  # type: ignore[no
     Args:
         starts: (joints, individuals) [rad].
         ends: (joints, individuals) [rad].
-        lanes: (≥ count) indices of individuals, changed.
+        lanes: (≥ count + LANES) indices of individuals, changed.
         count: How many.
         judging: Arm, ellipses and path of the collision model; target, box and weights of the objective.
         results: (3, individuals) written: cost, position error, joint displacement.

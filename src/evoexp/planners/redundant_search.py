@@ -21,6 +21,7 @@ from evoexp.numerics import standard_normal
 from evoexp.planners import redundant_kernels
 from evoexp.planners.redundant_kernels import RESULTS
 from evoexp.records import FloatArray
+from evoexp.robots.planar_ends import LANES
 
 SELECTIONS = ("tournament", "roulette", "rank")  # in the order of the kernels' numbers
 
@@ -74,7 +75,7 @@ class Search:
         first = self._num_genes if self._binary else 0
         table, offspring = np.empty((first + joints + RESULTS, size)), np.empty((first + joints + RESULTS, count))
         parents, elites = np.empty(count, dtype=np.int64), np.empty(ga.num_elites, dtype=np.int64)
-        self._lanes, self._hit = np.arange(size), np.zeros(size, dtype=np.bool_)
+        self._lanes, self._hit = np.arange(size + LANES), np.zeros(size, dtype=np.bool_)
         self._memory = (table, offspring, parents, elites, self._lanes, self._hit)
         self._starts = np.repeat(start[:, None], size, axis=1)
         self.genomes, self._angles, self._results = table[: self._num_genes], table[first:-RESULTS], table[-RESULTS:]

@@ -12,7 +12,7 @@ from evoexp.robots.planar_ends import PlanarArm, planar_arm
 from evoexp.scenarios.obstacles import ELLIPSE, ObstacleTable
 from evoexp.validation import Component, Count
 
-NUM_FIRST = 2  # positions tested before chords are swept; measured
+NUM_FIRST = 1  # positions tested before chords are swept, so that few blocks go all the way
 
 
 class LinkEllipses(Component):

@@ -10,7 +10,7 @@ from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.kinematics import U
 
-LANES = 64  # individuals per block
+LANES = 32  # individuals per block
 
 
 class PlanarArm(NamedTuple):

@@ -17,7 +17,26 @@ from shipped_conditions import different_conditions, shipped_conditions
 
 Path_ = tuple[str | int, ...]
 
-OTHER_WORDS = {"natural": "clamped", "one_sided": "symmetric", "inverse": "difference"}
+OTHER_WORDS = {
+    "natural": "clamped",
+    "one_sided": "symmetric",
+    "inverse": "difference",
+    "threshold": "finite",
+    "tournament": "roulette",
+    "roulette": "rank",
+    "rank": "tournament",
+    "one_point": "uniform",
+    "uniform": "arithmetic",
+    "arithmetic": "blx_alpha",
+    "blx_alpha": "one_point",
+    "non_uniform": "gaussian",
+    "gaussian": "uniform_reset",
+    "uniform_reset": "non_uniform",
+    "gene": "individual",
+    "individual": "gene",
+    "chords": "none",
+    "none": "chords",
+}
 SHIPPED = different_conditions("paper")
 
 

@@ -203,6 +203,6 @@ def _mapped(ellipse, x, y):  # type: ignore[no-untyped-def]
 
 @kernel
 def _meets(one, two):  # type: ignore[no-untyped-def]
-    """Whether a segment, its end included and its start not, touches the unit circle."""
+    """Whether a segment touches the unit circle."""
     (u, v, r), (p, q, s) = one, two
-    return between(u, v, r, p, q, s) <= 0.0 or s - CONTACT <= 0.0
+    return between(u, v, r, p, q, s) <= 0.0 or r - CONTACT <= 0.0 or s - CONTACT <= 0.0

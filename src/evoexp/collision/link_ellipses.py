@@ -1,6 +1,6 @@
 """The collision model of Lavoie & Boudreau 2001: a planar arm's links as lines among ellipses, along a whole path."""
 
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -134,7 +134,9 @@ def _first_link(arm: PlanarArm, center: FloatArray, rotation: FloatArray, size: 
     """Return the first link (1, 2, …) whose end can reach an ellipse's bounding box; N + 2 if none does."""
     lengths, base_x, base_y = arm[:3]
     c, s = rotation[0], rotation[3]
-    half = np.array([np.sqrt((c * size[0]) ** 2 + (s * size[1]) ** 2), np.sqrt((s * size[0]) ** 2 + (c * size[1]) ** 2)])
+    half = np.array(
+        [np.sqrt((c * size[0]) ** 2 + (s * size[1]) ** 2), np.sqrt((s * size[0]) ** 2 + (c * size[1]) ** 2)]
+    )
     off = np.maximum(np.abs(center[:2] - (base_x, base_y)) - half, 0.0)
     nearest = float(np.sqrt(np.sum(off * off))) * (1.0 - 1e-9)
     within = np.flatnonzero(np.cumsum(lengths) >= nearest)

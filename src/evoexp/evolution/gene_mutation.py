@@ -55,7 +55,9 @@ def mutate_genes(  # type: ignore[no-untyped-def]
             if uniforms[3 * k] < rate:
                 gene = min(int(uniforms[3 * k + 1] * num_genes), num_genes - 1)
                 z = normals[gene, k] if kind == GAUSSIAN else 0.0
-                genomes[gene, k] = _mutant(kind, genomes[gene, k], uniforms[3 * k + 2], z, spread, limits[gene, 0], limits[gene, 1])
+                genomes[gene, k] = _mutant(
+                    kind, genomes[gene, k], uniforms[3 * k + 2], z, spread, limits[gene, 0], limits[gene, 1]
+                )
 
 
 @kernel

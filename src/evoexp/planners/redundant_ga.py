@@ -176,7 +176,10 @@ class RedundantGa(Component):
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
         """Return postures A and B, uniform within the joint limits, (2, joints, count)."""
         low, high = problem.joint_limits.T
-        return low[:, None] + (high - low)[:, None] * rng.random((2, len(low), count))
+        postures = rng.random((2, len(low), count))
+        postures *= (high - low)[:, None]
+        postures += low[:, None]
+        return postures
 
     def cost(self, problem: Problem, population: FloatArray) -> Judgement:
         """Judge pairs of postures A and B (2, joints, individuals): what random search draws.

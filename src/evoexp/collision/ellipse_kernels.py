@@ -1,9 +1,9 @@
 """Straight links of planar arms among ellipses: which individuals of a population collide on their way.
 
-An ellipse is mapped to the unit circle by an upper triangular matrix; there a segment meets it where its distance to the
-origin is at most 1. With P, Q its ends in that frame and s = P·Q, the nearest point lies between them where P·P − s and
-Q·Q − s are positive, and then at the squared distance (P × Q)² / (P·P + Q·Q − 2 s): no division is needed. What is
-within a relative 1e-9 of touching counts as touching, so that rounding never lets a contact pass.
+An ellipse is mapped to the unit circle by an upper triangular matrix; there a segment meets it where its distance to
+the origin is at most 1. With P, Q its ends in that frame and s = P·Q, the nearest point lies between them where
+P·P − s and Q·Q − s are positive, and then at the squared distance (P × Q)² / (P·P + Q·Q − 2 s): no division is needed.
+What is within a relative 1e-9 of touching counts as touching, so that rounding never lets a contact pass.
 
 Only whether an individual collides is asked for, so any order of tests gives the same answer. First some positions are
 tested one after the other, the ones that find most collisions first, and whoever collides is not tested again; whoever
@@ -151,7 +151,7 @@ def _test_links_and_chords(reached, num, place, before, now, least):  # type: ig
 
 @kernel
 def between(u, v, r, p, q, s):  # type: ignore[no-untyped-def]
-    """Return ≤ 0 if a segment touches the unit circle between its ends (u, v) and (p, q) with squared distances r, s."""
+    """Return ≤ 0 if a segment touches the unit circle between its ends (u, v), (p, q) at squared distances r, s."""
     turned, along = u * q - v * p, u * p + v * q
     one, two = r - along, s - along
     value = turned * turned - CONTACT * (one + two)

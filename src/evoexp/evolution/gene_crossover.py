@@ -20,7 +20,7 @@ def cross_genes(kind, uniforms, genomes, parents, rate, alpha, limits, out):  # 
     Parents 2k and 2k + 1 form a pair; an odd last one stays alone.
 
     - uniform (Syswerda 1989): every gene is exchanged with probability 1/2.
-    - arithmetic (Michalewicz 1992): the children are λ x + (1 − λ) y and (1 − λ) x + λ y, with one λ in [0, 1) per pair.
+    - arithmetic (Michalewicz 1992): the children are λ x + (1 − λ) y and (1 − λ) x + λ y, one λ in [0, 1) per pair.
     - BLX-α (Eshelman & Schaffer 1993): every gene of either child is drawn uniformly from [l − α d, h + α d), where l
       and h are the lesser and the greater of both parents' genes and d = h − l; it is then brought within its limits.
 

@@ -22,7 +22,9 @@ def num_mutation_uniforms(num_genes: int, count: int, scope: int) -> int:
 def mutate_genes(  # type: ignore[no-untyped-def]
     kind, scope, uniforms, normals, genomes, count, rate, spread, limits
 ):
-    """Mutate genes in place, within their limits [l, h]; with w a uniform number in [0, 1) and z a normal deviate:
+    """Mutate genes x in place, within their limits [l, h].
+
+    With w a uniform number in [0, 1) and z a normal deviate:
 
     - non-uniform (Michalewicz 1992): x + (h − x) r s or x − (x − l) r s, each direction with probability 1/2; r is
       uniform in [0, 1) and s = (1 − t/T)^b falls over the generations (`non_uniform_spread`).

@@ -1,8 +1,8 @@
 """One generation of end postures of a sub-path, compiled (Lavoie & Boudreau 2001).
 
 A population is a table of rows, individuals innermost: the genes; the joint angles, which are the genes themselves in
-real coding and follow them in binary coding; then cost, position error and joint displacement. A whole generation is one
-call; settings travel as plain tuples, which `redundant_ga` makes.
+real coding and follow them in binary coding; then cost, position error and joint displacement. A whole generation is
+one call; settings travel as plain tuples, which `redundant_search` makes.
 """
 
 import numpy as np
@@ -35,7 +35,7 @@ def advance(draws, breeding, judging, starts, memory):  # type: ignore[no-untype
             (individuals + LANES,) for indices, (individuals,) for hits.
 
     Returns:
-        Index of the best, mean and standard deviation of the finite costs, number of finite costs, collision-free best.
+        See `summary`.
     """
     population, offspring, parents, elites, lanes, hit = memory
     num_joints, num_genes, binary = len(starts), breeding[0], breeding[1]

@@ -1,4 +1,4 @@
-"""One genetic search for the end posture of a sub-path (Lavoie & Boudreau 2001): its memory, and how it calls kernels."""
+"""One genetic search for the end posture of a sub-path (Lavoie & Boudreau 2001): its memory, its calls of kernels."""
 
 from typing import Any, NamedTuple
 

@@ -32,6 +32,7 @@ class Generation(NamedTuple):
     terms: dict[str, float]  # the paper's own terms of the best so far; written as term_<name>
     costs: FloatArray  # (individuals,), with a leading axis for co-evolving populations, whose best cost is a team's
     population: FloatArray  # any shape
+    criteria: FloatArray | None = None  # (populations, criteria, individuals), of generations whose front is recorded
 
 
 class GenerationRow(NamedTuple):
@@ -59,10 +60,11 @@ class SolutionRow(NamedTuple):
 
 
 class FrontRow(NamedTuple):
-    """A set of non-dominated solutions of one generation."""
+    """What one population is worth in one generation: its front are those that no other dominates."""
 
     generation: int
-    costs: FloatArray  # (members, criteria)
+    population: int
+    criteria: FloatArray  # (individuals, criteria), all minimised
 
 
 class ReplicateSummary(NamedTuple):

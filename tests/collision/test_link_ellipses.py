@@ -218,6 +218,8 @@ def test_an_ellipse_counts_from_the_first_link_that_reaches_it() -> None:
         (ARM, (SphereObstacle(shape="sphere", center=(1.0, 2.0), radius=1.0),), "scenario.obstacles[0].shape: must be"),
         (ARM, (EllipseObstacle(shape="ellipse", center=(1.0, 2.0, 3.0), semi_axes=(1.0, 2.0)),), "in the plane z = 0"),
         (Arms(arms=(ARM, TURNED)), BOX, "robot: must be one planar arm"),
+        (ARM.model_copy(update={"link_radius": 0.1}), BOX, "robot.link_radius: must be 0"),
+        (ARM.model_copy(update={"tool_radius": 0.1}), BOX, "robot: must be one planar arm"),
     ],
 )
 def test_what_the_model_cannot_be_is_refused(robot: object, obstacles: tuple[object, ...], message: str) -> None:

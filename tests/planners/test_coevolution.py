@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from evoexp import compose
+from evoexp.collision.certificate import certificate
 from evoexp.errors import SettingError
 from evoexp.planners.coevolution import Coevolution, Evaluated, Problem
 from evoexp.report.pages.curkovic import lower_bound
@@ -19,7 +20,8 @@ def prepared(*overrides: str, experiment: str = "curkovic_methods") -> tuple[Coe
     words = [f"experiment={experiment}", *overrides]
     if not any(word.startswith("ga=") for word in words):
         words.append("ga=curkovic_5")
-    condition = compose.expand(words, only=["V"])[0].conditions[0].condition
+    only = ["V"] if experiment == "curkovic_methods" else []
+    condition = compose.expand(words, only=only)[0].conditions[0].condition
     planner, problem = condition.prepare()
     return planner, problem
 
@@ -157,7 +159,10 @@ def test_restarts_draw_fresh_populations() -> None:
             ("scenario.q_start=[{angles:[90.0,90.0]},{angles:[200.0,10.0]}]",),
             "q_start[1].angles[0]: must be within [0, 180]",
         ),
-        (("scenario.q_start=[{angles:[60.0,0.0]},{angles:[120.0,180.0]}]",), "q_start: must be free of collision"),
+        (
+            ("scenario.q_start=[{angles:[60.0,0.0]},{angles:[120.0,180.0]}]",),
+            "q_start: must be free of collision (robots 1 and 2 touch: arm_1_link_2 and arm_2_link_2)",
+        ),
         (
             ("scenario.q_goal=[{tip:[0.9,0.0],elbow:left},{angles:[30.0,120.0]}]",),
             "q_goal[0].tip: must be 0 to 0.5 away",
@@ -165,6 +170,8 @@ def test_restarts_draw_fresh_populations() -> None:
         (("scenario.q_goal=[{tip:[0.4,0.0]},{angles:[30.0,120.0]}]",), "elbow: must be given with tip"),
         (("scenario.stationary=[0]",), "q_goal[0]: must be the same as its start"),
         (("ga.hall_depth=0.001",), "hall_depth: must be 0, or large enough"),
+        (("planner.chromosome_length=7",), "chromosome_length: must be even and at least 2"),
+        (("planner.chromosome_length=0",), "chromosome_length: must be "),
     ],
 )
 def test_what_cannot_be_is_refused(words: tuple[str, ...], message: str) -> None:
@@ -210,3 +217,56 @@ def test_no_team_is_cheaper_than_the_lower_bound() -> None:
     assert last.best_cost > bound
     turns = np.abs(problem.goal - problem.start).sum()
     assert bound > turns
+
+
+def test_a_spline_is_executed_between_the_same_configurations() -> None:
+    planner, problem = prepared(*SMALL)
+    curved, _ = prepared(*SMALL, "planner.interpolation=cubic")
+    solution = list(planner.evolve(problem, np.random.default_rng(8)))[-1].best
+    again = list(curved.evolve(problem, np.random.default_rng(8)))[-1].best
+    assert np.array_equal(solution, again)  # the search does not know
+    straight, spline = planner.motion(problem, solution), curved.motion(problem, solution)
+    assert spline.q == pytest.approx(straight.q, abs=1e-12)
+    assert spline.at(2.5) != pytest.approx(straight.at(2.5), abs=1e-6)
+    terms = curved.evaluate(problem, solution)
+    times = np.linspace(0.0, 5.0, 5001)
+    relative = np.rad2deg([spline.at(t) for t in times])
+    absolute = relative.copy()
+    absolute[:, 1::2] += relative[:, ::2]
+    for r in range(2):
+        own = absolute[:, 2 * r : 2 * r + 2]
+        beyond = max(0.0, -own.min(), own.max() - 180.0)
+        assert terms[f"out_of_range_robot_{r + 1}_deg"] == pytest.approx(beyond, abs=1e-3)
+        speed = np.abs(np.gradient(own, times, axis=0)).max()
+        assert terms[f"fastest_turn_robot_{r + 1}_deg"] == pytest.approx(speed, abs=0.05)
+        steps = np.abs(np.diff(solution.reshape(2, 6, 2)[r], axis=0)).max()
+        assert planner.evaluate(problem, solution)[f"fastest_turn_robot_{r + 1}_deg"] == pytest.approx(steps)
+
+
+def test_the_first_generations_of_method_v_are_those_of_the_pareto_experiment() -> None:
+    """Eq. 10 over 30 generations, with the decay that 30 of 200 have."""
+    condition = compose.expand(["experiment=curkovic_pareto"])[0].conditions[0].condition
+    front, problem = condition.prepare()
+    method, _ = prepared()
+    pairs = zip(
+        front.evolve(problem, np.random.default_rng(9)), method.evolve(problem, np.random.default_rng(9)), strict=False
+    )
+    for one, other in pairs:
+        assert np.array_equal(one.population, other.population)
+    assert one.index == 30
+    assert one.criteria is not None
+    assert one.criteria.shape == (2, 4, 100)
+    assert one.criteria.sum(axis=1) == pytest.approx(one.costs)
+    assert other.criteria is None
+
+
+def test_thick_links_and_tools_are_judged_by_their_bodies() -> None:
+    """What the envelopes' lines let pass between configurations, or a circle hides, the exact verdict sees."""
+    planner, problem = prepared("collision.tcp_radius=0.04", experiment="curkovic_safety")
+    names = set(problem.scene.names)
+    assert names == {f"arm_{r}_link_{k}" for r in (1, 2) for k in (1, 2, 3)}
+    radii = [shape.radius for shape, _, _ in problem.scene.shapes]
+    assert radii == [0.02, 0.02, 0.04] * 2
+    *_, last = planner.evolve(problem, np.random.default_rng(0))
+    verdict = certificate(problem, planner.motion(problem, last.best))
+    assert verdict.certified is not None

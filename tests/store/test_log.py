@@ -16,7 +16,7 @@ from evoexp.records import FrontRow, GenerationRow
 from evoexp.store.log import Log
 from evoexp.store.log_reader import generation_columns, read_log, read_solution, read_summary
 
-FRONT = FrontRow(4, np.array([[1.0, math.inf], [math.nan, -2.5], [-math.inf, 0.1]]))
+FRONT = FrontRow(4, 1, np.array([[1.0, math.inf], [math.nan, -2.5], [-math.inf, 0.1]]))
 
 
 def same(one: object, other: object) -> bool:
@@ -34,7 +34,7 @@ def same(one: object, other: object) -> bool:
 
 def test_round_trip(tmp_path: Path) -> None:
     given = generations(10)
-    finished = write(given, fronts=[FRONT, FrontRow(6, np.empty((0, 3)))])
+    finished = write(given, fronts=[FRONT, FrontRow(6, 0, np.empty((0, 3)))])
     path = tmp_path / "0007.mcap"
     path.write_bytes(finished.content)
     contents = read_log(path)
@@ -47,7 +47,7 @@ def test_round_trip(tmp_path: Path) -> None:
         assert same(tuple(row)[:-1], tuple(expected))
         assert len(bytes.fromhex(row.chain)) == 16
     assert len({row.chain for row in contents.generations}) == len(given)
-    assert same(contents.fronts[0], FRONT) and contents.fronts[1].costs.shape == (0, 3)
+    assert same(contents.fronts[0], FRONT) and contents.fronts[1].criteria.shape == (0, 3)
 
 
 def test_summary_is_completed_with_the_digest() -> None:

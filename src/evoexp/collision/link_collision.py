@@ -70,17 +70,18 @@ class LinkCollision(NamedTuple):
         """Whether robots are more than their lines."""
         return self.half_width > 0.0 or self.tcp_radius > 0.0
 
-    def outlines(self, robot: int, genes: FloatArray, start: FloatArray, goal: FloatArray) -> FloatArray:
+    def outlines(self, robot: int, path: FloatArray, points: FloatArray) -> FloatArray:
         """Return what is tested of a population's paths, (configurations, 4 | 8, N).
 
         Args:
             robot: Whose population.
-            genes: (K, 2, N) link angles [rad].
-            start: (2,) [rad].
-            goal: (2,) [rad].
+            path: (K + 2, 2, N) link angles [rad], start and goal included, which are the same for all.
+            points: (K + 2, 4, N) of the robot's `Arm.points` at these angles.
         """
-        q = genes if self.substeps == 1 else path_configurations(genes, start, goal, self.substeps)
-        return self.of_configurations(robot, q)
+        if self.substeps > 1:
+            q = path_configurations(path[1:-1], path[0, :, 0], path[-1, :, 0], self.substeps)
+            return self.of_configurations(robot, q)
+        return self._enveloped(robot).outlines(path[1:-1]) if self.enveloped else points[1:-1]
 
     def of_configurations(self, robot: int, q: FloatArray) -> FloatArray:
         """Return the same of configurations (K, 2, N) as they are."""
@@ -121,7 +122,8 @@ def _pairs_of_joints(assembly: Assembly) -> list[tuple[int, int]]:
     """Return first and one-past-last joint of every robot, which must have two and turn in the plane."""
     slices = [(int(first), int(stop)) for first, stop in assembly.arm_slices]
     flat = assembly.table.planar and all(stop - first == 2 for first, stop in slices)
-    straight = flat and all(not link.start.any() and not link.end[1:].any() for link in assembly.links)
+    links = [link for link in assembly.links if not link.is_tool]
+    straight = flat and all(not link.start.any() and not link.end[1:].any() for link in links)
     turned = [bool(assembly.table.turned[k]) for k in range(len(assembly.table.parent))]
     if not straight or any(turned):
         must = "planar arms of two links with base_angle 0"
@@ -131,5 +133,7 @@ def _pairs_of_joints(assembly: Assembly) -> list[tuple[int, int]]:
 
 def _arm(assembly: Assembly, first: int) -> Arm:
     base = assembly.table.translation[first]
-    lengths = [float(link.end[0]) for link in assembly.links if link.joint - 1 in (first, first + 1)]
+    lengths = [
+        float(link.end[0]) for link in assembly.links if link.joint - 1 in (first, first + 1) and not link.is_tool
+    ]
     return Arm((float(base[0]), float(base[1])), (lengths[0], lengths[1]))

@@ -34,9 +34,11 @@ class LinkEllipses(Component):
         """Return the model of an arm among obstacles.
 
         Raises:
-            SettingError: If the robot is no single planar arm, or an obstacle no ellipse in its plane.
+            SettingError: If the robot is no single planar arm of thin links, or an obstacle no ellipse in its plane.
         """
         arm = planar_arm(assembly)
+        if thick := [link.radius for link in assembly.links if link.radius > 0.0]:
+            raise SettingError("robot.link_radius", "0: this collision model knows links as lines", thick[0])
         for k, (kind, center) in enumerate(zip(obstacles.kind, obstacles.center, strict=True)):
             if kind != ELLIPSE or center[2] != 0.0:
                 raise SettingError(f"scenario.obstacles[{k}].shape", "an ellipse in the plane z = 0", int(kind))

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from evoexp.collision.sphere_kernels import clearances
+from evoexp.errors import SettingError
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly, sphere_geometry
 from evoexp.scenarios.obstacles import ObstacleTable, obstacle_table
@@ -33,8 +34,10 @@ class TouchingSpheres(Component):
         """Return the model of a robot among obstacles, ready for batches.
 
         Raises:
-            SettingError: If an obstacle is an ellipse.
+            SettingError: If an obstacle is an ellipse, or a robot has a tool.
         """
+        if any(link.is_tool for link in assembly.links):
+            raise SettingError("robot", "without tools: circles of one size cannot show them", "tool_radius above 0")
         spheres = [sphere for link in assembly.links if link.joint > 0 for sphere in self._of_link(assembly, link)]
         kept = _without_repetitions(spheres)
         joint = np.array([sphere.joint - 1 for sphere in kept], dtype=np.int64)

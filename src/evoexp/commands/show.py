@@ -13,7 +13,8 @@ from rich.text import Text
 from evoexp import compose, shipped
 from evoexp.commands.console import add_columns, new_table, plain_console
 from evoexp.commands.hashes import with_candidates
-from evoexp.errors import AmbiguousHash, UnknownHash
+from evoexp.condition import Condition
+from evoexp.errors import AmbiguousHash, EvoexpError, UnknownHash
 from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
 from evoexp.store.tables import read_summaries
 
@@ -33,6 +34,7 @@ def main(arguments: argparse.Namespace) -> int:
     config, replicates, manifest = json.loads(run.config_json()), _replicates(run), run.manifest()
     _print_head(console, run.condition_id)
     _print_config(console, config)
+    _print_notes(console, run.config_json())
     console.print(replicates)
     _print_config(console, {"manifest": {k: v for k, v in manifest.items() if k != "condition"}})
     return 0
@@ -48,7 +50,9 @@ def _show_shipped(console: Console, prefix: str, error: UnknownHash) -> int:
     _print_head(console, row.condition_id)
     console.print(f"not run here; run it: {row.command}", soft_wrap=True)
     experiment = compose.expand([f"experiment={row.experiment}", f"budget={row.budget}"], only=[row.label])[0]
-    _print_config(console, json.loads(experiment.conditions[0].condition.to_json()))
+    text = experiment.conditions[0].condition.to_json()
+    _print_config(console, json.loads(text))
+    _print_notes(console, text)
     return 0
 
 
@@ -62,6 +66,17 @@ def _print_head(console: Console, condition_id: str) -> None:
 def _print_config(console: Console, config: dict[str, Any]) -> None:
     text = yaml.safe_dump(config, sort_keys=False, default_flow_style=None, allow_unicode=True, width=110)
     console.print(text, soft_wrap=True)
+
+
+def _print_notes(console: Console, config_json: bytes) -> None:
+    """Print what a planner has to say of its own settings, if it has."""
+    try:
+        planner, problem = Condition.from_json(config_json).prepare()
+    except EvoexpError as error:  # stored by another revision of the code: the run can be shown all the same
+        console.print(f"notes: {error}", soft_wrap=True)
+        return
+    for note in planner.notes(problem) if hasattr(planner, "notes") else ():
+        console.print(f"note: {note}", soft_wrap=True)
 
 
 def _replicates(run: RunDirectory) -> Table:

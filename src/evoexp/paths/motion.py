@@ -96,6 +96,45 @@ def spline_motion(spline: Any) -> Motion:
     return cubic_motion(powers)
 
 
+def clamped_cubic(q: FloatArray) -> Motion:
+    """Return the cubic spline through configurations q (instants, nq) that starts and ends at rest.
+
+    Two times continuously differentiable, and as smooth as "a polynomial of the third order to ensure second order
+    derivability" (Curkovic et al. 2013, Fig. 9) can be.
+
+    Raises:
+        ValueError: If there are fewer than two configurations.
+    """
+    from scipy.interpolate import CubicSpline  # only curves need it, and it takes long to load
+
+    if q.ndim != 2 or len(q) < 2:
+        raise ValueError(f"q must have shape (2 or more instants, nq), was {q.shape}")
+    return spline_motion(CubicSpline(np.arange(float(len(q))), q, axis=0, bc_type="clamped"))
+
+
+def joint_ranges(motion: Motion) -> FloatArray:
+    """Return the least and the greatest value of every joint over the whole motion, (nq, 2); exact but for rounding."""
+    c0, c1, c2, c3 = motion.polynomials.transpose(1, 0, 2)  # each (segments, nq)
+    values = [motion.q]
+    if motion.coefficients is not None:  # where 3 c3 u² + 2 c2 u + c1 = 0, by the formula that loses no digits
+        root = -(c2 + np.copysign(np.sqrt(np.maximum(c2 * c2 - 3.0 * c1 * c3, 0.0)), c2))
+        for above, below in ((root, 3.0 * c3), (c1, root)):
+            u = np.divide(above, below, out=np.zeros_like(above), where=below != 0.0)
+            u = np.minimum(np.maximum(u, 0.0), 1.0)
+            values.append(c0 + u * (c1 + u * (c2 + u * c3)))
+    stacked = np.concatenate(values)
+    return np.stack([stacked.min(axis=0), stacked.max(axis=0)], axis=1)
+
+
+def top_speeds(motion: Motion) -> FloatArray:
+    """Return the greatest |dq/dt| of every joint over the whole motion, (nq,) per instant; exact but for rounding."""
+    _, c1, c2, c3 = motion.polynomials.transpose(1, 0, 2)
+    u = np.divide(-c2, 3.0 * c3, out=np.zeros_like(c2), where=c3 != 0.0)  # where the acceleration vanishes
+    instants = np.zeros_like(c1), np.ones_like(c1), np.minimum(np.maximum(u, 0.0), 1.0)
+    speeds = np.concatenate([np.abs(c1 + u * (2.0 * c2 + 3.0 * u * c3)) for u in instants])
+    return np.asarray(speeds.max(axis=0))
+
+
 @kernel
 def speed_bound(coefficients, joint, begin, end):  # type: ignore[no-untyped-def]
     """Greatest |dq/du| of a joint on [begin, end] of a segment with `coefficients` (4, nq), or more."""

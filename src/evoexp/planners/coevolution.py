@@ -11,23 +11,26 @@ goal included.
 
 from collections.abc import Iterator
 from itertools import combinations
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
+from pydantic import model_validator
 
 from evoexp.collision.link_collision import LinkCollision, LinkCrossings
 from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
 from evoexp.evolution.coevolution_settings import CoevolutionSettings
-from evoexp.evolution.crossover import cross_single_point, num_single_point_uniforms
+from evoexp.evolution.crossover import num_single_point_uniforms
 from evoexp.evolution.hall_of_fame import Hall, best_team, update_hall
-from evoexp.evolution.mutation import decayed_rate, mutate_allele, num_allele_uniforms
+from evoexp.evolution.mutation import decayed_rate, num_allele_uniforms
 from evoexp.evolution.pareto import pareto_front
-from evoexp.evolution.selection import difference_weights, elites, inverse_weights, spin_roulette
 from evoexp.evolution.statistics import cost_statistics
 from evoexp.numerics import DEGREE
 from evoexp.objectives.motion_criteria import MotionCriteria, measure_motions
-from evoexp.paths.motion import Motion
+from evoexp.paths.motion import Motion, clamped_cubic, joint_ranges, top_speeds
+from evoexp.planners.chromosome_length import SpeedLimit, length_notes
+from evoexp.planners.coevolution_kernels import breed, drop_copies
+from evoexp.planners.teams import Evaluated, Judgement
 from evoexp.records import FloatArray, Generation
 from evoexp.robots.assembly import Assembly, Robot
 from evoexp.scenarios.link_motion import LinkMotion
@@ -58,57 +61,14 @@ class Problem(NamedTuple):
     security_margin: float
 
 
-class Evaluated(NamedTuple):
-    """Populations evaluated all against all.
-
-    Attributes:
-        costs: (robots, individuals) C1 + C2 + C3 + C4, weighted.
-        criteria: (robots, 4, individuals) C1 … C4.
-        own: (robots, individuals) C2 + C3 + C4, weighted.
-        collisions: (pairs of robots, individuals, individuals) colliding configurations.
-        blocked: (robots, individuals) configurations that collide with obstacles.
-    """
-
-    costs: FloatArray
-    criteria: FloatArray
-    own: FloatArray
-    collisions: np.ndarray
-    blocked: np.ndarray
-
-    @property
-    def teamable(self) -> FloatArray:
-        """(robots, individuals) own cost; inf for those that collide with an obstacle."""
-        return np.where(self.blocked > 0, np.inf, self.own)
-
-
-class Judgement(NamedTuple):
-    """Individuals of the first robot, each with its cheapest collision-free team.
-
-    Attributes:
-        cost: (individuals,) own costs of that team summed; inf if there is none.
-        evaluated: The populations.
-        collision_queries: Configurations judged for it.
-    """
-
-    cost: FloatArray
-    evaluated: Evaluated
-    collision_queries: int
-
-    @property
-    def feasible(self) -> np.ndarray:
-        """(individuals,) whether each has a collision-free team."""
-        return np.isfinite(self.cost)
-
-    def named_terms(self, individual: int) -> dict[str, float]:
-        """Return the criteria of an individual's team by name."""
-        return _terms(self.evaluated, _team_of(self.evaluated, individual))
-
-
 class Coevolution(Component):
     """The co-evolutionary algorithm of Curkovic et al., sections 2 and 3; methods I–VIII are settings of it.
 
     Attributes:
-        num_configurations: K; a chromosome has L = 2 K genes.
+        chromosome_length: L, even: two link angles for each of K = L/2 configurations between start and goal [-].
+        interpolation: What is executed between configurations: straight lines in the joint angles, or a cubic spline
+            that starts and ends at rest (Fig. 9). The verdict judges that; the search looks at the configurations.
+        speed_limit: Of the end-effector (Eqs. 2, 3); no part of the search.
         ga: Populations, generations, rates, hall of fame.
         objective: Weights of C1 … C4.
         collision: Links as lines, or their envelopes.
@@ -116,10 +76,24 @@ class Coevolution(Component):
 
     component: ClassVar[str] = "coevolution"
 
-    num_configurations: Count
+    chromosome_length: Count
+    interpolation: Literal["linear", "cubic"]
+    speed_limit: SpeedLimit
     ga: CoevolutionSettings
     objective: MotionCriteria
     collision: LinkCrossings
+
+    @model_validator(mode="after")
+    def _genes_come_in_pairs(self) -> Self:
+        if self.chromosome_length < 2 or self.chromosome_length % 2:
+            must = "even and at least 2: two link angles per configuration"
+            raise SettingError("chromosome_length", must, self.chromosome_length)
+        return self
+
+    @property
+    def num_configurations(self) -> int:
+        """K, the configurations between start and goal."""
+        return self.chromosome_length // 2
 
     def prepare(self, robot: Robot, scenario: LinkMotion) -> Problem:
         """Build the robots and check that start and goal fit them and are free of collision.
@@ -138,8 +112,10 @@ class Coevolution(Component):
         problem = Problem(assembly, collision, start, goal, moving, bodies, scenario.security_margin)
         for name, posture in (("q_start", start), ("q_goal", goal)):
             if contact := collision.contact(posture):
+                relative = np.stack([posture[:, 0], posture[:, 1] - posture[:, 0]], axis=1).ravel()
+                closest = " and ".join(bodies.nearest_pair(relative))
                 given = (posture / DEGREE).round(9).tolist()
-                raise SettingError(f"scenario.{name}", f"free of collision ({contact})", given)
+                raise SettingError(f"scenario.{name}", f"free of collision ({contact}: {closest})", given)
         return problem
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
@@ -168,7 +144,7 @@ class Coevolution(Component):
         if not depth:
             return hall
         fronts = np.array([pareto_front(criteria) for criteria in found.criteria])
-        _drop_copies(populations, fronts, hall)
+        drop_copies(populations, hall.teams, fronts)
         memory, frozen = self.ga.hall_memory, self.ga.hall_frozen
         return update_hall(found.collisions, found.teamable, fronts, hall, depth, memory, frozen)
 
@@ -182,22 +158,14 @@ class Coevolution(Component):
         index: int,
     ) -> FloatArray:
         """Return the next populations: offspring, then elites, then the members of the hall, unchanged."""
-        ga, bred = self.ga, populations.copy()
+        ga, bred = self.ga, np.empty_like(populations)
         rate = decayed_rate(ga.mutation_rate, ga.mutation_decay, index, ga.num_generations)
-        size = ga.population_size
-        count = size - ga.num_elites - hall.num_teams
-        weigh = inverse_weights if ga.selection == "inverse" else difference_weights
-        weights, parents = np.empty(size), np.empty(count, dtype=np.int64)
-        for robot in np.flatnonzero(problem.moving):
-            weigh(found.costs[robot], weights)
-            uniforms = rng.random(count + num_single_point_uniforms(count // 2) + num_allele_uniforms(count))
-            spin_roulette(weights, uniforms[:count], parents)
-            genes, last = bred[robot], count + num_single_point_uniforms(count // 2)
-            cross_single_point(uniforms[count:last], populations[robot], parents, ga.crossover_rate, genes)
-            symmetric = ga.mutation_direction == "symmetric"
-            mutate_allele(uniforms[last:], genes, count, rate, DEGREE * ga.mutation_step, HALF_TURN, symmetric)
-            kept = [*elites(found.costs[robot], ga.num_elites), *hall.teams[:, robot]]
-            genes[:, count:] = populations[robot][:, kept]
+        count = ga.population_size - ga.num_elites - hall.num_teams
+        numbers = count + num_single_point_uniforms(count // 2) + num_allele_uniforms(count)
+        uniforms = rng.random((int(np.count_nonzero(problem.moving)), numbers))
+        mutation = rate, DEGREE * ga.mutation_step, HALF_TURN, ga.mutation_direction == "symmetric"
+        settings = ga.num_elites, ga.selection == "inverse", ga.crossover_rate, *mutation
+        breed(uniforms, populations, found.costs, problem.moving, hall.teams, settings, bred)
         return bred
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
@@ -216,8 +184,9 @@ class Coevolution(Component):
             path = np.empty((self.num_configurations + 2, 2, count))
             path[0], path[-1] = problem.start[r][:, None], problem.goal[r][:, None]
             path[1:-1] = populations[r].reshape(self.num_configurations, 2, count)
-            measure_motions(path, collision.arms[r].points(path), self.objective.own_weights, criteria[r, 1:], own[r])
-            lines.append(collision.outlines(r, path[1:-1], problem.start[r], problem.goal[r]))
+            points = collision.arms[r].points(path)
+            measure_motions(path, points, self.objective.own_weights, criteria[r, 1:], own[r])
+            lines.append(collision.outlines(r, path, points))
             blocked[r] = collision.with_obstacles(r, lines[r])
         hits, sums = [], blocked * count  # an obstacle is in the way whoever the collaborator is
         for a, b in combinations(range(robots), 2):
@@ -233,7 +202,7 @@ class Coevolution(Component):
         found = self.evaluated(problem, population)
         count, costs = population.shape[2], np.empty(population.shape[2])
         for i in range(count):
-            costs[i] = _cost_of(found, _team_of(found, i))
+            costs[i] = found.cost_of(found.team_of(i))
         return Judgement(costs, found, self.queries(problem, count))
 
     def queries(self, problem: Problem, count: int) -> int:
@@ -244,7 +213,7 @@ class Coevolution(Component):
 
     def solution(self, problem: Problem, population: FloatArray, individual: int) -> FloatArray:
         """Return the team of an individual of the first robot as a flat solution."""
-        return self.team_solution(problem, population, _team_of(self.evaluated(problem, population), individual))
+        return self.team_solution(problem, population, self.evaluated(problem, population).team_of(individual))
 
     def team_solution(self, problem: Problem, population: FloatArray, team: np.ndarray) -> FloatArray:
         """Return one individual of every population as a flat solution."""
@@ -255,23 +224,42 @@ class Coevolution(Component):
         return np.concatenate(parts)
 
     def motion(self, problem: Problem, solution: FloatArray) -> Motion:
-        """Return the joint-space motion of a solution: straight from configuration to configuration, in equal times."""
-        paths = DEGREE * self._paths(problem, solution)
-        relative = paths.copy()
-        relative[:, :, 1] -= paths[:, :, 0]  # the models' joints turn against the link before
-        return Motion(np.ascontiguousarray(relative.transpose(1, 0, 2).reshape(paths.shape[1], -1)))
+        """Return the joint-space motion of a solution, from configuration to configuration in equal times."""
+        absolute = self._curve(problem, solution).q
+        relative = absolute.reshape(len(absolute), -1, 2).copy()
+        relative[:, :, 1] -= relative[:, :, 0]  # the models' joints turn against the link before
+        return self._interpolated(relative.reshape(absolute.shape))
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
-        """Return the criteria C1 … C4 of every robot of one team; C1 against the team's other robots only.
+        """Return the criteria of every robot of one team, and what the executed curve asks of its joints.
+
+        Returns:
+            C1 … C4 (C1 against the team's other robots only), how far the curve leaves the range [0, π] of link angles,
+            and the largest turn of a link per sampling step, at the curve's fastest instant.
 
         Raises:
             ValueError: If the solution has another size than robots × (K + 2) × 2.
         """
+        terms, curve = self.criteria(problem, solution), self._curve(problem, solution)
+        least, greatest = (joint_ranges(curve)[:, k].reshape(-1, 2) / DEGREE for k in range(2))
+        turns = top_speeds(curve).reshape(-1, 2) / DEGREE
+        for r in range(len(turns)):
+            beyond = max(0.0, -float(least[r].min()), float(greatest[r].max()) - HALF_TURN / DEGREE)
+            terms[f"out_of_range_robot_{r + 1}_deg"] = beyond
+            terms[f"fastest_turn_robot_{r + 1}_deg"] = float(turns[r].max())
+        return terms
+
+    def criteria(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
+        """Return C1 … C4 of every robot of one team by name; see `evaluate`."""
         paths = DEGREE * self._paths(problem, solution)
         ends = problem._replace(start=paths[:, 0], goal=paths[:, -1])
         genes = np.ascontiguousarray(paths[:, 1:-1].reshape(len(paths), -1, 1))
-        found = self.evaluated(ends, genes)
-        return _terms(found, np.zeros(len(paths), dtype=np.int64))
+        return self.evaluated(ends, genes).terms_of(np.zeros(len(paths), dtype=np.int64))
+
+    def notes(self, problem: Problem) -> list[str]:
+        """Return what Eqs. 2 and 3 say of the chromosome's length, line by line."""
+        lengths = [arm.lengths for arm in problem.collision.arms]
+        return length_notes(self.speed_limit, lengths, problem.start, problem.goal, self.chromosome_length)
 
     def shape(self, problem: Problem) -> tuple[tuple[int, int], ...]:
         """Return the documented shape of a solution: per robot, (K + 2, 2)."""
@@ -282,6 +270,15 @@ class Coevolution(Component):
         if solution.shape != (int(np.prod(shape)),):
             raise ValueError(f"a solution has {int(np.prod(shape))} values, was {solution.shape}")
         return solution.reshape(shape)
+
+    def _curve(self, problem: Problem, solution: FloatArray) -> Motion:
+        """Return what is executed, in absolute link angles [rad]."""
+        paths = DEGREE * self._paths(problem, solution)
+        return self._interpolated(paths.transpose(1, 0, 2).reshape(paths.shape[1], -1))
+
+    def _interpolated(self, q: FloatArray) -> Motion:
+        q = np.ascontiguousarray(q)
+        return clamped_cubic(q) if self.interpolation == "cubic" else Motion(q)
 
 
 class _Record:
@@ -308,7 +305,7 @@ class _Record:
             self.cost = best.cost
             team = best.individuals if best.found else np.array([int(np.argmin(costs)) for costs in found.costs])
             self.solution = planner.team_solution(self.problem, populations, team)
-            self.terms = planner.evaluate(self.problem, self.solution)
+            self.terms = planner.criteria(self.problem, self.solution)  # of what is recorded, rounded to degrees
         statistics = cost_statistics(found.costs.ravel())
         return Generation(
             index=index,
@@ -317,79 +314,12 @@ class _Record:
             best_cost_in_generation=best.cost,
             mean_cost=statistics.mean,
             std_cost=statistics.std,
-            num_feasible=_num_feasible(found),
+            num_feasible=found.num_feasible,
             evaluations=self.evaluations,
             collision_queries=self.queries,
             solved=self.feasible,
             terms=self.terms,
             costs=found.costs,
             population=populations,
+            criteria=found.criteria if index == planner.ga.num_generations else None,
         )
-
-
-def _drop_copies(populations: FloatArray, fronts: np.ndarray, hall: Hall) -> None:
-    """Take copies of other members, and of the hall's, off the fronts: they would fill the hall with one pair."""
-    for robot, genes in enumerate(populations):
-        known = {genes[:, member].tobytes() for member in hall.teams[:, robot]}
-        for member in np.flatnonzero(fronts[robot]):
-            genome = genes[:, member].tobytes()
-            fronts[robot, member] = genome not in known
-            known.add(genome)
-
-
-def _num_feasible(found: Evaluated) -> int:
-    """Return how many individuals of the first robot have a collision-free partner in every other population."""
-    robots = len(found.own)
-    free = found.blocked[0] == 0
-    for other in range(1, robots):  # pairs (0, 1), (0, 2), … come first
-        usable = found.blocked[other] == 0
-        free &= ((found.collisions[other - 1] == 0) & usable).any(axis=1)
-    return int(np.count_nonzero(free))
-
-
-def _team_of(found: Evaluated, individual: int) -> np.ndarray:
-    """Return the cheapest collision-free team with an individual of the first robot; else one with few collisions."""
-    own = found.teamable.copy()
-    alone = own[0, individual]
-    own[0] = np.inf
-    own[0, individual] = alone
-    best = best_team(found.collisions, own)
-    if best.found:
-        return best.individuals
-    team = np.zeros(len(own), dtype=np.int64)
-    team[0] = individual
-    for other in range(1, len(own)):
-        team[other] = int(np.argmin(found.collisions[other - 1, individual]))
-    return team
-
-
-def _cost_of(found: Evaluated, team: np.ndarray) -> float:
-    """Return the summed own cost of a team, inf if it collides."""
-    if _team_collisions(found, team) > 0:
-        return np.inf
-    return float(sum(found.own[r, i] for r, i in enumerate(team)))
-
-
-def _team_collisions(found: Evaluated, team: np.ndarray) -> int:
-    """Return the colliding configurations within a team and with obstacles."""
-    pairs = enumerate(combinations(range(len(team)), 2))
-    hits = sum(int(found.collisions[pair, team[a], team[b]]) for pair, (a, b) in pairs)
-    return hits + sum(int(found.blocked[r, i]) for r, i in enumerate(team))
-
-
-def _terms(found: Evaluated, team: np.ndarray) -> dict[str, float]:
-    """Return a team's terms by name."""
-    robots, met = len(team), np.array([found.blocked[r, team[r]] for r in range(len(team))])
-    for pair, (a, b) in enumerate(combinations(range(robots), 2)):
-        met[[a, b]] += found.collisions[pair, team[a], team[b]]
-    terms = {
-        "team_cost": float(sum(found.own[r, i] for r, i in enumerate(team))),
-        "team_collisions": float(_team_collisions(found, team)),
-    }
-    for r, individual in enumerate(team):
-        _, path, rotation, evenness = found.criteria[r, :, individual]
-        terms[f"collisions_robot_{r + 1}"] = float(met[r])
-        terms[f"tip_path_robot_{r + 1}"] = float(path)
-        terms[f"rotation_robot_{r + 1}_rad"] = float(rotation)
-        terms[f"tip_unevenness_robot_{r + 1}"] = float(evenness)
-    return terms

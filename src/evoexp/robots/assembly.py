@@ -12,13 +12,18 @@ from evoexp.validation import Component
 
 
 class Link(NamedTuple):
-    """A straight link: a line segment, thickened by a radius, that moves with one joint."""
+    """A straight link: a line segment, thickened by a radius, that moves with one joint; a tool has no length."""
 
     arm: int
     joint: int  # index of the Pinocchio joint that moves it; 0: it stands still
     start: FloatArray  # (3,) in the frame of the joint [length unit of the scene]
     end: FloatArray  # (3,)
     radius: float  # 0 for a line
+
+    @property
+    def is_tool(self) -> bool:
+        """Whether it is a ball."""
+        return bool(np.array_equal(self.start, self.end))
 
 
 class Assembly(NamedTuple):
@@ -82,7 +87,9 @@ class Chain(Robot):
 
 
 def link_capsule(link: Link, name: str) -> Any:
-    """Return a link as a `pin.GeometryObject` with a coal capsule from its start to its end."""
+    """Return a link as a `pin.GeometryObject` with a coal capsule from its start to its end, a tool with a sphere."""
+    if link.is_tool:
+        return pin.GeometryObject(name, link.joint, 0, pin.SE3(np.eye(3), link.start), coal.Sphere(link.radius))
     shape = coal.Capsule(link.radius, float(np.linalg.norm(link.end - link.start)))
     return pin.GeometryObject(name, link.joint, 0, _along(link.start, link.end), shape)
 

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from evoexp.errors import SettingError
 from evoexp.numerics import DEGREE, sincos
 from evoexp.robots.assembly import Chain, Link
-from evoexp.validation import Positive
+from evoexp.validation import NonNegative, Positive
 
 Point2 = tuple[float, float]
 
@@ -22,6 +22,7 @@ class PlanarChain(Chain):
         base_position: The first joint (x, y).
         base_angle: Direction of the first link at q = 0, from +x [deg].
         link_radius: Half the thickness of every link; 0: a line.
+        tool_radius: Of a ball around the tip; 0: none.
         joint_limits: Least and greatest angle of every joint [rad], as the papers print them; None: any angle.
     """
 
@@ -30,7 +31,8 @@ class PlanarChain(Chain):
     link_lengths: Annotated[tuple[Positive, ...], Field(min_length=1)]
     base_position: Point2
     base_angle: float = 0.0
-    link_radius: Annotated[float, Field(ge=0.0)] = 0.0
+    link_radius: NonNegative = 0.0
+    tool_radius: NonNegative = 0.0
     joint_limits: tuple[tuple[float, float], ...] | None = None
 
     @model_validator(mode="after")
@@ -46,7 +48,7 @@ class PlanarChain(Chain):
         return self
 
     def append_to(self, model: Any, arm: int) -> list[Link]:
-        """Add one revolute joint per link."""
+        """Add one revolute joint per link; a tool is one link more, of no length, on the last joint."""
         parent = 0
         s, c = sincos(DEGREE * self.base_angle)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -58,4 +60,7 @@ class PlanarChain(Chain):
                 model.lowerPositionLimit[parent - 1], model.upperPositionLimit[parent - 1] = self.joint_limits[k]
             links.append(Link(arm, parent, np.zeros(3), np.array([length, 0.0, 0.0]), self.link_radius))
             placement = pin.SE3(np.eye(3), np.array([length, 0.0, 0.0]))
+        if self.tool_radius > 0.0:
+            tip = links[-1].end
+            links.append(Link(arm, parent, tip, tip, self.tool_radius))
         return links

@@ -154,6 +154,9 @@ class Log:
         self._last = generation
         if len(self._pending) >= _BATCH:
             self._flush()
+        if generation.criteria is not None:
+            for population, criteria in enumerate(generation.criteria):
+                self.write_front(FrontRow(generation.index, population, criteria.T))
 
     def _flush(self) -> None:
         for generation, costs, best, state in self._pending:
@@ -169,7 +172,7 @@ class Log:
         self._pending.clear()
 
     def write_front(self, front: FrontRow) -> None:
-        """Append the non-dominated set of the generation last written."""
+        """Append what a population of the generation last written is worth."""
         self._flush()
         self._add(FRONT_TOPIC, FrontRow, front.generation, encode_front(front))
 

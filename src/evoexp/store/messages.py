@@ -39,7 +39,7 @@ def json_schema(record: type, terms: Iterable[str] = ()) -> bytes:
     """
     properties = {name: _JSON_TYPES[kind] for name, kind in field_types(record).items()}
     if record is FrontRow:  # a matrix travels flat
-        properties["criteria"] = _JSON_TYPES[int]
+        properties["num_criteria"] = _JSON_TYPES[int]
     properties.update({TERM + name: _JSON_TYPES[float] for name in sorted(terms)})
     title = f"evoexp.{record.__name__.removesuffix('Row')}"
     return orjson.dumps({"title": title, "type": "object", "properties": properties})
@@ -80,10 +80,15 @@ def encode_solution(generation: int, cost: float, values: FloatArray) -> bytes:
 
 
 def encode_front(front: FrontRow) -> bytes:
-    """Return the message of one front; its costs travel flat, beside the number of criteria."""
-    flat = np.ascontiguousarray(front.costs, dtype=np.float64)
-    row = {"generation": int(front.generation), "costs": flat.reshape(-1), "criteria": int(flat.shape[1])}
-    return _encode_with_array(row, "costs")
+    """Return the message of one front; its criteria travel flat, beside their number."""
+    flat = np.ascontiguousarray(front.criteria, dtype=np.float64)
+    row = {
+        "generation": int(front.generation),
+        "population": int(front.population),
+        "criteria": flat.reshape(-1),
+        "num_criteria": int(flat.shape[1]),
+    }
+    return _encode_with_array(row, "criteria")
 
 
 def encode_summary(summary: ReplicateSummary) -> dict[str, str]:
@@ -125,7 +130,7 @@ def decode_front(data: bytes) -> FrontRow:
     """Undo `encode_front`."""
     row = orjson.loads(data)
     fields, _ = _typed(FrontRow, row)
-    return FrontRow(fields["generation"], fields["costs"].reshape(-1, row["criteria"]))
+    return FrontRow(**fields | {"criteria": fields["criteria"].reshape(-1, row["num_criteria"])})
 
 
 def _encode_with_array(row: dict[str, Any], name: str) -> bytes:

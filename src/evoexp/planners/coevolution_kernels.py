@@ -1,0 +1,83 @@
+"""Breeding of co-evolving populations, compiled (Curkovic et al. 2013, section 3)."""
+
+import numpy as np
+
+from evoexp.evolution.crossover import cross_single_point
+from evoexp.evolution.mutation import mutate_allele
+from evoexp.evolution.selection import choose_elites, difference_weights, inverse_weights, spin_roulette
+from evoexp.numerics import kernel
+
+
+@kernel
+def breed(uniforms, populations, costs, moving, teams, settings, bred):  # type: ignore[no-untyped-def]
+    """Write the next populations: offspring, then elites, then the members of the hall, unchanged.
+
+    Args:
+        uniforms: (moving robots, numbers) uniform in [0, 1): parents, then cross-over, then mutation.
+        populations: (robots, genes, individuals).
+        costs: (robots, individuals).
+        moving: (robots,) false for robots that stand still: their populations are copied.
+        teams: (teams, robots) members of the hall.
+        settings: num_elites; whether weights are inverse costs; crossover_rate; mutation rate, step, limit, symmetric.
+        bred: Like populations, written.
+    """
+    num_elites, inverse, crossover_rate, rate, step, limit, symmetric = settings
+    size, kept = populations.shape[2], num_elites + len(teams)
+    count = size - kept
+    last = count + 2 * (count // 2)  # behind the numbers of cross-over
+    weights, parents = np.empty(size), np.empty(count, dtype=np.int64)
+    chosen = np.empty(num_elites, dtype=np.int64)
+    row = 0
+    for robot in range(len(populations)):
+        if not moving[robot]:
+            bred[robot] = populations[robot]
+            continue
+        draws, genes, before = uniforms[row], bred[robot], populations[robot]
+        row += 1
+        if inverse:
+            inverse_weights(costs[robot], weights)
+        else:
+            difference_weights(costs[robot], weights)
+        spin_roulette(weights, draws[:count], parents)
+        cross_single_point(draws[count:last], before, parents, crossover_rate, genes)
+        mutate_allele(draws[last:], genes, count, rate, step, limit, symmetric)
+        choose_elites(costs[robot], chosen)
+        for gene in range(len(genes)):
+            for k in range(num_elites):
+                genes[gene, count + k] = before[gene, chosen[k]]
+            for k in range(len(teams)):
+                genes[gene, count + num_elites + k] = before[gene, teams[k, robot]]
+
+
+@kernel
+def drop_copies(populations, teams, fronts):  # type: ignore[no-untyped-def]
+    """Take copies of other members, and of the hall's, off the fronts: they would fill the hall with one pair.
+
+    Args:
+        populations: (robots, genes, individuals).
+        teams: (teams, robots) members of the hall.
+        fronts: (robots, individuals) bool, changed: of equal genomes the first stays, none if the hall has one.
+    """
+    for robot in range(len(populations)):
+        genes, front = populations[robot], fronts[robot]
+        known = np.empty(len(teams) + genes.shape[1], dtype=np.int64)
+        num_known = len(teams)
+        for k in range(num_known):
+            known[k] = teams[k, robot]
+        for member in range(genes.shape[1]):
+            if not front[member]:
+                continue
+            fresh = True
+            for k in range(num_known):
+                same = True
+                for gene in range(len(genes)):
+                    if genes[gene, member] != genes[gene, known[k]]:
+                        same = False
+                        break
+                if same:
+                    fresh = False
+                    break
+            front[member] = fresh
+            if fresh:
+                known[num_known] = member
+                num_known += 1

@@ -1,33 +1,37 @@
 """Ablations: one quantity of every condition side by side, and how much better the first condition is."""
 
+from collections.abc import Callable, Mapping
+
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from evoexp.records import FloatArray
 from evoexp.report import style
 from evoexp.report.claims import Comparison
 from evoexp.report.figures.boxes import draw_box
-from evoexp.report.results import Results
+from evoexp.report.results import ConditionResults, Results
+from evoexp.report.statistics import quantile
 from evoexp.report.tables import groups
 
+Values = Callable[[ConditionResults], FloatArray]
 
-def values_table(results: Results, names: dict[str, str]) -> pd.DataFrame:
+
+def values_table(results: Results, quantities: Mapping[str, Values]) -> pd.DataFrame:
     """Return quantities of every finished replicate.
 
     Args:
         results: With data.
-        names: Column of the summaries → its name with unit.
+        quantities: Name with unit → its values of a condition, (done,); inf: never.
 
     Returns:
         Columns quantity, position, condition, replicate, value, failed (replicates of the condition).
     """
     parts = []
-    for column, name in names.items():
+    for name, values in quantities.items():
         for position, c in enumerate(results.with_data):
             given = {"quantity": name, "position": position, "condition": c.label}
-            parts.append(
-                pd.DataFrame(given | {"replicate": c.summaries.index, "value": c.column(column), "failed": c.failed})
-            )
+            parts.append(pd.DataFrame(given | {"replicate": c.summaries.index, "value": values(c), "failed": c.failed}))
     return pd.concat(parts, ignore_index=True)
 
 
@@ -41,8 +45,13 @@ def draw_values(table: pd.DataFrame) -> Figure:
         rows = table[table["quantity"] == quantity]
         for position, own in groups(rows, "position"):
             draw_box(axes, position, own["value"].to_numpy(), style.condition_colour(position))
-        middle = rows.loc[rows["position"] == 0, "value"].median()
-        axes.axvline(middle, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
+            never = int(np.isinf(own["value"]).sum())
+            if never:
+                place = (1.0, position)
+                axes.annotate(f"{never} never", place, xycoords=axes.get_yaxis_transform(), ha="right", va="center")
+        middle = quantile(rows.loc[rows["position"] == 0, "value"].to_numpy(), 0.5)
+        if np.isfinite(middle):
+            axes.axvline(middle, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
         axes.set_xlabel(quantity)
         axes.margins(x=0.06)
     counts = (

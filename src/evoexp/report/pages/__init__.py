@@ -10,6 +10,9 @@ from evoexp.report.settings import ReportSettings
 
 PAGES = {
     "curkovic": "evoexp.report.pages.curkovic:page",
+    "curkovic_motion": "evoexp.report.pages.curkovic_motion:page",
+    "curkovic_pareto": "evoexp.report.pages.curkovic_pareto:page",
+    "curkovic_sweep": "evoexp.report.pages.curkovic_sweep:page",
     "ablations": "evoexp.report.pages.ablations:page",
     "generic": "evoexp.report.pages.generic:page",
     "planar_arms": "evoexp.report.pages.planar_arms:page",

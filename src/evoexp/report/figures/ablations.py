@@ -1,5 +1,6 @@
 """Ablations: one quantity of every condition side by side, and how much better the first condition is."""
 
+import textwrap
 from collections.abc import Callable, Mapping
 
 import numpy as np
@@ -14,6 +15,7 @@ from evoexp.report.results import ConditionResults, Results
 from evoexp.report.statistics import quantile
 from evoexp.report.tables import groups
 
+WRAPPED = 24  # characters of a name in a panel, per line
 Values = Callable[[ConditionResults], FloatArray]
 
 
@@ -47,12 +49,12 @@ def draw_values(table: pd.DataFrame) -> Figure:
             draw_box(axes, position, own["value"].to_numpy(), style.condition_colour(position))
             never = int(np.isinf(own["value"]).sum())
             if never:
-                place = (1.0, position)
-                axes.annotate(f"{never} never", place, xycoords=axes.get_yaxis_transform(), ha="right", va="center")
+                place = (1.01, position)
+                axes.annotate(f"{never} never", place, xycoords=axes.get_yaxis_transform(), fontsize=6.5, va="center")
         middle = quantile(rows.loc[rows["position"] == 0, "value"].to_numpy(), 0.5)
         if np.isfinite(middle):
             axes.axvline(middle, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
-        axes.set_xlabel(quantity)
+        axes.set_xlabel(textwrap.fill(quantity, WRAPPED))
         axes.margins(x=0.06)
     counts = (
         table[table["quantity"] == quantities[0]].groupby("position").agg(n=("value", "size"), failed=("failed", "max"))
@@ -108,7 +110,7 @@ def draw_effects(table: pd.DataFrame) -> Figure:
             label=f"adjusted p ≥ {level:g}",
         )
         axes.set_xlim(-0.03, 1.03)
-        axes.set_title(quantity)
+        axes.set_title(textwrap.fill(quantity, WRAPPED))
         axes.set_xlabel("A12: the first condition is better")
     panels[0].set_yticks(range(len(labels)), [f"against {label}" for label in labels])
     panels[0].set_ylim(len(labels) - 0.5, -0.5)

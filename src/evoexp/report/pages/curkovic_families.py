@@ -55,14 +55,13 @@ class Tested(NamedTuple):
 def families(results: Results) -> tuple[Family, ...]:
     """Return what is compared: twins that differ in collision substeps; else all with the first of their Eq. 9."""
     conditions = results.with_data
-    if len({c.planner.collision.collision_substeps for c in conditions}) > 1:
-        firsts: dict[str, ConditionResults] = {}
-        twins = []
-        for c in sorted(conditions, key=lambda c: int(c.planner.collision.collision_substeps)):
-            first = firsts.setdefault(_without_substeps(c), c)
-            if first is not c:
-                twins.append((first, c))
-        return (Family("each method, tested at its configurations only,", tuple(twins)),)
+    fewest = min(_substeps(c) for c in conditions)
+    finer = [c for c in conditions if _substeps(c) > fewest]
+    if finer:
+        firsts = {_without_substeps(c): c for c in reversed(conditions) if _substeps(c) == fewest}
+        pairs = ((firsts.get(_without_substeps(c)), c) for c in finer)
+        twins = tuple((first, c) for first, c in pairs if first is not None)
+        return (Family("each method, tested at its configurations only,", twins),)
     found = []
     for reading in dict.fromkeys(c.planner.ga.mutation_direction for c in conditions):
         first, *others = (c for c in conditions if c.planner.ga.mutation_direction == reading)
@@ -100,11 +99,16 @@ def _measures(results: Results, threshold: float) -> tuple[Measure, ...]:
         Measure("best cost", generic.by_column("best_cost")),
         Measure(f"generations {to}", partial(measures.generations_to, threshold=threshold)),
     ]
-    if len({c.planner.ga.population_size for c in results.with_data}) > 1:
+    sizes = [tuple(c.planner.ga.population_size for c in pair) for family in families(results) for pair in family.pairs]
+    if any(one != other for one, other in sizes):
         found.append(Measure(f"evaluations {to}", partial(measures.evaluations_to, threshold=threshold)))
-    if len({c.planner.collision.collision_substeps for c in results.with_data}) > 1 or curved(results):
+    if len({_substeps(c) for c in results.with_data}) > 1 or curved(results):
         found.append(Measure(f"solved motion {measures.REFUTED}", measures.refuted, converges=False))
     return tuple(found)
+
+
+def _substeps(condition: ConditionResults) -> int:
+    return int(condition.planner.collision.collision_substeps)
 
 
 def _without_substeps(condition: ConditionResults) -> str:

@@ -12,7 +12,7 @@ from evoexp.report.page import Quantity
 from evoexp.report.pages import generic
 from evoexp.report.parameters import planned_replicates
 from evoexp.report.results import ConditionResults, Results
-from evoexp.report.statistics import Interval, wilson
+from evoexp.report.statistics import Interval, quantile, wilson
 
 ROUNDING = 1e-9  # [deg] a curve may leave the range by this much and still touch its end
 REFUTED = "collides between its configurations (exact verdict)"
@@ -83,13 +83,17 @@ def evaluations_to(condition: ConditionResults, threshold: float) -> FloatArray:
 
 def expected_evaluations(condition: ConditionResults, threshold: float) -> float:
     """Return the expected running time in evaluations: all that were spent, over the runs that got there."""
-    return _expected(condition, threshold, np.ones(condition.done))
+    first = evaluations_to(condition, threshold)
+    reached = np.isfinite(first)
+    spent = np.where(reached, first, condition.column("evaluations"))
+    return float(spent.sum() / reached.sum()) if reached.any() else np.inf
 
 
 def expected_seconds(condition: ConditionResults, threshold: float) -> float:
-    """Return the same in seconds of CPU time; a run's search spends equal times on equal numbers of evaluations."""
+    """Return the same in seconds of CPU time, at what an evaluation costs in the median run's search."""
     searching = condition.column("cpu_s") - condition.column("certificate_s")
-    return _expected(condition, threshold, searching / condition.column("evaluations"))
+    price = quantile(searching / condition.column("evaluations"), 0.5)
+    return expected_evaluations(condition, threshold) * price
 
 
 def effort_quantities(results: Results, threshold: float) -> tuple[Quantity, ...]:
@@ -99,7 +103,7 @@ def effort_quantities(results: Results, threshold: float) -> tuple[Quantity, ...
     return (
         row(f"generations to a {to}", "generation", lambda c: generations_to(c, threshold)),
         row(f"evaluations to a {to}", "–", lambda c: evaluations_to(c, threshold)),
-        row(f"evaluations {expected}", "–", lambda c: np.array([expected_evaluations(c, threshold)])),
+        row(f"evaluations {expected}", "–", lambda c: np.rint([expected_evaluations(c, threshold)])),
         row(f"CPU time of the search {expected}", "s", lambda c: np.array([expected_seconds(c, threshold)])),
     )
 
@@ -144,10 +148,3 @@ def _first(condition: ConditionResults, threshold: float, column: str) -> FloatA
     rows = condition.generations
     first = rows[rows["best_cost"] <= threshold].groupby("replicate")[column].min()
     return first.reindex(condition.summaries.index).fillna(np.inf).to_numpy(np.float64)
-
-
-def _expected(condition: ConditionResults, threshold: float, price: FloatArray) -> float:
-    first = evaluations_to(condition, threshold)
-    reached = np.isfinite(first)
-    spent = np.where(reached, first, condition.column("evaluations")) * price
-    return float(spent.sum() / reached.sum()) if reached.any() else np.inf

@@ -63,12 +63,12 @@ def tool_distance(condition: ConditionResults) -> FloatArray:
                 if one != other:
                     chain = [np.broadcast_to(arm.base, (len(links), 2)), theirs[:, :2, 0], theirs[:, 2:, 0]]
                     tips = own[:, 2:, 0]
-                    least = min(least, *(_to_segment(tips, a, b) for a, b in itertools.pairwise(chain)))
+                    least = min(least, *(to_segment(tips, a, b) for a, b in itertools.pairwise(chain)))
         found.append(least)
     return np.array(found)
 
 
-def _to_segment(points: FloatArray, start: FloatArray, end: FloatArray) -> float:
+def to_segment(points: FloatArray, start: FloatArray, end: FloatArray) -> float:
     """Return the least distance of points from segments, row by row; each (rows, 2)."""
     along = end - start
     share = np.clip(((points - start) * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)

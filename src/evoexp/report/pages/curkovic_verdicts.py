@@ -10,22 +10,31 @@ from evoexp.report.results import ConditionResults, Results
 from evoexp.report.settings import ReportSettings
 from evoexp.report.statistics import spread
 
+HALL = {"ga.hall_depth", "ga.hall_memory", "ga.hall_frozen", "ga.num_elites"}
+MUTATION = {"ga.mutation_rate", "ga.mutation_decay", "ga.mutation_direction"}
 READINGS = {"one_sided": "Eq. 9 as printed", "symmetric": "Eq. 9 read as symmetric"}
 
 
 def of_sweep(results: Results, settings: ReportSettings, found: Sequence[Tested]) -> tuple[Claim, ...]:
     """Return the claims that a sweep can judge, told by what its conditions differ in."""
-    algorithms = [c.planner.ga for c in results.with_data]
     judge: Callable[[Results, ReportSettings, Sequence[Tested]], list[Claim]]
-    if any(ga.hall_frozen or ga.num_elites for ga in algorithms):
+    varied = _varied(results)
+    if varied <= HALL and varied & {"ga.hall_frozen", "ga.num_elites"}:
         judge = _hall
-    elif len({ga.hall_depth for ga in algorithms}) > 1:
+    elif varied == {"ga.hall_depth"}:
         judge = _depth
-    elif len({(ga.mutation_rate, ga.mutation_decay) for ga in algorithms}) > 1:
+    elif varied <= MUTATION and varied & {"ga.mutation_rate", "ga.mutation_decay"}:
         judge = _mutation
     else:
         return ()
     return tuple(judge(results, settings, [one for one in found if one.measure.converges]))
+
+
+def _varied(results: Results) -> set[str]:
+    """Return the settings of the planner in which conditions differ, those of its algorithm one by one."""
+    given = [c.planner.canonical() for c in results.with_data]
+    flat = [{**{f"ga.{key}": value for key, value in one.pop("ga").items()}, **one} for one in given]
+    return {key for key in flat[0] if any(one[key] != flat[0][key] for one in flat)}
 
 
 def _hall(results: Results, settings: ReportSettings, found: Sequence[Tested]) -> list[Claim]:

@@ -77,6 +77,7 @@ def _robot(angles: Axes, turns: Axes, table: pd.DataFrame, colour: str) -> None:
         angles.plot(at["instant"], at["angle_deg"], "o", color=colour, mec="white", markersize=5, clip_on=False)
         limit = float(rows["limit_deg"].iloc[0])
         turns.axhline(limit, color=style.FORBIDDEN, linewidth=1.2, linestyle=":")
-        beside: dict[str, Any] = {"xytext": (2, -7 if link == 0 else 1), "textcoords": "offset points", "fontsize": 6.5}
-        turns.annotate(f"link {int(link) + 1}: {limit:.1f}°", (0.0, limit), **beside)
+        beside: dict[str, Any] = {"xycoords": turns.get_yaxis_transform(), "fontsize": 6.5}
+        beside["va"] = "top" if link == 0 else "bottom"  # the limits may be close
+        turns.annotate(f"link {int(link) + 1}: {limit:.1f}°", (1.01, limit), **beside)
     turns.set_ylim(bottom=0.0)

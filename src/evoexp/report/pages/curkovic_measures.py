@@ -8,7 +8,8 @@ import numpy as np
 from evoexp.records import FloatArray
 from evoexp.report import link_motions, markdown
 from evoexp.report.claims import Claim, Comparison
-from evoexp.report.page import Quantity
+from evoexp.report.figures import convergence
+from evoexp.report.page import Drawing, Quantity
 from evoexp.report.pages import generic
 from evoexp.report.parameters import planned_replicates
 from evoexp.report.results import ConditionResults, Results
@@ -106,6 +107,13 @@ def effort_quantities(results: Results, threshold: float) -> tuple[Quantity, ...
         row(f"evaluations {expected}", "–", lambda c: np.rint([expected_evaluations(c, threshold)])),
         row(f"CPU time of the search {expected}", "s", lambda c: np.array([expected_seconds(c, threshold)])),
     )
+
+
+def convergence_drawing(results: Results, more: str = "") -> Drawing:
+    """Return the figure of the best cost only; that of an average individual, full of collisions, would hide it."""
+    caption = f"Median of the best cost so far over replicates. Lower is better.{more}"
+    table = partial(convergence.cost_table, results)
+    return Drawing("convergence", "Convergence", caption, table, convergence.draw_best, results.with_data)
 
 
 def refuted(condition: ConditionResults) -> FloatArray:

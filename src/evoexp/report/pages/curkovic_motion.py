@@ -45,7 +45,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
         claims=_claims(results, settings, tools),
         checks=_checks(results),
         comparisons=(*base.comparisons, *((("Largest against smallest radius", tools),) if tools else ())),
-        drawings=(*_drawings(results, settings), *base.drawings),
+        drawings=(*_drawings(results, settings), measures.convergence_drawing(results)),
     )
 
 

@@ -39,7 +39,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
         introduction=INTRODUCTION,
         quantities=(*(_quantity(results, p, of) for p, of in sizes), *base.quantities),
         checks=tuple(check for c in drawn for check in _checks(c, fronts[c.label])),
-        drawings=(*(_drawing(results, c, fronts[c.label]) for c in drawn), *base.drawings),
+        drawings=(*(_drawing(results, c, fronts[c.label]) for c in drawn), measures.convergence_drawing(results)),
     )
 
 

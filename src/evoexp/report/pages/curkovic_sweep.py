@@ -6,7 +6,7 @@ from functools import partial
 import pandas as pd
 
 from evoexp.report import markdown
-from evoexp.report.figures import ablations, convergence, defect_rates
+from evoexp.report.figures import ablations, defect_rates
 from evoexp.report.page import Drawing, Page, Quantity
 from evoexp.report.pages import curkovic_families, curkovic_verdicts, generic
 from evoexp.report.pages import curkovic_measures as measures
@@ -92,14 +92,10 @@ def _drawings(
             ablations.draw_effects,
             shown,
         ),
-        Drawing(
-            "convergence",
-            "Convergence",
-            f"Median of the best cost so far over replicates. Lower is better. Threshold {markdown.number(threshold)}, "
-            f"lower bound {markdown.number(threshold / settings.threshold_ratio)}.",
-            partial(convergence.cost_table, results),
-            convergence.draw_best,
-            shown,
+        measures.convergence_drawing(
+            results,
+            f" Threshold {markdown.number(threshold)}, lower bound "
+            f"{markdown.number(threshold / settings.threshold_ratio)}.",
         ),
         Drawing(
             "defects",

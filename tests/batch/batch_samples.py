@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from evoexp.batch.runner import Batch, Outcome
+from evoexp.batch.jobs import Outcome
+from evoexp.batch.runner import Batch
 from evoexp.batch.settings import RunnerSettings
 from evoexp.condition import Condition
 from evoexp.store.log_reader import read_log

@@ -2,19 +2,27 @@
 
 import json
 import os
+import subprocess
+import sys
 from collections import deque
 from pathlib import Path
 
+import joblib
 import pytest
 from batch_samples import WORDS, digests, new_batch, run
 from hypothesis import given
 from hypothesis import strategies as st
 
 from evoexp import compose
-from evoexp.batch.runner import MAX_BUNDLE, TASK_S, Job, Outcome, _Bundles, fan_out
+from evoexp.batch import jobs
+from evoexp.batch.jobs import Job, Outcome, run_jobs
+from evoexp.batch.replicate import run_replicate
+from evoexp.batch.runner import MAX_BUNDLE, TASK_S, _Bundles, fan_out
+from evoexp.batch.workers import in_workers, loading
 from evoexp.cli import main
 from evoexp.condition import Condition
 from evoexp.errors import Busy, SettingError
+from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.tables import read_summaries
 
@@ -54,6 +62,52 @@ def test_more_replicates_leave_the_earlier_ones_alone(faulty: Condition, tmp_pat
     assert read_summaries(directory)["replicate"].tolist() == [0, 1, 2, 3]
     assert run(tmp_path, (faulty, 1)) == []
     assert sorted(directory.completed()) == [0, 1, 2, 3], "fewer replicates take nothing away"
+
+
+def test_of_two_thousand_the_missing_ones_are_found_without_opening_a_log(
+    faulty: Condition, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Completion is the finished file itself: which names are there, never how many."""
+    directory = RunDirectory(tmp_path, faulty.id)
+    directory.create(faulty.to_json(), {})
+    for replicate in range(2000):
+        directory.log_path(replicate).touch()
+    for replicate in (0, 7, 1234):
+        directory.log_path(replicate).unlink()
+    directory.log_path(2007).touch()  # as many as there should be, and others
+    (directory.replicates / ".0007.mcap.1.tmp").touch()
+    canonical = Condition.to_json
+    calls: list[Condition] = []
+    monkeypatch.setattr(Condition, "to_json", lambda self: calls.append(self) or canonical(self))  # type: ignore[func-returns-value]
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "read_bytes", lambda path: pytest.fail(f"{path} is opened"))
+        patch.setattr("builtins.open", lambda path, *_: pytest.fail(f"{path} is opened"))
+        batch = new_batch(tmp_path, (faulty, 2004))
+    assert [job.replicate for job in batch.jobs] == [0, 7, 1234, *range(2000, 2004)]
+    assert len(calls) <= 4, "a configuration is put into words per condition, not per replicate"
+
+
+def test_a_condition_is_built_once_per_process(faulty: Condition, monkeypatch: pytest.MonkeyPatch) -> None:
+    jobs._condition.cache_clear()
+    build, calls = Condition.from_config, []
+    monkeypatch.setattr(Condition, "from_config", lambda config: calls.append(config) or build(config))  # type: ignore[func-returns-value]
+    outcomes = run_jobs([Job(faulty.id, faulty.to_json(), k) for k in range(3)])
+    assert [outcome.reason for outcome in outcomes] == ["", "", ""]
+    assert len(calls) == 1
+    again = run_replicate(faulty, 2).content
+    assert read_log(outcomes[2].content).content_digest == read_log(again).content_digest
+
+
+def test_a_worker_loads_neither_tables_nor_the_command_line() -> None:
+    code = "import sys, evoexp.batch.jobs; print(*sorted({name.split('.')[0] for name in sys.modules}))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert not {"pandas", "pyarrow", "matplotlib", "hydra", "rich"} & set(done.stdout.split())
+
+
+def test_a_worker_that_dies_while_it_loads_is_replaced(fresh_workers: None) -> None:
+    with loading(2, os._exit, 1):
+        pass
+    assert sorted(in_workers(2, (joblib.delayed(abs)(-k) for k in range(4)))) == [0, 1, 2, 3]
 
 
 def test_a_condition_wanted_twice_runs_once(faulty: Condition, tmp_path: Path) -> None:
@@ -208,9 +262,9 @@ def test_a_killed_worker_costs_its_own_replicate_a_retry(
     st.lists(st.floats(1e-5, 1.0), min_size=1, max_size=20),
 )
 def test_every_job_is_bundled_once(num_jobs: int, num_workers: int, walls: list[float]) -> None:
-    jobs = [Job("0" * 64, b"", k) for k in range(num_jobs)]
+    waiting = [Job("0" * 64, b"", k) for k in range(num_jobs)]
     in_flight: dict[tuple[str, int], Job] = {}
-    bundles = _Bundles(deque(jobs), in_flight, num_workers)
+    bundles = _Bundles(deque(waiting), in_flight, num_workers)
     seen: list[Job] = []
     for count, bundle in enumerate(bundles):
         assert 1 <= len(bundle) <= MAX_BUNDLE
@@ -220,18 +274,21 @@ def test_every_job_is_bundled_once(num_jobs: int, num_workers: int, walls: list[
         wall = walls[count % len(walls)]
         bundles.took([Outcome(job.condition_id, job.replicate, "", "", b"", wall) for job in bundle])
         assert not in_flight
-    assert seen == jobs
+    assert seen == waiting
 
 
 def test_bundles_are_as_long_as_a_task() -> None:
-    jobs = [Job("0" * 64, b"", k) for k in range(1000)]
-    bundles = _Bundles(deque(jobs), {}, 2)
+    waiting = [Job("0" * 64, b"", k) for k in range(1000)]
+    bundles = _Bundles(deque(waiting), {}, 2)
     iterator = iter(bundles)
     assert len(next(iterator)) == 1, "nothing is known yet"
     bundles.took([Outcome("0" * 64, 0, "", "", b"", TASK_S / 10)])
     assert len(next(iterator)) == 10
     bundles.took([Outcome("0" * 64, k, "", "", b"", 1.0) for k in range(10)])
     assert len(next(iterator)) == 1
+    for _ in range(12):
+        bundles.took([Outcome("0" * 64, k, "", "", b"", TASK_S / 10) for k in range(10)])
+    assert len(next(iterator)) == 9, "slow ones are forgotten"
 
 
 def test_no_jobs_are_no_outcomes() -> None:

@@ -156,3 +156,13 @@ def test_an_ambiguous_shipped_hash_lists_the_candidates(
     monkeypatch.setattr(shipped, "shipped", lambda: rows)
     for command in ("show", "reproduce"):
         assert refused(command, "abc") == "hash: 'abc' is ambiguous: abc0abc0abc0, abc1abc1abc1"
+
+
+def test_show_says_what_the_chromosomes_length_violates(evoexp: Evoexp, outputs: Path) -> None:
+    condition = compose.expand(["experiment=curkovic_methods"], only=["V"])[0].conditions[0].condition
+    said = evoexp("show", condition.id[:12])
+    assert said.code == 0
+    assert not outputs.exists()
+    assert "robot 1: Eq. 2 allows steps of 5.73 and 11.46 deg (printed: 11.5 and 23)" in said.out
+    assert "robot 2: Eq. 3 asks for L = 42 here (120 deg), for L = 64 over 180 deg (printed: 32)" in said.out
+    assert "L = 8 (K = 4) takes steps of 24.00 deg at best, which violates it 4.19 times over" in said.out

@@ -188,6 +188,11 @@ def test_a_missing_replicate_lists_those_that_are_there(refused: Refused, stored
     run = find_runs(stored)[0]
     said = refused("reproduce", run.hash12, "--replicate", "7")
     assert said == f"run {run.hash12}: no finished replicate 7 (finished: 0, 1)"
+    log = run.log_path(0).read_bytes()
+    for replicate in (2, 3, 5, 6):
+        run.log_path(replicate).write_bytes(log)
+    said = refused("reproduce", run.hash12, "--replicate", "7")
+    assert said.endswith("(finished: 0–3, 5, 6)"), "thousands fit in a line"
     assert "invalid int value: 'x'" in refused("reproduce", run.hash12, "--replicate", "x")
 
 

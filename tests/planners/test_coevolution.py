@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from evoexp import compose
+from evoexp.collision.certificate import certificate
 from evoexp.errors import SettingError
 from evoexp.planners.coevolution import Coevolution, Evaluated, Problem
 from evoexp.report.pages.curkovic import lower_bound
@@ -19,7 +20,8 @@ def prepared(*overrides: str, experiment: str = "curkovic_methods") -> tuple[Coe
     words = [f"experiment={experiment}", *overrides]
     if not any(word.startswith("ga=") for word in words):
         words.append("ga=curkovic_5")
-    condition = compose.expand(words, only=["V"])[0].conditions[0].condition
+    only = ["V"] if experiment == "curkovic_methods" else []
+    condition = compose.expand(words, only=only)[0].conditions[0].condition
     planner, problem = condition.prepare()
     return planner, problem
 
@@ -157,7 +159,10 @@ def test_restarts_draw_fresh_populations() -> None:
             ("scenario.q_start=[{angles:[90.0,90.0]},{angles:[200.0,10.0]}]",),
             "q_start[1].angles[0]: must be within [0, 180]",
         ),
-        (("scenario.q_start=[{angles:[60.0,0.0]},{angles:[120.0,180.0]}]",), "q_start: must be free of collision"),
+        (
+            ("scenario.q_start=[{angles:[60.0,0.0]},{angles:[120.0,180.0]}]",),
+            "q_start: must be free of collision (robots 1 and 2 touch: arm_1_link_2 and arm_2_link_2)",
+        ),
         (
             ("scenario.q_goal=[{tip:[0.9,0.0],elbow:left},{angles:[30.0,120.0]}]",),
             "q_goal[0].tip: must be 0 to 0.5 away",
@@ -206,7 +211,7 @@ def test_no_team_is_cheaper_than_the_lower_bound() -> None:
 
     condition = compose.expand(["experiment=curkovic_methods"], only=["V"])[0].conditions[0].condition
     nothing: Any = None
-    bound = lower_bound(ConditionResults("V", condition, 1, nothing, {}, nothing, {}, None, {}))
+    bound = lower_bound(ConditionResults("V", condition, 1, nothing, {}, None, {}))
     planner, problem = prepared(*SMALL)
     *_, last = planner.evolve(problem, np.random.default_rng(6))
     assert last.best_cost > bound
@@ -253,3 +258,15 @@ def test_the_first_generations_of_method_v_are_those_of_the_pareto_experiment() 
     assert one.criteria.shape == (2, 4, 100)
     assert one.criteria.sum(axis=1) == pytest.approx(one.costs)
     assert other.criteria is None
+
+
+def test_thick_links_and_tools_are_judged_by_their_bodies() -> None:
+    """What the envelopes' lines let pass between configurations, or a circle hides, the exact verdict sees."""
+    planner, problem = prepared("collision.tcp_radius=0.04", experiment="curkovic_safety")
+    names = set(problem.scene.names)
+    assert names == {f"arm_{r}_link_{k}" for r in (1, 2) for k in (1, 2, 3)}
+    radii = [shape.radius for shape, _, _ in problem.scene.shapes]
+    assert radii == [0.02, 0.02, 0.04] * 2
+    *_, last = planner.evolve(problem, np.random.default_rng(0))
+    verdict = certificate(problem, planner.motion(problem, last.best))
+    assert verdict.certified is not None

@@ -13,7 +13,7 @@ def of(*overrides: str, name: str = "rana_planar", budget: str = "paper", label:
     """Return the parameters of a condition that nobody ran, by name."""
     experiment = compose.expand([f"experiment={name}", f"budget={budget}", *overrides])[0]
     text, condition = experiment.conditions[label]
-    found = ConditionResults(text, condition, experiment.num_replicates, None, {}, None, {}, None, {})  # type: ignore[arg-type]
+    found = ConditionResults(text, condition, experiment.num_replicates, None, {}, None, {})  # type: ignore[arg-type]
     rows = parameters.parameters(Results(name, budget, (found,)), found)
     assert len({row.name for row in rows}) == len(rows)
     return {row.name: row for row in rows}
@@ -59,7 +59,7 @@ def test_another_option_than_the_experiments_own_is_recognised() -> None:
 
 def test_options_are_recognised_without_an_experiment() -> None:
     condition = compose.expand(["experiment=rana_three_arms"])[0].conditions[0].condition
-    found = ConditionResults("", condition, 20, None, {}, None, {}, None, {})  # type: ignore[arg-type]
+    found = ConditionResults("", condition, 20, None, {}, None, {})  # type: ignore[arg-type]
     rows = {row.name: row for row in parameters.parameters(Results("", "", (found,)), found)}
     assert rows["robot"].source == "conf/robot/three_planar_2r.yaml"
     assert rows["robot.arms[2].base_position"].unit == "unit"

@@ -7,6 +7,7 @@ from report_samples import expand, store
 
 from evoexp.condition import Condition
 from evoexp.errors import NothingStored
+from evoexp.report import results as results_module
 from evoexp.report.results import Results, gather
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
@@ -64,3 +65,20 @@ def test_failed_and_missing_replicates_are_counted(tmp_path: Path) -> None:
 def test_a_condition_is_read_back_from_its_run(stored: Path, results: Results) -> None:
     ga = results.conditions[0]
     assert Condition.from_json(RunDirectory(stored, ga.condition.id).config_json()) == ga.condition
+
+
+def test_logs_are_opened_when_a_page_asks_for_what_they_hold(stored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    gathered(stored, 2)  # summary.parquet is there
+
+    def never(*_: object) -> None:
+        raise AssertionError("a log is opened")
+
+    for name in ("read_generations", "read_solution", "read_log"):
+        monkeypatch.setattr(results_module, name, never)
+    ga = gathered(stored, 2).conditions[0]
+    assert (ga.done, ga.solved) == (2, int(ga.summaries["solved"].sum()))
+    for part in ("generations", "solutions", "first_solution"):
+        with pytest.raises(AssertionError, match="a log is opened"):
+            getattr(ga, part)
+    monkeypatch.undo()
+    assert ga.generations is ga.generations and ga.solutions is ga.solutions, "read once"

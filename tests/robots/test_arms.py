@@ -5,6 +5,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from evoexp.collision.touching_spheres import TouchingSpheres
 from evoexp.errors import SettingError
 from evoexp.robots.arms import Arms
 from evoexp.robots.planar_chain import PlanarChain
@@ -60,3 +61,22 @@ def test_geometry_holds_the_links_as_capsules_of_the_given_radius() -> None:
 def test_impossible_chains_are_refused(settings: dict[str, object], message: str) -> None:
     with pytest.raises(SettingError, match=message):
         build({"_target_": "planar_chain", **settings}, lambda name, field: PlanarChain, "robot")
+
+
+def test_a_tool_is_a_ball_that_moves_with_the_tip() -> None:
+    assembly = PlanarChain(link_lengths=(2.0, 1.0), base_position=(0.0, 0.0), tool_radius=0.3).build()
+    *links, tool = assembly.links
+    assert [link.is_tool for link in links] == [False, False]
+    assert tool.is_tool
+    assert isinstance(assembly.geometry.geometryObjects[2].geometry, coal.Sphere)
+    data, placements = assembly.model.createData(), assembly.geometry.createData()
+    q = np.array([0.4, -1.1])
+    pin.updateGeometryPlacements(assembly.model, data, assembly.geometry, placements, q)
+    tip = [2.0 * np.cos(0.4) + np.cos(-0.7), 2.0 * np.sin(0.4) + np.sin(-0.7), 0.0]
+    assert placements.oMg[2].translation == pytest.approx(tip, abs=1e-12)
+
+
+def test_circles_of_one_size_cannot_show_a_tool() -> None:
+    assembly = PlanarChain(link_lengths=(2.0, 1.0), base_position=(0.0, 0.0), tool_radius=0.3).build()
+    with pytest.raises(SettingError, match="robot: must be without tools"):
+        TouchingSpheres(spheres_per_link=5, sphere_radius=0.1, collision_substeps=1).bind(assembly, ())

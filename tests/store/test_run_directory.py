@@ -14,6 +14,7 @@ import pytest
 from store_samples import CONDITION, CONFIG
 
 from evoexp.errors import AmbiguousHash, Busy, EvoexpError, UnknownHash
+from evoexp.store.files import FEW
 from evoexp.store.log import Finished
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory, StoreError, find_runs, lock_all, outputs_root, resolve
@@ -35,8 +36,9 @@ WRITE = """
     with run.lock():
         print("held", flush=True)
         while True:
-            for replicate in range(50):
+            for replicate in range(0, 50, 10):
                 run.write_log(replicate, content)
+                run.write_logs(dict.fromkeys(range(replicate, replicate + 10), content))
 """
 
 
@@ -96,6 +98,33 @@ def test_a_failed_write_leaves_nothing(run: RunDirectory, monkeypatch: pytest.Mo
     with pytest.raises(OSError, match="No space"):
         run.write_log(0, b"x" * 1000)
     assert os.listdir(run.replicates) == []
+
+
+@pytest.mark.parametrize("count", [1, FEW - 1, FEW, 3 * FEW])
+def test_nothing_gets_its_name_before_its_bytes_are_on_the_disk(
+    run: RunDirectory, monkeypatch: pytest.MonkeyPatch, count: int
+) -> None:
+    """What a machine that loses its power keeps is what was synced: every file before the first name, names after."""
+    events: list[tuple[str, str]] = []
+    fsync, replace = os.fsync, os.replace
+
+    def note_fsync(descriptor: int) -> None:
+        events.append(("sync", os.readlink(f"/proc/self/fd/{descriptor}")))
+        fsync(descriptor)
+
+    def note_replace(source: Path, target: Path) -> None:
+        events.append(("rename", str(source)))
+        replace(source, target)
+
+    monkeypatch.setattr(os, "fsync", note_fsync)
+    monkeypatch.setattr(os, "replace", note_replace)
+    run.write_logs({k: bytes([k]) * 1000 for k in range(count)})
+    renamed = [path for kind, path in events if kind == "rename"]
+    assert len(renamed) == count
+    assert [kind for kind, _ in events] == ["sync"] * count + ["rename"] * count + ["sync"]
+    assert sorted(path for _, path in events[:count]) == sorted(renamed), "each file itself"
+    assert events[-1] == ("sync", str(run.replicates)), "then their names"
+    assert [run.log_path(k).read_bytes() for k in range(count)] == [bytes([k]) * 1000 for k in range(count)]
 
 
 def test_killed_while_writing_leaves_whole_files(

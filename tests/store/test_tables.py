@@ -2,6 +2,7 @@
 
 import math
 import os
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -186,3 +187,30 @@ def test_read_generations(run: RunDirectory, add: Add, tmp_path: Path) -> None:
     assert frame["term_other"].tolist()[12:] == [0.0, 1.0, 2.0, 3.0] and frame["term_other"][:12].isna().all()
     assert frame["solved"].tolist()[:6] == [False] * 3 + [True] * 3 and frame.dtypes["solved"] == np.bool_
     assert frame.dtypes["evaluations"] == np.int64 and frame.dtypes["mean_cost"] == np.float64
+
+
+def test_only_the_replicates_asked_for_are_read(
+    run: RunDirectory, add: Add, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    for replicate in range(4):
+        add(replicate)
+    names: list[str] = []
+    read = tables.generation_columns
+    monkeypatch.setattr(tables, "generation_columns", lambda path: names.append(path.name) or read(path))  # type: ignore[func-returns-value]
+    assert read_generations(run, [3, 1, 9])["replicate"].unique().tolist() == [1, 3]
+    assert names == ["0001.mcap", "0003.mcap"]
+
+
+def test_reading_generations_takes_the_memory_of_their_table(run: RunDirectory) -> None:
+    """Logs are looked at one by one, and no column is there twice: thousands need no more than their numbers."""
+    content = write(generations(60)).content
+    for replicate in range(200):
+        run.log_path(replicate).write_bytes(content)
+    read_generations(run, [0])
+    tracemalloc.start()
+    frame = read_generations(run)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    table = int(frame.memory_usage(index=False).sum())
+    assert len(frame) == 200 * 60 and table > 1_000_000
+    assert peak < 1.5 * table + 500_000, "besides the table one column, one log, and an object per array"

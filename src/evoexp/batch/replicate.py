@@ -1,5 +1,6 @@
 """The one loop: a planner yields generations, a log takes them, the certifier judges the best motion."""
 
+import hashlib
 import time
 
 from evoexp.collision.certificate import certificate
@@ -9,12 +10,20 @@ from evoexp.store.log import Finished, Log
 from evoexp.store.manifest import environment
 
 
-def run_replicate(condition: Condition, index: int) -> Finished:
-    """Run one seeded replicate; return its finished log as bytes and its summary row."""
+def run_replicate(condition: Condition, index: int, config_json: bytes | None = None) -> Finished:
+    """Run one seeded replicate; return its finished log as bytes and its summary row.
+
+    Args:
+        condition: What to run.
+        index: Of the replicate.
+        config_json: The condition's canonical form, where it is at hand; making it takes as long as a short run.
+    """
     cpu, wall = time.process_time(), time.perf_counter()
     rng = condition.rng(index)
     planner, problem = condition.prepare()
-    log = Log(condition.id, condition.to_json(), index, rng, environment=environment())
+    config_json = config_json or condition.to_json()
+    condition_id = hashlib.sha256(config_json).hexdigest()
+    log = Log(condition_id, config_json, index, rng, environment=environment())
     first_feasible: int | None = None
     last: Generation | None = None
     for last in planner.evolve(problem, rng):
@@ -26,7 +35,7 @@ def run_replicate(condition: Condition, index: int) -> Finished:
     verdict = certificate(problem, planner.motion(problem, last.best))
     certified = time.process_time()
     summary = ReplicateSummary(
-        condition=condition.id,
+        condition=condition_id,
         replicate=index,
         status="done",
         stop_reason="generations",

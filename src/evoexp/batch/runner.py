@@ -6,67 +6,26 @@ so an interrupted batch is resumed by asking for it again.
 
 import contextlib
 import itertools
-import time
-import traceback
 from collections import deque
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
 
 import joblib
 import numpy as np
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-from evoexp.batch.replicate import run_replicate
+from evoexp.batch.jobs import Job, Outcome, load, run_jobs
 from evoexp.batch.settings import RunnerSettings
-from evoexp.batch.workers import in_workers
+from evoexp.batch.workers import in_workers, loading
 from evoexp.collision.certificate import certificate
 from evoexp.condition import Condition
 from evoexp.paths.motion import Motion
 from evoexp.store.manifest import manifest
 from evoexp.store.run_directory import RunDirectory, lock_all
-from evoexp.store.tables import write_summary
 
 TASK_S = 0.05  # [s] replicates are bundled into tasks of about this length
 MAX_BUNDLE = 64  # replicates per task at most, so that results keep streaming
-
-
-class Job(NamedTuple):
-    """One replicate to run."""
-
-    condition_id: str
-    condition_json: bytes
-    replicate: int
-
-    @property
-    def key(self) -> tuple[str, int]:
-        """Names it among all jobs."""
-        return self.condition_id, self.replicate
-
-
-class Outcome(NamedTuple):
-    """One replicate that ended.
-
-    Attributes:
-        condition_id: 64 hex digits.
-        replicate: Its index.
-        reason: Why it failed, in one line; empty when done.
-        traceback: Of the failure.
-        content: The finished log; dropped once it is written.
-        wall_s: How long it took.
-    """
-
-    condition_id: str
-    replicate: int
-    reason: str
-    traceback: str
-    content: bytes
-    wall_s: float
-
-    @property
-    def failed(self) -> bool:
-        """Whether it ended without a log."""
-        return bool(self.reason)
 
 
 class Batch:
@@ -118,8 +77,13 @@ class Batch:
                 condition, _, notes = self._wanted[key]
                 run.create(condition.to_json(), manifest(key) | notes)
             self.jobs = self._missing()
+            num_workers = max(1, min(self._settings.num_workers or num_cores(), len(self.jobs)))
+            config_jsons = list(dict.fromkeys(job.condition_json for job in self.jobs))
+            with loading(num_workers, load, config_jsons):
+                _warm(config_jsons)
+                from evoexp.store.tables import write_summary  # and pandas: now there is time
             try:
-                for outcomes in fan_out(self.jobs, _warm(self.jobs, self._settings)):
+                for outcomes in fan_out(self.jobs, num_workers):
                     yield from self._store(outcomes)
             finally:
                 for run in self.runs.values():
@@ -128,8 +92,8 @@ class Batch:
     def _missing(self) -> list[Job]:
         jobs = []
         for key, (condition, count, _) in self._wanted.items():
-            done = self.runs[key].completed()
-            jobs += [Job(key, condition.to_json(), index) for index in range(count) if index not in done]
+            config_json, done = condition.to_json(), self.runs[key].completed()
+            jobs += [Job(key, config_json, index) for index in range(count) if index not in done]
         return jobs
 
     def _store(self, outcomes: Sequence[Outcome]) -> list[Outcome]:
@@ -143,22 +107,6 @@ class Batch:
         for key, contents in by_run.items():
             self.runs[key].write_logs(contents)
         return [outcome._replace(content=b"") for outcome in outcomes]
-
-
-def run_jobs(jobs: Sequence[Job]) -> list[Outcome]:
-    """Run some replicates, here; a failure is an outcome."""
-    outcomes = []
-    for job in jobs:
-        start = time.perf_counter()
-        try:
-            condition = Condition.from_json(job.condition_json)
-            content, reason, trace = run_replicate(condition, job.replicate).content, "", ""
-        except Exception as error:
-            content, trace = b"", traceback.format_exc()
-            reason = f"{type(error).__name__}: {error}".splitlines()[0]
-        seconds = time.perf_counter() - start
-        outcomes.append(Outcome(job.condition_id, job.replicate, reason, trace, content, seconds))
-    return outcomes
 
 
 def fan_out(jobs: Sequence[Job], num_workers: int) -> Iterator[list[Outcome]]:
@@ -184,11 +132,11 @@ def fan_out(jobs: Sequence[Job], num_workers: int) -> Iterator[list[Outcome]]:
 
 
 class _Bundles:
-    """Takes waiting jobs into tasks of about `TASK_S`, by the times seen so far."""
+    """Takes waiting jobs into tasks of about `TASK_S`, by the times seen of late."""
 
     def __init__(self, waiting: deque[Job], in_flight: dict[tuple[str, int], Job], num_workers: int) -> None:
         self._waiting, self._in_flight, self._num_workers = waiting, in_flight, num_workers
-        self._seconds, self._count = 0.0, 0
+        self._seconds, self._count = 0.0, 0.0
 
     def __iter__(self) -> Iterator[list[Job]]:
         while self._waiting:
@@ -201,7 +149,8 @@ class _Bundles:
             yield bundle
 
     def took(self, outcomes: Sequence[Outcome]) -> None:
-        """Note what came back."""
+        """Note what came back; what came before counts half from now on, so that slow first jobs are soon forgotten."""
+        self._seconds, self._count = self._seconds / 2.0, self._count / 2.0
         for outcome in outcomes:
             self._seconds += outcome.wall_s
             self._count += 1
@@ -220,9 +169,9 @@ def _run_alone(job: Job) -> Outcome:
     return Outcome(job.condition_id, job.replicate, "worker process died twice", trace, b"", 0.0)
 
 
-def _warm(jobs: Sequence[Job], settings: RunnerSettings) -> int:
-    """Compile every kernel the jobs need, once and here; return the number of workers that make sense."""
-    for text in dict.fromkeys(job.condition_json for job in jobs):
+def _warm(config_jsons: Iterable[bytes]) -> None:
+    """Compile every kernel that some conditions need, once and here."""
+    for text in config_jsons:
         with contextlib.suppress(Exception):  # a planner that fails does so again in its replicate, and is noted there
             condition = Condition.from_json(text)
             planner, problem = condition.prepare()
@@ -232,7 +181,6 @@ def _warm(jobs: Sequence[Job], settings: RunnerSettings) -> int:
                 certificate(problem, motion)
                 if motion is not None:  # and one that touches nothing, whose closest approach is sought
                     certificate(problem, Motion(np.repeat(motion.q[:1], 2, axis=0)))
-    return max(1, min(settings.num_workers or num_cores(), len(jobs)))
 
 
 def num_cores() -> int:

@@ -4,17 +4,19 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import joblib
+from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 WATCH_S = 1.0  # [s] between two looks whether the parent is alive
 
 
 def in_workers(num_workers: int, tasks: Iterable[Any], ordered: bool = False) -> Iterator[Any]:
-    """Run delayed calls in worker processes; yield what they return, as it comes or in order.
+    """Run delayed calls in worker processes, from now on; yield what they return, as it comes or in order.
 
     Raises:
         TerminatedWorkerError: If a worker dies.
@@ -30,8 +32,25 @@ def in_workers(num_workers: int, tasks: Iterable[Any], ordered: bool = False) ->
         initargs=(os.getpid(),),
     )
     with _children_ignore_interrupts():
-        results = pool(tasks)  # starts the workers
-    yield from results
+        results: Iterator[Any] = pool(tasks)  # starts the workers
+    return results
+
+
+@contextmanager
+def loading(num_workers: int, load: Callable[..., None], *arguments: Any) -> Iterator[None]:
+    """Have worker processes load what they will need, while the body does something else; wait for them at its end.
+
+    A worker that dies meanwhile is no error: whoever gives work to workers starts new ones.
+    """
+    if num_workers == 1:
+        yield
+        return
+    loaded = in_workers(num_workers, (joblib.delayed(load)(*arguments) for _ in range(num_workers)))
+    try:
+        yield
+    finally:
+        with suppress(TerminatedWorkerError):
+            deque(loaded, maxlen=0)
 
 
 def leave_with_parent(parent: int) -> None:

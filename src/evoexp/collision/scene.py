@@ -47,6 +47,13 @@ class Scene(NamedTuple):
         one, two = self.pairs[pair]
         return self.names[one], self.names[two]
 
+    def nearest_pair(self, q: FloatArray) -> tuple[str, str]:
+        """Return the names of the two bodies that are closest, or deepest in each other, at q (nq,) [rad]."""
+        data, placements = self.model.createData(), self.geometry.createData()
+        pin.computeDistances(self.model, data, self.geometry, placements, q)
+        distances = [result.min_distance for result in placements.distanceResults]
+        return self.pair_names(int(np.argmin(distances)))
+
 
 def scene(assembly: Assembly, obstacles: ObstacleTable | tuple[Any, ...] = (), self_pairs: bool = False) -> Scene:
     """Return a robot among obstacles: links of different arms, and every link with every obstacle.

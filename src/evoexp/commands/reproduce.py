@@ -1,7 +1,8 @@
 """`evoexp reproduce`: run replicates again and say MATCH, or the first generation that differs."""
 
 import argparse
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import joblib
@@ -48,11 +49,18 @@ def main(arguments: argparse.Namespace) -> int:
 def _logs(run: RunDirectory, replicate: int | None) -> list[Path]:
     done = sorted(run.completed())
     if replicate is not None and replicate not in done:
-        there = ", ".join(map(str, done)) or "none"
+        there = ", ".join(_spans(done)) or "none"
         raise NothingStored(f"run {run.hash12}: no finished replicate {replicate} (finished: {there})")
     if not done:
         raise NothingStored(f"run {run.hash12}: no finished replicate to compare with")
     return [run.log_path(k) for k in ([replicate] if replicate is not None else done)]
+
+
+def _spans(numbers: Sequence[int]) -> Iterator[str]:
+    """Yield ascending numbers as text, three and more in a row as one span: 0–1999."""
+    for _, group in itertools.groupby(enumerate(numbers), lambda pair: pair[1] - pair[0]):
+        row = [number for _, number in group]
+        yield from (f"{row[0]}–{row[-1]}",) if len(row) > 2 else map(str, row)
 
 
 def _compare_all(paths: Sequence[Path]) -> list[Comparison]:

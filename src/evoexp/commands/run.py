@@ -10,15 +10,14 @@ from rich.console import Console
 from rich.table import Table
 
 from evoexp import compose
-from evoexp.batch.runner import Batch, Outcome
+from evoexp.batch.jobs import Outcome
+from evoexp.batch.runner import Batch
 from evoexp.commands.arguments import add_experiment_arguments
 from evoexp.commands.console import add_columns, add_hash_column, new_table, plain_console
 from evoexp.commands.progress import BatchProgress
-from evoexp.commands.report import of_experiment
 from evoexp.errors import UnknownOption
 from evoexp.report.pages import PAGES
 from evoexp.store.run_directory import RunDirectory, outputs_root
-from evoexp.store.tables import read_summaries
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -47,6 +46,8 @@ def main(arguments: argparse.Namespace) -> int:
         for experiment in experiments:
             console.print(summary_table(experiment))
             if not arguments.no_report:
+                from evoexp.commands.report import of_experiment  # pandas
+
                 page = of_experiment(experiment, arguments.overrides, arguments.multirun, arguments.only)
                 console.print(f"report: {page}", soft_wrap=True)
     finally:
@@ -82,6 +83,8 @@ def _notes(experiment: compose.Experiment, label: str, command: str) -> dict[str
 
 def summary_table(experiment: compose.Experiment) -> Table:
     """Return one row per condition: what is there, and how good."""
+    from evoexp.store.tables import read_summaries  # pandas, which a batch loads while its workers start
+
     table = new_table(experiment.report_name)
     add_columns(table, "condition")
     add_hash_column(table)

@@ -112,8 +112,10 @@ class Coevolution(Component):
         problem = Problem(assembly, collision, start, goal, moving, bodies, scenario.security_margin)
         for name, posture in (("q_start", start), ("q_goal", goal)):
             if contact := collision.contact(posture):
+                relative = np.stack([posture[:, 0], posture[:, 1] - posture[:, 0]], axis=1).ravel()
+                closest = " and ".join(bodies.nearest_pair(relative))
                 given = (posture / DEGREE).round(9).tolist()
-                raise SettingError(f"scenario.{name}", f"free of collision ({contact})", given)
+                raise SettingError(f"scenario.{name}", f"free of collision ({contact}: {closest})", given)
         return problem
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:

@@ -20,6 +20,7 @@ from evoexp.validation import TARGET
 OVERRIDE = "override"
 _COMMENT = re.compile(r"#\s*(?:\[(?P<unit>[^\]]*)\])?\s*(?P<source>.*)")
 _REFERENCE = re.compile(r"\$\{(\w+)\}")
+_SHARED = re.compile(r"\$\{(\w+\.[\w.]+)\}")  # one setting of another group
 
 
 class Entry(NamedTuple):
@@ -175,6 +176,8 @@ def _flat(value: Any, prefix: str) -> Iterator[tuple[str, Any]]:
 def _parameter(name: str, value: Any, entry: Entry | None, otherwise: str) -> Parameter:
     if entry is None:
         return Parameter(name, _text(value), "", otherwise)
+    if shared := _SHARED.fullmatch(str(entry.value)):
+        return Parameter(name, _text(value), "", f"as {shared[1]}")
     source = entry.source if _same(value, entry.value) else otherwise
     return Parameter(name, _text(value), entry.unit, source)
 

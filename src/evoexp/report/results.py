@@ -1,5 +1,6 @@
 """What the outputs hold of the conditions that a report is asked for."""
 
+import functools
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -39,6 +40,39 @@ class Verdicts(NamedTuple):
     with_margin: int
 
 
+class StoredLogs:
+    """What the logs of some finished replicates hold, each part read when it is first asked for.
+
+    A page that draws no convergence reads no generation; thousands of logs are looked at one by one, and only the
+    columns stay.
+    """
+
+    def __init__(self, run: RunDirectory, replicates: Sequence[int], best: int | None) -> None:
+        """Name the logs; nothing is read.
+
+        Args:
+            run: Where they are.
+            replicates: Which, in order.
+            best: Replicate of the lowest best cost; None where nothing is finished.
+        """
+        self._run, self._replicates, self._best = run, replicates, best
+
+    @functools.cached_property
+    def generations(self) -> pd.DataFrame:
+        """One row per generation of every replicate."""
+        return read_generations(self._run, self._replicates)
+
+    @functools.cached_property
+    def solutions(self) -> dict[int, FloatArray]:
+        """Replicate → its best solution, flat."""
+        return {k: read_solution(self._run.log_path(k)).values for k in self._replicates}
+
+    @functools.cached_property
+    def first_solution(self) -> FloatArray | None:
+        """Best of the initial population of the best replicate; None where nothing is finished."""
+        return None if self._best is None else read_log(self._run.log_path(self._best)).solutions[0].values
+
+
 class ConditionResults(NamedTuple):
     """One condition's replicates as far as they are stored and planned.
 
@@ -48,9 +82,7 @@ class ConditionResults(NamedTuple):
         planned: Number of replicates; what is stored beyond is not looked at.
         summaries: One row per finished replicate, indexed by replicate, in order.
         failures: Replicate → why it failed.
-        generations: One row per generation of every finished replicate.
-        solutions: Replicate → its best solution, flat.
-        first_solution: Best of the initial population of the best replicate; None where nothing is finished.
+        logs: What the logs of the finished replicates hold.
         code: Version, commit and dirty flag of the code that created the run.
     """
 
@@ -59,10 +91,23 @@ class ConditionResults(NamedTuple):
     planned: int
     summaries: pd.DataFrame
     failures: dict[int, str]
-    generations: pd.DataFrame
-    solutions: dict[int, FloatArray]
-    first_solution: FloatArray | None
+    logs: StoredLogs
     code: dict[str, Any]
+
+    @property
+    def generations(self) -> pd.DataFrame:
+        """One row per generation of every finished replicate."""
+        return self.logs.generations
+
+    @property
+    def solutions(self) -> dict[int, FloatArray]:
+        """Replicate → its best solution, flat."""
+        return self.logs.solutions
+
+    @property
+    def first_solution(self) -> FloatArray | None:
+        """Best of the initial population of the best replicate; None where nothing is finished."""
+        return self.logs.first_solution
 
     @property
     def hash12(self) -> str:
@@ -102,7 +147,7 @@ class ConditionResults(NamedTuple):
     @property
     def best_replicate(self) -> int:
         """Replicate of the lowest best cost; the first of equals."""
-        return int(self.summaries.index[int(np.argmin(self.column("best_cost")))])
+        return _best_replicate(self.summaries)
 
     @property
     def prepared(self) -> Prepared:
@@ -203,23 +248,20 @@ def _read(outputs: Path, label: str, condition: Condition, num_replicates: int |
     rows = read_summaries(run)
     rows = rows[rows["replicate"] < planned].sort_values("replicate", kind="stable").set_index("replicate")
     done, failed = rows[rows["status"] == "done"], rows[rows["status"] == "failed"]
-    generations = read_generations(run)
-    generations = generations[generations["replicate"].isin(done.index)].reset_index(drop=True)
-    solutions = {int(k): read_solution(run.log_path(int(k))).values for k in done.index}
-    results = ConditionResults(
+    best = _best_replicate(done) if len(done) else None
+    return ConditionResults(
         label,
         condition,
         planned,
         done,
         dict(zip(map(int, failed.index), map(str, failed["stop_reason"]), strict=True)),
-        generations,
-        solutions,
-        None,
+        StoredLogs(run, [int(k) for k in done.index], best),
         _code(run) if stored else {},
     )
-    if not solutions:
-        return results
-    return results._replace(first_solution=read_log(run.log_path(results.best_replicate)).solutions[0].values)
+
+
+def _best_replicate(done: pd.DataFrame) -> int:
+    return int(done.index[int(np.argmin(done["best_cost"].to_numpy(dtype=np.float64, na_value=np.nan)))])
 
 
 def _code(run: RunDirectory) -> dict[str, Any]:

@@ -4,7 +4,8 @@ Every reader first checks the whole file against its checksums (0.1 ms per log),
 only `read_log` also decodes every message and compares the content digest.
 """
 
-from collections.abc import Iterable, Iterator
+import operator
+from collections.abc import Iterator
 from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,13 +13,22 @@ from typing import Any, NamedTuple
 import numpy as np
 import orjson
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, ChunkIndex, Metadata, MetadataIndex, Schema
 from numpy.typing import NDArray
 
 from evoexp.errors import CorruptLog
 from evoexp.records import FrontRow, GenerationRow, ReplicateSummary, SolutionRow
 from evoexp.store import log as written
-from evoexp.store.container import Container, Message, check, chunk_messages, parse, unreadable_is_corrupt
+from evoexp.store.container import Container, Message, check, chunk_messages, unreadable_is_corrupt
+from evoexp.store.container_records import (
+    Channel,
+    ChunkPlace,
+    read_attachment,
+    read_channel,
+    read_chunk_index,
+    read_metadata,
+    read_metadata_index,
+    read_schema,
+)
 from evoexp.store.messages import (
     NONFINITE,
     TERM,
@@ -31,7 +41,7 @@ from evoexp.store.messages import (
     restore,
 )
 
-DTYPES: dict[Any, Any] = {int: np.int64, float: np.float64, bool: np.bool_, str: "U32"}  # of generation_columns
+DTYPES: dict[Any, Any] = {int: np.int64, float: np.float64, bool: np.bool_}  # of generation_columns
 Source = str | PathLike[str] | bytes
 
 
@@ -56,7 +66,7 @@ class _Index(NamedTuple):
     metadata: dict[str, int]  # name → offset
     channels: dict[str, Channel]  # by topic
     schemas: dict[int, str]  # id → name
-    chunks: list[ChunkIndex]
+    chunks: list[ChunkPlace]
 
 
 def read_log(source: Source) -> LogContents:
@@ -72,7 +82,7 @@ def read_log(source: Source) -> LogContents:
     with unreadable_is_corrupt(name):
         index = _index(container)
         run = _run(container, index, name)
-        attachments = {a.name: a.data for a in _bodies(container, Opcode.ATTACHMENT, Attachment)}
+        attachments = dict(read_attachment(body) for body in _bodies(container, Opcode.ATTACHMENT))
         messages, content_digest = _messages(container, index)
         metadata = _metadata(container, index, written.SUMMARY, name)
         if content_digest != decode_values(metadata)[written.CONTENT_DIGEST]:
@@ -115,14 +125,14 @@ def read_solution(source: Source) -> SolutionRow:
     with unreadable_is_corrupt(name):
         index = _index(container)
         _run(container, index, name)
-        channel_id = index.channels[written.SOLUTION_TOPIC].id
-        last = [chunk for chunk in index.chunks if channel_id in chunk.message_index_offsets][-1]
-        solutions = [data for channel, _, _, data in container.messages_at(last) if channel == channel_id]
+        number = index.channels[written.SOLUTION_TOPIC].number
+        last = [chunk for chunk in index.chunks if number in chunk.channels][-1]
+        solutions = [data for channel, _, _, data in container.messages_at(last.offset) if channel == number]
         return decode_solution(solutions[-1])
 
 
 def generation_columns(source: Source) -> dict[str, NDArray[Any]]:
-    """Return the records on /generation as one array per field and term, each (generations,).
+    """Return the records on /generation, without their chain, as one array per field and term, each (generations,).
 
     A term that a generation does not have is NaN there.
 
@@ -133,25 +143,25 @@ def generation_columns(source: Source) -> dict[str, NDArray[Any]]:
     with unreadable_is_corrupt(name):
         index = _index(container)
         _run(container, index, name)
-        channel_id = index.channels[written.GENERATION_TOPIC].id
-        data = [data for channel, _, _, data in _all_messages(container) if channel == channel_id]
+        number = index.channels[written.GENERATION_TOPIC].number
+        data = [data for channel, _, _, data in _all_messages(container) if channel == number]
         return _columns(orjson.loads(b"[" + b",".join(data) + b"]"))
 
 
 def _columns(rows: list[dict[str, Any]]) -> dict[str, NDArray[Any]]:
-    names: set[str] = set()
+    kinds = {name: DTYPES[kind] for name, kind in field_types(GenerationRow).items() if name != "chain"}
     for row in rows:
         if NONFINITE in row:
             restore(row)
-        if not row.keys() <= names:
-            names |= row.keys()
-    columns = {
-        name: np.array([row[name] for row in rows], dtype=DTYPES[kind])
-        for name, kind in field_types(GenerationRow).items()
-    }
-    for name in sorted(name for name in names if name.startswith(TERM)):
-        columns[name] = np.array([row.get(name, np.nan) for row in rows], dtype=np.float64)
-    return columns
+            del row[NONFINITE]
+    names = rows[0].keys() if rows else set()
+    if not all(row.keys() == names for row in rows):
+        names = {name for row in rows for name in row}
+        absent = dict.fromkeys((name for name in names if name.startswith(TERM)), np.nan)
+        rows = [absent | row for row in rows]
+    kinds |= dict.fromkeys(sorted(name for name in names if name.startswith(TERM)), np.float64)
+    values = zip(*map(operator.itemgetter(*kinds), rows), strict=True) if rows else [()] * len(kinds)
+    return {name: np.array(column, dtype=kinds[name]) for name, column in zip(kinds, values, strict=True)}
 
 
 def _open(source: Source) -> tuple[Container, str]:
@@ -167,24 +177,23 @@ def _index(container: Container) -> _Index:
     index = _Index({}, {}, {}, [])
     for opcode, body in container.summary_section():
         if opcode == Opcode.METADATA_INDEX:
-            entry = parse(MetadataIndex, body)
-            index.metadata[entry.name] = entry.offset
+            name, offset = read_metadata_index(body)
+            index.metadata[name] = offset
         elif opcode == Opcode.CHANNEL:
-            channel = parse(Channel, body)
+            channel = read_channel(body)
             index.channels[channel.topic] = channel
         elif opcode == Opcode.SCHEMA:
-            schema = parse(Schema, body)
-            index.schemas[schema.id] = schema.name
+            number, name = read_schema(body)
+            index.schemas[number] = name
         elif opcode == Opcode.CHUNK_INDEX:
-            index.chunks.append(parse(ChunkIndex, body))
+            index.chunks.append(read_chunk_index(body))
     return index
 
 
 def _metadata(container: Container, index: _Index, record: str, name: str) -> dict[str, str]:
     if record not in index.metadata:
         raise CorruptLog(f"{name}: incomplete: no metadata record '{record}'")
-    metadata: dict[str, str] = parse(Metadata, container.record_at(index.metadata[record])).metadata
-    return metadata
+    return read_metadata(container.record_at(index.metadata[record]))
 
 
 def _run(container: Container, index: _Index, name: str) -> dict[str, str]:
@@ -208,21 +217,20 @@ def _summary(metadata: dict[str, str], run: dict[str, str], name: str) -> Replic
     return summary
 
 
-def _bodies(container: Container, opcode: int, record: Any) -> Iterator[Any]:
-    return (parse(record, body) for kind, body in container.data_section() if kind == opcode)
+def _bodies(container: Container, opcode: int) -> Iterator[bytes]:
+    return (body for kind, body in container.data_section() if kind == opcode)
 
 
 def _all_messages(container: Container) -> Iterator[Message]:
-    chunks: Iterable[bytes] = (body for opcode, body in container.data_section() if opcode == Opcode.CHUNK)
-    return (message for chunk in chunks for message in chunk_messages(chunk))
+    return (message for chunk in _bodies(container, Opcode.CHUNK) for message in chunk_messages(chunk))
 
 
 def _messages(container: Container, index: _Index) -> tuple[dict[str, list[bytes]], str]:
     """Return the data of all messages by topic, and the content digest over them."""
     digest = written.ContentDigest()
-    topics = {channel.id: topic for topic, channel in index.channels.items()}
+    topics = {channel.number: topic for topic, channel in index.channels.items()}
     identities = {
-        c.id: written.channel_identity(c.topic, index.schemas[c.schema_id], c.message_encoding)
+        c.number: written.channel_identity(c.topic, index.schemas[c.schema], c.encoding)
         for c in index.channels.values()
     }
     messages: dict[str, list[bytes]] = {}

@@ -32,7 +32,8 @@ def field_types(record: type) -> dict[str, Any]:
     return {name: kind for name, kind in get_type_hints(record).items() if name != "terms"}
 
 
-def json_schema(record: type, terms: Iterable[str] = ()) -> bytes:
+@cache
+def json_schema(record: type, terms: tuple[str, ...] = ()) -> bytes:
     """Return the JSON Schema of a record's messages, in the subset that Foxglove reads (one type per field).
 
     Any number may be null, which JSON Schema could only say with a union type; see the module's first lines.

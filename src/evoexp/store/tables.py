@@ -1,7 +1,7 @@
 """Tables over logs: `summary.parquet`, always rebuildable, and DataFrames of summaries and generations."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from evoexp.errors import Busy, CorruptLog
 from evoexp.records import GenerationRow, ReplicateSummary, flatten
 from evoexp.store.files import write_file
 from evoexp.store.log_reader import DTYPES, generation_columns, read_summary
-from evoexp.store.messages import TERM, field_types
+from evoexp.store.messages import field_types
 from evoexp.store.run_directory import RunDirectory
 
 Runs = RunDirectory | Iterable[RunDirectory]
@@ -70,8 +70,14 @@ def read_summaries(runs: Runs) -> pd.DataFrame:
     return frame
 
 
-def read_generations(runs: Runs) -> pd.DataFrame:
-    """Return the generations of all completed replicates of one or several runs.
+def read_generations(runs: Runs, replicates: Collection[int] | None = None) -> pd.DataFrame:
+    """Return the generations of completed replicates of one or several runs.
+
+    Logs are read one after the other; of each only its columns are kept.
+
+    Args:
+        runs: One or several.
+        replicates: Which ones of every run, done or not; None: all.
 
     Returns:
         Columns condition (categorical), replicate, those of `GenerationRow` without its chain, and `term_<name>` in
@@ -81,27 +87,28 @@ def read_generations(runs: Runs) -> pd.DataFrame:
         CorruptLog: A log is damaged.
     """
     directories = _as_list(runs)
-    codes, replicates, parts = [], [], []
+    codes, indices, parts = [], [], []
     for code, run in enumerate(directories):
-        for replicate in sorted(run.completed()):
-            columns = generation_columns(run.log_path(replicate))
-            del columns["chain"]
-            parts.append(columns)
+        done = run.completed()
+        for replicate in sorted(done if replicates is None else done.intersection(replicates)):
+            parts.append(generation_columns(run.log_path(replicate)))
             codes.append(code)
-            replicates.append(replicate)
+            indices.append(replicate)
     lengths = [len(columns["index"]) for columns in parts]
     categories = pd.Index([run.condition_id for run in directories], dtype="str")
     frame: dict[str, Any] = {
         "condition": pd.Categorical.from_codes(np.repeat(np.array(codes, dtype=np.int32), lengths), categories),
-        "replicate": np.repeat(np.array(replicates, dtype=np.int64), lengths),
+        "replicate": np.repeat(np.array(indices, dtype=np.int64), lengths),
     }
-    for name, kind in field_types(GenerationRow).items():
-        if name != "chain":
-            frame[name] = np.concatenate([np.empty(0, dtype=DTYPES[kind]), *(columns[name] for columns in parts)])
-    for name in sorted({name for columns in parts for name in columns if name.startswith(TERM)}):
-        absent = ((columns, np.full(length, np.nan)) for columns, length in zip(parts, lengths, strict=True))
-        frame[name] = np.concatenate([columns.get(name, missing) for columns, missing in absent])
-    return pd.DataFrame(frame)
+    kinds = {name: DTYPES[kind] for name, kind in field_types(GenerationRow).items() if name != "chain"}
+    kinds |= dict.fromkeys(sorted({name for columns in parts for name in columns} - set(kinds)), np.float64)
+    for name, kind in kinds.items():  # a column leaves the parts when it is in the frame: nothing is there twice
+        pieces = (columns.pop(name, None) for columns in parts)
+        filled = (
+            np.full(length, np.nan) if piece is None else piece for piece, length in zip(pieces, lengths, strict=True)
+        )
+        frame[name] = np.concatenate([np.empty(0, dtype=kind), *filled])
+    return pd.DataFrame(frame, copy=False)
 
 
 def _as_list(runs: Runs) -> list[RunDirectory]:

@@ -1,12 +1,14 @@
 """Pages: which figures, claims and checks a report of some experiment has."""
 
 import importlib
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from evoexp.errors import UnknownOption
-from evoexp.report.page import Page
-from evoexp.report.results import Results
 from evoexp.report.settings import ReportSettings
+
+if TYPE_CHECKING:  # pandas: `evoexp run` asks for the names of the pages before anything else
+    from evoexp.report.page import Page
+    from evoexp.report.results import Results
 
 PAGES = {
     "curkovic": "evoexp.report.pages.curkovic:page",
@@ -21,7 +23,7 @@ PAGES = {
 """Name, as `report.figures` gives it → `module:function`."""
 
 
-def page_of(results: Results, settings: ReportSettings) -> Page:
+def page_of(results: "Results", settings: ReportSettings) -> "Page":
     """Return the page that the settings name, filled from results.
 
     Raises:
@@ -31,4 +33,4 @@ def page_of(results: Results, settings: ReportSettings) -> Page:
     if name not in PAGES:
         raise UnknownOption("report.figures", name, PAGES)
     module, _, function = PAGES[name].partition(":")
-    return cast(Page, cast(Any, getattr(importlib.import_module(module), function))(results, settings))
+    return cast("Page", cast(Any, getattr(importlib.import_module(module), function))(results, settings))

@@ -1,0 +1,78 @@
+"""Replicates as tasks: a description goes out, what became of it comes back. All that a worker process loads."""
+
+import contextlib
+import functools
+import time
+import traceback
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from evoexp.batch.replicate import run_replicate
+from evoexp.condition import Condition
+
+
+class Job(NamedTuple):
+    """One replicate to run."""
+
+    condition_id: str
+    condition_json: bytes
+    replicate: int
+
+    @property
+    def key(self) -> tuple[str, int]:
+        """Names it among all jobs."""
+        return self.condition_id, self.replicate
+
+
+class Outcome(NamedTuple):
+    """One replicate that ended.
+
+    Attributes:
+        condition_id: 64 hex digits.
+        replicate: Its index.
+        reason: Why it failed, in one line; empty when done.
+        traceback: Of the failure.
+        content: The finished log; dropped once it is written.
+        wall_s: How long it took.
+    """
+
+    condition_id: str
+    replicate: int
+    reason: str
+    traceback: str
+    content: bytes
+    wall_s: float
+
+    @property
+    def failed(self) -> bool:
+        """Whether it ended without a log."""
+        return bool(self.reason)
+
+
+def run_jobs(jobs: Sequence[Job]) -> list[Outcome]:
+    """Run some replicates, here; a failure is an outcome."""
+    outcomes = []
+    for job in jobs:
+        start = time.perf_counter()
+        try:
+            condition = _condition(job.condition_json)
+            content, reason, trace = run_replicate(condition, job.replicate, job.condition_json).content, "", ""
+        except Exception as error:
+            content, trace = b"", traceback.format_exc()
+            reason = f"{type(error).__name__}: {error}".splitlines()[0]
+        seconds = time.perf_counter() - start
+        outcomes.append(Outcome(job.condition_id, job.replicate, reason, trace, content, seconds))
+    return outcomes
+
+
+def load(config_jsons: Sequence[bytes]) -> None:
+    """Load what some conditions need, code and compiled kernels; what is wrong with one is said by its jobs."""
+    for config_json in config_jsons:
+        with contextlib.suppress(Exception):
+            _condition(config_json).prepare()
+
+
+@functools.lru_cache(maxsize=64)
+def _condition(config_json: bytes) -> Condition:
+    """Return the condition of a canonical form; checking it takes as long as a short run, hence once per process."""
+    return Condition.from_json(config_json)

@@ -6,10 +6,13 @@ from evoexp.report.claims import (
     INCONCLUSIVE,
     NOT_JUDGED,
     REPRODUCED,
+    Comparison,
     adjusted,
     compare,
     judge_all,
+    judge_best,
     judge_better,
+    judge_better_than_all,
 )
 
 LOW, HIGH = np.arange(12.0), np.arange(12.0) + 20.0
@@ -58,7 +61,58 @@ def test_two_infinite_costs_do_not_differ() -> None:
     assert found.test.num_pairs == 2
 
 
+def pair(first: float, second: float) -> Comparison:
+    """Return a comparison of lower-is-better values that differ by a constant."""
+    return compare("x", LOW + first, LOW + second, True, 0.95, 50)
+
+
+BETTER, WORSE, EQUAL = pair(0.0, 20.0), pair(20.0, 0.0), pair(0.0, 0.0)
+
+
+def test_a_comparison_says_who_is_better() -> None:
+    assert [c.says(0.05) for c in (BETTER, WORSE, EQUAL)] == [1, -1, 0]
+    assert BETTER.says(1e-9) == 0
+
+
+@pytest.mark.parametrize(
+    ("comparisons", "verdict"),
+    [
+        ([BETTER, BETTER], REPRODUCED),
+        ([BETTER, EQUAL], INCONCLUSIVE),
+        ([BETTER, WORSE], CONTRADICTED),
+        ([EQUAL], INCONCLUSIVE),
+        ([], INCONCLUSIVE),
+    ],
+)
+def test_a_claim_about_being_better_than_each(comparisons: list[Comparison], verdict: str) -> None:
+    assert judge_better_than_all("", comparisons, 0.05) == verdict
+    assert judge_better_than_all("budget smoke", comparisons, 0.05) == NOT_JUDGED
+
+
+@pytest.mark.parametrize(
+    ("comparisons", "best_median", "verdict"),
+    [
+        ([BETTER, EQUAL], True, REPRODUCED),  # a neighbour may be as good
+        ([BETTER, EQUAL], False, INCONCLUSIVE),
+        ([EQUAL, EQUAL], True, INCONCLUSIVE),  # then none matters
+        ([BETTER, WORSE], True, CONTRADICTED),
+        ([], True, INCONCLUSIVE),
+    ],
+)
+def test_a_claim_about_the_best_setting(comparisons: list[Comparison], best_median: bool, verdict: str) -> None:
+    assert judge_best("", comparisons, best_median, 0.05) == verdict
+    assert judge_best("fewer replicates", comparisons, best_median, 0.05) == NOT_JUDGED
+
+
 def test_p_values_are_adjusted_over_all_comparisons() -> None:
     one, other = compare("a", LOW, HIGH, True, 0.95, 50), compare("b", LOW, LOW, True, 0.95, 50)
     first, second = adjusted([one, other])
     assert (first.p_adjusted, second.p_adjusted) == (2.0 * one.test.p_value, 1.0)
+
+
+def test_either_test_is_a_family_of_its_own() -> None:
+    found = adjusted([BETTER, EQUAL, EQUAL])
+    assert found[0].unpaired_adjusted == pytest.approx(3.0 * BETTER.unpaired.p_value)
+    assert found[0].p_adjusted == pytest.approx(3.0 * BETTER.test.p_value)
+    assert BETTER.unpaired.p_value != BETTER.test.p_value
+    assert found[1].unpaired_adjusted == 1.0

@@ -9,10 +9,12 @@ from hypothesis import strategies as st
 
 from evoexp.report.statistics import (
     EXACT_PAIRS,
+    EXACT_VALUES,
     Interval,
     effect,
     holm,
     quantile,
+    rank_sum,
     signed_rank,
     spread,
     vargha_delaney,
@@ -116,3 +118,45 @@ def test_effect_has_the_bootstrap_interval_of_its_pairs() -> None:
 def test_effect_of_separated_and_of_no_values() -> None:
     assert effect(np.arange(5.0) + 10.0, np.arange(5.0), 0.95, 50) == (1.0, (1.0, 1.0))
     assert math.isnan(effect(np.empty(0), np.empty(0), 0.95, 50).a12)
+
+
+@pytest.mark.parametrize(("n", "m"), [(1, 1), (5, 7), (20, 20), (30, 12)])
+def test_rank_sum_without_ties_is_the_exact_test_of_scipy(n: int, m: int) -> None:
+    rng = np.random.default_rng(n)
+    x, y = rng.normal(size=n), rng.normal(0.6, size=m)
+    expected = scipy.stats.mannwhitneyu(x, y, method="exact")
+    found = rank_sum(x, y)
+    assert found.u == expected.statistic
+    assert found.p_value == pytest.approx(expected.pvalue, rel=1e-12)
+
+
+def test_rank_sum_with_ties_counts_all_choices_of_ranks() -> None:
+    x, y = np.array([1.0, 1.0, 2.0, np.inf]), np.array([1.0, 2.0, 3.0, np.inf, np.inf])
+    ranks = scipy.stats.rankdata(np.concatenate([x, y]))
+    observed = ranks[:4].sum()
+    sums = np.array([sum(chosen) for chosen in itertools.combinations(ranks, 4)])
+    expected = min(1.0, 2.0 * min(np.mean(sums <= observed), np.mean(sums >= observed)))
+    found = rank_sum(x, y)
+    assert found.u == observed - 10.0
+    assert found.p_value == pytest.approx(expected, rel=1e-12)
+
+
+def test_rank_sum_of_many_values_is_the_normal_approximation_of_scipy() -> None:
+    rng = np.random.default_rng(5)
+    x, y = np.round(rng.normal(size=70), 1), np.round(rng.normal(0.3, size=60), 1)
+    expected = scipy.stats.mannwhitneyu(x, y, method="asymptotic", use_continuity=False)
+    assert len(x) + len(y) > EXACT_VALUES
+    assert rank_sum(x, y).u == expected.statistic
+    assert rank_sum(x, y).p_value == pytest.approx(expected.pvalue, rel=1e-9)
+
+
+def test_rank_sum_of_equal_and_of_no_values_says_nothing() -> None:
+    assert rank_sum(np.ones(4), np.ones(6)) == (12.0, 1.0)
+    assert rank_sum(np.ones(80), np.ones(80)).p_value == 1.0
+    assert rank_sum(np.empty(0), np.ones(3)) == (0.0, 1.0)
+
+
+def test_a12_is_the_rank_sums_share_of_pairs() -> None:
+    rng = np.random.default_rng(6)
+    x, y = np.round(rng.normal(size=12), 1), np.round(rng.normal(size=12), 1)
+    assert vargha_delaney(x, y) == pytest.approx(rank_sum(x, y).u / 144)

@@ -1,11 +1,12 @@
 """Verdicts on what a paper claims, computed from results; below the paper's budget nothing is judged."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from evoexp.records import FloatArray
-from evoexp.report.statistics import Effect, SignedRank, effect, holm, quantile, signed_rank
+from evoexp.report.statistics import Effect, RankSum, SignedRank, effect, holm, quantile, rank_sum, signed_rank
 
 REPRODUCED, CONTRADICTED, INCONCLUSIVE, NOT_JUDGED = "reproduced", "contradicted", "inconclusive", "not judged"
 
@@ -34,7 +35,9 @@ class Comparison(NamedTuple):
         num_seeds: Replicates that both have.
         median_difference: Of first minus second.
         test: Signed-rank test of the pairs.
-        p_adjusted: By Holm over all quantities compared; equal to the plain one until `adjusted`.
+        p_adjusted: Its p-value by Holm over all quantities compared; equal to the plain one until `adjusted`.
+        unpaired: The same values tested as independent samples.
+        unpaired_adjusted: Its p-value by Holm, a family of its own.
         better: A12 of the first being better than the second.
     """
 
@@ -43,7 +46,15 @@ class Comparison(NamedTuple):
     median_difference: float
     test: SignedRank
     p_adjusted: float
+    unpaired: RankSum
+    unpaired_adjusted: float
     better: Effect
+
+    def says(self, significance: float) -> int:
+        """Return 1 if the first is significantly better, −1 if it is significantly worse, 0 if neither."""
+        if self.p_adjusted >= significance or self.better.a12 == 0.5:
+            return 0
+        return 1 if self.better.a12 > 0.5 else -1
 
 
 def judge_all(not_judged: str, holds: int, done: int, planned: int) -> str:
@@ -75,11 +86,49 @@ def judge_better(not_judged: str, comparison: Comparison | None, significance: f
     """
     if not_judged:
         return NOT_JUDGED
-    if comparison is None or comparison.p_adjusted >= significance:
+    if comparison is None:
         return INCONCLUSIVE
-    if comparison.better.a12 == 0.5:
-        return INCONCLUSIVE
-    return REPRODUCED if comparison.better.a12 > 0.5 else CONTRADICTED
+    return {1: REPRODUCED, -1: CONTRADICTED}.get(comparison.says(significance), INCONCLUSIVE)
+
+
+def judge_better_than_all(not_judged: str, comparisons: Sequence[Comparison], significance: float) -> str:
+    """Judge a claim that one condition is better than each of several others.
+
+    Args:
+        not_judged: Why it is not to be judged; empty: judge it.
+        comparisons: Of that condition with each other one.
+        significance: Below this adjusted p-value a difference counts.
+
+    Returns:
+        Contradicted by one that is significantly better, reproduced if all are significantly worse.
+    """
+    if not_judged:
+        return NOT_JUDGED
+    found = [comparison.says(significance) for comparison in comparisons]
+    if -1 in found:
+        return CONTRADICTED
+    return REPRODUCED if found and 0 not in found else INCONCLUSIVE
+
+
+def judge_best(not_judged: str, comparisons: Sequence[Comparison], best_median: bool, significance: float) -> str:
+    """Judge a claim that one of several settings is the best.
+
+    Args:
+        not_judged: Why it is not to be judged; empty: judge it.
+        comparisons: Of that setting with each other one.
+        best_median: Whether no other setting has a better median.
+        significance: Below this adjusted p-value a difference counts.
+
+    Returns:
+        Contradicted by one that is significantly better; reproduced if it has the best median and one other setting at
+        least is significantly worse: neighbours of a best setting are about as good, so not all need be.
+    """
+    if not_judged:
+        return NOT_JUDGED
+    found = [comparison.says(significance) for comparison in comparisons]
+    if -1 in found:
+        return CONTRADICTED
+    return REPRODUCED if best_median and 1 in found else INCONCLUSIVE
 
 
 def compare(
@@ -95,15 +144,18 @@ def compare(
         confidence: Level of the interval.
         num_resamples: Of the bootstrap.
     """
-    test = signed_rank(first, second)
+    test, unpaired = signed_rank(first, second), rank_sum(first, second)
     sign = -1.0 if lower_is_better else 1.0
     better = effect(sign * first, sign * second, confidence, num_resamples)
     differences = np.zeros(len(first))
     np.subtract(first, second, out=differences, where=first != second)  # two infinite costs do not differ
-    return Comparison(quantity, len(first), quantile(differences, 0.5), test, test.p_value, better)
+    median = quantile(differences, 0.5)
+    return Comparison(quantity, len(first), median, test, test.p_value, unpaired, unpaired.p_value, better)
 
 
 def adjusted(comparisons: list[Comparison]) -> list[Comparison]:
-    """Return comparisons with p-values adjusted by Holm over all of them."""
-    p_values = holm([comparison.test.p_value for comparison in comparisons])
-    return [c._replace(p_adjusted=p) for c, p in zip(comparisons, p_values, strict=True)]
+    """Return comparisons with p-values adjusted by Holm over all of them, each of both tests a family."""
+    paired = holm([comparison.test.p_value for comparison in comparisons])
+    unpaired = holm([comparison.unpaired.p_value for comparison in comparisons])
+    found = zip(comparisons, paired, unpaired, strict=True)
+    return [c._replace(p_adjusted=p, unpaired_adjusted=q) for c, p, q in found]

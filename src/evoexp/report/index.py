@@ -120,14 +120,18 @@ def _comparison(rows: Iterable[Comparison], settings: ReportSettings) -> str:
                 f"{c.better.a12:.3f} [{low:.3f}, {high:.3f}]",
                 markdown.p_value(c.test.p_value),
                 markdown.p_value(c.p_adjusted),
+                markdown.p_value(c.unpaired.p_value),
+                markdown.p_value(c.unpaired_adjusted),
             )
         )
-    headers = ("quantity", "common seeds", "median difference", "A12 of being better", "p", "p adjusted")
+    tests = ("Wilcoxon p", "adjusted", "Mann–Whitney p", "adjusted")
+    headers = ("quantity", "common seeds", "median difference", "A12 of being better", *tests)
     note = (
         "Difference: first minus second, seed by seed. A12 (Vargha and Delaney): probability that a run of the first "
         f"is better than one of the second, ties count half; in brackets the {100 * settings.confidence:g} % "
-        f"percentile interval of {settings.num_resamples} resamples of seeds. p: Wilcoxon's signed-rank test, "
-        "two-sided; adjusted: Holm over the rows of this table.\n"
+        f"percentile interval of {settings.num_resamples} resamples of seeds. Two tests, "
+        "two-sided: Wilcoxon's signed-rank test of the pairs, which verdicts follow, and Mann and Whitney's of the "
+        "same values as independent samples; adjusted: Holm over the rows of this table, test by test.\n"
     )
     return f"{markdown.table(headers, cells)}\n{note}"
 

@@ -38,9 +38,11 @@ def percent(interval: Interval) -> str:
 
 
 def spread(values: Spread) -> str:
-    """Return a median with its quartiles."""
+    """Return a median with its quartiles; a single value as it is."""
     if not values.num_values:
         return "–"
+    if values.num_values == 1:
+        return number(values.median)
     return f"{number(values.median)} [{number(values.lower)}, {number(values.upper)}]"
 
 

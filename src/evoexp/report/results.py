@@ -182,11 +182,13 @@ class Results(NamedTuple):
         experiment: Name of the experiment; empty for runs given by their hashes.
         budget: Name of the budget; empty for runs given by their hashes.
         conditions: In the order of the experiment.
+        outputs: Root of the outputs that they were read from.
     """
 
     experiment: str
     budget: str
     conditions: tuple[ConditionResults, ...]
+    outputs: Path = Path()
 
     @property
     def with_data(self) -> tuple[ConditionResults, ...]:
@@ -234,7 +236,7 @@ def gather(
     found = tuple(_read(outputs, label, condition, num_replicates) for label, condition in conditions)
     if not any(condition.done or condition.failed for condition in found):
         raise NothingStored(f"{experiment or 'report'}: nothing stored in {outputs}; try: {command}")
-    return Results(experiment, budget, found)
+    return Results(experiment, budget, found, outputs)
 
 
 def _read(outputs: Path, label: str, condition: Condition, num_replicates: int | None) -> ConditionResults:

@@ -13,6 +13,7 @@ import numpy as np
 from evoexp.records import FloatArray
 
 EXACT_PAIRS = 200  # up to here the signed-rank distribution is computed, beyond it approximated
+EXACT_VALUES = 100  # of both samples together: the same of the rank-sum distribution
 BOOTSTRAP_SEED = 20_250_419  # of the report's own generator; any fixed number
 
 
@@ -50,6 +51,18 @@ class SignedRank(NamedTuple):
 
     num_pairs: int
     positive_ranks: float
+    p_value: float
+
+
+class RankSum(NamedTuple):
+    """Mann and Whitney's test of two independent samples.
+
+    Attributes:
+        u: Pairs (x, y) with x > y, and half of those with x = y.
+        p_value: Two-sided.
+    """
+
+    u: float
     p_value: float
 
 
@@ -113,6 +126,21 @@ def signed_rank(x: FloatArray, y: FloatArray) -> SignedRank:
     return SignedRank(len(ranks), doubled / 2.0, test(ranks, doubled))
 
 
+def rank_sum(x: FloatArray, y: FloatArray) -> RankSum:
+    """Test whether values of two samples differ (Mann and Whitney 1947); ties share their mean rank.
+
+    Args:
+        x: (n,); infinite values are compared as such.
+        y: (m,).
+    """
+    if not len(x) or not len(y):
+        return RankSum(0.0, 1.0)
+    ranks = _doubled_midranks(np.concatenate([x, y]))
+    doubled = int(ranks[: len(x)].sum())
+    test = _exact_rank_sum_p if len(ranks) <= EXACT_VALUES else _normal_rank_sum_p
+    return RankSum((doubled - len(x) * (len(x) + 1)) / 2.0, test(ranks, len(x), doubled))
+
+
 def holm(p_values: Sequence[float]) -> list[float]:
     """Return p-values adjusted by Holm's step-down method, in the given order."""
     adjusted, running = [0.0] * len(p_values), 0.0
@@ -173,3 +201,23 @@ def _normal_p(ranks: np.ndarray, doubled: int) -> float:
     """Two-sided p by the normal approximation, ties accounted for by the ranks themselves."""
     mean, variance = ranks.sum() / 2.0, float((ranks.astype(np.float64) ** 2).sum()) / 4.0
     return min(1.0, 2.0 * NormalDist().cdf(-abs(doubled - mean) / math.sqrt(variance)))
+
+
+def _exact_rank_sum_p(ranks: np.ndarray, size: int, doubled: int) -> float:
+    """Two-sided p over all choices of `size` of the ranks."""
+    choices = np.zeros((size + 1, int(ranks.sum()) + 1))  # (how many are chosen, their sum): number of ways
+    choices[0, 0] = 1.0
+    for k, rank in enumerate(ranks):
+        for chosen in range(min(k + 1, size), 0, -1):
+            choices[chosen, rank:] += choices[chosen - 1, : choices.shape[1] - rank]
+    ways = choices[size]
+    below, above = math.fsum(ways[: doubled + 1]), math.fsum(ways[doubled:])
+    return min(1.0, 2.0 * min(below, above) / math.comb(len(ranks), size))
+
+
+def _normal_rank_sum_p(ranks: np.ndarray, size: int, doubled: int) -> float:
+    """Two-sided p by the normal approximation, ties accounted for by the ranks themselves."""
+    total, other = len(ranks), len(ranks) - size
+    mean = size * float(ranks.mean())
+    variance = size * other / (total - 1) * float(np.mean((ranks - ranks.mean()) ** 2))
+    return min(1.0, 2.0 * NormalDist().cdf(-abs(doubled - mean) / math.sqrt(variance))) if variance else 1.0

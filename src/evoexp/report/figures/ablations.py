@@ -1,33 +1,39 @@
 """Ablations: one quantity of every condition side by side, and how much better the first condition is."""
 
+import textwrap
+from collections.abc import Callable, Mapping
+
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from evoexp.records import FloatArray
 from evoexp.report import style
 from evoexp.report.claims import Comparison
 from evoexp.report.figures.boxes import draw_box
-from evoexp.report.results import Results
+from evoexp.report.results import ConditionResults, Results
+from evoexp.report.statistics import quantile
 from evoexp.report.tables import groups
 
+WRAPPED = 24  # characters of a name in a panel, per line
+Values = Callable[[ConditionResults], FloatArray]
 
-def values_table(results: Results, names: dict[str, str]) -> pd.DataFrame:
+
+def values_table(results: Results, quantities: Mapping[str, Values]) -> pd.DataFrame:
     """Return quantities of every finished replicate.
 
     Args:
         results: With data.
-        names: Column of the summaries → its name with unit.
+        quantities: Name with unit → its values of a condition, (done,); inf: never.
 
     Returns:
         Columns quantity, position, condition, replicate, value, failed (replicates of the condition).
     """
     parts = []
-    for column, name in names.items():
+    for name, values in quantities.items():
         for position, c in enumerate(results.with_data):
             given = {"quantity": name, "position": position, "condition": c.label}
-            parts.append(
-                pd.DataFrame(given | {"replicate": c.summaries.index, "value": c.column(column), "failed": c.failed})
-            )
+            parts.append(pd.DataFrame(given | {"replicate": c.summaries.index, "value": values(c), "failed": c.failed}))
     return pd.concat(parts, ignore_index=True)
 
 
@@ -41,9 +47,14 @@ def draw_values(table: pd.DataFrame) -> Figure:
         rows = table[table["quantity"] == quantity]
         for position, own in groups(rows, "position"):
             draw_box(axes, position, own["value"].to_numpy(), style.condition_colour(position))
-        middle = rows.loc[rows["position"] == 0, "value"].median()
-        axes.axvline(middle, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
-        axes.set_xlabel(quantity)
+            never = int(np.isinf(own["value"]).sum())
+            if never:
+                place = (1.01, position)
+                axes.annotate(f"{never} never", place, xycoords=axes.get_yaxis_transform(), fontsize=6.5, va="center")
+        middle = quantile(rows.loc[rows["position"] == 0, "value"].to_numpy(), 0.5)
+        if np.isfinite(middle):
+            axes.axvline(middle, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
+        axes.set_xlabel(textwrap.fill(quantity, WRAPPED))
         axes.margins(x=0.06)
     counts = (
         table[table["quantity"] == quantities[0]].groupby("position").agg(n=("value", "size"), failed=("failed", "max"))
@@ -99,7 +110,7 @@ def draw_effects(table: pd.DataFrame) -> Figure:
             label=f"adjusted p ≥ {level:g}",
         )
         axes.set_xlim(-0.03, 1.03)
-        axes.set_title(quantity)
+        axes.set_title(textwrap.fill(quantity, WRAPPED))
         axes.set_xlabel("A12: the first condition is better")
     panels[0].set_yticks(range(len(labels)), [f"against {label}" for label in labels])
     panels[0].set_ylim(len(labels) - 0.5, -0.5)

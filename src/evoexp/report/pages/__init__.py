@@ -12,6 +12,9 @@ if TYPE_CHECKING:  # pandas: `evoexp run` asks for the names of the pages before
 
 PAGES = {
     "curkovic": "evoexp.report.pages.curkovic:page",
+    "curkovic_motion": "evoexp.report.pages.curkovic_motion:page",
+    "curkovic_pareto": "evoexp.report.pages.curkovic_pareto:page",
+    "curkovic_sweep": "evoexp.report.pages.curkovic_sweep:page",
     "ablations": "evoexp.report.pages.ablations:page",
     "generic": "evoexp.report.pages.generic:page",
     "planar_arms": "evoexp.report.pages.planar_arms:page",

@@ -36,7 +36,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
     first = results.with_data[0].label
     quantities = list(base.quantities)
     quantities.insert(1, generic.quantity(results, COMPARED[1][1], unit, generic.by_column("clearance")))
-    names = {column: f"{short} [{units[name]}]" for short, name, _, _, column in COMPARED[:DRAWN]}
+    drawn = {f"{short} [{units[name]}]": generic.by_column(column) for short, name, _, _, column in COMPARED[:DRAWN]}
     effects = {short: tables[name] for short, name, _, _, _ in COMPARED[:DRAWN]}
     return base._replace(
         title=f"{results.experiment or 'stored runs'}: {first} against each other condition",
@@ -45,7 +45,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
         claims=_claims(results, settings, tables[COMPARED[0][1]]),
         comparisons=tuple((f"{name}: {first} against …", rows) for name, rows in tables.items() if rows),
         drawings=(
-            _drawing(results, "values", "Every condition", VALUES, partial(ablations.values_table, results, names)),
+            _drawing(results, "values", "Every condition", VALUES, partial(ablations.values_table, results, drawn)),
             _drawing(
                 results,
                 "effects",

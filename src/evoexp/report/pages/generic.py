@@ -55,8 +55,8 @@ def term_quantities(results: Results) -> tuple[Quantity, ...]:
     rows = []
     for term in results.terms:
         name, unit = term.replace("_", " "), "–"
-        if term.endswith("_deg"):
-            name, unit = name.removesuffix(" deg"), "deg"
+        if term.endswith(("_deg", "_rad")):
+            name, _, unit = name.rpartition(" ")
         elif "distance" in term or "clearance" in term:
             unit = results.with_data[0].condition.length_unit or "–"
         rows.append(quantity(results, name, unit, by_column(TERM + term)))

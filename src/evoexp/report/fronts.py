@@ -1,0 +1,20 @@
+"""Fronts of populations, as the log of a replicate holds them."""
+
+from evoexp.records import FrontRow
+from evoexp.report.results import ConditionResults, Results
+from evoexp.store.log_reader import read_log
+from evoexp.store.run_directory import RunDirectory
+
+
+def read_fronts(results: Results, condition: ConditionResults, replicate: int) -> list[FrontRow]:
+    """Return what a finished replicate's log says of its populations' criteria, one record per population.
+
+    Args:
+        results: That the condition is one of.
+        condition: Whose replicate.
+        replicate: Which.
+
+    Raises:
+        CorruptLog: If the log cannot be trusted.
+    """
+    return read_log(RunDirectory(results.outputs, condition.condition.id).log_path(replicate)).fronts

@@ -136,12 +136,13 @@ def _checks(results: Results) -> tuple[tuple[str, str], ...]:
         (f"Solved motions that fail: {rate.defect}", measures.rates_text(results, which))
         for which, rate in enumerate(measures.rates(results.with_data[0]))
     ]
-    prepared = results.with_data[0].prepared
+    first = results.with_data[0]
+    prepared = first.prepared
     if prepared.problem.collision.enveloped:
         sticks = [c.label for c in results.with_data if _sticks_out(c)]
         what = "Boundary lines have no ends: the body of a link, round at its end, sticks out where the tool is smaller"
         defects.append((what, "; ".join(sticks) or "nowhere"))
-    notes = [("Length of the chromosome (Eqs. 2, 3)", note) for note in prepared.planner.notes(prepared.problem)]
+    notes = [("Length of the chromosome (Eqs. 2, 3)", note) for note in first.planner.notes(prepared.problem)]
     return (*defects, *notes)
 
 

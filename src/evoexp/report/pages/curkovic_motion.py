@@ -116,9 +116,13 @@ def _claims(results: Results, settings: ReportSettings, tools: tuple[Comparison,
         else:
             text, source = "A collision-free motion of two robots in each other's way", "section 4, Figs. 8, 9"
         certified = int((c.summaries["certified"].eq(True) & c.summaries["solved"]).sum())
-        for judge, holds in (("the paper's model", c.solved), ("the exact verdict on the whole motion", certified)):
-            verdict = claims.judge_all(reason, holds, c.done, c.planned)
-            evidence = f"{markdown.share(holds, c.done)} runs"
+        decided = c.done - c.verdicts.undecided
+        for judge, holds, judged in (
+            ("the paper's model", c.solved, c.done),
+            ("the exact verdict on the whole motion", certified, decided),
+        ):
+            verdict = claims.judge_all(reason, holds, judged, c.planned)
+            evidence = f"{markdown.share(holds, judged)} runs"
             found.append(
                 measures.claim(f"{c.label}: {text}, in every run, by {judge}", source, evidence, verdict, reason)
             )

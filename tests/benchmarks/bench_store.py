@@ -1,4 +1,4 @@
-"""What a replicate costs besides its planner: its log beside mcap's own writer and reader, and its way to the disk."""
+"""What a replicate costs besides its planner: reading its log, beside mcap's own reader, and its way to the disk."""
 
 import io
 import json
@@ -10,11 +10,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from mcap.reader import make_reader
-from mcap.writer import CompressionType, IndexType, Writer
 
 from evoexp import compose
 from evoexp.batch.replicate import run_replicate
-from evoexp.store.container_writer import CHUNK_SIZE, ContainerWriter
 from evoexp.store.files import write_file, write_files
 from evoexp.store.log_reader import generation_columns, read_log, read_summary
 
@@ -29,48 +27,9 @@ def content() -> bytes:
     return run_replicate(condition, 0).content
 
 
-def messages(content: bytes) -> list[tuple[str, str, bytes, int, bytes]]:
-    """Return (topic, schema's name, schema, log_time, data) of every message."""
-    found = make_reader(io.BytesIO(content)).iter_messages(log_time_order=False)
-    return [(c.topic, s.name, s.data, m.log_time, m.data) for s, c, m in found if s is not None]
-
-
-def written_by_us(given: list[tuple[str, str, bytes, int, bytes]]) -> bytes:
-    writer = ContainerWriter("evoexp")
-    channels: dict[str, int] = {}
-    for topic, name, schema, log_time, data in given:
-        if topic not in channels:
-            channels[topic] = writer.add_channel(topic, "json", (name, "jsonschema", schema))
-        writer.add_message(channels[topic], log_time, data)
-    return writer.finish()
-
-
-def written_by_mcap(given: list[tuple[str, str, bytes, int, bytes]]) -> bytes:
-    buffer = io.BytesIO()
-    settings: dict[str, Any] = {"compression": CompressionType.ZSTD, "index_types": IndexType.ALL}
-    writer = Writer(buffer, chunk_size=CHUNK_SIZE, use_summary_offsets=False, enable_data_crcs=True, **settings)
-    writer.start(profile="", library="evoexp")
-    channels: dict[str, int] = {}
-    counts: dict[str, int] = {}
-    for topic, name, schema, log_time, data in given:
-        if topic not in channels:
-            channels[topic] = writer.register_channel(topic, "json", writer.register_schema(name, "jsonschema", schema))
-        writer.add_message(channels[topic], log_time, data, log_time, counts.setdefault(topic, 0))
-        counts[topic] += 1
-    writer.finish()
-    return buffer.getvalue()
-
-
 def frame_by_mcap(content: bytes) -> pd.DataFrame:
     found = make_reader(io.BytesIO(content)).iter_messages(topics=["/generation"])
     return pd.DataFrame([json.loads(message.data) for _, _, message in found])
-
-
-def bench_write_log(beside: Any, content: bytes) -> None:
-    given = messages(content)
-    assert written_by_us(given) == written_by_mcap(given)
-    work = f"MCAP of {len(given)} messages"
-    beside(work, lambda: written_by_us(given), {"mcap": (lambda: written_by_mcap(given), 1, 1)}, "log")
 
 
 def bench_read_generations(beside: Any, content: bytes) -> None:

@@ -7,22 +7,27 @@ import struct
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import NamedTuple
+from io import BytesIO
+from typing import Any, NamedTuple
 
 import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
 from mcap.opcode import Opcode
+from mcap.records import Chunk, ChunkIndex
+from mcap.stream_reader import get_chunk_data_stream
 
 from evoexp.errors import CorruptLog
-from evoexp.store.container_records import read_chunk
 
-MAGIC = b"\x89MCAP0\r\n"
-HEAD = struct.Struct("<BQ")  # opcode, length
-MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log_time, publish_time
-FOOTER = struct.Struct("<BQQQI")  # opcode, length, summary start, summary offset start, CRC
-DATA_END = struct.Struct("<BQI")  # opcode, length, CRC
-_TAIL = FOOTER.size + len(MAGIC)
+_MAGIC = b"\x89MCAP0\r\n"
+_HEAD = struct.Struct("<BQ")  # opcode, length
+_MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log_time, publish_time
+_FOOTER = struct.Struct("<BQQQI")  # opcode, length, summary start, summary offset start, CRC
+_DATA_END = struct.Struct("<BQI")  # opcode, length, CRC
+_TAIL = _FOOTER.size + len(_MAGIC)
 
 _UNREADABLE = (
+    McapError,
     zstandard.ZstdError,
     struct.error,
     ArithmeticError,
@@ -45,7 +50,7 @@ class Container(NamedTuple):
 
     def data_section(self) -> Iterator[tuple[int, bytes]]:
         """Yield (opcode, body) of every record of the data section."""
-        return _records(self.content, len(MAGIC), self.summary_start)
+        return _records(self.content, len(_MAGIC), self.summary_start)
 
     def summary_section(self) -> Iterator[tuple[int, bytes]]:
         """Yield (opcode, body) of every record of the summary section, the index of the file."""
@@ -57,9 +62,9 @@ class Container(NamedTuple):
             return body
         raise ValueError(f"no record at byte {offset}")
 
-    def messages_at(self, offset: int) -> Iterator[Message]:
+    def messages_at(self, index: ChunkIndex) -> Iterator[Message]:
         """Yield the messages of one chunk that the summary section points to."""
-        return chunk_messages(self.record_at(offset))
+        return chunk_messages(self.record_at(index.chunk_start_offset))
 
 
 @contextmanager
@@ -79,45 +84,51 @@ def check(content: bytes, name: str) -> Container:
     """
     if not content:
         raise CorruptLog(f"{name}: empty file")
-    if content[: len(MAGIC)] != MAGIC[: len(content)]:
+    if content[: len(_MAGIC)] != _MAGIC[: len(content)]:
         raise CorruptLog(f"{name}: not an MCAP file")
-    smallest = len(MAGIC) + DATA_END.size + _TAIL
-    if len(content) < smallest or content[-len(MAGIC) :] != MAGIC:
+    smallest = len(_MAGIC) + _DATA_END.size + _TAIL
+    if len(content) < smallest or content[-len(_MAGIC) :] != _MAGIC:
         raise CorruptLog(f"{name}: cut or overwritten: {len(content)} bytes that do not end as an MCAP ends")
-    opcode, length, summary_start, _, summary_crc = FOOTER.unpack_from(content, len(content) - _TAIL)
-    data_end = summary_start - DATA_END.size
-    if (opcode, length) != (Opcode.FOOTER, 20) or not len(MAGIC) <= data_end <= len(content) - smallest + len(MAGIC):
+    opcode, length, summary_start, _, summary_crc = _FOOTER.unpack_from(content, len(content) - _TAIL)
+    data_end = summary_start - _DATA_END.size
+    if (opcode, length) != (Opcode.FOOTER, 20) or not len(_MAGIC) <= data_end <= len(content) - smallest + len(_MAGIC):
         raise CorruptLog(f"{name}: altered: its footer is damaged")
     view = memoryview(content)
-    opcode, length, data_crc = DATA_END.unpack_from(content, data_end)
+    opcode, length, data_crc = _DATA_END.unpack_from(content, data_end)
     if not (data_crc and summary_crc) and (opcode, length) == (Opcode.DATA_END, 4):
         raise CorruptLog(f"{name}: not a log of evoexp: an MCAP without checksums")
-    if zlib.crc32(view[summary_start : -len(MAGIC) - 4]) != summary_crc:
+    if zlib.crc32(view[summary_start : -len(_MAGIC) - 4]) != summary_crc:
         raise CorruptLog(f"{name}: altered: the checksum of its summary section is wrong")
     if (opcode, length) != (Opcode.DATA_END, 4) or zlib.crc32(view[:data_end]) != data_crc:
         raise CorruptLog(f"{name}: altered: the checksum of its data section is wrong")
     return Container(content, summary_start)
 
 
+def parse(record: Any, body: bytes) -> Any:
+    """Return the record of mcap's class `record` that a body holds."""
+    return record.read(ReadDataStream(BytesIO(body)))
+
+
 def chunk_messages(body: bytes) -> Iterator[Message]:
     """Yield the messages of a chunk record, its checksum verified."""
-    content = read_chunk(body)
-    start, end, kind = 0, len(content), int(Opcode.MESSAGE)
+    stream, end = get_chunk_data_stream(parse(Chunk, body), validate_crc=True)
+    content = stream.read(end)
+    start, kind = 0, int(Opcode.MESSAGE)
     while start < end:
-        opcode, length = HEAD.unpack_from(content, start)
-        stop = start + HEAD.size + length
+        opcode, length = _HEAD.unpack_from(content, start)
+        stop = start + _HEAD.size + length
         if stop > end:
             raise ValueError(f"a message ends at byte {stop} of a chunk of {end}")
         if opcode == kind:
-            _, _, channel_id, sequence, log_time, _ = MESSAGE.unpack_from(content, start)
-            yield channel_id, sequence, log_time, content[start + MESSAGE.size : stop]
+            _, _, channel_id, sequence, log_time, _ = _MESSAGE.unpack_from(content, start)
+            yield channel_id, sequence, log_time, content[start + _MESSAGE.size : stop]
         start = stop
 
 
 def _records(content: bytes, start: int, end: int) -> Iterator[tuple[int, bytes]]:
     while start < end:
-        opcode, length = HEAD.unpack_from(content, start)
-        body = start + HEAD.size
+        opcode, length = _HEAD.unpack_from(content, start)
+        body = start + _HEAD.size
         start = body + length
         if start > end:
             raise ValueError(f"a record ends at byte {start}, beyond {end}")

@@ -1,14 +1,15 @@
 """One replicate as one self-contained MCAP, written in memory."""
 
+import io
 import struct
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 import xxhash
+from mcap.writer import CompressionType, IndexType, Writer
 
 from evoexp.records import FloatArray, FrontRow, Generation, GenerationRow, ReplicateSummary, SolutionRow
-from evoexp.store.container_writer import ContainerWriter
 from evoexp.store.digests import Chain, array_bytes
 from evoexp.store.messages import (
     TERM,
@@ -20,7 +21,7 @@ from evoexp.store.messages import (
     json_schema,
 )
 
-LIBRARY = "evoexp"  # no version: that is no part of what was computed
+LIBRARY = "evoexp"  # pinned, so that a log's bytes do not tell mcap's version
 SCHEMA_VERSION = 2  # of everything a log holds; raised when a reader of the old version would misunderstand
 RUN = "evoexp.run"
 SUMMARY = "evoexp.summary"
@@ -29,6 +30,7 @@ CONFIG = "config.json"
 CONTENT_DIGEST = "content_digest"
 GENERATION_TOPIC, SOLUTION_TOPIC, FRONT_TOPIC = "/generation", "/solution", "/front"
 
+_CHUNK_SIZE = 56 * 1024  # [B] a chunk ends with the message that passes this, hence within 64 KiB
 _MESSAGE = struct.Struct("<QIQ")  # log_time, sequence, bytes of data
 _BATCH = 64  # generations encoded together
 _TICK = 1_000_000_000  # [ns] the synthetic clock: one second per generation
@@ -71,11 +73,15 @@ def channel_identity(topic: str, schema_name: str, message_encoding: str) -> byt
     return "\0".join((topic, schema_name, message_encoding, "")).encode()
 
 
-class _Channel(NamedTuple):
-    """A channel of the log: its number, and its identity in the content digest."""
+class _Channel:
+    """A channel of the log: its id, its identity in the content digest, and how many messages it has."""
 
-    number: int
-    identity: bytes
+    def __init__(self, writer: Writer, topic: str, record: type, terms: tuple[str, ...] = ()) -> None:
+        name = f"evoexp.{record.__name__.removesuffix('Row')}"
+        schema_id = writer.register_schema(name, "jsonschema", json_schema(record, terms))
+        self.id = writer.register_channel(topic, "json", schema_id)
+        self.identity = channel_identity(topic, name, "json")
+        self.num_messages = 0
 
 
 class Log:
@@ -118,7 +124,17 @@ class Log:
         self._pending: list[_Pending] = []
         self._best = self._written = b""  # array_bytes of the best so far, and of the last solution written
         self._best_cost = self._written_cost = np.inf
-        self._writer = ContainerWriter(LIBRARY)
+        self._buffer = io.BytesIO()
+        self._writer = Writer(
+            self._buffer,
+            chunk_size=_CHUNK_SIZE,
+            compression=CompressionType.ZSTD,
+            index_types=IndexType.ALL,
+            use_summary_offsets=False,
+            enable_crcs=True,
+            enable_data_crcs=True,
+        )
+        self._writer.start(profile="", library=LIBRARY)
         run = {"condition": condition_id, "replicate": str(replicate), "schema_version": str(SCHEMA_VERSION)}
         self._writer.add_metadata(RUN, run)
         self._attach(CONFIG, config_json)
@@ -183,11 +199,12 @@ class Log:
         self._writer.add_metadata(ENVIRONMENT, encode_values(self._environment))
         content = encode_values({CONTENT_DIGEST: self._content.hexdigest()})
         self._writer.add_metadata(SUMMARY, encode_summary(summary) | content)
-        return Finished(self._writer.finish(), summary)
+        self._writer.finish()
+        return Finished(self._buffer.getvalue(), summary)
 
     def _attach(self, name: str, data: bytes) -> None:
         media_type = "application/json" if name.endswith(".json") else "application/octet-stream"
-        self._writer.add_attachment(name, media_type, data)
+        self._writer.add_attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=data)
 
     def _write_solution(self, index: int) -> None:
         self._written, self._written_cost = self._best, self._best_cost
@@ -197,13 +214,10 @@ class Log:
     def _add(self, topic: str, record: type, generation: int, data: bytes) -> None:
         channel = self._channels.get(topic)
         if channel is None:  # registered with its first message, when the terms are known
-            channel = self._channels[topic] = self._new_channel(topic, record)
+            terms = tuple(self._terms) if record is GenerationRow else ()
+            channel = self._channels[topic] = _Channel(self._writer, topic, record, terms)
         log_time = int(generation) * _TICK
-        sequence = self._writer.add_message(channel.number, log_time, data)
+        sequence = channel.num_messages
+        channel.num_messages += 1
+        self._writer.add_message(channel.id, log_time, data, log_time, sequence)
         self._content.update(channel.identity, log_time, sequence, data)
-
-    def _new_channel(self, topic: str, record: type) -> _Channel:
-        name = f"evoexp.{record.__name__.removesuffix('Row')}"
-        terms = tuple(self._terms) if record is GenerationRow else ()
-        number = self._writer.add_channel(topic, "json", (name, "jsonschema", json_schema(record, terms)))
-        return _Channel(number, channel_identity(topic, name, "json"))

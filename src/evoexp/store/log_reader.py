@@ -5,7 +5,7 @@ only `read_log` also decodes every message and compares the content digest.
 """
 
 import operator
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,22 +13,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import orjson
 from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, ChunkIndex, Metadata, MetadataIndex, Schema
 from numpy.typing import NDArray
 
 from evoexp.errors import CorruptLog
 from evoexp.records import FrontRow, GenerationRow, ReplicateSummary, SolutionRow
 from evoexp.store import log as written
-from evoexp.store.container import Container, Message, check, chunk_messages, unreadable_is_corrupt
-from evoexp.store.container_records import (
-    Channel,
-    ChunkPlace,
-    read_attachment,
-    read_channel,
-    read_chunk_index,
-    read_metadata,
-    read_metadata_index,
-    read_schema,
-)
+from evoexp.store.container import Container, Message, check, chunk_messages, parse, unreadable_is_corrupt
 from evoexp.store.messages import (
     NONFINITE,
     TERM,
@@ -66,7 +57,7 @@ class _Index(NamedTuple):
     metadata: dict[str, int]  # name → offset
     channels: dict[str, Channel]  # by topic
     schemas: dict[int, str]  # id → name
-    chunks: list[ChunkPlace]
+    chunks: list[ChunkIndex]
 
 
 def read_log(source: Source) -> LogContents:
@@ -82,7 +73,7 @@ def read_log(source: Source) -> LogContents:
     with unreadable_is_corrupt(name):
         index = _index(container)
         run = _run(container, index, name)
-        attachments = dict(read_attachment(body) for body in _bodies(container, Opcode.ATTACHMENT))
+        attachments = {a.name: a.data for a in _bodies(container, Opcode.ATTACHMENT, Attachment)}
         messages, content_digest = _messages(container, index)
         metadata = _metadata(container, index, written.SUMMARY, name)
         if content_digest != decode_values(metadata)[written.CONTENT_DIGEST]:
@@ -125,9 +116,9 @@ def read_solution(source: Source) -> SolutionRow:
     with unreadable_is_corrupt(name):
         index = _index(container)
         _run(container, index, name)
-        number = index.channels[written.SOLUTION_TOPIC].number
-        last = [chunk for chunk in index.chunks if number in chunk.channels][-1]
-        solutions = [data for channel, _, _, data in container.messages_at(last.offset) if channel == number]
+        channel_id = index.channels[written.SOLUTION_TOPIC].id
+        last = [chunk for chunk in index.chunks if channel_id in chunk.message_index_offsets][-1]
+        solutions = [data for channel, _, _, data in container.messages_at(last) if channel == channel_id]
         return decode_solution(solutions[-1])
 
 
@@ -143,8 +134,8 @@ def generation_columns(source: Source) -> dict[str, NDArray[Any]]:
     with unreadable_is_corrupt(name):
         index = _index(container)
         _run(container, index, name)
-        number = index.channels[written.GENERATION_TOPIC].number
-        data = [data for channel, _, _, data in _all_messages(container) if channel == number]
+        channel_id = index.channels[written.GENERATION_TOPIC].id
+        data = [data for channel, _, _, data in _all_messages(container) if channel == channel_id]
         return _columns(orjson.loads(b"[" + b",".join(data) + b"]"))
 
 
@@ -177,23 +168,24 @@ def _index(container: Container) -> _Index:
     index = _Index({}, {}, {}, [])
     for opcode, body in container.summary_section():
         if opcode == Opcode.METADATA_INDEX:
-            name, offset = read_metadata_index(body)
-            index.metadata[name] = offset
+            entry = parse(MetadataIndex, body)
+            index.metadata[entry.name] = entry.offset
         elif opcode == Opcode.CHANNEL:
-            channel = read_channel(body)
+            channel = parse(Channel, body)
             index.channels[channel.topic] = channel
         elif opcode == Opcode.SCHEMA:
-            number, name = read_schema(body)
-            index.schemas[number] = name
+            schema = parse(Schema, body)
+            index.schemas[schema.id] = schema.name
         elif opcode == Opcode.CHUNK_INDEX:
-            index.chunks.append(read_chunk_index(body))
+            index.chunks.append(parse(ChunkIndex, body))
     return index
 
 
 def _metadata(container: Container, index: _Index, record: str, name: str) -> dict[str, str]:
     if record not in index.metadata:
         raise CorruptLog(f"{name}: incomplete: no metadata record '{record}'")
-    return read_metadata(container.record_at(index.metadata[record]))
+    metadata: dict[str, str] = parse(Metadata, container.record_at(index.metadata[record])).metadata
+    return metadata
 
 
 def _run(container: Container, index: _Index, name: str) -> dict[str, str]:
@@ -217,20 +209,21 @@ def _summary(metadata: dict[str, str], run: dict[str, str], name: str) -> Replic
     return summary
 
 
-def _bodies(container: Container, opcode: int) -> Iterator[bytes]:
-    return (body for kind, body in container.data_section() if kind == opcode)
+def _bodies(container: Container, opcode: int, record: Any) -> Iterator[Any]:
+    return (parse(record, body) for kind, body in container.data_section() if kind == opcode)
 
 
 def _all_messages(container: Container) -> Iterator[Message]:
-    return (message for chunk in _bodies(container, Opcode.CHUNK) for message in chunk_messages(chunk))
+    chunks: Iterable[bytes] = (body for opcode, body in container.data_section() if opcode == Opcode.CHUNK)
+    return (message for chunk in chunks for message in chunk_messages(chunk))
 
 
 def _messages(container: Container, index: _Index) -> tuple[dict[str, list[bytes]], str]:
     """Return the data of all messages by topic, and the content digest over them."""
     digest = written.ContentDigest()
-    topics = {channel.number: topic for topic, channel in index.channels.items()}
+    topics = {channel.id: topic for topic, channel in index.channels.items()}
     identities = {
-        c.number: written.channel_identity(c.topic, index.schemas[c.schema], c.encoding)
+        c.id: written.channel_identity(c.topic, index.schemas[c.schema_id], c.message_encoding)
         for c in index.channels.values()
     }
     messages: dict[str, list[bytes]] = {}

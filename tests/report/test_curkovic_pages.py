@@ -14,7 +14,7 @@ from evoexp.report.figures import link_intersection, pareto_fronts, robot_motion
 from evoexp.report.fronts import read_fronts
 from evoexp.report.page import Page
 from evoexp.report.pages import curkovic_families, curkovic_measures, curkovic_motion, curkovic_verdicts, page_of
-from evoexp.report.results import Results, gather
+from evoexp.report.results import ConditionResults, Results, gather
 from evoexp.report.settings import ReportSettings
 
 
@@ -243,6 +243,21 @@ def test_effort_to_a_threshold_counts_runs_that_never_get_there(outputs: Path) -
     assert curkovic_measures.expected_evaluations(condition, threshold) == spent
     assert curkovic_measures.expected_evaluations(condition, 0.0) == np.inf
     assert curkovic_measures.lower_bound(condition) <= costs.to_numpy().min()
+
+
+def test_claims_are_judged_only_on_the_papers_own_settings(outputs: Path) -> None:
+    found = results_of(outputs, "curkovic_pareto")
+    (paper,) = compose.expand(["experiment=curkovic_pareto"])[0].conditions
+    judged = found.conditions[0]._replace(condition=paper.condition, planned=20)
+
+    def reason(condition: ConditionResults, budget: str = "paper") -> str:
+        return curkovic_measures.not_judged(found._replace(budget=budget, conditions=(condition,)))
+
+    assert reason(judged) == ""
+    assert reason(judged._replace(condition=paper.condition._replace(seed=5))) == ""
+    assert reason(judged, "quick") == "budget quick"
+    assert reason(judged._replace(planned=3)) == "fewer replicates than planned"
+    assert reason(found.conditions[0]._replace(planned=20)) == "settings overridden"
 
 
 def test_rates_are_counted_among_solved_motions(outputs: Path) -> None:

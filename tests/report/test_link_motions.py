@@ -53,6 +53,11 @@ def test_limits_are_those_of_equation_2() -> None:
     assert link_motions.times_over_limit(one, link_motions.straight(one)) == pytest.approx(expected)
 
 
+def test_a_control_has_the_limits_of_the_planner_beside_it() -> None:
+    control = expand("curkovic_methods_b", "control=random_search").conditions[0].condition.prepare()
+    np.testing.assert_array_equal(link_motions.speed_limits(control), link_motions.speed_limits(prepared("linear")))
+
+
 def test_distances_of_bodies_are_those_of_links(one: Prepared, solution: FloatArray) -> None:
     q = link_motions.sampled(link_motions.executed(one, solution), 20).q
     expected = motions.LinkDistance(one.problem.assembly)(q)

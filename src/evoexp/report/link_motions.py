@@ -8,6 +8,7 @@ from evoexp.condition import Prepared
 from evoexp.numerics import DEGREE
 from evoexp.paths.motion import Motion, cubic_motion, top_speeds
 from evoexp.records import FloatArray
+from evoexp.report.results import WRAPPED
 
 
 class Sampled(NamedTuple):
@@ -62,7 +63,8 @@ def speed_limits(prepared: Prepared) -> FloatArray:
     Returns:
         (robots, 2) [deg].
     """
-    arms, limit = prepared.problem.collision.arms, prepared.planner.speed_limit
+    arms = prepared.problem.collision.arms
+    limit = getattr(prepared.planner, WRAPPED, prepared.planner).speed_limit
     return np.array([limit.greatest_steps(arm.lengths) for arm in arms])
 
 

@@ -11,9 +11,10 @@ from evoexp.report.claims import Claim, Comparison
 from evoexp.report.figures import convergence
 from evoexp.report.page import Drawing, Quantity
 from evoexp.report.pages import generic
-from evoexp.report.parameters import planned_replicates
+from evoexp.report.parameters import option, planned_replicates
 from evoexp.report.results import ConditionResults, Results
 from evoexp.report.statistics import Interval, quantile, wilson
+from evoexp.shipped import config_directory, shipped
 
 ROUNDING = 1e-9  # [deg] a curve may leave the range by this much and still touch its end
 REFUTED = "collides between its configurations (exact verdict)"
@@ -44,6 +45,10 @@ def not_judged(results: Results) -> str:
         return f"budget {results.budget or 'unknown'}"
     if any(c.planned < planned_replicates(results.experiment) for c in results.conditions):
         return "fewer replicates than planned"
+    own = {row.condition_id for row in shipped() if (row.experiment, row.budget) == (results.experiment, "paper")}
+    seed = option(config_directory() / "config.yaml")["seed"].value  # another one is as good as any
+    if any(c.condition._replace(seed=seed).id not in own for c in results.conditions):
+        return "settings overridden"
     return ""
 
 

@@ -116,9 +116,13 @@ def _claims(results: Results, settings: ReportSettings, tools: tuple[Comparison,
         else:
             text, source = "A collision-free motion of two robots in each other's way", "section 4, Figs. 8, 9"
         certified = int((c.summaries["certified"].eq(True) & c.summaries["solved"]).sum())
-        for judge, holds in (("the paper's model", c.solved), ("the exact verdict on the whole motion", certified)):
-            verdict = claims.judge_all(reason, holds, c.done, c.planned)
-            evidence = f"{markdown.share(holds, c.done)} runs"
+        decided = c.done - c.verdicts.undecided
+        for judge, holds, judged in (
+            ("the paper's model", c.solved, c.done),
+            ("the exact verdict on the whole motion", certified, decided),
+        ):
+            verdict = claims.judge_all(reason, holds, judged, c.planned)
+            evidence = f"{markdown.share(holds, judged)} runs"
             found.append(
                 measures.claim(f"{c.label}: {text}, in every run, by {judge}", source, evidence, verdict, reason)
             )
@@ -136,12 +140,13 @@ def _checks(results: Results) -> tuple[tuple[str, str], ...]:
         (f"Solved motions that fail: {rate.defect}", measures.rates_text(results, which))
         for which, rate in enumerate(measures.rates(results.with_data[0]))
     ]
-    prepared = results.with_data[0].prepared
+    first = results.with_data[0]
+    prepared = first.prepared
     if prepared.problem.collision.enveloped:
         sticks = [c.label for c in results.with_data if _sticks_out(c)]
         what = "Boundary lines have no ends: the body of a link, round at its end, sticks out where the tool is smaller"
         defects.append((what, "; ".join(sticks) or "nowhere"))
-    notes = [("Length of the chromosome (Eqs. 2, 3)", note) for note in prepared.planner.notes(prepared.problem)]
+    notes = [("Length of the chromosome (Eqs. 2, 3)", note) for note in first.planner.notes(prepared.problem)]
     return (*defects, *notes)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+from matplotlib.ticker import EngFormatter
 
 from evoexp.records import FloatArray
 from evoexp.report import style
@@ -16,6 +17,7 @@ from evoexp.report.statistics import quantile
 from evoexp.report.tables import groups
 
 WRAPPED = 24  # characters of a name in a panel, per line
+THOUSANDS = 10_000  # from here on numbers along an axis are written with k and M
 Values = Callable[[ConditionResults], FloatArray]
 
 
@@ -56,6 +58,9 @@ def draw_values(table: pd.DataFrame) -> Figure:
             axes.axvline(middle, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
         axes.set_xlabel(textwrap.fill(quantity, WRAPPED))
         axes.margins(x=0.06)
+        axes.xaxis.set_major_locator(style.few_ticks())
+        if axes.get_xlim()[1] >= THOUSANDS:
+            axes.xaxis.set_major_formatter(EngFormatter())  # 200 k
     counts = (
         table[table["quantity"] == quantities[0]].groupby("position").agg(n=("value", "size"), failed=("failed", "max"))
     )

@@ -33,6 +33,13 @@ def draw_box(
         whiskerprops={"color": colour},
         capprops={"color": colour},
         medianprops={"color": colour, "linewidth": 2.0},
+        flierprops={
+            "marker": "o",
+            "markersize": 2.6,
+            "markerfacecolor": colour,
+            "markeredgecolor": "none",
+            "alpha": 0.5,
+        },
     )
     if len(values) <= POINTS:
         beside = position + JITTER * (2.0 * ((np.arange(len(values)) * 0.618034) % 1.0) - 1.0)

@@ -21,6 +21,15 @@ OTHER_WORDS = {
     "natural": "clamped",
     "one_sided": "symmetric",
     "inverse": "difference",
+    "threshold": "finite",
+    "tournament": "roulette",
+    "rank": "tournament",
+    "one_point": "uniform",
+    "arithmetic": "blx_alpha",
+    "non_uniform": "gaussian",
+    "uniform_reset": "non_uniform",
+    "gene": "individual",
+    "chords": "none",
     "linear": "cubic",
 }
 OTHER_WORDS |= {other: word for word, other in OTHER_WORDS.items()}
@@ -184,7 +193,8 @@ def test_another_revision_is_refused_and_names_both(config: dict[str, Any]) -> N
 
 def test_revisions_are_listed_for_every_component(shipped: Condition) -> None:
     found = {field: (stored, installed) for field, stored, installed in revisions(json.loads(shipped.to_json()))}
-    assert {"robot", "robot.arms[0]", "scenario", "planner"} <= set(found)
+    arms = {"robot.arms[0]"} if hasattr(shipped.robot, "arms") else set()
+    assert {"robot", "scenario", "planner"} | arms <= set(found)
     assert all(stored == installed for stored, installed in found.values())
 
 

@@ -14,6 +14,7 @@ from evoexp.scenarios.obstacles import (
     BoxObstacle,
     CapsuleObstacle,
     CylinderObstacle,
+    EllipseObstacle,
     HalfSpaceObstacle,
     SphereObstacle,
     obstacle_table,
@@ -48,6 +49,7 @@ OBSTACLES = [
     CapsuleObstacle(shape="capsule", start=(-1.0, 1.0), end=(-2.0, -2.0, 1.0), radius=0.3),
     CylinderObstacle(shape="cylinder", start=(-1.0, 1.0), end=(-2.0, -2.0, 1.0), radius=0.3),
     HalfSpaceObstacle(shape="half_space", point=(1.0, -1.0, 0.5), normal=(1.0, 2.0, -0.5)),
+    EllipseObstacle(shape="ellipse", center=(1.0, 2.0, 3.0), semi_axes=(1.2, 0.7), angle=35.0),
 ]
 
 
@@ -58,6 +60,9 @@ def inside(obstacle: object, points: np.ndarray) -> np.ndarray:
     if isinstance(obstacle, BoxObstacle):
         turn = pin.rpy.rpyToMatrix(*np.deg2rad(obstacle.rotation))
         return np.all(np.abs((points - obstacle.center) @ turn) < 0.5 * np.array(obstacle.size), axis=1)
+    if isinstance(obstacle, EllipseObstacle):
+        turn = pin.rpy.rpyToMatrix(0.0, 0.0, np.deg2rad(obstacle.angle))
+        return (((points - obstacle.center) @ turn / np.array([1.2, 0.7, 0.7])) ** 2).sum(axis=1) < 1.0
     if isinstance(obstacle, HalfSpaceObstacle):
         return (points - obstacle.point) @ np.array(obstacle.normal) < 0.0
     start, end = (np.array([*p, 0.0][:3]) for p in (obstacle.start, obstacle.end))

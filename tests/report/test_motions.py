@@ -10,6 +10,7 @@ from evoexp.scenarios.obstacles import (
     BoxObstacle,
     CapsuleObstacle,
     CylinderObstacle,
+    EllipseObstacle,
     HalfSpaceObstacle,
     SphereObstacle,
     obstacle_table,
@@ -117,9 +118,10 @@ def test_outlines_lie_on_the_surfaces_of_obstacles() -> None:
             CylinderObstacle(shape="cylinder", start=(2.0, 3.0, -1.0), end=(2.0, 3.0, 1.0), radius=0.3),
             CylinderObstacle(shape="cylinder", start=(2.0, 3.0), end=(4.0, 3.0), radius=0.3),
             HalfSpaceObstacle(shape="half_space", point=(0.0, -2.0), normal=(0.0, 1.0)),
+            EllipseObstacle(shape="ellipse", center=(1.0, 2.0), semi_axes=(3.0, 0.5), angle=60.0),
         )
     )
-    ball, box, capsule, tin, lying, wall = motions.obstacle_outlines(table, 8.0)
+    ball, box, capsule, tin, lying, wall, egg = motions.obstacle_outlines(table, 8.0)
     np.testing.assert_allclose(np.linalg.norm(ball - [5.2, 4.0], axis=1), 0.4)
     np.testing.assert_allclose(np.linalg.norm(box - [-5.5, 4.0], axis=1), 0.4 * np.sqrt(2.0))
     first = np.degrees(np.arctan2(*(box[1] - box[0])[::-1]))
@@ -131,5 +133,8 @@ def test_outlines_lie_on_the_surfaces_of_obstacles() -> None:
     np.testing.assert_allclose(np.linalg.norm(tin - [2.0, 3.0], axis=1), 0.3)
     assert (lying.min(axis=0).tolist(), lying.max(axis=0).tolist()) == ([2.0, 2.7], [4.0, 3.3])
     assert (wall.min(axis=0).round(9).tolist(), wall.max(axis=0).round(9).tolist()) == ([-8.0, -2.8], [8.0, -2.0])
-    for outline in (ball, box, capsule, tin, lying, wall):
+    turn = np.deg2rad(60.0)
+    along = (egg - [1.0, 2.0]) @ [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]
+    np.testing.assert_allclose(np.linalg.norm(along / [3.0, 0.5], axis=1), 1.0)
+    for outline in (ball, box, capsule, tin, lying, wall, egg):
         np.testing.assert_allclose(outline[0], outline[-1], atol=1e-12)

@@ -11,11 +11,13 @@ from evoexp.scenarios.obstacles import (
     BOX,
     CAPSULE,
     CYLINDER,
+    ELLIPSE,
     HALF_SPACE,
     SPHERE,
     BoxObstacle,
     CapsuleObstacle,
     CylinderObstacle,
+    EllipseObstacle,
     HalfSpaceObstacle,
     Obstacle,
     SphereObstacle,
@@ -29,18 +31,26 @@ ONE_OF_EACH = (
     CapsuleObstacle(shape="capsule", start=(0.0, 0.0), end=(0.0, 3.0), radius=0.1),
     CylinderObstacle(shape="cylinder", start=(0.0, 0.0, 1.0), end=(2.0, 0.0, 1.0), radius=0.3),
     HalfSpaceObstacle(shape="half_space", point=(0.0, -1.0), normal=(0.0, 2.0)),
+    EllipseObstacle(shape="ellipse", center=(3.0, 4.0), semi_axes=(2.0, 0.5), angle=90.0),
 )
 
 
 def test_the_table_of_every_kind() -> None:
     table = obstacle_table(ONE_OF_EACH)
-    assert table.kind.tolist() == [SPHERE, BOX, CAPSULE, CYLINDER, HALF_SPACE]
-    assert table.center.tolist() == [[1, 2, 0], [1, 2, 3], [0, 1.5, 0], [1, 0, 1], [0, -1, 0]]
-    assert table.size.tolist() == [[0.5, 0, 0], [0.1, 0.2, 0.3], [0.1, 1.5, 0], [0.3, 1.0, 0], [0, 0, 0]]
+    assert table.kind.tolist() == [SPHERE, BOX, CAPSULE, CYLINDER, HALF_SPACE, ELLIPSE]
+    assert table.center.tolist() == [[1, 2, 0], [1, 2, 3], [0, 1.5, 0], [1, 0, 1], [0, -1, 0], [3, 4, 0]]
+    sizes = [[0.5, 0, 0], [0.1, 0.2, 0.3], [0.1, 1.5, 0], [0.3, 1.0, 0], [0, 0, 0], [2.0, 0.5, 0.5]]
+    assert table.size.tolist() == sizes
     rotations = table.rotation.reshape(-1, 3, 3)
-    np.testing.assert_allclose(rotations @ rotations.transpose(0, 2, 1), np.tile(np.eye(3), (5, 1, 1)), atol=1e-15)
+    np.testing.assert_allclose(rotations @ rotations.transpose(0, 2, 1), np.tile(np.eye(3), (6, 1, 1)), atol=1e-15)
     np.testing.assert_array_equal(rotations[1], rotation_matrix((10.0, 20.0, 30.0)))
-    np.testing.assert_allclose(rotations[2:, :, 2], [[0, 1, 0], [1, 0, 0], [0, 1, 0]], atol=1e-15)
+    np.testing.assert_allclose(rotations[2:5, :, 2], [[0, 1, 0], [1, 0, 0], [0, 1, 0]], atol=1e-15)
+
+
+def test_collision_models_without_ellipses_refuse_them() -> None:
+    assert obstacle_table(ONE_OF_EACH[:5]).without_ellipses().kind.tolist() == [0, 1, 2, 3, 4]
+    with pytest.raises(SettingError, match=r"scenario\.obstacles\[5\]\.shape: must be any but an ellipse"):
+        obstacle_table(ONE_OF_EACH).without_ellipses()
 
 
 @given(*[st.floats(-10.0, 10.0)] * 3)

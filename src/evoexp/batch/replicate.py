@@ -47,7 +47,7 @@ def run_replicate(condition: Condition, index: int, config_json: bytes | None = 
         solved=last.solved,
         **verdict._asdict(),
         length_unit=condition.length_unit,
-        terms=planner.evaluate(problem, last.best),
+        terms=last.terms | planner.evaluate(problem, last.best),  # the log's own say what the search went through
         digest="",
         certificate_s=certified - evolved,
         cpu_s=time.process_time() - cpu,

@@ -180,9 +180,10 @@ def pack_obstacles(
     A body is checked against all but the ignored ones; bodies of the world against none.
 
     Raises:
+        SettingError: If an obstacle is an ellipse.
         ValueError: If an ignored pair names no joint with shapes, or no obstacle.
     """
-    kind, size = obstacles.kind, obstacles.size
+    kind, size = obstacles.without_ellipses().kind, obstacles.size
     for joint, k in ignored:
         if joint not in joints or not 0 <= k < len(kind):
             must = f"pairs (joint, obstacle), of joints {joints.tolist()} and obstacles 0 to {len(kind) - 1}"

@@ -14,7 +14,7 @@ from evoexp.collision.body_table import BodyTable, body_table
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.kinematics import KinematicTable, kinematic_table
-from evoexp.scenarios.obstacles import BOX, CAPSULE, CYLINDER, SPHERE, ObstacleTable, obstacle_table
+from evoexp.scenarios.obstacles import BOX, CAPSULE, CYLINDER, ELLIPSE, SPHERE, ObstacleTable, obstacle_table
 
 
 class Scene(NamedTuple):
@@ -118,6 +118,8 @@ def obstacle_shapes(table: ObstacleTable) -> list[tuple[Any, Any]]:
             shape = coal.Capsule(a, 2.0 * b)
         elif kind == CYLINDER:
             shape = coal.Cylinder(a, 2.0 * b)
+        elif kind == ELLIPSE:
+            shape = coal.Ellipsoid(a, b, c)
         else:
             shape = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
         shapes.append((shape, pin.SE3(rotation.reshape(3, 3), center)))

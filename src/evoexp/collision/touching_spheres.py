@@ -31,7 +31,11 @@ class TouchingSpheres(Component):
     collision_substeps: Count
 
     def bind(self, assembly: Assembly, obstacles: tuple[Any, ...]) -> "SphereCollision":
-        """Return the model of a robot among obstacles, ready for batches."""
+        """Return the model of a robot among obstacles, ready for batches.
+
+        Raises:
+            SettingError: If an obstacle is an ellipse, or a robot has a tool.
+        """
         if any(link.is_tool for link in assembly.links):
             raise SettingError("robot", "without tools: circles of one size cannot show them", "tool_radius above 0")
         spheres = [sphere for link in assembly.links if link.joint > 0 for sphere in self._of_link(assembly, link)]
@@ -48,7 +52,7 @@ class TouchingSpheres(Component):
             _ranges(arms, assembly.num_arms),
             _bounds(joint, local, _ranges(links, links[-1] + 1), _ranges(link_arms, assembly.num_arms)),
             self.sphere_radius,
-            obstacle_table(obstacles),
+            obstacle_table(obstacles).without_ellipses(),
             sphere_geometry(
                 assembly,
                 np.array([sphere.center for sphere in kept]),

@@ -11,7 +11,7 @@ from evoexp.condition import Prepared
 from evoexp.numerics import DEGREE
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
-from evoexp.scenarios.obstacles import BOX, CYLINDER, HALF_SPACE, SPHERE, ObstacleTable
+from evoexp.scenarios.obstacles import BOX, CYLINDER, ELLIPSE, HALF_SPACE, SPHERE, ObstacleTable
 
 OUTLINE_POINTS = 49  # of a round obstacle
 
@@ -94,6 +94,8 @@ def obstacle_outlines(table: ObstacleTable, reach: float = 1.0) -> list[FloatArr
             points = (np.vstack(ends) @ matrix.T)[:, :2]
             hull = ConvexHull(points).vertices
             outline = points[[*hull, hull[0]]]
+        elif kind == ELLIPSE:
+            outline = (circle * size[:2]) @ matrix[:2, :2].T
         elif kind == HALF_SPACE:
             inward = -matrix[:2, 2]
             along, depth = reach * np.array([-inward[1], inward[0]]), 0.1 * reach * inward

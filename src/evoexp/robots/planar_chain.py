@@ -1,11 +1,12 @@
 """A planar arm of revolute joints, given by its link lengths."""
 
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 import pinocchio as pin
-from pydantic import Field
+from pydantic import Field, model_validator
 
+from evoexp.errors import SettingError
 from evoexp.numerics import DEGREE, sincos
 from evoexp.robots.assembly import Chain, Link
 from evoexp.validation import NonNegative, Positive
@@ -22,6 +23,7 @@ class PlanarChain(Chain):
         base_angle: Direction of the first link at q = 0, from +x [deg].
         link_radius: Half the thickness of every link; 0: a line.
         tool_radius: Of a ball around the tip; 0: none.
+        joint_limits: Least and greatest angle of every joint [rad], as the papers print them; None: any angle.
     """
 
     component: ClassVar[str] = "planar_chain"
@@ -31,6 +33,19 @@ class PlanarChain(Chain):
     base_angle: float = 0.0
     link_radius: NonNegative = 0.0
     tool_radius: NonNegative = 0.0
+    joint_limits: tuple[tuple[float, float], ...] | None = None
+
+    @model_validator(mode="after")
+    def _limits_fit(self) -> Self:
+        if self.joint_limits is None:
+            return self
+        if len(self.joint_limits) != len(self.link_lengths):
+            must = f"one pair per link ({len(self.link_lengths)})"
+            raise SettingError("joint_limits", must, len(self.joint_limits))
+        for k, (least, greatest) in enumerate(self.joint_limits):
+            if not least < greatest:
+                raise SettingError(f"joint_limits[{k}]", "[least, greatest] with least < greatest", [least, greatest])
+        return self
 
     def append_to(self, model: Any, arm: int) -> list[Link]:
         """Add one revolute joint per link; a tool is one link more, of no length, on the last joint."""
@@ -41,6 +56,8 @@ class PlanarChain(Chain):
         links = []
         for k, length in enumerate(self.link_lengths):
             parent = model.addJoint(parent, pin.JointModelRZ(), placement, f"arm_{arm}_joint_{k}")
+            if self.joint_limits is not None:
+                model.lowerPositionLimit[parent - 1], model.upperPositionLimit[parent - 1] = self.joint_limits[k]
             links.append(Link(arm, parent, np.zeros(3), np.array([length, 0.0, 0.0]), self.link_radius))
             placement = pin.SE3(np.eye(3), np.array([length, 0.0, 0.0]))
         if self.tool_radius > 0.0:

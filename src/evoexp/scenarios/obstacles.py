@@ -15,7 +15,7 @@ Point = Annotated[tuple[float, ...], Field(min_length=2, max_length=3)]
 
 Angles = tuple[float, float, float]
 
-SPHERE, BOX, CAPSULE, CYLINDER, HALF_SPACE = range(5)
+SPHERE, BOX, CAPSULE, CYLINDER, HALF_SPACE, ELLIPSE = range(6)
 
 
 class SphereObstacle(Settings):
@@ -66,8 +66,27 @@ class HalfSpaceObstacle(Settings):
     normal: Point
 
 
+class EllipseObstacle(Settings):
+    """An ellipse in the plane with its inside; in space an ellipsoid whose third semi-axis, along z, is the second one.
+
+    The third semi-axis decides nothing for links that move in the plane of the centre: in a plane of symmetry of a
+    convex body, distances are those of its section.
+
+    Attributes:
+        center: Of the ellipse.
+        semi_axes: Both, of any order.
+        angle: Of the first semi-axis, from +x [deg].
+    """
+
+    shape: Literal["ellipse"]
+    center: Point
+    semi_axes: tuple[Positive, Positive]
+    angle: float = 0.0
+
+
 Obstacle = Annotated[
-    SphereObstacle | BoxObstacle | CapsuleObstacle | CylinderObstacle | HalfSpaceObstacle, Field(discriminator="shape")
+    SphereObstacle | BoxObstacle | CapsuleObstacle | CylinderObstacle | HalfSpaceObstacle | EllipseObstacle,
+    Field(discriminator="shape"),
 ]
 
 
@@ -75,18 +94,29 @@ class ObstacleTable(NamedTuple):
     """Obstacles as arrays.
 
     Attributes:
-        kind: (obstacles,) SPHERE, BOX, CAPSULE, CYLINDER or HALF_SPACE.
+        kind: (obstacles,) SPHERE, BOX, CAPSULE, CYLINDER, HALF_SPACE or ELLIPSE.
         center: (obstacles, 3); of a half-space a point of its boundary.
         rotation: (obstacles, 9) from the obstacle's frame to the world, row by row; capsules and cylinders lie along
             their z axis, a half-space is all points with z ≤ 0.
         size: (obstacles, 3): radius | half the edges | radius, half the length, 0 (capsules and cylinders; the length
-            of a capsule is that of its segment) | unused.
+            of a capsule is that of its segment) | unused (half-spaces) | semi-axes.
     """
 
     kind: np.ndarray
     center: FloatArray
     rotation: FloatArray
     size: FloatArray
+
+    def without_ellipses(self) -> "ObstacleTable":
+        """Return the table itself, for collision models that know no ellipses.
+
+        Raises:
+            SettingError: If there is one.
+        """
+        if ELLIPSE in self.kind:
+            field = f"scenario.obstacles[{int(np.argmax(self.kind == ELLIPSE))}].shape"
+            raise SettingError(field, "any but an ellipse with this collision model", "ellipse")
+        return self
 
 
 def obstacle_table(obstacles: tuple[Any, ...]) -> ObstacleTable:
@@ -108,6 +138,10 @@ def obstacle_table(obstacles: tuple[Any, ...]) -> ObstacleTable:
             table.kind[k], table.center[k] = BOX, _point(obstacle.center)
             table.size[k] = 0.5 * np.array([*obstacle.size, 1.0][:3])
             table.rotation[k] = rotation_matrix(obstacle.rotation).ravel()
+        elif isinstance(obstacle, EllipseObstacle):
+            table.kind[k], table.center[k] = ELLIPSE, _point(obstacle.center)
+            table.size[k] = *obstacle.semi_axes, obstacle.semi_axes[1]
+            table.rotation[k] = rotation_matrix((0.0, 0.0, obstacle.angle)).ravel()
         elif isinstance(obstacle, HalfSpaceObstacle):
             axis, length = _direction(_point(obstacle.normal))
             if length == 0.0:

@@ -1,0 +1,75 @@
+"""The objective of Lavoie & Boudreau 2001 without its collisions: how far the tip is off, how much the joints turn."""
+
+from typing import ClassVar
+
+import numpy as np
+
+from evoexp.numerics import kernel
+from evoexp.robots.kinematics import U
+from evoexp.robots.planar_ends import LANES, block_ends, load_lanes
+from evoexp.validation import Component, NonNegative
+
+
+class Reaching(Component):
+    """Weights of Eq. 4.
+
+    Attributes:
+        position_weight: w1, of the distance between tip and target [1/length unit].
+        displacement_weight: w2, of the Euclidean distance between the postures [1/rad].
+    """
+
+    component: ClassVar[str] = "reaching"
+
+    position_weight: NonNegative
+    displacement_weight: NonNegative
+
+    @property
+    def weights(self) -> tuple[float, float]:
+        """As the kernel takes them."""
+        return self.position_weight, self.displacement_weight
+
+
+@kernel
+def measure_reach(  # type: ignore[no-untyped-def]
+    starts, ends, lanes, count, arm, target, box, weights, cost, error, displacement
+):
+    """Write Eqs. 1, 2 and 4 of some individuals, inf where the tip ends outside the box; collisions are not looked at.
+
+    Args:
+        starts: (N, individuals) relative joint angles [rad].
+        ends: (N, individuals).
+        lanes: (≥ count + LANES) indices of the individuals; those behind `count` are overwritten.
+        count: How many.
+        arm: See `planar_ends.block_ends`.
+        target: Desired place of the tip (x, y).
+        box: Least and greatest x, least and greatest y; a tip on its edge is inside.
+        weights: w1, w2.
+        cost: (individuals,) written: Eq. 4.
+        error: (individuals,) written: Eq. 1 [length unit].
+        displacement: (individuals,) written: Eq. 2 [rad].
+    """
+    num, rows = len(starts), len(starts) * LANES
+    begin, end = np.empty(rows), np.empty(rows)
+    x, y = np.empty(rows + LANES), np.empty(rows + LANES)
+    value, off, turned = np.empty(LANES), np.empty(LANES), np.empty(LANES)
+    for first in range(0, count, LANES):
+        load_lanes(starts, lanes, first, count, begin)
+        load_lanes(ends, lanes, first, count, end)
+        block_ends(begin, end, arm, 1, 1, value, off, turned, x, y)
+        turned[:] = 0.0
+        for k in range(num):
+            for n in range(LANES):
+                turn = begin[U(k) * U(LANES) + U(n)] - end[U(k) * U(LANES) + U(n)]
+                turned[n] += turn * turn
+        for n in range(LANES):
+            tip_x, tip_y = x[U(rows) + U(n)], y[U(rows) + U(n)]
+            off_x, off_y = tip_x - target[0], tip_y - target[1]
+            off[n], turned[n] = np.sqrt(off_x * off_x + off_y * off_y), np.sqrt(turned[n])
+            worth = weights[0] * off[n] + weights[1] * turned[n]
+            worth = worth if box[0] <= tip_x else np.inf
+            worth = worth if tip_x <= box[1] else np.inf
+            worth = worth if box[2] <= tip_y else np.inf
+            value[n] = worth if tip_y <= box[3] else np.inf
+        for n in range(min(LANES, count - first)):
+            individual = lanes[first + n]
+            cost[individual], error[individual], displacement[individual] = value[n], off[n], turned[n]

@@ -1,0 +1,131 @@
+"""One genetic search for the end posture of a sub-path (Lavoie & Boudreau 2001): its memory, its calls of kernels."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from evoexp.evolution.crossover import num_single_point_uniforms
+from evoexp.evolution.gene_crossover import CROSSOVERS, ONE_POINT, num_gene_uniforms
+from evoexp.evolution.gene_mutation import (
+    GAUSSIAN,
+    GENE,
+    MUTATIONS,
+    NON_UNIFORM,
+    SCOPES,
+    decode_bits,
+    non_uniform_spread,
+    num_mutation_uniforms,
+)
+from evoexp.evolution.operator_settings import BinaryGenetic, RealGenetic, SelectiveSettings
+from evoexp.numerics import standard_normal
+from evoexp.planners import redundant_kernels
+from evoexp.planners.redundant_kernels import RESULTS
+from evoexp.records import FloatArray
+from evoexp.robots.planar_ends import LANES
+
+SELECTIONS = ("tournament", "roulette", "rank")  # in the order of the kernels' numbers
+
+
+class Found(NamedTuple):
+    """The best individual of a population.
+
+    Attributes:
+        cost: Eq. 4.
+        posture: (joints,) [rad].
+        terms: (3,) cost, position error, joint displacement.
+    """
+
+    cost: float
+    posture: FloatArray
+    terms: FloatArray
+
+
+class Summary(NamedTuple):
+    """What a generation's costs say."""
+
+    best: int
+    mean: float
+    std: float
+    num_finite: int
+
+
+class Search:
+    """One run of the genetic algorithm over the ends of one sub-path.
+
+    Attributes:
+        genomes: (genes, individuals) of the population; a view.
+        costs: (individuals,) a view.
+        best: A copy of the best individual; elites keep it the best so far.
+        summary: Of the costs.
+    """
+
+    def __init__(self, ga: SelectiveSettings, limits: FloatArray, judging: tuple[Any, ...], start: FloatArray) -> None:
+        """Take the settings, and memory for a population.
+
+        Args:
+            ga: Settings of a real or a binary genetic algorithm.
+            limits: (joints, 2) of the joint angles [rad].
+            judging: See `redundant_kernels.judge`.
+            start: (joints,) where the sub-path starts [rad].
+        """
+        joints, size, count = len(start), ga.population_size, ga.num_offspring
+        self._ga, self._limits, self._judging = ga, limits, judging
+        self._binary = isinstance(ga, BinaryGenetic)
+        self._num_genes = joints * ga.bits_per_gene if isinstance(ga, BinaryGenetic) else joints
+        first = self._num_genes if self._binary else 0
+        table, offspring = np.empty((first + joints + RESULTS, size)), np.empty((first + joints + RESULTS, count))
+        parents, elites = np.empty(count, dtype=np.int64), np.empty(ga.num_elites, dtype=np.int64)
+        self._lanes, self._hit = np.arange(size + LANES), np.zeros(size, dtype=np.bool_)
+        self._memory = (table, offspring, parents, elites, self._lanes, self._hit)
+        self._starts = np.repeat(start[:, None], size, axis=1)
+        self.genomes, self._angles, self._results = table[: self._num_genes], table[first:-RESULTS], table[-RESULTS:]
+        self.costs = self._results[0]
+        self.best, self.summary = Found(np.inf, start, np.empty(0)), Summary(0, np.nan, np.nan, 0)
+
+    def begin(self, rng: np.random.Generator) -> None:
+        """Draw the initial population, uniform within the limits, and judge it."""
+        size = len(self.costs)
+        if self._binary:
+            self.genomes[:] = np.floor(2.0 * rng.random(self.genomes.shape))
+            decode_bits(self.genomes, size, self._limits, self._angles)
+        else:
+            low, high = self._limits.T
+            self._angles[:] = low[:, None] + (high - low)[:, None] * rng.random(self._angles.shape)
+        judged = (self._judging, self._results, self._hit)
+        redundant_kernels.judge(self._starts, self._angles, self._lanes, size, *judged)
+        self._summarise(redundant_kernels.summary(self.costs))
+
+    def advance(self, rng: np.random.Generator, index: int) -> None:
+        """Replace the population of generation `index` by the next one."""
+        ga, count = self._ga, len(self._memory[2])
+        choosing = (SELECTIONS.index(ga.selection), ga.tournament_size, ga.rank_pressure)
+        crossing, mutating = self._varying(index)
+        pairs, (kind, scope) = count // 2, mutating[:2]
+        sizes = (
+            count * (ga.tournament_size if ga.selection == "tournament" else 1),
+            num_single_point_uniforms(pairs) if crossing[0] == ONE_POINT else num_gene_uniforms(self._num_genes, pairs),
+            num_mutation_uniforms(self._num_genes, count, scope) if not self._binary else self._num_genes * count,
+        )
+        uniforms = rng.random(sum(sizes))
+        normals = standard_normal(rng, (self._num_genes, count)) if kind == GAUSSIAN else np.empty((0, 0))
+        draws = (uniforms[: sizes[0]], uniforms[sizes[0] : sizes[0] + sizes[1]], uniforms[sum(sizes[:2]) :], normals)
+        breeding = (self._num_genes, self._binary, choosing, crossing, mutating, self._limits)
+        found = redundant_kernels.advance(draws, breeding, self._judging, self._starts, self._memory)
+        self._summarise(found)
+
+    def _varying(self, index: int) -> tuple[tuple[int, float, float], tuple[int, int, float, float]]:
+        """Return (crossover, its rate, α) and (mutation, its scope, its rate, its spread)."""
+        ga = self._ga
+        if not isinstance(ga, RealGenetic):
+            return (ONE_POINT, ga.crossover_rate, 0.0), (NON_UNIFORM, GENE, ga.mutation_rate, 0.0)
+        kind = MUTATIONS.index(ga.mutation)
+        spread = ga.mutation_std
+        if kind == NON_UNIFORM:
+            spread = float(non_uniform_spread(index, ga.num_generations, ga.mutation_power))
+        crossing = (CROSSOVERS.index(ga.crossover), ga.crossover_rate, ga.blend_alpha)
+        return crossing, (kind, SCOPES.index(ga.mutation_scope), ga.mutation_rate, spread)
+
+    def _summarise(self, found: tuple[int, float, float, int]) -> None:
+        self.summary = Summary(*found)
+        terms = self._results[:, self.summary.best].copy()
+        self.best = Found(float(terms[0]), self._angles[:, self.summary.best].copy(), terms)

@@ -1,0 +1,153 @@
+"""Where the link ends of one planar arm are along straight joint-space paths, for whole populations."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from evoexp.errors import SettingError
+from evoexp.numerics import atan2, kernel, sincos
+from evoexp.records import FloatArray
+from evoexp.robots.assembly import Assembly
+from evoexp.robots.kinematics import U
+
+LANES = 32  # individuals per block
+
+
+class PlanarArm(NamedTuple):
+    """One arm of revolute joints in the plane z = 0, its links straight from joint to joint.
+
+    Attributes:
+        lengths: (N,) of the links [length unit].
+        base_x: Of the first joint.
+        base_y: Likewise.
+        base_angle: Direction of the first link at angle 0 [rad].
+    """
+
+    lengths: FloatArray
+    base_x: float
+    base_y: float
+    base_angle: float
+
+
+def planar_arm(assembly: Assembly) -> PlanarArm:
+    """Return a built robot as a planar arm.
+
+    Raises:
+        SettingError: If it is none.
+    """
+    table, links = assembly.table, assembly.links
+    straight = all(not link.start.any() and not link.end[1:].any() for link in links)
+    chained = table.planar and np.array_equal(table.parent, np.arange(len(table.parent)) - 1)
+    bent = bool(table.turned[1:].any()) or bool(table.translation[:, 2].any())
+    if assembly.num_arms != 1 or not straight or not chained or bent or len(links) != len(table.parent):
+        joints = ", ".join(f"{stop - first} joints" for first, stop in assembly.arm_slices)
+        raise SettingError("robot", "one planar arm in the plane z = 0", joints)
+    x, y, _ = table.translation[0]
+    angle = float(atan2(table.rotation[0][3], table.rotation[0][0]))
+    return PlanarArm(np.array([link.end[0] for link in links]), float(x), float(y), angle)
+
+
+@kernel
+def block_ends(starts, ends, arm, position, num_positions, angle, at_x, at_y, x, y):  # type: ignore[no-untyped-def]
+    """Write the base and the link ends of a block at one position, rows 0 … N of `LANES`.
+
+    Args:
+        starts: (N × LANES) joint angles [rad].
+        ends: (N × LANES).
+        arm: (N,) link lengths; base x, base y, direction of the first link at angle 0 [rad].
+        position: j of Eq. 3; at j = M the end itself is taken, without any rounding.
+        num_positions: M.
+        angle: (LANES,) scratch: running sums are kept apart from what is written, or the loop stays scalar.
+        at_x: (LANES,) likewise.
+        at_y: (LANES,) likewise.
+        x: ((N + 1) × LANES) written.
+        y: Likewise.
+    """
+    lengths, base_x, base_y, base_angle = arm
+    share, last = position / num_positions, position == num_positions
+    angle[:], at_x[:], at_y[:] = base_angle, base_x, base_y
+    x[:LANES], y[:LANES] = base_x, base_y
+    for k in range(len(lengths)):
+        row, length = U(k) * U(LANES), lengths[k]
+        for n in range(LANES):
+            lane, to = U(n), row + U(LANES) + U(n)
+            begin, end = starts[row + lane], ends[row + lane]
+            between = begin + share * (end - begin)
+            turned = angle[lane] + (end if last else between)
+            s, c = sincos(turned)
+            tip_x, tip_y = at_x[lane] + length * c, at_y[lane] + length * s
+            angle[lane], at_x[lane], at_y[lane], x[to], y[to] = turned, tip_x, tip_y, tip_x, tip_y
+
+
+@kernel
+def begin_turning(starts, ends, arm, position, num_positions, angle, step, turn):  # type: ignore[no-untyped-def]
+    """Write directions of the links at one position, and how they turn from one position to the next.
+
+    Args:
+        starts: (N × LANES) joint angles [rad].
+        ends: (N × LANES).
+        arm: See `block_ends`.
+        position: j of Eq. 3.
+        num_positions: M.
+        angle: (LANES,) scratch.
+        step: (LANES,) scratch.
+        turn: (4, N × LANES) written: sine and cosine of every link's direction, and of its turn per position.
+    """
+    share, sine, cosine, turn_sine, turn_cosine = position / num_positions, turn[0], turn[1], turn[2], turn[3]
+    angle[:], step[:] = arm[3], 0.0
+    for k in range(len(arm[0])):
+        for n in range(LANES):
+            lane, place = U(n), U(k) * U(LANES) + U(n)
+            begin, way = starts[place], ends[place] - starts[place]
+            angle[lane] += begin + share * way
+            step[lane] += way / num_positions
+            sine[place], cosine[place] = sincos(angle[lane])
+            turn_sine[place], turn_cosine[place] = sincos(step[lane])
+
+
+@kernel
+def turned_ends(arm, at_x, at_y, turn, x, y):  # type: ignore[no-untyped-def]
+    """Turn all links on by one position and write their ends, as `block_ends` does but without sines.
+
+    Every turn adds some 2e-16 to the error of a direction; whoever takes many of them begins anew now and then.
+
+    Args:
+        arm: See `block_ends`.
+        at_x: (LANES,) scratch.
+        at_y: (LANES,) scratch.
+        turn: See `begin_turning`, changed.
+        x: ((N + 1) × LANES) written but for the base.
+        y: Likewise.
+    """
+    lengths, base_x, base_y, _ = arm
+    sine, cosine, turn_sine, turn_cosine = turn[0], turn[1], turn[2], turn[3]
+    at_x[:], at_y[:] = base_x, base_y
+    x[:LANES], y[:LANES] = base_x, base_y
+    for k in range(len(lengths)):
+        row, length = U(k) * U(LANES), lengths[k]
+        for n in range(LANES):
+            lane, place, to = U(n), row + U(n), row + U(LANES) + U(n)
+            s, c, u, v = sine[place], cosine[place], turn_sine[place], turn_cosine[place]
+            next_s, next_c = s * v + c * u, c * v - s * u
+            tip_x, tip_y = at_x[lane] + length * next_c, at_y[lane] + length * next_s
+            sine[place], cosine[place], at_x[lane], at_y[lane] = next_s, next_c, tip_x, tip_y
+            x[to], y[to] = tip_x, tip_y
+
+
+@kernel
+def load_lanes(q, lanes, first, count, block):  # type: ignore[no-untyped-def]
+    """Gather a block of individuals (N × LANES); what is missing is filled with the last one.
+
+    Args:
+        q: (N, individuals).
+        lanes: (≥ first + LANES) indices of individuals; those behind `count` are overwritten.
+        first: Where the block begins among the indices.
+        count: How many indices there are.
+        block: Written.
+    """
+    for n in range(count, first + LANES):
+        lanes[n] = lanes[count - 1]
+    for k in range(len(q)):
+        source = q[k]
+        for n in range(LANES):
+            block[U(k) * U(LANES) + U(n)] = source[U(lanes[U(first) + U(n)])]

@@ -1,0 +1,59 @@
+"""An arm whose tip shall pass a via point and end at a goal point inside a box, among obstacles."""
+
+from typing import Annotated, ClassVar, Self
+
+from pydantic import Field, model_validator
+
+from evoexp.errors import SettingError
+from evoexp.scenarios.obstacles import Obstacle, ObstacleTable, obstacle_table
+from evoexp.validation import Component, NonNegative, Vector
+
+Point2 = tuple[float, float]
+
+
+class PickAndPlace(Component):
+    """Start posture, via point and goal point of one planar arm's tip (Lavoie & Boudreau 2001, section 4).
+
+    Attributes:
+        q_start: Posture at the start, joint angles relative to the link before [rad].
+        via_point: Where the tip shall be at the end of the first sub-path (x, y) [length unit].
+        goal_point: Where it shall be at the end of the second one.
+        box_x: Least and greatest x of the box in which the tip must be at the end of the second sub-path.
+        box_y: The same of y.
+        obstacle_shift: By how much obstacles and box are moved together (dx, dy).
+        security_margin: Clearance between bodies that the task requires.
+        length_unit: Name of the scene's unit of length.
+        obstacles: What does not move.
+    """
+
+    component: ClassVar[str] = "pick_and_place"
+
+    q_start: Annotated[Vector, Field(min_length=1)]
+    via_point: Point2
+    goal_point: Point2
+    box_x: Point2
+    box_y: Point2
+    obstacle_shift: Point2
+    security_margin: NonNegative
+    length_unit: str
+    obstacles: tuple[Obstacle, ...] = ()
+
+    @model_validator(mode="after")
+    def _box_has_an_inside(self) -> Self:
+        for name in ("box_x", "box_y"):
+            least, greatest = getattr(self, name)
+            if not least < greatest:
+                raise SettingError(name, "[least, greatest] with least < greatest", [least, greatest])
+        return self
+
+    @property
+    def box(self) -> tuple[float, float, float, float]:
+        """Least x, greatest x, least y, greatest y of the box where it stands."""
+        (dx, dy), (left, right), (bottom, top) = self.obstacle_shift, self.box_x, self.box_y
+        return left + dx, right + dx, bottom + dy, top + dy
+
+    def obstacle_table(self) -> ObstacleTable:
+        """Return the obstacles where they stand."""
+        table = obstacle_table(self.obstacles)
+        table.center[:, :2] += self.obstacle_shift
+        return table

@@ -104,6 +104,8 @@ def _checks(results: Results, settings: ReportSettings, refuted: dict[str, Refut
             ),
         ),
         ("An error of 2 or more", AT_LEAST_TWO),
+        ("Selection, crossover and mutation", OPERATORS),
+        ("Time of a run", TIME),
     ]
     literal = ((c, _literal_shift(c)) for c in shown)
     rows += [(f"{c.label}: the printed shift of obstacles, read literally", text) for c, text in literal if text]
@@ -115,6 +117,13 @@ AT_LEAST_TWO = (
     "runs with a solution, and the printed 99.8 % says that 2 of 1000 runs of the paper had none after ten attempts, "
     "or counted as successful without stopping below 2"
 )
+
+
+OPERATORS = (
+    "are not named by the paper, and the percentages depend on them: `evoexp run experiment=lavoie_operators`; so neither "
+    "agreement nor disagreement with Fig. 3 says much of the paper's algorithm"
+)
+TIME = "the paper prints its own (Pentium II, 400 MHz) inside Fig. 3 only; here: above, one core of this run's machine"
 
 
 def _literal_shift(condition: ConditionResults) -> str:

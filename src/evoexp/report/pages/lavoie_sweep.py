@@ -84,23 +84,22 @@ def tested(results: Results, settings: ReportSettings) -> tuple[Tested, ...]:
 
 
 def _checks(results: Results, settings: ReportSettings, refuted: dict[str, Refuted]) -> tuple[tuple[str, str], ...]:
-    level = settings.confidence
-
-    def line(what: str, of: dict[str, Proportion]) -> tuple[str, str]:
-        return what, "; ".join(f"{label}: {measures.text(found, level)}" for label, found in of.items() if found.total)
-
-    shown = results.with_data
-    rows = [
-        line("Runs with a solution", {c.label: Proportion(c.solved, c.done) for c in shown}),
-        *(line(f"Position error below {x:g}", {c.label: measures.below(c, x) for c in shown}) for x in measures.BOUNDS),
-        line("Accepted motions that touch an obstacle", {label: found.anywhere for label, found in refuted.items()}),
-        line("… on SP1", {label: found.sp1 for label, found in refuted.items()}),
-        line("… on SP2", {label: found.sp2 for label, found in refuted.items()}),
-        ("Attempts, mean", "; ".join(f"{c.label}: {c.column('term_attempts').mean():.2f}" for c in results.main)),
-    ]
-    if not _paths_differ(results):
-        rows += _weak_evidence(results, settings)
-    return tuple(rows)
+    """Return one row of shares per condition, and what agreement with Fig. 3 is worth."""
+    rows = []
+    for c in results.with_data:
+        found = refuted[c.label]
+        told = {
+            "with a solution": Proportion(c.solved, c.done),
+            f"error below {BOUND:g}": measures.below(c, BOUND),
+            "accepted and in contact": found.anywhere,
+            "on SP1": found.sp1,
+            "on SP2": found.sp2,
+        }
+        texts = [f"{name}: {measures.text(p, settings.confidence)}" for name, p in told.items() if p.total]
+        if not c.is_control:
+            texts.append(f"mean attempts: {c.column('term_attempts').mean():.2f}")
+        rows.append((f"{c.label}: shares of runs", "; ".join(texts)))
+    return (*rows, *([] if _paths_differ(results) else _weak_evidence(results, settings)))
 
 
 def _weak_evidence(results: Results, settings: ReportSettings) -> list[tuple[str, str]]:
@@ -178,8 +177,8 @@ def _drawings(
             Drawing(
                 "stopping",
                 "Precision against the stopping value",
-                "Medians with quartiles over all runs; one without a solution counts as infinite. To the right searches "
-                "stop at smaller values.",
+                "Medians with quartiles over all runs; one without a solution counts as infinite. To the right "
+                "searches stop at smaller values.",
                 partial(stopping.stopping_table, results, measures.errors, measures.effort),
                 stopping.draw_stopping,
                 shown,

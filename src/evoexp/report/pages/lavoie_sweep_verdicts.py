@@ -193,7 +193,8 @@ def _compared(
 
 
 def _median(condition: ConditionResults, values: Callable[[ConditionResults], FloatArray]) -> str:
-    return markdown.number(float(np.median(values(condition))))
+    value = float(np.median(values(condition)))
+    return markdown.number(float(round(value)) if 1e3 < value < np.inf else value)
 
 
 def _shares(one: Proportion, two: Proportion, settings: ReportSettings) -> str:

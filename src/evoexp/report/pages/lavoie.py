@@ -120,8 +120,8 @@ AT_LEAST_TWO = (
 
 
 OPERATORS = (
-    "are not named by the paper, and the percentages depend on them: `evoexp run experiment=lavoie_operators`; so neither "
-    "agreement nor disagreement with Fig. 3 says much of the paper's algorithm"
+    "are not named by the paper, and the percentages depend on them: `evoexp run experiment=lavoie_operators`; so "
+    "neither agreement nor disagreement with Fig. 3 says much of the paper's algorithm"
 )
 TIME = "the paper prints its own (Pentium II, 400 MHz) inside Fig. 3 only; here: above, one core of this run's machine"
 

@@ -142,49 +142,18 @@ def _literal_shift(condition: ConditionResults) -> str:
 
 def _drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
     shown, level = results.with_data, f"{100 * settings.confidence:g} %"
-    starts = [Shown(c.label, c) for c in shown]
-    solutions = [_solution(c, _median_replicate(c, measures.solved(c))) for c in shown if c.solved]
-    touching = [(c, measures.solved(c) & measures.touches(c)) for c in shown]
-    through = [_solution(c, _median_replicate(c, rows)) for c, rows in touching if rows.any()]
-    distribution = partial(
-        error_distribution.distribution_table, results, measures.errors, _printed, settings.confidence
-    )
-    found = [
-        Drawing(
-            "fig_1_start",
-            "Fig. 1: start postures",
-            "The ellipses as they are tested, exactly; their places and sizes are read off the paper's Fig. 1. The tip "
-            "must end inside the box.",
-            partial(reaching.reaching_table, starts),
-            reaching.draw_reaching,
-            shown,
-        )
-    ]
-    if solutions:
-        found.append(
-            Drawing(
-                "fig_2_solution",
-                "Fig. 2: solutions",
-                "The paper shows one solution of the arm of seven joints. Here: per arm the run whose position error "
-                "is the median of all solved runs (the lower one of two); intermediate postures are tested positions "
-                "(Eq. 3), the later the stronger.",
-                partial(reaching.reaching_table, solutions),
-                reaching.draw_reaching,
-                shown,
-            )
-        )
-    found.append(
+    return (
+        _postures("fig_1_start", "Fig. 1: start postures", START, [Shown(c.label, c) for c in shown]),
+        *_solutions(results),
         Drawing(
             "fig_3_error",
             "Fig. 3: probability of a position error below x",
             f"Steps: share of all runs that end with a solution of a smaller error, with Wilson's {level} interval at "
             "each x. Diamonds: the percentages that the paper prints, with the intervals of its own thousand runs.",
-            distribution,
+            partial(error_distribution.distribution_table, results, measures.errors, _printed, settings.confidence),
             error_distribution.draw_distribution,
             shown,
-        )
-    )
-    found.append(
+        ),
         Drawing(
             "attempts",
             "Attempts",
@@ -192,21 +161,45 @@ def _drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]
             partial(attempts.attempts_table, results, settings.confidence),
             attempts.draw_attempts,
             shown,
-        )
+        ),
     )
-    if through:
-        found.append(
-            Drawing(
-                "refuted",
-                "What the tested positions let through",
-                "Per arm the accepted run of median position error among those that the exact verdict refutes: every "
-                "tested position is free, and the arm passes through an obstacle between two of them.",
-                partial(reaching.reaching_table, through),
-                reaching.draw_reaching,
-                shown,
-            )
-        )
-    return tuple(found)
+
+
+START = (
+    "The ellipses as they are tested, exactly; their places and sizes are read off the paper's Fig. 1. The tip must "
+    "end inside the box."
+)
+SOLUTIONS = (
+    "The paper shows one solution of the arm of seven joints. Here: per arm the run whose position error is the median "
+    "of all solved runs (the lower one of two); intermediate postures are tested positions (Eq. 3), the later the "
+    "stronger."
+)
+THROUGH = (
+    "Per arm the accepted run of median position error among those that the exact verdict refutes: every tested "
+    "position is free, and the arm passes through an obstacle between two of them."
+)
+
+
+def _solutions(results: Results) -> list[Drawing]:
+    """Return the figures of solutions: the median one of each arm, and the median one of those that are refuted."""
+    found = []
+    for stem, title, caption, only_refuted in (
+        ("fig_2_solution", "Fig. 2: solutions", SOLUTIONS, False),
+        ("refuted", "What the tested positions let through", THROUGH, True),
+    ):
+        shown = []
+        for c in results.with_data:
+            rows = measures.solved(c) & (measures.touches(c) | (not only_refuted))
+            if rows.any():
+                shown.append(_solution(c, _median_replicate(c, rows)))
+        if shown:
+            found.append(_postures(stem, title, caption, shown))
+    return found
+
+
+def _postures(stem: str, title: str, caption: str, shown: list[Shown]) -> Drawing:
+    table = partial(reaching.reaching_table, shown)
+    return Drawing(stem, title, caption, table, reaching.draw_reaching, tuple(one.condition for one in shown))
 
 
 def _printed(condition: ConditionResults) -> list[error_distribution.Point]:

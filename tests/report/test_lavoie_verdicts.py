@@ -10,7 +10,7 @@ from report_samples import REPORT
 from evoexp import compose
 from evoexp.report.claims import CONTRADICTED, INCONCLUSIVE, NOT_JUDGED, REPRODUCED, Claim
 from evoexp.report.pages import lavoie_measures, lavoie_sweep_verdicts, lavoie_verdicts
-from evoexp.report.pages.lavoie_measures import PRINTED, Refuted
+from evoexp.report.pages.lavoie_measures import Refuted
 from evoexp.report.proportions import Proportion
 from evoexp.report.results import ConditionResults, Results, StoredLogs
 from evoexp.report.settings import ReportSettings
@@ -79,10 +79,7 @@ def test_one_proportion_is_greater(one: Proportion, two: Proportion, verdict: st
 
 def test_printed_percentages_say_the_numbers_and_the_rule() -> None:
     results = made_up({"7-DOF": below_one(964), "10-DOF": below_one(991)}, "lavoie")
-    seven, ten = (
-        lavoie_verdicts.percentage(results, c, printed, SETTINGS)
-        for c, printed in zip(results.conditions, (PRINTED[0], PRINTED[2]), strict=True)
-    )
+    (seven, _), (ten, _) = (lavoie_verdicts.percentages("", c, SETTINGS) for c in results.conditions)
     assert (seven.verdict, ten.verdict) == (CONTRADICTED, REPRODUCED)
     assert seven.text == "7-DOF: a position error below 1 in 93.5 % of runs"
     assert "964 of 1000 = 96.4 % [95.1, 97.4]; the printed one lies outside" in seven.evidence
@@ -129,7 +126,9 @@ def test_what_is_overridden_or_too_few_is_not_judged() -> None:
     other = made_up(errors, "lavoie", "planner.success=finite")
     for results, why in ((few, "fewer replicates than planned"), (other, "overridden: planner.success")):
         for claim in (
-            lavoie_verdicts.percentage(results, results.conditions[0], PRINTED[0], SETTINGS),
+            *lavoie_verdicts.percentages(
+                lavoie_verdicts.reason(results, results.conditions[0]), results.conditions[0], SETTINGS
+            ),
             *lavoie_verdicts.more_joints_are_better(results, SETTINGS),
             lavoie_verdicts.no_start_needed(results, results.conditions[0]),
         ):
@@ -203,6 +202,19 @@ def test_positions_and_chords_are_judged_with_adjusted_p_values() -> None:
     assert found["M = 50 removes contacts altogether: 7-DOF, M = 50, chords"].verdict == CONTRADICTED
     assert found["M = 50 removes contacts altogether: 10-DOF, M = 50, chords"].verdict == REPRODUCED
     assert len(found) == 10
+
+
+def test_printed_percentages_are_judged_by_either_reading_of_a_success() -> None:
+    errors = {
+        "7-DOF, below its value": below_one(964),
+        "7-DOF, any finite cost": below_one(953),
+        "10-DOF, below its value": below_one(999),
+        "10-DOF, any finite cost": below_one(982),
+    }
+    found = sweep(made_up(errors, "lavoie_success"))
+    below_1 = {claim.text.split(":")[0]: claim.verdict for claim in found if "below 1 " in claim.text}
+    assert below_1 == {label: CONTRADICTED if "value" in label else REPRODUCED for label in errors}
+    assert len(found) == 8
 
 
 def test_operators_judge_nothing() -> None:

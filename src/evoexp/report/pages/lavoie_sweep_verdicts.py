@@ -13,7 +13,7 @@ from evoexp.report.pages import generic
 from evoexp.report.pages import lavoie_measures as measures
 from evoexp.report.pages.curkovic_measures import claim, evidence, not_judged
 from evoexp.report.pages.lavoie_measures import Refuted
-from evoexp.report.pages.lavoie_verdicts import judge_greater
+from evoexp.report.pages.lavoie_verdicts import judge_greater, percentages
 from evoexp.report.proportions import Proportion, fisher_exact
 from evoexp.report.results import ConditionResults, Results
 from evoexp.report.settings import ReportSettings
@@ -26,6 +26,7 @@ Group = list[ConditionResults]
 def of_sweep(results: Results, settings: ReportSettings, refuted: dict[str, Refuted]) -> tuple[Claim, ...]:
     """Return the claims that the conditions can judge; none where they differ in nothing that a claim is about."""
     return (
+        *_success(results, settings),
         *_precision(results, settings),
         *_generations(results, settings),
         *_coding(results, settings),
@@ -53,6 +54,13 @@ def groups_but_for(results: Results, *path: str) -> list[Group]:
         key = repr((c.condition.robot.canonical(), c.condition.scenario.canonical(), planner))
         found.setdefault(key, []).append(c)
     return [group for group in found.values() if len(group) > 1]
+
+
+def _success(results: Results, settings: ReportSettings) -> list[Claim]:
+    """Judge the printed percentages by either reading of a success."""
+    why = not_judged(results)
+    conditions = [c for group in groups_but_for(results, "success") for c in group]
+    return [one for c in conditions for one in percentages(why, c, settings)]
 
 
 def _precision(results: Results, settings: ReportSettings) -> list[Claim]:

@@ -6,7 +6,7 @@ from evoexp.report import claims, markdown
 from evoexp.report.claims import Claim
 from evoexp.report.pages import lavoie_measures as measures
 from evoexp.report.pages.curkovic_measures import claim, not_judged
-from evoexp.report.pages.lavoie_measures import Printed
+from evoexp.report.pages.lavoie_measures import PRINTED, Printed
 from evoexp.report.parameters import overridden, parameters
 from evoexp.report.proportions import Proportion, fisher_exact, newcombe
 from evoexp.report.results import ConditionResults, Results
@@ -67,9 +67,20 @@ def reason(results: Results, condition: ConditionResults) -> str:
     return f"overridden: {', '.join(changed)}" if changed else ""
 
 
-def percentage(results: Results, condition: ConditionResults, printed: Printed, settings: ReportSettings) -> Claim:
-    """Return the claim that a printed percentage makes."""
-    why, level = reason(results, condition), settings.confidence
+def percentages(why: str, condition: ConditionResults, settings: ReportSettings) -> list[Claim]:
+    """Return the claims that the percentages printed for an arm of so many joints make.
+
+    Args:
+        why: Why they are not to be judged; empty: judge them.
+        condition: Whose runs they are judged on.
+        settings: Level of the intervals.
+    """
+    joints = measures.num_joints(condition)
+    return [_percentage(why, condition, printed, settings) for printed in PRINTED if printed.joints == joints]
+
+
+def _percentage(why: str, condition: ConditionResults, printed: Printed, settings: ReportSettings) -> Claim:
+    level = settings.confidence
     own, theirs = measures.below(condition, printed.bound), printed.proportion
     low, high = newcombe(own, theirs, level)
     within = own.interval(level)

@@ -17,6 +17,8 @@ PAGES = {
     "curkovic_sweep": "evoexp.report.pages.curkovic_sweep:page",
     "ablations": "evoexp.report.pages.ablations:page",
     "generic": "evoexp.report.pages.generic:page",
+    "lavoie": "evoexp.report.pages.lavoie:page",
+    "lavoie_sweep": "evoexp.report.pages.lavoie_sweep:page",
     "planar_arms": "evoexp.report.pages.planar_arms:page",
     "rana": "evoexp.report.pages.rana:page",
 }

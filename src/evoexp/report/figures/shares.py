@@ -1,0 +1,68 @@
+"""How many runs of every condition have a property, with intervals: one panel per property."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from evoexp.records import FloatArray
+from evoexp.report import style
+from evoexp.report.proportions import Proportion
+from evoexp.report.tables import groups
+
+MARGIN = 0.08  # [-] of a panel's range, beyond the intervals
+
+
+def shares_table(
+    rows: Sequence[tuple[str, int, str, Proportion]], printed: Mapping[str, float], confidence: float
+) -> pd.DataFrame:
+    """Return shares of runs.
+
+    Args:
+        rows: (quantity, position, condition, how many).
+        printed: Quantity → the share that a paper prints for it.
+        confidence: Level of Wilson's intervals.
+
+    Returns:
+        Columns quantity, position, condition, having, total, share, lower, upper, printed.
+    """
+    names = ["quantity", "position", "condition", "having", "total", "share", "lower", "upper"]
+    table = pd.DataFrame([(*given, *p, p.share, *p.interval(confidence)) for *given, p in rows], columns=names)
+    return table.assign(printed=table["quantity"].map(dict(printed)).astype("float64"))
+
+
+def draw_shares(table: pd.DataFrame) -> Figure:
+    """Draw one panel per quantity, one row per condition; each panel has its own range."""
+    quantities = list(dict.fromkeys(table["quantity"]))
+    labels = dict(zip(table["position"], table["condition"], strict=True))
+    rows_of = {position: row for row, position in enumerate(sorted(labels))}
+    figure = style.figure(0.26 * len(labels) + 1.1)
+    panels = figure.subplots(1, len(quantities), sharey=True, squeeze=False)[0]
+    for axes, quantity in zip(panels, quantities, strict=True):
+        every = table[table["quantity"] == quantity]
+        own = every[every["total"] > 0]
+        for position, rows in groups(every, "position"):
+            colour, y = style.condition_colour(int(position)), rows_of[position]
+            if rows["total"].iloc[0]:
+                axes.hlines(y, 100 * rows["lower"], 100 * rows["upper"], color=colour, linewidth=1.6)
+                axes.plot(100 * rows["share"], [y], "o", color=colour, markersize=4.5)
+            text = f" {rows['having'].iloc[0]}/{rows['total'].iloc[0]}"
+            axes.annotate(text, (1.0, y), xycoords=axes.get_yaxis_transform(), fontsize=6.5, va="center", ha="left")
+        if len(own):
+            for printed in own["printed"].dropna().unique():
+                axes.axvline(100 * printed, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
+            axes.set_xlim(*_range(100 * own[["lower", "upper", "printed"]].to_numpy()))
+        axes.xaxis.set_major_locator(style.few_ticks())
+        axes.set_xlabel("share of runs [%]")
+        axes.set_title(quantity, fontsize=7.5)
+    panels[0].set_yticks(list(rows_of.values()), [labels[position] for position in rows_of])
+    panels[0].set_ylim(len(labels) - 0.5, -0.5)
+    return figure
+
+
+def _range(values: FloatArray) -> tuple[float, float]:
+    """Return the range of an axis that shows all of some percentages; NaN is ignored."""
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    beyond = MARGIN * (high - low)
+    return low - beyond, high + beyond

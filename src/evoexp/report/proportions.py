@@ -1,0 +1,54 @@
+"""Two proportions of independent runs: how far apart they are, and whether they differ."""
+
+import math
+from fractions import Fraction
+from typing import NamedTuple
+
+from evoexp.report.statistics import Interval, wilson
+
+
+class Proportion(NamedTuple):
+    """How many of some runs have a property.
+
+    Attributes:
+        having: Runs that have it.
+        total: All runs.
+    """
+
+    having: int
+    total: int
+
+    @property
+    def share(self) -> float:
+        """In [0, 1]; NaN without runs."""
+        return self.having / self.total if self.total else math.nan
+
+    def interval(self, confidence: float) -> Interval:
+        """Return Wilson's score interval."""
+        return wilson(self.having, self.total, confidence)
+
+
+def newcombe(one: Proportion, two: Proportion, confidence: float) -> Interval:
+    """Return an interval of the difference `one` − `two` (Newcombe 1998, method 10: from Wilson's intervals).
+
+    Args:
+        one: Of some runs; without any the interval is [−1, 1].
+        two: Of other runs.
+        confidence: Level of the interval.
+    """
+    if not one.total or not two.total:
+        return Interval(-1.0, 1.0)
+    (low_one, high_one), (low_two, high_two) = one.interval(confidence), two.interval(confidence)
+    difference = one.share - two.share
+    below = math.sqrt((one.share - low_one) ** 2 + (high_two - two.share) ** 2)
+    above = math.sqrt((high_one - one.share) ** 2 + (two.share - low_two) ** 2)
+    return Interval(difference - below, difference + above)
+
+
+def fisher_exact(one: Proportion, two: Proportion) -> float:
+    """Return the two-sided p-value of Fisher's exact test: tables at most as likely as the one that was found."""
+    count, total = one.having + two.having, one.total + two.total
+    least, greatest = max(0, count - two.total), min(count, one.total)
+    ways = [math.comb(one.total, k) * math.comb(two.total, count - k) for k in range(least, greatest + 1)]
+    found = ways[one.having - least]
+    return float(Fraction(sum(way for way in ways if way <= found), math.comb(total, count)))

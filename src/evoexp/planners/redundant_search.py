@@ -80,7 +80,21 @@ class Search:
         self._starts = np.repeat(start[:, None], size, axis=1)
         self.genomes, self._angles, self._results = table[: self._num_genes], table[first:-RESULTS], table[-RESULTS:]
         self.costs = self._results[0]
+        self._count, self._mutation = count, _mutation(ga)
+        selecting = (SELECTIONS.index(ga.selection), ga.tournament_size, ga.rank_pressure)
+        crossing = _crossing(ga)
+        self._breeding = (self._num_genes, self._binary, selecting, crossing)
+        self._stops = self._places(crossing[0])
         self.best, self.summary = Found(np.inf, start, np.empty(0)), Summary(0, np.nan, np.nan, 0)
+
+    def _places(self, crossover: int) -> tuple[int, int, int]:
+        """Return where a generation's uniform numbers for crossover and for mutation begin, and how many there are."""
+        ga, count, num_genes = self._ga, self._count, self._num_genes
+        pairs = count // 2
+        chosen = count * (ga.tournament_size if ga.selection == "tournament" else 1)
+        crossed = num_single_point_uniforms(pairs) if crossover == ONE_POINT else num_gene_uniforms(num_genes, pairs)
+        mutated = num_genes * count if self._binary else num_mutation_uniforms(num_genes, count, self._mutation[1])
+        return chosen, chosen + crossed, chosen + crossed + mutated
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw the initial population, uniform within the limits, and judge it."""
@@ -97,35 +111,35 @@ class Search:
 
     def advance(self, rng: np.random.Generator, index: int) -> None:
         """Replace the population of generation `index` by the next one."""
-        ga, count = self._ga, len(self._memory[2])
-        choosing = (SELECTIONS.index(ga.selection), ga.tournament_size, ga.rank_pressure)
-        crossing, mutating = self._varying(index)
-        pairs, (kind, scope) = count // 2, mutating[:2]
-        sizes = (
-            count * (ga.tournament_size if ga.selection == "tournament" else 1),
-            num_single_point_uniforms(pairs) if crossing[0] == ONE_POINT else num_gene_uniforms(self._num_genes, pairs),
-            num_mutation_uniforms(self._num_genes, count, scope) if not self._binary else self._num_genes * count,
-        )
-        uniforms = rng.random(sum(sizes))
-        normals = standard_normal(rng, (self._num_genes, count)) if kind == GAUSSIAN else np.empty((0, 0))
-        draws = (uniforms[: sizes[0]], uniforms[sizes[0] : sizes[0] + sizes[1]], uniforms[sum(sizes[:2]) :], normals)
-        breeding = (self._num_genes, self._binary, choosing, crossing, mutating, self._limits)
+        crossing, mutating, end = self._stops
+        uniforms = rng.random(end)
+        kind, scope, rate, spread = self._mutation
+        if kind == NON_UNIFORM and isinstance(self._ga, RealGenetic):
+            spread = float(non_uniform_spread(index, self._ga.num_generations, self._ga.mutation_power))
+        normals = standard_normal(rng, (self._num_genes, self._count)) if kind == GAUSSIAN else _NO_NORMALS
+        draws = (uniforms[:crossing], uniforms[crossing:mutating], uniforms[mutating:], normals)
+        breeding = (*self._breeding, (kind, scope, rate, spread), self._limits)
         found = redundant_kernels.advance(draws, breeding, self._judging, self._starts, self._memory)
         self._summarise(found)
-
-    def _varying(self, index: int) -> tuple[tuple[int, float, float], tuple[int, int, float, float]]:
-        """Return (crossover, its rate, α) and (mutation, its scope, its rate, its spread)."""
-        ga = self._ga
-        if not isinstance(ga, RealGenetic):
-            return (ONE_POINT, ga.crossover_rate, 0.0), (NON_UNIFORM, GENE, ga.mutation_rate, 0.0)
-        kind = MUTATIONS.index(ga.mutation)
-        spread = ga.mutation_std
-        if kind == NON_UNIFORM:
-            spread = float(non_uniform_spread(index, ga.num_generations, ga.mutation_power))
-        crossing = (CROSSOVERS.index(ga.crossover), ga.crossover_rate, ga.blend_alpha)
-        return crossing, (kind, SCOPES.index(ga.mutation_scope), ga.mutation_rate, spread)
 
     def _summarise(self, found: tuple[int, float, float, int]) -> None:
         self.summary = Summary(*found)
         terms = self._results[:, self.summary.best].copy()
         self.best = Found(float(terms[0]), self._angles[:, self.summary.best].copy(), terms)
+
+
+_NO_NORMALS = np.empty((0, 0))
+
+
+def _crossing(ga: SelectiveSettings) -> tuple[int, float, float]:
+    """Return crossover, its rate, α."""
+    if not isinstance(ga, RealGenetic):
+        return ONE_POINT, ga.crossover_rate, 0.0
+    return CROSSOVERS.index(ga.crossover), ga.crossover_rate, ga.blend_alpha
+
+
+def _mutation(ga: SelectiveSettings) -> tuple[int, int, float, float]:
+    """Return mutation, its scope, its rate, its spread."""
+    if not isinstance(ga, RealGenetic):
+        return NON_UNIFORM, GENE, ga.mutation_rate, 0.0
+    return MUTATIONS.index(ga.mutation), SCOPES.index(ga.mutation_scope), ga.mutation_rate, ga.mutation_std

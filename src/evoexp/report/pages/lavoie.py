@@ -22,7 +22,8 @@ INTRODUCTION = (
     "second one the posture B at the end of the second (SP2, tip near the goal, inside the box); both are repeated "
     "until both are successful, ten times at most. The cost is the objective of SP2 (Eq. 4): position error + 0.7 · "
     "joint displacement, infinite in collision or outside the box; lower is better. A run has a solution if both "
-    "searches stopped below their values (6 and 2); its error is that of the tip at the end of SP2."
+    "searches were successful: they stopped below their values, 6 and 2 (unless `planner.success` is `finite`); its error "
+    "is that of the tip at the end of SP2."
 )
 
 

@@ -12,6 +12,7 @@ from evoexp.report.figures.reaching import Shown
 from evoexp.report.page import Drawing, Page, Quantity
 from evoexp.report.pages import generic, lavoie_verdicts
 from evoexp.report.pages import lavoie_measures as measures
+from evoexp.report.pages.curkovic_measures import not_judged
 from evoexp.report.pages.lavoie_measures import PRINTED, Refuted
 from evoexp.report.proportions import Proportion
 from evoexp.report.results import ConditionResults, Results
@@ -22,7 +23,8 @@ INTRODUCTION = (
     "second one the posture B at the end of the second (SP2, tip near the goal, inside the box); both are repeated "
     "until both are successful, ten times at most. The cost is the objective of SP2 (Eq. 4): position error + 0.7 · "
     "joint displacement, infinite in collision or outside the box; lower is better. A run has a solution if both "
-    "searches stopped below their values (6 and 2); its error is that of the tip at the end of SP2."
+    "searches were successful: they stopped below their values, 6 and 2 (unless `planner.success` is `finite`); its "
+    "error is that of the tip at the end of SP2."
 )
 
 
@@ -66,7 +68,7 @@ def quantities(results: Results) -> tuple[Quantity, ...]:
 def _claims(results: Results, settings: ReportSettings, refuted: dict[str, Refuted]) -> tuple[Claim, ...]:
     found: list[Claim] = []
     for c in results.with_data:
-        found += lavoie_verdicts.percentages(lavoie_verdicts.reason(results, c), c, settings)
+        found += lavoie_verdicts.percentages(not_judged(results), c, settings)
     found += lavoie_verdicts.more_joints_are_better(results, settings)
     for c in results.with_data:
         found.append(lavoie_verdicts.no_start_needed(results, c))

@@ -19,8 +19,8 @@ from evoexp.report.settings import ReportSettings
 
 INTRODUCTION = (
     "Each condition changes one part of the first one of its arm; all share their seeds. A run has a solution if both "
-    "searches stopped below their values; one without counts as an infinite error and infinite effort. Searches differ "
-    "in length and one follows the other, so there is no common axis to draw convergence on."
+    "searches were successful (`planner.success`); one without counts as an infinite error and infinite effort. "
+    "Searches differ in length and one follows the other, so there is no common axis to draw convergence on."
 )
 BOUND = 1.0  # x of P(position error < x) that the paper's percentages tell most by
 
@@ -146,7 +146,7 @@ def _drawings(
             "shares",
             "Shares of runs",
             f"With Wilson's {level} interval, counts beside. Motions that touch an obstacle are counted among the "
-            "accepted ones. Dashed: the percentage that the paper prints.",
+            "accepted ones. A dashed line: the percentage that the paper prints, where all conditions are of one arm.",
             partial(_shares, results, refuted, settings.confidence),
             shares.draw_shares,
             shown,

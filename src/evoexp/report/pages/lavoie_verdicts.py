@@ -7,7 +7,6 @@ from evoexp.report.claims import Claim
 from evoexp.report.pages import lavoie_measures as measures
 from evoexp.report.pages.curkovic_measures import claim, not_judged
 from evoexp.report.pages.lavoie_measures import PRINTED, Printed
-from evoexp.report.parameters import overridden, parameters
 from evoexp.report.proportions import Proportion, fisher_exact, newcombe
 from evoexp.report.results import ConditionResults, Results
 from evoexp.report.settings import ReportSettings
@@ -59,14 +58,6 @@ def judge_greater(
     return claims.REPRODUCED if one.share > two.share else claims.CONTRADICTED
 
 
-def reason(results: Results, condition: ConditionResults) -> str:
-    """Return why a printed number is not judged on a condition; empty if it is."""
-    if other := not_judged(results):
-        return other
-    changed = overridden(parameters(results, condition))
-    return f"overridden: {', '.join(changed)}" if changed else ""
-
-
 def percentages(why: str, condition: ConditionResults, settings: ReportSettings) -> list[Claim]:
     """Return the claims that the percentages printed for an arm of so many joints make.
 
@@ -101,7 +92,7 @@ def more_joints_are_better(results: Results, settings: ReportSettings) -> list[C
     if not {7, 10} <= set(by_joints):
         return []
     found, both = [], (by_joints[10], by_joints[7])
-    why = reason(results, both[0]) or reason(results, both[1])
+    why = not_judged(results)
     for bound in measures.BOUNDS:
         ten, seven = (measures.below(c, bound) for c in both)
         told = (
@@ -115,7 +106,7 @@ def more_joints_are_better(results: Results, settings: ReportSettings) -> list[C
 
 def no_start_needed(results: Results, condition: ConditionResults) -> Claim:
     """Return the claim that random populations are a good enough start."""
-    why = reason(results, condition)
+    why = not_judged(results)
     told = (
         f"{markdown.share(condition.solved, condition.done)} runs from uniform random populations end with a solution "
         "(reproduced: all of them; one without contradicts)"
@@ -130,7 +121,7 @@ def free_of_collision(
     results: Results, condition: ConditionResults, refuted: Proportion, settings: ReportSettings
 ) -> Claim:
     """Return the claim that accepted motions touch nothing."""
-    why = reason(results, condition)
+    why = not_judged(results)
     free = int(np.count_nonzero(measures.solved(condition) & condition.summaries["certified"].eq(True).fillna(False)))
     told = f"{markdown.share(free, refuted.total)} certified; refuted {measures.text(refuted, settings.confidence)}"
     planned = condition.planned if condition.solved == condition.done else 0

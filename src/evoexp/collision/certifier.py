@@ -29,9 +29,6 @@ Status = Literal["certified", "refuted", "undecided"]
 ROUNDING = 1e-12
 """[-] of the scene's size: error of the sweep's own distances."""
 
-COARSE = 0.5
-"""[-] resolution of a first sweep: finds contacts before time goes into the least clearance."""
-
 POLISH_STEP = 0.02  # [segments] first step towards a local minimum
 
 SAME = 1e-4  # [segments] a local minimum so close is the same one
@@ -160,13 +157,11 @@ class _Judgement:
             none = np.inf, np.nan, None, np.nan, None
             return Verdict("certified", "certified", *none, np.inf, 0, 0, np.nan)
         try:
-            proven = -np.inf
-            for resolution in sorted({max(COARSE, self.resolution), self.resolution}, reverse=True):
-                contact, bound = self._search(resolution, self.tolerances, self.tolerances)
-                if contact is not None:
-                    return self._refuted(contact)
-                self._polish()
-                proven = max(proven, min(bound, self.best.distance))
+            contact, bound = self._search(self.resolution, self.tolerances, self.tolerances)
+            if contact is not None:
+                return self._refuted(contact)
+            self._polish()
+            proven = min(bound, self.best.distance)
             status: Status = "certified" if proven > -np.inf else "undecided"
             return self._free(status, self._judge_margin(status, proven), proven)
         except QueryLimit:

@@ -200,7 +200,7 @@ def _exact_p(ranks: np.ndarray, doubled: int) -> float:
 def _normal_p(ranks: np.ndarray, doubled: int) -> float:
     """Two-sided p by the normal approximation, ties accounted for by the ranks themselves."""
     mean, variance = ranks.sum() / 2.0, float((ranks.astype(np.float64) ** 2).sum()) / 4.0
-    return min(1.0, 2.0 * NormalDist().cdf(-abs(doubled - mean) / math.sqrt(variance)))
+    return _two_sided(doubled - mean, variance)
 
 
 def _exact_rank_sum_p(ranks: np.ndarray, size: int, doubled: int) -> float:
@@ -220,4 +220,9 @@ def _normal_rank_sum_p(ranks: np.ndarray, size: int, doubled: int) -> float:
     total, other = len(ranks), len(ranks) - size
     mean = size * float(ranks.mean())
     variance = size * other / (total - 1) * float(np.mean((ranks - ranks.mean()) ** 2))
-    return min(1.0, 2.0 * NormalDist().cdf(-abs(doubled - mean) / math.sqrt(variance))) if variance else 1.0
+    return _two_sided(doubled - mean, variance)
+
+
+def _two_sided(deviation: float, variance: float) -> float:
+    """Probability that a normal deviate is as far from its mean; erfc keeps the far tail, where cdf gives 0."""
+    return math.erfc(abs(deviation) / math.sqrt(2.0 * variance)) if variance else 1.0

@@ -10,7 +10,7 @@ from evoexp import compose
 from evoexp.collision.certificate import certificate
 from evoexp.errors import SettingError
 from evoexp.planners.coevolution import Coevolution, Evaluated, Problem
-from evoexp.report.pages.curkovic import lower_bound
+from evoexp.report.pages.curkovic_measures import lower_bound
 
 SMALL = ("ga.population_size=12", "ga.num_generations=15", "ga.hall_depth=0.25")
 NO_HALL = ("ga=curkovic_1", "ga.population_size=12", "ga.num_generations=15")

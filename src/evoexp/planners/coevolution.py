@@ -26,10 +26,10 @@ from evoexp.evolution.mutation import decayed_rate, num_allele_uniforms
 from evoexp.evolution.pareto import pareto_front
 from evoexp.evolution.statistics import cost_statistics
 from evoexp.numerics import DEGREE
-from evoexp.objectives.motion_criteria import MotionCriteria, measure_motions
+from evoexp.objectives.motion_criteria import MotionCriteria
 from evoexp.paths.motion import Motion, clamped_cubic, joint_ranges, top_speeds
 from evoexp.planners.chromosome_length import SpeedLimit, length_notes
-from evoexp.planners.coevolution_kernels import breed, drop_copies
+from evoexp.planners.coevolution_kernels import breed, drop_copies, measure
 from evoexp.planners.teams import Evaluated, Judgement
 from evoexp.records import FloatArray, Generation
 from evoexp.robots.assembly import Assembly, Robot
@@ -179,15 +179,11 @@ class Coevolution(Component):
         """Evaluate populations (robots, 2 K, individuals), everybody against everybody of the other robots (Eq. 4)."""
         collision, robots, count = problem.collision, len(populations), populations.shape[2]
         criteria, own = np.empty((robots, 4, count)), np.empty((robots, count))
-        blocked, lines = np.zeros((robots, count), dtype=np.int64), []
-        for r in range(robots):
-            path = np.empty((self.num_configurations + 2, 2, count))
-            path[0], path[-1] = problem.start[r][:, None], problem.goal[r][:, None]
-            path[1:-1] = populations[r].reshape(self.num_configurations, 2, count)
-            points = collision.arms[r].points(path)
-            measure_motions(path, points, self.objective.own_weights, criteria[r, 1:], own[r])
-            lines.append(collision.outlines(r, path, points))
-            blocked[r] = collision.with_obstacles(r, lines[r])
+        paths, points = (np.empty((robots, self.num_configurations + 2, rows, count)) for rows in (2, 4))
+        arms, weights = np.array([(*arm.base, *arm.lengths) for arm in collision.arms]), self.objective.own_weights
+        measure(populations, problem.start, problem.goal, arms, weights, paths, points, criteria, own)
+        lines = [collision.outlines(r, paths[r], points[r]) for r in range(robots)]
+        blocked = np.array([collision.with_obstacles(r, lines[r]) for r in range(robots)])
         hits, sums = [], blocked * count  # an obstacle is in the way whoever the collaborator is
         for a, b in combinations(range(robots), 2):
             crossings = collision.between(a, lines[a], b, lines[b])
@@ -240,7 +236,11 @@ class Coevolution(Component):
         Raises:
             ValueError: If the solution has another size than robots × (K + 2) × 2.
         """
-        terms, curve = self.criteria(problem, solution), self._curve(problem, solution)
+        paths = DEGREE * self._paths(problem, solution)
+        ends = problem._replace(start=paths[:, 0], goal=paths[:, -1])
+        genes = np.ascontiguousarray(paths[:, 1:-1].reshape(len(paths), -1, 1))
+        terms = self.evaluated(ends, genes).terms_of(np.zeros(len(paths), dtype=np.int64))
+        curve = self._curve(problem, solution)
         least, greatest = (joint_ranges(curve)[:, k].reshape(-1, 2) / DEGREE for k in range(2))
         turns = top_speeds(curve).reshape(-1, 2) / DEGREE
         for r in range(len(turns)):
@@ -248,13 +248,6 @@ class Coevolution(Component):
             terms[f"out_of_range_robot_{r + 1}_deg"] = beyond
             terms[f"fastest_turn_robot_{r + 1}_deg"] = float(turns[r].max())
         return terms
-
-    def criteria(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
-        """Return C1 … C4 of every robot of one team by name; see `evaluate`."""
-        paths = DEGREE * self._paths(problem, solution)
-        ends = problem._replace(start=paths[:, 0], goal=paths[:, -1])
-        genes = np.ascontiguousarray(paths[:, 1:-1].reshape(len(paths), -1, 1))
-        return self.evaluated(ends, genes).terms_of(np.zeros(len(paths), dtype=np.int64))
 
     def notes(self, problem: Problem) -> list[str]:
         """Return what Eqs. 2 and 3 say of the chromosome's length, line by line."""
@@ -305,7 +298,7 @@ class _Record:
             self.cost = best.cost
             team = best.individuals if best.found else np.array([int(np.argmin(costs)) for costs in found.costs])
             self.solution = planner.team_solution(self.problem, populations, team)
-            self.terms = planner.criteria(self.problem, self.solution)  # of what is recorded, rounded to degrees
+            self.terms = found.terms_of(team)
         statistics = cost_statistics(found.costs.ravel())
         return Generation(
             index=index,

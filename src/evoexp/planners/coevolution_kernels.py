@@ -1,11 +1,13 @@
-"""Breeding of co-evolving populations, compiled (Curkovic et al. 2013, section 3)."""
+"""Breeding and measuring co-evolving populations, compiled (Curkovic et al. 2013, section 3)."""
 
 import numpy as np
 
+from evoexp.collision.link_crossing_kernels import link_points
 from evoexp.evolution.crossover import cross_single_point
 from evoexp.evolution.mutation import mutate_allele
 from evoexp.evolution.selection import choose_elites, difference_weights, inverse_weights, spin_roulette
 from evoexp.numerics import kernel
+from evoexp.objectives.motion_criteria import measure_motions
 
 
 @kernel
@@ -81,3 +83,29 @@ def drop_copies(populations, teams, fronts):  # type: ignore[no-untyped-def]
             if fresh:
                 known[num_known] = member
                 num_known += 1
+
+
+@kernel
+def measure(populations, starts, goals, arms, weights, paths, points, criteria, own):  # type: ignore[no-untyped-def]
+    """Lay out all paths, and measure what each costs whoever its collaborators are.
+
+    Args:
+        populations: (robots, 2 K, individuals) link angles [rad].
+        starts: (robots, 2) [rad].
+        goals: (robots, 2) [rad].
+        arms: (robots, 4) base x, base y, lengths of both links [length unit].
+        weights: Of C2, C3, C4.
+        paths: (robots, K + 2, 2, individuals) written: link angles, start and goal included.
+        points: (robots, K + 2, 4, individuals) written: elbow x, y, tip x, y.
+        criteria: (robots, 4, individuals), C2, C3, C4 written.
+        own: (robots, individuals) written: their weighted sum.
+    """
+    last = paths.shape[1] - 1
+    for r in range(len(populations)):
+        path, genes = paths[r], populations[r]
+        for link in range(2):
+            path[0, link], path[last, link] = starts[r, link], goals[r, link]
+            for k in range(1, last):
+                path[k, link] = genes[2 * (k - 1) + link]
+        link_points(path, arms[r, 0], arms[r, 1], arms[r, 2], arms[r, 3], points[r])
+        measure_motions(path, points[r], weights, criteria[r, 1:], own[r])

@@ -13,7 +13,14 @@ from evoexp.report import build, claims, link_motions, style
 from evoexp.report.figures import link_intersection, pareto_fronts, robot_motions
 from evoexp.report.fronts import read_fronts
 from evoexp.report.page import Page
-from evoexp.report.pages import curkovic_families, curkovic_measures, curkovic_motion, curkovic_verdicts, page_of
+from evoexp.report.pages import (
+    curkovic_families,
+    curkovic_measures,
+    curkovic_motion,
+    curkovic_verdicts,
+    page_of,
+    verdicts,
+)
 from evoexp.report.results import ConditionResults, Results, gather
 from evoexp.report.settings import ReportSettings
 
@@ -195,16 +202,16 @@ def test_mutation_rates_are_compared_within_a_reading(outputs: Path) -> None:
 
 def test_verdicts_follow_the_rows_of_a_sweep(outputs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     results = results_of(outputs, "curkovic_mutation")
-    monkeypatch.setattr(curkovic_measures, "not_judged", lambda results: "")
+    monkeypatch.setattr(verdicts, "not_judged", lambda results: "")
     low, high = np.arange(12.0), np.arange(12.0) + 20.0
-    settings, verdicts = settings_of("curkovic_mutation"), []
+    settings, found = settings_of("curkovic_mutation"), []
     for first, second in ((low, high), (high, low), (low, low)):
         rows = tuple(claims.compare(f"constant {k}", first, second, True, 0.95, 50) for k in range(3))
         tested = [one._replace(rows=rows) for one in curkovic_families.tested(results, settings, 12.0)[:1]]
         (judged,) = curkovic_verdicts.of_sweep(results, settings, tested)
-        verdicts.append(judged.verdict)
+        found.append(judged.verdict)
         assert "constant 2 (A12" in judged.evidence
-    assert verdicts == [claims.REPRODUCED, claims.CONTRADICTED, claims.INCONCLUSIVE]
+    assert found == [claims.REPRODUCED, claims.CONTRADICTED, claims.INCONCLUSIVE]
 
 
 def test_what_is_tested_between_configurations_is_paired_with_its_twin(outputs: Path) -> None:
@@ -251,7 +258,7 @@ def test_claims_are_judged_only_on_the_papers_own_settings(outputs: Path) -> Non
     judged = found.conditions[0]._replace(condition=paper.condition, planned=20)
 
     def reason(condition: ConditionResults, budget: str = "paper") -> str:
-        return curkovic_measures.not_judged(found._replace(budget=budget, conditions=(condition,)))
+        return verdicts.not_judged(found._replace(budget=budget, conditions=(condition,)))
 
     assert reason(judged) == ""
     assert reason(judged._replace(condition=paper.condition._replace(seed=5))) == ""

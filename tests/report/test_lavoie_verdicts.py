@@ -10,8 +10,8 @@ from report_samples import REPORT
 from evoexp import compose
 from evoexp.report.claims import CONTRADICTED, INCONCLUSIVE, NOT_JUDGED, REPRODUCED, Claim
 from evoexp.report.pages import lavoie_measures, lavoie_sweep_verdicts, lavoie_verdicts
-from evoexp.report.pages.curkovic_measures import not_judged
 from evoexp.report.pages.lavoie_measures import Refuted
+from evoexp.report.pages.verdicts import not_judged
 from evoexp.report.proportions import Proportion
 from evoexp.report.results import ConditionResults, Results, StoredLogs
 from evoexp.report.settings import ReportSettings

@@ -6,8 +6,7 @@ from evoexp.report import claims, markdown
 from evoexp.report.claims import Comparison
 from evoexp.report.figures import ablations, convergence
 from evoexp.report.page import Drawing, Page
-from evoexp.report.pages import generic
-from evoexp.report.parameters import planned_replicates
+from evoexp.report.pages import generic, verdicts
 from evoexp.report.results import Results
 from evoexp.report.settings import ReportSettings
 
@@ -89,24 +88,14 @@ def _against_first(
 
 def _claims(results: Results, settings: ReportSettings, costs: tuple[Comparison, ...]) -> tuple[claims.Claim, ...]:
     """Judge the paper's claim about the two operators, part by part."""
-    reason = ""
-    if results.budget != "paper":
-        reason = f"budget {results.budget or 'unknown'}"
-    elif any(c.planned < planned_replicates(results.experiment) for c in results.conditions):
-        reason = "fewer replicates than planned"
+    reason = verdicts.not_judged(results)
     found = []
     for comparison in costs:
         if comparison.quantity not in PARTS:
             continue
-        low, high = comparison.better.interval
-        evidence = (
-            f"median difference of the best cost {markdown.number(comparison.median_difference)}; with it better in "
-            f"{100 * comparison.better.a12:.0f} % of pairs of runs (A12 {comparison.better.a12:.3f} [{low:.3f}, "
-            f"{high:.3f}]), p = {markdown.p_value(comparison.p_adjusted)}"
-        )
+        difference = markdown.number(comparison.median_difference)
+        told = f"median difference of the best cost {difference}; with it {verdicts.evidence(comparison, 'better')}"
         text = f"Relaxation and redistribution improve the search: against {comparison.quantity}"
         verdict = claims.judge_better(reason, comparison, settings.significance)
-        found.append(
-            claims.Claim(text, "section 5", evidence, f"{claims.NOT_JUDGED} ({reason})" if reason else verdict)
-        )
+        found.append(verdicts.claim(text, "section 5", told, verdict, reason))
     return tuple(found)

@@ -10,7 +10,7 @@ from evoexp.report.claims import Comparison
 from evoexp.report.figures import methods
 from evoexp.report.page import Drawing, Page, Quantity
 from evoexp.report.pages import curkovic_measures as measures
-from evoexp.report.pages import generic
+from evoexp.report.pages import generic, verdicts
 from evoexp.report.results import ConditionResults, Results
 from evoexp.report.settings import ReportSettings
 
@@ -84,18 +84,18 @@ def _matched(results: Results, settings: ReportSettings, what: str, threshold: f
 def _claims(
     results: Results, settings: ReportSettings, compared: dict[str, tuple[Comparison, ...]], threshold: float
 ) -> tuple[claims.Claim, ...]:
-    reason, found = measures.not_judged(results), []
+    reason, found = verdicts.not_judged(results), []
     for name, title in (("generations", f"a team of cost ≤ {markdown.number(threshold)}"), ("best cost", "the end")):
         for comparison in compared[name]:
-            evidence = measures.evidence(comparison, "earlier" if name == "generations" else "lower")
+            evidence = verdicts.evidence(comparison, "earlier" if name == "generations" else "lower")
             verdict = claims.judge_better(reason, comparison, settings.significance)
             text = f"Methods with hall of fame and Eq. 10 converge faster, judged by {title}: {comparison.quantity}"
-            found.append(measures.claim(text, "section 3, Fig. 6", evidence, verdict, reason))
+            found.append(verdicts.claim(text, "section 3, Fig. 6", evidence, verdict, reason))
     slowest = max((float(c.column("cpu_s").max()) for c in results.with_data), default=np.nan)
     solved, done = sum(c.solved for c in results.with_data), sum(c.done for c in results.with_data)
     within = claims.judge_all(reason, solved if slowest < 10.0 else 0, done, sum(c.planned for c in results.conditions))
     found.append(
-        measures.claim(
+        verdicts.claim(
             "A collision-free solution in less than 10 s",
             "section 3",
             f"{markdown.share(solved, done)} runs found one; the slowest run took {markdown.number(slowest)} s of CPU",

@@ -11,7 +11,7 @@ from evoexp.report.claims import Claim, Comparison
 from evoexp.report.figures import body_distances, joint_values, link_intersection, robot_motions
 from evoexp.report.page import Drawing, Page
 from evoexp.report.pages import curkovic_measures as measures
-from evoexp.report.pages import generic, planar_arms
+from evoexp.report.pages import generic, planar_arms, verdicts
 from evoexp.report.results import ConditionResults, Results
 from evoexp.report.settings import ReportSettings
 
@@ -101,7 +101,7 @@ def _tested(substeps: int) -> str:
 
 
 def _claims(results: Results, settings: ReportSettings, tools: tuple[Comparison, ...]) -> tuple[Claim, ...]:
-    reason, found = measures.not_judged(results), []
+    reason, found = verdicts.not_judged(results), []
     for c in results.main:
         problem = c.prepared.problem
         if len(problem.start) > 2:
@@ -124,13 +124,13 @@ def _claims(results: Results, settings: ReportSettings, tools: tuple[Comparison,
             verdict = claims.judge_all(reason, holds, judged, c.planned)
             evidence = f"{markdown.share(holds, judged)} runs"
             found.append(
-                measures.claim(f"{c.label}: {text}, in every run, by {judge}", source, evidence, verdict, reason)
+                verdicts.claim(f"{c.label}: {text}, in every run, by {judge}", source, evidence, verdict, reason)
             )
     for comparison in tools:
         text = f"A larger radius forces the robots further apart: {comparison.quantity}"
         verdict = claims.judge_better(reason, comparison, settings.significance)
         found.append(
-            measures.claim(text, "section 4, Fig. 11", measures.evidence(comparison, "larger"), verdict, reason)
+            verdicts.claim(text, "section 4, Fig. 11", verdicts.evidence(comparison, "larger"), verdict, reason)
         )
     return tuple(found)
 

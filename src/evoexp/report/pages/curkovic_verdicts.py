@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 from evoexp.report import claims, markdown
 from evoexp.report.claims import Claim, Comparison
-from evoexp.report.pages import curkovic_measures as measures
+from evoexp.report.pages import verdicts
 from evoexp.report.pages.curkovic_families import Tested
 from evoexp.report.results import ConditionResults, Results
 from evoexp.report.settings import ReportSettings
@@ -38,7 +38,7 @@ def _varied(results: Results) -> set[str]:
 
 
 def _hall(results: Results, settings: ReportSettings, found: Sequence[Tested]) -> list[Claim]:
-    reason, judged = measures.not_judged(results), []
+    reason, judged = verdicts.not_judged(results), []
     for c in results.with_data[1:]:
         ga = c.planner.ga
         if ga.hall_frozen:
@@ -51,15 +51,15 @@ def _hall(results: Results, settings: ReportSettings, found: Sequence[Tested]) -
             continue
         for one in found:
             row = next((row for row in one.rows if row.quantity == c.label), None)
-            told = measures.evidence(row, "better") if row else "nothing to compare"
+            told = verdicts.evidence(row, "better") if row else "nothing to compare"
             evidence = f"{one.family.name} against {c.label}: {told}"
             verdict = claims.judge_better(reason, row, settings.significance)
-            judged.append(measures.claim(f"{text}, judged by {one.measure.name}", source, evidence, verdict, reason))
+            judged.append(verdicts.claim(f"{text}, judged by {one.measure.name}", source, evidence, verdict, reason))
     return judged
 
 
 def _depth(results: Results, settings: ReportSettings, found: Sequence[Tested]) -> list[Claim]:
-    reason, (first, *others) = measures.not_judged(results), results.with_data
+    reason, (first, *others) = verdicts.not_judged(results), results.with_data
     judged = []
     for one in found:
         own, *medians = (spread(one.measure.values(c)).median for c in (first, *others))
@@ -71,12 +71,12 @@ def _depth(results: Results, settings: ReportSettings, found: Sequence[Tested]) 
             "significantly worse; contradicted: one significantly better)"
         )
         text = f"A hall of at most {first.label} of the population is the best, judged by {one.measure.name}"
-        judged.append(measures.claim(text, "section 3", evidence, verdict, reason))
+        judged.append(verdicts.claim(text, "section 3", evidence, verdict, reason))
     return judged
 
 
 def _mutation(results: Results, settings: ReportSettings, found: Sequence[Tested]) -> list[Claim]:
-    reason, judged = measures.not_judged(results), []
+    reason, judged = verdicts.not_judged(results), []
     for one in found:
         if not one.rows:
             continue
@@ -86,7 +86,7 @@ def _mutation(results: Results, settings: ReportSettings, found: Sequence[Tested
         evidence = f"{_who(first, one.rows, settings.significance)} {rule}"
         reading = READINGS[first.planner.ga.mutation_direction]
         text = f"A rate that falls (Eq. 10) helps, against constant rates, judged by {one.measure.name}; {reading}"
-        judged.append(measures.claim(text, "section 3, Eq. 10", evidence, verdict, reason))
+        judged.append(verdicts.claim(text, "section 3, Eq. 10", evidence, verdict, reason))
     return judged
 
 

@@ -12,8 +12,8 @@ from evoexp.report.figures.reaching import Shown
 from evoexp.report.page import Drawing, Page, Quantity
 from evoexp.report.pages import generic, lavoie_verdicts
 from evoexp.report.pages import lavoie_measures as measures
-from evoexp.report.pages.curkovic_measures import not_judged
 from evoexp.report.pages.lavoie_measures import PRINTED, Refuted
+from evoexp.report.pages.verdicts import not_judged
 from evoexp.report.proportions import Proportion
 from evoexp.report.results import ConditionResults, Results
 from evoexp.report.settings import ReportSettings

@@ -11,9 +11,9 @@ from evoexp.report import claims, markdown
 from evoexp.report.claims import Claim, Comparison
 from evoexp.report.pages import generic
 from evoexp.report.pages import lavoie_measures as measures
-from evoexp.report.pages.curkovic_measures import claim, evidence, not_judged
 from evoexp.report.pages.lavoie_measures import Refuted
 from evoexp.report.pages.lavoie_verdicts import judge_greater, percentages
+from evoexp.report.pages.verdicts import claim, evidence, not_judged
 from evoexp.report.proportions import Proportion, fisher_exact
 from evoexp.report.results import ConditionResults, Results
 from evoexp.report.settings import ReportSettings

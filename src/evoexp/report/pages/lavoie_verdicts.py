@@ -5,8 +5,8 @@ import numpy as np
 from evoexp.report import claims, markdown
 from evoexp.report.claims import Claim
 from evoexp.report.pages import lavoie_measures as measures
-from evoexp.report.pages.curkovic_measures import claim, not_judged
 from evoexp.report.pages.lavoie_measures import PRINTED, Printed
+from evoexp.report.pages.verdicts import claim, not_judged
 from evoexp.report.proportions import Proportion, fisher_exact, newcombe
 from evoexp.report.results import ConditionResults, Results
 from evoexp.report.settings import ReportSettings

@@ -1,0 +1,34 @@
+"""What the pages of sweeps and methods say alike of a claim: whether to judge it, by what numbers, and how it reads."""
+
+from evoexp.report import markdown
+from evoexp.report.claims import Claim, Comparison
+from evoexp.report.parameters import option, planned_replicates
+from evoexp.report.results import Results
+from evoexp.shipped import config_directory, shipped
+
+
+def not_judged(results: Results) -> str:
+    """Return why claims are not to be judged; empty if they are."""
+    if results.budget != "paper":
+        return f"budget {results.budget or 'unknown'}"
+    if any(c.planned < planned_replicates(results.experiment) for c in results.conditions):
+        return "fewer replicates than planned"
+    own = {row.condition_id for row in shipped() if (row.experiment, row.budget) == (results.experiment, "paper")}
+    seed = option(config_directory() / "config.yaml")["seed"].value  # another one is as good as any
+    if any(c.condition._replace(seed=seed).id not in own for c in results.conditions):
+        return "settings overridden"
+    return ""
+
+
+def claim(text: str, source: str, evidence: str, verdict: str, reason: str) -> Claim:
+    """Return a claim; its verdict names the reason why it is not judged."""
+    return Claim(text, source, evidence, f"{verdict} ({reason})" if reason else verdict)
+
+
+def evidence(comparison: Comparison, better: str) -> str:
+    """Return a comparison in words: "lower in 80 % of pairs of runs (…)"."""
+    low, high = comparison.better.interval
+    return (
+        f"{better} in {100 * comparison.better.a12:.0f} % of pairs of runs (A12 {comparison.better.a12:.3f} "
+        f"[{low:.3f}, {high:.3f}]), p = {markdown.p_value(comparison.p_adjusted)}"
+    )

@@ -1,6 +1,7 @@
 """Every condition of every shipped experiment, composed once per test process: composing is what takes long."""
 
 import functools
+import re
 
 from evoexp import compose
 from evoexp.condition import Condition
@@ -20,6 +21,18 @@ def different_conditions(budget: str) -> dict[str, Condition]:
     """Return "experiment: label" → condition, each condition once: experiments share some."""
     found = {condition.id: (f"{name}: {label}", condition) for (name, label), condition in _smallest_last(budget)}
     return dict(found.values())
+
+
+def kinds_of_conditions(budget: str) -> dict[str, Condition]:
+    """Return `different_conditions`, of those that differ in numbers only the last: sweeps are long and alike."""
+    found = {_kind(condition): (name, condition) for name, condition in different_conditions(budget).items()}
+    return dict(found.values())
+
+
+def _kind(condition: Condition) -> str:
+    """Return the canonical form without its numbers; how many there are stays."""
+    numbers = re.compile(r"-?\d+(\.\d+)?([eE][-+]?\d+)?")
+    return numbers.sub("0", condition.to_json().decode())
 
 
 def _smallest_last(budget: str) -> list[tuple[tuple[str, str], Condition]]:

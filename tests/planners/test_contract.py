@@ -1,4 +1,4 @@
-"""What every planner of every shipped experiment keeps to."""
+"""What every planner keeps to, in every kind of shipped condition."""
 
 import numpy as np
 import pytest
@@ -6,9 +6,9 @@ import pytest
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.store.log_reader import read_log
-from shipped_conditions import different_conditions
+from shipped_conditions import kinds_of_conditions
 
-SHIPPED = [pytest.param(condition, id=name) for name, condition in sorted(different_conditions("smoke").items())]
+SHIPPED = [pytest.param(condition, id=name) for name, condition in sorted(kinds_of_conditions("smoke").items())]
 
 
 @pytest.fixture(params=SHIPPED)

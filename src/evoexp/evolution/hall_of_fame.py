@@ -62,8 +62,9 @@ class Hall(NamedTuple):
 
     def moved(self, first: int) -> "Hall":
         """Return the hall as it lies in the next populations: in each of them the k-th team's member at first + k."""
-        places = np.arange(first, first + self.num_teams, dtype=np.int64)
-        return self._replace(teams=np.repeat(places[:, np.newaxis], self.teams.shape[1], axis=1))
+        teams = np.empty_like(self.teams)
+        teams[:] = np.arange(first, first + self.num_teams)[:, np.newaxis]
+        return self._replace(teams=teams)
 
 
 class BestTeam(NamedTuple):

@@ -21,15 +21,14 @@ from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
 from evoexp.evolution.coevolution_settings import CoevolutionSettings
 from evoexp.evolution.crossover import num_single_point_uniforms
-from evoexp.evolution.hall_of_fame import Hall, best_team, update_hall
+from evoexp.evolution.hall_of_fame import Hall, best_team
 from evoexp.evolution.mutation import decayed_rate, num_allele_uniforms
-from evoexp.evolution.pareto import pareto_front
 from evoexp.evolution.statistics import cost_statistics
 from evoexp.numerics import DEGREE
 from evoexp.objectives.motion_criteria import MotionCriteria
 from evoexp.paths.motion import Motion, clamped_cubic, joint_ranges, top_speeds
 from evoexp.planners.chromosome_length import SpeedLimit, length_notes
-from evoexp.planners.coevolution_kernels import breed, drop_copies, measure
+from evoexp.planners.coevolution_kernels import breed, measure, renew
 from evoexp.planners.teams import Evaluated, Judgement
 from evoexp.records import FloatArray, Generation
 from evoexp.robots.assembly import Assembly, Robot
@@ -143,10 +142,13 @@ class Coevolution(Component):
         depth = self.ga.num_hall_teams
         if not depth:
             return hall
-        fronts = np.array([pareto_front(criteria) for criteria in found.criteria])
-        drop_copies(populations, hall.teams, fronts)
-        memory, frozen = self.ga.hall_memory, self.ga.hall_frozen
-        return update_hall(found.collisions, found.teamable, fronts, hall, depth, memory, frozen)
+        teams, ages = np.empty((depth, len(populations)), dtype=np.int64), np.empty(depth, dtype=np.int64)
+        teams[: hall.num_teams], ages[: hall.num_teams] = hall.teams, hall.ages
+        collisions, costs = np.empty(depth, dtype=np.int64), np.empty(depth)
+        rules = self.ga.hall_memory or 0, self.ga.hall_frozen
+        found_keys = found.criteria, found.collisions, found.teamable
+        held = renew(populations, *found_keys, rules, teams, ages, hall.num_teams, (collisions, costs))
+        return Hall(teams[:held], ages[:held], collisions[:held], costs[:held])
 
     def _bred(
         self,
@@ -191,7 +193,8 @@ class Coevolution(Component):
             sums[a] += crossings.sums_1
             sums[b] += crossings.sums_2
         criteria[:, 0] = sums
-        return Evaluated(self.objective.collision_weight * sums + own, criteria, own, np.array(hits), blocked)
+        pairs = hits[0][np.newaxis] if len(hits) == 1 else np.array(hits)
+        return Evaluated(self.objective.collision_weight * sums + own, criteria, own, pairs, blocked)
 
     def cost(self, problem: Problem, population: FloatArray) -> Judgement:
         """Judge the individuals of the first robot, each by its cheapest collision-free team."""

@@ -4,7 +4,9 @@ import numpy as np
 
 from evoexp.collision.link_crossing_kernels import link_points
 from evoexp.evolution.crossover import cross_single_point
+from evoexp.evolution.hall_of_fame import renew_hall
 from evoexp.evolution.mutation import mutate_allele
+from evoexp.evolution.pareto import non_dominated
 from evoexp.evolution.selection import choose_elites, difference_weights, inverse_weights, spin_roulette
 from evoexp.numerics import kernel
 from evoexp.objectives.motion_criteria import measure_motions
@@ -49,6 +51,31 @@ def breed(uniforms, populations, costs, moving, teams, settings, bred):  # type:
                 genes[gene, count + k] = before[gene, chosen[k]]
             for k in range(len(teams)):
                 genes[gene, count + num_elites + k] = before[gene, teams[k, robot]]
+
+
+@kernel
+def renew(populations, criteria, collisions, own, settings, teams, ages, num_teams, keys):  # type: ignore[no-untyped-def]
+    """Renew the hall of fame from the Pareto fronts of all populations, without copies; return how many teams it holds.
+
+    Args:
+        populations: (robots, genes, individuals).
+        criteria: (robots, criteria, individuals), all minimised.
+        collisions: See `hall_of_fame`.
+        own: Likewise.
+        settings: Memory of the hall (0: no rule), whether it is frozen; see `update_hall`.
+        teams: (depth, robots) places of the members, rewritten.
+        ages: (depth,) rewritten.
+        num_teams: How many teams there are.
+        keys: Collisions and costs of the teams, each (depth,), written.
+    """
+    count = populations.shape[2]
+    fronts = np.empty((len(populations), count), dtype=np.bool_)
+    for robot in range(len(populations)):
+        non_dominated(criteria[robot], count, fronts[robot])
+    drop_copies(populations, teams[:num_teams], fronts)
+    return renew_hall(
+        collisions, own, fronts, count, teams, ages, num_teams, settings[0], settings[1], keys[0], keys[1]
+    )
 
 
 @kernel

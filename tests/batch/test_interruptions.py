@@ -40,6 +40,7 @@ def started(outputs: Path, plug_in: Path) -> Iterator[subprocess.Popen[str]]:
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # ignored by what starts in the background
     )
     try:
         yield process

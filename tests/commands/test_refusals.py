@@ -56,7 +56,7 @@ OPTIONS = f"(options: {EXPERIMENTS})"
         ("planner.spline_end=natur", "planner.spline_end: must be one of 'natural' or 'clamped', was 'natur'; did you"),
         (
             "scenario.obstacles=[{shape:cone}]",
-            "scenario.obstacles[0]: must be one of 'sphere', 'box', 'capsule', 'cylinder', 'half_space', 'ellipse', was",
+            "scenario.obstacles[0]: must be one of 'sphere', 'box', 'capsule', 'cylinder', 'half_space', 'ellipse'",
         ),
         ("robot.arms.0.link_lengths=[4,-1]", "robot.arms[0].link_lengths[1]: must be greater than 0"),
         ("seed=1.5", "seed: must be a whole number, at least 0, was 1.5"),

@@ -4,6 +4,7 @@ import os
 import signal
 import threading
 import time
+import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -13,6 +14,10 @@ import joblib
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 WATCH_S = 1.0  # [s] between two looks whether the parent is alive
+
+# Whoever interrupts a batch gives up what is in flight on purpose; joblib tells that as a mistake.
+_GIVEN_UP = r"\d+ tasks (which were still being processed|have been successfully executed)"
+warnings.filterwarnings("ignore", _GIVEN_UP, UserWarning)
 
 
 def in_workers(num_workers: int, tasks: Iterable[Any], ordered: bool = False) -> Iterator[Any]:

@@ -1,9 +1,13 @@
 """Small experiments to report on."""
 
+import functools
 from pathlib import Path
 
 from evoexp import compose
 from evoexp.batch.replicate import run_replicate
+from evoexp.report import build
+from evoexp.report.results import Results, gather
+from evoexp.report.settings import ReportSettings
 from evoexp.store.manifest import manifest
 from evoexp.store.run_directory import RunDirectory
 
@@ -32,3 +36,36 @@ def store(outputs: Path, experiment: compose.Experiment) -> None:
         run.create(condition.to_json(), manifest(condition.id) | {"label": label})
         for replicate in range(experiment.num_replicates):
             run.write_log(replicate, run_replicate(condition, replicate).content)
+
+
+@functools.cache
+def smoke_experiment(name: str, *overrides: str) -> compose.Experiment:
+    """Return an experiment with two replicates of ten generations; composing it is most of the work."""
+    return compose.expand([f"experiment={name}", "budget=smoke", *overrides])[0]
+
+
+@functools.cache
+def smoke_results(outputs: Path, name: str, *overrides: str) -> Results:
+    """Return what two replicates of every condition gave."""
+    experiment = smoke_experiment(name, *overrides)
+    store(outputs, experiment)
+    return gather(outputs, experiment.conditions, experiment.num_replicates, name, experiment.budget, "")
+
+
+def page_settings(name: str, figures: str | None = None) -> ReportSettings:
+    """Return settings for an experiment's own page, or another one."""
+    pages = {"formats": ("svg",), "figures": figures or smoke_experiment(name).report.figures}
+    return ReportSettings(**REPORT | pages)  # type: ignore[arg-type]
+
+
+def smoke_report(outputs: Path, name: str) -> Path:
+    """Return the directory of a whole report."""
+    smoke_results(outputs, name)
+    experiment = smoke_experiment(name)
+    request = build.Request(experiment.report_name, name, experiment.budget, experiment.conditions)
+    return build.report(request, page_settings(name), outputs, experiment.num_replicates).parent
+
+
+def figure_stems(directory: Path) -> set[str]:
+    """Return the names of a report's figures."""
+    return {path.stem for path in directory.glob("*.svg")}

@@ -1,15 +1,14 @@
 """The pages on Curkovic et al. 2013: what they hold, and the tables behind their figures."""
 
-import functools
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from report_samples import REPORT, store
+from report_samples import figure_stems, page_settings, smoke_report, smoke_results
 
 from evoexp import compose
-from evoexp.report import build, claims, link_motions, style
+from evoexp.report import claims, link_motions, style
 from evoexp.report.figures import link_intersection, pareto_fronts, robot_motions
 from evoexp.report.fronts import read_fronts
 from evoexp.report.page import Page
@@ -21,14 +20,7 @@ from evoexp.report.pages import (
     page_of,
     verdicts,
 )
-from evoexp.report.results import ConditionResults, Results, gather
-from evoexp.report.settings import ReportSettings
-
-
-@functools.cache
-def experiment_of(name: str) -> compose.Experiment:
-    """Return an experiment with two replicates of ten generations; composing it is most of the work."""
-    return compose.expand([f"experiment={name}", "budget=smoke"])[0]
+from evoexp.report.results import ConditionResults
 
 
 @pytest.fixture(scope="module")
@@ -36,21 +28,8 @@ def outputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("curkovic")
 
 
-@functools.cache
-def results_of(outputs: Path, name: str) -> Results:
-    """Return what two replicates of every condition gave."""
-    experiment = experiment_of(name)
-    store(outputs, experiment)
-    return gather(outputs, experiment.conditions, experiment.num_replicates, name, experiment.budget, "")
-
-
-def settings_of(name: str, figures: str | None = None) -> ReportSettings:
-    pages = {"formats": ("svg",), "figures": figures or experiment_of(name).report.figures}
-    return ReportSettings(**REPORT | pages)  # type: ignore[arg-type]
-
-
 def page(outputs: Path, name: str, figures: str | None = None) -> Page:
-    return page_of(results_of(outputs, name), settings_of(name, figures))
+    return page_of(smoke_results(outputs, name), page_settings(name, figures))
 
 
 def drawing(found: Page, stem: str) -> pd.DataFrame:
@@ -61,27 +40,15 @@ def drawing(found: Page, stem: str) -> pd.DataFrame:
     return table
 
 
-def written(outputs: Path, name: str) -> Path:
-    """Return the directory of a whole report."""
-    results_of(outputs, name)
-    experiment = experiment_of(name)
-    request = build.Request(experiment.report_name, name, experiment.budget, experiment.conditions)
-    return build.report(request, settings_of(name), outputs, experiment.num_replicates).parent
-
-
-def stems(directory: Path) -> set[str]:
-    return {path.stem for path in directory.glob("*.svg")}
-
-
 def test_fronts_are_what_no_other_individual_dominates(outputs: Path) -> None:
-    directory = written(outputs, "curkovic_pareto")
+    directory = smoke_report(outputs, "curkovic_pareto")
     table = pd.read_csv(directory / "fig_5_fronts.csv")
     assert len(table) == 2 * 100
     for _, rows in table.groupby("population"):
         values = rows[list(pareto_fronts.CRITERIA)].to_numpy()
         dominated = [any((other <= own).all() and (other < own).any() for other in values) for own in values]
         assert list(~np.array(dominated)) == list(rows["non_dominated"])
-    results = results_of(outputs, "curkovic_pareto")
+    results = smoke_results(outputs, "curkovic_pareto")
     fronts = read_fronts(results, results.conditions[0], 1)
     assert [(front.generation, front.population) for front in fronts] == [(10, 0), (10, 1)]
     text = (directory / "index.md").read_text()
@@ -90,11 +57,11 @@ def test_fronts_are_what_no_other_individual_dominates(outputs: Path) -> None:
 
 
 def test_motions_of_two_robots_are_figures_7_to_9(outputs: Path) -> None:
-    directory = written(outputs, "curkovic_motion")
+    directory = smoke_report(outputs, "curkovic_motion")
     names = {
         f"fig_{k}_{what}_{c}" for k, what in ((8, "motion"), (9, "joints")) for c in ("1_straight", "2_cubic_spline")
     }
-    assert stems(directory) == names | {"fig_7_intersection", "distances", "convergence"}
+    assert figure_stems(directory) == names | {"fig_7_intersection", "distances", "convergence"}
     text = (directory / "index.md").read_text()
     assert "Eq. 2 allows steps of 5.73 and 11.46 deg (printed: 11.5 and 23)" in text
     assert "executed curve leaves [0, π] | straight: 0 of 2; cubic spline:" in text
@@ -108,7 +75,7 @@ def test_motions_of_two_robots_are_figures_7_to_9(outputs: Path) -> None:
 
 
 def test_the_intersection_lies_on_both_vectors(outputs: Path) -> None:
-    condition = results_of(outputs, "curkovic_motion").conditions[0]
+    condition = smoke_results(outputs, "curkovic_motion").conditions[0]
     table = link_intersection.intersection_table(condition).set_index("element")
     point = table.loc["point", ["x", "y"]].to_numpy(float)
     for vector, share in (("b", "mu"), ("d", "nu")):
@@ -125,7 +92,7 @@ def test_the_intersection_lies_on_both_vectors(outputs: Path) -> None:
 
 
 def test_a_trail_begins_at_the_start_and_ends_at_the_goal(outputs: Path) -> None:
-    condition = results_of(outputs, "curkovic_motion").conditions[0]
+    condition = smoke_results(outputs, "curkovic_motion").conditions[0]
     table = robot_motions.motion_table(condition)
     path = table[(table["element"] == "path") & (table["replicate"] == condition.best_replicate)]
     problem = condition.prepared.problem
@@ -152,7 +119,7 @@ def test_other_scenes_are_drawn_and_claimed(outputs: Path, name: str, robots: in
     distances = drawing(found, "distances")
     assert sorted(distances["replicate"].unique()) == [-1, 0, 1]
     for (position, replicate), rows in distances[distances["replicate"] >= 0].groupby(["position", "replicate"]):
-        exact = results_of(outputs, name).conditions[position].column("clearance")[replicate]
+        exact = smoke_results(outputs, name).conditions[position].column("clearance")[replicate]
         assert rows["distance"].min() >= exact - 1e-6  # sampled
 
 
@@ -168,7 +135,7 @@ def test_three_radii_are_figure_11(outputs: Path) -> None:
     trail = drawing(found, "motion_3_radius_0_04_m")
     radii = trail[trail["element"] == "configuration"].groupby("link")["radius"].unique()
     assert [list(values) for values in radii] == [[0.02], [0.02], [0.04]]
-    condition = results_of(outputs, "curkovic_safety").conditions[0]
+    condition = smoke_results(outputs, "curkovic_safety").conditions[0]
     lines = curkovic_motion.tool_distance(condition)
     assert (lines >= condition.column("clearance")).all()  # bodies are thicker than lines
 
@@ -190,21 +157,21 @@ def test_the_depth_of_the_hall_is_judged_once_per_measure(outputs: Path) -> None
 
 
 def test_mutation_rates_are_compared_within_a_reading(outputs: Path) -> None:
-    results = results_of(outputs, "curkovic_mutation")
+    results = smoke_results(outputs, "curkovic_mutation")
     one, two = curkovic_families.families(results)
     assert [other.label for _, other in one.pairs] == [f"constant {rate}" for rate in ("0.1", "0.3", "0.6", "1")]
     assert {first.label for first, _ in two.pairs} == {"Eq. 10, symmetric"}
     assert all(other.label.endswith("symmetric") for _, other in two.pairs)
-    tested = curkovic_families.tested(results, settings_of("curkovic_mutation"), 12.0)
-    judged = curkovic_verdicts.of_sweep(results, settings_of("curkovic_mutation"), tested)
+    tested = curkovic_families.tested(results, page_settings("curkovic_mutation"), 12.0)
+    judged = curkovic_verdicts.of_sweep(results, page_settings("curkovic_mutation"), tested)
     assert [claim.text.rsplit("; ", 1)[1] for claim in judged] == ["Eq. 9 as printed", "Eq. 9 read as symmetric"] * 2
 
 
 def test_verdicts_follow_the_rows_of_a_sweep(outputs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    results = results_of(outputs, "curkovic_mutation")
+    results = smoke_results(outputs, "curkovic_mutation")
     monkeypatch.setattr(verdicts, "not_judged", lambda results: "")
     low, high = np.arange(12.0), np.arange(12.0) + 20.0
-    settings, found = settings_of("curkovic_mutation"), []
+    settings, found = page_settings("curkovic_mutation"), []
     for first, second in ((low, high), (high, low), (low, low)):
         rows = tuple(claims.compare(f"constant {k}", first, second, True, 0.95, 50) for k in range(3))
         tested = [one._replace(rows=rows) for one in curkovic_families.tested(results, settings, 12.0)[:1]]
@@ -215,7 +182,7 @@ def test_verdicts_follow_the_rows_of_a_sweep(outputs: Path, monkeypatch: pytest.
 
 
 def test_what_is_tested_between_configurations_is_paired_with_its_twin(outputs: Path) -> None:
-    results = results_of(outputs, "curkovic_stationary")
+    results = smoke_results(outputs, "curkovic_stationary")
     (twins,) = curkovic_families.families(results)
     assert [(a.label, b.label) for a, b in twins.pairs] == [("configurations only", "5 substeps")]
     found = page(outputs, "curkovic_stationary", "curkovic_sweep")
@@ -238,7 +205,7 @@ def test_curves_show_three_defects(outputs: Path) -> None:
 
 
 def test_effort_to_a_threshold_counts_runs_that_never_get_there(outputs: Path) -> None:
-    condition = results_of(outputs, "curkovic_hall").conditions[0]
+    condition = smoke_results(outputs, "curkovic_hall").conditions[0]
     costs = condition.generations.pivot(index="replicate", columns="index", values="best_cost")
     threshold = float(costs[10].mean())  # one of the two replicates gets there
     reached = (costs <= threshold).to_numpy()
@@ -253,7 +220,7 @@ def test_effort_to_a_threshold_counts_runs_that_never_get_there(outputs: Path) -
 
 
 def test_claims_are_judged_only_on_the_papers_own_settings(outputs: Path) -> None:
-    found = results_of(outputs, "curkovic_pareto")
+    found = smoke_results(outputs, "curkovic_pareto")
     (paper,) = compose.expand(["experiment=curkovic_pareto"])[0].conditions
     judged = found.conditions[0]._replace(condition=paper.condition, planned=20)
 
@@ -268,7 +235,7 @@ def test_claims_are_judged_only_on_the_papers_own_settings(outputs: Path) -> Non
 
 
 def test_rates_are_counted_among_solved_motions(outputs: Path) -> None:
-    condition = results_of(outputs, "curkovic_motion").conditions[1]
+    condition = smoke_results(outputs, "curkovic_motion").conditions[1]
     refuted, leaves, fast = curkovic_measures.rates(condition)
     assert (refuted.failing, refuted.solved) == (condition.verdicts.solved_refuted, condition.solved)
     far = [

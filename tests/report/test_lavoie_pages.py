@@ -1,29 +1,22 @@
 """The pages on Lavoie & Boudreau 2001: what they hold, and the tables behind their figures."""
 
-import functools
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from report_samples import REPORT, store
+from report_samples import REPORT, figure_stems, page_settings, smoke_experiment, smoke_report, smoke_results
 
-from evoexp import compose
 from evoexp.collision.certificate import certificate
 from evoexp.numerics import DEGREE
 from evoexp.paths.motion import Motion
-from evoexp.report import bodies, build, motions, style
+from evoexp.report import bodies, motions, style
 from evoexp.report.figures import attempts, error_distribution, reaching, shares
 from evoexp.report.figures.reaching import Shown
 from evoexp.report.pages import lavoie_measures, page_of
 from evoexp.report.proportions import Proportion
-from evoexp.report.results import ConditionResults, Results, gather
+from evoexp.report.results import ConditionResults, Results
 from evoexp.report.settings import ReportSettings
-
-
-@functools.cache
-def experiment_of(name: str, *overrides: str) -> compose.Experiment:
-    return compose.expand([f"experiment={name}", "budget=smoke", *overrides])[0]
 
 
 @pytest.fixture(scope="module")
@@ -31,49 +24,24 @@ def outputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("lavoie")
 
 
-@functools.cache
-def results_of(outputs: Path, name: str, *overrides: str) -> Results:
-    """Return what two replicates of every condition gave."""
-    experiment = experiment_of(name, *overrides)
-    store(outputs, experiment)
-    return gather(outputs, experiment.conditions, experiment.num_replicates, name, experiment.budget, "")
-
-
-def settings_of(name: str, figures: str | None = None) -> ReportSettings:
-    pages = {"formats": ("svg",), "figures": figures or experiment_of(name).report.figures}
-    return ReportSettings(**REPORT | pages)  # type: ignore[arg-type]
-
-
-def written(outputs: Path, name: str) -> Path:
-    """Return the directory of a whole report."""
-    results_of(outputs, name)
-    experiment = experiment_of(name)
-    request = build.Request(experiment.report_name, name, experiment.budget, experiment.conditions)
-    return build.report(request, settings_of(name), outputs, experiment.num_replicates).parent
-
-
-def stems(directory: Path) -> set[str]:
-    return {path.stem for path in directory.glob("*.svg")}
-
-
 def blind(outputs: Path) -> ConditionResults:
     """Return runs of arms that ignore obstacles and are content with any solution: most of them touch."""
-    return results_of(outputs, "lavoie_7dof", "collision.blind=true", "planner.success=finite").conditions[0]
+    return smoke_results(outputs, "lavoie_7dof", "collision.blind=true", "planner.success=finite").conditions[0]
 
 
 def test_the_page_has_the_papers_figures_and_judges_nothing_below_its_budget(outputs: Path) -> None:
-    directory = written(outputs, "lavoie")
-    assert {"fig_1_start", "fig_2_solution", "fig_3_error", "attempts"} <= stems(directory)
+    directory = smoke_report(outputs, "lavoie")
+    assert {"fig_1_start", "fig_2_solution", "fig_3_error", "attempts"} <= figure_stems(directory)
     text = (directory / "index.md").read_text()
     assert text.count("**not judged (budget smoke)**") == 10
     assert text.count("**not judged**") == 2  # those that need a sweep
     assert "(-15, -5) instead of (-5, -15) is refused: scenario.q_start: must be free of collision (link" in text
     assert "tests of a link against an ellipse per second of search" in text
-    assert "convergence" not in stems(directory)
+    assert "convergence" not in figure_stems(directory)
 
 
 def test_one_arm_has_a_page_of_its_own(outputs: Path) -> None:
-    directory = written(outputs, "lavoie_10dof")
+    directory = smoke_report(outputs, "lavoie_10dof")
     text = (directory / "index.md").read_text()
     assert "a position error below 1 in 99.1 % of runs" in text
     assert "93.5 %" not in text
@@ -86,9 +54,9 @@ def test_no_generation_is_read(outputs: Path, monkeypatch: pytest.MonkeyPatch) -
     def refuse(*_: object) -> None:
         raise AssertionError("generations were read")
 
-    results = results_of(outputs, "lavoie")
+    results = smoke_results(outputs, "lavoie")
     monkeypatch.setattr("evoexp.report.results.read_generations", refuse)
-    for drawing in page_of(results, settings_of("lavoie")).drawings:
+    for drawing in page_of(results, page_settings("lavoie")).drawings:
         drawing.table()
 
 
@@ -101,10 +69,10 @@ def test_no_generation_is_read(outputs: Path, monkeypatch: pytest.MonkeyPatch) -
     ],
 )
 def test_sweeps_have_figures_and_a_row_of_shares_per_condition(outputs: Path, name: str, expected: set[str]) -> None:
-    directory = written(outputs, name)
-    assert stems(directory) == expected
+    directory = smoke_report(outputs, name)
+    assert figure_stems(directory) == expected
     text = (directory / "index.md").read_text()
-    for label, _ in experiment_of(name).conditions:
+    for label, _ in smoke_experiment(name).conditions:
         assert f"| {label}: shares of runs |" in text
     table = pd.read_csv(directory / "shares.csv")
     quantities = ["touch an obstacle", "on SP1", "on SP2"]
@@ -115,9 +83,9 @@ def test_sweeps_have_figures_and_a_row_of_shares_per_condition(outputs: Path, na
 
 
 def test_a_sweep_of_one_condition_is_the_page_itself(outputs: Path) -> None:
-    results = results_of(outputs, "lavoie")
+    results = smoke_results(outputs, "lavoie")
     alone = results._replace(conditions=results.conditions[:1])
-    found = page_of(alone, settings_of("lavoie", "lavoie_sweep"))
+    found = page_of(alone, page_settings("lavoie", "lavoie_sweep"))
     assert "fig_3_error" in {drawing.stem for drawing in found.drawings}
 
 
@@ -128,7 +96,7 @@ def test_other_planners_get_the_generic_page(results: Results) -> None:
 
 
 def test_arms_stand_as_the_paper_prints(outputs: Path) -> None:
-    results = results_of(outputs, "lavoie")
+    results = smoke_results(outputs, "lavoie")
     table = reaching.reaching_table([Shown(c.label, c) for c in results.conditions])
     links = table[table["element"] == reaching.LINK]
     lengths = np.hypot(links["x_end"] - links["x"], links["y_end"] - links["y"])
@@ -191,7 +159,7 @@ def test_either_sub_path_is_judged_by_itself(outputs: Path) -> None:
 
 
 def test_the_distribution_counts_smaller_errors_only(outputs: Path) -> None:
-    results = results_of(outputs, "lavoie_7dof")
+    results = smoke_results(outputs, "lavoie_7dof")
     errors = np.array([0.5, 0.25, np.inf, 0.25])
     printed = [(1.0, Proportion(935, 1000))]
     table = error_distribution.distribution_table(results, lambda _: errors, lambda _: printed, 0.95)
@@ -211,7 +179,7 @@ def test_the_distribution_counts_smaller_errors_only(outputs: Path) -> None:
 
 
 def test_attempts_add_up_to_all_runs(outputs: Path) -> None:
-    results = results_of(outputs, "lavoie")
+    results = smoke_results(outputs, "lavoie")
     table = attempts.attempts_table(results, 0.95)
     assert list(table["attempts"]) == [*range(1, 11)] * 2
     assert list(table.groupby("position")["having"].sum()) == [2, 2]

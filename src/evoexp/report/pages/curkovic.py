@@ -8,7 +8,7 @@ from evoexp.records import FloatArray
 from evoexp.report import claims, markdown
 from evoexp.report.claims import Comparison
 from evoexp.report.figures import methods
-from evoexp.report.page import Drawing, Page, Quantity
+from evoexp.report.page import Drawing, Page
 from evoexp.report.pages import curkovic_measures as measures
 from evoexp.report.pages import generic, verdicts
 from evoexp.report.results import ConditionResults, Results
@@ -37,7 +37,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
     return Page(
         title=f"Curkovic et al. 2013: {results.experiment or 'stored runs'}",
         introduction=INTRODUCTION,
-        quantities=_quantities(results, threshold),
+        quantities=(*measures.team_quantities(results, threshold), *generic.term_quantities(results)),
         claims=_claims(results, settings, compared, threshold),
         checks=_checks(results, bound),
         comparisons=tuple(
@@ -49,20 +49,6 @@ def page(results: Results, settings: ReportSettings) -> Page:
             if rows
         ),
         drawings=drawings,
-    )
-
-
-def _quantities(results: Results, threshold: float) -> tuple[Quantity, ...]:
-    row = partial(generic.quantity, results)
-    cost, _, *effort = generic.quantities(results)
-    unit = results.with_data[0].condition.length_unit
-    return (
-        cost._replace(name="best cost of a collision-free team"),
-        *measures.effort_quantities(results, threshold),
-        row("clearance of the bodies over the whole motion (exact)", unit, generic.by_column("clearance")),
-        *effort,
-        row("CPU time of a run", "s", generic.by_column("cpu_s")),
-        *generic.term_quantities(results),
     )
 
 

@@ -84,6 +84,21 @@ def effort_quantities(results: Results, threshold: float) -> tuple[Quantity, ...
     )
 
 
+def team_quantities(results: Results, threshold: float, *more: Quantity) -> tuple[Quantity, ...]:
+    """Return the rows of the table of results that methods and sweeps share; `more` ones follow the clearance."""
+    row = partial(generic.quantity, results)
+    cost, _, *effort = generic.quantities(results)
+    unit = results.with_data[0].condition.length_unit
+    return (
+        cost._replace(name="best cost of a collision-free team"),
+        *effort_quantities(results, threshold),
+        row("clearance of the bodies over the whole motion (exact)", unit, generic.by_column("clearance")),
+        *more,
+        *effort,
+        row("CPU time of a run", "s", generic.by_column("cpu_s")),
+    )
+
+
 def convergence_drawing(results: Results, more: str = "") -> Drawing:
     """Return the figure of the best cost only; that of an average individual, full of collisions, would hide it."""
     caption = f"Median of the best cost so far over replicates. Lower is better.{more}"

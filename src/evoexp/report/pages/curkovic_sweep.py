@@ -43,16 +43,9 @@ def page(results: Results, settings: ReportSettings) -> Page:
 
 
 def _quantities(results: Results, threshold: float) -> tuple[Quantity, ...]:
-    row = partial(generic.quantity, results)
-    cost, _, *effort = generic.quantities(results)
-    unit = results.with_data[0].condition.length_unit
-    return (
-        cost._replace(name="best cost of a collision-free team"),
-        *measures.effort_quantities(results, threshold),
-        row("clearance of the bodies over the whole motion (exact)", unit, generic.by_column("clearance")),
-        row("greatest speed of a link over what Eq. 2 allows", "–", measures.times_over_limit),
-        *effort,
-        row("CPU time of a run", "s", generic.by_column("cpu_s")),
+    speed = "greatest speed of a link over what Eq. 2 allows"
+    return measures.team_quantities(
+        results, threshold, generic.quantity(results, speed, "–", measures.times_over_limit)
     )
 
 

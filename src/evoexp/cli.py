@@ -23,6 +23,8 @@ COMMANDS = {
     "show": "show one stored run: configuration, replicates, environment",
 }
 
+WITH_WORKERS = ("run", "reproduce")
+
 
 class _Parser(argparse.ArgumentParser):
     """Says what is wrong in one line; takes no abbreviated options, whose meaning changes when options are added."""
@@ -58,6 +60,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if chosen is None:
         parser.parse_args(words)
         return 0
+    if arguments is None and chosen in WITH_WORKERS and not {"-h", "--help"} & set(words):
+        importlib.import_module("evoexp.batch.workers").start_server()  # this process is all ours
     module = importlib.import_module(f"evoexp.commands.{'list_' if chosen == 'list' else chosen}")
     command = _Parser(prog=f"evoexp {chosen}", description=f"{COMMANDS[chosen][0].upper()}{COMMANDS[chosen][1:]}.")
     module.add_arguments(command)

@@ -1,7 +1,8 @@
 """A plug-in for tests: Rana & Zalzala's planner, which misbehaves where the environment tells it to.
 
-`FAULTY` holds `<what>:<replicates>`, several with `;`: `raise:1,3`, `kill:2`, `kill_once:4`, `hang:5,6`. It is no
-part of the condition, so that results can be compared with those of an undisturbed run.
+`FAULTY` holds `<what>:<replicates>`, several with `;`: `raise:1,3`, `kill:2`, `kill_once:4`, `hang:5,6`, `tell:7`
+(whether a server forked the worker). It is no part of the condition, so that results can be compared with those of an
+undisturbed run.
 """
 
 import multiprocessing
@@ -32,6 +33,8 @@ class Faulty(ViaPointGa):
                 time.sleep(HANG_S)
             if "raise" in faults and generation.index == 1:
                 raise ArithmeticError(f"replicate {seed.spawn_key[0]} is [bold]told[/] to fail\nand says why")
+            if "tell" in faults:
+                raise RuntimeError("a server's worker" if forked_from_server() else "the parent's worker")
             if faults & {"kill", "kill_once"} and generation.index == 1 and in_worker():
                 die(seed.spawn_key[0], once="kill_once" in faults)
             yield generation
@@ -44,6 +47,11 @@ def faults_of(replicate: int) -> set[str]:
 
 def in_worker() -> bool:
     return multiprocessing.parent_process() is not None
+
+
+def forked_from_server() -> bool:
+    origin = multiprocessing.parent_process()
+    return origin is not None and origin.pid != os.getppid()
 
 
 def die(replicate: int, once: bool) -> None:

@@ -21,17 +21,18 @@ from evoexp.store.tables import read_summaries
 
 HERE = Path(__file__).parent
 COMMAND = ["run", *WORDS, "runner.num_workers=2", "--no-report"]
-FIRST_HANGING = 4  # replicates from here on take an hour
+HANGING = "hang:4,5,6,7,8,9,10,11"  # these replicates take an hour
 PATIENCE_S = 120.0  # [s] for anything that a busy machine may take long for
 
 
 @contextmanager
-def started(outputs: Path, plug_in: Path) -> Iterator[subprocess.Popen[str]]:
-    """Run the command, which will not finish, in a group of its own; nothing of it is left behind."""
+def started(outputs: Path, plug_in: Path, faults: str = HANGING) -> Iterator[subprocess.Popen[str]]:
+    """Run the command in a group of its own; nothing of it is left behind."""
     environment = os.environ | {
         "EVOEXP_OUTPUTS": str(outputs),
         "PYTHONPATH": os.pathsep.join((str(plug_in), str(HERE), os.environ.get("PYTHONPATH", ""))),
-        "FAULTY": "hang:" + ",".join(map(str, range(FIRST_HANGING, 12))),
+        "FAULTY": faults,
+        "FAULTY_FLAGS": str(outputs.parent),
     }
     process = subprocess.Popen(
         [sys.executable, "-m", "evoexp", *COMMAND],
@@ -129,3 +130,17 @@ def test_kill_9_at_any_moment(faulty: Condition, undisturbed: dict[int, str], tm
     assert digests(outputs, faulty) == undisturbed
     assert read_summaries(directory)["digest"].tolist() == list(undisturbed.values())
     assert not list(directory.replicates.glob(".*"))
+
+
+def test_a_worker_forked_from_the_server_may_die(
+    faulty: Condition, undisturbed: dict[int, str], tmp_path: Path, plug_in: Path
+) -> None:
+    outputs = tmp_path / "outputs"
+    with started(outputs, plug_in, "kill_once:3;kill:7;tell:9") as process:
+        out, err = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 1
+    reason = RunDirectory(outputs, faulty.id).failure(9)["reason"]
+    assert reason == "RuntimeError: a server's worker"
+    assert RunDirectory(outputs, faulty.id).failure(7)["reason"] == "worker process died twice"
+    assert sorted(re.findall(r"^failed: \w+ #(\d+)", err, re.MULTILINE)) == ["7", "9"], out
+    assert digests(outputs, faulty) == {k: digest for k, digest in undisturbed.items() if k not in (7, 9)}

@@ -16,10 +16,11 @@ from store_samples import CONDITION, generations, write
 
 from evoexp.errors import CorruptLog
 from evoexp.records import ReplicateSummary
-from evoexp.store import tables
+from evoexp.store import summaries, tables
 from evoexp.store.log import Finished
 from evoexp.store.run_directory import RunDirectory
-from evoexp.store.tables import read_generations, read_summaries, write_summary
+from evoexp.store.summaries import write_summary
+from evoexp.store.tables import read_generations, read_summaries
 
 Add = Callable[..., Finished]
 
@@ -28,13 +29,13 @@ Add = Callable[..., Finished]
 def reads(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Return the names of the logs whose summary was read since."""
     names: list[str] = []
-    read = tables.read_summary
+    read = summaries.read_summary
 
     def count(path: Path) -> ReplicateSummary:
         names.append(path.name)
         return read(path)
 
-    monkeypatch.setattr(tables, "read_summary", count)
+    monkeypatch.setattr(summaries, "read_summary", count)
     return names
 
 

@@ -17,12 +17,13 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from evoexp.batch.jobs import Job, Outcome, load, run_jobs
 from evoexp.batch.settings import RunnerSettings
-from evoexp.batch.workers import in_workers, loading
+from evoexp.batch.workers import in_workers, loading, num_cores
 from evoexp.collision.certificate import certificate
 from evoexp.condition import Condition
 from evoexp.paths.motion import Motion
 from evoexp.store.manifest import manifest
 from evoexp.store.run_directory import RunDirectory, lock_all
+from evoexp.store.summaries import write_summary
 
 TASK_S = 0.05  # [s] replicates are bundled into tasks of about this length
 MAX_BUNDLE = 64  # replicates per task at most, so that results keep streaming
@@ -81,7 +82,6 @@ class Batch:
             config_jsons = list(dict.fromkeys(job.condition_json for job in self.jobs))
             with loading(num_workers, load, config_jsons):
                 _warm(config_jsons)
-                from evoexp.store.tables import write_summary  # and pandas: now there is time
             try:
                 for outcomes in fan_out(self.jobs, num_workers):
                     yield from self._store(outcomes)
@@ -181,8 +181,3 @@ def _warm(config_jsons: Iterable[bytes]) -> None:
                 certificate(problem, motion)
                 if motion is not None:  # and one that touches nothing, whose closest approach is sought
                     certificate(problem, Motion(np.repeat(motion.q[:1], 2, axis=0)))
-
-
-def num_cores() -> int:
-    """Return how many cores this process may use."""
-    return int(joblib.cpu_count())

@@ -1,5 +1,6 @@
 """Worker processes: silent when Ctrl-C reaches all processes of a terminal, and gone when their parent is."""
 
+import multiprocessing
 import os
 import signal
 import threading
@@ -8,9 +9,11 @@ import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from multiprocessing import forkserver
 from typing import Any
 
 import joblib
+from joblib.externals.loky.backend.context import get_start_method, set_start_method
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 WATCH_S = 1.0  # [s] between two looks whether the parent is alive
@@ -18,6 +21,33 @@ WATCH_S = 1.0  # [s] between two looks whether the parent is alive
 # Whoever interrupts a batch gives up what is in flight on purpose; joblib tells that as a mistake.
 _GIVEN_UP = r"\d+ tasks (which were still being processed|have been successfully executed)"
 warnings.filterwarnings("ignore", _GIVEN_UP, UserWarning)
+
+
+_NEEDED = ["evoexp.batch.jobs", "coal", "pinocchio", "joblib.externals.loky.process_executor"]
+"""What every worker loads, whatever it runs."""
+
+
+_SERVED = "forkserver"  # the name of this way to start processes
+_NUM_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+def start_server() -> None:
+    """Let a process of its own load what every worker needs, from now on; workers are then forked from it at once.
+
+    For processes that are evoexp's own: it changes how all of joblib's workers start. Without it, or where processes
+    cannot be forked, each worker loads everything by itself, later.
+    """
+    if num_cores() == 1 or _SERVED not in multiprocessing.get_all_start_methods():
+        return
+    set_start_method(_SERVED, force=True)
+    multiprocessing.set_forkserver_preload(_NEEDED)
+    with _children_ignore_interrupts(), _one_thread_each():
+        forkserver.ensure_running()
+
+
+def num_cores() -> int:
+    """Return how many cores this process may use."""
+    return int(joblib.cpu_count())
 
 
 def in_workers(num_workers: int, tasks: Iterable[Any], ordered: bool = False) -> Iterator[Any]:
@@ -34,7 +64,7 @@ def in_workers(num_workers: int, tasks: Iterable[Any], ordered: bool = False) ->
         inner_max_num_threads=1,
         backend="loky",
         initializer=leave_with_parent,
-        initargs=(os.getpid(),),
+        initargs=(os.getpid(), get_start_method() == _SERVED),
     )
     with _children_ignore_interrupts():
         results: Iterator[Any] = pool(tasks)  # starts the workers
@@ -58,14 +88,18 @@ def loading(num_workers: int, load: Callable[..., None], *arguments: Any) -> Ite
             deque(loaded, maxlen=0)
 
 
-def leave_with_parent(parent: int) -> None:
+def leave_with_parent(parent: int, served: bool) -> None:
     """End this process soon after its parent died: nobody takes its results any more."""
-    threading.Thread(target=_watch, args=(parent,), daemon=True).start()
+    threading.Thread(target=_watch, args=(parent, served), daemon=True).start()
 
 
-def _watch(parent: int) -> None:
-    while os.getppid() == parent:
-        time.sleep(WATCH_S)
+def _watch(parent: int, served: bool) -> None:
+    origin = multiprocessing.parent_process()
+    if served and origin is not None:  # our process's parent is the server, which lives as long as we do
+        origin.join()
+    else:
+        while os.getppid() == parent:
+            time.sleep(WATCH_S)
     os._exit(1)
 
 
@@ -80,3 +114,18 @@ def _children_ignore_interrupts() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
+def _one_thread_each() -> Iterator[None]:
+    """Start processes whose libraries compute in one thread: the replicates keep all cores busy."""
+    before = {name: os.environ.get(name) for name in _NUM_THREADS}
+    os.environ.update(dict.fromkeys(_NUM_THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value

@@ -12,8 +12,7 @@ from rich.text import Text
 from evoexp import compose, shipped
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.reproduce import Comparison, reproduce_log
-from evoexp.batch.runner import num_cores
-from evoexp.batch.workers import in_workers
+from evoexp.batch.workers import in_workers, num_cores
 from evoexp.commands.console import add_columns, add_hash_column, new_table, plain_console
 from evoexp.commands.hashes import with_candidates
 from evoexp.errors import AmbiguousHash, NothingStored, RevisionMismatch, UnknownHash

@@ -6,6 +6,9 @@ import shlex
 import sys
 from typing import Any
 
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
 from rich.console import Console
 from rich.table import Table
 
@@ -18,6 +21,7 @@ from evoexp.commands.progress import BatchProgress
 from evoexp.errors import UnknownOption
 from evoexp.report.pages import PAGES
 from evoexp.store.run_directory import RunDirectory, outputs_root
+from evoexp.store.summaries import summary_table as stored_summaries
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -83,24 +87,28 @@ def _notes(experiment: compose.Experiment, label: str, command: str) -> dict[str
 
 def summary_table(experiment: compose.Experiment) -> Table:
     """Return one row per condition: what is there, and how good."""
-    from evoexp.store.tables import read_summaries  # pandas, which a batch loads while its workers start
-
     table = new_table(experiment.report_name)
     add_columns(table, "condition")
     add_hash_column(table)
     add_columns(table, "replicates", "solved", "median\nbest cost", "CPU s\neach", right=True)
     for label, condition in experiment.conditions:
-        rows = read_summaries(RunDirectory(outputs_root(), condition.id))
-        done = rows[(rows["status"] == "done") & (rows["replicate"] < experiment.num_replicates)]
+        rows = stored_summaries(RunDirectory(outputs_root(), condition.id))
+        wanted = pc.less(rows["replicate"], experiment.num_replicates)
+        done = rows.filter(pc.and_(pc.equal(rows["status"], "done"), wanted))
+        num_done, num_solved = done.num_rows, pc.sum(done["solved"]).as_py() or 0
         table.add_row(
             label,
             condition.id[:12],
-            f"{len(done)} of {experiment.num_replicates}",
-            f"{int(done['solved'].sum())} of {len(done)}",
-            f"{done['best_cost'].median():.4g}" if len(done) else "–",
-            f"{done['cpu_s'].median():.3f}" if len(done) else "–",
+            f"{num_done} of {experiment.num_replicates}",
+            f"{num_solved} of {num_done}",
+            _median(done["best_cost"], ".4g"),
+            _median(done["cpu_s"], ".3f"),
         )
     return table
+
+
+def _median(column: pa.ChunkedArray, form: str) -> str:
+    return format(np.median(column.to_numpy()), form) if len(column) else "–"
 
 
 def _failure_table(batch: Batch, failures: list[Outcome]) -> Table:

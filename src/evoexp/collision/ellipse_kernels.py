@@ -19,6 +19,7 @@ from evoexp.robots.planar_ends import LANES, begin_turning, block_ends, load_lan
 
 AFRESH = 32  # positions after which sines are computed anew, between them turned on
 CONTACT = 1.0 + 1e-9  # [-] squared distance to the centre of the unit circle that still counts as contact
+BEYOND = CONTACT  # [-] distance from an axis at which nothing counts as contact any more
 
 
 @kernel
@@ -57,7 +58,7 @@ def _drop_colliding(  # type: ignore[no-untyped-def]
     begin, end, least = np.empty(rows), np.empty(rows), np.empty(LANES)
     angle, at_x, at_y = np.empty(LANES), np.empty(LANES), np.empty(LANES)
     x, y = np.empty(rows + LANES), np.empty(rows + LANES)
-    mapped = np.empty((3, rows + LANES))
+    mapped, codes = np.empty((2, rows + LANES)), np.empty(num + 1, dtype=np.int64)
     kept = 0
     for first in range(0, count, LANES):
         load_lanes(starts, alive, first, count, begin)
@@ -66,8 +67,8 @@ def _drop_colliding(  # type: ignore[no-untyped-def]
         least[:] = 1.0
         for e in range(len(ellipses[0])):
             reached = ellipses[1][e]
-            _map(ellipses[0][e], reached, num, x, y, U(0), mapped, least)
-            _test_links(reached, num, U(0), mapped, least)
+            _map(ellipses[0][e], reached, num, x, y, U(0), mapped, codes)
+            _test_links(reached, num, U(0), mapped, codes, least)
         for n in range(min(LANES, count - first)):
             individual, free = alive[first + n], least[n] > 0.0
             hit[individual] = not free
@@ -84,13 +85,15 @@ def _sweep(starts, ends, alive, count, arm, ellipses, num_positions, hit):  # ty
     angle, at_x, at_y = np.empty(LANES), np.empty(LANES), np.empty(LANES)
     x, y = np.empty(rows + LANES), np.empty(rows + LANES)
     turn, size = np.empty((4, rows)), len(ellipses[0]) * (rows + LANES)
-    before, now = np.empty((3, size)), np.empty((3, size))
+    before, now = np.empty((2, size)), np.empty((2, size))
+    codes_before = np.empty((len(ellipses[0]), num + 1), dtype=np.int64)
+    codes = np.empty((len(ellipses[0]), num + 1), dtype=np.int64)
     for first in range(0, count, LANES):
         load_lanes(starts, alive, first, count, begin)
         load_lanes(ends, alive, first, count, end)
         least[:] = 1.0
         for position in range(num_positions + 1):
-            before, now = now, before
+            before, now, codes_before, codes = now, before, codes, codes_before
             if position == 0 or position == num_positions:
                 block_ends(begin, end, arm, position, num_positions, angle, at_x, at_y, x, y)
             else:
@@ -99,54 +102,65 @@ def _sweep(starts, ends, alive, count, arm, ellipses, num_positions, hit):  # ty
                 turned_ends(arm, at_x, at_y, turn, x, y)
             for e in range(len(ellipses[0])):
                 reached, place = ellipses[1][e], U(e) * U(rows + LANES)
-                _map(ellipses[0][e], reached, num, x, y, place, now, least)
+                _map(ellipses[0][e], reached, num, x, y, place, now, codes[e])
                 if position > 0:
-                    _test_links_and_chords(reached, num, place, before, now, least)
+                    _test_links(reached, num, place, now, codes[e], least)
+                    _test_chords(reached, num, place, before, now, codes_before[e], codes[e], least)
         for n in range(min(LANES, count - first)):
             hit[alive[first + n]] = not least[n] > 0.0
 
 
 @kernel
-def _map(ellipse, reached, num, x, y, place, mapped, least):  # type: ignore[no-untyped-def]
-    """Write link ends in an ellipse's frame, and their squared distances; lower `least` where one is inside."""
+def _map(ellipse, reached, num, x, y, place, mapped, codes):  # type: ignore[no-untyped-def]
+    """Write link ends in an ellipse's frame, and the sides of the unit circle that all of a block's lie beyond.
+
+    Where two ends share a side, nothing between them meets the circle (outcodes, Newman & Sproull 1979); as the arms of
+    a block are alike, most tests need not be done.
+    """
     a, b, c, d, e = ellipse[0], ellipse[1], ellipse[2], ellipse[3], ellipse[4]
-    u, v, r = mapped[0], mapped[1], mapped[2]
+    u, v = mapped[0], mapped[1]
     for k in range(reached - 1, num + 1):
         row, to = U(k) * U(LANES), place + U(k) * U(LANES)
+        not_right, not_left, not_above, not_below = 0, 0, 0, 0
         for n in range(LANES):
             lane = U(n)
             p, q = a * x[row + lane] + b * y[row + lane] + c, d * y[row + lane] + e
-            squared = p * p + q * q
-            u[to + lane], v[to + lane], r[to + lane] = p, q, squared
-            inside, lowest = squared - CONTACT, least[lane]
-            least[lane] = inside if inside < lowest else lowest
+            u[to + lane], v[to + lane] = p, q
+            not_right |= p <= BEYOND
+            not_left |= p >= -BEYOND
+            not_above |= q <= BEYOND
+            not_below |= q >= -BEYOND
+        codes[k] = 15 - (not_right + 2 * not_left + 4 * not_above + 8 * not_below)
 
 
 @kernel
-def _test_links(reached, num, place, mapped, least):  # type: ignore[no-untyped-def]
-    """Lower `least` to 0 or less where a link meets the ellipse between its ends."""
-    u, v, r = mapped[0], mapped[1], mapped[2]
+def _test_links(reached, num, place, mapped, codes, least):  # type: ignore[no-untyped-def]
+    """Lower `least` to 0 or less where a link meets the ellipse."""
+    u, v = mapped[0], mapped[1]
     for k in range(reached, num + 1):
-        row, to = place + U(k - 1) * U(LANES), place + U(k) * U(LANES)
-        for n in range(LANES):
-            i, j = row + U(n), to + U(n)
-            value, lowest = between(u[i], v[i], r[i], u[j], v[j], r[j]), least[U(n)]
-            least[U(n)] = value if value < lowest else lowest
+        if codes[k - 1] & codes[k] == 0:
+            _test(u, v, place + U(k - 1) * U(LANES), u, v, place + U(k) * U(LANES), least)
 
 
 @kernel
-def _test_links_and_chords(reached, num, place, before, now, least):  # type: ignore[no-untyped-def]
-    """The same for links, and for the chords of their ends since the position before."""
-    u_0, v_0, r_0, u, v, r = before[0], before[1], before[2], now[0], now[1], now[2]
+def _test_chords(reached, num, place, before, now, codes_before, codes, least):  # type: ignore[no-untyped-def]
+    """The same for the chords of link ends since the position before."""
     for k in range(reached, num + 1):
-        row, to = place + U(k - 1) * U(LANES), place + U(k) * U(LANES)
-        for n in range(LANES):
-            i, j = row + U(n), to + U(n)
-            p, q, squared, lowest = u[j], v[j], r[j], least[U(n)]
-            link = between(u[i], v[i], r[i], p, q, squared)
-            chord = between(u_0[j], v_0[j], r_0[j], p, q, squared)
-            lowest = link if link < lowest else lowest
-            least[U(n)] = chord if chord < lowest else lowest
+        if codes_before[k] & codes[k] == 0:
+            row = place + U(k) * U(LANES)
+            _test(before[0], before[1], row, now[0], now[1], row, least)
+
+
+@kernel
+def _test(u, v, row, p, q, to, least):  # type: ignore[no-untyped-def]
+    """Lower `least` to 0 or less where a segment from (u, v) to (p, q) touches the unit circle."""
+    for n in range(LANES):
+        lane = U(n)
+        x_0, y_0, x_1, y_1, lowest = u[row + lane], v[row + lane], p[to + lane], q[to + lane], least[lane]
+        r, s = x_0 * x_0 + y_0 * y_0, x_1 * x_1 + y_1 * y_1
+        inner, nearer = between(x_0, y_0, r, x_1, y_1, s), (r if r < s else s) - CONTACT
+        value = inner if inner < nearer else nearer
+        least[lane] = value if value < lowest else lowest
 
 
 @kernel

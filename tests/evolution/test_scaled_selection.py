@@ -55,7 +55,7 @@ def test_infeasible_ones_expect_nothing_and_equal_ones_equally_much() -> None:
 
 
 @pytest.mark.parametrize(
-    "costs, count, multiple",
+    ("costs", "count", "multiple"),
     [(np.ones((2, 2)), 3, 2.0), (np.ones(0), 3, 2.0), (np.ones(3), -1, 2.0), (np.ones(3), 3, 1.0)],
 )
 def test_scaling_refuses_what_cannot_be(costs: np.ndarray, count: int, multiple: float) -> None:

@@ -14,10 +14,10 @@ def num_remainder_uniforms(num: int, count: int) -> int:
 def stochastic_remainder(rng: np.random.Generator, expected: FloatArray) -> np.ndarray:
     """Choose parents by stochastic remainder sampling without replacement (Chen & Zalzala 1995, sections 2.3 and 3.2).
 
-    Everyone becomes a parent as often as the whole part of its expected number says. For the places left, the remainders
-    are scanned once, in random order: they are added up, and whoever brings the sum past u, u + 1, u + 2, … gets one of
-    the places, u being one uniform number. So nobody gets more than one, and everybody gets one with exactly the
-    probability of its remainder.
+    Everyone becomes a parent as often as the whole part of its expected number says. For the places left, the
+    remainders are scanned once, in random order: they are added up, and whoever brings the sum past u, u + 1, u + 2, …
+    gets one of the places, u being one uniform number. So nobody gets more than one, and everybody gets one with
+    exactly the probability of its remainder.
 
     Goldberg's scan, which tosses a coin per remainder until the places are full, is biased: in the order of indices
     against those that come late, and in any order against small remainders (of 0.9 and 0.1 the second one gets the
@@ -28,7 +28,7 @@ def stochastic_remainder(rng: np.random.Generator, expected: FloatArray) -> np.n
         expected: (individuals,) ≥ 0, as `scaling.scale_linearly` returns them; their sum is the number of parents.
 
     Returns:
-        (parents,) indices in random order: neighbours are a random pairing. The count of k is ⌊expected[k]⌋ or one more.
+        (parents,) indices in random order: neighbours are a random pairing; k occurs ⌊expected[k]⌋ times or once more.
 
     Raises:
         ValueError: If a number is negative or not finite, or the sum is no whole number.

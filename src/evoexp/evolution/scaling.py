@@ -9,8 +9,8 @@ from evoexp.records import FloatArray
 def scale_linearly(costs: FloatArray, count: int, multiple: float = 2.0) -> FloatArray:
     """Return the numbers of copies that linear scaling expects (Goldberg 1989; Chen & Zalzala 1995, Eqs. 5 and 16).
 
-    The paper scales a fitness f = C_m − C to f' = a f + b, whose mean is that of f and whose maximum is `multiple` times
-    the mean; what becomes negative is 0. An individual then expects f' / mean(f') copies:
+    The paper scales a fitness f = C_m − C to f' = a f + b, whose mean is that of f and whose maximum is `multiple`
+    times the mean; what becomes negative is 0. An individual then expects f' / mean(f') copies:
 
         f' / mean(f) = 1 + (multiple − 1) (mean(C) − C) / (mean(C) − min(C)),
 

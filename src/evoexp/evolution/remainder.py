@@ -6,8 +6,9 @@ from evoexp.numerics import kernel
 from evoexp.records import FloatArray
 
 
-def num_remainder_uniforms(num: int, count: int) -> int:
-    """Return how many uniform numbers it takes to choose `count` parents out of `num` individuals."""
+@kernel
+def num_remainder_uniforms(num, count):  # type: ignore[no-untyped-def]
+    """Return how many uniform numbers it takes to choose `count` parents out of `num` individuals; for kernels, too."""
     return num + 1 + count
 
 

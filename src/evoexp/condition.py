@@ -31,6 +31,7 @@ REGISTRY = {
     "coevolutionary": "evoexp.evolution.coevolution_settings:CoevolutionSettings",
     "real_genetic": "evoexp.evolution.operator_settings:RealGenetic",
     "binary_genetic": "evoexp.evolution.operator_settings:BinaryGenetic",
+    "scaled_genetic": "evoexp.evolution.scaled_settings:ScaledGenetic",
     "motion_criteria": "evoexp.objectives.motion_criteria:MotionCriteria",
     "string_fitness": "evoexp.objectives.string_fitness:StringFitness",
     "reaching": "evoexp.objectives.reaching:Reaching",

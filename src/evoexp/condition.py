@@ -142,6 +142,15 @@ class Condition(NamedTuple):
         """Unit of every length in the results, as the scenario names it."""
         return str(getattr(self.scenario, "length_unit", ""))
 
+    @property
+    def is_reference(self) -> bool:
+        """Whether this is a reference: a truth that needs no seed, and one replicate."""
+        return bool(getattr(self.planner, "is_reference", False))
+
+    def num_replicates(self, asked: int) -> int:
+        """Return how many replicates this condition gets where so many are asked for: a reference has one."""
+        return 1 if self.is_reference else asked
+
     def rng(self, replicate: int) -> np.random.Generator:
         """Return the replicate's generator; equal seeds give equal streams to all conditions (common seeds)."""
         return np.random.Generator(np.random.PCG64(np.random.SeedSequence(self.seed, spawn_key=(replicate,))))

@@ -91,7 +91,8 @@ class Batch:
 
     def _missing(self) -> list[Job]:
         jobs = []
-        for key, (condition, count, _) in self._wanted.items():
+        first = sorted(self._wanted.items(), key=lambda item: not item[1][0].is_reference)  # the longest replicates
+        for key, (condition, count, _) in first:
             config_json, done = condition.to_json(), self.runs[key].completed()
             jobs += [Job(key, config_json, index) for index in range(count) if index not in done]
         return jobs
@@ -175,6 +176,8 @@ def _warm(config_jsons: Iterable[bytes]) -> None:
         with contextlib.suppress(Exception):  # a planner that fails does so again in its replicate, and is noted there
             condition = Condition.from_json(text)
             planner, problem = condition.prepare()
+            if condition.is_reference:  # long, and what it compiles is mostly that of the planner beside it
+                planner = planner.planner
             for generation in itertools.islice(planner.evolve(problem, condition.rng(0)), 2):
                 planner.evaluate(problem, generation.best)
                 motion = planner.motion(problem, generation.best)

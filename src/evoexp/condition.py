@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, cast, get_type_hints
 
 import numpy as np
 
+from evoexp.attachments import attached
 from evoexp.errors import RevisionMismatch, SettingError, UnknownSetting, nearest
 from evoexp.validation import TARGET, Component, build
 
@@ -20,12 +21,15 @@ REGISTRY = {
     "arms": "evoexp.robots.arms:Arms",
     "planar_chain": "evoexp.robots.planar_chain:PlanarChain",
     "serial_chain": "evoexp.robots.serial_chain:SerialChain",
+    "floor_platform": "evoexp.robots.floor_platform:FloorPlatform",
+    "grid_motion": "evoexp.scenarios.grid_motion:GridMotion",
     "link_motion": "evoexp.scenarios.link_motion:LinkMotion",
     "pick_and_place": "evoexp.scenarios.pick_and_place:PickAndPlace",
     "arm_motion": "evoexp.scenarios.arm_motion:ArmMotion",
     "via_point_ga": "evoexp.planners.via_point_ga:ViaPointGa",
     "coevolution": "evoexp.planners.coevolution:Coevolution",
     "redundant_ga": "evoexp.planners.redundant_ga:RedundantGa",
+    "grid_path_ga": "evoexp.planners.grid_path_ga:GridPathGa",
     "random_search": "evoexp.planners.random_search:RandomSearch",
     "genetic": "evoexp.evolution.settings:GeneticSettings",
     "coevolutionary": "evoexp.evolution.coevolution_settings:CoevolutionSettings",
@@ -33,6 +37,8 @@ REGISTRY = {
     "binary_genetic": "evoexp.evolution.operator_settings:BinaryGenetic",
     "scaled_genetic": "evoexp.evolution.scaled_settings:ScaledGenetic",
     "motion_criteria": "evoexp.objectives.motion_criteria:MotionCriteria",
+    "path_cost": "evoexp.objectives.path_cost:PathCost",
+    "potential_fields": "evoexp.collision.potential_fields:PotentialFields",
     "string_fitness": "evoexp.objectives.string_fitness:StringFitness",
     "reaching": "evoexp.objectives.reaching:Reaching",
     "link_ellipses": "evoexp.collision.link_ellipses:LinkEllipses",
@@ -131,6 +137,10 @@ class Condition(NamedTuple):
         """Return the canonical form: keys sorted, floats by shortest repr. Its SHA-256 is the identity."""
         config = {part: getattr(self, part).canonical() for part in PARTS} | {"seed": self.seed}
         return json.dumps(config, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
+
+    def files(self) -> dict[str, bytes]:
+        """Return the contents of the files that it refers to, by their names in a log."""
+        return attached({part: getattr(self, part).canonical() for part in PARTS})
 
     @property
     def id(self) -> str:

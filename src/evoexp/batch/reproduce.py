@@ -10,10 +10,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from evoexp.attachments import PREFIX, keep_all
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.errors import CorruptLog
 from evoexp.records import GenerationRow, ReplicateSummary
+from evoexp.store.log import ARRAY
 from evoexp.store.log_reader import LogContents, decode_array, read_log
 from evoexp.store.manifest import differences, environment
 
@@ -73,6 +75,7 @@ def reproduce_log(path: Path) -> Comparison:
         RevisionMismatch: If a component has another revision in this installation.
     """
     stored = read_log(path)
+    keep_all(data for name, data in stored.attachments.items() if name.startswith(PREFIX))
     condition = Condition.from_json(stored.config_json)
     if condition.id != stored.condition_id:
         raise CorruptLog(
@@ -151,4 +154,4 @@ def _numbers(log: LogContents) -> Iterator[tuple[str, Any]]:
     yield from (("clearance", summary.clearance), ("feasible", last.num_feasible))
     yield from ((f"term {name}", value) for name, value in summary.terms.items())
     yield "solution", log.solutions[-1].values
-    yield from ((name, decode_array(data)) for name, data in log.attachments.items())
+    yield from ((name, decode_array(data)) for name, data in log.attachments.items() if name.endswith(ARRAY))

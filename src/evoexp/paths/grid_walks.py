@@ -4,8 +4,9 @@ A path is written into one row of a table: its number of nodes, then their indic
 last the goal. Which nodes a path has is looked up in `place` (nodes,): a node is in the path if the path has it at its
 place; so nothing needs to be cleared between paths.
 
-Uniform numbers come out of a block: `draws` is the block and, as an array of one number, how many were taken. How many a
-walk takes is not known before; if a block is used up, whatever was made with it is to be made again with a longer one.
+Uniform numbers come out of a block: `draws` is the block and, as an array of one number, how many were taken. How
+many a walk takes is not known before; if a block is used up, whatever was made with it is to be made again with a
+longer one.
 """
 
 import numpy as np

@@ -1,12 +1,12 @@
 """Grids of nodes: which moves they permit, and wave fronts over them.
 
-A node is known by its whole coordinates, or by its index. Around the nodes of a grid there is a ring of more nodes, which
-are never free; with it nodes are counted, the last coordinate fastest, so that the difference of two neighbours' indices
-tells the move. Moves go to nodes that differ by at most one in every coordinate.
+A node is known by its whole coordinates, or by its index. Around the nodes of a grid there is a ring of more nodes,
+which are never free; with it nodes are counted, the last coordinate fastest, so that the difference of two
+neighbours' indices tells the move. Moves go to nodes that differ by at most one in every coordinate.
 """
 
 import itertools
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,7 +23,8 @@ class Grid(NamedTuple):
         coordinates: (nodes, dimensions) of every node, those of the ring included.
         neighbours: (nodes, moves) index of the node that each move leads to, −1 where it is not permitted.
         changes: (moves,) how many coordinates each move changes; ascending, so that the first 2m moves are lateral.
-        kinds: (greatest difference of neighbours' indices + 1,) how many coordinates a move changes, by that difference.
+        kinds: (greatest difference of neighbours' indices + 1,) how many coordinates a move changes, by that
+            difference.
     """
 
     free: np.ndarray
@@ -37,7 +38,7 @@ class Grid(NamedTuple):
         """Number of nodes, the ring included."""
         return int(self.free.size)
 
-    def index(self, node: tuple[int, ...]) -> int:
+    def index_of(self, node: tuple[int, ...]) -> int:
         """Return the index of a node, of the ring at most."""
         return int(np.ravel_multi_index(tuple(value + 1 for value in node), self.free.shape))
 
@@ -70,7 +71,7 @@ def grid(blocked: np.ndarray) -> Grid:
     free = np.pad(~blocked.astype(bool), 1)
     nodes = np.arange(free.size).reshape(free.shape)
     neighbours = np.full((*free.shape, len(moves)), -1, dtype=np.int32)
-    inside = (slice(1, -1),) * dimensions
+    inside: tuple[Any, ...] = (slice(1, -1),) * dimensions
     kinds = np.zeros(int(np.abs(nodes[inside] - _shifted(nodes, (1,) * dimensions)).max()) + 1, dtype=np.int32)
     for k, move in enumerate(moves):
         permitted = _permitted(free, move)

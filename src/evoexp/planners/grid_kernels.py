@@ -4,8 +4,6 @@ A population is a table of paths (individuals, nodes + 1), each row as `paths.gr
 mean unsafenesses and costs (3, individuals). A whole generation is one call; settings travel as plain tuples.
 """
 
-import numpy as np
-
 from evoexp.evolution.remainder import choose_by_remainders, num_remainder_uniforms
 from evoexp.evolution.scaling import scale_costs
 from evoexp.evolution.selection import choose_elites
@@ -160,8 +158,8 @@ def cross(draws, world, parents, settings, children, scratch):  # type: ignore[n
 def exchange_without_loops(head, tail, i, j, sites, child):  # type: ignore[no-untyped-def]
     """Write the head of a path up to its node i and the tail of another behind its node j, without loops.
 
-    Neither path has loops, so a loop begins in the head and ends in the tail: at a site. Erasing loops one by one leaves
-    the head up to the first node at which any node of the tail comes back to it, and the tail from there.
+    Neither path has loops, so a loop begins in the head and ends in the tail: at a site. Erasing loops one by one
+    leaves the head up to the first node at which any node of the tail comes back to it, and the tail from there.
 
     Args:
         head: A path without loops.
@@ -185,7 +183,7 @@ def exchange_without_loops(head, tail, i, j, sites, child):  # type: ignore[no-u
 
 @kernel
 def _join(head, i, link, tail, j, joined):  # type: ignore[no-untyped-def]
-    """Write the head of a path up to i, a node between if `link` is one, the tail of another from j; return how many."""
+    """Write the head of a path up to i, a node between if `link` is one, another's tail from j; return how many."""
     count = i
     for k in range(1, i + 1):
         joined[k] = head[k]

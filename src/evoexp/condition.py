@@ -30,6 +30,7 @@ REGISTRY = {
     "coevolution": "evoexp.planners.coevolution:Coevolution",
     "redundant_ga": "evoexp.planners.redundant_ga:RedundantGa",
     "grid_path_ga": "evoexp.planners.grid_path_ga:GridPathGa",
+    "grid_frontier": "evoexp.references.grid_frontier:GridFrontier",
     "random_search": "evoexp.planners.random_search:RandomSearch",
     "genetic": "evoexp.evolution.settings:GeneticSettings",
     "coevolutionary": "evoexp.evolution.coevolution_settings:CoevolutionSettings",

@@ -274,7 +274,7 @@ def _begin(
     nodes = problem.fields.grid.num_nodes
     paths, results = _table(count, nodes)
     place, taken = np.zeros(nodes, dtype=np.int32), np.zeros(1, dtype=np.int64)
-    uniforms = rng.random(count * 2 * int(problem.steps[problem.ends[0]]) + BLOCK)
+    uniforms = rng.random(count * 4 * int(problem.steps[problem.ends[0]]) + BLOCK)
     arguments = (problem.world, planner.objective.weights, not planner.revisits, paths, results, place)
     while not grid_kernels.begin((uniforms, taken), *arguments):
         uniforms, taken[0] = np.concatenate([uniforms, rng.random(len(uniforms))]), 0

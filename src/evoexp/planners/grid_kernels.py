@@ -50,6 +50,13 @@ def measure(path, world, weights, results, k):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def measure_all(paths, world, weights, results):  # type: ignore[no-untyped-def]
+    """Write D, S and C of all paths of a population."""
+    for k in range(len(paths)):
+        measure(paths[k], world, weights, results, k)
+
+
+@kernel
 def advance(draws, world, weights, breeding, population, following, memory):  # type: ignore[no-untyped-def]
     """Write the population that follows another: its offspring, then the elites, best first.
 

@@ -173,8 +173,7 @@ class GridPathGa(Component):
                 f"paths must be (individuals, {problem.fields.grid.num_nodes + 1}), was {population.shape}"
             )
         results = np.empty((RESULTS, len(population)))
-        for k, path in enumerate(population):
-            grid_kernels.measure(path, problem.world, self.objective.weights, results, k)
+        grid_kernels.measure_all(population, problem.world, self.objective.weights, results)
         return Judgement(results, population[:, 0])
 
     def solution(self, problem: Problem, population: np.ndarray, individual: int) -> FloatArray:

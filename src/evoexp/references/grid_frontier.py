@@ -15,6 +15,8 @@ from evoexp.records import FloatArray
 from evoexp.references.truth import Reference, Truth
 from evoexp.validation import Count, Positive
 
+BLOCK = 16  # numbers of nodes whose walks are bounded together
+NOTHING = np.zeros((0, 0), dtype=np.int32)
 SAFEST_OF_SHORTEST = 1e-6  # [1] weight of ΣS where length alone counts: decides among equally short paths only
 
 
@@ -58,8 +60,8 @@ class GridFrontier(Reference):
 
         Its terms: `lower_bound`, the cost of the best walk; `walk_nodes`, its number of nodes; `bound_is_reached`,
         whether a path was found that costs as little. Its arrays: `frontier` (μ, D, S, nodes, cost), one row per
-        distinct path; `walks` (nodes, cost), one row per number of nodes; `walk`, nodes of the best one; `goal_field`
-        (NaN where no path can be) and `unsafeness`, (nodes along x, along y[, along z]).
+        distinct path; `walks` (nodes, cost), one row per number of nodes looked at; `walk`, nodes of the best one;
+        `goal_field` (NaN where no path can be) and `unsafeness`, (nodes along x, along y[, along z]).
         """
         network, (epsilon, lam) = network_of(problem), self.planner.objective.weights
         paths = frontier(network, self._weights() if lam else np.array([SAFEST_OF_SHORTEST]))
@@ -114,14 +116,14 @@ def frontier(network: Network, weights: FloatArray) -> list[tuple[float, np.ndar
         network: The moves.
         weights: Values of μ [cell].
     """
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import dijkstra
+    from scipy.sparse import csgraph, csr_array
 
+    dijkstra: Any = csgraph.dijkstra
     count = len(network.unsafeness)
     found: dict[tuple[int, ...], float] = {}
     for mu in weights:
         costs = network.lengths + mu * network.unsafeness[network.heads]
-        graph = csr_array((costs, (network.tails, network.heads)), shape=(count, count))
+        graph: Any = csr_array((costs, (network.tails, network.heads)), shape=(count, count))
         _, before = dijkstra(graph, indices=network.ends[0], return_predecessors=True)
         path = [network.ends[1]]
         while path[-1] != network.ends[0]:
@@ -133,7 +135,9 @@ def frontier(network: Network, weights: FloatArray) -> list[tuple[float, np.ndar
 def best_walk(
     network: Network, epsilon: float, lam: float, known: float, max_nodes: int
 ) -> tuple[FloatArray, np.ndarray]:
-    """Return what the best walk of every number of nodes costs (numbers, 2), and the best of all (nodes,).
+    """Return what the best walks of some numbers of nodes cost (numbers, 2), and the best of all (nodes,).
+
+    Numbers whose walks are shown to be no better are left out.
 
     Args:
         network: The moves.
@@ -148,36 +152,42 @@ def best_walk(
     order = np.argsort(network.heads, kind="stable")
     tails, heads, lengths = (values[order] for values in (network.tails, network.heads, network.lengths))
     first = np.searchsorted(heads, np.arange(len(network.unsafeness) + 1))
+    edges = (tails, lengths, first, network.unsafeness, network.ends, epsilon)
     costs = np.full(most + 1, np.inf)
-    _walk_costs(tails, lengths, first, network.unsafeness, network.ends, (epsilon, lam), costs)
-    count = int(costs.argmin())
-    before = np.zeros((count + 1, len(network.unsafeness)), dtype=np.int32)
-    _trace_walk(tails, lengths, first, network.unsafeness, network.ends, (epsilon, lam), count, before)
+    for count in range(BLOCK, most + 1, BLOCK):
+        costs[count] = _walk_costs(*edges, lam / count, count, NOTHING)[count]
+    for last in range(BLOCK, most + BLOCK, BLOCK):  # for all these numbers λ / N is at least that of the last
+        below = _walk_costs(*edges, lam / last, min(last, most), NOTHING)
+        for count in range(max(last - BLOCK + 1, 2), min(last - 1, most) + 1):
+            if below[count] < costs.min():
+                costs[count] = _walk_costs(*edges, lam / count, count, NOTHING)[count]
+    best = int(costs.argmin())
+    before = np.zeros((best + 1, len(network.unsafeness)), dtype=np.int32)
+    _walk_costs(*edges, lam / best, best, before)
     walk = [network.ends[1]]
-    for k in range(count, 1, -1):
+    for k in range(best, 1, -1):
         walk.append(int(before[k, walk[-1]]))
     numbers = np.flatnonzero(np.isfinite(costs))
     return np.column_stack([numbers.astype(np.float64), costs[numbers]]), np.array(walk[::-1])
 
 
 @kernel
-def _walk_costs(tails, lengths, first, unsafeness, ends, weights, costs):  # type: ignore[no-untyped-def]
-    """Write the cost of the best walk of 2, 3, … nodes into `costs`."""
-    nothing = np.zeros((0, 0), dtype=np.int32)
-    for count in range(2, len(costs)):
-        costs[count] = _walk_cost(tails, lengths, first, unsafeness, ends, weights, count, nothing)
+def _walk_costs(tails, lengths, first, unsafeness, ends, epsilon, mu, count, before):  # type: ignore[no-untyped-def]
+    """Return the least ε D + μ ΣS of walks of 0 … `count` nodes, (count + 1,).
 
-
-@kernel
-def _trace_walk(tails, lengths, first, unsafeness, ends, weights, count, before):  # type: ignore[no-untyped-def]
-    """Write where the best walk of `count` nodes to each node comes from, (nodes of the walk + 1, nodes)."""
-    return _walk_cost(tails, lengths, first, unsafeness, ends, weights, count, before)
-
-
-@kernel
-def _walk_cost(tails, lengths, first, unsafeness, ends, weights, count, before):  # type: ignore[no-untyped-def]
-    epsilon, mu = weights[0], weights[1] / count
+    Args:
+        tails: (edges,) node where each edge starts, in the order of the nodes where edges end.
+        lengths: (edges,) theirs.
+        first: (nodes + 1,) first edge that ends at each node.
+        unsafeness: (nodes,).
+        ends: Start and goal.
+        epsilon: ε.
+        mu: μ.
+        count: Of nodes.
+        before: (count + 1, nodes) written: where the best walk of so many nodes to each node comes from; or empty.
+    """
     num = len(unsafeness)
+    costs = np.full(count + 1, np.inf)
     present, following = np.full(num, np.inf), np.full(num, np.inf)
     present[ends[0]] = mu * unsafeness[ends[0]]
     for k in range(2, count + 1):
@@ -191,4 +201,5 @@ def _walk_cost(tails, lengths, first, unsafeness, ends, weights, count, before):
             if len(before) > 0:
                 before[k, node] = source
         present, following = following, present
-    return present[ends[1]]
+        costs[k] = present[ends[1]]
+    return costs

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,7 @@ class Route(NamedTuple):
     """
 
     name: str
-    members: tuple[object, ...]
+    members: tuple[Any, ...]
 
 
 def signature(path: FloatArray, centres: FloatArray) -> Signature:
@@ -45,7 +45,7 @@ def inside_points(boxes: Sequence[Sequence[int]]) -> FloatArray:
     return np.array([[0.5 * (x0 + x1) + 0.26, 0.5 * (y0 + y1)] for x0, y0, x1, y1 in boxes]).reshape(-1, 2)
 
 
-def routes(paths: Mapping[object, FloatArray], centres: FloatArray) -> list[Route]:
+def routes(paths: Mapping[Any, FloatArray], centres: FloatArray) -> list[Route]:
     """Return paths grouped by signature, the most frequent route first; of equals the one of the first path.
 
     Args:
@@ -61,7 +61,7 @@ def routes(paths: Mapping[object, FloatArray], centres: FloatArray) -> list[Rout
 
 
 def _name(number: int) -> str:
-    """Return A … Z, AA …"""
+    """Return A to Z, then AA and so on."""
     letters = ""
     number += 1
     while number:

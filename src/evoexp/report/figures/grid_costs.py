@@ -2,6 +2,7 @@
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from evoexp.report import style
@@ -43,23 +44,26 @@ def draw_costs(table: pd.DataFrame) -> Figure:
     panels = figure.subplots(1, len(names), squeeze=False)[0]
     for axes, (name, rows) in zip(panels, grouped(table, "panel"), strict=True):
         for (position, quantity), line in grouped(rows[rows["position"] >= 0], ["position", "quantity"]):
-            colour = style.condition_colour(int(position))
-            dashed, label = quantity == AVERAGE, f"{line['condition'].iloc[0]}"
-            axes.plot(line["generation"], line["median"], color=colour, linestyle="--" if dashed else "-",
-                      linewidth=0.9 if dashed else 1.4, label=f"{label}, average" if dashed else label)  # fmt: skip
-            if not dashed:
-                axes.fill_between(
-                    line["generation"], line["lower"], line["upper"], color=colour, alpha=0.18, linewidth=0
-                )
-        for k, (kind, line) in enumerate(grouped(rows[rows["position"] < 0], "quantity")):
-            axes.axhline(float(line["median"].iloc[0]), color=style.NEUTRAL, linewidth=1.0, linestyle=(":", "-.")[k % 2],
-                         label=str(kind))  # fmt: skip
+            _curve(axes, line, style.condition_colour(int(position)), dashed=quantity == AVERAGE)
+        for (kind, line), pattern in zip(grouped(rows[rows["position"] < 0], "quantity"), (":", "-."), strict=False):
+            at = float(line["median"].iloc[0])
+            axes.axhline(at, color=style.NEUTRAL, linewidth=1.0, linestyle=pattern, label=str(kind))
         axes.set_title(str(name))
         axes.set_xlabel("generation")
         if axes is panels[0]:
             axes.set_ylabel("cost C(P)")
     style.legend_below(figure, panels[0], 3)
     return figure
+
+
+def _curve(axes: Axes, line: pd.DataFrame, colour: str, *, dashed: bool) -> None:
+    """Draw a median, and its quartiles unless it is dashed."""
+    label, x = str(line["condition"].iloc[0]), line["generation"]
+    if dashed:
+        axes.plot(x, line["median"], color=colour, linestyle="--", linewidth=0.9, label=f"{label}, average")
+        return
+    axes.plot(x, line["median"], color=colour, label=label)
+    axes.fill_between(x, line["lower"], line["upper"], color=colour, alpha=0.18, linewidth=0)
 
 
 def gaps_table(found: tuple[Group, ...]) -> pd.DataFrame:
@@ -87,7 +91,7 @@ def draw_gaps(table: pd.DataFrame) -> Figure:
             axes.step(x, 100.0 * steps, where="post", color=colour, label=str(own["condition"].iloc[0]))
         axes.axvline(0.0, color=style.NEUTRAL, linewidth=1.0, linestyle=":")
         axes.set_title(str(name))
-        axes.set_xlabel("cost above the best path known [%]")
+        axes.set_xlabel("cost above best known [%]")
     panels[0].set_ylabel("share of runs [%]")
     style.legend_below(figure, panels[0], len(set(table["condition"])))
     return figure

@@ -1,7 +1,7 @@
 """Paths over a grid: the workspace with its obstacles, and what goes through it (Chen & Zalzala 1995, Fig. 2)."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -69,12 +69,12 @@ def paths_table(panels: Sequence[Panel]) -> pd.DataFrame:
 def draw_paths(table: pd.DataFrame) -> Figure:
     """Draw workspaces side by side: all runs faint, one run, the reference."""
     colours = {FAINT: "#88aacc", MEDIAN: style.CONDITION_COLOURS[0], EXACT: style.CONDITION_COLOURS[1]}
-    styles = {
+    styles: dict[str, dict[str, Any]] = {
         FAINT: {"linewidth": 0.5, "alpha": 0.45},
         MEDIAN: {"linewidth": 1.8},
         EXACT: {"linewidth": 1.4, "linestyle": "--"},
     }
-    figure, panels = _panels(table, 2.9)
+    figure, panels = _panels(table, 2.9 if table["panel"].nunique() > 2 else 3.6)
     for axes, (_, rows) in zip(panels, groups(table, "panel"), strict=True):
         for (kind, _), line in groups(rows[rows["kind"] != OBSTACLE], ["kind", "number"]):
             axes.plot(line["x"], line["y"], color=colours[str(kind)], **styles[str(kind)])
@@ -93,7 +93,7 @@ def draw_routes(table: pd.DataFrame) -> Figure:
             colour = style.condition_colour(names.index(str(kind)))
             width = 0.8 + 3.2 * float(line["share"].iloc[0])
             axes.plot(line["x"], line["y"], color=colour, linewidth=width, label=line["text"].iloc[0])
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.22), ncols=2, fontsize=6.5)
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.24), ncols=2, fontsize=6.5)
     return figure
 
 
@@ -108,6 +108,8 @@ def _panels(table: pd.DataFrame, height: float) -> tuple[Figure, np.ndarray]:
             axes.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, facecolor="#bbbbbb", edgecolor=style.NEUTRAL))
         _ends(axes, rows[rows["kind"] != OBSTACLE])
         style.operational_axes(axes, str(rows["unit"].iloc[0]))
+        axes.set_xlim(table["x"].min() - 1.0, table["x"].max() + 1.0)
+        axes.set_ylim(table["y"].min() - 1.0, table["y"].max() + 1.0)
         axes.set_title(str(name))
         if axes is not panels[0]:
             axes.set_ylabel("")

@@ -115,7 +115,7 @@ def _map(condition: ConditionResults) -> Drawing:
     return Drawing(
         f"fields_{'_'.join(map(str, _fields(condition)[0].shape))}",
         f"{condition.label}: the fields as maps",
-        "Dark grey: obstacles. The potential of the goal is not followed downhill: it weighs the draws of random walks.",
+        "Dark grey: obstacles. The potential of the goal is not followed downhill: it weighs draws of random walks.",
         partial(_map_table, condition),
         potential_fields.draw_maps,
         (condition,),

@@ -75,7 +75,7 @@ def shortest(groups: tuple[Group, ...]) -> float:
 
 def gaps(condition: ConditionResults, truth: float) -> FloatArray:
     """Return by how much each run's cost is above a known one, (done,) [%]."""
-    return np.asarray(100.0 * (condition.column("best_cost") / truth - 1.0))
+    return np.asarray(np.round(100.0 * (condition.column("best_cost") / truth - 1.0), 9))
 
 
 def within(condition: ConditionResults, truth: float, share: float) -> Proportion:
@@ -101,7 +101,7 @@ def route_list(groups: tuple[Group, ...]) -> list[Route]:
 
 def routes_of(condition: ConditionResults, found: list[Route]) -> dict[str, list[int]]:
     """Return name of a route → replicates of a condition that take it, of routes that any takes."""
-    own = {route.name: [m[1] for m in route.members if m[0] == condition.label] for route in found}  # type: ignore[index]
+    own = {route.name: [m[1] for m in route.members if m[0] == condition.label] for route in found}
     return {name: members for name, members in own.items() if members}
 
 

@@ -74,7 +74,7 @@ def draw_paths(table: pd.DataFrame) -> Figure:
         MEDIAN: {"linewidth": 1.8},
         EXACT: {"linewidth": 1.4, "linestyle": "--"},
     }
-    figure, panels = _panels(table, 2.9 if table["panel"].nunique() > 2 else 3.6)
+    figure, panels = _panels(table, {1: 4.2, 2: 3.6, 3: 2.9}.get(table["panel"].nunique(), 2.4))
     for axes, (_, rows) in zip(panels, groups(table, "panel"), strict=True):
         for (kind, _), line in groups(rows[rows["kind"] != OBSTACLE], ["kind", "number"]):
             axes.plot(line["x"], line["y"], color=colours[str(kind)], **styles[str(kind)])
@@ -87,7 +87,7 @@ def draw_paths(table: pd.DataFrame) -> Figure:
 def draw_routes(table: pd.DataFrame) -> Figure:
     """Draw one path per route, as wide as it is frequent, with a legend per workspace."""
     names = sorted({str(kind) for kind in table["kind"] if kind != OBSTACLE}, key=lambda name: (len(name), name))
-    figure, panels = _panels(table, 3.5)
+    figure, panels = _panels(table, 3.1)
     for axes, (_, rows) in zip(panels, groups(table, "panel"), strict=True):
         for (kind, _), line in groups(rows[rows["kind"] != OBSTACLE], ["kind", "number"]):
             colour = style.condition_colour(names.index(str(kind)))

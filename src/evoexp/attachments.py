@@ -6,12 +6,13 @@ descriptions of replicates, is attached to their logs, and lies beside the confi
 """
 
 import hashlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import Field
 
-from evoexp.errors import EvoexpError
+from evoexp.errors import EvoexpError, SettingError
 from evoexp.validation import Settings
 
 FILE, SHA256 = "file", "sha256"
@@ -56,6 +57,31 @@ def keep_all(contents: Iterable[bytes]) -> None:
     """Keep the contents of several files."""
     for content in contents:
         keep(content)
+
+
+def with_files(value: Any, field: str, folders: Sequence[Path]) -> Any:
+    """Return plain data with the content's hash in the place of every `{file: path}`; the contents are kept.
+
+    Args:
+        value: Any nesting of mappings, lists and scalars.
+        field: Dotted path of it, for errors.
+        folders: Where paths are looked for, in this order.
+
+    Raises:
+        SettingError: If a file cannot be read.
+    """
+    if isinstance(value, list):
+        return [with_files(item, f"{field}[{k}]", folders) for k, item in enumerate(value)]
+    if not isinstance(value, dict):
+        return value
+    if set(value) != {FILE}:
+        return {key: with_files(item, f"{field}.{key}", folders) for key, item in value.items()}
+    paths = [folder / str(value[FILE]) for folder in folders]
+    try:
+        return {SHA256: keep(next((path for path in paths if path.exists()), paths[0]).read_bytes())}
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise SettingError(f"{field}.{FILE}", f"a file that can be read ({reason})", str(value[FILE])) from None
 
 
 def attached(config: Any) -> dict[str, bytes]:

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from evoexp.errors import SettingError
-from evoexp.objectives.placement_kernels import RESULTS, measure_both, measure_postures
+from evoexp.objectives.placement_kernels import RESULTS, measure_both, measure_branches, measure_postures
 from evoexp.records import FloatArray
 from evoexp.validation import Component, NonNegative, NonNegativeCount, Positive, Rate, Settings
 
@@ -105,6 +105,13 @@ class Model(NamedTuple):
         out = np.empty((6, angles.shape[1]))
         measure_postures(angles, angles.shape[1], *self, out)
         return out
+
+    def measure_branches(self, angles: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return E and θ3 [deg] of postures θ1, θ2 (2, individuals) [deg], each (2, individuals): by branch."""
+        angles = np.ascontiguousarray(angles, dtype=np.float64)
+        costs, theta_3 = np.empty(angles.shape), np.empty(angles.shape)
+        measure_branches(angles, *self, costs, theta_3)
+        return costs, theta_3
 
     def posture(self, theta_1: float, theta_2: float) -> tuple[int, FloatArray, FloatArray]:
         """Return the better branch (−1: neither is feasible), and all numbers of it and of the other one (RESULTS,)."""

@@ -106,6 +106,16 @@ def measure_both(theta_1, theta_2, task, weights, avoided, limits, out, other): 
 
 
 @kernel
+def measure_branches(angles, task, weights, avoided, limits, costs, theta_3):  # type: ignore[no-untyped-def]
+    """Measure both values of θ3 of every posture: costs and θ3 [deg], both (2, individuals), are written."""
+    out = np.empty(RESULTS)
+    for k in range(angles.shape[1]):
+        for branch in range(2):
+            measure_posture(angles[0, k], angles[1, k], branch, task, weights, avoided, limits, out)
+            costs[branch, k], theta_3[branch, k] = out[COST], out[THETA_3]
+
+
+@kernel
 def measure_postures(angles, count, task, weights, avoided, limits, out):  # type: ignore[no-untyped-def]
     """Measure a population, the better θ3 of each.
 

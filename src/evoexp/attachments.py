@@ -6,7 +6,7 @@ descriptions of replicates, is attached to their logs, and lies beside the confi
 """
 
 import hashlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -59,26 +59,26 @@ def keep_all(contents: Iterable[bytes]) -> None:
         keep(content)
 
 
-def with_files(value: Any, field: str, folders: Sequence[Path]) -> Any:
+def with_files(value: Any, shipped: Path, field: str = "") -> Any:
     """Return plain data with the content's hash in the place of every `{file: path}`; the contents are kept.
 
     Args:
         value: Any nesting of mappings, lists and scalars.
-        field: Dotted path of it, for errors.
-        folders: Where paths are looked for, in this order.
+        shipped: Where paths are looked for that are not there from the current directory.
+        field: Dotted path of the value, for errors.
 
     Raises:
         SettingError: If a file cannot be read.
     """
     if isinstance(value, list):
-        return [with_files(item, f"{field}[{k}]", folders) for k, item in enumerate(value)]
+        return [with_files(item, shipped, f"{field}[{k}]") for k, item in enumerate(value)]
     if not isinstance(value, dict):
         return value
     if set(value) != {FILE}:
-        return {key: with_files(item, f"{field}.{key}", folders) for key, item in value.items()}
-    paths = [folder / str(value[FILE]) for folder in folders]
+        return {key: with_files(item, shipped, f"{field}.{key}" if field else str(key)) for key, item in value.items()}
+    path = Path(str(value[FILE]))
     try:
-        return {SHA256: keep(next((path for path in paths if path.exists()), paths[0]).read_bytes())}
+        return {SHA256: keep((path if path.exists() else shipped / path).read_bytes())}
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise SettingError(f"{field}.{FILE}", f"a file that can be read ({reason})", str(value[FILE])) from None

@@ -9,7 +9,6 @@ import hashlib
 import itertools
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 import hydra
@@ -177,14 +176,11 @@ def _condition(config: DictConfig, budget: Budget) -> Condition:
     _cap_generations(config, budget)
     raw = str(OmegaConf.to_container(config.planner, resolve=False))
     try:
-        plain = OmegaConf.to_container(config, resolve=True)
+        plain: Any = with_files(OmegaConf.to_container(config, resolve=True), config_directory() / "scenario")
     except OmegaConfBaseException as error:
         if absent := [group for group in PLANNER_PARTS if f"key '{group}' not found" in str(error)]:
             raise SettingError(absent[0], f"chosen: {', '.join(options(absent[0]))}", None) from None
         raise SettingError(error.full_key or "configuration", "resolvable", _first_line(error)) from None
-    assert isinstance(plain, dict)
-    folders = Path(), config_directory() / "scenario"
-    plain = {str(key): with_files(value, str(key), folders) for key, value in plain.items()}
     for group in PLANNER_PARTS:
         if plain.get(group) is not None and group in plain["planner"] and f"${{{group}" not in raw:
             must = f"left as it is; set {group}, the group that it is taken from"

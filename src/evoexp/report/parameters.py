@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import yaml
 
+from evoexp.attachments import FILE, SHA256, keep
 from evoexp.condition import PARTS
 from evoexp.report.results import WRAPPED, ConditionResults, Results
 from evoexp.shipped import config_directory
@@ -89,7 +90,10 @@ def option(path: Path) -> dict[str, Entry]:
         if isinstance(base, str) and base != "_self_":
             entries |= option(path.parent / f"{base}.yaml")
     for key, leaf in _leaves(node, ""):
-        entries[key] = Entry(yaml.safe_load(yaml.serialize(leaf)), *_comment(text.splitlines(), leaf))
+        value = yaml.safe_load(yaml.serialize(leaf))
+        if key.endswith(f".{FILE}"):  # conditions know files by their content
+            key, value = key.removesuffix(FILE) + SHA256, keep((path.parent / value).read_bytes())
+        entries[key] = Entry(value, *_comment(text.splitlines(), leaf))
     return entries
 
 

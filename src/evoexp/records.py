@@ -4,6 +4,7 @@ Records are flat. Quantities carry their unit in the name (`cpu_s`) unless the u
 names it (`length_unit`). Costs are minimised; `inf` means infeasible or not evaluated.
 """
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,6 +34,7 @@ class Generation(NamedTuple):
     costs: FloatArray  # (individuals,), with a leading axis for co-evolving populations, whose best cost is a team's
     population: FloatArray  # any shape
     criteria: FloatArray | None = None  # (populations, criteria, individuals), of generations whose front is recorded
+    arrays: Mapping[str, NDArray[Any]] | None = None  # of references: attached to the log as <name>.npy
 
 
 class GenerationRow(NamedTuple):

@@ -91,7 +91,11 @@ def read_motion(path: Path) -> Any:
 
 
 def flatten(values: list[Any], shape: Any) -> FloatArray | None:
-    """Return a motion as a flat solution of a planner's documented shape, None if it does not fit."""
+    """Return a motion as a flat solution of a planner's documented shape, None if it does not fit.
+
+    A shape that begins with an ellipsis is that of any number of equal parts.
+    """
+    shape = _counted(shape, len(values) if isinstance(values, list) else 0)
     if len(values) != len(shape):
         return None
     parts = []
@@ -125,7 +129,14 @@ def _not_finite(values: Any, place: str) -> str:
     return f"was {str(values)[:40]} at {place or 'its top'}"
 
 
+def _counted(shape: Any, count: int) -> Any:
+    """Return a shape whose parts are counted."""
+    return tuple(shape[1:]) * count if len(shape) and shape[0] is ... else shape
+
+
 def _shape_text(shape: Any) -> str:
+    if len(shape) and shape[0] is ...:
+        return f"any number × {_shape_text(shape[1:]).removeprefix('1 × ')}"
     parts = [" × ".join(map(str, part)) for part in shape]
     return f"{len(parts)} × {parts[0]}" if len(set(parts)) == 1 else f"{len(parts)} lists: {', '.join(parts)}"
 

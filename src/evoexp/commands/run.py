@@ -39,7 +39,11 @@ def main(arguments: argparse.Namespace) -> int:
             raise UnknownOption("report.figures", str(figures), PAGES)
     command = _command(arguments)
     wanted = [
-        (labelled.condition, experiment.num_replicates, _notes(experiment, labelled.label, command))
+        (
+            labelled.condition,
+            labelled.condition.num_replicates(experiment.num_replicates),
+            _notes(experiment, labelled.label, command),
+        )
         for experiment in experiments
         for labelled in experiment.conditions
     ]
@@ -93,13 +97,14 @@ def summary_table(experiment: compose.Experiment) -> Table:
     add_columns(table, "replicates", "solved", "median\nbest cost", "CPU s\neach", right=True)
     for label, condition in experiment.conditions:
         rows = stored_summaries(RunDirectory(outputs_root(), condition.id))
-        wanted = pc.less(rows["replicate"], experiment.num_replicates)
+        planned = condition.num_replicates(experiment.num_replicates)
+        wanted = pc.less(rows["replicate"], planned)
         done = rows.filter(pc.and_(pc.equal(rows["status"], "done"), wanted))
         num_done, num_solved = done.num_rows, pc.sum(done["solved"]).as_py() or 0
         table.add_row(
             label,
             condition.id[:12],
-            f"{num_done} of {experiment.num_replicates}",
+            f"{num_done} of {planned}",
             f"{num_solved} of {num_done}",
             _median(done["best_cost"], ".4g"),
             _median(done["cpu_s"], ".3f"),

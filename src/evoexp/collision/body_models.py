@@ -22,7 +22,7 @@ from evoexp.scenarios.obstacles import ObstacleTable, obstacle_table
 from evoexp.validation import Component, NonNegative, Positive
 
 SAMPLES = 1000  # random postures by which pairs that always touch are found
-GRID = 128  # values per joint by which pairs that never touch are proven
+GRID, COARSE_GRID = 128, 48  # values per joint by which pairs that never touch are proven
 NO_OBSTACLES = obstacle_table(())
 
 Pair = tuple[int, int]
@@ -228,7 +228,8 @@ def _alone(assembly: Assembly, shapes: Shapes, pair: Pair) -> PrimitiveCollision
 def _never_touch(assembly: Assembly, shapes: Shapes, pair: Pair) -> bool:
     """Whether two bodies are proven apart: a grid over the joints between them, and how far a step can move them.
 
-    Proven for two joints at most; what more joints move is tested always.
+    The distances are those of the covers, or where these are too close, coal's on a coarser grid. Proven for two joints
+    at most; what more joints move is tested always.
     """
     items, table = list(assembly.geometry.geometryObjects), assembly.table
     bodies = body_table(table, [items[body] for body in pair])
@@ -239,13 +240,35 @@ def _never_touch(assembly: Assembly, shapes: Shapes, pair: Pair) -> bool:
     moving = np.flatnonzero(way > 0.0)
     if len(moving) > 2:
         return False
+    q, slack = _grid(assembly, moving, way, GRID)
+    if float(_alone(assembly, shapes, pair).clearance(q).least.min()) > slack:
+        return True
+    q, slack = _grid(assembly, moving, way, COARSE_GRID)
+    return bool(_coal_distances(assembly, pair, q).min() > slack)
+
+
+def _grid(assembly: Assembly, moving: np.ndarray, way: FloatArray, size: int) -> tuple[FloatArray, float]:
+    """Return configurations (nq, n) on a grid, and how much a distance can differ half a step away."""
     low, high = _limits(assembly)
-    columns = table.index_q[moving]
-    step = (high[columns] - low[columns]) / GRID
-    values = [low[c] + s * (np.arange(GRID) + 0.5) for c, s in zip(columns, step, strict=True)]
+    columns = assembly.table.index_q[moving]
+    step = (high[columns] - low[columns]) / size
+    values = [low[c] + s * (np.arange(size) + 0.5) for c, s in zip(columns, step, strict=True)]
     grid = np.meshgrid(*values, indexing="ij") if len(moving) else []
-    q = np.repeat(0.5 * (low + high)[:, None], max(1, grid[0].size if grid else 1), axis=1)
+    q = np.repeat(0.5 * (low + high)[:, None], grid[0].size if grid else 1, axis=1)
     for column, value in zip(columns, grid, strict=True):
         q[column] = value.ravel()
-    least = float(_alone(assembly, shapes, pair).clearance(q).least.min())
-    return least > float(np.sum(way[moving] * 0.5 * step))
+    return q, float(np.sum(way[moving] * 0.5 * step))
+
+
+def _coal_distances(assembly: Assembly, pair: Pair, q: FloatArray) -> FloatArray:
+    """Return the distances of two bodies, (configurations,)."""
+    model, data = assembly.model, assembly.model.createData()
+    items = [assembly.geometry.geometryObjects[body] for body in pair]
+    request, result, out = coal.DistanceRequest(), coal.DistanceResult(), np.empty(q.shape[1])
+    for n in range(q.shape[1]):
+        pin.forwardKinematics(model, data, np.ascontiguousarray(q[:, n]))
+        places = [data.oMi[item.parentJoint] * item.placement for item in items]
+        one, two = (coal.Transform3s(place.rotation, place.translation) for place in places)
+        result.clear()
+        out[n] = coal.distance(items[0].geometry, one, items[1].geometry, two, request, result)
+    return out

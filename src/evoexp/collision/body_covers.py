@@ -14,7 +14,7 @@ from scipy.spatial import ConvexHull
 from evoexp.collision.body_table import UnsupportedShape
 from evoexp.records import FloatArray
 
-MOST_CELLS = 32  # along one edge of a box around a body
+MOST_SPHERES = 150  # of one body that is neither ball nor capsule; where they do not suffice, the inflation grows
 WIDER = 1.0 + 1e-9  # covers are made larger by more than rounding
 
 
@@ -38,11 +38,12 @@ def sphere_cover(item: Any, inflation: float) -> Cover:
     """Return spheres that cover a geometry object.
 
     Balls and capsules are covered by equal spheres on their axis; everything else by spheres around the cells of a
-    lattice, with as few cells as keep within the inflation.
+    lattice, with as few cells as keep within the inflation; where that takes more than `MOST_SPHERES`, by those that
+    reach the least beyond it.
 
     Args:
         item: A `pin.GeometryObject` with a convex coal shape or a mesh; of a mesh the convex hull is covered.
-        inflation: How far spheres may reach beyond the body [length unit].
+        inflation: How far spheres may reach beyond the body [length unit]; `Cover.inflation` says how far they do.
 
     Raises:
         UnsupportedShape: If the shape has no inside that could be covered.
@@ -57,13 +58,36 @@ def sphere_cover(item: Any, inflation: float) -> Cover:
         centers = np.column_stack([np.zeros((count, 2)), along])
         return _placed(item, centers, centers, np.full(count, radius), radius - shape.radius)
     solid = _solid(item)
+    best = _column(shape) if isinstance(shape, coal.Cylinder | coal.Cone) else None
     for counts in _lattices(solid.high - solid.low):
         centers, radius = _cells(solid, counts)
-        reach = float((solid.distance(centers) + radius).max())
-        if reach <= inflation:
-            return _placed(item, centers, centers, np.full(len(centers), radius * WIDER), reach)
-    must = f"an inflation above {inflation:g} to be covered by {MOST_CELLS} spheres along an edge"
-    raise UnsupportedShape(f"robot: body '{item.name}' needs {must}")
+        found = _Spheres(centers, radius, float((solid.distance(centers) + radius).max()))
+        if best is None or found.reach < best.reach:
+            best = found
+        if best.reach <= inflation:
+            break
+    assert best is not None
+    radii = np.full(len(best.centers), best.radius * WIDER)
+    return _placed(item, best.centers, best.centers, radii, best.reach)
+
+
+class _Spheres(NamedTuple):
+    """Equal spheres, and how far they reach beyond the body at most."""
+
+    centers: FloatArray
+    radius: float
+    reach: float
+
+
+def _column(shape: Any) -> _Spheres:
+    """Return spheres on the axis of a cylinder, or of one around a cone, one above the other."""
+    radius, half = float(shape.radius), float(shape.halfLength)
+    count = max(1, int(np.ceil(half / radius)))
+    piece = half / count  # half of what a sphere covers
+    around = float(np.sqrt(radius * radius + piece * piece))
+    along = -half + piece * (2.0 * np.arange(count) + 1.0)
+    reach = max(around - radius, around - piece)
+    return _Spheres(np.column_stack([np.zeros((count, 2)), along]), around, reach)
 
 
 def capsule_cover(item: Any) -> Cover:
@@ -124,19 +148,21 @@ def _solid(item: Any) -> _Solid:
     else:
         raise UnsupportedShape(f"robot: body '{item.name}' must be a solid, was a {type(shape).__name__}")
     planes = ConvexHull(corners).equations  # outward normals, unit length
-    return _Solid(corners.min(axis=0), corners.max(axis=0), lambda points: _hull_distance(points, planes))
+    return _Solid(corners.min(axis=0), corners.max(axis=0), lambda points: _hull_distance(points, planes, shape))
 
 
 def _lattices(edges: FloatArray) -> list[tuple[int, ...]]:
     """Return numbers of cells along the three edges, of cells about as long as wide, from coarse to fine."""
-    found = set()
-    size, finest = float(edges.max()), float(edges.max()) / MOST_CELLS
-    while size >= finest:
+    found: set[tuple[int, ...]] = set()
+    size, most = float(edges.max()), 0
+    while most <= MOST_SPHERES:
         counts = tuple(max(1, int(np.ceil(edge / size - 1e-9))) for edge in edges)
+        most = counts[0] * counts[1] * counts[2]
         for extra in product((0, 1), repeat=3):
-            found.add(tuple(min(n + e, MOST_CELLS) for n, e in zip(counts, extra, strict=True)))
+            found.add(tuple(n + e for n, e in zip(counts, extra, strict=True)))
         size *= 0.93  # steps that change a count by one
-    return sorted(found, key=lambda counts: (counts[0] * counts[1] * counts[2], counts))
+    few = [counts for counts in found if counts[0] * counts[1] * counts[2] <= MOST_SPHERES]
+    return sorted(few, key=lambda counts: (counts[0] * counts[1] * counts[2], counts))
 
 
 def _cells(solid: _Solid, counts: tuple[int, ...]) -> tuple[FloatArray, float]:
@@ -159,9 +185,15 @@ def _cylinder_distance(points: FloatArray, radius: float, half: float) -> FloatA
     return _box_distance(flat, np.array([radius, half]))
 
 
-def _hull_distance(points: FloatArray, planes: FloatArray) -> FloatArray:
-    """Return the greatest signed distance to a plane of the hull: less than the distance near edges, never more."""
-    return np.asarray((points @ planes[:, :3].T + planes[:, 3]).max(axis=1))
+def _hull_distance(points: FloatArray, planes: FloatArray, shape: Any) -> FloatArray:
+    """Return the signed distances from a hull: inside from its planes, outside as coal has them from the body itself."""
+    found = (points @ planes[:, :3].T + planes[:, 3]).max(axis=1)
+    here, ball, request, result = coal.Transform3s(), coal.Sphere(1e-9), coal.DistanceRequest(), coal.DistanceResult()
+    for k in np.flatnonzero(found > 0.0):
+        result.clear()
+        there = coal.Transform3s(np.eye(3), points[k])
+        found[k] = max(float(found[k]), coal.distance(ball, there, shape, here, request, result))
+    return np.asarray(found)
 
 
 def _placed(item: Any, start: FloatArray, end: FloatArray, radius: FloatArray, inflation: float) -> Cover:

@@ -24,6 +24,8 @@ from evoexp.robots.poses import IDENTITY, compose, frame_pose, invert, local_pos
 from evoexp.scenarios.obstacles import BOX, CYLINDER, ObstacleTable, rotation_matrix
 from evoexp.scenarios.posture_task import Phase, PointGoal, PoseGoal, PostureTask, ShiftGoal, SurfaceGoal
 
+KEPT = 64  # stages and scenes that a problem keeps
+
 POINT, ROD, ROUND, EDGED = range(4)  # what a distance is measured to; see `rate_poses`
 TOOL_UP, OBJECT_UP = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 
@@ -151,35 +153,37 @@ def judge(stage: Stage, q: FloatArray) -> Judged:
 
 
 def begin(problem: Problem, index: int, q: FloatArray, situation: Situation) -> Stage:
-    """Begin a phase at posture q (nq,)."""
-    phase = problem.phases[index]
-    still = situation.held < 0 and not isinstance(phase.goal, ShiftGoal) and _unmoved(problem, situation)
-    if still and (index, "stage") in problem.memory:
-        kept: Stage = problem.memory[index, "stage"]
-        return kept
-    joint, local = problem.tool
-    held = situation.held >= 0
-    controlled = (joint, situation.grasp if held else local)
-    aim = _aim(problem, phase, q, situation, controlled)
-    weights = problem.weights[index]
+    """Begin a phase at posture q (nq,). Stages are kept: a path is walked again for its verdict and its terms."""
+    moved = not _unmoved(problem, situation) or situation.held >= 0
+    key = (index, situation.poses.tobytes(), situation.grasp.tobytes()) if moved else (index,)
+    if isinstance(problem.phases[index].goal, ShiftGoal):
+        key = (*key, q.tobytes())
+    if key not in problem.memory:
+        if len(problem.memory) > KEPT:
+            problem.memory.clear()
+        problem.memory[key] = _begun(problem, index, q, situation)
+    stage: Stage = problem.memory[key]
+    return stage
+
+
+def _begun(problem: Problem, index: int, q: FloatArray, situation: Situation) -> Stage:
+    phase, (joint, local) = problem.phases[index], problem.tool
+    controlled = (joint, situation.grasp if situation.held >= 0 else local)
     collision = problem.bodies.collision(*_surroundings(problem, phase, situation))
     objective, task = problem.objective, problem.task
     judging = (
         problem.assembly.table[:6],
         joint,
         controlled[1],
-        aim,
-        weights,
+        _aim(problem, phase, q, situation, controlled),
+        problem.weights[index],
         np.array(objective.tilt_limits),
         problem.limits,
         collision.tables,
         objective.free_space.reach if objective.free_space else 0.0,
         np.array([task.position_tolerance, DEGREE * task.angle_tolerance]),
     )
-    stage = Stage(index, phase, situation, controlled, judging)
-    if still:
-        problem.memory[index, "stage"] = stage
-    return stage
+    return Stage(index, phase, situation, controlled, judging)
 
 
 def finish(problem: Problem, stage: Stage, q: FloatArray) -> Situation:
@@ -217,15 +221,12 @@ def spans(problem: Problem, postures: FloatArray) -> list[Span]:
 
 def scene_of(problem: Problem, stage: Stage) -> Scene:
     """Return the bodies of a phase, for the exact verdict."""
-    situation, phase = stage.situation, stage.phase
-    key = (phase.contacts, situation.held, situation.grasp.tobytes(), situation.poses.tobytes())
-    if problem.memory.get("scene", (None, None))[0] != key:
-        if _unmoved(problem, situation) and situation.held < 0:
-            if (phase.contacts, "scene") not in problem.memory:
-                problem.memory[phase.contacts, "scene"] = _scene(problem, stage)
-            return problem.memory[phase.contacts, "scene"]  # type: ignore[no-any-return]
-        problem.memory["scene"] = key, _scene(problem, stage)
-    return problem.memory["scene"][1]  # type: ignore[no-any-return]
+    situation = stage.situation
+    key = ("scene", stage.phase.contacts, situation.held, situation.grasp.tobytes(), situation.poses.tobytes())
+    if key not in problem.memory:
+        problem.memory[key] = _scene(problem, stage)
+    bodies: Scene = problem.memory[key]
+    return bodies
 
 
 def _scene(problem: Problem, stage: Stage) -> Scene:

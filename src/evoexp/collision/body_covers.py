@@ -186,7 +186,7 @@ def _cylinder_distance(points: FloatArray, radius: float, half: float) -> FloatA
 
 
 def _hull_distance(points: FloatArray, planes: FloatArray, shape: Any) -> FloatArray:
-    """Return the signed distances from a hull: inside from its planes, outside as coal has them from the body itself."""
+    """Return signed distances from a hull: inside from its planes, outside as coal has them from the body itself."""
     found = (points @ planes[:, :3].T + planes[:, 3]).max(axis=1)
     here, ball, request, result = coal.Transform3s(), coal.Sphere(1e-9), coal.DistanceRequest(), coal.DistanceResult()
     for k in np.flatnonzero(found > 0.0):

@@ -136,7 +136,8 @@ class BodyModel(NamedTuple):
         if carried is not None:
             own = len(self.covers)
             extra = cover_shapes([carried.cover], [carried.joint], own)
-            shapes = Shapes(*(np.concatenate(both) for both in zip(shapes, extra, strict=True)))
+            columns: Any = zip(shapes, extra, strict=True)
+            shapes = Shapes(*(np.concatenate(both) for both in columns))
             pairs = (*pairs, *((body, own) for body in carried.watched))
         return PrimitiveCollision.build(model, shapes, obstacles, pairs, ignored, of_joint)
 
@@ -170,7 +171,8 @@ def cover_shapes(covers: list[Cover], joints: list[int], first: int = 0) -> Shap
 def _derived_pairs(assembly: Assembly, shapes: Shapes) -> tuple[tuple[Pair, ...], ...]:
     """Return pairs that are tested, are adjacent, always touch, never do."""
     items, parents = list(assembly.geometry.geometryObjects), assembly.model.parents
-    adjacent, apart = [], []
+    adjacent: list[Pair] = []
+    apart: list[Pair] = []
     for a, one in enumerate(items):
         for b, two in enumerate(items[a + 1 :], start=a + 1):
             i, j = one.parentJoint, two.parentJoint

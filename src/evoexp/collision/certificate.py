@@ -70,7 +70,8 @@ def judged_part(part: Part, motion: Motion, security_margin: float) -> Certifica
     found = _judged(part.scene, Motion(motion.q[part.first : part.last + 1]), security_margin)
     at, touched = found.clearance_at, found.refuted_at
     return found._replace(
-        clearance_at=None if at is None else at + part.first, refuted_at=None if touched is None else touched + part.first
+        clearance_at=None if at is None else at + part.first,
+        refuted_at=None if touched is None else touched + part.first,
     )
 
 
@@ -82,9 +83,7 @@ def combined(parts: list[Certificate]) -> Certificate:
         return min(touched, key=lambda part: float(part.refuted_at or 0.0))._replace(certificate_queries=queries)
     closest = min(parts, key=lambda part: part.clearance)
     answers = {"certified": [part.certified for part in parts], "margin": [part.certified_margin for part in parts]}
-    certified, margin = (
-        False if False in given else None if None in given else True for given in answers.values()
-    )
+    certified, margin = (False if False in given else None if None in given else True for given in answers.values())
     return closest._replace(certified=certified, certified_margin=margin, certificate_queries=queries)
 
 

@@ -1,7 +1,7 @@
 """What a posture costs: terms that a configuration chooses and weighs (Corsépius 2001, section 4.3).
 
-Every term is a field of the objective: what is given counts, what is not given does not. The cost is the sum of weight ×
-term. Terms and their units:
+Every term is a field of the objective: what is given counts, what is not given does not. The cost is the sum of weight
+× term. Terms and their units:
 
 - `goal_distance` [length unit]: of the controlled frame from the goal's point, or from the surface of an object
   (inside of it the signed distance is negative; what counts is its magnitude).

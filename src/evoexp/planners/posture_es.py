@@ -129,6 +129,8 @@ class PostureEs(Component):
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
         """Return the terms of the last posture in its phase, and what the whole path is like.
 
+        `phase_1_end` and so on are the postures at which phases end, counted from 0; −1: not reached.
+
         Raises:
             ValueError: If the solution is no list of postures.
         """
@@ -136,11 +138,15 @@ class PostureEs(Component):
         found = spans(problem, postures)
         terms = named(found[-1].judged.rows[:, -1], self.chosen) | path_terms(postures, problem.scope)
         for k in range(len(problem.phases) if len(problem.phases) > 1 else 0):
-            terms[f"phase_{k + 1}_end"] = float(found[k].last) if k < len(found) and found[k].reached else np.nan
-        return terms | {"infeasible_postures": float(sum(np.sum(~s.judged.feasible) for s in found))} | self._tilts(found, postures)
+            terms[f"phase_{k + 1}_end"] = float(found[k].last) if k < len(found) and found[k].reached else -1.0
+        return (
+            terms
+            | {"infeasible_postures": float(sum(np.sum(~s.judged.feasible) for s in found))}
+            | self._tilts(found, postures)
+        )
 
     def listing(self, problem: Problem, solution: FloatArray) -> tuple[list[str], list[list[Any]]]:
-        """Return names and rows of a table with one row per posture: its phase, terms, cost, step from the one before."""
+        """Return names and rows of a table, one row per posture: its phase, terms, cost, step from the one before."""
         postures = self._postures(problem, solution)
         names = ["posture", "phase", *(COLUMNS[k] for k in self.chosen), "cost", "goal", "step_rad", "step_scopes"]
         rows: list[list[Any]] = []
@@ -171,7 +177,9 @@ class PostureEs(Component):
             for span in found:
                 if span.stage.judging[4][term] > 0.0:
                     at.append(float(span.judged.rows[term].max()))
-                    between.append(float(judge(span.stage, dense(postures[span.first : span.last + 1])).rows[term].max()))
+                    between.append(
+                        float(judge(span.stage, dense(postures[span.first : span.last + 1])).rows[term].max())
+                    )
             terms[f"greatest_{TERMS[term]}_deg"] = max(at) / DEGREE
             terms[f"greatest_{TERMS[term]}_between_deg"] = max(between) / DEGREE
         return terms

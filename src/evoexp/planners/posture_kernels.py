@@ -210,5 +210,3 @@ def advance(uniforms, normals, bred, plus, substeps, breeding, judging, members,
             usable += 1
     order = np.argsort(keys, kind="mergesort")  # stable: the same on every machine
     return order[: min(len(parent_costs), usable)], winner
-
-

@@ -7,6 +7,7 @@ import pinocchio as pin
 
 from evoexp.collision.body_covers import Cover
 from evoexp.collision.body_models import CollisionModel
+from evoexp.collision.scene import obstacle_shapes
 from evoexp.errors import SettingError, nearest
 from evoexp.numerics import DEGREE
 from evoexp.objectives.posture_cost import ANGLE, AXIAL, HEADING, TERMS, PostureCost
@@ -14,14 +15,11 @@ from evoexp.planners.posture_stages import Problem, begin, judge, scene_of
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly, Robot
 from evoexp.robots.poses import local_pose
-from evoexp.scenarios.obstacles import CYLINDER, CAPSULE, ObstacleTable, obstacle_table
+from evoexp.scenarios.obstacles import CAPSULE, CYLINDER, ObstacleTable, obstacle_table
 from evoexp.scenarios.posture_task import Phase, PointGoal, PoseGoal, PostureTask, ShiftGoal, SurfaceGoal
-from evoexp.collision.scene import obstacle_shapes
 
 
-def prepare(
-    robot: Robot, task: PostureTask, scope: Any, objective: PostureCost, collision: CollisionModel
-) -> Problem:
+def prepare(robot: Robot, task: PostureTask, scope: Any, objective: PostureCost, collision: CollisionModel) -> Problem:
     """Return the problem of a task.
 
     Raises:
@@ -206,7 +204,9 @@ def _check_reach(problem: Problem) -> None:
                 ways = len(task.subgoals)
                 field = f"scenario.subgoals[{k}]" if k < ways else f"scenario.phases[{k - ways}].goal.point"
                 where = ", ".join(f"{value:g}" for value in center)
-                must = f"within reach, {far:.4g} {task.length_unit} from ({where}) (check_reach=false searches it anyway)"
+                must = (
+                    f"within reach, {far:.4g} {task.length_unit} from ({where}) (check_reach=false searches it anyway)"
+                )
                 raise SettingError(field, must, f"{away:.4g} away")
         held = {"attach": True, "detach": False}.get(phase.then, held)
 

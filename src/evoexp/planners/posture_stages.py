@@ -20,7 +20,7 @@ from evoexp.planners import posture_kernels
 from evoexp.planners.posture_kernels import ROWS
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
-from evoexp.robots.poses import IDENTITY, compose, frame_pose, invert, local_pose, pose_of
+from evoexp.robots.poses import IDENTITY, compose, frame_pose, invert, pose_of
 from evoexp.scenarios.obstacles import BOX, CYLINDER, ObstacleTable, rotation_matrix
 from evoexp.scenarios.posture_task import Phase, PointGoal, PoseGoal, PostureTask, ShiftGoal, SurfaceGoal
 
@@ -97,14 +97,14 @@ class Stage(NamedTuple):
     """One phase, begun.
 
     Attributes:
-        index: Of the phase.
+        number: Of the phase, from 0.
         phase: The phase.
         situation: Where things are in it.
         controlled: Index into the kinematic table, and local pose (12,), of the frame that is controlled.
         judging: What `posture_kernels.judge` takes.
     """
 
-    index: int
+    number: int
     phase: Phase
     situation: Situation
     controlled: tuple[int, FloatArray]
@@ -281,7 +281,7 @@ def _apart_from_tool(problem: Problem) -> list[int]:
 
 
 def _surroundings(problem: Problem, phase: Phase, situation: Situation) -> tuple[Any, ...]:
-    """Return obstacles, pairs (body, obstacle) that may touch, and the object carried, as `BodyModel.collision` has them."""
+    """Return obstacles, pairs (body, obstacle) that may touch, and the object carried: for `BodyModel.collision`."""
     names, bodies = problem.task.names, problem.bodies.names
     allowed = _allowed(problem, phase)
     held = situation.held
@@ -346,4 +346,3 @@ def _aim(
     aim[24:27] = up / np.sqrt(np.sum(up * up))
     aim[27:30] = OBJECT_UP if situation.held >= 0 else TOOL_UP
     return aim
-

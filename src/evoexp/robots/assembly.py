@@ -95,9 +95,7 @@ class Robot(Component):
             disabled |= chain.disabled_pairs()
             slices.append((first, model.nq))
         ranges, table = np.array(slices, dtype=np.int64), kinematic_table(model)
-        return Assembly(
-            model, geometry, tuple(links), ranges, table, tuple(arms), tuple(tools), frozenset(disabled)
-        )
+        return Assembly(model, geometry, tuple(links), ranges, table, tuple(arms), tuple(tools), frozenset(disabled))
 
 
 class Chain(Robot):

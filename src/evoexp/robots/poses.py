@@ -1,4 +1,4 @@
-"""Poses as 12 numbers: nine of the rotation, row by row, three of the position. Sums in one order, the same everywhere."""
+"""Poses as 12 numbers: nine of the rotation, row by row, then the position; sums in one order, everywhere the same."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ def pose_of(rotation: Any, position: Any) -> FloatArray:
 
 def local_pose(table: KinematicTable, joint: int, rotation: Any, position: Any) -> FloatArray:
     """Return (12,) in the table's frame of a joint what is given in Pinocchio's frame of joint `joint` (≥ 1)."""
-    return compose(pose_of(table.alignment[joint - 1].T, np.zeros(3)), pose_of(rotation, position))
+    return np.asarray(compose(pose_of(table.alignment[joint - 1].T, np.zeros(3)), pose_of(rotation, position)))
 
 
 @kernel

@@ -9,6 +9,7 @@ import hashlib
 import itertools
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 import hydra
@@ -19,6 +20,7 @@ from omegaconf import DictConfig, ListConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 from pydantic import ValidationError
 
+from evoexp.attachments import FILE, SHA256, keep
 from evoexp.batch.settings import RunnerSettings
 from evoexp.condition import PARTS, Condition, component_class
 from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting, nearest
@@ -27,6 +29,7 @@ from evoexp.shipped import config_directory
 from evoexp.validation import TARGET, Count, Settings, build, settings_error
 
 PLANNER_PARTS = ("ga", "objective", "collision")  # groups that a planner's option takes in by interpolation
+AROUND = ("control", "reference")  # groups whose option is put around the chosen planner
 JOIN = " · "
 
 AnySettings = TypeVar("AnySettings", bound=Settings)
@@ -60,7 +63,7 @@ class Experiment(NamedTuple):
         name: Of the experiment file; "custom" without one.
         budget: Name of the budget.
         conditions: In the order of the file; two labels may share a condition.
-        num_replicates: Of every condition.
+        num_replicates: Of every condition, but for references (`Condition.num_replicates`).
         runner: How to run them.
         report: How to report them.
         changed: Whether overrides or `--only` make this another set of conditions than the file's own.
@@ -180,6 +183,7 @@ def _condition(config: DictConfig, budget: Budget) -> Condition:
             raise SettingError(absent[0], f"chosen: {', '.join(options(absent[0]))}", None) from None
         raise SettingError(error.full_key or "configuration", "resolvable", _first_line(error)) from None
     assert isinstance(plain, dict)
+    plain = {str(key): _with_files(value, str(key)) for key, value in plain.items()}
     for group in PLANNER_PARTS:
         if plain.get(group) is not None and group in plain["planner"] and f"${{{group}" not in raw:
             must = f"left as it is; set {group}, the group that it is taken from"
@@ -188,14 +192,36 @@ def _condition(config: DictConfig, budget: Budget) -> Condition:
             if f"${{{group}" not in raw:
                 raise SettingError(group, "a part of the chosen planner", plain[group])
             build(plain[group], component_class, group)  # errors name the group, as it was typed
-    if plain.get("control") is not None:
+    around = [group for group in AROUND if plain.get(group) is not None]
+    if len(around) > 1:
+        raise SettingError(around[1], f"left out beside a {around[0]}", plain[around[1]].get(TARGET))
+    for group in around:
         build(plain["planner"], component_class, "planner")  # likewise
-        if TARGET not in plain["control"]:
-            raise SettingError("control", f"chosen: {', '.join(options('control'))}", plain["control"])
-        if "planner" in plain["control"]:
-            raise SettingError("control.planner", "left out: it is the chosen planner", plain["control"]["planner"])
-        plain["planner"] = {**plain["control"], "planner": plain["planner"]}
+        if TARGET not in plain[group]:
+            raise SettingError(group, f"chosen: {', '.join(options(group))}", plain[group])
+        if "planner" in plain[group]:
+            raise SettingError(f"{group}.planner", "left out: it is the chosen planner", plain[group]["planner"])
+        plain["planner"] = {**plain[group], "planner": plain["planner"]}
     return Condition.from_config({part: plain[part] for part in (*PARTS, "seed")})
+
+
+def _with_files(value: Any, field: str) -> Any:
+    """Return plain data with the content's hash in the place of every `{file: path}`; the content is kept.
+
+    Paths are those of the current directory, or of the shipped scenarios.
+    """
+    if isinstance(value, list):
+        return [_with_files(item, f"{field}[{k}]") for k, item in enumerate(value)]
+    if not isinstance(value, dict):
+        return value
+    if set(value) != {FILE}:
+        return {key: _with_files(item, f"{field}.{key}") for key, item in value.items()}
+    path, shipped_path = Path(str(value[FILE])), config_directory() / "scenario" / str(value[FILE])
+    try:
+        return {SHA256: keep((path if path.exists() else shipped_path).read_bytes())}
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise SettingError(f"{field}.{FILE}", f"a file that can be read ({reason})", str(value[FILE])) from None
 
 
 def _cap_generations(config: DictConfig, budget: Budget) -> None:
@@ -345,7 +371,7 @@ def _check_key(override: Override, text: str) -> None:
         raise SettingError(key, "given", text)
 
 
-_OPTIONAL = ("experiment", "control", *PLANNER_PARTS)  # groups without which a configuration may be complete
+_OPTIONAL = ("experiment", *AROUND, *PLANNER_PARTS)  # groups without which a configuration may be complete
 
 
 def _check_options(override: Override) -> None:

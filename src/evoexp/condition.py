@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, cast, get_type_hints
 
 import numpy as np
 
+from evoexp.attachments import attached
 from evoexp.errors import RevisionMismatch, SettingError, UnknownSetting, nearest
 from evoexp.validation import TARGET, Component, build
 
@@ -21,6 +22,8 @@ REGISTRY = {
     "planar_chain": "evoexp.robots.planar_chain:PlanarChain",
     "serial_chain": "evoexp.robots.serial_chain:SerialChain",
     "dh_chain": "evoexp.robots.dh_chain:DhChain",
+    "floor_platform": "evoexp.robots.floor_platform:FloorPlatform",
+    "grid_motion": "evoexp.scenarios.grid_motion:GridMotion",
     "link_motion": "evoexp.scenarios.link_motion:LinkMotion",
     "pick_and_place": "evoexp.scenarios.pick_and_place:PickAndPlace",
     "arm_motion": "evoexp.scenarios.arm_motion:ArmMotion",
@@ -29,13 +32,18 @@ REGISTRY = {
     "coevolution": "evoexp.planners.coevolution:Coevolution",
     "redundant_ga": "evoexp.planners.redundant_ga:RedundantGa",
     "posture_es": "evoexp.planners.posture_es:PostureEs",
+    "grid_path_ga": "evoexp.planners.grid_path_ga:GridPathGa",
+    "grid_frontier": "evoexp.references.grid_frontier:GridFrontier",
     "random_search": "evoexp.planners.random_search:RandomSearch",
     "genetic": "evoexp.evolution.settings:GeneticSettings",
     "coevolutionary": "evoexp.evolution.coevolution_settings:CoevolutionSettings",
     "real_genetic": "evoexp.evolution.operator_settings:RealGenetic",
     "binary_genetic": "evoexp.evolution.operator_settings:BinaryGenetic",
     "strategy": "evoexp.evolution.strategy_settings:StrategySettings",
+    "scaled_genetic": "evoexp.evolution.scaled_settings:ScaledGenetic",
     "motion_criteria": "evoexp.objectives.motion_criteria:MotionCriteria",
+    "path_cost": "evoexp.objectives.path_cost:PathCost",
+    "potential_fields": "evoexp.collision.potential_fields:PotentialFields",
     "string_fitness": "evoexp.objectives.string_fitness:StringFitness",
     "reaching": "evoexp.objectives.reaching:Reaching",
     "posture_cost": "evoexp.objectives.posture_cost:PostureCost",
@@ -138,6 +146,10 @@ class Condition(NamedTuple):
         config = {part: getattr(self, part).canonical() for part in PARTS} | {"seed": self.seed}
         return json.dumps(config, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
 
+    def files(self) -> dict[str, bytes]:
+        """Return the contents of the files that it refers to, by their names in a log."""
+        return attached({part: getattr(self, part).canonical() for part in PARTS})
+
     @property
     def id(self) -> str:
         """64 hex digits; 12 are shown, any unique prefix is accepted."""
@@ -147,6 +159,15 @@ class Condition(NamedTuple):
     def length_unit(self) -> str:
         """Unit of every length in the results, as the scenario names it."""
         return str(getattr(self.scenario, "length_unit", ""))
+
+    @property
+    def is_reference(self) -> bool:
+        """Whether this is a reference: a truth that needs no seed, and one replicate."""
+        return bool(getattr(self.planner, "is_reference", False))
+
+    def num_replicates(self, asked: int) -> int:
+        """Return how many replicates this condition gets where so many are asked for: a reference has one."""
+        return 1 if self.is_reference else asked
 
     def rng(self, replicate: int) -> np.random.Generator:
         """Return the replicate's generator; equal seeds give equal streams to all conditions (common seeds)."""

@@ -4,6 +4,7 @@ Records are flat. Quantities carry their unit in the name (`cpu_s`) unless the u
 names it (`length_unit`). Costs are minimised; `inf` means infeasible or not evaluated.
 """
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,6 +35,7 @@ class Generation(NamedTuple):
     population: FloatArray  # any shape
     criteria: FloatArray | None = None  # (populations, criteria, individuals), of generations whose front is recorded
     stop_reason: str = ""  # of the last generation: why the planner ends, if not because its generations are used up
+    arrays: Mapping[str, NDArray[Any]] | None = None  # of references: attached to the log as <name>.npy
 
 
 class GenerationRow(NamedTuple):

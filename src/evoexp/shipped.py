@@ -28,7 +28,7 @@ class Shipped(NamedTuple):
         label: Of the condition.
         budget: `paper` or `smoke`.
         condition_id: 64 hex digits.
-        digest: Of replicate 0.
+        digest: Of replicate 0; of a reference its cost, `cost 1.7…`, which is compared to 1e-9.
     """
 
     experiment: str

@@ -42,8 +42,9 @@ def test_the_best_solution_is_worth_what_was_recorded(condition: Condition) -> N
     log = read_log(run_replicate(condition, 0).content)
     terms = planner.evaluate(problem, log.solutions[-1].values)
     recorded = log.generations[-1].terms
-    search = {"attempts", "sub_path", "phase", "cycles", "idle_cycles"}
-    assert recorded.keys() - terms.keys() <= search, "what only the search knows"
+    if not condition.is_reference:  # whose own numbers are not a solution's
+        search = {"attempts", "sub_path", "phase", "cycles", "idle_cycles"}
+        assert recorded.keys() - terms.keys() <= search, "what only the search knows"
     common = recorded.keys() & terms.keys()  # equal but for the rounding of a solution's units
     assert {name: recorded[name] for name in common} == pytest.approx({name: terms[name] for name in common}, abs=1e-9)
     assert log.summary.terms == recorded | terms
@@ -75,6 +76,8 @@ def test_motions_fit_the_robot(condition: Condition) -> None:
     planner, problem = condition.prepare()
     generation = next(planner.evolve(problem, condition.rng(0)))
     motion = planner.motion(problem, generation.best)
+    if motion is None:  # the answer is none
+        return
     assert motion.q.shape[1] == condition.robot.build().model.nq
     assert np.all(np.isfinite(motion.q))
 

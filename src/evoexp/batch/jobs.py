@@ -7,16 +7,25 @@ import traceback
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from evoexp.attachments import keep_all
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 
 
 class Job(NamedTuple):
-    """One replicate to run."""
+    """One replicate to run.
+
+    Attributes:
+        condition_id: 64 hex digits.
+        condition_json: Canonical form of the condition.
+        replicate: Its index.
+        files: Contents of the files that the condition refers to.
+    """
 
     condition_id: str
     condition_json: bytes
     replicate: int
+    files: tuple[bytes, ...] = ()
 
     @property
     def key(self) -> tuple[str, int]:
@@ -55,6 +64,7 @@ def run_jobs(jobs: Sequence[Job]) -> list[Outcome]:
     for job in jobs:
         start = time.perf_counter()
         try:
+            keep_all(job.files)
             condition = _condition(job.condition_json)
             content, reason, trace = run_replicate(condition, job.replicate, job.condition_json).content, "", ""
         except Exception as error:
@@ -65,8 +75,9 @@ def run_jobs(jobs: Sequence[Job]) -> list[Outcome]:
     return outcomes
 
 
-def load(config_jsons: Sequence[bytes]) -> None:
+def load(config_jsons: Sequence[bytes], files: Sequence[bytes] = ()) -> None:
     """Load what some conditions need, code and compiled kernels; what is wrong with one is said by its jobs."""
+    keep_all(files)
     for config_json in config_jsons:
         with contextlib.suppress(Exception):
             _condition(config_json).prepare()

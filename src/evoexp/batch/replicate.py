@@ -3,11 +3,14 @@
 import hashlib
 import time
 
+from evoexp.attachments import SHA256
 from evoexp.collision.certificate import certificate
 from evoexp.condition import Condition
 from evoexp.records import Generation, ReplicateSummary
 from evoexp.store.log import Finished, Log
 from evoexp.store.manifest import environment
+
+HASHED = f'"{SHA256}"'.encode()  # stands in configurations that refer to files, and only there
 
 
 def run_replicate(condition: Condition, index: int, config_json: bytes | None = None) -> Finished:
@@ -23,7 +26,8 @@ def run_replicate(condition: Condition, index: int, config_json: bytes | None = 
     planner, problem = condition.prepare()
     config_json = config_json or condition.to_json()
     condition_id = hashlib.sha256(config_json).hexdigest()
-    log = Log(condition_id, config_json, index, rng, environment=environment())
+    files = condition.files() if HASHED in config_json else None
+    log = Log(condition_id, config_json, index, rng, files, environment())
     first_feasible: int | None = None
     last: Generation | None = None
     for last in planner.evolve(problem, rng):

@@ -75,11 +75,12 @@ class Batch:
         with lock_all(self.runs.values()):
             for key, run in self.runs.items():
                 condition, _, notes = self._wanted[key]
-                run.create(condition.to_json(), manifest(key) | notes)
+                run.create(condition.to_json(), manifest(key) | notes, condition.files())
             self.jobs = self._missing()
             num_workers = max(1, min(self._settings.num_workers or num_cores(), len(self.jobs)))
             config_jsons = list(dict.fromkeys(job.condition_json for job in self.jobs))
-            with loading(num_workers, load, config_jsons):
+            files = list(dict.fromkeys(content for job in self.jobs for content in job.files))
+            with loading(num_workers, load, config_jsons, files):
                 _warm(config_jsons)
                 from evoexp.store.tables import write_summary  # and pandas: now there is time
             try:
@@ -91,9 +92,11 @@ class Batch:
 
     def _missing(self) -> list[Job]:
         jobs = []
-        for key, (condition, count, _) in self._wanted.items():
+        first = sorted(self._wanted.items(), key=lambda item: not item[1][0].is_reference)  # the longest replicates
+        for key, (condition, count, _) in first:
             config_json, done = condition.to_json(), self.runs[key].completed()
-            jobs += [Job(key, config_json, index) for index in range(count) if index not in done]
+            files = tuple(condition.files().values())
+            jobs += [Job(key, config_json, index, files) for index in range(count) if index not in done]
         return jobs
 
     def _store(self, outcomes: Sequence[Outcome]) -> list[Outcome]:
@@ -175,6 +178,8 @@ def _warm(config_jsons: Iterable[bytes]) -> None:
         with contextlib.suppress(Exception):  # a planner that fails does so again in its replicate, and is noted there
             condition = Condition.from_json(text)
             planner, problem = condition.prepare()
+            if condition.is_reference:  # long, and what it compiles is mostly that of the planner beside it
+                planner = planner.planner
             for generation in itertools.islice(planner.evolve(problem, condition.rng(0)), 2):
                 planner.evaluate(problem, generation.best)
                 motion = planner.motion(problem, generation.best)

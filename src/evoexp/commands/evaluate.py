@@ -100,14 +100,9 @@ def read_motion(path: Path) -> Any:
 def flatten(values: list[Any], shape: Any) -> FloatArray | None:
     """Return a motion as a flat solution of a planner's documented shape, None if it does not fit.
 
-    Parts whose first size is None have any number of rows; if there is one part only, the file may hold its rows.
+    A shape that begins with an ellipsis is that of any number of equal parts.
     """
-    if (
-        len(shape) == 1
-        and shape[0][0] is None
-        and not (values and isinstance(values[0], list) and _is_nested(values[0]))
-    ):
-        values = [values]
+    shape = _counted(shape, len(values) if isinstance(values, list) else 0)
     if len(values) != len(shape):
         return None
     parts = []
@@ -116,15 +111,10 @@ def flatten(values: list[Any], shape: Any) -> FloatArray | None:
             array = np.asarray(part, dtype=np.float64)
         except ValueError:  # ragged
             return None
-        sizes = zip(array.shape, expected, strict=False)
-        if array.ndim != len(expected) or any(size != wanted for size, wanted in sizes if wanted is not None):
+        if array.shape != tuple(expected):
             return None
         parts.append(array.ravel())
     return np.concatenate(parts)
-
-
-def _is_nested(part: list[Any]) -> bool:
-    return bool(part) and isinstance(part[0], list)
 
 
 def _split(words: list[str]) -> tuple[list[str], Path]:
@@ -146,10 +136,15 @@ def _not_finite(values: Any, place: str) -> str:
     return f"was {str(values)[:40]} at {place or 'its top'}"
 
 
+def _counted(shape: Any, count: int) -> Any:
+    """Return a shape whose parts are counted."""
+    return tuple(shape[1:]) * count if len(shape) and shape[0] is ... else shape
+
+
 def _shape_text(shape: Any) -> str:
-    parts = [" × ".join("any number" if size is None else str(size) for size in part) for part in shape]
-    if len(parts) == 1:
-        return parts[0]
+    if len(shape) and shape[0] is ...:
+        return f"any number × {_shape_text(shape[1:]).removeprefix('1 × ')}"
+    parts = [" × ".join(map(str, part)) for part in shape]
     return f"{len(parts)} × {parts[0]}" if len(set(parts)) == 1 else f"{len(parts)} lists: {', '.join(parts)}"
 
 

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from evoexp import compose, shipped
 from evoexp.batch.replicate import run_replicate
-from evoexp.batch.reproduce import Comparison, reproduce_log
+from evoexp.batch.reproduce import Comparison, fingerprint, reproduce_log, same_fingerprint
 from evoexp.batch.runner import num_cores
 from evoexp.batch.workers import in_workers
 from evoexp.commands.console import add_columns, add_hash_column, new_table, plain_console
@@ -103,7 +103,7 @@ def _without_stored_run(console: Console, prefix: str, replicate: int | None, er
     experiment = compose.expand([f"experiment={row.experiment}", f"budget={row.budget}"], only=[row.label])[0]
     condition = experiment.conditions[0].condition
     summary = run_replicate(condition, 0).summary
-    matches = summary.digest == row.digest and condition.id == row.condition_id
+    matches = same_fingerprint(fingerprint(condition, summary), row.digest) and condition.id == row.condition_id
     verdict = Text("MATCH", "green") if matches else Text("DIVERGES", "red")
     console.print(f"{row.condition_id[:12]} replicate 0 against the shipped table:", verdict)
     console.print(f"({row.experiment}, {row.label}, budget {row.budget}; store it: {row.command})", soft_wrap=True)

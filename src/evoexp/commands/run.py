@@ -35,7 +35,11 @@ def main(arguments: argparse.Namespace) -> int:
             raise UnknownOption("report.figures", str(figures), PAGES)
     command = _command(arguments)
     wanted = [
-        (labelled.condition, experiment.num_replicates, _notes(experiment, labelled.label, command))
+        (
+            labelled.condition,
+            labelled.condition.num_replicates(experiment.num_replicates),
+            _notes(experiment, labelled.label, command),
+        )
         for experiment in experiments
         for labelled in experiment.conditions
     ]
@@ -91,11 +95,12 @@ def summary_table(experiment: compose.Experiment) -> Table:
     add_columns(table, "replicates", "solved", "median\nbest cost", "CPU s\neach", right=True)
     for label, condition in experiment.conditions:
         rows = read_summaries(RunDirectory(outputs_root(), condition.id))
-        done = rows[(rows["status"] == "done") & (rows["replicate"] < experiment.num_replicates)]
+        planned = condition.num_replicates(experiment.num_replicates)
+        done = rows[(rows["status"] == "done") & (rows["replicate"] < planned)]
         table.add_row(
             label,
             condition.id[:12],
-            f"{len(done)} of {experiment.num_replicates}",
+            f"{len(done)} of {planned}",
             f"{int(done['solved'].sum())} of {len(done)}",
             f"{done['best_cost'].median():.4g}" if len(done) else "–",
             f"{done['cpu_s'].median():.3f}" if len(done) else "–",

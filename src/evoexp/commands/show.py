@@ -15,6 +15,7 @@ from evoexp.commands.console import add_columns, new_table, plain_console
 from evoexp.commands.hashes import with_candidates
 from evoexp.condition import Condition
 from evoexp.errors import AmbiguousHash, EvoexpError, UnknownHash
+from evoexp.store.log_reader import array_names, read_array
 from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
 from evoexp.store.tables import read_summaries
 
@@ -36,6 +37,7 @@ def main(arguments: argparse.Namespace) -> int:
     _print_config(console, config)
     _print_notes(console, run.config_json())
     console.print(replicates)
+    _print_arrays(console, run)
     _print_config(console, {"manifest": {k: v for k, v in manifest.items() if k != "condition"}})
     return 0
 
@@ -77,6 +79,14 @@ def _print_notes(console: Console, config_json: bytes) -> None:
         return
     for note in planner.notes(problem) if hasattr(planner, "notes") else ():
         console.print(f"note: {note}", soft_wrap=True)
+
+
+def _print_arrays(console: Console, run: RunDirectory) -> None:
+    """Print the arrays that references attach to their logs."""
+    for path in (run.log_path(k) for k in sorted(run.completed())[:1]):
+        for name in array_names(path):
+            shape = " × ".join(map(str, read_array(path, name).shape))
+            console.print(f"array: {name} ({shape}), attached to {path.name}", soft_wrap=True)
 
 
 def _replicates(run: RunDirectory) -> Table:

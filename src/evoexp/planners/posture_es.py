@@ -159,9 +159,9 @@ class PostureEs(Component):
                 rows.append([at, span.stage.phase.name, *values, bool(judged.met[n]), *steps])
         return names, rows
 
-    def shape(self, problem: Problem) -> tuple[tuple[int | None, int], ...]:
+    def shape(self, problem: Problem) -> tuple[Any, ...]:
         """Return the documented shape of a solution: any number of postures × nq."""
-        return ((None, len(problem.start)),)
+        return ..., (len(problem.start),)
 
     def notes(self, problem: Problem) -> tuple[str, ...]:
         """Return what the collision model is, and which pairs of bodies it does not test."""

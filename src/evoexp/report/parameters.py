@@ -53,15 +53,16 @@ def parameters(results: Results, condition: ConditionResults) -> list[Parameter]
     preferred = _choices(results.experiment)
     found: list[Parameter] = []
     for part, value in config.items():
-        if WRAPPED in value:  # a control around the planner
+        if WRAPPED in value:  # a control or a reference around the planner
             outer = {key: v for key, v in value.items() if key != WRAPPED}
-            found += _component("control", outer, preferred)
+            found += _component("reference" if condition.is_reference else "control", outer, preferred)
             value = value[WRAPPED]
         found += _component(part, value, preferred)
     root = option(config_directory() / "config.yaml")
     found.append(_parameter("seed", condition.condition.seed, root.get("seed"), OVERRIDE))
     planned = Entry(planned_replicates(results.experiment), *root["num_replicates"][1:])
-    found.append(_parameter("num_replicates", condition.planned, planned, OVERRIDE))
+    if not condition.is_reference:  # which has one, whatever is planned
+        found.append(_parameter("num_replicates", condition.planned, planned, OVERRIDE))
     return [_capped(parameter, results.budget) for parameter in found]
 
 

@@ -7,12 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from evoexp.condition import Condition, Prepared
 from evoexp.errors import NothingStored
 from evoexp.records import FloatArray
 from evoexp.report.statistics import Spread, spread
-from evoexp.store.log_reader import read_log, read_solution
+from evoexp.store.log_reader import read_array, read_log, read_solution
 from evoexp.store.messages import TERM
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.tables import read_generations, read_summaries
@@ -71,6 +72,16 @@ class StoredLogs:
     def first_solution(self) -> FloatArray | None:
         """Best of the initial population of the best replicate; None where nothing is finished."""
         return None if self._best is None else read_log(self._run.log_path(self._best)).solutions[0].values
+
+    def array(self, name: str) -> NDArray[Any]:
+        """Return an array attached to the log of the best replicate.
+
+        Raises:
+            KeyError: If there is none of this name.
+        """
+        if self._best is None:
+            raise KeyError(name)
+        return read_array(self._run.log_path(self._best), name)
 
 
 class ConditionResults(NamedTuple):
@@ -156,13 +167,26 @@ class ConditionResults(NamedTuple):
 
     @property
     def planner(self) -> Any:
-        """The paper's planner; of a control the one that it stands beside."""
+        """The paper's planner; of a control or a reference the one that it stands beside."""
         return getattr(self.condition.planner, WRAPPED, self.condition.planner)
 
     @property
     def is_control(self) -> bool:
         """Whether this is a control: a planner that stands beside the paper's."""
-        return hasattr(self.condition.planner, WRAPPED)
+        return hasattr(self.condition.planner, WRAPPED) and not self.is_reference
+
+    @property
+    def is_reference(self) -> bool:
+        """Whether this is a reference: a truth that stands beside the planners."""
+        return self.condition.is_reference
+
+    def array(self, name: str) -> NDArray[Any]:
+        """Return an array that the best replicate attached to its log; a reference has one replicate.
+
+        Raises:
+            KeyError: If there is none of this name.
+        """
+        return self.logs.array(name)
 
     def column(self, name: str) -> FloatArray:
         """Return a column of the summaries as floats, (done,); NaN where there is none."""
@@ -197,8 +221,18 @@ class Results(NamedTuple):
 
     @property
     def main(self) -> tuple[ConditionResults, ...]:
-        """Those with data that are no controls; controls where there is nothing else."""
-        return tuple(c for c in self.with_data if not c.is_control) or self.with_data
+        """Those with data that are no controls and no references; controls where there is nothing else."""
+        return tuple(c for c in self.evolved if not c.is_control) or self.evolved
+
+    @property
+    def evolved(self) -> tuple[ConditionResults, ...]:
+        """Those with data that are no references; references where there is nothing else."""
+        return tuple(c for c in self.with_data if not c.is_reference) or self.with_data
+
+    @property
+    def references(self) -> tuple[ConditionResults, ...]:
+        """References with data."""
+        return tuple(c for c in self.with_data if c.is_reference)
 
     @property
     def terms(self) -> list[str]:
@@ -242,7 +276,7 @@ def gather(
 def _read(outputs: Path, label: str, condition: Condition, num_replicates: int | None) -> ConditionResults:
     run = RunDirectory(outputs, condition.id)
     stored = run.completed() | run.failed()
-    planned = max(stored, default=-1) + 1 if num_replicates is None else num_replicates
+    planned = max(stored, default=-1) + 1 if num_replicates is None else condition.num_replicates(num_replicates)
     if stored:
         run.check()
     rows = read_summaries(run)

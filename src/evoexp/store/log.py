@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xxhash
 from mcap.writer import CompressionType, IndexType, Writer
+from numpy.typing import NDArray
 
 from evoexp.records import FloatArray, FrontRow, Generation, GenerationRow, ReplicateSummary, SolutionRow
 from evoexp.store.digests import Chain, array_bytes
@@ -27,6 +28,7 @@ RUN = "evoexp.run"
 SUMMARY = "evoexp.summary"
 ENVIRONMENT = "evoexp.environment"
 CONFIG = "config.json"
+ARRAY = ".npy"  # the ending of an attached array's name
 CONTENT_DIGEST = "content_digest"
 GENERATION_TOPIC, SOLUTION_TOPIC, FRONT_TOPIC = "/generation", "/solution", "/front"
 
@@ -71,6 +73,14 @@ class ContentDigest:
 def channel_identity(topic: str, schema_name: str, message_encoding: str) -> bytes:
     """Return what a channel contributes to the digest of each of its messages."""
     return "\0".join((topic, schema_name, message_encoding, "")).encode()
+
+
+def array_file(array: NDArray[Any]) -> bytes:
+    """Return an array as the bytes of a `.npy` file: C order, float64 or int64, little-endian."""
+    kind = "<f8" if array.dtype.kind == "f" else "<i8"
+    buffer = io.BytesIO()
+    np.lib.format.write_array(buffer, np.ascontiguousarray(array, dtype=kind), version=(1, 0), allow_pickle=False)
+    return buffer.getvalue()
 
 
 class _Channel:
@@ -154,6 +164,8 @@ class Log:
         self._last = generation
         if len(self._pending) >= _BATCH:
             self._flush()
+        for name, array in sorted((generation.arrays or {}).items()):
+            self._attach(name + ARRAY, array_file(array))
         if generation.criteria is not None:
             for population, criteria in enumerate(generation.criteria):
                 self.write_front(FrontRow(generation.index, population, criteria.T))

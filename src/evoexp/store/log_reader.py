@@ -4,6 +4,7 @@ Every reader first checks the whole file against its checksums (0.1 ms per log),
 only `read_log` also decodes every message and compares the content digest.
 """
 
+import io
 import operator
 from collections.abc import Iterable, Iterator
 from os import PathLike
@@ -13,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import orjson
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, ChunkIndex, Metadata, MetadataIndex, Schema
+from mcap.records import Attachment, AttachmentIndex, Channel, ChunkIndex, Metadata, MetadataIndex, Schema
 from numpy.typing import NDArray
 
 from evoexp.errors import CorruptLog
@@ -58,6 +59,7 @@ class _Index(NamedTuple):
     channels: dict[str, Channel]  # by topic
     schemas: dict[int, str]  # id → name
     chunks: list[ChunkIndex]
+    attachments: dict[str, int]  # name → offset
 
 
 def read_log(source: Source) -> LogContents:
@@ -122,6 +124,46 @@ def read_solution(source: Source) -> SolutionRow:
         return decode_solution(solutions[-1])
 
 
+def array_names(source: Source) -> list[str]:
+    """Return the names of the arrays that are attached to a log, in alphabetical order.
+
+    Raises:
+        CorruptLog: As `read_log`, except that the content digest is not compared.
+    """
+    container, name = _open(source)
+    with unreadable_is_corrupt(name):
+        index = _index(container)
+        _run(container, index, name)
+        return sorted(n.removesuffix(written.ARRAY) for n in index.attachments if n.endswith(written.ARRAY))
+
+
+def read_array(source: Source, array: str) -> NDArray[Any]:
+    """Return one of the arrays that are attached to a log; nothing else is decoded.
+
+    Args:
+        source: Path of a log, or its bytes.
+        array: Its name, without `.npy`.
+
+    Raises:
+        KeyError: There is none of this name.
+        CorruptLog: As `read_log`, except that the content digest is not compared.
+    """
+    container, name = _open(source)
+    with unreadable_is_corrupt(name):
+        index = _index(container)
+        _run(container, index, name)
+        offset = index.attachments.get(array + written.ARRAY)
+        if offset is not None:
+            return decode_array(parse(Attachment, container.record_at(offset)).data)
+    raise KeyError(array)
+
+
+def decode_array(data: bytes) -> NDArray[Any]:
+    """Return the array that a `.npy` attachment holds."""
+    array: NDArray[Any] = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
+    return array
+
+
 def generation_columns(source: Source) -> dict[str, NDArray[Any]]:
     """Return the records on /generation, without their chain, as one array per field and term, each (generations,).
 
@@ -165,7 +207,7 @@ def _open(source: Source) -> tuple[Container, str]:
 
 
 def _index(container: Container) -> _Index:
-    index = _Index({}, {}, {}, [])
+    index = _Index({}, {}, {}, [], {})
     for opcode, body in container.summary_section():
         if opcode == Opcode.METADATA_INDEX:
             entry = parse(MetadataIndex, body)
@@ -178,6 +220,9 @@ def _index(container: Container) -> _Index:
             index.schemas[schema.id] = schema.name
         elif opcode == Opcode.CHUNK_INDEX:
             index.chunks.append(parse(ChunkIndex, body))
+        elif opcode == Opcode.ATTACHMENT_INDEX:
+            attachment = parse(AttachmentIndex, body)
+            index.attachments[attachment.name] = attachment.offset
     return index
 
 

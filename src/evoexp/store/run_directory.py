@@ -11,6 +11,7 @@ from typing import Any
 
 from filelock import FileLock, Timeout
 
+from evoexp.attachments import PREFIX, keep_all
 from evoexp.errors import AmbiguousHash, Busy, EvoexpError, UnknownHash, nearest
 from evoexp.store.files import remove_stale, sync_directory, write_file, write_files
 
@@ -69,12 +70,13 @@ class RunDirectory:
         """Return where the reason of a failed replicate is or will be."""
         return self.replicates / f"{replicate:04d}.failed.json"
 
-    def create(self, config_json: bytes, manifest: Mapping[str, Any]) -> None:
+    def create(self, config_json: bytes, manifest: Mapping[str, Any], files: Mapping[str, bytes] | None = None) -> None:
         """Create what is missing; a configuration and manifest already there stay as they are.
 
         Args:
             config_json: Canonical form of the condition.
             manifest: See `manifest.manifest`.
+            files: Contents of the files that the condition refers to, by the names that `attachments.attached` gives.
 
         Raises:
             StoreError: The directory is damaged or belongs to another condition.
@@ -85,6 +87,9 @@ class RunDirectory:
         if (self.path / "config.json").exists():
             self.check()
         else:
+            for name, content in (files or {}).items():
+                (self.path / name).parent.mkdir(exist_ok=True)
+                write_file(self.path / name, content)
             write_file(self.path / "config.json", config_json)
             sync_directory(self.path.parent)
         if not (self.path / "manifest.json").exists():
@@ -104,8 +109,9 @@ class RunDirectory:
             )
 
     def config_json(self) -> bytes:
-        """Return the canonical form of the condition, checked."""
+        """Return the canonical form of the condition, checked; the files that it refers to are kept."""
         self.check()
+        keep_all(path.read_bytes() for path in sorted((self.path / PREFIX).glob("*")))
         return (self.path / "config.json").read_bytes()
 
     def manifest(self) -> dict[str, Any]:

@@ -14,20 +14,24 @@ from evoexp.report.tables import groups
 
 COLUMNS = ("best_cost", "mean_cost")
 NAMES = {"best_cost": "best so far", "mean_cost": "average"}
+REFERENCE = "reference"
+DASH_DOTTED = (0, (5, 1.5, 1, 1.5))
 
 
 def cost_table(results: Results) -> pd.DataFrame:
     """Return median and quartiles of best and average cost over replicates, per condition and generation.
 
     Returns:
-        Columns condition, position, quantity, generation, evaluations, median, lower, upper, replicates.
+        Columns condition, position, quantity, generation, evaluations, median, lower, upper, replicates; a reference
+        has one row.
     """
-    return pd.concat([_condition(results, condition, None) for condition in results.with_data], ignore_index=True)
+    parts = [_condition(results, condition, None) for condition in results.evolved]
+    return pd.concat([*parts, *_references(results)], ignore_index=True)
 
 
 def fitness_table(results: Results) -> pd.DataFrame:
     """Return the same of the paper's fitness, of conditions whose objective turns a cost into one."""
-    parts = [_condition(results, c, c.planner.objective) for c in results.with_data]
+    parts = [_condition(results, c, c.planner.objective) for c in results.evolved]
     return pd.concat(parts, ignore_index=True)
 
 
@@ -35,7 +39,10 @@ def draw_cost(table: pd.DataFrame) -> Figure:
     """Draw best and average cost against generations."""
     figure = style.figure(3.4)
     axes = figure.subplots()
-    _curves(axes, table, tuple(NAMES))
+    beside = table["quantity"] == REFERENCE
+    _curves(axes, table[~beside], tuple(NAMES))
+    for position, label, cost in table.loc[beside, ["position", "condition", "median"]].itertuples(index=False):
+        axes.axhline(cost, color=style.condition_colour(position), linestyle=DASH_DOTTED, linewidth=1.0, label=label)
     axes.set_ylabel("cost")
     style.legend_below(figure, axes, 2)
     return figure
@@ -104,6 +111,14 @@ def _condition(results: Results, condition: ConditionResults, objective: Any) ->
             )
         )
     return pd.concat(parts, ignore_index=True)
+
+
+def _references(results: Results) -> list[pd.DataFrame]:
+    """Return the costs of references, which have no generations, one row each."""
+    shown = [c for c in results.references if c not in results.evolved and np.isfinite(c.column("best_cost")).all()]
+    return [
+        _condition(results, c, None).iloc[:1].assign(quantity=REFERENCE, generation=0, evaluations=0.0) for c in shown
+    ]
 
 
 def _curves(axes: Axes, table: pd.DataFrame, columns: tuple[str, ...]) -> None:

@@ -11,6 +11,9 @@ if TYPE_CHECKING:  # pandas: `evoexp run` asks for the names of the pages before
     from evoexp.report.results import Results
 
 PAGES = {
+    "chen_fields": "evoexp.report.pages.chen_fields:page",
+    "chen_lingering": "evoexp.report.pages.chen_lingering:page",
+    "chen_path": "evoexp.report.pages.chen_path:page",
     "curkovic": "evoexp.report.pages.curkovic:page",
     "curkovic_motion": "evoexp.report.pages.curkovic_motion:page",
     "curkovic_pareto": "evoexp.report.pages.curkovic_pareto:page",

@@ -69,7 +69,7 @@ def cost_drawing(results: Results) -> Drawing:
         stem="convergence",
         title="Convergence",
         caption="Best cost so far (full) and average cost of the finite individuals of a generation (dashed): median "
-        "and quartiles over replicates. Lower is better.",
+        "and quartiles over replicates; dash-dotted: references. Lower is better.",
         table=partial(convergence.cost_table, results),
         draw=convergence.draw_cost,
         conditions=results.with_data,
@@ -90,8 +90,8 @@ def comparisons(
         (heading, one comparison per quantity), p-values adjusted over the quantities.
     """
     found = []
-    for first in results.with_data:
-        for second in results.with_data:
+    for first in results.evolved:
+        for second in results.evolved:
             if first.is_control or not second.is_control or not _beside(first.condition, second.condition):
                 continue
             rows = [compare_on_common_seeds(first, second, *what, settings) for what in compared]

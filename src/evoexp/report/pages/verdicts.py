@@ -11,7 +11,8 @@ def not_judged(results: Results) -> str:
     """Return why claims are not to be judged; empty if they are."""
     if results.budget != "paper":
         return f"budget {results.budget or 'unknown'}"
-    if any(c.planned < planned_replicates(results.experiment) for c in results.conditions):
+    planned = planned_replicates(results.experiment)
+    if any(c.planned < c.condition.num_replicates(planned) for c in results.conditions):
         return "fewer replicates than planned"
     own = {row.condition_id for row in shipped() if (row.experiment, row.budget) == (results.experiment, "paper")}
     seed = option(config_directory() / "config.yaml")["seed"].value  # another one is as good as any

@@ -1,0 +1,74 @@
+"""Files that a condition needs: known by the hash of their content, which is kept here by the process that needs it.
+
+The door reads a file where a configuration says `{file: path}` and puts `{sha256: …}` in its place: a condition's
+identity is that of the content, wherever the file lay and whatever it was called. The content travels with the
+descriptions of replicates, is attached to their logs, and lies beside the configuration of a stored run.
+"""
+
+import hashlib
+from collections.abc import Iterable, Iterator
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from evoexp.errors import EvoexpError
+from evoexp.validation import Settings
+
+FILE, SHA256 = "file", "sha256"
+PREFIX = "files/"  # of the names of such attachments in a log
+
+_contents: dict[str, bytes] = {}
+
+
+class MissingFile(EvoexpError):
+    """The content of a file that a condition needs is nowhere to be found."""
+
+
+class File(Settings):
+    """A file, as its content.
+
+    Attributes:
+        sha256: Of the content, 64 hex digits.
+    """
+
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+
+    @property
+    def content(self) -> bytes:
+        """The content.
+
+        Raises:
+            MissingFile: If this process never saw it.
+        """
+        if self.sha256 not in _contents:
+            raise MissingFile(f"file of sha256 {self.sha256[:12]}…: its content is not there; give the file again")
+        return _contents[self.sha256]
+
+
+def keep(content: bytes) -> str:
+    """Keep the content of a file for as long as the process lives; return its SHA-256."""
+    sha256 = hashlib.sha256(content).hexdigest()
+    _contents[sha256] = content
+    return sha256
+
+
+def keep_all(contents: Iterable[bytes]) -> None:
+    """Keep the contents of several files."""
+    for content in contents:
+        keep(content)
+
+
+def attached(config: Any) -> dict[str, bytes]:
+    """Return the contents that a plain configuration refers to, as far as they are there, by their names in a log."""
+    return {PREFIX + sha256: _contents[sha256] for sha256 in _hashes(config) if sha256 in _contents}
+
+
+def _hashes(config: Any) -> Iterator[str]:
+    if isinstance(config, dict):
+        if set(config) == {SHA256}:
+            yield str(config[SHA256])
+        for value in config.values():
+            yield from _hashes(value)
+    elif isinstance(config, list | tuple):
+        for value in config:
+            yield from _hashes(value)

@@ -1,0 +1,107 @@
+"""Numerical potential fields over a grid by wave fronts: toward the goal, and away from obstacles.
+
+Chen & Zalzala 1995, section 2.1, after Barraquand & Latombe 1991. The potential of the obstacles is what the paper
+calls the unsafeness of a node; it is the model of collision that its paths are planned with.
+"""
+
+from itertools import pairwise
+from typing import Annotated, ClassVar, NamedTuple, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from evoexp.errors import SettingError
+from evoexp.paths.grids import UNREACHED, Grid, front, grid
+from evoexp.records import FloatArray
+from evoexp.validation import Component, Count, Positive, Vector
+
+
+class Fields(NamedTuple):
+    """What the fields of an occupancy grid are.
+
+    Attributes:
+        grid: Its free nodes and permitted moves; nodes that are too unsafe are not free.
+        unsafeness: (nodes,) S_i of every node: potential of the nearest obstacle or boundary.
+        potentials: (nodes,) potential toward a goal after so many steps of its front.
+        neighbourhood: p of the fronts.
+    """
+
+    grid: Grid
+    unsafeness: FloatArray
+    potentials: FloatArray
+    neighbourhood: int
+
+    @property
+    def num_moves(self) -> int:
+        """How many of the grid's moves the front of a goal makes."""
+        return self.grid.moves_within(self.neighbourhood)
+
+    def steps_to(self, node: int) -> np.ndarray:
+        """Return how many steps every node (nodes,) is away from one; `grids.UNREACHED` where it cannot be reached."""
+        return front(self.grid, np.array([node]), self.neighbourhood)
+
+    def goal_field(self, node: int) -> FloatArray:
+        """Return the potential of every node (nodes,) toward a goal; NaN where the goal cannot be reached from."""
+        steps = self.steps_to(node)
+        return np.where(steps == UNREACHED, np.nan, self.potentials[steps])
+
+
+class PotentialFields(Component):
+    """Potentials after so many steps of the wave fronts.
+
+    Attributes:
+        neighbourhood: p: a step of a front changes at most so many coordinates.
+        goal_potentials: d_1, d_2, … after 1, 2, … steps from the goal, where it is 0; goes on with the last difference.
+        obstacle_potentials: o_0, o_1, … after 0, 1, … steps from obstacles and from the ring of nodes around the grid;
+            the last one is held.
+        max_unsafeness: S_* of Eq. 3: no path may pass a node of a greater one; None: any.
+    """
+
+    component: ClassVar[str] = "potential_fields"
+
+    neighbourhood: Count
+    goal_potentials: Annotated[tuple[Positive, ...], Field(min_length=2)]
+    obstacle_potentials: Annotated[Vector, Field(min_length=1)]
+    max_unsafeness: float | None = None
+
+    @model_validator(mode="after")
+    def _potentials_are_ordered(self) -> Self:
+        if any(b <= a for a, b in pairwise(self.goal_potentials)):
+            raise SettingError("goal_potentials", "ascending: d1 < d2 < …", list(self.goal_potentials))
+        if any(b > a for a, b in pairwise(self.obstacle_potentials)):
+            raise SettingError("obstacle_potentials", "descending: o0 ≥ o1 ≥ …", list(self.obstacle_potentials))
+        return self
+
+    def bind(self, blocked: np.ndarray) -> Fields:
+        """Return the fields of an occupancy grid.
+
+        Args:
+            blocked: (nodes along x, along y[, along z]), true for the nodes of obstacles.
+
+        Raises:
+            SettingError: If p is more than the grid has dimensions.
+        """
+        if self.neighbourhood > blocked.ndim:
+            must = f"at most the grid's number of dimensions ({blocked.ndim})"
+            raise SettingError("collision.neighbourhood", must, self.neighbourhood)
+        unsafeness = self._unsafeness(blocked)
+        closed = blocked if self.max_unsafeness is None else blocked | (unsafeness > self.max_unsafeness)
+        own = grid(closed)
+        around = np.pad(unsafeness, 1, constant_values=self.obstacle_potentials[0])
+        return Fields(own, around.ravel(), self._goal_potentials(own.num_nodes), self.neighbourhood)
+
+    def _unsafeness(self, blocked: np.ndarray) -> FloatArray:
+        """Return the unsafeness of every node, in the shape of the grid."""
+        sources = np.pad(blocked, 1, constant_values=True)  # "obstacles (including the natural boundaries)"
+        everywhere = grid(np.zeros(sources.shape, dtype=bool))
+        starts = np.flatnonzero(np.pad(sources, 1))
+        steps = everywhere.inner(front(everywhere, starts, self.neighbourhood))
+        table = np.array(self.obstacle_potentials)
+        inside = (slice(1, -1),) * blocked.ndim
+        return np.asarray(table[np.minimum(steps[inside], len(table) - 1)])
+
+    def _goal_potentials(self, count: int) -> FloatArray:
+        """Return the potentials after 0 … count − 1 steps."""
+        own = np.array([0.0, *self.goal_potentials])
+        further = np.arange(1.0, max(count - len(own), 0) + 1.0) * (own[-1] - own[-2]) + own[-1]
+        return np.concatenate([own, further])

@@ -1,0 +1,33 @@
+"""The cost of a path over a grid: its length, and how unsafe its nodes are on average (Chen & Zalzala 1995, Eq. 1)."""
+
+from typing import ClassVar, Self
+
+from pydantic import model_validator
+
+from evoexp.errors import SettingError
+from evoexp.validation import Component, NonNegative
+
+
+class PathCost(Component):
+    """Weights of Eq. 1, C = ε D + λ S.
+
+    Attributes:
+        distance_weight: ε, of the length D (Eq. 2) [1/cell].
+        unsafeness_weight: λ, of the mean unsafeness S of the path's nodes (Eq. 3) [-].
+    """
+
+    component: ClassVar[str] = "path_cost"
+
+    distance_weight: NonNegative
+    unsafeness_weight: NonNegative
+
+    @model_validator(mode="after")
+    def _something_costs(self) -> Self:
+        if self.distance_weight == 0.0 and self.unsafeness_weight == 0.0:
+            raise SettingError("distance_weight", "above 0, or unsafeness_weight is: else all paths cost 0", 0.0)
+        return self
+
+    @property
+    def weights(self) -> tuple[float, float]:
+        """(ε, λ), as kernels take them."""
+        return self.distance_weight, self.unsafeness_weight

@@ -1,0 +1,1 @@
+"""References: deterministic truths that are drawn beside planners."""

@@ -1,0 +1,41 @@
+"""A platform that moves over a floor without turning; or a body that moves through space."""
+
+from typing import ClassVar, Literal
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from evoexp.robots.assembly import Assembly, Link, Robot
+from evoexp.robots.kinematics import kinematic_table
+from evoexp.validation import Positive
+
+
+class FloorPlatform(Robot):
+    """An upright cylinder on prismatic joints along x and y, or along x, y and z.
+
+    Attributes:
+        body_radius: Of the cylinder [length unit of the scene].
+        body_height: Of the cylinder, which stands on the floor z = 0; in three dimensions it is centred on its place.
+        dimensions: How many directions it moves along.
+    """
+
+    component: ClassVar[str] = "floor_platform"
+
+    body_radius: Positive
+    body_height: Positive
+    dimensions: Literal[2, 3] = 2
+
+    def build(self) -> Assembly:
+        """Return the model with q = (x, y[, z]) and its body."""
+        model, geometry, parent = pin.Model(), pin.GeometryModel(), 0
+        joints = (pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ)[: self.dimensions]
+        for axis, joint in zip("xyz", joints, strict=False):
+            parent = model.addJoint(parent, joint(), pin.SE3.Identity(), f"platform_{axis}")
+        low = 0.0 if self.dimensions == 2 else -0.5 * self.body_height
+        start, end = np.array([0.0, 0.0, low]), np.array([0.0, 0.0, low + self.body_height])
+        shape = coal.Cylinder(self.body_radius, self.body_height)
+        placement = pin.SE3(np.eye(3), 0.5 * (start + end))
+        geometry.addGeometryObject(pin.GeometryObject("link_0", parent, 0, placement, shape))
+        links = (Link(0, parent, start, end, self.body_radius),)
+        return Assembly(model, geometry, links, np.array([[0, model.nq]]), kinematic_table(model))

@@ -1,0 +1,100 @@
+"""Linear scaling and stochastic remainder sampling: what the paper's formula says, and counts that are unbiased."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from evoexp.evolution.remainder import stochastic_remainder
+from evoexp.evolution.scaling import scale_linearly
+
+COSTS = st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=30).map(np.array)
+
+
+def scaled_as_printed(fitness: np.ndarray, multiple: float = 2.0) -> np.ndarray:
+    """f' = a f + b of Eq. 5, negative ones 0, from its two conditions alone."""
+    mean, most = fitness.mean(), fitness.max()
+    a, b = np.linalg.solve([[mean, 1.0], [most, 1.0]], [mean, multiple * mean])
+    return np.maximum(a * fitness + b, 0.0)
+
+
+@given(st.integers(0, 2**32), st.integers(2, 40), st.integers(1, 60))
+def test_scaling_is_equation_5_whatever_the_constant(seed: int, num: int, count: int) -> None:
+    costs = np.random.default_rng(seed).uniform(10.0, 90.0, num)
+    for constant in (costs.max(), 250.0):
+        scaled = scaled_as_printed(constant - costs)
+        np.testing.assert_allclose(scale_linearly(costs, count), count * scaled / scaled.sum(), rtol=1e-7, atol=1e-9)
+
+
+def test_mean_is_kept_and_the_best_expects_twice_the_mean_where_nothing_is_negative() -> None:
+    expected = scale_linearly(np.array([1.0, 2.0, 3.0]), 3)
+    np.testing.assert_allclose(expected, [2.0, 1.0, 0.0])
+    np.testing.assert_allclose(scale_linearly(np.array([1.0, 2.0, 3.0]), 3, 1.5), [1.5, 1.0, 0.5])
+
+
+def test_what_would_be_negative_is_0_and_the_rest_is_divided_by_the_mean() -> None:
+    expected = scale_linearly(np.array([0.0, 0.0, 0.0, 10.0]), 4)  # 2, 2, 2, -2
+    np.testing.assert_allclose(expected, [4 / 3, 4 / 3, 4 / 3, 0.0])
+
+
+@given(COSTS, st.floats(-1e3, 1e3), st.integers(0, 40))
+def test_scaling_does_not_change_with_a_shift_and_adds_up(costs: np.ndarray, shift: float, count: int) -> None:
+    costs = np.round(costs, 3)
+    expected = scale_linearly(costs, count)
+    assert expected.sum() == pytest.approx(count)
+    assert (expected >= 0.0).all()
+    shifted = scale_linearly(np.round(costs + np.round(shift, 3), 3), count)
+    np.testing.assert_allclose(shifted, expected, atol=1e-6 * max(count, 1))
+
+
+def test_infeasible_ones_expect_nothing_and_equal_ones_equally_much() -> None:
+    expected = scale_linearly(np.array([np.inf, 3.0, np.nan, 5.0]), 4)
+    np.testing.assert_allclose(expected, [0.0, 4.0, 0.0, 0.0])
+    np.testing.assert_allclose(scale_linearly(np.full(5, 0.1), 4), np.full(5, 0.8))
+    np.testing.assert_allclose(scale_linearly(np.full(5, np.inf), 4), np.full(5, 0.8))
+
+
+@pytest.mark.parametrize(
+    ("costs", "count", "multiple"),
+    [(np.ones((2, 2)), 3, 2.0), (np.ones(0), 3, 2.0), (np.ones(3), -1, 2.0), (np.ones(3), 3, 1.0)],
+)
+def test_scaling_refuses_what_cannot_be(costs: np.ndarray, count: int, multiple: float) -> None:
+    with pytest.raises(ValueError, match="must"):
+        scale_linearly(costs, count, multiple)
+
+
+@given(COSTS, st.integers(0, 60), st.integers(0, 2**32))
+def test_counts_are_the_floor_or_one_more(costs: np.ndarray, count: int, seed: int) -> None:
+    expected = scale_linearly(costs, count)
+    parents = stochastic_remainder(np.random.default_rng(seed), expected)
+    counts = np.bincount(parents, minlength=len(costs))
+    assert len(parents) == count
+    assert (counts >= np.floor(expected - 1e-9)).all()
+    assert (counts <= np.ceil(expected + 1e-9)).all()
+
+
+def test_whole_numbers_leave_nothing_to_chance() -> None:
+    for seed in range(50):
+        parents = stochastic_remainder(np.random.default_rng(seed), np.array([2.0, 0.0, 1.0, 3.0]))
+        assert sorted(parents) == [0, 0, 2, 3, 3, 3]
+
+
+def test_counts_are_unbiased() -> None:
+    """The mean of 40000 counts, each of standard deviation ≤ 0.5: six standard errors are 0.015."""
+    expected = np.array([0.9, 0.1, 0.5, 0.5, 1.3, 0.7, 2.2, 0.8])
+    rng, num = np.random.default_rng(3), 40_000
+    counts = sum(np.bincount(stochastic_remainder(rng, expected), minlength=8) for _ in range(num))
+    np.testing.assert_allclose(counts / num, expected, atol=0.015)
+
+
+def test_order_of_parents_is_random() -> None:
+    """Each of three parents stands first in a third of 6000 draws: six standard errors are 0.037."""
+    rng, num = np.random.default_rng(4), 6000
+    first = np.bincount([stochastic_remainder(rng, np.ones(3))[0] for _ in range(num)], minlength=3) / num
+    np.testing.assert_allclose(first, 1 / 3, atol=0.037)
+
+
+@pytest.mark.parametrize("expected", [[0.5, 0.7], [-1.0, 2.0], [np.nan, 1.0], [[1.0]]])
+def test_selection_refuses_what_cannot_be(expected: list[float]) -> None:
+    with pytest.raises(ValueError, match="expected must"):
+        stochastic_remainder(np.random.default_rng(0), np.array(expected))

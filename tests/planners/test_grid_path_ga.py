@@ -1,0 +1,236 @@
+"""Grid paths: valid under every operator, their costs as the equations say, and what is refused."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from evoexp.collision.certificate import certificate
+from evoexp.collision.potential_fields import PotentialFields
+from evoexp.errors import SettingError
+from evoexp.objectives.path_cost import PathCost
+from evoexp.planners import grid_kernels
+from evoexp.planners.random_search import RandomSearch
+from planners.grid_samples import FIELDS, faults, planner, robot, scenario, solvable
+
+SEEDS = st.integers(0, 2**32)
+SHAPES = st.sampled_from([(3, 3), (6, 5), (9, 9), (12, 4), (4, 4, 4)])
+
+
+def rng(seed: int) -> np.random.Generator:
+    return np.random.Generator(np.random.PCG64(seed))
+
+
+def nodes_of(path: np.ndarray) -> list[int]:
+    return [int(node) for node in path[1 : path[0] + 1]]
+
+
+def without_loops(nodes: list[int]) -> list[int]:
+    """The obvious way: cut out the first loop that closes, and look again."""
+    for k, node in enumerate(nodes):
+        if node in nodes[:k]:
+            return without_loops(nodes[: nodes.index(node)] + nodes[k:])
+    return nodes
+
+
+@settings(max_examples=40, deadline=None)
+@given(SHAPES, st.floats(0.0, 0.5), st.booleans(), SEEDS)
+def test_every_path_of_every_generation_is_valid_and_costs_what_the_equations_say(
+    shape: tuple[int, ...], share: float, revisits: bool, seed: int
+) -> None:
+    own = planner(revisits=revisits)
+    problem = solvable(shape, share, seed, own)
+    grid = problem.fields.grid
+    for generation in own.evolve(problem, rng(seed)):
+        for path, cost in zip(generation.population, generation.costs, strict=True):
+            assert faults(problem, path, revisits=revisits) == []
+            nodes = grid.coordinates[nodes_of(path)].astype(float)
+            distance = np.sqrt((np.diff(nodes, axis=0) ** 2).sum(axis=1)).sum()
+            unsafeness = problem.fields.unsafeness[nodes_of(path)].mean()
+            assert cost == pytest.approx(0.2 * distance + 1.0 * unsafeness, rel=1e-12)
+
+
+@settings(max_examples=40, deadline=None)
+@given(SHAPES, st.floats(0.0, 0.5), SEEDS)
+def test_exchange_without_loops_is_exchange_and_then_erasing_loops(
+    shape: tuple[int, ...], share: float, seed: int
+) -> None:
+    own = planner()
+    problem = solvable(shape, share, seed, own)
+    paths = own.sample(problem, rng(seed), 12)
+    place, sites = np.zeros(problem.fields.grid.num_nodes, dtype=np.int32), np.zeros((2, 400), dtype=np.int32)
+    child = np.zeros_like(paths[0])
+    for one, two in zip(paths[:-1], paths[1:], strict=True):
+        count = grid_kernels.coincident_sites(one, two, place, sites)
+        common = set(nodes_of(one)[1:-1]) & set(nodes_of(two)[1:-1])
+        assert count == len(common)
+        for i, j in sites[:, :count].T.tolist():
+            assert one[i] == two[j]
+            grid_kernels.exchange_without_loops(one, two, i, j, sites[:, :count], child)
+            assert nodes_of(child) == without_loops(nodes_of(one)[:i] + nodes_of(two)[j:])
+
+
+def test_paths_without_a_common_node_are_crossed_where_they_are_near() -> None:
+    own = planner()
+    blocked = np.zeros((9, 4), dtype=bool)
+    blocked[2:7, 1:3] = True  # a block of two rows between the lower and the upper way: rows 0 and 3, three apart
+    problem = own.prepare(robot(), scenario(blocked))
+    index = problem.fields.grid.index_of
+    lower = [(0, 0), *((x, 0) for x in range(1, 8)), (8, 1), (8, 2), (8, 3)]
+    upper = [(0, 0), (0, 1), (0, 2), (0, 3), *((x, 3) for x in range(1, 9))]
+    size = problem.fields.grid.num_nodes
+    table = np.zeros((4, size + 1), dtype=np.int32)
+    for row, path in zip(table, (lower, upper), strict=False):
+        row[: len(path) + 1] = [len(path), *map(index, path)]
+    arrays = [np.zeros(n, dtype=np.int32) for n in (size, 3 * size + 3, size, size, size + 1)]
+    scratch = (arrays[0], arrays[1], np.zeros((2, size + 1), dtype=np.int32), *arrays[2:])
+    draws = rng(1).random(64), np.zeros(1, dtype=np.int64)
+    for reach, crossed in ((0, False), (2, True)):
+        done = grid_kernels.cross(
+            draws, problem.world, (table[0], table[1]), (True, reach), (table[2], table[3]), scratch
+        )
+        assert done is crossed
+    for child in table[2:]:
+        assert faults(problem, child, revisits=False) == []
+        assert nodes_of(child) not in (nodes_of(table[0]), nodes_of(table[1]))
+
+
+def test_without_crossover_and_mutation_only_selection_is_left() -> None:
+    own = planner(crossover_rate=0.0, mutation_rate=0.0, num_elites=0)
+    problem = solvable((9, 9), 0.3, 1, own)
+    first: set[tuple[int, ...]] = set()
+    for generation in own.evolve(problem, rng(3)):
+        paths = {tuple(nodes_of(path)) for path in generation.population}
+        first = first or paths
+        assert paths <= first
+
+
+def test_elites_stay() -> None:
+    own = planner(num_elites=2, mutation_rate=1.0, num_generations=20)
+    problem = solvable((12, 12), 0.3, 2, own)
+    bests = [generation.best_cost_in_generation for generation in own.evolve(problem, rng(0))]
+    assert all(b <= a for a, b in zip(bests, bests[1:], strict=False))
+
+
+def test_blocks_of_uniform_numbers_grow_where_walks_are_long() -> None:
+    """A labyrinth, whose walks take more numbers than a block has; small populations draw short blocks."""
+    blocked = np.zeros((21, 21), dtype=bool)
+    for x in range(1, 21, 2):
+        blocked[x, :20] = True
+        blocked[x] = np.roll(blocked[x], 1 if x % 4 == 3 else 0)
+    own = planner(population_size=60, mutation_rate=1.0, num_generations=2)
+    problem = own.prepare(robot(), scenario(blocked))
+    for generation in own.evolve(problem, rng(5)):
+        assert all(faults(problem, path, revisits=False) == [] for path in generation.population)
+
+
+def test_large_grids_work_out_fronts_as_they_go() -> None:
+    own = planner(population_size=6, mutation_rate=1.0, num_generations=2)
+    problem = own.prepare(robot(), scenario(np.zeros((50, 50), dtype=bool)))
+    assert len(problem.world[6]) == 0
+    last = list(own.evolve(problem, rng(0)))[-1]
+    assert all(faults(problem, path, revisits=False) == [] for path in last.population)
+
+
+def test_permitted_moves_past_corners_are_certified() -> None:
+    blocked = np.zeros((4, 4), dtype=bool)
+    blocked[1:3, 2] = True
+    own = planner()
+    problem = own.prepare(robot(), scenario(blocked, obstacles=((1, 2, 2, 2),)))
+    past = np.array([[0, 0], [1, 1], [2, 1], [3, 2], [3, 3]], dtype=float)
+    assert own.evaluate(problem, past.ravel())["forbidden_moves"] == 0.0
+    verdict = certificate(problem, own.motion(problem, past.ravel()))
+    assert verdict.certified
+    assert verdict.clearance == pytest.approx(np.sqrt(0.5) - 0.4, abs=0.02)
+    through = np.array([[0, 2], [3, 2], [3, 3]], dtype=float)
+    assert certificate(problem, own.motion(problem, through.ravel())).certified is False
+
+
+def test_evaluate_says_what_is_wrong_with_a_path() -> None:
+    blocked = np.zeros((4, 4), dtype=bool)
+    blocked[1, 1] = True
+    own = planner()
+    problem = own.prepare(robot(), scenario(blocked))
+    terms = own.evaluate(problem, np.array([0, 0, 1, 1, 2, 2, 3.0, 2]))
+    assert terms["blocked_nodes"] == 1.0
+    assert terms["forbidden_moves"] == 2.0
+    assert terms["missed_ends"] == 1.0
+    assert terms["cost"] == np.inf
+    assert terms["distance"] == pytest.approx(2 * np.sqrt(2.0) + 1.0)
+
+
+@pytest.mark.parametrize(
+    ("path", "said"),
+    [
+        ([[0.0, 0.0]], "path: must be two nodes at least"),
+        (
+            [[0, 0], [0, 4]],
+            r"path\[1\]: must be a node of the grid, whole numbers \(0\.\.3 × 0\.\.3\), was \[0\.0, 4\.0\]",
+        ),
+        ([[0, 0], [0.5, 1]], r"path\[1\]: must be a node"),
+        ([[-1, 0], [0, 0]], r"path\[0\]: must be a node"),
+    ],
+)
+def test_evaluate_refuses_what_is_no_path(path: list[list[float]], said: str) -> None:
+    own = planner()
+    problem = own.prepare(robot(), scenario(np.zeros((4, 4), dtype=bool)))
+    with pytest.raises(SettingError, match=said):
+        own.evaluate(problem, np.array(path, dtype=float).ravel())
+
+
+def test_a_goal_behind_obstacles_is_said_before_any_search() -> None:
+    blocked = np.zeros((5, 5), dtype=bool)
+    blocked[3, 3:] = blocked[4, 3] = True
+    with pytest.raises(
+        SettingError, match=r"scenario\.goal: must be a node that can be reached from the start \[0, 0\]"
+    ):
+        planner().prepare(robot(), scenario(blocked))
+    blocked[3, 3] = False  # leaves the gap between two corners, which may not be passed
+    with pytest.raises(SettingError, match="can be reached"):
+        planner().prepare(robot(), scenario(blocked))
+
+
+def test_start_and_goal_are_safe_enough() -> None:
+    capped = PotentialFields(**FIELDS, max_unsafeness=7.0)
+    with pytest.raises(
+        SettingError, match=r"scenario\.start: must be a node of an unsafeness of at most .* \(7\), was 9"
+    ):
+        planner(collision=capped).prepare(robot(), scenario(np.zeros((5, 5), dtype=bool)))
+
+
+def test_the_cap_is_kept_by_all_paths() -> None:
+    capped = PotentialFields(**FIELDS, max_unsafeness=7.0)
+    own = planner(collision=capped)
+    inside: dict[str, Any] = {"start": (1, 1), "goal": (8, 8)}
+    problem = own.prepare(robot(), scenario(np.zeros((10, 10), dtype=bool), **inside))
+    for generation in own.evolve(problem, rng(0)):
+        for path in generation.population:
+            assert problem.fields.unsafeness[nodes_of(path)].max() <= 7.0
+
+
+def test_something_must_cost() -> None:
+    with pytest.raises(SettingError, match="distance_weight: must be above 0, or unsafeness_weight is"):
+        PathCost(distance_weight=0.0, unsafeness_weight=0.0)
+
+
+def test_robot_and_grid_have_the_same_dimensions() -> None:
+    with pytest.raises(SettingError, match=r"robot\.dimensions: must be as many as the grid has \(2\), was 3"):
+        planner().prepare(robot(3), scenario(np.zeros((4, 4), dtype=bool)))
+
+
+def test_random_search_draws_the_same_first_paths() -> None:
+    own = planner()
+    problem = solvable((9, 9), 0.3, 4, own)
+    control = RandomSearch(planner=own)
+    first, drawn = next(own.evolve(problem, rng(7))), next(control.evolve(problem, rng(7)))
+    assert np.array_equal(first.population, drawn.population)
+    assert np.array_equal(first.costs, drawn.costs)
+
+
+def test_populations_are_checked() -> None:
+    own = planner()
+    problem = solvable((4, 4), 0.0, 0, own)
+    with pytest.raises(ValueError, match="paths must be"):
+        own.cost(problem, np.zeros((3, 4), dtype=np.int32))

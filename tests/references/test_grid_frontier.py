@@ -1,0 +1,113 @@
+"""The truth about grid paths: against all paths of small grids, and against what walks cannot be below."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from evoexp import compose
+from evoexp.references.grid_frontier import GridFrontier, best_walk, frontier, network_of
+from planners.grid_samples import planner, robot, scenario, solvable
+
+SETTINGS = {"num_weights": 40, "least_weight": 1e-3, "greatest_weight": 10.0, "max_nodes": 60}
+
+
+def all_simple_paths(problem: Any) -> list[list[int]]:
+    start, goal = problem.ends
+    found, stack = [], [[start]]
+    while stack:
+        path = stack.pop()
+        for other in problem.fields.grid.neighbours[path[-1]]:
+            if other == goal:
+                found.append([*path, int(other)])
+            elif other >= 0 and other not in path:
+                stack.append([*path, int(other)])
+    return found
+
+
+def cost(own: Any, problem: Any, path: Any) -> float:
+    nodes = problem.fields.grid.coordinates[path].astype(float)
+    return float(own.evaluate(problem, nodes.ravel())["cost"])
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_shortest_path_is_the_shortest_of_all(seed: int) -> None:
+    own = planner((1.0, 0.0))
+    problem = solvable((4, 4), 0.4, seed, own)
+    truth = GridFrontier(planner=own, **SETTINGS).truth(problem)
+    everything = [cost(own, problem, path) for path in all_simple_paths(problem)]
+    assert truth.cost == pytest.approx(min(everything), abs=1e-12)
+    assert truth.terms["bound_is_reached"]
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("weights", [(0.3, 1.0), (1.0, 0.3)])
+def test_no_path_is_below_the_bound_and_the_best_known_is_a_path(weights: tuple[float, float], seed: int) -> None:
+    own = planner(weights)
+    problem = solvable((4, 4), 0.4, seed, own)
+    truth = GridFrontier(planner=own, **SETTINGS).truth(problem)
+    everything = [cost(own, problem, path) for path in all_simple_paths(problem)]
+    assert truth.terms["lower_bound"] <= min(everything) + 1e-12
+    assert truth.cost >= min(everything) - 1e-12
+    if truth.terms["bound_is_reached"]:
+        assert truth.cost == pytest.approx(min(everything))
+
+
+def walk_costs(problem: Any, epsilon: float, lam: float, most: int) -> list[float]:
+    """Return the cost of the best walk of 2 … most nodes, over all walks."""
+    own, unsafeness = problem.fields.grid, problem.fields.unsafeness
+    start, goal = problem.ends
+    level: dict[int, set[tuple[int, int, float]]] = {start: {(0, 0, float(unsafeness[start]))}}  # lateral, diagonal, ΣS
+    costs = []
+    for count in range(2, most + 1):
+        following: dict[int, set[tuple[int, int, float]]] = {}
+        for node, states in level.items():
+            for move, other in enumerate(own.neighbours[node]):
+                if other >= 0:
+                    step = (1, 0) if own.changes[move] == 1 else (0, 1)
+                    following.setdefault(int(other), set()).update(
+                        (a + step[0], b + step[1], s + float(unsafeness[other])) for a, b, s in states
+                    )
+        level = following
+        ends = [epsilon * (a + b * np.sqrt(2)) + lam * s / count for a, b, s in level.get(goal, ())]
+        costs.append(min(ends, default=np.inf))
+    return costs
+
+
+@pytest.mark.parametrize("weights", [(0.05, 2.0), (0.2, 1.0)])
+def test_the_best_walk_is_the_best_of_all_walks(weights: tuple[float, float]) -> None:
+    own = planner(weights, revisits=True)
+    blocked = np.zeros((6, 6), dtype=bool)
+    blocked[0, 2] = blocked[3, 1] = True
+    problem = own.prepare(robot(), scenario(blocked))
+    expected = walk_costs(problem, *weights, 24)
+    walks, walk = best_walk(network_of(problem), *weights, 1e3, 24)
+    assert walks[:, 1].min() == pytest.approx(min(expected), rel=1e-12)
+    for count, found in walks:
+        assert found == pytest.approx(expected[int(count) - 2], rel=1e-12)
+    assert cost(own, problem, walk) == pytest.approx(min(expected), rel=1e-12)
+    assert GridFrontier(planner=own, **(SETTINGS | {"max_nodes": 24})).truth(problem).cost == pytest.approx(
+        min(expected)
+    )
+
+
+def test_the_frontier_goes_from_the_shortest_to_the_safest() -> None:
+    own = planner()
+    problem = solvable((16, 16), 0.25, 3, own)
+    found = frontier(network_of(problem), np.geomspace(1e-4, 10.0, 50))
+    terms = [own.evaluate(problem, problem.fields.grid.coordinates[path].astype(float).ravel()) for _, path in found]
+    lengths = [term["distance"] for term in terms]
+    sums = [term["unsafeness"] * term["num_nodes"] for term in terms]
+    assert lengths == sorted(lengths)
+    assert sums == sorted(sums, reverse=True)
+
+
+def test_lingering_pays_in_the_papers_own_workspace() -> None:
+    experiment = compose.expand(["experiment=chen_lingering"])[0]
+    found = {label: condition.prepare() for label, condition in experiment.conditions if condition.is_reference}
+    truths = {label: planner.truth(problem) for label, (planner, problem) in found.items()}
+    free, simple = truths["(b), revisits, exact"], truths["(b), loops erased, exact"]
+    assert free.terms["bound_is_reached"]
+    assert free.cost < 0.85 * simple.cost
+    assert len(free.best) > 2 * len(simple.best)
+    assert simple.terms["lower_bound"] == pytest.approx(free.cost)

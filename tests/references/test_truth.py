@@ -1,0 +1,162 @@
+"""References run, are stored, shown, reproduced and reported like conditions of one replicate."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from evoexp import compose, condition
+from evoexp.batch.replicate import run_replicate
+from evoexp.batch.reproduce import difference, farthest, fingerprint, same_fingerprint
+from evoexp.cli import main
+from evoexp.errors import EvoexpError, SettingError
+from evoexp.report.results import gather
+from evoexp.store.log_reader import array_names, read_array, read_log
+from evoexp.store.run_directory import RunDirectory
+
+EXPERIMENT = ("experiment=rana_obstacles", "ga.population_size=8", "ga.num_generations=2", "runner=serial")
+WORDS = (*EXPERIMENT, "planner.num_new_trajectories=1", "+reference._target_=counted")
+
+
+@pytest.fixture(autouse=True)
+def registered(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Have a reference of our own among the registered components."""
+    monkeypatch.setitem(condition.REGISTRY, "counted", "references.counted:Counted")
+    condition._registry.cache_clear()
+    yield
+    condition._registry.cache_clear()
+
+
+@pytest.fixture
+def said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
+    """Return what runs a command and gives its exit code and what it printed."""
+    monkeypatch.setenv("EVOEXP_OUTPUTS", str(tmp_path / "outputs"))
+    monkeypatch.setenv("COLUMNS", "200")
+
+    def run(*words: str, code: int = 0) -> str:
+        assert main(words) == code, capsys.readouterr()
+        return capsys.readouterr().out
+
+    return run
+
+
+def test_a_reference_stands_around_the_planner_and_overrides_reach_it() -> None:
+    (experiment,) = compose.expand([*WORDS, "num_replicates=9", "ga.mutation_rate=0.5"])
+    ((_, found),) = experiment.conditions
+    assert found.is_reference
+    assert found.planner.component == "counted"
+    assert found.planner.planner.ga.mutation_rate == 0.5
+    assert (experiment.num_replicates, found.num_replicates(experiment.num_replicates)) == (9, 1)
+
+
+def test_the_group_is_no_part_of_other_identities() -> None:
+    without = compose.expand(["experiment=rana_obstacles"])[0].conditions[0].condition
+    assert not without.is_reference
+    assert without.num_replicates(7) == 7
+    assert compose.expand(["experiment=rana_obstacles", "reference=null"])[0].conditions[0].condition.id == without.id
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["control=random_search"], "reference: must be left out beside a control, was 'counted'"),
+        (["+reference.planner=1"], "reference.planner: must be left out: it is the chosen planner, was 1"),
+        (["+reference.rows=x"], "planner.rows: must be a whole number, was 'x'"),
+    ],
+)
+def test_what_cannot_be(words: list[str], message: str) -> None:
+    with pytest.raises(SettingError) as error:
+        compose.expand([*WORDS, *words])
+    assert str(error.value) == message
+
+
+def test_a_reference_needs_its_name() -> None:
+    with pytest.raises(EvoexpError, match="reference: must be chosen: "):
+        compose.expand([*EXPERIMENT, "planner.num_new_trajectories=1", "+reference.rows=4"])
+
+
+def test_the_log_carries_the_arrays_and_reads_them_one_by_one() -> None:
+    found = compose.expand(WORDS)[0].conditions[0].condition
+    content = run_replicate(found, 0).content
+    log = read_log(content)
+    assert len(log.generations) == 1
+    assert log.summary.terms["share"] == 0.25
+    assert array_names(content) == ["counts", "table"]
+    np.testing.assert_array_equal(read_array(content, "table")[:, 0], [0.0, 0.1, 0.2])
+    assert np.isinf(read_array(content, "table")[:, 1]).all()
+    assert read_array(content, "counts").dtype == np.int64
+    with pytest.raises(KeyError):
+        read_array(content, "tables")
+    assert run_replicate(found, 0).summary.digest == log.summary.digest
+
+
+def test_run_list_show_reproduce_report(said: Callable[..., str], monkeypatch: pytest.MonkeyPatch) -> None:
+    for budget in ("paper", "smoke"):
+        printed = said("run", *WORDS, "num_replicates=4", f"budget={budget}")
+        assert "1 of 1" in printed
+    found = compose.expand(WORDS)[0].conditions[0].condition
+    assert found.id[:12] in said("list")
+    shown = said("show", found.id[:12])
+    assert "array: table (3 × 3), attached to 0000.mcap" in shown
+    assert "MATCH to 1e-09" in said("reproduce", found.id[:12])
+    monkeypatch.setenv("DISTURBED", "1e-10")
+    assert "MATCH to 1e-09 (at most" in said("reproduce", found.id[:12])
+    monkeypatch.setenv("DISTURBED", "1e-3")
+    assert "DIVERGES by" in said("reproduce", found.id[:12], code=1)
+
+
+def test_the_report_reads_references_beside_the_planners(said: Callable[..., str], tmp_path: Path) -> None:
+    said("run", *WORDS[:-1], "num_replicates=2")
+    said("run", *WORDS, "num_replicates=2")
+    conditions = [
+        ("ga", compose.expand(WORDS[:-1])[0].conditions[0].condition),
+        ("truth", compose.expand(WORDS)[0].conditions[0].condition),
+    ]
+    results = gather(tmp_path / "outputs", conditions, 2, "", "", "")
+    ga, truth = results.conditions
+    assert (ga.planned, truth.planned, ga.done, truth.done) == (2, 1, 2, 1)
+    assert (ga.is_reference, truth.is_reference, truth.is_control) == (False, True, False)
+    assert [c.label for c in results.main] == [c.label for c in results.evolved] == ["ga"]
+    assert [c.label for c in results.references] == ["truth"]
+    assert truth.planner == ga.planner
+    assert truth.array("table").shape == (3, 3)
+    with pytest.raises(KeyError):
+        ga.array("table")
+    page = said("report", *(c.id[:12] for _, c in conditions)).split("report: ")[1].strip()
+    text = Path(page).read_text()
+    assert "reference" in text
+    table = Path(page).with_name("convergence.csv").read_text()
+    assert table.count("reference") == 1
+
+
+def test_numbers_are_compared_to_a_tolerance() -> None:
+    assert difference([1.0, np.inf, np.nan], [1.0, np.inf, np.nan]) == 0.0
+    assert difference(1e6, 1e6 + 1.0) == pytest.approx(1e-6)
+    assert difference(1e-12, 0.0) == 1e-12
+    assert difference([1.0], [np.inf]) == difference([1.0], [1.0, 2.0]) == np.inf
+    assert same_fingerprint("cost 1.0", "cost 1.0000000001")
+    assert not same_fingerprint("cost 1.0", "cost 1.00000001")
+    assert same_fingerprint("cost inf", "cost inf")
+    assert not same_fingerprint("0" * 32, "cost 0.0")
+
+
+def test_arrays_that_are_missing_differ() -> None:
+    found = compose.expand(WORDS)[0].conditions[0].condition
+    other = compose.expand([*WORDS, "+reference.rows=4"])[0].conditions[0].condition
+    one, two = (read_log(run_replicate(c, 0).content) for c in (found, other))
+    assert farthest(one, one) == ("cost", 0.0)
+    assert farthest(one, two) == ("table.npy", np.inf)
+    assert farthest(one, one._replace(attachments={})) == ("counts.npy", np.inf)
+    assert fingerprint(found, one.summary) == f"cost {one.summary.best_cost!r}"
+
+
+def test_references_run_first(tmp_path: Path) -> None:
+    from evoexp.batch.runner import Batch
+    from evoexp.batch.settings import RunnerSettings
+
+    planner, truth = (compose.expand(w)[0].conditions[0].condition for w in (WORDS[:-1], WORDS))
+    batch = Batch([(planner, 2, {}), (truth, 1, {})], RunnerSettings(num_workers=1), tmp_path)
+    assert [job.condition_id for job in batch.jobs] == [truth.id, planner.id, planner.id]
+    assert len(list(batch.run())) == 3
+    assert RunDirectory(tmp_path, truth.id).completed() == {0}

@@ -1,0 +1,102 @@
+"""Occupancy grids: out of text, out of pictures, out of blocks; what each refusal says."""
+
+import io
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
+
+from evoexp.attachments import File, MissingFile, keep
+from evoexp.errors import SettingError
+from evoexp.scenarios.grid_maps import read_map
+from evoexp.scenarios.grid_motion import GridMotion, blocks
+
+BASE: dict[str, Any] = {"size": (4, 3), "start": (0, 0), "goal": (3, 2), "obstacle_height": 0.5}
+BASE |= {"security_margin": 0.0, "length_unit": "unit"}
+TEXT = b"; a comment\n..*.  ; upper row\n+ + + +\n.#.."
+SEEN = {(2, 2), (1, 0)}
+
+
+def png(rows: list[list[int]]) -> bytes:
+    buffer = io.BytesIO()
+    Image.fromarray(np.array(rows, dtype=np.uint8)).save(buffer, "PNG")
+    return buffer.getvalue()
+
+
+PICTURE = png([[255, 255, 0, 255], [255, 255, 255, 255], [255, 0, 255, 255]])
+
+
+@pytest.mark.parametrize("content", [TEXT, PICTURE, TEXT.replace(b"\n", b"\r\n")])
+def test_a_map_has_its_greatest_y_first(content: bytes) -> None:
+    found = read_map(content, (4, 3), "scenario.map")
+    assert {tuple(node) for node in np.argwhere(found).tolist()} == SEEN
+
+
+def test_a_map_in_space_has_one_block_per_z() -> None:
+    found = read_map(b"*.\n..\n\n..\n.*\n\n..\n..\n", (2, 2, 3), "scenario.map")
+    assert {tuple(node) for node in np.argwhere(found).tolist()} == {(0, 1, 0), (1, 0, 1)}
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"....\n....\n", r"scenario\.map: must be a map of 4 × 3 nodes, as scenario\.size says, was '4 × 2'"),
+        (b"....\n..x.\n....", r"must be a map of \* or # \(blocked\) and \+ or \. \(free\), was 'x in row 2'"),
+        (b"....\n..\n....", "equally long"),
+        (b"", "equally long, was 'empty'"),
+        (b"\xff\xfe", "a text or a PNG"),
+        (b"\x89PNG\r\n\x1a\nnothing", "a PNG that can be read"),
+        (png([[255, 128, 0, 255]] * 3), r"black \(blocked\) and white \(free\) pixels, was 'grey 128'"),
+    ],
+)
+def test_what_is_no_map_is_refused(content: bytes, said: str) -> None:
+    with pytest.raises(SettingError, match=said):
+        read_map(content, (4, 3), "scenario.map")
+
+
+def test_blocks_and_map_add_up() -> None:
+    scenario = GridMotion(**BASE, obstacles=((1, 1, 2, 1),), map=File(sha256=keep(TEXT)))
+    assert {tuple(node) for node in np.argwhere(scenario.blocked()).tolist()} == SEEN | {(1, 1), (2, 1)}
+    assert scenario.bodies()[0].size == (1.0, 0.02, 0.5)
+    assert scenario.bodies()[0].center == (1.5, 1.0, 0.25)
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"start": (4, 0)}, r"start: must be a node inside the grid \(0\.\.3 × 0\.\.2\), was \[4, 0\]"),
+        ({"goal": (0, 0)}, "goal: must be another node than start"),
+        ({"goal": (1, 1, 1)}, "goal: must be a node inside"),
+        ({"obstacles": ((0, 0, 1),)}, "obstacles"),
+        ({"obstacles": ((2, 1, 1, 1),)}, r"obstacles\[0\]: must be from a lower to an upper corner"),
+        ({"obstacles": ((0, 0, 4, 0),)}, r"obstacles\[0\]"),
+    ],
+)
+def test_what_does_not_fit_the_grid_is_refused(changed: dict[str, Any], said: str) -> None:
+    with pytest.raises((SettingError, ValueError), match=said):
+        GridMotion(**(BASE | changed))
+
+
+def test_start_and_goal_are_free() -> None:
+    for name, corners in (("start", (0, 0, 1, 1)), ("goal", (3, 2, 3, 2))):
+        with pytest.raises(SettingError, match=rf"scenario\.{name}: must be a free node; an obstacle is there"):
+            GridMotion(**BASE, obstacles=(corners,)).blocked()
+
+
+def test_a_file_nobody_gave_is_missed() -> None:
+    with pytest.raises(MissingFile, match="give the file again"):
+        GridMotion(**BASE, map=File(sha256="0" * 64)).blocked()
+
+
+@given(st.sampled_from([(5, 6), (3, 3, 4)]), st.floats(0.0, 1.0), st.integers(0, 2**32))
+def test_blocks_cover_a_set_and_nothing_else(shape: tuple[int, ...], share: float, seed: int) -> None:
+    nodes = np.random.default_rng(seed).random(shape) < share
+    covered = np.zeros(shape, dtype=bool)
+    for low, high in blocks(nodes):
+        part = tuple(slice(a, b + 1) for a, b in zip(low, high, strict=True))
+        assert nodes[part].all()
+        covered[part] = True
+    assert np.array_equal(covered, nodes)

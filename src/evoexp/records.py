@@ -34,6 +34,7 @@ class Generation(NamedTuple):
     costs: FloatArray  # (individuals,), with a leading axis for co-evolving populations, whose best cost is a team's
     population: FloatArray  # any shape
     criteria: FloatArray | None = None  # (populations, criteria, individuals), of generations whose front is recorded
+    stop_reason: str = ""  # of the last generation: why the planner ends, if not because its generations are used up
     arrays: Mapping[str, NDArray[Any]] | None = None  # of references: attached to the log as <name>.npy
 
 

@@ -29,7 +29,7 @@ def test_records_are_consistent(condition: Condition) -> None:
     assert [row.index for row in rows] == list(range(len(rows)))
     assert all(b.best_cost <= a.best_cost for a, b in zip(rows, rows[1:], strict=False)), "best so far is monotone"
     assert all(row.best_cost <= row.best_cost_in_generation for row in rows)
-    if not {"team_cost", "sub_path"} & rows[0].terms.keys():  # else the best is a team, or a whole plan
+    if not {"team_cost", "sub_path", "phase"} & rows[0].terms.keys():  # else the best is a team, or a whole plan
         assert all(row.best_cost_in_generation <= row.mean_cost for row in rows if np.isfinite(row.mean_cost))
     assert all(b.evaluations > a.evaluations for a, b in zip(rows, rows[1:], strict=False))
     assert log.summary.best_cost == rows[-1].best_cost == log.solutions[-1].cost
@@ -43,7 +43,8 @@ def test_the_best_solution_is_worth_what_was_recorded(condition: Condition) -> N
     terms = planner.evaluate(problem, log.solutions[-1].values)
     recorded = log.generations[-1].terms
     if not condition.is_reference:  # whose own numbers are not a solution's
-        assert recorded.keys() - terms.keys() <= {"attempts", "sub_path"}, "what only the search knows"
+        search = {"attempts", "sub_path", "phase", "cycles", "idle_cycles"}
+        assert recorded.keys() - terms.keys() <= search, "what only the search knows"
     common = recorded.keys() & terms.keys()  # equal but for the rounding of a solution's units
     assert {name: recorded[name] for name in common} == pytest.approx({name: terms[name] for name in common}, abs=1e-9)
     assert log.summary.terms == recorded | terms

@@ -33,12 +33,20 @@ class Shapes(NamedTuple):
         start: (shapes, 3) one end, or the centre, in the joint's frame [length unit].
         end: (shapes, 3) the other end.
         radius: (shapes,) at least 0.
+        body: (shapes,) number of the body that each belongs to; None: all shapes of one joint are one body, whose
+            number is the joint's.
     """
 
     joint: np.ndarray
     start: FloatArray
     end: FloatArray
     radius: FloatArray
+    body: np.ndarray | None = None
+
+    @property
+    def labels(self) -> np.ndarray:
+        """(shapes,) number of the body that each belongs to."""
+        return self.joint if self.body is None else self.body
 
     def checked(self, model: Any) -> "Shapes":
         """Return the shapes as arrays of the right types.
@@ -59,7 +67,10 @@ class Shapes(NamedTuple):
             raise ValueError(
                 f"shapes.joint must be joints of the model, 0 to {model.njoints - 1}, was {joint.tolist()}"
             )
-        return Shapes(joint, start, end, radius)
+        if self.body is not None and len(self.body) != len(joint):
+            raise ValueError(f"shapes.body must have shape {joint.shape}, was {self.body.shape}")
+        body = None if self.body is None else np.asarray(self.body, dtype=np.int64)
+        return Shapes(joint, start, end, radius, body)
 
 
 class Units(NamedTuple):
@@ -106,9 +117,16 @@ class PackedObstacles(NamedTuple):
 
 
 def pack_shapes(
-    table: KinematicTable, shapes: Shapes, joints: np.ndarray
+    table: KinematicTable, shapes: Shapes, numbers: np.ndarray, joints: np.ndarray
 ) -> tuple[Units, PackedShapes, list[list[int]]]:
-    """Return the shapes of all bodies, and of each body the units that are its parts."""
+    """Return the shapes of all bodies, and of each body the units that are its parts.
+
+    Args:
+        table: The kinematic table.
+        shapes: All shapes.
+        numbers: (bodies,) of the bodies.
+        joints: (bodies,) that move them.
+    """
     world = len(table.parent)
     turn = np.concatenate([np.eye(3)[None], table.alignment.transpose(0, 2, 1)])[shapes.joint]
     start = np.einsum("nij,nj->ni", turn, shapes.start)
@@ -121,8 +139,8 @@ def pack_shapes(
     parts: list[list[int]] = []
     bodies: list[tuple[Any, ...]] = []
     cuts: list[tuple[Any, ...]] = []
-    for k, joint in enumerate(joints):
-        own, first = np.flatnonzero(shapes.joint == joint), (len(runs), len(rods))
+    for k, (number, joint) in enumerate(zip(numbers, joints, strict=True)):
+        own, first = np.flatnonzero(shapes.labels == number), (len(runs), len(rods))
         frame = int(joint) - 1 if joint > 0 else world
         rows = []
         for cut in _cut(own, start + 0.5 * axis, ball):
@@ -173,7 +191,7 @@ def _ball(start: FloatArray, axis: FloatArray, radius: FloatArray, own: np.ndarr
 
 
 def pack_obstacles(
-    obstacles: ObstacleTable, joints: np.ndarray, ignored: tuple[tuple[int, int], ...]
+    obstacles: ObstacleTable, numbers: np.ndarray, joints: np.ndarray, ignored: tuple[tuple[int, int], ...]
 ) -> tuple[PackedObstacles, np.ndarray]:
     """Return the obstacles, and where each body's list of them begins and ends, (bodies, 2).
 
@@ -184,10 +202,10 @@ def pack_obstacles(
         ValueError: If an ignored pair names no joint with shapes, or no obstacle.
     """
     kind, size = obstacles.without_ellipses().kind, obstacles.size
-    for joint, k in ignored:
-        if joint not in joints or not 0 <= k < len(kind):
-            must = f"pairs (joint, obstacle), of joints {joints.tolist()} and obstacles 0 to {len(kind) - 1}"
-            raise ValueError(f"ignored must hold {must}, was {(joint, k)}")
+    for number, k in ignored:
+        if number not in numbers or not 0 <= k < len(kind):
+            must = f"pairs (joint, obstacle), of joints {numbers.tolist()} and obstacles 0 to {len(kind) - 1}"
+            raise ValueError(f"ignored must hold {must}, was {(number, k)}")
     core = np.zeros((len(kind), 4))
     core[kind == SPHERE, 3] = size[kind == SPHERE, 0]
     core[kind == BOX, :3] = size[kind == BOX]
@@ -198,8 +216,11 @@ def pack_obstacles(
     around = np.sqrt((core[:, :3] ** 2).sum(axis=1)) + core[:, 3]
     data = np.column_stack([obstacles.center, obstacles.rotation, core, around, box])
     classes = np.select([kind == CYLINDER, kind == HALF_SPACE], [CYLINDERS, HALF_SPACES], BOXES)
-    skipped = {(int(joint), int(k)) for joint, k in ignored}
-    lists = [[k for k in range(len(kind)) if joint > 0 and (int(joint), k) not in skipped] for joint in joints]
+    skipped = {(int(number), int(k)) for number, k in ignored}
+    lists = [
+        [k for k in range(len(kind)) if joint > 0 and (int(number), k) not in skipped]
+        for number, joint in zip(numbers, joints, strict=True)
+    ]
     listed = np.array([(k, classes[k]) for one in lists for k in one], dtype=np.int64).reshape(-1, 2)
     ends = np.cumsum([0, *map(len, lists)])
     return PackedObstacles(data, listed), np.column_stack([ends[:-1], ends[1:]])

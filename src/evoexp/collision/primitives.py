@@ -1,7 +1,7 @@
 """Robots as spheres and capsules, among obstacles of all kinds: the kernels in three dimensions.
 
 Any Pinocchio model whose joints have one coordinate, any number of arms; the kernels are in `primitive_kernels`. A body
-is all shapes that move with one joint. Angles are radians here, as in Pinocchio.
+is all shapes that move with one joint, or what is told apart of them. Angles are radians here, as in Pinocchio.
 """
 
 from collections.abc import Iterable, Sequence
@@ -119,8 +119,9 @@ class PrimitiveCollision(NamedTuple):
             model: `pin.Model` whose joints have one coordinate each.
             shapes: Its spheres and capsules; those of the world (a pedestal) are checked against bodies only.
             obstacles: The obstacle table.
-            pairs: Joints whose bodies are checked against each other; `default_pairs` if not given.
-            ignored: Pairs (joint, obstacle) that are not checked: the floor that the first link stands on.
+            pairs: Bodies that are checked against each other, by their numbers (the joints', unless shapes have
+                others); `default_pairs` if not given.
+            ignored: Pairs (body, obstacle) that are not checked: the floor that the first link stands on.
             arms: Which arm each joint of the model belongs to, the world included; `arms_of_joints` if not given.
                 Negative numbers belong to every arm.
 
@@ -129,14 +130,15 @@ class PrimitiveCollision(NamedTuple):
             ValueError: If shapes, pairs or arms do not fit the model.
         """
         shapes, table = shapes.checked(model), kinematic_table(model)
-        joints = np.unique(shapes.joint)
-        units, packed, parts = pack_shapes(table, shapes, joints)
+        numbers, first = np.unique(shapes.labels, return_index=True)
+        joints = shapes.joint[first]
+        units, packed, parts = pack_shapes(table, shapes, numbers, joints)
         chosen = default_pairs(model, joints) if pairs is None else tuple((int(a), int(b)) for a, b in pairs)
         arm = arms_of_joints(model) if arms is None else tuple(arms)
         if len(arm) != model.njoints:
             raise ValueError(f"arms must have one number per joint of the model, {model.njoints}, had {len(arm)}")
-        around, units.whole[: len(joints), 5:] = pack_obstacles(obstacles, joints, tuple(ignored))
-        rows = _pair_table(joints, chosen, arm, parts, units, packed)
+        around, units.whole[: len(joints), 5:] = pack_obstacles(obstacles, numbers, joints, tuple(ignored))
+        rows = _pair_table(numbers, chosen, [arm[joint] for joint in joints], parts, units, packed)
         tables = (table[:6], tuple(units), tuple(packed), tuple(around), rows)
         return cls(table, joints, units, packed, around, rows, tables)
 
@@ -190,7 +192,7 @@ class PrimitiveCollision(NamedTuple):
 
 
 def _pair_table(
-    joints: np.ndarray,
+    numbers: np.ndarray,
     pairs: tuple[tuple[int, int], ...],
     arms: Sequence[int],
     parts: list[list[int]],
@@ -198,12 +200,13 @@ def _pair_table(
     shapes: PackedShapes,
 ) -> np.ndarray:
     """Return all pairs of parts of the bodies that are paired; the part with more spheres stays in its frame."""
-    body = {int(joint): k for k, joint in enumerate(joints)}
+    body = {int(number): k for k, number in enumerate(numbers)}
     rows: list[tuple[int, int, int]] = []
     for one, two in pairs:
         if one not in body or two not in body or one == two:
-            raise ValueError(f"pairs must hold two different joints of {joints.tolist()} each, was {(one, two)}")
-        between = arms[one] != arms[two] and arms[one] >= 0 and arms[two] >= 0
+            raise ValueError(f"pairs must hold two different joints of {numbers.tolist()} each, was {(one, two)}")
+        arm, other = arms[body[one]], arms[body[two]]
+        between = arm != other and arm >= 0 and other >= 0
         for a in parts[body[one]]:
             for b in parts[body[two]]:
                 more, fewer = (a, b) if num_spheres(units, shapes, a) >= num_spheres(units, shapes, b) else (b, a)

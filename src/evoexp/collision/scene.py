@@ -66,20 +66,23 @@ def scene(assembly: Assembly, obstacles: ObstacleTable | tuple[Any, ...] = (), s
     table = obstacles if isinstance(obstacles, ObstacleTable) else obstacle_table(obstacles)
     geometry = pin.GeometryModel()
     counts = [0] * assembly.num_arms
-    for link, item in zip(assembly.links, assembly.geometry.geometryObjects, strict=True):
-        counts[link.arm] += 1
-        name = f"arm_{link.arm + 1}_link_{counts[link.arm]}"
-        geometry.addGeometryObject(pin.GeometryObject(name, link.joint, 0, item.placement, item.geometry))
+    bodies = list(assembly.geometry.geometryObjects)
+    for arm, item in zip(assembly.body_arms, bodies, strict=True):
+        counts[arm] += 1
+        own = not item.name.startswith("link_")  # bodies that have names of their own keep them
+        name = item.name if own else f"arm_{arm + 1}_link_{counts[arm]}"
+        geometry.addGeometryObject(pin.GeometryObject(name, item.parentJoint, 0, item.placement, item.geometry))
     for k, (shape, placement) in enumerate(obstacle_shapes(table)):
         geometry.addGeometryObject(pin.GeometryObject(f"obstacle_{k + 1}", 0, 0, placement, shape))
-    parents, links = assembly.model.parents, assembly.links
-    for a, one in enumerate(links):
-        for b, two in enumerate(links[a + 1 :], start=a + 1):
-            neighbours = one.joint in (two.joint, parents[two.joint]) or two.joint == parents[one.joint]
-            if one.arm != two.arm or (self_pairs and not neighbours):
+    parents, arms = assembly.model.parents, assembly.body_arms
+    joints = [item.parentJoint for item in bodies]
+    for a, one in enumerate(joints):
+        for b, two in enumerate(joints[a + 1 :], start=a + 1):
+            neighbours = one in (two, parents[two]) or two == parents[one]
+            if arms[a] != arms[b] or (self_pairs and not neighbours):
                 geometry.addCollisionPair(pin.CollisionPair(a, b))
         for k in range(len(table.kind)):
-            geometry.addCollisionPair(pin.CollisionPair(a, len(links) + k))
+            geometry.addCollisionPair(pin.CollisionPair(a, len(bodies) + k))
     return geometry_scene(assembly.model, geometry, assembly.table)
 
 

@@ -40,6 +40,7 @@ def main(arguments: argparse.Namespace) -> int:
     values = read_motion(path)
     rows: list[dict[str, Any]] = []
     misfits = []
+    listings: list[tuple[str, list[str], list[list[Any]]]] = []
     for experiment in compose.expand(overrides, multirun=arguments.multirun, only=arguments.only):
         for label, condition in experiment.conditions:
             planner, problem = condition.prepare()
@@ -51,16 +52,22 @@ def main(arguments: argparse.Namespace) -> int:
             verdict = certificate(problem, planner.motion(problem, solution))._asdict()
             head = dict(zip(HEAD, (label, condition.id, condition.length_unit), strict=True))
             rows.append(head | planner.evaluate(problem, solution) | verdict)
+            if hasattr(planner, "listing"):
+                listings.append((label, *planner.listing(problem, solution)))
     if not rows:
         given = " and ".join(map(str, _shape_of(values)))
         raise MotionFileError(
             f"{path}: must be {'; '.join(dict.fromkeys(misfits))} (start and goal included), was {given}"
         )
     if arguments.json:
+        for row, (_, names, cells) in zip(rows, listings, strict=False):
+            row["rows"] = [dict(zip(names, values, strict=True)) for values in cells]
         plain = [{name: _finite(value) for name, value in row.items()} for row in rows]
         print(json.dumps(plain if len(rows) > 1 else plain[0], indent=2, allow_nan=False, default=_plain))
     else:
         console = plain_console()
+        for label, names, cells in listings:
+            console.print(_listing(label, names, cells))
         for table in _tables(rows, console.width):
             console.print(table)
     return 0
@@ -155,6 +162,15 @@ def _finite(value: Any) -> Any:
 
 def _plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else str(value)
+
+
+def _listing(label: str, names: list[str], rows: list[list[Any]]) -> Table:
+    """Return a table with one row per configuration of the motion."""
+    table = new_table(label)
+    add_columns(table, *names, right=True)
+    for row in rows:
+        table.add_row(*(_cell(value) for value in row))
+    return table
 
 
 def _tables(rows: list[dict[str, Any]], width: int) -> list[Table]:

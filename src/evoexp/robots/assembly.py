@@ -26,15 +26,27 @@ class Link(NamedTuple):
         return bool(np.array_equal(self.start, self.end))
 
 
+class Tool(NamedTuple):
+    """The frame of an arm's tool: z is the main grasping direction, y stands across it."""
+
+    joint: int  # index of the Pinocchio joint that moves it
+    rotation: FloatArray  # (3, 3) in the frame of the joint
+    position: FloatArray  # (3,)
+
+
 class Assembly(NamedTuple):
     """A robot, built. Shared and read-only: whoever needs `pin.Data` makes its own.
 
     Attributes:
         model: Pinocchio model of all arms together.
-        geometry: Exact link shapes as coal capsules (of radius 0 for line links), one per link, in order of `links`.
-        links: The same links as segments.
+        geometry: Exact bodies as coal shapes; of robots given by links one capsule per link (of radius 0 for line
+            links), in order of `links`.
+        links: Links as segments.
         arm_slices: (arms, 2) first and one-past-last index of each arm in q.
         table: The kinematic table of the model.
+        body_arms: Which arm each body belongs to.
+        tools: The tool's frame of each arm.
+        disabled: Pairs of bodies' names that are never judged (an SRDF's).
     """
 
     model: Any  # pin.Model
@@ -42,6 +54,9 @@ class Assembly(NamedTuple):
     links: tuple[Link, ...]
     arm_slices: np.ndarray
     table: KinematicTable
+    body_arms: tuple[int, ...] = ()
+    tools: tuple[Tool, ...] = ()
+    disabled: frozenset[frozenset[str]] = frozenset()
 
     @property
     def num_arms(self) -> int:
@@ -64,14 +79,23 @@ class Robot(Component):
         """
         model, geometry = pin.Model(), pin.GeometryModel()
         links: list[Link] = []
-        slices = []
+        slices, arms, tools, disabled = [], [], [], set()
         for k, chain in enumerate(self.chains()):
-            first = model.nq
-            for link in chain.append_to(model, k):
-                links.append(link)
-                geometry.addGeometryObject(link_capsule(link, f"link_{len(links) - 1}"))
+            first, joint = model.nq, model.njoints
+            own = chain.append_to(model, k)
+            bodies = chain.append_bodies(model, k, joint, own)
+            for body in bodies:
+                body.name = body.name or f"link_{geometry.ngeoms}"
+                if len(self.chains()) > 1 and geometry.existGeometryName(body.name):
+                    body.name = f"arm_{k + 1}_{body.name}"
+                geometry.addGeometryObject(body)
+            links += own
+            arms += [k] * len(bodies)
+            tools.append(chain.tool(model, joint, own))
+            disabled |= chain.disabled_pairs()
             slices.append((first, model.nq))
-        return Assembly(model, geometry, tuple(links), np.array(slices, dtype=np.int64), kinematic_table(model))
+        ranges, table = np.array(slices, dtype=np.int64), kinematic_table(model)
+        return Assembly(model, geometry, tuple(links), ranges, table, tuple(arms), tuple(tools), frozenset(disabled))
 
 
 class Chain(Robot):
@@ -84,6 +108,25 @@ class Chain(Robot):
     def append_to(self, model: Any, arm: int) -> list[Link]:
         """Add the arm's joints to a model; return its links."""
         raise NotImplementedError
+
+    def append_bodies(self, model: Any, arm: int, first_joint: int, links: list[Link]) -> list[Any]:
+        """Return the bodies as `pin.GeometryObject`: the links themselves, unless an arm has others.
+
+        Args:
+            model: With the arm's joints.
+            arm: Its number.
+            first_joint: Its first joint.
+            links: Its links.
+        """
+        return [link_capsule(link, "") for link in links]
+
+    def tool(self, model: Any, first_joint: int, links: list[Link]) -> Tool:
+        """Return the tool's frame: at the end of the last link, turned as its joint, unless an arm has another."""
+        return Tool(links[-1].joint, np.eye(3), links[-1].end)
+
+    def disabled_pairs(self) -> set[frozenset[str]]:
+        """Return pairs of bodies' names that are never judged."""
+        return set()
 
 
 def link_capsule(link: Link, name: str) -> Any:

@@ -18,7 +18,17 @@ Angles = tuple[float, float, float]
 SPHERE, BOX, CAPSULE, CYLINDER, HALF_SPACE, ELLIPSE = range(6)
 
 
-class SphereObstacle(Settings):
+class NamedObstacle(Settings):
+    """What all obstacles have.
+
+    Attributes:
+        name: By which contacts, objects and verdicts speak of it; without one it is `obstacle_1` and so on.
+    """
+
+    name: str = ""
+
+
+class SphereObstacle(NamedObstacle):
     """A ball; in the plane a disc."""
 
     shape: Literal["sphere"]
@@ -26,7 +36,7 @@ class SphereObstacle(Settings):
     radius: Positive
 
 
-class BoxObstacle(Settings):
+class BoxObstacle(NamedObstacle):
     """A box, turned by roll, pitch and yaw [deg] (fixed axes x, y, z, in this order)."""
 
     shape: Literal["box"]
@@ -35,7 +45,7 @@ class BoxObstacle(Settings):
     rotation: Angles = (0.0, 0.0, 0.0)
 
 
-class CapsuleObstacle(Settings):
+class CapsuleObstacle(NamedObstacle):
     """All points within `radius` of the segment from `start` to `end`."""
 
     shape: Literal["capsule"]
@@ -44,7 +54,7 @@ class CapsuleObstacle(Settings):
     radius: Positive
 
 
-class CylinderObstacle(Settings):
+class CylinderObstacle(NamedObstacle):
     """A solid cylinder with flat ends, its axis from `start` to `end`."""
 
     shape: Literal["cylinder"]
@@ -53,7 +63,7 @@ class CylinderObstacle(Settings):
     radius: Positive
 
 
-class HalfSpaceObstacle(Settings):
+class HalfSpaceObstacle(NamedObstacle):
     """All points on one side of a plane (in the plane: of a line): a floor, a wall.
 
     Attributes:
@@ -66,7 +76,7 @@ class HalfSpaceObstacle(Settings):
     normal: Point
 
 
-class EllipseObstacle(Settings):
+class EllipseObstacle(NamedObstacle):
     """An ellipse in the plane with its inside; in space an ellipsoid whose third semi-axis, along z, is the second one.
 
     The third semi-axis decides nothing for links that move in the plane of the centre: in a plane of symmetry of a

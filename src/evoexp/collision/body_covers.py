@@ -1,0 +1,201 @@
+"""Bodies covered by spheres or capsules: what the fast kernels test in place of coal's shapes.
+
+A cover contains its body, so whatever coal sees touching, the cover sees, too. What it adds is its inflation: how far
+the cover reaches beyond the body at most, bounded from above for every body.
+"""
+
+from itertools import product
+from typing import Any, NamedTuple
+
+import coal
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from evoexp.collision.body_table import UnsupportedShape
+from evoexp.records import FloatArray
+
+MOST_SPHERES = 150  # of one body that is neither ball nor capsule; where they do not suffice, the inflation grows
+WIDER = 1.0 + 1e-9  # covers are made larger by more than rounding
+
+
+class Cover(NamedTuple):
+    """Spheres or capsules around a body, in its joint's frame.
+
+    Attributes:
+        start: (shapes, 3) centre, or one end.
+        end: (shapes, 3) the same for spheres.
+        radius: (shapes,).
+        inflation: How far the cover reaches beyond the body at most [length unit].
+    """
+
+    start: FloatArray
+    end: FloatArray
+    radius: FloatArray
+    inflation: float
+
+
+def sphere_cover(item: Any, inflation: float) -> Cover:
+    """Return spheres that cover a geometry object.
+
+    Balls and capsules are covered by equal spheres on their axis; everything else by spheres around the cells of a
+    lattice, with as few cells as keep within the inflation; where that takes more than `MOST_SPHERES`, by those that
+    reach the least beyond it.
+
+    Args:
+        item: A `pin.GeometryObject` with a convex coal shape or a mesh; of a mesh the convex hull is covered.
+        inflation: How far spheres may reach beyond the body [length unit]; `Cover.inflation` says how far they do.
+
+    Raises:
+        UnsupportedShape: If the shape has no inside that could be covered.
+    """
+    shape = item.geometry
+    if isinstance(shape, coal.Sphere | coal.Capsule):
+        half = shape.halfLength if isinstance(shape, coal.Capsule) else 0.0
+        radius = shape.radius + (inflation if half > 0.0 else 0.0)
+        spacing = 2.0 * np.sqrt(max(radius * radius - shape.radius * shape.radius, 0.0)) / WIDER
+        count = int(np.ceil(2.0 * half / spacing)) + 1 if half > 0.0 else 1
+        along = np.linspace(-half, half, count) if count > 1 else np.zeros(1)
+        centers = np.column_stack([np.zeros((count, 2)), along])
+        return _placed(item, centers, centers, np.full(count, radius), radius - shape.radius)
+    solid = _solid(item)
+    best = _column(shape) if isinstance(shape, coal.Cylinder | coal.Cone) else None
+    for counts in _lattices(solid.high - solid.low):
+        centers, radius = _cells(solid, counts)
+        found = _Spheres(centers, radius, float((solid.distance(centers) + radius).max()))
+        if best is None or found.reach < best.reach:
+            best = found
+        if best.reach <= inflation:
+            break
+    assert best is not None
+    radii = np.full(len(best.centers), best.radius * WIDER)
+    return _placed(item, best.centers, best.centers, radii, best.reach)
+
+
+class _Spheres(NamedTuple):
+    """Equal spheres, and how far they reach beyond the body at most."""
+
+    centers: FloatArray
+    radius: float
+    reach: float
+
+
+def _column(shape: Any) -> _Spheres:
+    """Return spheres on the axis of a cylinder, or of one around a cone, one above the other."""
+    radius, half = float(shape.radius), float(shape.halfLength)
+    count = max(1, int(np.ceil(half / radius)))
+    piece = half / count  # half of what a sphere covers
+    around = float(np.sqrt(radius * radius + piece * piece))
+    along = -half + piece * (2.0 * np.arange(count) + 1.0)
+    reach = max(around - radius, around - piece)
+    return _Spheres(np.column_stack([np.zeros((count, 2)), along]), around, reach)
+
+
+def capsule_cover(item: Any) -> Cover:
+    """Return one capsule, or sphere, that covers a geometry object: exact for balls and capsules.
+
+    Raises:
+        UnsupportedShape: As `sphere_cover`.
+    """
+    shape = item.geometry
+    if isinstance(shape, coal.Sphere | coal.Capsule):
+        half = shape.halfLength if isinstance(shape, coal.Capsule) else 0.0
+        ends = np.array([[0.0, 0.0, -half]]), np.array([[0.0, 0.0, half]])
+        return _placed(item, *ends, np.array([shape.radius]), 0.0)
+    solid = _solid(item)
+    edges, middle = solid.high - solid.low, 0.5 * (solid.low + solid.high)
+    axis = int(np.argmax(edges))
+    across = np.delete(edges, axis)
+    slack = float(np.sqrt(np.sum(across * across))) / 2.0  # of the corners of a box around
+    if isinstance(shape, coal.Cylinder) and axis == 2:
+        slack = float(shape.radius)
+    radius = slack * np.sqrt(1.25)  # at the end faces: half a radius inside the ends
+    half = max(0.5 * edges[axis] - 0.5 * slack, 0.0)
+    if half == 0.0:
+        radius = float(np.sqrt(slack * slack + 0.25 * edges[axis] ** 2))
+    start, end = middle.copy(), middle.copy()
+    start[axis] -= half
+    end[axis] += half
+    reach = max(radius - 0.5 * float(across.min()), half + radius - 0.5 * edges[axis])
+    return _placed(item, start[None], end[None], np.array([radius * WIDER]), reach)
+
+
+class _Solid(NamedTuple):
+    """A convex body in its own frame: the box around it, and a function (points, 3) → signed distance or more."""
+
+    low: FloatArray
+    high: FloatArray
+    distance: Any
+
+
+def _solid(item: Any) -> _Solid:
+    shape = item.geometry
+    if isinstance(shape, coal.Box):
+        half = np.array(shape.halfSide)
+        return _Solid(-half, half, lambda points: _box_distance(points, half))
+    if isinstance(shape, coal.Cylinder):
+        half = np.array([shape.radius, shape.radius, shape.halfLength])
+        return _Solid(-half, half, lambda points: _cylinder_distance(points, shape.radius, shape.halfLength))
+    if isinstance(shape, coal.Ellipsoid):
+        half = np.array(shape.radii)
+        return _Solid(-half, half, lambda points: _box_distance(points, half))
+    if isinstance(shape, coal.ConvexBase):
+        corners = np.array([shape.point(i) for i in range(shape.num_points)])
+    elif isinstance(shape, coal.BVHModelBase):
+        corners = np.array([shape.vertex(i) for i in range(shape.num_vertices)])
+    elif isinstance(shape, coal.Cone):
+        half = np.array([shape.radius, shape.radius, shape.halfLength])
+        return _Solid(-half, half, lambda points: _cylinder_distance(points, shape.radius, shape.halfLength))
+    else:
+        raise UnsupportedShape(f"robot: body '{item.name}' must be a solid, was a {type(shape).__name__}")
+    planes = ConvexHull(corners).equations  # outward normals, unit length
+    return _Solid(corners.min(axis=0), corners.max(axis=0), lambda points: _hull_distance(points, planes, shape))
+
+
+def _lattices(edges: FloatArray) -> list[tuple[int, ...]]:
+    """Return numbers of cells along the three edges, of cells about as long as wide, from coarse to fine."""
+    found: set[tuple[int, ...]] = set()
+    size, most = float(edges.max()), 0
+    while most <= MOST_SPHERES:
+        counts = tuple(max(1, int(np.ceil(edge / size - 1e-9))) for edge in edges)
+        most = counts[0] * counts[1] * counts[2]
+        for extra in product((0, 1), repeat=3):
+            found.add(tuple(n + e for n, e in zip(counts, extra, strict=True)))
+        size *= 0.93  # steps that change a count by one
+    few = [counts for counts in found if counts[0] * counts[1] * counts[2] <= MOST_SPHERES]
+    return sorted(few, key=lambda counts: (counts[0] * counts[1] * counts[2], counts))
+
+
+def _cells(solid: _Solid, counts: tuple[int, ...]) -> tuple[FloatArray, float]:
+    """Return centres of the cells that meet the solid, and the radius of spheres around them."""
+    cell = (solid.high - solid.low) / counts
+    axes = [solid.low[k] + cell[k] * (np.arange(counts[k]) + 0.5) for k in range(3)]
+    centers = np.array(list(product(*axes)))
+    radius = float(np.sqrt(np.sum(cell * cell))) / 2.0
+    return centers[solid.distance(centers) <= radius], radius
+
+
+def _box_distance(points: FloatArray, half: FloatArray) -> FloatArray:
+    off = np.abs(points) - half
+    outside = np.sqrt((np.maximum(off, 0.0) ** 2).sum(axis=1))
+    return np.asarray(outside + np.minimum(off.max(axis=1), 0.0))
+
+
+def _cylinder_distance(points: FloatArray, radius: float, half: float) -> FloatArray:
+    flat = np.column_stack([np.sqrt(points[:, 0] ** 2 + points[:, 1] ** 2), points[:, 2]])
+    return _box_distance(flat, np.array([radius, half]))
+
+
+def _hull_distance(points: FloatArray, planes: FloatArray, shape: Any) -> FloatArray:
+    """Return signed distances from a hull: inside from its planes, outside as coal has them from the body itself."""
+    found = (points @ planes[:, :3].T + planes[:, 3]).max(axis=1)
+    here, ball, request, result = coal.Transform3s(), coal.Sphere(1e-9), coal.DistanceRequest(), coal.DistanceResult()
+    for k in np.flatnonzero(found > 0.0):
+        result.clear()
+        there = coal.Transform3s(np.eye(3), points[k])
+        found[k] = max(float(found[k]), coal.distance(ball, there, shape, here, request, result))
+    return np.asarray(found)
+
+
+def _placed(item: Any, start: FloatArray, end: FloatArray, radius: FloatArray, inflation: float) -> Cover:
+    rotation, translation = np.array(item.placement.rotation), np.array(item.placement.translation)
+    return Cover(start @ rotation.T + translation, end @ rotation.T + translation, radius, inflation)

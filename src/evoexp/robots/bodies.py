@@ -1,0 +1,102 @@
+"""Bodies of links: plain shapes fixed to joints, as coal knows them."""
+
+from typing import Annotated, Any, Literal
+
+import coal
+import numpy as np
+import pinocchio as pin
+from pydantic import Field
+
+from evoexp.errors import SettingError
+from evoexp.numerics import DEGREE, sincos
+from evoexp.records import FloatArray
+from evoexp.validation import Positive, Settings
+
+Point3 = tuple[float, float, float]
+
+
+class Body(Settings):
+    """What all bodies have.
+
+    Attributes:
+        name: By which contacts and verdicts speak of it.
+        joint: The joint that moves it, counted from 1; 0: it stands still on the base.
+    """
+
+    name: str
+    joint: Annotated[int, Field(ge=0)]
+
+
+class SphereBody(Body):
+    """A ball."""
+
+    shape: Literal["sphere"]
+    center: Point3
+    radius: Positive
+
+
+class BoxBody(Body):
+    """A box with edges along the joint's axes."""
+
+    shape: Literal["box"]
+    center: Point3
+    size: tuple[Positive, Positive, Positive]
+
+
+class CapsuleBody(Body):
+    """All points within `radius` of the segment from `start` to `end`."""
+
+    shape: Literal["capsule"]
+    start: Point3
+    end: Point3
+    radius: Positive
+
+
+class CylinderBody(Body):
+    """A solid cylinder with flat ends, its axis from `start` to `end`."""
+
+    shape: Literal["cylinder"]
+    start: Point3
+    end: Point3
+    radius: Positive
+
+
+AnyBody = Annotated[SphereBody | BoxBody | CapsuleBody | CylinderBody, Field(discriminator="shape")]
+
+
+def body_geometry(body: Body, field: str) -> tuple[Any, Any]:
+    """Return a body as a coal shape and its placement in the joint's frame, a `pin.SE3`.
+
+    Args:
+        body: The body.
+        field: Its name in the configuration, for errors.
+
+    Raises:
+        SettingError: If the ends of a capsule or cylinder coincide.
+    """
+    if isinstance(body, SphereBody):
+        return coal.Sphere(body.radius), pin.SE3(np.eye(3), np.array(body.center))
+    if isinstance(body, BoxBody):
+        return coal.Box(*body.size), pin.SE3(np.eye(3), np.array(body.center))
+    assert isinstance(body, CapsuleBody | CylinderBody)
+    start, end = np.array(body.start), np.array(body.end)
+    along = end - start
+    length = float(np.sqrt(np.sum(along * along)))
+    if length == 0.0:
+        raise SettingError(f"{field}.end", "another point than start", list(body.end))
+    kind = coal.Capsule if isinstance(body, CapsuleBody) else coal.Cylinder
+    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), along / length).toRotationMatrix()
+    return kind(body.radius, length), pin.SE3(turn, 0.5 * (start + end))
+
+
+def placed(position: Point3, angles: Point3) -> Any:
+    """Return the `pin.SE3` of a position and roll, pitch, yaw [deg] about fixed axes x, y, z, in this order."""
+    (sr, cr), (sp, cp), (sy, cy) = (sincos(DEGREE * angle) for angle in angles)
+    rotation: FloatArray = np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+    return pin.SE3(rotation, np.array(position))

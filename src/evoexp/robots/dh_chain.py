@@ -1,0 +1,116 @@
+"""An arm given by its Denavit–Hartenberg table, with bodies on its links (Corsépius 2001, section 4.1)."""
+
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+import numpy as np
+import pinocchio as pin
+from pydantic import Field, model_validator
+
+from evoexp.errors import SettingError
+from evoexp.numerics import DEGREE, sincos
+from evoexp.records import FloatArray
+from evoexp.robots.assembly import Chain, Link, Tool
+from evoexp.robots.bodies import AnyBody, Point3, body_geometry, placed
+from evoexp.validation import Settings
+
+
+class DhJoint(Settings):
+    """One row of a table in the distal (standard) form: turn about z, shift along z, shift along x, turn about x.
+
+    Attributes:
+        dh: a, α, d, θ at q = 0 [length unit, deg, length unit, deg].
+        limits: Least and greatest value of the joint [deg], of a sliding one [length unit].
+        kind: Whether θ or d is what moves.
+    """
+
+    dh: tuple[float, float, float, float]
+    limits: tuple[float, float]
+    kind: Literal["revolute", "prismatic"] = "revolute"
+
+    @model_validator(mode="after")
+    def _limits_are_in_order(self) -> Self:
+        if not self.limits[0] < self.limits[1]:
+            raise SettingError("limits", "[least, greatest] with least < greatest", list(self.limits))
+        return self
+
+    def behind(self) -> Any:
+        """Return the `pin.SE3` from the frame that the joint moves to the next joint's frame: a, α, d, θ at q = 0."""
+        a, alpha, d, theta = self.dh
+        s, c = sincos(DEGREE * theta)
+        sa, ca = sincos(DEGREE * alpha)
+        rotation: FloatArray = np.array([[c, -s * ca, s * sa], [s, c * ca, -c * sa], [0.0, sa, ca]])
+        return pin.SE3(rotation, np.array([a * c, a * s, d]))
+
+
+class DhChain(Chain):
+    """Joints one behind the other, each about (or along) the z axis of the frame before, as ⁰T₁ ¹T₂ … ⁿ⁻¹Tₙ.
+
+    Body frames: a body of joint k is given in the frame k of the table, which moves with joint k (a body of joint 0 in
+    the base's).
+
+    Attributes:
+        joints: Rows of the table, from the base to the last joint.
+        bodies: What can collide.
+        base_position: Of the frame 0 in the world [length unit].
+        base_rotation: Its roll, pitch, yaw [deg].
+        tool_position: Of the tool's frame in the last one [length unit].
+        tool_rotation: Its roll, pitch, yaw [deg]; z is the main grasping direction, y stands across it.
+    """
+
+    component: ClassVar[str] = "dh_chain"
+
+    joints: Annotated[tuple[DhJoint, ...], Field(min_length=1)]
+    bodies: Annotated[tuple[AnyBody, ...], Field(min_length=1)]
+    base_position: Point3
+    base_rotation: Point3 = (0.0, 0.0, 0.0)
+    tool_position: Point3 = (0.0, 0.0, 0.0)
+    tool_rotation: Point3 = (0.0, 0.0, 0.0)
+
+    @model_validator(mode="after")
+    def _bodies_fit(self) -> Self:
+        names = [body.name for body in self.bodies]
+        for k, body in enumerate(self.bodies):
+            if body.joint > len(self.joints):
+                raise SettingError(f"bodies[{k}].joint", f"at most {len(self.joints)}", body.joint)
+            if body.name in names[:k]:
+                raise SettingError(f"bodies[{k}].name", "a name that no other body has", body.name)
+        return self
+
+    def append_to(self, model: Any, arm: int) -> list[Link]:
+        """Add the joints; a link is the line from one joint to the next, the last to the tool."""
+        before, parent, links = placed(self.base_position, self.base_rotation), 0, []
+        for k, joint in enumerate(self.joints):
+            sliding = joint.kind == "prismatic"
+            kind = pin.JointModelPZ() if sliding else pin.JointModelRZ()
+            links.append(Link(arm, parent, *self._ends(before, first=k == 0), 0.0))
+            parent = model.addJoint(parent, kind, before, f"arm_{arm}_joint_{k}")
+            unit = 1.0 if sliding else DEGREE
+            model.lowerPositionLimit[parent - 1] = unit * joint.limits[0]
+            model.upperPositionLimit[parent - 1] = unit * joint.limits[1]
+            before = joint.behind()
+        tip = before * placed(self.tool_position, self.tool_rotation)
+        links.append(Link(arm, parent, np.zeros(3), np.array(tip.translation), 0.0))
+        return [link for link in links if not np.array_equal(link.start, link.end)]
+
+    def append_bodies(self, model: Any, arm: int, first_joint: int, links: list[Link]) -> list[Any]:
+        """Return the bodies as geometry objects."""
+        objects = []
+        for k, body in enumerate(self.bodies):
+            shape, placement = body_geometry(body, f"robot.bodies[{k}]")
+            if body.joint > 0:
+                joint, frame = first_joint + body.joint - 1, self.joints[body.joint - 1].behind()
+            else:
+                joint, frame = 0, placed(self.base_position, self.base_rotation)
+            objects.append(pin.GeometryObject(body.name, joint, 0, frame * placement, shape))
+        return objects
+
+    def tool(self, model: Any, first_joint: int, links: list[Link]) -> Tool:
+        """Return the tool's frame."""
+        last = first_joint + len(self.joints) - 1
+        placement = self.joints[-1].behind() * placed(self.tool_position, self.tool_rotation)
+        return Tool(last, np.array(placement.rotation), np.array(placement.translation))
+
+    def _ends(self, placement: Any, first: bool) -> tuple[FloatArray, FloatArray]:
+        """Return where the link to a joint begins and ends, in the frame before."""
+        start = np.array(self.base_position) if first else np.zeros(3)
+        return start, np.array(placement.translation)

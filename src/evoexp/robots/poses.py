@@ -1,0 +1,87 @@
+"""Poses as 12 numbers: nine of the rotation, row by row, then the position; sums in one order, everywhere the same."""
+
+from typing import Any
+
+import numpy as np
+
+from evoexp.numerics import kernel
+from evoexp.records import FloatArray
+from evoexp.robots.kinematics import BLOCK, SPATIAL_ROWS, KinematicTable, U, block_frames, load_block
+
+IDENTITY = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+
+
+def pose_of(rotation: Any, position: Any) -> FloatArray:
+    """Return (12,) of a rotation (3, 3) and a position (3,)."""
+    return np.concatenate([np.asarray(rotation, dtype=np.float64).ravel(), np.asarray(position, dtype=np.float64)])
+
+
+def local_pose(table: KinematicTable, joint: int, rotation: Any, position: Any) -> FloatArray:
+    """Return (12,) in the table's frame of a joint what is given in Pinocchio's frame of joint `joint` (≥ 1)."""
+    return np.asarray(compose(pose_of(table.alignment[joint - 1].T, np.zeros(3)), pose_of(rotation, position)))
+
+
+@kernel
+def compose(one, two):  # type: ignore[no-untyped-def]
+    """Return the pose `two`, given in the frame `one`, in the frame that `one` is given in."""
+    out = np.empty(12)
+    for e in range(3):
+        a, b, c = one[3 * e], one[3 * e + 1], one[3 * e + 2]
+        for k in range(3):
+            out[3 * e + k] = a * two[k] + b * two[3 + k] + c * two[6 + k]
+        out[9 + e] = one[9 + e] + (a * two[9] + b * two[10] + c * two[11])
+    return out
+
+
+@kernel
+def invert(pose):  # type: ignore[no-untyped-def]
+    """Return the inverse of a pose."""
+    out = np.empty(12)
+    for e in range(3):
+        for k in range(3):
+            out[3 * e + k] = pose[3 * k + e]
+        out[9 + e] = -(pose[e] * pose[9] + pose[3 + e] * pose[10] + pose[6 + e] * pose[11])
+    return out
+
+
+@kernel
+def frame_poses(table, joint, local, q, out):  # type: ignore[no-untyped-def]
+    """Write the pose of one frame in the world for a batch of configurations.
+
+    Args:
+        table: The kinematic table's first six fields.
+        joint: Index into the table of the joint that moves the frame.
+        local: (12,) in the table's frame of the joint.
+        q: (nq, configurations).
+        out: (12, configurations) written.
+    """
+    parent, index_q, prismatic, turned, rotation, translation = table
+    num_joints = len(parent)
+    block_q = np.zeros(q.shape[0] * BLOCK)
+    frames, scratch = np.empty(num_joints * SPATIAL_ROWS * BLOCK), np.empty(SPATIAL_ROWS * BLOCK)
+    own = U(joint) * U(SPATIAL_ROWS * BLOCK)
+    for first in range(0, q.shape[1], BLOCK):
+        count = min(BLOCK, q.shape[1] - first)
+        load_block(q, first, count, 1.0, block_q)
+        block_frames(parent, index_q, prismatic, turned, rotation, translation, block_q, frames, scratch)
+        for e in range(3):
+            x, y, z = own + U(3 * e * BLOCK), own + U((3 * e + 1) * BLOCK), own + U((3 * e + 2) * BLOCK)
+            o = own + U((9 + e) * BLOCK)
+            for k in range(3):
+                for n in range(count):
+                    i = U(n)
+                    turned_axis = frames[x + i] * local[k] + frames[y + i] * local[3 + k] + frames[z + i] * local[6 + k]
+                    out[3 * e + k, first + n] = turned_axis
+            for n in range(count):
+                i = U(n)
+                moved = frames[x + i] * local[9] + frames[y + i] * local[10] + frames[z + i] * local[11]
+                out[9 + e, first + n] = frames[o + i] + moved
+
+
+def frame_pose(table: KinematicTable, joint: int, local: FloatArray, q: FloatArray) -> FloatArray:
+    """Return (12,) of one frame in the world at q (nq,); `joint` −1 is the world."""
+    if joint < 0:
+        return local
+    out = np.empty((12, 1))
+    frame_poses(table[:6], joint, local, np.ascontiguousarray(q[:, None]), out)
+    return out[:, 0].copy()

@@ -11,14 +11,8 @@ from rich.text import Text
 
 from evoexp import compose, shipped
 from evoexp.batch.replicate import run_replicate
-<<<<<<< HEAD
-from evoexp.batch.reproduce import Comparison, reproduce_log
-from evoexp.batch.workers import in_workers, num_cores
-=======
 from evoexp.batch.reproduce import Comparison, fingerprint, reproduce_log, same_fingerprint
-from evoexp.batch.runner import num_cores
-from evoexp.batch.workers import in_workers
->>>>>>> a4a9dd0dcf3805259f09df8a47b218f785f66664
+from evoexp.batch.workers import in_workers, num_cores
 from evoexp.commands.console import add_columns, add_hash_column, new_table, plain_console
 from evoexp.commands.hashes import with_candidates
 from evoexp.errors import AmbiguousHash, NothingStored, RevisionMismatch, UnknownHash

@@ -13,6 +13,7 @@ if TYPE_CHECKING:  # pandas: `evoexp run` asks for the names of the pages before
 PAGES = {
     "chen_fields": "evoexp.report.pages.chen_fields:page",
     "chen_lingering": "evoexp.report.pages.chen_lingering:page",
+    "chen_mission": "evoexp.report.pages.chen_mission:page",
     "chen_path": "evoexp.report.pages.chen_path:page",
     "curkovic": "evoexp.report.pages.curkovic:page",
     "curkovic_motion": "evoexp.report.pages.curkovic_motion:page",

@@ -34,7 +34,7 @@ def store(outputs: Path, experiment: compose.Experiment) -> None:
     for label, condition in experiment.conditions:
         run = RunDirectory(outputs, condition.id)
         run.create(condition.to_json(), manifest(condition.id) | {"label": label})
-        for replicate in range(experiment.num_replicates):
+        for replicate in range(condition.num_replicates(experiment.num_replicates)):
             run.write_log(replicate, run_replicate(condition, replicate).content)
 
 

@@ -11,6 +11,8 @@ if TYPE_CHECKING:  # pandas: `evoexp run` asks for the names of the pages before
     from evoexp.report.results import Results
 
 PAGES = {
+    "chen_landscapes": "evoexp.report.pages.chen_landscapes:page",
+    "chen_placement": "evoexp.report.pages.chen_placement:page",
     "curkovic": "evoexp.report.pages.curkovic:page",
     "curkovic_motion": "evoexp.report.pages.curkovic_motion:page",
     "curkovic_pareto": "evoexp.report.pages.curkovic_pareto:page",

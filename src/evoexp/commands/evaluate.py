@@ -53,9 +53,8 @@ def main(arguments: argparse.Namespace) -> int:
             rows.append(head | planner.evaluate(problem, solution) | verdict)
     if not rows:
         given = " and ".join(map(str, _shape_of(values)))
-        raise MotionFileError(
-            f"{path}: must be {'; '.join(dict.fromkeys(misfits))} (start and goal included), was {given}"
-        )
+        included = "" if all("numbers" in text for text in misfits) else " (start and goal included)"
+        raise MotionFileError(f"{path}: must be {'; '.join(dict.fromkeys(misfits))}{included}, was {given}")
     if arguments.json:
         plain = [{name: _finite(value) for name, value in row.items()} for row in rows]
         print(json.dumps(plain if len(rows) > 1 else plain[0], indent=2, allow_nan=False, default=_plain))
@@ -126,6 +125,8 @@ def _not_finite(values: Any, place: str) -> str:
 
 
 def _shape_text(shape: Any) -> str:
+    if not any(shape):
+        return f"{len(shape)} numbers"
     parts = [" × ".join(map(str, part)) for part in shape]
     return f"{len(parts)} × {parts[0]}" if len(set(parts)) == 1 else f"{len(parts)} lists: {', '.join(parts)}"
 

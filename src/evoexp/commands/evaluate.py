@@ -56,9 +56,8 @@ def main(arguments: argparse.Namespace) -> int:
                 listings.append((label, *planner.listing(problem, solution)))
     if not rows:
         given = " and ".join(map(str, _shape_of(values)))
-        raise MotionFileError(
-            f"{path}: must be {'; '.join(dict.fromkeys(misfits))} (start and goal included), was {given}"
-        )
+        included = "" if all("numbers" in text for text in misfits) else " (start and goal included)"
+        raise MotionFileError(f"{path}: must be {'; '.join(dict.fromkeys(misfits))}{included}, was {given}")
     if arguments.json:
         for row, (_, names, cells) in zip(rows, listings, strict=False):
             row["rows"] = [dict(zip(names, values, strict=True)) for values in cells]
@@ -144,6 +143,8 @@ def _counted(shape: Any, count: int) -> Any:
 def _shape_text(shape: Any) -> str:
     if len(shape) and shape[0] is ...:
         return f"any number × {_shape_text(shape[1:]).removeprefix('1 × ')}"
+    if not any(shape):
+        return f"{len(shape)} numbers"
     parts = [" × ".join(map(str, part)) for part in shape]
     return f"{len(parts)} × {parts[0]}" if len(set(parts)) == 1 else f"{len(parts)} lists: {', '.join(parts)}"
 

@@ -92,7 +92,7 @@ class PlacementConventional(Reference):
 
 def _newton(model: Directions, x: FloatArray) -> End:
     """Minimise E itself from x, kinks included."""
-    from scipy.optimize import minimize  # takes long to load
+    from scipy import optimize  # takes long to load
 
     if not model.weights[1]:
         return descend(model, x)
@@ -106,6 +106,7 @@ def _newton(model: Directions, x: FloatArray) -> End:
     constraints: list[Any] = [{"type": "eq", "fun": model.height, "jac": lambda x: gradient(model.height, x)}]
     if len(model.margins(x)):
         constraints.append({"type": "ineq", "fun": model.margins, "jac": lambda x: gradient(model.margins, x)})
+    minimize: Any = optimize.minimize  # whose overloads no callable of ours fits
     found = minimize(
         lambda x: float(model.cost(x)), x, jac=slope, constraints=constraints, method="SLSQP", options={"maxiter": 200}
     )

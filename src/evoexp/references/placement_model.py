@@ -11,6 +11,7 @@ import numpy as np
 from evoexp.objectives.placement_criteria import Model
 from evoexp.records import FloatArray
 
+INSIDE = 1e-11  # [rad], of torques [-]: what is on a limit stays within it in spite of rounding
 STEP = 1e-30  # of the complex step: its square vanishes beside anything
 TURN = 360.0  # [deg]
 
@@ -97,7 +98,8 @@ class Directions(NamedTuple):
 
     def directions(self, theta: FloatArray, theta_3: float) -> FloatArray:
         """Return x of joint angles θ1, θ2 and θ3 [deg]."""
-        return np.radians(np.cumsum([theta[0], theta[1], theta_3]))
+        x: FloatArray = np.radians(np.cumsum([theta[0], theta[1], theta_3]))
+        return x
 
 
 def directions_of(model: Model, angle_limits: FloatArray) -> Directions:
@@ -111,9 +113,9 @@ def directions_of(model: Model, angle_limits: FloatArray) -> Directions:
     for k, (least, greatest) in enumerate(angle_limits):
         if greatest - least < TURN:
             joints[k] = max(least, joints[k, 0]), min(greatest, joints[k, 1])
-    return Directions(
-        task[:3], task[3:5], task[5:7], model.weights[:6], model.avoided, np.radians(joints), model.limits[3:]
-    )
+    inside = INSIDE * np.array([1.0, -1.0])
+    limits = np.radians(joints) + inside, model.limits[3:] + inside
+    return Directions(task[:3], task[3:5], task[5:7], model.weights[:6], model.avoided, *limits)
 
 
 def gradient(function: Any, x: FloatArray) -> FloatArray:

@@ -71,7 +71,8 @@ def lowest(model: Model, angle_limits: FloatArray, num_angles: int, count: int) 
     angles, costs, theta_3 = branch_costs(model, angle_limits, num_angles)
     shifts = [(one, two) for one in (-1, 0, 1) for two in (-1, 0, 1)]
     around = np.stack([np.roll(costs, shift, axis=(1, 2)) for shift in shifts])
-    lowest_around, at_edge = around.min(axis=0), (around >= model.weights[6]).any(axis=0)
+    lowest_around = around.min(axis=0)
+    at_edge = np.stack([np.roll(np.isnan(theta_3), shift, axis=(1, 2)) for shift in shifts]).any(axis=0)
     least = (costs <= lowest_around) & (~at_edge | (costs <= lowest_around[::-1]))
     found = np.flatnonzero((least & (costs < model.weights[6])).ravel())
     found = found[np.argsort(costs.ravel()[found], kind="stable")][:count]

@@ -57,7 +57,7 @@ class Programme:
 
 def descend(model: Directions, x: FloatArray, most_steps: int = 200) -> End:
     """Minimise E from x by sequential quadratic programming (scipy's SLSQP), the minimax term as a bound t."""
-    from scipy.optimize import minimize  # takes long to load
+    from scipy import optimize  # takes long to load
 
     programme = Programme(model)
     constraints: list[Any] = [
@@ -68,6 +68,7 @@ def descend(model: Directions, x: FloatArray, most_steps: int = 200) -> End:
         constraints.append(
             {"type": "ineq", "fun": programme.margins, "jac": lambda z: gradient(programme.margins, z)},
         )
+    minimize: Any = optimize.minimize  # whose overloads no callable of ours fits
     found = minimize(
         lambda z: float(programme.objective(z)),
         z,
@@ -99,12 +100,12 @@ def polish(model: Directions, x: FloatArray) -> End:
     slopes = gradient(binding, z)
     multipliers = np.linalg.lstsq(slopes.T, gradient(programme.objective, z), rcond=None)[0]
     y, steps = np.concatenate([z, multipliers]), 0
-    for steps in range(1, MOST_STEPS + 1):
+    while steps < MOST_STEPS:
         values = conditions(y)
         if np.abs(values).max() < 1e-13:
             break
         step, *_ = np.linalg.lstsq(_jacobian(conditions, y), values, rcond=None)
-        y = y - step
+        y, steps = y - step, steps + 1
     moved = float(np.abs(y[:3] - x).max())
     if not np.isfinite(y).all() or moved > 1e-3 or np.abs(conditions(y)).max() > 1e-9:
         return End(x, float(model.cost(x)), 0)

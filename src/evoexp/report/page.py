@@ -64,18 +64,18 @@ class Page(NamedTuple):
         title: Heading.
         introduction: One paragraph.
         quantities: The table of results.
-        tables: Of its own.
         claims: With verdicts; empty where there is no paper to judge.
         checks: (what, finding): known defects and checks of the scene, shown at every budget.
         comparisons: Of conditions on common seeds, by heading.
         drawings: The figures.
+        tables: Of its own, shown behind the table of results.
     """
 
     title: str
     introduction: str
     quantities: tuple[Quantity, ...] = ()
-    tables: tuple[Table, ...] = ()
     claims: tuple[Claim, ...] = ()
     checks: tuple[tuple[str, str], ...] = ()
     comparisons: tuple[tuple[str, tuple[Comparison, ...]], ...] = ()
     drawings: tuple[Drawing, ...] = ()
+    tables: tuple[Table, ...] = ()

@@ -54,7 +54,7 @@ class Assembly(NamedTuple):
     links: tuple[Link, ...]
     arm_slices: np.ndarray
     table: KinematicTable
-    body_arms: tuple[int, ...] = ()
+    body_arms: tuple[int, ...]
     tools: tuple[Tool, ...] = ()
     disabled: frozenset[frozenset[str]] = frozenset()
 

@@ -51,7 +51,9 @@ class FloorManipulator(Robot):
             place = np.array([length, 0.0, 0.0])
             links.append(Link(0, parent, np.zeros(3), place, self.link_radius))
             geometry.addGeometryObject(link_capsule(links[-1], f"link_{k + 1}"))
-        return Assembly(model, geometry, tuple(links), np.array([[0, model.nq]]), kinematic_table(model))
+        return Assembly(
+            model, geometry, tuple(links), np.array([[0, model.nq]]), kinematic_table(model), (0,) * len(links)
+        )
 
     def platform(self) -> FloorPlatform:
         """Return the platform alone."""

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from matplotlib.ticker import MultipleLocator
 
 from evoexp.report import style
 from evoexp.report.chen_cases import Case
@@ -59,30 +60,38 @@ def _points(case: Case) -> dict[str, Any]:
 
 
 def draw_landscape(table: pd.DataFrame) -> Figure:
-    """Draw E in colours, one panel per criterion, white where no posture is feasible."""
+    """Draw E in colours, one column per criterion, white where no posture is feasible; below: around the best."""
     panels = [rows for _, rows in groups(table, "panel")]
-    figure = style.figure(4.2)
-    places = figure.subplots(1, len(panels), squeeze=False)[0]
-    for axes, rows in zip(places, panels, strict=True):
+    figure = style.figure(7.4)
+    places = figure.subplots(2, len(panels), squeeze=False)
+    for column, rows in enumerate(panels):
         grid = rows[rows["element"] == GRID].pivot(index="theta_2_deg", columns="theta_1_deg", values="cost")
         costs = grid.to_numpy()
-        norm = LogNorm(vmin=float(np.nanmin(costs)), vmax=float(np.nanmin(costs)) * 20.0)
-        x, y = grid.columns.to_numpy(), grid.index.to_numpy()
-        image = axes.pcolormesh(x, y, costs, norm=norm, cmap="viridis_r", shading="nearest", rasterized=True)
-        bar = figure.colorbar(image, ax=axes, orientation="horizontal", shrink=0.9, extend="max")
-        bar.set_label("E [-], logarithmic; lower is better")
-        for element, look in LOOKS.items():
-            own = rows[rows["element"] == element]
-            if len(own):
-                axes.plot(own["theta_1_deg"], own["theta_2_deg"], linestyle="none", label=element, **look)
-        axes.set_xlim(-180, 180)
-        axes.set_ylim(-180, 180)
-        axes.set_xticks(range(-180, 181, 90))
-        axes.set_yticks(range(-180, 181, 90))
-        axes.set_aspect("equal")
-        axes.set_xlabel("θ₁ [deg]")
-        axes.set_ylabel("θ₂ [deg]")
-        axes.set_title(rows["case"].iloc[0])
-        axes.grid(False)
-    style.legend_below(figure, places[0], 4)
+        least, x, y = float(np.nanmin(costs)), grid.columns.to_numpy(), grid.index.to_numpy()
+        for axes, widest in zip(places[:, column], (20.0, 3.0), strict=True):
+            norm = LogNorm(vmin=least, vmax=least * widest)
+            image = axes.pcolormesh(x, y, costs, norm=norm, cmap="viridis_r", shading="nearest", rasterized=True)
+            ticks = least * np.array([1.0, 1.5, 2.0, 3.0] if widest < 10.0 else [1.0, 2.0, 5.0, 10.0, 20.0])
+            bar = figure.colorbar(image, ax=axes, extend="max", shrink=0.8)
+            bar.set_ticks(ticks.tolist(), labels=[f"{tick:.3g}" for tick in ticks])
+            bar.minorticks_off()
+            bar.set_label("E [-], lower is better")
+            for element, look in LOOKS.items():
+                own = rows[rows["element"] == element]
+                if len(own):
+                    axes.plot(own["theta_1_deg"], own["theta_2_deg"], linestyle="none", label=element, **look)
+            axes.set_xlabel("θ₁ [deg]")
+            axes.set_ylabel("θ₂ [deg]")
+            axes.set_aspect("equal")
+            axes.grid(False)
+        places[0, column].set(xlim=(x.min(), x.max()), ylim=(y.min(), y.max()), title=rows["case"].iloc[0])
+        places[0, column].xaxis.set_major_locator(MultipleLocator(90.0))
+        places[0, column].yaxis.set_major_locator(MultipleLocator(90.0))
+        best = rows[rows["element"].isin([OPTIMUM, PAPER, RUN])]
+        for axis, name in (("x", "theta_1_deg"), ("y", "theta_2_deg")):
+            if len(best):
+                low, high = float(best[name].min()) - 15.0, float(best[name].max()) + 15.0
+                places[1, column].set(**{f"{axis}lim": (low, high)})
+        places[1, column].set_title("around the best", fontweight="normal")
+    style.legend_below(figure, places[0, 0], 4)
     return figure

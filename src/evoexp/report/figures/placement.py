@@ -16,7 +16,6 @@ from evoexp.report.tables import groups, records, rounded
 METHODS = ("GA", "GA, elitism", "random search", "Newton-type", "Newton-type, smooth form", "subgradient")
 LEAST_GAP = 1e-6  # [-] what is drawn of a smaller one
 POSTURES = ("exact optimum", "best run", "paper's angles")
-SUFFIX = "\n"
 
 
 def _colour(method: str) -> str:
@@ -114,7 +113,7 @@ def draw_gaps(table: pd.DataFrame) -> Figure:
         axes.set_xscale("log")
         axes.set_xlim(LEAST_GAP, 10.0)
         axes.set_ylim(0.0, 1.02)
-        axes.set_xlabel("gap to the optimum, E / E* − 1 [-]")
+        axes.set_xlabel("gap E / E* − 1 [-]")
         axes.set_ylabel("share with a smaller gap")
         axes.set_title(rows["case"].iloc[0])
     most = max(range(len(places)), key=lambda k: len(places[k].get_legend_handles_labels()[1]))
@@ -177,7 +176,9 @@ def _links(case: Case, posture: str, found: dict[str, float]) -> list[tuple[Any,
 def draw_postures(table: pd.DataFrame) -> Figure:
     """Draw one panel per criterion."""
     figure, places = _panels(table["panel"].nunique(), 2.6)
-    looks = dict(zip(POSTURES, ((style.NEUTRAL, 3.4), (style.ARM_COLOURS[0], 1.7), (style.ARM_COLOURS[1], 1.1))))
+    looks = dict(
+        zip(POSTURES, ((style.NEUTRAL, 3.4), (style.ARM_COLOURS[0], 1.7), (style.ARM_COLOURS[1], 1.1)), strict=True)
+    )
     for axes, (_, rows) in zip(places, groups(table, "panel"), strict=False):
         style.operational_axes(axes, "unit")
         axes.axhline(0.0, color=style.FAINT, linewidth=0.8)
@@ -191,7 +192,9 @@ def draw_postures(table: pd.DataFrame) -> Figure:
             arrow = {"arrowstyle": "-|>", "color": style.ARM_COLOURS[2], "linewidth": 1.4}
             axes.annotate("", (row.x_end, row.y_end), (row.x, row.y), arrowprops=arrow, zorder=7)
             axes.plot([], [], color=style.ARM_COLOURS[2], label="force F")
-        axes.margins(0.1)
+        axes.set_xlim(*_around(table, "x"))
+        axes.set_ylim(*_around(table, "y"))
+        axes.xaxis.set_major_locator(style.few_ticks())
         axes.set_title(rows["case"].iloc[0])
     handles: dict[str, Any] = {}
     for axes in places:
@@ -207,19 +210,17 @@ def _draw_posture(axes: Axes, rows: pd.DataFrame, label: str, colour: str, width
     axes.plot(x, y, "o-", color=colour, linewidth=width, ms=3.0, mfc="white", label=label, zorder=5)
     for row in records(rows[rows["element"] == "platform"]):
         height = row.y_end - row.y
-        box = FancyBboxPatch(
-            (row.x + height / 2, row.y),
-            row.x_end - row.x - height,
-            height,
-            boxstyle=f"round,pad=0,rounding_size={height / 2 - 1e-9}",
-            fill=False,
-            edgecolor=colour,
-            linewidth=0.6 * width,
-            zorder=4,
-        )
-        box.set_boxstyle("round", pad=0.0, rounding_size=height / 2 - 1e-9)
-        box.set_bounds(row.x, row.y, row.x_end - row.x, height)
+        look: dict[str, Any] = {"fill": False, "edgecolor": colour, "linewidth": 0.6 * width, "zorder": 4}
+        rounded_ends = f"round,pad=0,rounding_size={0.499 * height}"
+        box = FancyBboxPatch((row.x, row.y), row.x_end - row.x, height, boxstyle=rounded_ends, **look)
         axes.add_patch(box)
+
+
+def _around(table: pd.DataFrame, name: str) -> tuple[float, float]:
+    """Return the range of a coordinate over all panels, with a margin."""
+    values = table[[name, f"{name}_end"]].to_numpy()
+    margin = 0.07 * float(np.ptp(values)) + 0.05
+    return float(values.min()) - margin, float(values.max()) + margin
 
 
 def _panels(count: int, height: float) -> tuple[Figure, list[Axes]]:

@@ -110,13 +110,21 @@ def _checks(cases: list[Case]) -> tuple[tuple[str, str], ...]:
             clearance = float(case.optimum.column("clearance")[0])
             pair = str(case.optimum.summaries["refuted_pair" if touching else "clearance_pair"].iloc[0])
             told = "touches" if touching else f"is free, clearance {markdown.number(clearance)}"
-            rows.append((f"{case.name}: bodies at the exact optimum", f"{told} ({pair})"))
+            rows.append((f"{case.name}: bodies at the exact optimum", f"{told} ({_named(pair)})"))
         for name, c in case.evolved.items():
             verdicts = c.verdicts
             told = f"{verdicts.refuted} of {verdicts.judged} best postures touch"
             if case.any.planner.objective.avoidances:
                 rows.append((f"{case.name}: {name}, exact bodies", told))
     return tuple(rows)
+
+
+def _named(pair: str) -> str:
+    """Return the names of two bodies as the paper counts links: the certifier's first one is the platform."""
+    words = pair.replace("arm_1_link_1", "platform").replace("obstacle_1", "obstacle")
+    for k in (2, 3, 4):
+        words = words.replace(f"arm_1_link_{k}", f"link {k - 1}")
+    return words
 
 
 def _drawings(cases: list[Case]) -> tuple[Drawing, ...]:
@@ -127,8 +135,8 @@ def _drawings(cases: list[Case]) -> tuple[Drawing, ...]:
             "fig_3_to_8_postures",
             "Figs. 3–8: postures",
             "Thick: the exact optimum; thin: the best run of the genetic algorithm, with elitism where it was run; "
-            "where the paper prints angles, its posture. Where two differ, they are often mirror images. The platform's "
-            "size and the obstacle of Fig. 7 are assumed.",
+            "where the paper prints angles, its posture. Where two differ, they are often mirror images. The "
+            "platform's size and the obstacle of Fig. 7 are assumed.",
             partial(placement.postures_table, cases),
             placement.draw_postures,
             shown,

@@ -32,7 +32,8 @@ def of_cases(results: Results, cases: list[Case], settings: ReportSettings) -> t
 
 def _printed(case: Case, why: str) -> list[Claim]:
     """Judge the numbers that the paper prints of a posture."""
-    assert case.printed is not None and case.optimum is not None
+    assert case.printed is not None
+    assert case.optimum is not None
     printed, rows = case.printed, []
     exact = case.measured(case.optimum.solutions[case.optimum.best_replicate])
     if not math.isnan(printed.value):
@@ -100,7 +101,8 @@ def _against_conventional(cases: list[Case], why: str, settings: ReportSettings)
 
 def _better(case: Case, method: str, at_best: Proportion, why: str, settings: ReportSettings) -> Claim:
     """Judge a run of the genetic algorithm against one start of a method, and tell what either costs."""
-    assert case.elitist is not None and case.conventional is not None
+    assert case.elitist is not None
+    assert case.conventional is not None
     own = case.within(case.elitist.column("best_cost"), CLOSE[1])
     p = fisher_exact(own, at_best)
     verdict = claims.INCONCLUSIVE

@@ -12,6 +12,7 @@ longer one.
 import numpy as np
 
 from evoexp.numerics import kernel
+from evoexp.records import FloatArray
 
 
 @kernel
@@ -35,7 +36,7 @@ def draw_index(draws, count):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def walk(draws, neighbours, potentials, steps, ends, erase, path, place):  # type: ignore[no-untyped-def]
+def walk(draws, neighbours, potentials, steps, choices, ends, erase, path, place):  # type: ignore[no-untyped-def]
     """Write a random path: every step draws one of the permitted moves, weighted toward the target.
 
     A neighbour of potential U has the weight U_max − U + 1, U_max being the greatest among the neighbours (Chen &
@@ -46,6 +47,7 @@ def walk(draws, neighbours, potentials, steps, ends, erase, path, place):  # typ
         neighbours: (nodes, moves), see `grids.Grid`.
         potentials: (≥ greatest number of steps + 1,) potential after so many steps of the front from the target.
         steps: (nodes,) of the front from the target, see `grids.front`.
+        choices: What `choice_table` made of all that, or empty arrays.
         ends: Indices of the node it starts at and of the target, which the front must reach.
         erase: Whether loops are erased as they arise.
         path: (≥ nodes + 1,) written; see above.
@@ -55,7 +57,10 @@ def walk(draws, neighbours, potentials, steps, ends, erase, path, place):  # typ
     path[1], count = node, 1
     place[node] = 1
     while node != target and not used_up(draws):
-        node = _next_node(draws, neighbours[node], potentials, steps, node)
+        if len(choices[0]) > 0:
+            node = _choose(draws, choices, node)
+        else:
+            node = _next_node(draws, neighbours[node], potentials, steps, node)
         if not erase and count == len(path) - 1:  # full: what has no loops fits always
             count = erase_loops(path, count, path, place)
         known = place[node]
@@ -66,6 +71,40 @@ def walk(draws, neighbours, potentials, steps, ends, erase, path, place):  # typ
             path[count] = node
             place[node] = count
     path[0] = count
+
+
+def choice_table(neighbours: np.ndarray, potentials: FloatArray, steps: np.ndarray) -> tuple[FloatArray, np.ndarray]:
+    """Return the choices of walks to one target at every node, which many walks share.
+
+    Args:
+        neighbours: (nodes, moves), see `grids.Grid`.
+        potentials: See `walk`.
+        steps: (nodes,) of the front from the target.
+
+    Returns:
+        Weights of the moves added up, and where each move leads to, (nodes, moves); a move that is not permitted adds
+        nothing and leads where the one before it does.
+    """
+    permitted = neighbours >= 0
+    potential = np.where(permitted, potentials[steps[neighbours]], -np.inf)
+    greatest = np.maximum(potential.max(axis=1, keepdims=True), 0.0)
+    weights = np.where(permitted, greatest - potential + 1.0, 0.0)
+    targets = np.where(permitted, neighbours, -1)
+    before = np.arange(len(targets))
+    for move in range(targets.shape[1]):
+        targets[:, move] = before = np.where(permitted[:, move], targets[:, move], before)
+    return np.cumsum(weights, axis=1), targets.astype(np.int32)
+
+
+@kernel
+def _choose(draws, choices, node):  # type: ignore[no-untyped-def]
+    """Draw one of a node's neighbours as `_next_node` does, from a `choice_table`."""
+    added = choices[0][node]
+    last = len(added) - 1
+    place, move = draw(draws) * added[last], 0
+    while move < last and added[move] <= place:
+        move += 1
+    return choices[1][node, move]
 
 
 @kernel

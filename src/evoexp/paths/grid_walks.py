@@ -53,14 +53,18 @@ def walk(draws, neighbours, potentials, steps, choices, ends, erase, path, place
         path: (≥ nodes + 1,) written; see above.
         place: (nodes,) scratch.
     """
+    uniforms, taken = draws
+    added, targets = choices
     node, target = ends
+    at, num = taken[0], len(uniforms)
     path[1], count = node, 1
     place[node] = 1
-    while node != target and not used_up(draws):
-        if len(choices[0]) > 0:
-            node = _choose(draws, choices, node)
+    while node != target and at < num:
+        if len(added) > 0:
+            node = _choose(uniforms[at], added, targets, node)
         else:
-            node = _next_node(draws, neighbours[node], potentials, steps, node)
+            node = _next_node(uniforms[at], neighbours, potentials, steps, node)
+        at += 1
         if not erase and count == len(path) - 1:  # full: what has no loops fits always
             count = erase_loops(path, count, path, place)
         known = place[node]
@@ -70,6 +74,7 @@ def walk(draws, neighbours, potentials, steps, choices, ends, erase, path, place
             count += 1
             path[count] = node
             place[node] = count
+    taken[0] = at if node == target else num + 1
     path[0] = count
 
 
@@ -97,34 +102,33 @@ def choice_table(neighbours: np.ndarray, potentials: FloatArray, steps: np.ndarr
 
 
 @kernel
-def _choose(draws, choices, node):  # type: ignore[no-untyped-def]
-    """Draw one of a node's neighbours as `_next_node` does, from a `choice_table`."""
-    added = choices[0][node]
-    last = len(added) - 1
-    place, move = draw(draws) * added[last], 0
-    while move < last and added[move] <= place:
+def _choose(uniform, added, targets, node):  # type: ignore[no-untyped-def]
+    """Choose one of a node's neighbours as `_next_node` does, from a `choice_table`."""
+    last = added.shape[1] - 1
+    place, move = uniform * added[node, last], 0
+    while move < last and added[node, move] <= place:
         move += 1
-    return choices[1][node, move]
+    return targets[node, move]
 
 
 @kernel
-def _next_node(draws, neighbours, potentials, steps, node):  # type: ignore[no-untyped-def]
-    """Draw one of a node's neighbours; the node itself if it has none."""
+def _next_node(uniform, neighbours, potentials, steps, node):  # type: ignore[no-untyped-def]
+    """Choose one of a node's neighbours by a uniform number; the node itself if it has none."""
     greatest, total, count = 0.0, 0.0, 0
-    for move in range(len(neighbours)):
-        other = neighbours[move]
+    for move in range(neighbours.shape[1]):
+        other = neighbours[node, move]
         if other >= 0:
             potential = potentials[steps[other]]
             greatest = max(greatest, potential)
             total += potential
             count += 1
-    left = draw(draws) * (count * (greatest + 1.0) - total)
-    for move in range(len(neighbours)):
-        other = neighbours[move]
+    left, chosen = uniform * (count * (greatest + 1.0) - total), node
+    for move in range(neighbours.shape[1]):
+        other = neighbours[node, move]
         if other >= 0 and left >= 0.0:
-            node = other
+            chosen = other
             left -= greatest - potentials[steps[other]] + 1.0
-    return node
+    return chosen
 
 
 @kernel

@@ -54,7 +54,7 @@ class PlacementConventional(Reference):
         ends["subgradient"] = self._slide(model, starts)
         arrays = {name: np.array([_row(model, end) for end in found]) for name, found in ends.items()}
         every = np.concatenate(list(arrays.values()))
-        best = every[int(np.argmin(every[:, 2]))]
+        best = min(every, key=lambda row: (round(float(row[2]), 6), *row[:2]))  # of mirror images always the same
         spent = {name: sum(end.evaluations for end in found) for name, found in ends.items()}
         terms = {f"{name}_evaluations": total / self.num_starts for name, total in spent.items()}
         solved = bool(np.isfinite(best[2]))

@@ -104,7 +104,7 @@ def test_conventional_ends_are_never_below_the_optimum_and_some_are_stuck() -> N
     for case in ("minimax", "manipulability"):
         truth, _, _ = found(case, "placement_conventional")
         least = CASES[case][1]
-        names = ["newton", "subgradient"] + ["bounded"] * (case == "minimax")
+        names = ["bounded" if case == "minimax" else "newton", "subgradient"]
         for name in names:
             ends = truth.arrays[name][:, 2]
             assert ends.shape == (60,)

@@ -9,7 +9,7 @@ import numpy as np
 
 from evoexp.errors import SettingError
 from evoexp.records import FloatArray
-from evoexp.references.placement_model import Directions, directions_of, gradient
+from evoexp.references.placement_model import Directions, directions_of
 from evoexp.references.placement_polish import End, descend
 from evoexp.references.placement_subgradient import slide
 from evoexp.references.truth import Reference, Truth
@@ -23,13 +23,14 @@ MOST_TRIES = 1000  # places looked at per start
 class PlacementConventional(Reference):
     """What local methods end at, each from the same starts: feasible postures spread evenly over all of them.
 
-    Arrays, one row per start: `starts` (starts, 3): θ1, θ2, θ3 [deg]; `newton`, `subgradient` and, of minimax problems,
-    `bounded`, each (starts, 3): θ1, θ2 [deg], E of where the method ended; inf where it broke a limit or left the
-    target.
+    Arrays, one row per start: `starts` (starts, 3): θ1, θ2, θ3 [deg]; `newton` (of minimax problems `bounded`) and
+    `subgradient`, each (starts, 3): θ1, θ2 [deg], E of where the method ended; inf where it broke a limit or left
+    the target.
 
-    - newton: sequential quadratic programming on E itself (scipy's SLSQP), which takes a kink for a smooth place.
+    - newton: sequential quadratic programming (scipy's SLSQP).
     - subgradient: see `placement_subgradient`.
-    - bounded: sequential quadratic programming again, the greatest torque as a variable above all torques.
+    - bounded: the same, the greatest torque as a variable above all torques; on E itself, which has kinks, rounding
+      would decide where it ends.
 
     Terms: `<method>_evaluations`: of E per start; derivatives of `newton` and `bounded` are exact and not counted.
 
@@ -49,13 +50,11 @@ class PlacementConventional(Reference):
         """Run all methods."""
         model = directions_of(problem.model, problem.angle_limits)
         starts, places = self._starts(problem, model)
-        ends = {"newton": [_newton(model, x) for x in starts]}
-        if model.weights[1]:
-            ends["bounded"] = [descend(model, x) for x in starts]
+        ends = {"bounded" if model.weights[1] else "newton": [descend(model, x) for x in starts]}
         ends["subgradient"] = self._slide(model, starts)
         arrays = {name: np.array([_row(model, end) for end in found]) for name, found in ends.items()}
         every = np.concatenate(list(arrays.values()))
-        best = every[int(np.argmin(every[:, 2]))]
+        best = min(every, key=lambda row: (round(float(row[2]), 6), *row[:2]))  # of mirror images always the same
         spent = {name: sum(end.evaluations for end in found) for name, found in ends.items()}
         terms = {f"{name}_evaluations": total / self.num_starts for name, total in spent.items()}
         solved = bool(np.isfinite(best[2]))
@@ -88,29 +87,6 @@ class PlacementConventional(Reference):
         slide(x, steps, model.lengths, model.target, model.force, model.weights, model.avoided, ends, costs)
         evaluations = 7 * self.num_steps
         return [End(end, float(cost), evaluations) for end, cost in zip(ends.T, costs, strict=True)]
-
-
-def _newton(model: Directions, x: FloatArray) -> End:
-    """Minimise E itself from x, kinks included."""
-    from scipy import optimize  # takes long to load
-
-    if not model.weights[1]:
-        return descend(model, x)
-
-    def slope(x: FloatArray) -> FloatArray:
-        torques = model.weighted_torques(x)
-        largest = int(np.argmax(np.abs(torques)))
-        kink = np.sign(torques[largest]) * gradient(model.weighted_torques, x)[largest]
-        return np.asarray(gradient(model.smooth, x) + model.weights[1] * kink)
-
-    constraints: list[Any] = [{"type": "eq", "fun": model.height, "jac": lambda x: gradient(model.height, x)}]
-    if len(model.margins(x)):
-        constraints.append({"type": "ineq", "fun": model.margins, "jac": lambda x: gradient(model.margins, x)})
-    minimize: Any = optimize.minimize  # whose overloads no callable of ours fits
-    found = minimize(
-        lambda x: float(model.cost(x)), x, jac=slope, constraints=constraints, method="SLSQP", options={"maxiter": 200}
-    )
-    return End(found.x, float(model.cost(found.x)), int(found.nfev))
 
 
 def _row(model: Directions, end: End) -> FloatArray:

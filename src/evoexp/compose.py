@@ -214,6 +214,9 @@ def _with_files(value: Any, field: str) -> Any:
         return [_with_files(item, f"{field}[{k}]") for k, item in enumerate(value)]
     if not isinstance(value, dict):
         return value
+    if isinstance(value.get(TARGET), str):  # a component that reads files of its own
+        reads = getattr(component_class(value[TARGET], field), "read_files", None)
+        value = reads(value, field) if reads is not None else value
     if set(value) != {FILE}:
         return {key: _with_files(item, f"{field}.{key}") for key, item in value.items()}
     path, shipped_path = Path(str(value[FILE])), config_directory() / "scenario" / str(value[FILE])

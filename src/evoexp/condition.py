@@ -21,6 +21,7 @@ REGISTRY = {
     "arms": "evoexp.robots.arms:Arms",
     "planar_chain": "evoexp.robots.planar_chain:PlanarChain",
     "serial_chain": "evoexp.robots.serial_chain:SerialChain",
+    "urdf": "evoexp.robots.urdf:Urdf",
     "dh_chain": "evoexp.robots.dh_chain:DhChain",
     "floor_platform": "evoexp.robots.floor_platform:FloorPlatform",
     "grid_motion": "evoexp.scenarios.grid_motion:GridMotion",

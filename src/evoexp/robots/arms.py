@@ -23,7 +23,8 @@ class Arms(Robot):
     def read_files(cls, settings: dict[str, Any], field: str) -> dict[str, Any]:
         """Return settings whose `path` and `srdf`, where given, are those of all arms out of a URDF."""
         settings = dict(settings)
-        shared = {name: settings.pop(name) for name in ("path", "srdf") if settings.get(name) is not None}
+        given = {name: settings.pop(name) for name in ("path", "srdf") if name in settings}
+        shared = {name: path for name, path in given.items() if path is not None}
         if shared and isinstance(settings.get("arms"), list):
             settings["arms"] = [{**shared, **arm} if arm.get(TARGET) == "urdf" else arm for arm in settings["arms"]]
         return settings

@@ -187,6 +187,8 @@ class Urdf(Chain):
 
 
 def _content(path: Any, field: str) -> bytes:
+    if path in (None, "???"):
+        raise SettingError(field, "given: the path of a URDF", None)
     try:
         return Path(str(path)).read_bytes()
     except OSError as error:

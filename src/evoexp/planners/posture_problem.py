@@ -34,6 +34,9 @@ def prepare(robot: Robot, task: PostureTask, scope: Any, objective: PostureCost,
     obstacles = obstacle_table(task.obstacles).without_ellipses()
     bodies = collision.bind(assembly)
     tool = assembly.tools[0]
+    for k, name in enumerate(task.names):
+        if name in bodies.names:
+            raise SettingError(f"scenario.obstacles[{k}].name", "a name that no body of the robot has", name)
     phases = task.all_phases
     problem = Problem(
         assembly,

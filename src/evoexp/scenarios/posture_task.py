@@ -116,6 +116,9 @@ class PostureTask(Component):
 
     @model_validator(mode="after")
     def _holds_one_thing_at_a_time(self) -> Self:
+        for k, name in enumerate(self.names):
+            if name in self.names[:k]:
+                raise SettingError(f"obstacles[{k}].name", "a name that no other obstacle has", name)
         held = ""
         for k, phase in enumerate(self.phases):
             field = f"phases[{k}]"

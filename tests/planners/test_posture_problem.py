@@ -31,12 +31,12 @@ def phases(text: str) -> str:
             "scenario.q_start[1]: must be within the joint's limits, -200 to 20, was 90.0",
         ),
         (
-            ["scenario.q_start=[0,-170,235,0,0,0]"],
+            ["scenario.obstacles.0.center=[0.322,0.105,0.896]"],
             "scenario.q_start: must be free of collision (",
         ),
         (
             [phases("[{name: a, goal: {kind: point, point: [2, 0, 0.6]}}]")],
-            "scenario.phases[0].goal.point: must be within reach, 0.9835 m from (0, 0, 0.6) (check_reach=false searches",
+            "scenario.phases[0].goal.point: must be within reach, 0.8936 m from (0, 0, 0.6) (check_reach=false",
         ),
         (["scenario.subgoals=[[0,0,3]]"], "scenario.subgoals[0]: must be within reach"),
         (
@@ -57,7 +57,7 @@ def phases(text: str) -> str:
         ),
         (
             ["objective=corsepius_grasp"],
-            "scenario.phases[0].goal.object: must be a cylinder or capsule, since axial_approach rates its axis, was 's",
+            "scenario.phases[0].goal.object: must be a cylinder or capsule, since axial_approach rates its axis",
         ),
         (
             ["objective=corsepius_grasp", phases(POINT)],
@@ -83,14 +83,13 @@ def phases(text: str) -> str:
             [phases("[{name: a, goal: {kind: point, point: [0.4,0.2,0.7]}, then: attach}]")],
             "scenario.phases[0].object: must be given with then: attach, and only then, was None",
         ),
-        (["scenario.up=[0,0,0]"], "scenario.up: must be a direction, not (0, 0, 0)"),
-        (["scenario.obstacles.0.name=hand"], "scenario.obstacles"),
+        (["+scenario.up=[0,0,0]"], "scenario.up: must be a direction, not (0, 0, 0)"),
         (["+objective.goal_anglee.weight=1"], "objective.goal_anglee: unknown setting; did you mean 'goal_angle'?"),
         (["objective.goal_distance.weight=0"], "objective.goal_distance.weight: must be greater than 0.0, was 0"),
-        (["+objective.goal_distance.unit=rad"], "objective.goal_distance.unit: must be 'length', was 'rad'"),
+        (["+objective.goal_distance.unit=rad"], "objective.goal_distance.unit: must be one of 'length', was 'rad'"),
         (["~objective.goal_distance"], "objective.goal_distance: must be given: every goal is a place, was None"),
         (["ga.num_parents=101"], "ga.num_parents: must be at most num_offspring (100) with comma selection, was 101"),
-        (["robot=planar_7r"], "robot"),
+        (["robot.joints.0.limits=[10,-10]"], "robot.joints[0].limits: must be [least, greatest] with least < greatest"),
         (["robot=two_planar_2r"], "robot: must be one arm, was '2 arms'"),
         (["scenario=lavoie_7dof"], "scenario: must be what posture_es takes, a PostureTask, was 'pick_and_place'"),
         (["collision=rana_planar"], "collision"),
@@ -100,6 +99,19 @@ def test_refusals(overrides: list[str], message: str) -> None:
     with pytest.raises(EvoexpError, match=re.escape(message)) as found:
         compose.expand([BALL, *overrides])[0].conditions[0].condition.prepare()
     assert "\n" not in str(found.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("hand", "scenario.obstacles[1].name: must be a name that no body of the robot has, was 'hand'"),
+        ("ground", "obstacles[1].name: must be a name that no other obstacle has, was 'ground'"),
+    ],
+)
+def test_names_are_told_apart(name: str, message: str) -> None:
+    overrides = ["experiment=corsepius_bottle", f"scenario.obstacles.1.name={name}"]
+    with pytest.raises(EvoexpError, match=re.escape(message)):
+        compose.expand(overrides)[0].conditions[0].condition.prepare()
 
 
 def test_one_thing_is_held_at_a_time() -> None:
@@ -113,7 +125,7 @@ def test_one_thing_is_held_at_a_time() -> None:
 
 def test_goals_out_of_reach_are_searched_on_request() -> None:
     far = phases("[{name: a, goal: {kind: point, point: [2, 0, 0.6]}}]")
-    planner, problem = prepared("corsepius_ball", far, "+scenario.check_reach=false", "ga.num_generations=30")
+    planner, problem = prepared("corsepius_ball", far, "scenario.check_reach=false", "ga.num_generations=30")
     last = list(planner.evolve(problem, condition("corsepius_ball").rng(0)))[-1]
     assert not last.solved
     assert last.terms["goal_distance"] > 1.0

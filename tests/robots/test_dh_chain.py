@@ -118,8 +118,9 @@ def test_bodies_that_do_not_fit(change: dict[str, object], message: str) -> None
 
 
 def test_limits_in_the_wrong_order_are_refused() -> None:
-    with pytest.raises(SettingError, match=r"limits: must be \[least, greatest\] with least < greatest"):
-        DhJoint(dh=(1.0, 0.0, 0.0, 0.0), limits=(90.0, -90.0))
+    joint = DhJoint(dh=(1.0, 0.0, 0.0, 0.0), limits=(90.0, -90.0))
+    with pytest.raises(SettingError, match=r"joints\[0\].limits: must be \[least, greatest\] with least < greatest"):
+        DhChain(joints=(joint,), bodies=(SPHERE,), base_position=(0.0, 0.0, 0.0))  # type: ignore[arg-type]
 
 
 def test_a_rod_without_length_is_refused() -> None:

@@ -5,6 +5,7 @@ import re
 
 from evoexp import compose
 from evoexp.condition import Condition
+from evoexp.experiment import options
 
 
 @functools.cache
@@ -12,7 +13,7 @@ def shipped_conditions(budget: str) -> dict[tuple[str, str], Condition]:
     """Return (experiment, label) → condition."""
     return {
         (name, label): condition
-        for name in compose.options("experiment")
+        for name in options("experiment")
         for label, condition in compose.expand([f"experiment={name}", f"budget={budget}"])[0].conditions
     }
 

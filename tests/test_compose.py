@@ -12,9 +12,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from omegaconf import DictConfig
 
-from evoexp import compose
-from evoexp.compose import Experiment, expand
+from evoexp import shipped
+from evoexp.compose import expand
 from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting
+from evoexp.experiment import Experiment, description, options
 
 PLAIN = ("experiment=rana_obstacles",)  # one condition
 BUDGETS = ("paper", "quick", "smoke")
@@ -38,7 +39,7 @@ def remember(monkeypatch: pytest.MonkeyPatch) -> None:
     """Compose nothing twice: these tests ask for the same configurations again and again."""
 
     def remembered(name: str, overrides: list[str]) -> DictConfig:
-        key = (str(compose.config_directory()), *overrides)
+        key = (str(shipped.config_directory()), *overrides)
         if key not in COMPOSED:
             COMPOSED[key] = hydra_compose(name, overrides=overrides)
         return copy.deepcopy(COMPOSED[key])
@@ -51,8 +52,8 @@ def remember(monkeypatch: pytest.MonkeyPatch) -> None:
 def write_experiment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """Return what writes an experiment file into a copy of `conf`, which then is the one in use."""
     conf = tmp_path / "conf"
-    shutil.copytree(compose.config_directory(), conf)
-    monkeypatch.setattr(compose, "config_directory", lambda: conf)
+    shutil.copytree(shipped.config_directory(), conf)
+    monkeypatch.setattr(shipped, "config_directory", lambda: conf)
     head = (conf / "experiment/rana_obstacles.yaml").read_text().replace("rana_obstacles", "rana_planar")
 
     def write(name: str, conditions: str, extra: str = "") -> None:
@@ -61,7 +62,7 @@ def write_experiment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callabl
     return write
 
 
-@pytest.mark.parametrize("experiment", compose.options("experiment"))
+@pytest.mark.parametrize("experiment", options("experiment"))
 @pytest.mark.parametrize("budget", BUDGETS)
 def test_every_experiment_composes_at_every_budget(experiment: str, budget: str) -> None:
     (expanded,) = expand([f"experiment={experiment}", f"budget={budget}"])
@@ -73,11 +74,11 @@ def test_every_experiment_composes_at_every_budget(experiment: str, budget: str)
         condition.prepare()
 
 
-@pytest.mark.parametrize("experiment", compose.options("experiment"))
+@pytest.mark.parametrize("experiment", options("experiment"))
 def test_an_experiment_file_says_how_it_is_run_and_what_it_is(experiment: str) -> None:
-    lines = (compose.config_directory() / "experiment" / f"{experiment}.yaml").read_text().splitlines()
+    lines = (shipped.config_directory() / "experiment" / f"{experiment}.yaml").read_text().splitlines()
     assert lines[1] == f"# evoexp run experiment={experiment}"
-    assert compose.description(experiment) == lines[2].removeprefix("# ") != ""
+    assert description(experiment) == lines[2].removeprefix("# ") != ""
 
 
 # Identity

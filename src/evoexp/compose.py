@@ -5,11 +5,10 @@ anything is computed, and said in one line.
 """
 
 import difflib
-import hashlib
 import itertools
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import hydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
@@ -19,11 +18,12 @@ from omegaconf import DictConfig, ListConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 from pydantic import ValidationError
 
+from evoexp import shipped
 from evoexp.batch.settings import RunnerSettings
 from evoexp.condition import PARTS, Condition, component_class, read_files
 from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting, nearest
+from evoexp.experiment import Experiment, Labelled, options
 from evoexp.report.settings import ReportSettings
-from evoexp.shipped import config_directory
 from evoexp.validation import TARGET, Count, Settings, build, settings_error
 
 PLANNER_PARTS = ("ga", "objective", "collision")  # groups that a planner's option takes in by interpolation
@@ -45,49 +45,6 @@ class Budget(Settings):
     name: str
     max_replicates: Count | None
     max_generations: Count | None
-
-
-class Labelled(NamedTuple):
-    """A condition under the name that figures give it."""
-
-    label: str
-    condition: Condition
-
-
-class Experiment(NamedTuple):
-    """What one call asks for.
-
-    Attributes:
-        name: Of the experiment file; "custom" without one.
-        budget: Name of the budget.
-        conditions: In the order of the file; two labels may share a condition.
-        num_replicates: Of every condition, but for references (`Condition.num_replicates`).
-        runner: How to run them.
-        report: How to report them.
-        changed: Whether overrides or `--only` make this another set of conditions than the file's own.
-    """
-
-    name: str
-    budget: str
-    conditions: tuple[Labelled, ...]
-    num_replicates: int
-    runner: RunnerSettings
-    report: ReportSettings
-    changed: bool
-
-    @property
-    def report_name(self) -> str:
-        """Directory of its report: `<experiment>[@budget][+hash of what was changed]`."""
-        name = self.name if self.budget == "paper" else f"{self.name}@{self.budget}"
-        if not self.changed:
-            return name
-        text = "\n".join(f"{label}\t{condition.id}" for label, condition in self.conditions)
-        return f"{name}+{hashlib.sha256(text.encode()).hexdigest()[:8]}"
-
-
-def options(group: str) -> list[str]:
-    """Return the names of a group's shipped options."""
-    return sorted(path.stem for path in (config_directory() / group).glob("*.yaml"))
 
 
 def expand(overrides: Sequence[str], *, multirun: bool = False, only: Sequence[str] = ()) -> list[Experiment]:
@@ -112,7 +69,7 @@ def expand(overrides: Sequence[str], *, multirun: bool = False, only: Sequence[s
     names = [None if name == "null" else name for name in _choices(chosen)] if chosen is not None else [None]
     if len(set(names)) < len(names):
         raise SettingError("experiment", "names that differ", ",".join(map(str, names)))
-    with hydra.initialize_config_dir(str(config_directory().resolve()), version_base="1.3"):
+    with hydra.initialize_config_dir(str(shipped.config_directory().resolve()), version_base="1.3"):
         return [_expand_one(name, parsed, only) for name in names]
 
 
@@ -175,7 +132,7 @@ def _condition(config: DictConfig, budget: Budget) -> Condition:
     _cap_generations(config, budget)
     raw = str(OmegaConf.to_container(config.planner, resolve=False))
     try:
-        plain: Any = read_files(OmegaConf.to_container(config, resolve=True), config_directory() / "scenario")
+        plain: Any = read_files(OmegaConf.to_container(config, resolve=True), shipped.config_directory() / "scenario")
     except OmegaConfBaseException as error:
         if absent := [group for group in PLANNER_PARTS if f"key '{group}' not found" in str(error)]:
             raise SettingError(absent[0], f"chosen: {', '.join(options(absent[0]))}", None) from None
@@ -369,7 +326,7 @@ def _choices(override: Override) -> list[str]:
 
 
 def _groups() -> list[str]:
-    return [path.name for path in config_directory().iterdir() if path.is_dir()]
+    return [path.name for path in shipped.config_directory().iterdir() if path.is_dir()]
 
 
 def _root(key: str) -> str:
@@ -391,9 +348,3 @@ def _text(override: Override, value: str) -> str:
 
 def _first_line(error: Exception) -> str:
     return str(error).strip().splitlines()[0]
-
-
-def description(experiment: str) -> str:
-    """Return the line of an experiment file that says what it is: its third."""
-    lines = (config_directory() / "experiment" / f"{experiment}.yaml").read_text().splitlines()
-    return lines[2].removeprefix("# ")

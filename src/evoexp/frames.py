@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from evoexp import compose
+from evoexp import expansions
 from evoexp.errors import NothingStored, UnknownHash, UnknownOption
+from evoexp.experiment import options
 from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
 from evoexp.store.tables import read_generations, read_summaries
 
@@ -46,8 +47,8 @@ def load(
         NothingStored: If nothing of it has been run.
     """
     root = Path(outputs) if outputs is not None else outputs_root()
-    if what in compose.options("experiment"):
-        experiments = compose.expand([f"experiment={what}", f"budget={budget}", *overrides], multirun=multirun)
+    if what in options("experiment"):
+        experiments = expansions.expand([f"experiment={what}", f"budget={budget}", *overrides], multirun=multirun)
         labels = [(c.label, c.condition.id) for e in experiments for c in e.conditions]
         runs = [RunDirectory(root, condition_id) for condition_id in dict.fromkeys(key for _, key in labels)]
         runs = [run for run in runs if run.completed() or run.failed()]
@@ -65,7 +66,7 @@ def _run(outputs: Path, what: str) -> RunDirectory:
     except UnknownHash:
         if re.fullmatch("[0-9a-fA-F]{1,64}", what):
             raise
-        raise UnknownOption("experiment or hash", what, compose.options("experiment")) from None
+        raise UnknownOption("experiment or hash", what, options("experiment")) from None
 
 
 def _labelled(frame: pd.DataFrame, labels: list[tuple[str, str]]) -> pd.DataFrame:

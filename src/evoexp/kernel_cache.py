@@ -30,12 +30,12 @@ def use_keyed_cache() -> None:
     for path in sorted(p for room in KERNEL_FILES for p in package.glob(room)):
         digest.update(path.relative_to(package).as_posix().encode())
         digest.update(path.read_bytes())
-    directory = _cache_root() / "kernels" / digest.hexdigest()[:16]
+    directory = cache_root() / "kernels" / digest.hexdigest()[:16]
     numba.config.CACHE_DIR = str(directory)  # type: ignore[attr-defined]
     _prune_caches(directory)
 
 
-def _cache_root() -> Path:
+def cache_root() -> Path:
     """Return a directory that can be written; numba would fall back to one beside the sources, which is not keyed."""
     user = Path(os.environ.get("EVOEXP_CACHE") or platformdirs.user_cache_dir("evoexp"))
     with contextlib.suppress(OSError):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from command_samples import SMALL, Evoexp
 
-from evoexp import compose
+from evoexp import compose, shipped
 from evoexp.collision.certificate import Certificate
 from evoexp.commands.evaluate import flatten
 from evoexp.store.log_reader import read_log
@@ -101,11 +101,11 @@ def test_a_condition_of_another_shape_is_left_out(
     evoexp: Evoexp, motion: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     conf = tmp_path / "conf"
-    shutil.copytree(compose.config_directory(), conf)
+    shutil.copytree(shipped.config_directory(), conf)
     text = (conf / "experiment/rana_planar.yaml").read_text().split("conditions:")[0]
     entries = "{two: [], three: [robot=three_planar_2r, scenario=rana_three_arms]}"
     (conf / "experiment/mixed.yaml").write_text(f"{text}conditions: {entries}\n")
-    monkeypatch.setattr(compose, "config_directory", lambda: conf)
+    monkeypatch.setattr(shipped, "config_directory", lambda: conf)
     two = json.loads(motion.read_text())
     files = {"two": two, "three": [*two, two[0]]}
     for label, values in files.items():

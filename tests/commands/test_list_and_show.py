@@ -9,6 +9,7 @@ from command_samples import SMALL, Evoexp
 
 from evoexp import compose, shipped
 from evoexp.batch.replicate import run_replicate
+from evoexp.experiment import description, options
 from evoexp.shipped import Shipped
 from evoexp.store.run_directory import RunDirectory, find_runs
 from evoexp.store.tables import read_summaries
@@ -32,9 +33,9 @@ def test_without_runs(evoexp: Evoexp, outputs: Path) -> None:
     said = evoexp("list")
     assert said.code == 0
     assert f"no runs stored in {outputs}" in said.out
-    for name in compose.options("experiment"):
+    for name in options("experiment"):
         assert f"│ {name} " in said.out
-        assert compose.description(name).split(" ")[0] in said.out
+        assert description(name).split(" ")[0] in said.out
     assert not outputs.exists()
 
 

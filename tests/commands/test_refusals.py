@@ -11,6 +11,7 @@ from command_samples import SERIAL, Evoexp
 from evoexp import compose
 from evoexp.condition import Condition
 from evoexp.evolution.settings import GeneticSettings
+from evoexp.experiment import options
 from evoexp.store.log import Log
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory, find_runs
@@ -19,7 +20,7 @@ Refused = Callable[..., str]
 
 PLANAR = ("experiment=rana_planar", *SERIAL)
 ARMS = ("experiment=rana_obstacles", *SERIAL)
-EXPERIMENTS = ", ".join(compose.options("experiment"))
+EXPERIMENTS = ", ".join(options("experiment"))
 OPTIONS = f"(options: {EXPERIMENTS})"
 
 

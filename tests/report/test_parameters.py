@@ -4,6 +4,7 @@ import pytest
 from report_samples import expand
 
 from evoexp import compose
+from evoexp.experiment import options
 from evoexp.report import parameters
 from evoexp.report.parameters import Parameter, option, overridden
 from evoexp.report.results import ConditionResults, Results
@@ -31,7 +32,7 @@ def test_units_and_sources_come_from_the_comments() -> None:
     assert rows["num_replicates"].value == "20"
 
 
-@pytest.mark.parametrize("name", compose.options("experiment"))
+@pytest.mark.parametrize("name", options("experiment"))
 def test_every_number_of_the_shipped_experiments_has_a_source(name: str) -> None:
     rows = of(name=name)
     numbers = [row for row in rows.values() if any(character.isdigit() for character in row.value)]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from evoexp import compose
+from evoexp import expansions
 from evoexp.collision.certificate import PAIR, certificate
 from evoexp.commands.arguments import add_experiment_arguments
 from evoexp.commands.console import add_columns, new_table, plain_console
@@ -41,7 +41,7 @@ def main(arguments: argparse.Namespace) -> int:
     rows: list[dict[str, Any]] = []
     misfits = []
     listings: list[tuple[str, list[str], list[list[Any]]]] = []
-    for experiment in compose.expand(overrides, multirun=arguments.multirun, only=arguments.only):
+    for experiment in expansions.expand(overrides, multirun=arguments.multirun, only=arguments.only):
         for label, condition in experiment.conditions:
             planner, problem = condition.prepare()
             shape = planner.shape(problem)

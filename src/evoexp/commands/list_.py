@@ -6,10 +6,11 @@ import pandas as pd
 from rich.table import Table
 from rich.text import Text
 
-from evoexp import compose, shipped
+from evoexp import shipped
 from evoexp.commands.console import add_columns, add_hash_column, new_table, plain_console
 from evoexp.commands.hashes import stored_runs
 from evoexp.errors import EvoexpError
+from evoexp.experiment import description, options
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.tables import read_summaries
 
@@ -33,8 +34,8 @@ def main(arguments: argparse.Namespace) -> int:
 def _experiments() -> Table:
     table = new_table("experiments")
     add_columns(table, "run experiment=", "what it is")
-    for name in compose.options("experiment"):
-        table.add_row(name, compose.description(name))
+    for name in options("experiment"):
+        table.add_row(name, description(name))
     return table
 
 

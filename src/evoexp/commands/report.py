@@ -9,10 +9,11 @@ from pathlib import Path
 
 from rich.console import Console
 
-from evoexp import compose
+from evoexp import expansions
 from evoexp.commands.arguments import add_experiment_arguments
 from evoexp.condition import Condition
 from evoexp.errors import SettingError, UnknownOption
+from evoexp.experiment import Experiment, options
 from evoexp.report import build
 from evoexp.store.run_directory import outputs_root, resolve
 
@@ -41,7 +42,7 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _pages(names: Sequence[str], overrides: Sequence[str], multirun: bool, only: Sequence[str]) -> list[Path]:
-    known = compose.options("experiment")
+    known = options("experiment")
     if names and not any(name in known for name in names):
         for name in names:
             if not _HASH.fullmatch(name):
@@ -54,17 +55,17 @@ def _pages(names: Sequence[str], overrides: Sequence[str], multirun: bool, only:
     for name in names:
         if name not in known:
             raise UnknownOption("experiment", name, known)
-    experiments = compose.expand([*chosen, *overrides], multirun=multirun or len(names) > 1, only=only)
+    experiments = expansions.expand([*chosen, *overrides], multirun=multirun or len(names) > 1, only=only)
     return [of_experiment(experiment, overrides, multirun, only) for experiment in experiments]
 
 
 def of_experiment(
-    experiment: compose.Experiment, overrides: Sequence[str], multirun: bool = False, only: Sequence[str] = ()
+    experiment: Experiment, overrides: Sequence[str], multirun: bool = False, only: Sequence[str] = ()
 ) -> Path:
     """Draw the report of one experiment; `run` ends with it, too.
 
     Args:
-        experiment: As `compose.expand` gives it.
+        experiment: As `expansions.expand` gives it.
         overrides: As typed; `experiment=` among them is not looked at.
         multirun: Whether `-m` was given.
         only: The labels of `--only`.
@@ -72,7 +73,7 @@ def of_experiment(
     Returns:
         Path of its `index.md`.
     """
-    words = [experiment.name] if experiment.name in compose.options("experiment") else []
+    words = [experiment.name] if experiment.name in options("experiment") else []
     words += [f"budget={experiment.budget}"] if experiment.budget != "paper" else []
     words += [word for word in overrides if word.split("=")[0] not in _SILENT]
     words += ["--only", ",".join(only)] if only else []
@@ -90,5 +91,5 @@ def _of_runs(prefixes: Sequence[str]) -> Path:
     name = "+".join(found)
     if len(found) > MAX_NAMED:
         name = f"{len(found)}_runs+{hashlib.sha256(name.encode()).hexdigest()[:8]}"
-    settings = compose.expand([f"experiment={compose.options('experiment')[0]}", "report=paper"])[0].report
+    settings = expansions.expand([f"experiment={options('experiment')[0]}", "report=paper"])[0].report
     return build.report(build.Request(name, "", "", tuple(found.items())), settings, outputs_root(), None)

@@ -9,7 +9,7 @@ import joblib
 from rich.console import Console
 from rich.text import Text
 
-from evoexp import compose, shipped
+from evoexp import expansions, shipped
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.reproduce import Comparison, fingerprint, reproduce_log, same_fingerprint
 from evoexp.batch.workers import in_workers, num_cores
@@ -99,7 +99,7 @@ def _without_stored_run(console: Console, prefix: str, replicate: int | None, er
         where = f"is neither stored in {outputs_root()} nor in the shipped table, which holds replicate 0"
         raise UnknownHash(f"NOTHING TO COMPARE: replicate {replicate} of {prefix} {where}")
     row = found[0]
-    experiment = compose.expand([f"experiment={row.experiment}", f"budget={row.budget}"], only=[row.label])[0]
+    experiment = expansions.expand([f"experiment={row.experiment}", f"budget={row.budget}"], only=[row.label])[0]
     condition = experiment.conditions[0].condition
     summary = run_replicate(condition, 0).summary
     matches = same_fingerprint(fingerprint(condition, summary), row.digest) and condition.id == row.condition_id

@@ -12,13 +12,14 @@ import pyarrow.compute as pc
 from rich.console import Console
 from rich.table import Table
 
-from evoexp import compose
+from evoexp import expansions
 from evoexp.batch.jobs import Outcome
 from evoexp.batch.runner import Batch
 from evoexp.commands.arguments import add_experiment_arguments
 from evoexp.commands.console import add_columns, add_hash_column, new_table, plain_console
 from evoexp.commands.progress import BatchProgress
 from evoexp.errors import UnknownOption
+from evoexp.experiment import Experiment
 from evoexp.report.pages import PAGES
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_table as stored_summaries
@@ -33,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Run; exit code 1 if a replicate failed."""
     console = plain_console()
-    experiments = compose.expand(arguments.overrides, multirun=arguments.multirun, only=arguments.only)
+    experiments = expansions.expand(arguments.overrides, multirun=arguments.multirun, only=arguments.only)
     for experiment in experiments:
         if (figures := experiment.report.figures) not in (None, *PAGES):
             raise UnknownOption("report.figures", str(figures), PAGES)
@@ -84,12 +85,12 @@ def _run(batch: Batch, console: Console) -> list[Outcome]:
     return failures
 
 
-def _notes(experiment: compose.Experiment, label: str, command: str) -> dict[str, Any]:
+def _notes(experiment: Experiment, label: str, command: str) -> dict[str, Any]:
     """What a new run's manifest says of why it was made; no part of its identity."""
     return {"experiment": experiment.name, "budget": experiment.budget, "label": label, "command": command}
 
 
-def summary_table(experiment: compose.Experiment) -> Table:
+def summary_table(experiment: Experiment) -> Table:
     """Return one row per condition: what is there, and how good."""
     table = new_table(experiment.report_name)
     add_columns(table, "condition")

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from evoexp import compose, shipped
+from evoexp import expansions, shipped
 from evoexp.commands.console import add_columns, new_table, plain_console
 from evoexp.commands.hashes import with_candidates
 from evoexp.condition import Condition
@@ -51,7 +51,7 @@ def _show_shipped(console: Console, prefix: str, error: UnknownHash) -> int:
     row = found[0]
     _print_head(console, row.condition_id)
     console.print(f"not run here; run it: {row.command}", soft_wrap=True)
-    experiment = compose.expand([f"experiment={row.experiment}", f"budget={row.budget}"], only=[row.label])[0]
+    experiment = expansions.expand([f"experiment={row.experiment}", f"budget={row.budget}"], only=[row.label])[0]
     text = experiment.conditions[0].condition.to_json()
     _print_config(console, json.loads(text))
     _print_notes(console, text)

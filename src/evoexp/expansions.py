@@ -1,0 +1,99 @@
+"""Experiments that were composed before, kept on disk: Hydra takes some 85 ms per condition, of up to 56.
+
+An expansion follows from what was typed, from `conf/` and from evoexp's own code; all three, as content, are the name
+that it is kept under, so whatever changes is composed anew. It is not kept where more has a say: files that conditions
+read, interpolations (which may ask the environment), plug-ins. Errors are never kept.
+"""
+
+import contextlib
+import hashlib
+import importlib.metadata
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import orjson
+import pydantic
+
+from evoexp import shipped
+from evoexp.batch.settings import RunnerSettings
+from evoexp.condition import Condition
+from evoexp.experiment import Experiment, Labelled
+from evoexp.kernel_cache import cache_root
+from evoexp.report.settings import ReportSettings
+
+NUM_KEPT = 200  # [-] expansions, the newest ones
+_COMPOSERS = ("hydra-core", "omegaconf")
+
+
+def expand(overrides: Sequence[str], *, multirun: bool = False, only: Sequence[str] = ()) -> list[Experiment]:
+    """Expand overrides into experiments as `compose.expand` does, which is asked where nothing is kept.
+
+    Raises:
+        EvoexpError: For whatever cannot be run.
+    """
+    path = _path([list(overrides), multirun, list(only)])
+    if path is not None and (kept := _read(path)) is not None:
+        return kept
+    from evoexp import compose  # and Hydra
+
+    experiments = compose.expand(overrides, multirun=multirun, only=only)
+    if path is not None and not any(c.condition.files() for e in experiments for c in e.conditions):
+        _write(path, experiments)
+    return experiments
+
+
+def _path(asked: list[Any]) -> Path | None:
+    """Return where an expansion is kept; None where it may not be."""
+    if any("${" in word for word in asked[0]) or importlib.metadata.entry_points(group="evoexp.components"):
+        return None
+    versions = [importlib.metadata.version(name) for name in _COMPOSERS]
+    digest = hashlib.sha256(orjson.dumps([asked, versions, pydantic.VERSION]))
+    conf, code = shipped.config_directory(), Path(__file__).parent
+    for root, pattern in ((conf, "*/*"), (conf, "*.yaml"), (code, "**/*.py")):
+        for path in sorted(path for path in root.glob(pattern) if path.is_file()):
+            content = path.read_bytes()
+            digest.update(f"{path.relative_to(root).as_posix()}\0{len(content)}\0".encode() + content)
+    return cache_root() / "expansions" / f"{digest.hexdigest()[:32]}.json"
+
+
+def _read(path: Path) -> list[Experiment] | None:
+    """Return what is kept; None if there is nothing, or nothing whole."""
+    try:
+        digest, _, text = path.read_bytes().partition(b"\n")
+    except OSError:
+        return None
+    if digest != hashlib.sha256(text).hexdigest().encode():
+        return None
+    with contextlib.suppress(OSError):
+        os.utime(path)
+    return [_experiment(plain) for plain in orjson.loads(text)]
+
+
+def _experiment(plain: dict[str, Any]) -> Experiment:
+    conditions = (Labelled(label, Condition.from_json(text.encode())) for label, text in plain["conditions"])
+    runner = RunnerSettings.model_validate_json(plain["runner"])
+    report = ReportSettings.model_validate_json(plain["report"])
+    return Experiment(**(plain | {"conditions": tuple(conditions), "runner": runner, "report": report}))
+
+
+def _write(path: Path, experiments: Sequence[Experiment]) -> None:
+    """Keep an expansion, and not too many of them; silent where that cannot be done."""
+    text = orjson.dumps([_plain(experiment) for experiment in experiments])
+    temporary = path.with_suffix(f".{os.getpid()}.tmp")
+    with contextlib.suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary.write_bytes(hashlib.sha256(text).hexdigest().encode() + b"\n" + text)
+        temporary.replace(path)
+        kept = sorted(path.parent.iterdir(), key=lambda path: path.stat().st_mtime, reverse=True)
+        for old in kept[NUM_KEPT:]:
+            old.unlink(missing_ok=True)
+
+
+def _plain(experiment: Experiment) -> dict[str, Any]:
+    return experiment._asdict() | {
+        "conditions": [(label, condition.to_json().decode()) for label, condition in experiment.conditions],
+        "runner": experiment.runner.model_dump_json(),
+        "report": experiment.report.model_dump_json(),
+    }

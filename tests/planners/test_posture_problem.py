@@ -38,6 +38,10 @@ def phases(text: str) -> str:
             [phases("[{name: a, goal: {kind: point, point: [2, 0, 0.6]}}]")],
             "scenario.phases[0].goal.point: must be within reach, 0.8936 m from (0, 0, 0.6) (check_reach=false",
         ),
+        (
+            ["scenario.obstacles.0.center=[3,0,0]"],
+            "scenario.phases[0].goal.object: must be within reach, 0.8936 m from",
+        ),
         (["scenario.subgoals=[[0,0,3]]"], "scenario.subgoals[0]: must be within reach"),
         (
             [phases("[{name: a, goal: {kind: surface, object: bal}}]")],

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 import coal
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from evoexp.collision.body_table import UnsupportedShape
 from evoexp.records import FloatArray
@@ -149,6 +148,8 @@ def _solid(item: Any) -> _Solid:
         corners = np.array([shape.vertex(i) for i in range(shape.num_vertices)])
     else:
         raise UnsupportedShape(f"robot: body '{item.name}' must be a solid, was a {type(shape).__name__}")
+    from scipy.spatial import ConvexHull  # only meshes need it, and it takes long to load
+
     planes = ConvexHull(corners).equations  # outward normals, unit length
 
     def near(points: FloatArray) -> FloatArray:

@@ -193,24 +193,25 @@ def _stroke(assembly: Assembly, limits: FloatArray, joint: int) -> float:
 
 
 def _check_reach(problem: Problem) -> None:
-    """Refuse goals that the stretched arm cannot reach while it holds nothing."""
+    """Refuse goals that the stretched arm cannot reach while it holds nothing, in the scene as it begins."""
     task = problem.task
     center, far = reach(problem.assembly, problem.limits)
-    held = False
+    held, ways = False, len(task.subgoals)
     for k, phase in enumerate(problem.phases):
-        goal, point = phase.goal, None
+        goal, point, size = phase.goal, None, 0.0
+        field = f"scenario.subgoals[{k}]" if k < ways else f"scenario.phases[{k - ways}].goal.point"
         if isinstance(goal, PointGoal | PoseGoal) and not held:
             point = np.array(goal.point)
+        elif isinstance(goal, SurfaceGoal):
+            index = task.names.index(goal.object)
+            point, field = problem.obstacles.center[index], f"scenario.phases[{k - ways}].goal.object"
+            size = float(np.sum(problem.obstacles.size[index]))  # no point of it is farther from its middle
         if point is not None:
-            away = float(np.sqrt(np.sum((point - center) ** 2)))
+            away = float(np.sqrt(np.sum((point - center) ** 2))) - size
             if away - task.position_tolerance > far:
-                ways = len(task.subgoals)
-                field = f"scenario.subgoals[{k}]" if k < ways else f"scenario.phases[{k - ways}].goal.point"
                 where = ", ".join(f"{value:g}" for value in center)
-                must = (
-                    f"within reach, {far:.4g} {task.length_unit} from ({where}) (check_reach=false searches it anyway)"
-                )
-                raise SettingError(field, must, f"{away:.4g} away")
+                must = f"within reach, {far:.4g} {task.length_unit} from ({where})"
+                raise SettingError(field, f"{must} (check_reach=false searches it anyway)", f"{away:.4g} away")
         held = {"attach": True, "detach": False}.get(phase.then, held)
 
 

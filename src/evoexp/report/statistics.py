@@ -3,6 +3,7 @@
 Costs may be infinite (infeasible). Medians, ranks and effect sizes stay defined then; nothing here takes a mean.
 """
 
+import functools
 import math
 from collections.abc import Sequence
 from statistics import NormalDist
@@ -224,6 +225,7 @@ def effort_ratio(
     return _percentiles(ratios, confidence)
 
 
+@functools.lru_cache(maxsize=8)
 def _weights(size: int, num_resamples: int) -> np.ndarray:
     """Return how often each of `size` runs is drawn, (resamples, size)."""
     rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))

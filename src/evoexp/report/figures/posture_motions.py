@@ -109,7 +109,9 @@ def _panel(problem: Any, span: Span, postures: FloatArray, first: int) -> list[d
         tip = frame_pose(problem.assembly.table, *problem.tool, q)[9:]
         rows.append({"element": TIP, "instant": first + n, "name": "tool"} | dict(zip("xyz", tip, strict=True)))
     goal = span.stage.judging[3][9:12] if span.stage.phase.goal.kind != "surface" else span.stage.judging[3][15:18]
-    rows.append({"element": GOAL, "instant": span.last, "name": span.stage.phase.name} | dict(zip("xyz", goal, strict=True)))
+    rows.append(
+        {"element": GOAL, "instant": span.last, "name": span.stage.phase.name} | dict(zip("xyz", goal, strict=True))
+    )
     situation = span.stage.situation
     table = placed_obstacles(problem, situation)
     for k, (shape, placement) in enumerate(obstacle_shapes(table)):

@@ -32,29 +32,20 @@ def page(results: Results, settings: ReportSettings) -> Page:
         quantities=quantities(results),
         claims=corsepius_verdicts.of_tasks(results, settings),
         checks=checks(results, settings),
-        comparisons=generic.comparisons(
-            results, settings, (("distance to the goal", True, measures.residuals),)
-        ),
+        comparisons=generic.comparisons(results, settings, (("distance to the goal", True, measures.residuals),)),
         drawings=drawings(results, settings),
     )
 
 
 def quantities(results: Results) -> tuple[Quantity, ...]:
     """Return the rows of the table of results."""
-    row, unit = partial(generic.quantity, results), results.with_data[0].condition.length_unit
-    column = generic.by_column
+    row, column = partial(generic.quantity, results), generic.by_column
+    unit = results.with_data[0].condition.length_unit
     rows = [
-        row("cycles, all phases", "–", measures.cycles),
-        row("evaluations", "–", measures.evaluations),
-        row("distance to the goal of the last phase", unit, measures.residuals),
-        row("steps of the path", "–", measures.num_steps),
+        *effort_quantities(results),
         row("length of the path in joint space", "rad", measures.path_lengths),
         row("length over the straight line of its ends", "–", measures.detours),
-        row("longest step", "scopes", column("term_longest_step_scopes")),
-        row("steps beyond the scope", "–", column("term_oversized_steps")),
         row("clearance of the bodies over the whole motion (exact)", unit, column("clearance")),
-        row("CPU time of its search", "s", measures.search_seconds),
-        row("evaluations per second of search", "1/s", _speed),
     ]
     for term in ("upright", "keep_parallel"):
         if any(getattr(c.planner.objective, term) is not None for c in results.with_data):
@@ -63,6 +54,22 @@ def quantities(results: Results) -> tuple[Quantity, ...]:
             between = column(f"term_greatest_{term}_between_deg")
             rows.append(row(f"greatest tilt between postures ({name})", "deg", between))
     return tuple(rows)
+
+
+def effort_quantities(results: Results) -> tuple[Quantity, ...]:
+    """Return those rows that the summaries alone give."""
+    row, unit = partial(generic.quantity, results), results.with_data[0].condition.length_unit
+    column = generic.by_column
+    return (
+        row("cycles, all phases", "–", measures.cycles),
+        row("evaluations", "–", measures.evaluations),
+        row("distance to the goal of the last phase", unit, measures.residuals),
+        row("steps of the path", "–", measures.num_steps),
+        row("longest step", "scopes", column("term_longest_step_scopes")),
+        row("steps beyond the scope", "–", column("term_oversized_steps")),
+        row("CPU time of its search", "s", measures.search_seconds),
+        row("evaluations per second of search", "1/s", _speed),
+    )
 
 
 def _speed(condition: ConditionResults) -> np.ndarray:
@@ -77,7 +84,9 @@ def checks(results: Results, settings: ReportSettings) -> tuple[tuple[str, str],
         ("Solved, and refuted between two postures", _each(shown, lambda c: measures.text(measures.refuted(c), level))),
         ("Searches ended by", _each(results.main, lambda c: _reasons(c))),
     ]
-    rows += [(f"{c.label}: phase by phase", _phases(c, level)) for c in results.main if len(measures.phase_names(c)) > 1]
+    rows += [
+        (f"{c.label}: phase by phase", _phases(c, level)) for c in results.main if len(measures.phase_names(c)) > 1
+    ]
     models = {measures.robot_key(c): c for c in results.main}
     for c in models.values():
         bodies = c.prepared.problem.bodies
@@ -86,7 +95,12 @@ def checks(results: Results, settings: ReportSettings) -> tuple[tuple[str, str],
         unit = c.condition.length_unit
         text = f"{len(bodies.names)} bodies covered by {bodies.num_shapes} shapes, at most {bodies.inflation:.3g} {unit} beyond them; {pairs}"
         rows.append((f"{c.label}: the model of collisions", text))
-    rows.append(("Times", "the paper: Pentium III class PC; here: one core of this run's machine, start-up of a worker included in its first run"))
+    rows.append(
+        (
+            "Times",
+            "the paper: Pentium III class PC; here: one core of this run's machine, start-up of a worker included in its first run",
+        )
+    )
     return tuple(rows)
 
 
@@ -159,11 +173,17 @@ def drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
     phased = tuple(c for c in main if len(measures.phase_names(c)) > 1)
     if phased:
         table = partial(posture_history.phases_table, results._replace(conditions=phased), settings.confidence)
-        caption = f"Of the runs that began a phase: how many met its goal (Wilson's {level} interval), and their cycles."
+        caption = (
+            f"Of the runs that began a phase: how many met its goal (Wilson's {level} interval), and their cycles."
+        )
         found.append(Drawing("phases", "Phases", caption, table, posture_history.draw_phases, phased))
     trap = posture_trap.pair(main)
     if trap is not None:
-        found.append(Drawing("trap", "The local minimum", TRAP, partial(posture_trap.trap_table, *trap), posture_trap.draw_trap, trap))
+        found.append(
+            Drawing(
+                "trap", "The local minimum", TRAP, partial(posture_trap.trap_table, *trap), posture_trap.draw_trap, trap
+            )
+        )
     return tuple(found)
 
 
@@ -173,9 +193,10 @@ PATHS = (
 )
 PHASES = "The same path, one panel per phase. Green: the object while it is held, where the phase begins and ends."
 TRAP = (
-    "Left: where the tools go, seen from above, all runs; crosses: where searches without a sub-goal end. Middle: the "
-    "cost over the two joints that a way around moves most, the others as in the median run that is stuck; grey: "
-    "infeasible. Right: distance to the goal along the paths: a way around must lead away from it first."
+    "a: where the tools go, all runs that are stuck (crosses: their ends) and all that a sub-goal has helped. b: a way "
+    "around must lead away from the goal, or along the wall, before it leads there. c: the cost over the two joints "
+    "that moved most on the way to the median stuck posture, the others as they are there; grey: infeasible. d: the "
+    f"least cost among {posture_trap.SAMPLES} random postures in boxes around it: how far away something better is."
 )
 
 

@@ -10,7 +10,6 @@ from evoexp.report.results import Results, Verdicts
 from evoexp.report.settings import ReportSettings
 from evoexp.report.statistics import wilson
 
-
 WIDEST = 20  # conditions side by side; more stand one below the other
 
 

@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import NullLocator
+from matplotlib.ticker import NullFormatter, NullLocator
 
 from evoexp.report import style
 from evoexp.report.pages import corsepius_measures as measures
@@ -116,7 +116,7 @@ def draw_ratios(table: pd.DataFrame, setting: str) -> Figure:
     for k, quantity in enumerate(quantities):
         own = table[table["quantity"] == quantity]
         axes = figure.add_subplot(grid[0, k])
-        _series(axes, own.replace(0.0, np.nan), len(tasks), float(own["reference"].iloc[0]))
+        _series(axes, own[own["expected"] > 0.0], len(tasks), float(own["reference"].iloc[0]))
         axes.axhline(1.0, color=style.NEUTRAL, linewidth=0.9)
         bounds = own[own["bound"] != 1.0].drop_duplicates("value").sort_values("value")
         if len(bounds):
@@ -151,6 +151,7 @@ def _series(axes: Axes, table: pd.DataFrame, count: int, marked: float) -> None:
         axes.set_ylim(-4, 104)
     else:
         axes.set_yscale("log")
+        axes.yaxis.set_minor_formatter(NullFormatter())
 
 
 def _dashes(position: int) -> Any:

@@ -124,7 +124,7 @@ def _no_faster(why: str, metric: str, rows: list[Against]) -> Claim:
         f"expected {metric} in units of those of 100 (of which λ): less for {told(rows, -1)}. More for {told(rows, 1)} "
     )
     evidence += "(reproduced: none is faster, one at least is slower)"
-    return claim(text, SOURCE, evidence, why and claims.NOT_JUDGED or verdict, why)
+    return claim(text, SOURCE, evidence, claims.NOT_JUDGED if why else verdict, why)
 
 
 def _not_necessarily(why: str, metric: str, rows: list[Against]) -> Claim:
@@ -136,7 +136,7 @@ def _not_necessarily(why: str, metric: str, rows: list[Against]) -> Claim:
     text = f"Larger populations do not necessarily plan faster: {metric}"
     evidence = f"of {len(names)} tasks nothing larger than 100 is faster on {len(never)}: {', '.join(never) or '–'}; "
     evidence += f"something larger is slower on {len(slower)} of them (reproduced: on one at least)"
-    return claim(text, SOURCE, evidence, why and claims.NOT_JUDGED or verdict, why)
+    return claim(text, SOURCE, evidence, claims.NOT_JUDGED if why else verdict, why)
 
 
 def _over_proportional(why: str, metric: str, rows: list[Against]) -> Claim:
@@ -151,7 +151,7 @@ def _over_proportional(why: str, metric: str, rows: list[Against]) -> Claim:
         f"over-proportional: {meaning}. It does for {told(rows, 1)}. It is below for {told(rows, -1)}. Not certain: "
         f"{sum(one == 0 for one in says)} of {len(rows)} (reproduced: everywhere)"
     )
-    return claim(text, SOURCE, evidence, why and claims.NOT_JUDGED or verdict, why)
+    return claim(text, SOURCE, evidence, claims.NOT_JUDGED if why else verdict, why)
 
 
 def _converges_less(why: str, found: tuple[Task, ...], settings: ReportSettings) -> Claim:
@@ -174,7 +174,7 @@ def _converges_less(why: str, found: tuple[Task, ...], settings: ReportSettings)
         f"tests, Holm): {'; '.join(texts) or '–'} (reproduced: never more often, less often somewhere)"
     )
     text = "Smaller populations reduce convergence"
-    return claim(text, SOURCE, evidence, why and claims.NOT_JUDGED or verdict, why)
+    return claim(text, SOURCE, evidence, claims.NOT_JUDGED if why else verdict, why)
 
 
 def _reasonable(why: str, metric: str, found: tuple[Task, ...], values: Values) -> Claim:
@@ -193,4 +193,4 @@ def _reasonable(why: str, metric: str, found: tuple[Task, ...], values: Values) 
     verdict = claims.CONTRADICTED if bad else claims.REPRODUCED if known else claims.INCONCLUSIVE
     evidence = f"effort of 100 over that of the best size: {', '.join(texts) or '–'} (reproduced: at most {REASONABLE:g} everywhere; our reading)"
     text = f"100 individuals are reasonable: {metric}"
-    return claim(text, SOURCE, evidence, why and claims.NOT_JUDGED or verdict, why)
+    return claim(text, SOURCE, evidence, claims.NOT_JUDGED if why else verdict, why)

@@ -130,8 +130,8 @@ def _drawings(
     if not parents and not _scopes(results):
         table = partial(
             ablations.values_table,
-            results,
-            {"evaluations to the goal [-]": effort, "steps of the path [-]": measures.num_steps},
+            results._replace(conditions=results.main),
+            {"evaluations to the goal": effort, "steps of the path": measures.num_steps},
         )
         drawn.append(Drawing("values", "Every condition", VALUES, table, ablations.draw_values, shown))
         effects = {name: rows for name, _, rows in compared}

@@ -68,7 +68,8 @@ def _redundant(results: Results, condition: ConditionResults, settings: ReportSe
     free = int(np.count_nonzero(measures.solved(condition) & condition.summaries["certified"].eq(True).fillna(False)))
     told = f"goal met {measures.text(measures.success(condition), settings.confidence)}, {free} of them certified"
     told += " (reproduced: at least one certified path)"
-    verdict = why and claims.NOT_JUDGED or (claims.REPRODUCED if free else claims.CONTRADICTED)
+    found = claims.REPRODUCED if free else claims.CONTRADICTED
+    verdict = claims.NOT_JUDGED if why else found
     text = f"{condition.label}: works for a redundant arm of {joints} joints"
     return [claim(text, "section 6", told, verdict, why)]
 

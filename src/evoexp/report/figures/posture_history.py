@@ -2,7 +2,10 @@
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
 from evoexp.report import style
 from evoexp.report.pages import corsepius_measures as measures
@@ -12,6 +15,8 @@ from evoexp.report.tables import groups
 
 DISTANCE, COST = "distance to the goal", "cost"
 PER_LINE = 3  # panels
+MANY = 3  # conditions; more have panels of their own
+VISIBLE = 1e-6  # [length unit] tolerances below are no line
 
 
 def history_table(results: Results) -> pd.DataFrame:
@@ -57,31 +62,60 @@ def history_table(results: Results) -> pd.DataFrame:
 
 
 def draw_history(table: pd.DataFrame) -> Figure:
-    """Draw medians with quartiles of the distance: one panel per phase; of one phase, the cost beside it."""
-    phases = [name for _, name in sorted({(row.order, row.phase) for row in table.itertuples()})]
-    single = len(phases) == 1
-    panels = [(phases[0], COST), (phases[0], DISTANCE)] if single else [(name, DISTANCE) for name in phases]
+    """Draw medians with quartiles of the distance, one panel per phase; of one phase alone, the cost beside it.
+
+    Where there are many conditions, each has its own panel, with a line per phase.
+    """
+    many = table["position"].nunique() > MANY
+    phases = _ordered(table)
+    if many:
+        panels = [(table["position"] == k, name, DISTANCE) for k, name in _conditions(table)]
+    elif len(phases) == 1:
+        panels = [(table["phase"] == phases[0], f"{'ab'[k]}  {what}", what) for k, what in enumerate((COST, DISTANCE))]
+    else:
+        panels = [(table["phase"] == name, f"{k + 1}  {name}", DISTANCE) for k, name in enumerate(phases)]
     columns = min(PER_LINE, len(panels))
     lines = -(-len(panels) // columns)
-    figure = style.figure(2.4 * lines + 0.8)
-    unit, level = table["length_unit"].iloc[0], table["tolerance"].iloc[0]
-    for k, (phase, quantity) in enumerate(panels):
+    figure = style.figure((2.1 if many else 2.4) * lines + 0.8)
+    names = phases if many else [name for _, name in _conditions(table)]
+    for k, (chosen, title, quantity) in enumerate(panels):
         axes = figure.add_subplot(lines, columns, k + 1)
-        rows = table[(table["phase"] == phase) & (table["quantity"] == quantity)]
-        for (position, condition), curve in groups(rows, ["position", "condition"]):
-            colour, name = style.condition_colour(int(position)), f"{condition} (n = {curve['begun'].iloc[0]})"
-            axes.fill_between(curve["cycle"], curve["lower"], curve["upper"], color=colour, alpha=0.2, linewidth=0)
-            axes.plot(curve["cycle"], curve["median"], color=colour, label=name)
-        axes.set_yscale("log")
-        if quantity == DISTANCE and level >= 1e-6:
-            axes.axhline(level, color=style.NEUTRAL, linewidth=0.9, linestyle=(0, (4, 2)), label="tolerance")
-        axes.set_title(f"{'ab'[k]}  {quantity}" if single else f"{k + 1}  {phase} (n = {rows['begun'].max()})")
-        axes.set_xlabel("cycle" if single else "cycle of the phase")
-        axes.set_ylabel(f"{quantity} [{unit}]" if quantity == DISTANCE else "cost of the best so far [-]")
-        axes.set_xlim(0, max(1, int(rows["cycle"].max())))
-        axes.xaxis.set_major_locator(style.few_ticks())
-    style.legend_below(figure, figure.axes[-1], 3)
+        rows = table[chosen & (table["quantity"] == quantity)]
+        _curves(axes, rows, "phase" if many else "condition", names)
+        if quantity == DISTANCE and rows["tolerance"].iloc[0] >= VISIBLE:
+            axes.axhline(rows["tolerance"].iloc[0], color=style.NEUTRAL, linewidth=0.9, linestyle=(0, (4, 2)))
+        axes.set_title(title, fontsize=8)
+        axes.set_xlabel("cycle of the phase")
+        unit = rows["length_unit"].iloc[0]
+        axes.set_ylabel(f"distance [{unit}]" if quantity == DISTANCE else "cost of the best so far [-]")
+    handles = [Line2D([], [], color=style.condition_colour(k), label=name) for k, name in enumerate(names)]
+    handles.append(Line2D([], [], color=style.NEUTRAL, linewidth=0.9, linestyle=(0, (4, 2)), label="tolerance"))
+    figure.legend(handles=handles, loc="outside lower center", ncols=4)
     return figure
+
+
+def _curves(axes: Axes, table: pd.DataFrame, by: str, names: list[str]) -> None:
+    """Draw one curve per condition or phase, with its number of runs at the end."""
+    for name, curve in groups(table, by):
+        colour = style.condition_colour(names.index(name))
+        axes.fill_between(curve["cycle"], curve["lower"], curve["upper"], color=colour, alpha=0.2, linewidth=0)
+        axes.plot(curve["cycle"], curve["median"], color=colour)
+        text, place = f" {curve['begun'].iloc[0]}", (curve["cycle"].iloc[-1], curve["median"].iloc[-1])
+        axes.annotate(text, place, fontsize=6, color=colour, va="center", ha="left", annotation_clip=False)
+    axes.set_yscale("log")
+    axes.set_xlim(0, max(1, int(table["cycle"].max())))
+    axes.xaxis.set_major_locator(MaxNLocator(nbins=4, integer=True))
+
+
+def _ordered(table: pd.DataFrame) -> list[str]:
+    """Return the names of the phases, sub-goals first, those of every condition in its order."""
+    found = [row.phase for row in table.sort_values(["position", "order"], kind="stable").itertuples()]
+    names = list(dict.fromkeys(found))
+    return sorted(names, key=lambda name: not name.startswith("subgoal"))
+
+
+def _conditions(table: pd.DataFrame) -> list[tuple[int, str]]:
+    return sorted(set(zip(table["position"], table["condition"], strict=True)))
 
 
 def phases_table(results: Results, confidence: float) -> pd.DataFrame:

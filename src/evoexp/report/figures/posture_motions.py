@@ -79,12 +79,12 @@ def draw_motions(table: pd.DataFrame) -> Figure:
         unit = rows["length_unit"].iloc[0]
         place = (k, 0) if above else divmod(k, columns)
         axes = solids.space(figure, grid[place], _points(rows), unit, VIEW)
-        axes.set_title(title)
+        axes.set_title(title, fontsize=8)
         _draw(axes, rows, "xyz")
         if above:
             plane = figure.add_subplot(grid[k, 1])
             style.operational_axes(plane, unit)
-            plane.set_title(f"{title}, from above")
+            plane.set_title(f"{title.splitlines()[0]}, from above", fontsize=8)
             _draw(plane, rows, "xy")
     grey = style.NEUTRAL
     handles = [

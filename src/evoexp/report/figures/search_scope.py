@@ -1,4 +1,4 @@
-"""The local search scope: boxes of offspring along a path, and where the tool can be a step away (Corsépius, Fig. 2)."""
+"""The local search scope: boxes of offspring along a path, the tool's places one step away (Corsépius 2001, Fig. 2)."""
 
 import numpy as np
 import pandas as pd

@@ -61,10 +61,7 @@ def draw_outline(axes: Any, row: Any, colour: str, alpha: float) -> None:
     """Draw a row of `COLUMNS` as seen along z, in plane axes."""
     turn = np.array([getattr(row, name) for name in TURN]).reshape(3, 3)
     size = np.array([getattr(row, name) for name in SIZES])
-    if row.shape == BRICK:
-        points = np.vstack(_FACES) * size
-    else:
-        points = _grid(row.shape, size).reshape(3, -1).T
+    points = np.vstack(_FACES) * size if row.shape == BRICK else _grid(row.shape, size).reshape(3, -1).T
     seen = (points @ turn.T)[:, :2] + (row.x, row.y)
     axes.fill(*seen[ConvexHull(seen).vertices].T, facecolor=colour, edgecolor=colour, alpha=alpha, linewidth=0.5)
 
@@ -75,10 +72,7 @@ def corners(table: pd.DataFrame) -> FloatArray:
     for _, row in table.iterrows():
         turn = row[TURN].to_numpy(dtype=np.float64).reshape(3, 3)
         size, place = row[SIZES].to_numpy(dtype=np.float64), row[["x", "y", "z"]].to_numpy(dtype=np.float64)
-        if row["shape"] == BRICK:
-            reach = np.abs(turn) @ size
-        else:
-            reach = size[0] + np.abs(turn[:, 2]) * size[1]
+        reach = np.abs(turn) @ size if row["shape"] == BRICK else size[0] + np.abs(turn[:, 2]) * size[1]
         found += [place[None] - reach, place[None] + reach]
     return np.vstack(found)
 
@@ -100,7 +94,7 @@ def space(figure: Figure, place: Any, points: FloatArray, unit: str, view: tuple
         getattr(axes, f"set_{name}lim")(least, greatest)
         getattr(axes, f"set_{name}label")(f"{name} [{unit}]", labelpad=-7, fontsize=7)
     spans = high - low + 2.0 * pad
-    axes.set_box_aspect(spans, zoom=1.12)
+    axes.set_box_aspect(spans, zoom=1.0)
     axes.patch.set_visible(False)
     axes.tick_params(labelsize=6, pad=-2)
     for axis, span in zip((axes.xaxis, axes.yaxis, axes.zaxis), spans, strict=True):

@@ -92,13 +92,14 @@ def checks(results: Results, settings: ReportSettings) -> tuple[tuple[str, str],
         bodies = c.prepared.problem.bodies
         pairs = f"pairs of bodies: {len(bodies.pairs)} tested, {len(bodies.adjacent)} neighbours or disabled, "
         pairs += f"{len(bodies.always)} always touch, {len(bodies.never)} never do"
-        unit = c.condition.length_unit
-        text = f"{len(bodies.names)} bodies covered by {bodies.num_shapes} shapes, at most {bodies.inflation:.3g} {unit} beyond them; {pairs}"
+        covers = f"{len(bodies.names)} bodies covered by {bodies.num_shapes} shapes, at most {bodies.inflation:.3g}"
+        text = f"{covers} {c.condition.length_unit} beyond them; {pairs}"
         rows.append((f"{c.label}: the model of collisions", text))
     rows.append(
         (
             "Times",
-            "the paper: Pentium III class PC; here: one core of this run's machine, start-up of a worker included in its first run",
+            "the paper: Pentium III class PC; here: one core of this run's machine; the first run of a worker process "
+            "loads the kernels, too",
         )
     )
     return tuple(rows)
@@ -143,7 +144,7 @@ def drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
             "history",
             "Approach to the goal",
             "Best so far against cycles: median and quartiles of the runs that began the phase; one that has ended "
-            "keeps its last value. What is best goes by cost, so a distance may grow.",
+            "keeps its last value. What is best goes by cost, so a distance may grow. At the curves: how many runs.",
             partial(posture_history.history_table, results),
             posture_history.draw_history,
             main,
@@ -219,4 +220,4 @@ def _models(main: tuple[ConditionResults, ...]) -> Drawing:
 def _shown(condition: ConditionResults) -> Shown:
     replicate = measures.shown_replicate(condition)
     state = "" if measures.solved(condition).any() else ", not solved"
-    return Shown(f"{condition.label}: run {replicate}{state}", condition, replicate)
+    return Shown(f"{condition.label}\nrun {replicate}{state}", condition, replicate)

@@ -22,8 +22,8 @@ INTRODUCTION = (
     "running time: the effort of all runs, failed ones included, over the number of runs that met the goal: what a "
     "success costs if one starts again after every failure. Cycles stand for planning time on as many processors as "
     "individuals, evaluations for time on one; CPU time is that of the search here, at the median run's price of an "
-    "evaluation, and has a fixed part per cycle, which weighs more where λ is small. A smaller λ is not only less search "
-    "per cycle: selection is weaker, too (5 of λ)."
+    "evaluation, and has a fixed part per cycle, which weighs more where λ is small. A smaller λ is not only less "
+    "search per cycle: selection is weaker, too (5 of λ)."
 )
 
 

@@ -191,6 +191,7 @@ def _reasonable(why: str, metric: str, found: tuple[Task, ...], values: Values) 
         known, bad = known + 1, bad + (factor > REASONABLE)
         texts.append(f"{task.name} {_short(factor)} (best: {best:g})")
     verdict = claims.CONTRADICTED if bad else claims.REPRODUCED if known else claims.INCONCLUSIVE
-    evidence = f"effort of 100 over that of the best size: {', '.join(texts) or '–'} (reproduced: at most {REASONABLE:g} everywhere; our reading)"
+    evidence = f"effort of 100 over that of the best size: {', '.join(texts) or '–'} "
+    evidence += f"(reproduced: at most {REASONABLE:g} everywhere; our reading)"
     text = f"100 individuals are reasonable: {metric}"
     return claim(text, SOURCE, evidence, claims.NOT_JUDGED if why else verdict, why)

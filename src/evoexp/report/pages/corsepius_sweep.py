@@ -108,8 +108,8 @@ def _drawings(
     drawn = []
     for task in _scopes(results):
         caption = (
-            "The goal's tolerance is too small to be met, so every search ends by stagnation: how near it came. Points: "
-            "runs; bars: medians and quartiles. A step has the size of the scope, so it seldom lands nearer than some "
+            "The goal's tolerance is too small to be met, so every search ends by stagnation: how near it came. "
+            "Points: runs; bars: medians and quartiles. A step has the size of the scope, so it seldom lands nearer than some "
             "share of it."
         )
         table = partial(residual_floor.floor_table, task)
@@ -158,8 +158,8 @@ def _effort(found: tuple[Task, ...], settings: ReportSettings) -> Drawing:
     return Drawing(
         "effort",
         "Success and effort against the number of parents",
-        f"Left: share of runs that meet the goal; right: expected running time, failures counted; {100 * settings.confidence:g} % "
-        f"intervals. Dashed: {PRINTED_PARENTS:g}, which the paper names typical.",
+        "Left: share of runs that meet the goal; right: expected running time, failures counted; "
+        f"{100 * settings.confidence:g} % intervals. Dashed: {PRINTED_PARENTS:g}, which the paper names typical.",
         partial(population_effort.effort_table, found, counts, metrics, settings.confidence, settings.num_resamples),
         partial(population_effort.draw_effort, setting="parents μ [-]", marked=PRINTED_PARENTS),
         tuple(c for task in found for c in task.conditions),

@@ -9,9 +9,10 @@ from matplotlib.ticker import MaxNLocator
 
 from evoexp.report import style
 from evoexp.report.pages import corsepius_measures as measures
+from evoexp.report.proportions import Proportion
 from evoexp.report.results import ConditionResults, Results
 from evoexp.report.statistics import quantile
-from evoexp.report.tables import groups
+from evoexp.report.tables import groups, records
 
 DISTANCE, COST = "distance to the goal", "cost"
 PER_LINE = 3  # panels
@@ -109,7 +110,7 @@ def _curves(axes: Axes, table: pd.DataFrame, by: str, names: list[str]) -> None:
 
 def _ordered(table: pd.DataFrame) -> list[str]:
     """Return the names of the phases, sub-goals first, those of every condition in its order."""
-    found = [row.phase for row in table.sort_values(["position", "order"], kind="stable").itertuples()]
+    found = [row.phase for row in records(table.sort_values(["position", "order"], kind="stable"))]
     names = list(dict.fromkeys(found))
     return sorted(names, key=lambda name: not name.startswith("subgoal"))
 
@@ -128,7 +129,7 @@ def phases_table(results: Results, confidence: float) -> pd.DataFrame:
     rows = []
     for position, c in enumerate(results.main):
         for phase, own in groups(measures.phase_cycles(c), "phase"):
-            reached = measures.Proportion(int(own["reached"].sum()), len(own))
+            reached = Proportion(int(own["reached"].sum()), len(own))
             values = own["cycles"].to_numpy(dtype=np.float64)
             spread = [quantile(values, share) for share in (0.5, 0.25, 0.75)]
             name = measures.phase_names(c)[int(phase)]
@@ -145,7 +146,7 @@ def draw_phases(table: pd.DataFrame) -> Figure:
     figure = style.figure(0.28 * len(one) + 1.1)
     left, right = figure.subplots(1, 2, sharey=True)
     labels = []
-    for y, row in enumerate(table.itertuples()):
+    for y, row in enumerate(records(table)):
         colour = style.condition_colour(int(row.position))
         left.hlines(y, 100 * row.lower, 100 * row.upper, color=colour, linewidth=1.6)
         left.plot([100 * row.share], [y], "o", color=colour, markersize=4.5)
@@ -166,7 +167,7 @@ def draw_phases(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def reasons_rows(results: Results) -> list[tuple[str, int, str, measures.Proportion]]:
+def reasons_rows(results: Results) -> list[tuple[str, int, str, Proportion]]:
     """Return how many runs of every condition ended for each reason: rows of `shares_table`."""
     kept: list[tuple[str, ConditionResults]] = [(c.label, c) for c in results.main]
     return [

@@ -105,8 +105,9 @@ def _panel(problem: Any, span: Span, postures: FloatArray, first: int) -> list[d
         for n in range(len(own)):
             where = dict(zip(("x", "y", "z", *PATH), (*start[n], *end[n]), strict=True))
             rows.append({"element": LINK, "instant": first + n, "name": str(link)} | where)
+    joint, local = problem.tool
     for n, q in enumerate(own):
-        tip = frame_pose(problem.assembly.table, *problem.tool, q)[9:]
+        tip = frame_pose(problem.assembly.table, joint, local, q)[9:]
         rows.append({"element": TIP, "instant": first + n, "name": "tool"} | dict(zip("xyz", tip, strict=True)))
     goal = span.stage.judging[3][9:12] if span.stage.phase.goal.kind != "surface" else span.stage.judging[3][15:18]
     rows.append(
@@ -121,7 +122,6 @@ def _panel(problem: Any, span: Span, postures: FloatArray, first: int) -> list[d
         for instant in instants:
             where = placement
             if element == HELD:
-                joint, _ = problem.tool
                 pose = frame_pose(problem.assembly.table, joint, situation.grasp, postures[instant])
                 where = pin.SE3(pose[:9].reshape(3, 3), pose[9:])
             found = solids.solid(shape, where)

@@ -118,7 +118,9 @@ def _landscape(figure: Figure, axes, table: pd.DataFrame) -> None:  # type: igno
     cells = table[table["element"] == CELL]
     wide = cells.pivot(index="y", columns="x", values="value")
     axes.set_facecolor("#c8c8c8")
-    shown = axes.pcolormesh(wide.columns, wide.index, wide.to_numpy(), cmap="viridis_r", shading="nearest")
+    shown = axes.pcolormesh(
+        wide.columns, wide.index, wide.to_numpy(), cmap="viridis_r", shading="nearest", rasterized=True
+    )
     figure.colorbar(shown, ax=axes, label="cost [-]", shrink=0.9)
     x, y = cells["x_end"].iloc[0], cells["y_end"].iloc[0]
     axes.plot(x, y, "X", color=style.FORBIDDEN, mec="white", markersize=8)
@@ -134,7 +136,8 @@ def _landscape(figure: Figure, axes, table: pd.DataFrame) -> None:  # type: igno
 def _tool(problem, stage: Stage, series: str, replicate: int, q: FloatArray) -> list[dict[str, object]]:  # type: ignore[no-untyped-def]
     """Return the places of the tool along a path, and its distances to the goal."""
     distance = np.abs(judge(stage, q.T).rows[0])
-    places = [frame_pose(problem.assembly.table, *problem.tool, posture)[9:] for posture in q]
+    joint, local = problem.tool
+    places = [frame_pose(problem.assembly.table, joint, local, posture)[9:] for posture in q]
     return [
         {"element": TOOL, "series": series, "replicate": replicate, "order": n, "x": x, "y": y, "z": z, "value": value}
         for n, ((x, y, z), value) in enumerate(zip(places, distance, strict=True))

@@ -16,7 +16,7 @@ BALL, BRICK, ROD, DRUM = "sphere", "box", "capsule", "cylinder"
 SIZES = ["size_1", "size_2", "size_3"]  # box: half its edges; else radius and half the length
 TURN = [f"r{row}{column}" for row in range(1, 4) for column in range(1, 4)]
 COLUMNS = ["shape", "x", "y", "z", *TURN, *SIZES]
-AROUND, ALONG = 18, 5  # pieces of a round surface, and of each of its ends
+AROUND, ALONG = 12, 4  # pieces of a round surface, and of each of its ends
 
 
 def solid(shape: Any, placement: Any) -> tuple[Any, ...] | None:

@@ -10,8 +10,10 @@ from evoexp.report.figures.posture_motions import Shown
 from evoexp.report.page import Drawing, Page, Quantity
 from evoexp.report.pages import corsepius_measures as measures
 from evoexp.report.pages import corsepius_verdicts, generic
+from evoexp.report.proportions import Proportion
 from evoexp.report.results import ConditionResults, Results
 from evoexp.report.settings import ReportSettings
+from evoexp.report.statistics import spread
 
 INTRODUCTION = (
     "An individual is a posture. Every cycle random steps within a local scope of a few parents give the offspring, "
@@ -87,8 +89,7 @@ def checks(results: Results, settings: ReportSettings) -> tuple[tuple[str, str],
     rows += [
         (f"{c.label}: phase by phase", _phases(c, level)) for c in results.main if len(measures.phase_names(c)) > 1
     ]
-    models = {measures.robot_key(c): c for c in results.main}
-    for c in models.values():
+    for c in measures.by_robot(results.main):
         bodies = c.prepared.problem.bodies
         pairs = f"pairs of bodies: {len(bodies.pairs)} tested, {len(bodies.adjacent)} neighbours or disabled, "
         pairs += f"{len(bodies.always)} always touch, {len(bodies.never)} never do"
@@ -118,8 +119,8 @@ def _phases(condition: ConditionResults, level: float) -> str:
     table, parts = measures.phase_cycles(condition), []
     for k, name in enumerate(measures.phase_names(condition)):
         own = table[table["phase"] == k]
-        reached = measures.Proportion(int(own["reached"].sum()), len(own))
-        spent = generic.spread(own["cycles"].to_numpy(dtype=np.float64))
+        reached = Proportion(int(own["reached"].sum()), len(own))
+        spent = spread(own["cycles"].to_numpy(dtype=np.float64))
         parts.append(f"{name}: {measures.text(reached, level)}, cycles {markdown.spread(spent)}")
     return "; ".join(parts)
 
@@ -202,10 +203,8 @@ TRAP = (
 
 
 def _models(main: tuple[ConditionResults, ...]) -> Drawing:
-    found: dict[str, ConditionResults] = {}
-    for c in main:
-        found.setdefault(measures.robot_key(c), c)
-    shown = [(c.label if len(found) > 1 else "the robot", c) for c in found.values()]
+    found = measures.by_robot(main)
+    shown = [(c.label if len(found) > 1 else "the robot", c) for c in found]
     return Drawing(
         "fig_3_4_models",
         "Figs. 3 and 4: robots, and what stands for them",
@@ -213,7 +212,7 @@ def _models(main: tuple[ConditionResults, ...]) -> Drawing:
         "the search does; the paper's sets have 10⁵ to 10⁶ spheres.",
         partial(posture_models.models_table, shown),
         posture_models.draw_models,
-        tuple(found.values()),
+        found,
     )
 
 

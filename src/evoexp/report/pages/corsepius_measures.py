@@ -160,9 +160,13 @@ def only_subgoals_differ(without: ConditionResults, having: ConditionResults) ->
     return bool(same and one == two)
 
 
-def robot_key(condition: ConditionResults) -> str:
-    """Return what robots, and what stands for them, are told apart by."""
-    return repr((condition.condition.robot.canonical(), condition.planner.canonical()["collision"]))
+def by_robot(conditions: tuple[ConditionResults, ...]) -> tuple[ConditionResults, ...]:
+    """Return the first condition of every robot, with what stands for it in the search."""
+    found: dict[str, ConditionResults] = {}
+    for c in conditions:
+        key = repr((c.condition.robot.canonical(), c.planner.canonical()["collision"]))
+        found.setdefault(key, c)
+    return tuple(found.values())
 
 
 def phase_cycles(condition: ConditionResults) -> pd.DataFrame:

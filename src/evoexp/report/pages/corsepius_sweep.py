@@ -109,8 +109,8 @@ def _drawings(
     for task in _scopes(results):
         caption = (
             "The goal's tolerance is too small to be met, so every search ends by stagnation: how near it came. "
-            "Points: runs; bars: medians and quartiles. A step has the size of the scope, so it seldom lands nearer than some "
-            "share of it."
+            "Points: runs; bars: medians and quartiles. A step has the size of the scope, so it seldom lands nearer "
+            "than some share of it."
         )
         table = partial(residual_floor.floor_table, task)
         drawn.append(Drawing("floor", "Residual floor", caption, table, residual_floor.draw_floor, task.conditions))

@@ -79,7 +79,7 @@ def test_contents(wheel: Path) -> None:
         path.relative_to(SOURCE.parent).as_posix() for path in SOURCE.rglob("*") if path.suffix in (".py", ".typed")
     }
     assets = {path.relative_to(SOURCE.parent).as_posix() for path in (SOURCE / "assets").iterdir()}
-    conf = {f"evoexp/{path.relative_to(ROOT).as_posix()}" for path in (ROOT / "conf").rglob("*.yaml")}
+    conf = {f"evoexp/{path.relative_to(ROOT).as_posix()}" for path in (ROOT / "conf").rglob("*") if path.is_file()}
     assert len(conf) > 20
     assert {"evoexp/py.typed", "evoexp/assets/shipped.json"} <= ours
     assert ours == package | assets | conf

@@ -7,11 +7,12 @@ descriptions of replicates, is attached to their logs, and lies beside the confi
 
 import hashlib
 from collections.abc import Iterable, Iterator
+from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import Field
 
-from evoexp.errors import EvoexpError
+from evoexp.errors import EvoexpError, SettingError
 from evoexp.validation import Settings
 
 FILE, SHA256 = "file", "sha256"
@@ -56,6 +57,31 @@ def keep_all(contents: Iterable[bytes]) -> None:
     """Keep the contents of several files."""
     for content in contents:
         keep(content)
+
+
+def with_files(value: Any, shipped: Path, field: str = "") -> Any:
+    """Return plain data with the content's hash in the place of every `{file: path}`; the contents are kept.
+
+    Args:
+        value: Any nesting of mappings, lists and scalars.
+        shipped: Where paths are looked for that are not there from the current directory.
+        field: Dotted path of the value, for errors.
+
+    Raises:
+        SettingError: If a file cannot be read.
+    """
+    if isinstance(value, list):
+        return [with_files(item, shipped, f"{field}[{k}]") for k, item in enumerate(value)]
+    if not isinstance(value, dict):
+        return value
+    if set(value) != {FILE}:
+        return {key: with_files(item, shipped, f"{field}.{key}" if field else str(key)) for key, item in value.items()}
+    path = Path(str(value[FILE]))
+    try:
+        return {SHA256: keep((path if path.exists() else shipped / path).read_bytes())}
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise SettingError(f"{field}.{FILE}", f"a file that can be read ({reason})", str(value[FILE])) from None
 
 
 def attached(config: Any) -> dict[str, bytes]:

@@ -9,7 +9,6 @@ import hashlib
 import itertools
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 import hydra
@@ -20,9 +19,8 @@ from omegaconf import DictConfig, ListConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 from pydantic import ValidationError
 
-from evoexp.attachments import FILE, SHA256, keep
 from evoexp.batch.settings import RunnerSettings
-from evoexp.condition import PARTS, Condition, component_class
+from evoexp.condition import PARTS, Condition, component_class, read_files
 from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting, nearest
 from evoexp.report.settings import ReportSettings
 from evoexp.shipped import config_directory
@@ -177,13 +175,11 @@ def _condition(config: DictConfig, budget: Budget) -> Condition:
     _cap_generations(config, budget)
     raw = str(OmegaConf.to_container(config.planner, resolve=False))
     try:
-        plain = OmegaConf.to_container(config, resolve=True)
+        plain: Any = read_files(OmegaConf.to_container(config, resolve=True), config_directory() / "scenario")
     except OmegaConfBaseException as error:
         if absent := [group for group in PLANNER_PARTS if f"key '{group}' not found" in str(error)]:
             raise SettingError(absent[0], f"chosen: {', '.join(options(absent[0]))}", None) from None
         raise SettingError(error.full_key or "configuration", "resolvable", _first_line(error)) from None
-    assert isinstance(plain, dict)
-    plain = {str(key): _with_files(value, str(key)) for key, value in plain.items()}
     for group in PLANNER_PARTS:
         if plain.get(group) is not None and group in plain["planner"] and f"${{{group}" not in raw:
             must = f"left as it is; set {group}, the group that it is taken from"
@@ -203,25 +199,6 @@ def _condition(config: DictConfig, budget: Budget) -> Condition:
             raise SettingError(f"{group}.planner", "left out: it is the chosen planner", plain[group]["planner"])
         plain["planner"] = {**plain[group], "planner": plain["planner"]}
     return Condition.from_config({part: plain[part] for part in (*PARTS, "seed")})
-
-
-def _with_files(value: Any, field: str) -> Any:
-    """Return plain data with the content's hash in the place of every `{file: path}`; the content is kept.
-
-    Paths are those of the current directory, or of the shipped scenarios.
-    """
-    if isinstance(value, list):
-        return [_with_files(item, f"{field}[{k}]") for k, item in enumerate(value)]
-    if not isinstance(value, dict):
-        return value
-    if set(value) != {FILE}:
-        return {key: _with_files(item, f"{field}.{key}") for key, item in value.items()}
-    path, shipped_path = Path(str(value[FILE])), config_directory() / "scenario" / str(value[FILE])
-    try:
-        return {SHA256: keep((path if path.exists() else shipped_path).read_bytes())}
-    except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise SettingError(f"{field}.{FILE}", f"a file that can be read ({reason})", str(value[FILE])) from None
 
 
 def _cap_generations(config: DictConfig, budget: Budget) -> None:

@@ -9,32 +9,43 @@ import hashlib
 import importlib
 import importlib.metadata
 import json
+from pathlib import Path
 from typing import Any, NamedTuple, cast, get_type_hints
 
 import numpy as np
 
-from evoexp.attachments import attached
+from evoexp.attachments import attached, with_files
 from evoexp.errors import RevisionMismatch, SettingError, UnknownSetting, nearest
 from evoexp.validation import TARGET, Component, build
 
 REGISTRY = {
     "arms": "evoexp.robots.arms:Arms",
+    "mobile_arm": "evoexp.robots.mobile_arm:MobileArm",
     "planar_chain": "evoexp.robots.planar_chain:PlanarChain",
     "serial_chain": "evoexp.robots.serial_chain:SerialChain",
+    "urdf": "evoexp.robots.urdf:Urdf",
     "dh_chain": "evoexp.robots.dh_chain:DhChain",
     "floor_platform": "evoexp.robots.floor_platform:FloorPlatform",
+    "floor_manipulator": "evoexp.robots.floor_manipulator:FloorManipulator",
+    "mission": "evoexp.scenarios.mission:Mission",
     "grid_motion": "evoexp.scenarios.grid_motion:GridMotion",
     "link_motion": "evoexp.scenarios.link_motion:LinkMotion",
     "pick_and_place": "evoexp.scenarios.pick_and_place:PickAndPlace",
+    "docking": "evoexp.scenarios.docking:Docking",
     "arm_motion": "evoexp.scenarios.arm_motion:ArmMotion",
     "posture_task": "evoexp.scenarios.posture_task:PostureTask",
     "via_point_ga": "evoexp.planners.via_point_ga:ViaPointGa",
     "coevolution": "evoexp.planners.coevolution:Coevolution",
     "redundant_ga": "evoexp.planners.redundant_ga:RedundantGa",
     "posture_es": "evoexp.planners.posture_es:PostureEs",
+    "two_stage": "evoexp.planners.two_stage:TwoStage",
     "grid_path_ga": "evoexp.planners.grid_path_ga:GridPathGa",
     "grid_frontier": "evoexp.references.grid_frontier:GridFrontier",
+    "placement_ga": "evoexp.planners.placement_ga:PlacementGa",
     "random_search": "evoexp.planners.random_search:RandomSearch",
+    "placement_optimum": "evoexp.references.placement_optimum:PlacementOptimum",
+    "placement_conventional": "evoexp.references.placement_conventional:PlacementConventional",
+    "placement_landscape": "evoexp.references.placement_landscape:PlacementLandscape",
     "genetic": "evoexp.evolution.settings:GeneticSettings",
     "coevolutionary": "evoexp.evolution.coevolution_settings:CoevolutionSettings",
     "real_genetic": "evoexp.evolution.operator_settings:RealGenetic",
@@ -45,6 +56,7 @@ REGISTRY = {
     "path_cost": "evoexp.objectives.path_cost:PathCost",
     "potential_fields": "evoexp.collision.potential_fields:PotentialFields",
     "string_fitness": "evoexp.objectives.string_fitness:StringFitness",
+    "placement_criteria": "evoexp.objectives.placement_criteria:PlacementCriteria",
     "reaching": "evoexp.objectives.reaching:Reaching",
     "posture_cost": "evoexp.objectives.posture_cost:PostureCost",
     "link_ellipses": "evoexp.collision.link_ellipses:LinkEllipses",
@@ -76,6 +88,30 @@ def component_class(name: str, field: str = TARGET) -> type[Component]:
 def _registry() -> dict[str, str]:
     plugins = {point.name: point.value for point in importlib.metadata.entry_points(group="evoexp.components")}
     return plugins | REGISTRY
+
+
+def read_files(config: Any, shipped: Path) -> Any:
+    """Return plain data with the contents' hashes in the place of paths; the contents are kept.
+
+    Besides `{file: path}` (see `attachments.with_files`), components may have files of their own: those have a class
+    method `read_files(settings, field)`. Only what a user typed is read; what a log holds names no paths.
+
+    Args:
+        config: Any nesting of mappings, lists and scalars.
+        shipped: Where paths are looked for that are not there from the current directory.
+    """
+    return with_files(_component_files(config, ""), shipped)
+
+
+def _component_files(value: Any, field: str) -> Any:
+    if isinstance(value, list):
+        return [_component_files(item, f"{field}[{k}]") for k, item in enumerate(value)]
+    if not isinstance(value, dict):
+        return value
+    if isinstance(value.get(TARGET), str):
+        reads = getattr(component_class(value[TARGET], field), "read_files", None)
+        value = reads(value, field) if reads is not None else value
+    return {key: _component_files(item, f"{field}.{key}" if field else str(key)) for key, item in value.items()}
 
 
 class Prepared(NamedTuple):

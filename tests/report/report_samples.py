@@ -33,8 +33,8 @@ def store(outputs: Path, experiment: compose.Experiment) -> None:
     """Run and store every replicate of an experiment."""
     for label, condition in experiment.conditions:
         run = RunDirectory(outputs, condition.id)
-        run.create(condition.to_json(), manifest(condition.id) | {"label": label})
-        for replicate in range(experiment.num_replicates):
+        run.create(condition.to_json(), manifest(condition.id) | {"label": label}, condition.files())
+        for replicate in range(condition.num_replicates(experiment.num_replicates)):
             run.write_log(replicate, run_replicate(condition, replicate).content)
 
 

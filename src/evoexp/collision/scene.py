@@ -69,7 +69,7 @@ def scene(assembly: Assembly, obstacles: ObstacleTable | tuple[Any, ...] = (), s
     bodies = list(assembly.geometry.geometryObjects)
     for arm, item in zip(assembly.body_arms, bodies, strict=True):
         counts[arm] += 1
-        own = not item.name.startswith("link_")  # bodies that have names of their own keep them
+        own = item.name != f"link_{sum(counts) - 1}"  # bodies that have names of their own keep them
         name = item.name if own else f"arm_{arm + 1}_link_{counts[arm]}"
         geometry.addGeometryObject(pin.GeometryObject(name, item.parentJoint, 0, item.placement, item.geometry))
     for k, (shape, placement) in enumerate(obstacle_shapes(table)):

@@ -1,7 +1,5 @@
 """What a posture search is asked: robot, task and objective, checked against each other."""
 
-from typing import Any
-
 import numpy as np
 import pinocchio as pin
 
@@ -19,7 +17,9 @@ from evoexp.scenarios.obstacles import CAPSULE, CYLINDER, ObstacleTable, obstacl
 from evoexp.scenarios.posture_task import Phase, PointGoal, PoseGoal, PostureTask, ShiftGoal, SurfaceGoal
 
 
-def prepare(robot: Robot, task: PostureTask, scope: Any, objective: PostureCost, collision: CollisionModel) -> Problem:
+def prepare(
+    robot: Robot, task: PostureTask, scope: tuple[float, ...], objective: PostureCost, collision: CollisionModel
+) -> Problem:
     """Return the problem of a task.
 
     Raises:
@@ -34,6 +34,9 @@ def prepare(robot: Robot, task: PostureTask, scope: Any, objective: PostureCost,
     obstacles = obstacle_table(task.obstacles).without_ellipses()
     bodies = collision.bind(assembly)
     tool = assembly.tools[0]
+    for k, name in enumerate(task.names):
+        if name in bodies.names:
+            raise SettingError(f"scenario.obstacles[{k}].name", "a name that no body of the robot has", name)
     phases = task.all_phases
     problem = Problem(
         assembly,
@@ -105,8 +108,8 @@ def _start(task: PostureTask, assembly: Assembly, limits: FloatArray) -> FloatAr
     return start
 
 
-def _scope(scope: Any, nq: int) -> FloatArray:
-    given = (scope,) * nq if isinstance(scope, float | int) else scope
+def _scope(scope: tuple[float, ...], nq: int) -> FloatArray:
+    given = scope * nq if len(scope) == 1 else scope
     if len(given) != nq:
         raise SettingError("planner.scope", f"one number, or one per joint ({nq})", list(given))
     return np.array(given, dtype=np.float64)

@@ -10,7 +10,6 @@ from matplotlib.lines import Line2D
 
 from evoexp.collision.scene import obstacle_shapes
 from evoexp.numerics import DEGREE
-from evoexp.planners.posture_stages import Span, placed_obstacles, spans
 from evoexp.records import FloatArray
 from evoexp.report import motions, style
 from evoexp.report.figures import solids
@@ -54,7 +53,7 @@ def motions_table(shown: list[Shown]) -> pd.DataFrame:
         problem = one.condition.prepared.problem
         nq = len(problem.start)
         postures = one.condition.solutions[one.replicate].reshape(-1, nq)
-        found = spans(problem, postures)
+        found = problem.spans(postures)
         parts = found if one.by_phase else [found[-1]]
         for number, span in enumerate(parts):
             first = span.first if one.by_phase else 0
@@ -97,7 +96,7 @@ def draw_motions(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _panel(problem: Any, span: Span, postures: FloatArray, first: int) -> list[dict[str, Any]]:
+def _panel(problem: Any, span: Any, postures: FloatArray, first: int) -> list[dict[str, Any]]:
     """Return the rows of one panel: postures from `first` to the end of the span, things as they are in it."""
     own = postures[first : span.last + 1]
     rows: list[dict[str, Any]] = []
@@ -114,7 +113,7 @@ def _panel(problem: Any, span: Span, postures: FloatArray, first: int) -> list[d
         {"element": GOAL, "instant": span.last, "name": span.stage.phase.name} | dict(zip("xyz", goal, strict=True))
     )
     situation = span.stage.situation
-    table = placed_obstacles(problem, situation)
+    table = problem.obstacles_in(span.stage)
     for k, (shape, placement) in enumerate(obstacle_shapes(table)):
         instants, element = [span.last], OBSTACLE
         if k == situation.held:

@@ -1,5 +1,7 @@
 """A local minimum of the search: where it gets stuck, the cost around, and the way that a sub-goal opens."""
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
@@ -9,8 +11,6 @@ from matplotlib.ticker import ScalarFormatter
 
 from evoexp.collision.scene import obstacle_shapes
 from evoexp.numerics import DEGREE
-from evoexp.planners.posture_kernels import COST
-from evoexp.planners.posture_stages import Stage, begin, judge, placed_obstacles
 from evoexp.records import FloatArray
 from evoexp.report import style
 from evoexp.report.figures import solids
@@ -60,7 +60,7 @@ def trap_table(stuck: ConditionResults, helped: ConditionResults) -> pd.DataFram
         half the edge of a box [scopes], the stuck posture's cost, the least one found in the box.
     """
     problem = stuck.prepared.problem
-    stage = begin(problem, len(problem.phases) - 1, problem.start, problem.first_situation)
+    stage = problem.last_stage
     rows: list[dict[str, object]] = []
     for series, condition in ((STUCK, stuck), (HELPED, helped)):
         wanted = measures.solved(condition) == (series == HELPED)
@@ -74,7 +74,7 @@ def trap_table(stuck: ConditionResults, helped: ConditionResults) -> pd.DataFram
     rows += _escape(problem, stage, failed[-1])
     x, y, z = stage.judging[3][9:12]
     rows.append({"element": GOAL, "order": 0, "x": x, "y": y, "z": z})
-    for k, (shape, placement) in enumerate(obstacle_shapes(placed_obstacles(problem, problem.first_situation))):
+    for k, (shape, placement) in enumerate(obstacle_shapes(problem.obstacles_in(stage))):
         found = solids.solid(shape, placement)
         if found is not None:
             rows.append({"element": OBSTACLE, "order": k} | dict(zip(solids.COLUMNS, found, strict=True)))
@@ -133,9 +133,9 @@ def _landscape(figure: Figure, axes, table: pd.DataFrame) -> None:  # type: igno
     axes.set_title("c  cost around a stuck posture (×), its scope")
 
 
-def _tool(problem, stage: Stage, series: str, replicate: int, q: FloatArray) -> list[dict[str, object]]:  # type: ignore[no-untyped-def]
+def _tool(problem, stage: Any, series: str, replicate: int, q: FloatArray) -> list[dict[str, object]]:  # type: ignore[no-untyped-def]
     """Return the places of the tool along a path, and its distances to the goal."""
-    distance = np.abs(judge(stage, q.T).rows[0])
+    distance = problem.judge(stage, q.T).distance
     joint, local = problem.tool
     places = [frame_pose(problem.assembly.table, joint, local, posture)[9:] for posture in q]
     return [
@@ -156,7 +156,7 @@ def _way_out(axes, table: pd.DataFrame) -> None:  # type: ignore[no-untyped-def]
     axes.set_ylim(bottom=0.0)
 
 
-def _cells(problem, stage: Stage, end: FloatArray, a: int, b: int) -> list[dict[str, object]]:  # type: ignore[no-untyped-def]
+def _cells(problem, stage: Any, end: FloatArray, a: int, b: int) -> list[dict[str, object]]:  # type: ignore[no-untyped-def]
     """Return the cost over two joints, the others as at the end of the run that is stuck."""
     ranges = []
     for k in (a, b):
@@ -166,8 +166,8 @@ def _cells(problem, stage: Stage, end: FloatArray, a: int, b: int) -> list[dict[
     first, second = (axis.ravel() for axis in np.meshgrid(*ranges, indexing="ij"))
     q = np.repeat(end[:, None], len(first), axis=1)
     q[a], q[b] = first, second
-    found = judge(stage, q)
-    cost = np.where(found.feasible, found.rows[COST], np.nan)
+    found = problem.judge(stage, q)
+    cost = np.where(found.feasible, found.cost, np.nan)
     same = {"x_end": end[a] / DEGREE, "y_end": end[b] / DEGREE, "scope_deg": problem.scope[a] / DEGREE}
     return [
         {"element": CELL, "order": n, "x": x, "y": y, "value": value} | same
@@ -175,18 +175,18 @@ def _cells(problem, stage: Stage, end: FloatArray, a: int, b: int) -> list[dict[
     ]
 
 
-def _escape(problem, stage: Stage, end: FloatArray) -> list[dict[str, object]]:  # type: ignore[no-untyped-def]
+def _escape(problem, stage: Any, end: FloatArray) -> list[dict[str, object]]:  # type: ignore[no-untyped-def]
     """Return the least feasible cost of random postures in boxes around a posture, and that posture's own."""
     rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
     low, high = problem.limits.T
-    own = float(judge(stage, end[:, None]).rows[COST, 0])
+    own = float(problem.judge(stage, end[:, None]).cost[0])
     rows: list[dict[str, object]] = []
     for n, half in enumerate(BOXES):
         least = np.maximum(end - half * problem.scope, low)
         most = np.minimum(end + half * problem.scope, high)
         q = least[:, None] + (most - least)[:, None] * rng.random((len(end), SAMPLES))
-        found = judge(stage, q)
-        costs = found.rows[COST][found.feasible]
+        found = problem.judge(stage, q)
+        costs = found.cost[found.feasible]
         rows.append(
             {"element": ESCAPE, "order": n, "x": half, "y": own, "value": costs.min() if len(costs) else np.nan}
         )

@@ -36,8 +36,10 @@ def scope_table(condition: ConditionResults, replicate: int) -> pd.DataFrame:
         for n, (x, y) in enumerate(q[:, [a, b]] / DEGREE)
     ]
 
+    joint, local = problem.tool
+
     def tool(posture: FloatArray) -> FloatArray:
-        return frame_pose(problem.assembly.table, *problem.tool, posture)[9:11]
+        return frame_pose(problem.assembly.table, joint, local, posture)[9:11]
 
     rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
     steps = 2.0 * rng.random((STEPS, len(problem.start))) - 1.0

@@ -177,11 +177,9 @@ def phase_cycles(condition: ConditionResults) -> pd.DataFrame:
     """
     names = phase_names(condition)
     rows = condition.generations
-    begun = rows.groupby(["replicate", rows["term_phase"].astype(int)]).size()
-    table = pd.DataFrame(
-        [(int(k), int(phase) - 1, int(count) - 1) for (k, phase), count in begun.items()],
-        columns=["replicate", "phase", "cycles"],
-    )
+    begun = rows.assign(phase=rows["term_phase"].astype(int) - 1).groupby(["replicate", "phase"], as_index=False)
+    table = begun.size().rename(columns={"size": "cycles"})
+    table["cycles"] -= 1  # the posture that a phase begins with
     last = table.groupby("replicate")["phase"].transform("max")
     won = table["replicate"].map(condition.summaries["solved"].astype(bool))
     return table.assign(reached=(table["phase"] < last) | (won & (table["phase"] == len(names) - 1)))

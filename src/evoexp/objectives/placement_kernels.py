@@ -1,0 +1,133 @@
+"""Criteria of a mobile arm's posture, compiled (Chen & Zalzala 1995, Eqs. 8 and 10–14, 17–19).
+
+The arm's kinematics know nothing of the platform's joints: the posture (θ1, θ2) leaves two values of θ3 that bring the
+end-effector to its height, and the platform stands where the arm's reach then ends at the target.
+"""
+
+import numpy as np
+
+from evoexp.numerics import DEGREE, asin, kernel, sincos
+
+COST, TORQUE_NORM, TORQUE_MAX, OBSTACLE, MANIPULABILITY = range(5)
+CRITERIA = 5  # numbers that a population keeps of every individual: E, E1, E2, Σ E_obs, E_man
+TORQUE, THETA_3, PLATFORM = 5, 8, 9  # of a whole posture
+RESULTS = 10  # … and τ1, τ2, τ3, θ3 [deg], X_p
+
+
+@kernel
+def measure_posture(theta_1, theta_2, branch, task, weights, avoided, limits, out):  # type: ignore[no-untyped-def]
+    """Measure one posture; return whether it is feasible: reachable, and within the limits.
+
+    Args:
+        theta_1: [deg].
+        theta_2: Relative to the first link [deg].
+        branch: Of θ3: 0: the third link points to +x, 1: to −x.
+        task: (7,) l1, l2, l3, X_e, Y_e, F_x, F_y.
+        weights: (7,) ε, λ, δ of Eq. 14, α1, α2, α3 of Eq. 11, and the greatest value of E and of every criterion, which
+            is what singular and infeasible postures have.
+        avoided: (n, 5) γ, link (0: the platform), place on it in [0, 1], X_o, Y_o of Eq. 12.
+        limits: (6, 2) of θ1, θ2, θ3 [deg] and τ1, τ2, τ3.
+        out: (RESULTS,) written; of what cannot be reached θ3, X_p and torques are NaN.
+    """
+    cap = weights[6]
+    for k in range(CRITERIA):
+        out[k] = cap
+    for k in range(CRITERIA, RESULTS):
+        out[k] = np.nan
+    s1, c1 = sincos(DEGREE * theta_1)
+    s12, c12 = sincos(DEGREE * (theta_1 + theta_2))
+    s123 = (task[4] - task[0] * s1 - task[1] * s12) / task[2]
+    if not abs(s123) <= 1.0:
+        return False
+    c123 = np.sqrt((1.0 - s123) * (1.0 + s123))
+    absolute = asin(s123) / DEGREE
+    if branch == 1:
+        c123, absolute = -c123, 180.0 - absolute
+    theta_3 = absolute - theta_1 - theta_2
+    theta_3 -= 360.0 * np.floor((theta_3 + 180.0) / 360.0)
+    x1, x2, x3 = task[0] * c1, task[1] * c12, task[2] * c123
+    y1, y2, y3 = task[0] * s1, task[1] * s12, task[2] * s123
+    platform = task[3] - (x1 + x2 + x3)  # Eq. 17
+    # The Jacobian (Eq. 19), row by row.
+    jx1, jx2, jx3 = -(y1 + y2 + y3), -(y2 + y3), -y3
+    jy1, jy2, jy3 = x1 + x2 + x3, x2 + x3, x3
+    out[TORQUE] = jx1 * task[5] + jy1 * task[6]  # Eq. 8
+    out[TORQUE + 1] = jx2 * task[5] + jy2 * task[6]
+    out[TORQUE + 2] = jx3 * task[5] + jy3 * task[6]
+    out[THETA_3], out[PLATFORM] = theta_3, platform
+    norm, largest, within = 0.0, 0.0, True
+    for k in range(3):
+        torque = out[TORQUE + k]
+        norm += torque * torque  # Eq. 10
+        largest = max(largest, abs(weights[3 + k] * torque))  # Eq. 11
+        angle = theta_1 if k == 0 else (theta_2 if k == 1 else theta_3)
+        within = within and limits[k, 0] <= angle <= limits[k, 1]
+        within = within and limits[3 + k, 0] <= torque <= limits[3 + k, 1]
+    xx = jx1 * jx1 + jx2 * jx2 + jx3 * jx3
+    yy = jy1 * jy1 + jy2 * jy2 + jy3 * jy3
+    xy = jx1 * jy1 + jx2 * jy2 + jx3 * jy3
+    obstacles = 0.0
+    for n in range(len(avoided)):
+        link, place = avoided[n, 1], avoided[n, 2]
+        x = platform + (place if link == 1.0 else 1.0) * x1 * (link >= 1.0)
+        y = (place if link == 1.0 else 1.0) * y1 * (link >= 1.0)
+        x += (place if link == 2.0 else 1.0) * x2 * (link >= 2.0) + place * x3 * (link >= 3.0)
+        y += (place if link == 2.0 else 1.0) * y2 * (link >= 2.0) + place * y3 * (link >= 3.0)
+        dx, dy = x - avoided[n, 3], y - avoided[n, 4]
+        obstacles += avoided[n, 0] * _inverse(dx * dx + dy * dy, cap)  # Eq. 12
+    out[TORQUE_NORM], out[TORQUE_MAX] = min(norm, cap), min(largest, cap)
+    out[OBSTACLE], out[MANIPULABILITY] = min(obstacles, cap), _inverse(xx * yy - xy * xy, cap)  # Eq. 13
+    total = obstacles + weights[0] * norm + weights[1] * largest + weights[2] * out[MANIPULABILITY]  # Eq. 14
+    out[COST] = min(total, cap) if within else cap
+    return within
+
+
+@kernel
+def _inverse(value, cap):  # type: ignore[no-untyped-def]
+    """Return 1 / value, at most `cap`; also where rounding made the value of a singular posture negative."""
+    return 1.0 / value if value * cap > 1.0 else cap
+
+
+@kernel
+def measure_both(theta_1, theta_2, task, weights, avoided, limits, out, other):  # type: ignore[no-untyped-def]
+    """Measure both values of θ3; the better one into `out`, the other one into `other`, both (RESULTS,).
+
+    Returns:
+        Its branch, −1 where neither is feasible.
+    """
+    one = measure_posture(theta_1, theta_2, 0, task, weights, avoided, limits, out)
+    two = measure_posture(theta_1, theta_2, 1, task, weights, avoided, limits, other)
+    branch = 0 if one else -1
+    if two and not (one and out[COST] <= other[COST]):
+        branch = 1
+        for k in range(RESULTS):
+            out[k], other[k] = other[k], out[k]
+    return branch
+
+
+@kernel
+def measure_branches(angles, task, weights, avoided, limits, costs, theta_3):  # type: ignore[no-untyped-def]
+    """Measure both values of θ3 of every posture: costs and θ3 [deg], both (2, individuals), are written."""
+    out = np.empty(RESULTS)
+    for k in range(angles.shape[1]):
+        for branch in range(2):
+            measure_posture(angles[0, k], angles[1, k], branch, task, weights, avoided, limits, out)
+            costs[branch, k], theta_3[branch, k] = out[COST], out[THETA_3]
+
+
+@kernel
+def measure_postures(angles, count, task, weights, avoided, limits, out):  # type: ignore[no-untyped-def]
+    """Measure a population, the better θ3 of each.
+
+    Args:
+        angles: (2, ≥ count) θ1, θ2 [deg].
+        count: Individuals.
+        task: As of `measure_posture`, and so are `weights`, `avoided` and `limits`.
+        out: (CRITERIA + 1, ≥ count) written: the criteria, and the branch (−1: infeasible).
+    """
+    one, two = np.empty(RESULTS), np.empty(RESULTS)
+    for k in range(count):
+        branch = measure_both(angles[0, k], angles[1, k], task, weights, avoided, limits, one, two)
+        for row in range(CRITERIA):
+            out[row, k] = one[row]
+        out[CRITERIA, k] = branch

@@ -1,0 +1,37 @@
+"""The landscape of a posture's cost over θ1 and θ2 (Chen & Zalzala 1995, Fig. 9)."""
+
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from evoexp.objectives.placement_kernels import CRITERIA
+from evoexp.references.truth import Reference, Truth
+
+
+class PlacementLandscape(Reference):
+    """E over all θ1 and θ2, the better θ3 of each.
+
+    Arrays: `theta_1` and `theta_2` (angles,) [deg]; `cost` (angles of θ1, angles of θ2): E, NaN where infeasible.
+
+    Attributes:
+        num_angles: Values of either angle, both ends of their range included.
+    """
+
+    component: ClassVar[str] = "placement_landscape"
+
+    num_angles: Annotated[int, Field(ge=2)]
+
+    def truth(self, problem: Any) -> Truth:
+        """Measure the grid; the best of it is the solution."""
+        share = np.arange(self.num_angles) / (self.num_angles - 1)
+        one, two = problem.angle_limits[:, :1] + np.diff(problem.angle_limits) * share
+        pairs = np.stack(np.meshgrid(one, two, indexing="ij")).reshape(2, -1)
+        found = problem.model.measure(pairs)
+        feasible = found[CRITERIA] >= 0.0
+        best = int(np.argmin(found[0]))
+        cost = np.where(feasible, found[0], np.nan).reshape(self.num_angles, self.num_angles)
+        arrays = {"theta_1": one, "theta_2": two, "cost": cost}
+        share_feasible = float(np.count_nonzero(feasible)) / pairs.shape[1]
+        terms = {"share_feasible": share_feasible}
+        return Truth(pairs[:, best].copy(), float(found[0, best]), bool(feasible[best]), pairs.shape[1], terms, arrays)

@@ -149,7 +149,7 @@ class Judged(NamedTuple):
     @property
     def distance(self) -> FloatArray:
         """How far the goal is, inside of a body, too, (postures,) [length unit]."""
-        return np.abs(self.rows[DISTANCE])
+        return np.asarray(np.abs(self.rows[DISTANCE]))
 
 
 class Span(NamedTuple):

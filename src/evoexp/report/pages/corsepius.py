@@ -7,7 +7,7 @@ import numpy as np
 from evoexp.report import markdown
 from evoexp.report.figures import posture_history, posture_models, posture_motions, posture_trap, search_scope, shares
 from evoexp.report.figures.posture_motions import Shown
-from evoexp.report.page import Drawing, Page, Quantity
+from evoexp.report.page import Drawing, Page, Quantity, Table
 from evoexp.report.pages import corsepius_measures as measures
 from evoexp.report.pages import corsepius_verdicts, generic
 from evoexp.report.proportions import Proportion
@@ -32,8 +32,9 @@ def page(results: Results, settings: ReportSettings) -> Page:
         title=f"Corsépius 2001: {results.experiment or 'stored runs'}",
         introduction=INTRODUCTION,
         quantities=quantities(results),
+        tables=tables(results, settings),
         claims=corsepius_verdicts.of_tasks(results, settings),
-        checks=checks(results, settings),
+        checks=checks(results),
         comparisons=generic.comparisons(results, settings, (("distance to the goal", True, measures.residuals),)),
         drawings=drawings(results, settings),
     )
@@ -78,36 +79,59 @@ def _speed(condition: ConditionResults) -> np.ndarray:
     return np.asarray(measures.evaluations(condition) / measures.search_seconds(condition))
 
 
-def checks(results: Results, settings: ReportSettings) -> tuple[tuple[str, str], ...]:
-    """Return what is found of success, verdicts, reasons to end, phases, steps, models."""
-    level, shown = settings.confidence, results.with_data
-    rows = [
-        ("Goal met", _each(shown, lambda c: measures.text(measures.success(c), level))),
-        ("Solved, and refuted between two postures", _each(shown, lambda c: measures.text(measures.refuted(c), level))),
-        ("Searches ended by", _each(results.main, lambda c: _reasons(c))),
-    ]
-    rows += [
-        (f"{c.label}: phase by phase", _phases(c, level)) for c in results.main if len(measures.phase_names(c)) > 1
-    ]
+def tables(results: Results, settings: ReportSettings) -> tuple[Table, ...]:
+    """Return what became of every task, and of every phase of those that have several."""
+    level = settings.confidence
+    rows = []
+    for c in results.with_data:
+        met, refuted, certified = measures.success(c), measures.refuted(c), measures.certified(c)
+        counts = (measures.text(one, level) for one in (met, certified, refuted))
+        rows.append((c.label, *counts, _reasons(c), *(markdown.spread(spread(v(c))) for v in PER_RUN)))
+    headers = (
+        "task",
+        "goal met",
+        "of these certified",
+        "of these refuted",
+        "ended by",
+        "cycles",
+        "evaluations",
+        "steps",
+    )
+    shares = f"in brackets Wilson's {100 * level:g} % interval; of others median [quartiles] over all runs."
+    found = [Table("Tasks", headers, tuple(rows), f"Shares of runs, {shares}")]
+    phases = tuple(row for c in results.main if len(measures.phase_names(c)) > 1 for row in _phases(c, level))
+    if phases:
+        columns = ("task", "phase", "goal of the phase met, of the runs that began it", "cycles")
+        found.append(Table("Phases", columns, phases))
+    return tuple(found)
+
+
+PER_RUN = (measures.cycles, measures.evaluations, measures.num_steps)
+
+
+def checks(results: Results) -> tuple[tuple[str, str], ...]:
+    """Return what is found of models and times."""
+    rows = []
     for c in measures.by_robot(results.main):
         bodies = c.prepared.problem.bodies
+        covers = f"{len(bodies.names)} bodies covered by {bodies.num_shapes} shapes, at most {bodies.inflation:.3g}"
         pairs = f"pairs of bodies: {len(bodies.pairs)} tested, {len(bodies.adjacent)} neighbours or disabled, "
         pairs += f"{len(bodies.always)} always touch, {len(bodies.never)} never do"
-        covers = f"{len(bodies.names)} bodies covered by {bodies.num_shapes} shapes, at most {bodies.inflation:.3g}"
         text = f"{covers} {c.condition.length_unit} beyond them; {pairs}"
         rows.append((f"{c.label}: the model of collisions", text))
-    rows.append(
-        (
-            "Times",
-            "the paper: Pentium III class PC; here: one core of this run's machine; the first run of a worker process "
-            "loads the kernels, too",
-        )
-    )
+    rows.append(("Paths between postures", BETWEEN))
+    rows.append(("Times", TIMES))
     return tuple(rows)
 
 
-def _each(conditions: tuple[ConditionResults, ...], tell) -> str:  # type: ignore[no-untyped-def]
-    return "; ".join(f"{c.label}: {tell(c)}" for c in conditions)
+BETWEEN = (
+    "are not rated by the paper: what is solved can be refuted; `planner.edge_check` tests configurations between a "
+    "parent and its child: `evoexp run experiment=corsepius_options`"
+)
+TIMES = (
+    "the paper: Pentium III class PC; here: one core of this run's machine; the first run of a worker process loads "
+    "the kernels, too"
+)
 
 
 def _reasons(condition: ConditionResults) -> str:
@@ -115,14 +139,15 @@ def _reasons(condition: ConditionResults) -> str:
     return ", ".join(f"{name} {proportion.having}" for name, proportion in found.items() if proportion.having)
 
 
-def _phases(condition: ConditionResults, level: float) -> str:
-    table, parts = measures.phase_cycles(condition), []
+def _phases(condition: ConditionResults, level: float) -> list[tuple[object, ...]]:
+    table = measures.phase_cycles(condition)
+    rows: list[tuple[object, ...]] = []
     for k, name in enumerate(measures.phase_names(condition)):
         own = table[table["phase"] == k]
         reached = Proportion(int(own["reached"].sum()), len(own))
         spent = spread(own["cycles"].to_numpy(dtype=np.float64))
-        parts.append(f"{name}: {measures.text(reached, level)}, cycles {markdown.spread(spent)}")
-    return "; ".join(parts)
+        rows.append((condition.label, f"{k + 1}  {name}", measures.text(reached, level), markdown.spread(spent)))
+    return rows
 
 
 def drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:

@@ -80,6 +80,12 @@ def refuted(condition: ConditionResults) -> Proportion:
     return Proportion(condition.verdicts.solved_refuted, condition.solved)
 
 
+def certified(condition: ConditionResults) -> Proportion:
+    """Return how many of the solved runs' paths the exact verdict certifies."""
+    free = condition.summaries["certified"].eq(True).fillna(False)
+    return Proportion(int(np.count_nonzero(solved(condition) & free)), condition.solved)
+
+
 def cycles(condition: ConditionResults) -> FloatArray:
     """Return the cycles of each run, all phases together, (done,)."""
     return condition.column("term_cycles")

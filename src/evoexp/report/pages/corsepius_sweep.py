@@ -8,7 +8,7 @@ from evoexp.records import FloatArray
 from evoexp.report import claims, markdown
 from evoexp.report.claims import Comparison
 from evoexp.report.figures import ablations, population_effort, residual_floor, shares
-from evoexp.report.page import Drawing, Page
+from evoexp.report.page import Drawing, Page, Table
 from evoexp.report.pages import corsepius, generic
 from evoexp.report.pages import corsepius_measures as measures
 from evoexp.report.pages.corsepius_measures import Task
@@ -35,7 +35,8 @@ def page(results: Results, settings: ReportSettings) -> Page:
         title=f"Corsépius 2001: {results.experiment or 'stored runs'}",
         introduction=INTRODUCTION,
         quantities=corsepius.quantities(results),
-        checks=_checks(results, settings),
+        tables=(_table(results, settings),),
+        checks=_checks(results),
         comparisons=tuple((f"{name}: {first} against …", rows) for name, first, rows in compared),
         drawings=_drawings(results, settings, compared),
     )
@@ -68,29 +69,31 @@ def comparisons(results: Results, settings: ReportSettings) -> list[tuple[str, s
     return found
 
 
-def _checks(results: Results, settings: ReportSettings) -> tuple[tuple[str, str], ...]:
-    """Return what each setting does to success, verdicts and steps; the floor of the scope."""
+def _table(results: Results, settings: ReportSettings) -> Table:
+    """Return what each setting does to success, verdicts and steps."""
     rows, level = [], settings.confidence
     for group in groups(results):
         first, *others = group
         p_values = holm([fisher_exact(measures.success(first), measures.success(c)) for c in others])
         contacts = holm([fisher_exact(measures.refuted(first), measures.refuted(c)) for c in others])
         for c, p, touching in zip(group, (None, *p_values), (None, *contacts), strict=True):
-            met, refuted = measures.success(c), measures.refuted(c)
-            text = f"goal met {measures.text(met, level)}{_versus(p)}"
-            text += f"; of these refuted {measures.text(refuted, level)}{_versus(touching)}"
-            beyond = c.column("term_oversized_steps")
-            if (beyond > 0).any():
-                text += f"; steps beyond the scope: median {markdown.number(spread(beyond).median)} of a path"
-            rows.append((c.label, text))
-    for task in _scopes(results):
-        text = f"slope of log residual over log scope {residual_floor.slope(task):.2f}; 1: proportional"
-        rows.append((f"{task.conditions[0].label.split(' ')[0]}: residual floor", text))
-    return tuple(rows)
+            met, refuted = measures.text(measures.success(c), level), measures.text(measures.refuted(c), level)
+            beyond = markdown.spread(spread(c.column("term_oversized_steps")))
+            rows.append((c.label, met, _p(p), refuted, _p(touching), beyond))
+    headers = ("condition", "goal met", "p", "of these refuted", "p", "steps beyond the scope, of a path")
+    note = "p: against the first condition of the task, Fisher's exact test, Holm over the task's conditions."
+    return Table("Shares of runs", headers, tuple(rows), note)
 
 
-def _versus(p: float | None) -> str:
-    return "" if p is None else f" (against the first: Fisher's exact, Holm, p = {markdown.p_value(p)})"
+def _checks(results: Results) -> tuple[tuple[str, str], ...]:
+    return tuple(
+        ("Residual floor", f"slope of log residual over log scope {residual_floor.slope(task):.2f}; 1: proportional")
+        for task in _scopes(results)
+    )
+
+
+def _p(p: float | None) -> str:
+    return "–" if p is None else markdown.p_value(p)
 
 
 def _scopes(results: Results) -> tuple[Task, ...]:

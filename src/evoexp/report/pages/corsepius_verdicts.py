@@ -28,7 +28,7 @@ def of_tasks(results: Results, settings: ReportSettings) -> tuple[Claim, ...]:
 def _free_of_collision(results: Results, condition: ConditionResults, settings: ReportSettings) -> list[Claim]:
     """Judge that binary ratings of distances keep the whole motion free."""
     why, refuted = not_judged(results), measures.refuted(condition)
-    free = _certified(condition)
+    free = measures.certified(condition).having
     told = f"{markdown.share(free, refuted.total)} solved runs certified; refuted "
     told += f"{measures.text(refuted, settings.confidence)}: postures are free, what lies between them is not rated"
     planned = refuted.total if condition.done == condition.planned else 0
@@ -65,7 +65,7 @@ def _redundant(results: Results, settings: ReportSettings) -> list[Claim]:
     for c in results.main:
         joints = len(c.condition.scenario.q_start)  # type: ignore[attr-defined]
         if joints > MANY_JOINTS:
-            free = _certified(c)
+            free = measures.certified(c).having
             certified += free
             met = measures.text(measures.success(c), settings.confidence)
             texts.append(f"{c.label}, {joints} joints: goal met {met}, {free} of them certified")
@@ -75,12 +75,6 @@ def _redundant(results: Results, settings: ReportSettings) -> list[Claim]:
     found = claims.REPRODUCED if certified else claims.CONTRADICTED
     text = "The approach works for highly redundant arms"
     return [claim(text, "section 6", told, claims.NOT_JUDGED if why else found, why)]
-
-
-def _certified(condition: ConditionResults) -> int:
-    """Return how many solved runs have a certified path."""
-    certified = condition.summaries["certified"].eq(True).fillna(False)
-    return int(np.count_nonzero(measures.solved(condition) & certified))
 
 
 def _planning_time(condition: ConditionResults) -> list[Claim]:

@@ -153,8 +153,7 @@ def _phases(condition: ConditionResults, level: float) -> list[tuple[object, ...
 def drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
     """Return the figures."""
     main, level = results.main, f"{100 * settings.confidence:g} %"
-    several = tuple(c for c in main if len(measures.phase_names(c)) > len(measures.subgoals(c)) + 1)
-    found = [
+    found = (
         _models(main),
         Drawing(
             "fig_2_scope",
@@ -191,7 +190,14 @@ def drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
             posture_motions.draw_motions,
             main,
         ),
-    ]
+    )
+    return (*found, *_manoeuvres(results, settings), *_trap(main))
+
+
+def _manoeuvres(results: Results, settings: ReportSettings) -> list[Drawing]:
+    """Return the figures of conditions that have several phases."""
+    main, found = results.main, []
+    several = [c for c in main if len(measures.phase_names(c)) > len(measures.subgoals(c)) + 1]
     for c in several:
         one = Shown(c.label, c, measures.shown_replicate(c), True)
         stem = "manoeuvre" if len(several) == 1 else f"manoeuvre_{results.position(c.label) + 1}"
@@ -199,19 +205,22 @@ def drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
         found.append(Drawing(stem, "The manoeuvre, phase by phase", PHASES, table, posture_motions.draw_motions, (c,)))
     phased = tuple(c for c in main if len(measures.phase_names(c)) > 1)
     if phased:
-        table = partial(posture_history.phases_table, results._replace(conditions=phased), settings.confidence)
+        level = f"{100 * settings.confidence:g} %"
         caption = (
             f"Of the runs that began a phase: how many met its goal (Wilson's {level} interval), and their cycles."
         )
+        table = partial(posture_history.phases_table, results._replace(conditions=phased), settings.confidence)
         found.append(Drawing("phases", "Phases", caption, table, posture_history.draw_phases, phased))
-    trap = posture_trap.pair(main)
-    if trap is not None:
-        found.append(
-            Drawing(
-                "trap", "The local minimum", TRAP, partial(posture_trap.trap_table, *trap), posture_trap.draw_trap, trap
-            )
-        )
-    return tuple(found)
+    return found
+
+
+def _trap(main: tuple[ConditionResults, ...]) -> list[Drawing]:
+    """Return the figure of the local minimum, where runs get stuck that a sub-goal helps."""
+    pair = posture_trap.pair(main)
+    if pair is None:
+        return []
+    table = partial(posture_trap.trap_table, *pair)
+    return [Drawing("trap", "The local minimum", TRAP, table, posture_trap.draw_trap, pair)]
 
 
 PATHS = (

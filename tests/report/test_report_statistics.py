@@ -12,6 +12,9 @@ from evoexp.report.statistics import (
     EXACT_VALUES,
     Interval,
     effect,
+    effort_ratio,
+    expected_effort,
+    expected_interval,
     holm,
     quantile,
     rank_sum,
@@ -160,3 +163,21 @@ def test_a12_is_the_rank_sums_share_of_pairs() -> None:
     rng = np.random.default_rng(6)
     x, y = np.round(rng.normal(size=12), 1), np.round(rng.normal(size=12), 1)
     assert vargha_delaney(x, y) == pytest.approx(rank_sum(x, y).u / 144)
+
+
+def test_expected_effort_counts_what_failures_spent() -> None:
+    effort, solved = np.array([10.0, 20.0, 30.0, 40.0]), np.array([True, False, True, False])
+    assert expected_effort(effort, solved) == 50.0
+    assert expected_effort(effort, ~(solved | ~solved)) == np.inf
+    low, high = expected_interval(effort, solved, 0.95, 500)
+    assert low < 50.0 < high
+
+
+def test_ratio_of_efforts_on_common_seeds() -> None:
+    effort = np.linspace(1.0, 10.0, 30)
+    every = np.ones(30, dtype=bool)
+    low, high = effort_ratio((2.0 * effort, every), (effort, every), 0.99, 300)
+    assert (low, high) == (pytest.approx(2.0), pytest.approx(2.0)), "seed by seed twice as much"
+    assert effort_ratio((effort, every), (effort, ~every), 0.95, 300) == (0.0, 0.0)
+    assert effort_ratio((effort, ~every), (effort, every), 0.95, 300) == (np.inf, np.inf)
+    assert effort_ratio((effort, ~every), (effort, ~every), 0.95, 300) == (0.0, np.inf)

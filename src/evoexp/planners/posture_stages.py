@@ -14,10 +14,10 @@ from evoexp.collision.body_models import BodyModel, Carried
 from evoexp.collision.certificate import Part
 from evoexp.collision.scene import Scene, geometry_scene, obstacle_shapes
 from evoexp.numerics import DEGREE
-from evoexp.objectives.posture_cost import PostureCost
+from evoexp.objectives.posture_cost import DISTANCE, PostureCost
 from evoexp.paths.motion import Motion
 from evoexp.planners import posture_kernels
-from evoexp.planners.posture_kernels import ROWS
+from evoexp.planners.posture_kernels import COST, ROWS
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.poses import IDENTITY, compose, frame_pose, invert, pose_of
@@ -92,6 +92,23 @@ class Problem(NamedTuple):
         """Return what the certifier judges: the motion phase by phase, each with its own bodies."""
         return [Part(scene_of(self, span.stage), span.first, span.last) for span in spans(self, motion.q)]
 
+    def spans(self, postures: FloatArray) -> "list[Span]":
+        """Return the phases of a list of postures (postures, nq) [rad], as far as it gets."""
+        return spans(self, postures)
+
+    @property
+    def last_stage(self) -> "Stage":
+        """The last phase, begun at the start with nothing moved."""
+        return begin(self, len(self.phases) - 1, self.start, self.first_situation)
+
+    def judge(self, stage: "Stage", q: FloatArray) -> "Judged":
+        """Judge postures q (nq, postures) [rad] by a phase."""
+        return judge(stage, q)
+
+    def obstacles_in(self, stage: "Stage") -> ObstacleTable:
+        """Return the obstacles as they stand in a phase; one that is held where it was taken."""
+        return placed_obstacles(self, stage.situation)
+
 
 class Stage(NamedTuple):
     """One phase, begun.
@@ -123,6 +140,16 @@ class Judged(NamedTuple):
     rows: FloatArray
     feasible: np.ndarray
     met: np.ndarray
+
+    @property
+    def cost(self) -> FloatArray:
+        """The cost, (postures,)."""
+        return np.asarray(self.rows[COST])
+
+    @property
+    def distance(self) -> FloatArray:
+        """How far the goal is, inside of a body, too, (postures,) [length unit]."""
+        return np.asarray(np.abs(self.rows[DISTANCE]))
 
 
 class Span(NamedTuple):

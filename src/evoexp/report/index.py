@@ -10,6 +10,8 @@ from evoexp.report.results import Results, Verdicts
 from evoexp.report.settings import ReportSettings
 from evoexp.report.statistics import wilson
 
+WIDEST = 20  # conditions side by side; more stand one below the other
+
 
 def render(page: Page, results: Results, settings: ReportSettings, command: str) -> str:
     """Return the page as Markdown; the same results give the same text.
@@ -92,9 +94,16 @@ def _quantities(page: Page, results: Results) -> str:
     labels = [c.label for c in results.with_data]
     if not labels or not page.quantities:
         return ""
-    rows = [(q.name, q.unit, *(markdown.spread(q.spreads[label]) for label in labels)) for q in page.quantities]
-    heads = [f"{c.label} (n = {c.done})" for c in results.with_data]
     note = "Median [first quartile, third quartile] over finished replicates.\n"
+    heads = [f"{c.label} (n = {c.done})" for c in results.with_data]
+    if len(labels) > WIDEST:
+        cells = [
+            (head, *(markdown.spread(q.spreads[c]) for q in page.quantities))
+            for head, c in zip(heads, labels, strict=True)
+        ]
+        names = [q.name if q.unit == "–" else f"{q.name} [{q.unit}]" for q in page.quantities]
+        return f"{markdown.table(('condition', *names), cells)}\n{note}"
+    rows = [(q.name, q.unit, *(markdown.spread(q.spreads[label]) for label in labels)) for q in page.quantities]
     return f"{markdown.table(('quantity', 'unit', *heads), rows)}\n{note}"
 
 

@@ -3,6 +3,7 @@
 Costs may be infinite (infeasible). Medians, ranks and effect sizes stay defined then; nothing here takes a mean.
 """
 
+import functools
 import math
 from collections.abc import Sequence
 from statistics import NormalDist
@@ -169,13 +170,78 @@ def effect(x: FloatArray, y: FloatArray, confidence: float, num_resamples: int) 
     """
     if not len(x):
         return Effect(math.nan, Interval(math.nan, math.nan))
-    rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
     wins = (x[:, None] > y) + 0.5 * (x[:, None] == y)  # (pairs, pairs)
-    weights = np.array([np.bincount(rng.integers(0, len(x), len(x)), minlength=len(x)) for _ in range(num_resamples)])
+    weights = _weights(len(x), num_resamples)
     resampled = ((weights @ wins) * weights).sum(axis=1) / len(x) ** 2  # multiples of 1/2 are exact in any order
+    return Effect(vargha_delaney(x, y), _percentiles(resampled, confidence))
+
+
+def expected_effort(effort: FloatArray, solved: np.ndarray) -> float:
+    """Return the expected running time (Hansen et al. 2009): all effort spent, over the runs that succeeded.
+
+    Args:
+        effort: (runs,) of every run, failed ones included.
+        solved: (runs,) whether it succeeded.
+
+    Returns:
+        What a success costs where failed runs are started again; inf if there is none.
+    """
+    having = int(np.count_nonzero(solved))
+    return float(np.sum(effort)) / having if having else math.inf
+
+
+def expected_interval(effort: FloatArray, solved: np.ndarray, confidence: float, num_resamples: int) -> Interval:
+    """Return the percentile interval of the expected running time over resampled runs.
+
+    Args:
+        effort: (runs,).
+        solved: (runs,).
+        confidence: Level of the interval.
+        num_resamples: Of the bootstrap.
+    """
+    return _percentiles(_resampled_effort(_weights(len(effort), num_resamples), effort, solved), confidence)
+
+
+def effort_ratio(
+    one: tuple[FloatArray, np.ndarray], two: tuple[FloatArray, np.ndarray], confidence: float, num_resamples: int
+) -> Interval:
+    """Return the percentile interval of the ratio of two expected running times, one over two, on common seeds.
+
+    Resamples in which neither succeeds say nothing and are left out; without any the interval is [0, inf].
+
+    Args:
+        one: Effort and success of every run, (runs,) each.
+        two: The same of other runs with the same seeds.
+        confidence: Level of the interval.
+        num_resamples: Of the bootstrap.
+    """
+    weights = _weights(len(one[0]), num_resamples)
+    above, below = (_resampled_effort(weights, *given) for given in (one, two))
+    known = np.isfinite(above) | np.isfinite(below)
+    if not known.any():
+        return Interval(0.0, math.inf)
+    ratios = np.full(int(np.count_nonzero(known)), math.inf)
+    np.divide(above[known], below[known], out=ratios, where=np.isfinite(above[known]))
+    return _percentiles(ratios, confidence)
+
+
+@functools.lru_cache(maxsize=8)
+def _weights(size: int, num_resamples: int) -> np.ndarray:
+    """Return how often each of `size` runs is drawn, (resamples, size)."""
+    rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
+    return np.array([np.bincount(rng.integers(0, size, size), minlength=size) for _ in range(num_resamples)])
+
+
+def _resampled_effort(weights: np.ndarray, effort: FloatArray, solved: np.ndarray) -> FloatArray:
+    spent, having = (weights * effort).sum(axis=1), (weights * solved).sum(axis=1)
+    found = np.full(len(weights), math.inf)
+    np.divide(spent, having, out=found, where=having > 0)
+    return found
+
+
+def _percentiles(values: FloatArray, confidence: float) -> Interval:
     tail = 0.5 * (1.0 - confidence)
-    interval = Interval(quantile(resampled, tail), quantile(resampled, 1.0 - tail))
-    return Effect(vargha_delaney(x, y), interval)
+    return Interval(quantile(values, tail), quantile(values, 1.0 - tail))
 
 
 def _doubled_midranks(values: FloatArray) -> np.ndarray:

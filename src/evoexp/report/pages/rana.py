@@ -46,10 +46,10 @@ def page(results: Results, settings: ReportSettings) -> Page:
         f"Rana & Zalzala 1995: {' and '.join(WHAT[flat] for flat in sorted(planar, reverse=True))}",
         INTRODUCTION,
         _quantities(results),
-        tuple(found),
-        tuple(checks),
-        comparisons,
-        tuple(sorted(drawings, key=rana_figures.order)),
+        claims=tuple(found),
+        checks=tuple(checks),
+        comparisons=comparisons,
+        drawings=tuple(sorted(drawings, key=rana_figures.order)),
     )
 
 

@@ -67,7 +67,7 @@ def scene(assembly: Assembly, obstacles: ObstacleTable | tuple[Any, ...] = (), s
     geometry = pin.GeometryModel()
     counts = [0] * assembly.num_arms
     bodies = list(assembly.geometry.geometryObjects)
-    arms = assembly.body_arms or tuple(0 for _ in bodies)
+    arms = assembly.body_arms
     for arm, item in zip(arms, bodies, strict=True):
         counts[arm] += 1
         own = item.name != f"link_{sum(counts) - 1}"  # bodies that have names of their own keep them

@@ -44,7 +44,7 @@ class Assembly(NamedTuple):
         links: Links as segments.
         arm_slices: (arms, 2) first and one-past-last index of each arm in q.
         table: The kinematic table of the model.
-        body_arms: Which arm each body belongs to; empty: all to one.
+        body_arms: Which arm each body belongs to.
         tools: The tool's frame of each arm.
         disabled: Pairs of bodies' names that are never judged (an SRDF's).
     """

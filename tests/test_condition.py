@@ -17,22 +17,28 @@ from shipped_conditions import different_conditions, shipped_conditions
 
 Path_ = tuple[str | int, ...]
 
-OTHER_WORDS = {
-    "natural": "clamped",
-    "one_sided": "symmetric",
-    "inverse": "difference",
-    "threshold": "finite",
-    "tournament": "roulette",
-    "rank": "tournament",
-    "one_point": "uniform",
-    "arithmetic": "blx_alpha",
-    "non_uniform": "gaussian",
-    "uniform_reset": "non_uniform",
-    "gene": "individual",
-    "chords": "none",
-    "linear": "cubic",
-}
-OTHER_WORDS |= {other: word for word, other in OTHER_WORDS.items()}
+WORDS = (  # that one setting takes
+    ("natural", "clamped"),
+    ("one_sided", "symmetric"),
+    ("inverse", "difference"),
+    ("threshold", "finite"),
+    ("tournament", "roulette", "rank"),
+    ("one_point", "uniform", "arithmetic", "blx_alpha"),
+    ("non_uniform", "gaussian", "uniform_reset"),
+    ("uniform", "gaussian"),
+    ("equal", "gaussian"),
+    ("comma", "plus"),
+    ("gene", "individual"),
+    ("chords", "none"),
+    ("linear", "cubic"),
+    ("binary", "gray"),
+    ("left", "right"),
+    ("world", "tool"),
+    ("go_on", "attach", "detach"),
+    ("revolute", "prismatic"),
+    ("rad", "deg"),
+    ("sine", "step"),
+)
 SHIPPED = different_conditions("paper")
 
 
@@ -100,7 +106,7 @@ def test_every_setting_is_part_of_the_hash(shipped: Condition) -> None:
         if path[-1] == "sha256":
             steps = ["0" * 64]
         elif isinstance(value, str):
-            steps = [OTHER_WORDS.get(value, f"{value}m")]
+            steps = [word for words in WORDS if value in words for word in words] or [f"{value}m"]
         elif value is None:
             steps = [3]
         elif not steps:

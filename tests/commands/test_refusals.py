@@ -36,7 +36,7 @@ OPTIONS = f"(options: {EXPERIMENTS})"
         ("mutation_rate=1", "mutation_rate: unknown setting; did you mean 'ga.mutation_rate'?"),
         ("+ga.temperature=1", "ga.temperature: unknown setting"),
         ("++temperature=1", "temperature: unknown setting (known here:"),
-        ("+reference=x", "reference: unknown setting"),
+        ("+reference=x", "reference: no option 'x' (options: grid_frontier, placement_conventional, "),
         ("robot.arms.0.length=1", "robot.arms.0.length: unknown setting; did you mean 'link_lengths'?"),
         ("robot.arms.x.length=1", "configuration: must be composable, was \"Index 'x' (str) is not an int"),
         (

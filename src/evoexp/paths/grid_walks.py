@@ -103,11 +103,14 @@ def choice_table(neighbours: np.ndarray, potentials: FloatArray, steps: np.ndarr
 
 @kernel
 def _choose(uniform, added, targets, node):  # type: ignore[no-untyped-def]
-    """Choose one of a node's neighbours as `_next_node` does, from a `choice_table`."""
+    """Choose one of a node's neighbours as `_next_node` does, from a `choice_table`.
+
+    All moves are compared: where to stop is what no processor can foresee, and a wrong guess takes longer.
+    """
     last = added.shape[1] - 1
     place, move = uniform * added[node, last], 0
-    while move < last and added[node, move] <= place:
-        move += 1
+    for other in range(last):
+        move += added[node, other] <= place
     return targets[node, move]
 
 

@@ -1,13 +1,15 @@
 """The pages on Corsépius 2001: what they hold, and the tables behind their figures."""
 
+import functools
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from report_samples import REPORT, figure_stems, page_settings, smoke_experiment, smoke_report, smoke_results
+from report_samples import REPORT, figure_stems, page_settings, smoke_experiment, smoke_report, smoke_results, store
 
+from evoexp import compose
 from evoexp.numerics import DEGREE
 from evoexp.report import style
 from evoexp.report.figures import (
@@ -24,10 +26,10 @@ from evoexp.report.figures.posture_motions import Shown
 from evoexp.report.pages import corsepius_measures as measures
 from evoexp.report.pages import page_of
 from evoexp.report.proportions import Proportion
-from evoexp.report.results import Results
+from evoexp.report.results import Results, gather
 from evoexp.report.settings import ReportSettings
 
-ENOUGH = "ga.num_generations=60"  # cycles in which runs meet their goals, where the smoke budget's do not
+FEW = 3  # replicates
 
 
 @pytest.fixture(scope="module")
@@ -35,9 +37,12 @@ def outputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("corsepius")
 
 
+@functools.cache
 def solved(outputs: Path, name: str) -> Results:
-    """Return results of two runs that have the cycles that they need."""
-    return smoke_results(outputs, name, ENOUGH)
+    """Return results of three runs at the paper's budget, whose cycles the smoke budget would cut."""
+    experiment = compose.expand([f"experiment={name}", f"num_replicates={FEW}"])[0]
+    store(outputs, experiment)
+    return gather(outputs, experiment.conditions, FEW, name, experiment.budget, "")
 
 
 def drawn(table: pd.DataFrame, draw) -> bool:  # type: ignore[no-untyped-def]
@@ -160,8 +165,8 @@ def test_every_child_lies_in_the_box_of_its_parent(outputs: Path) -> None:
 def test_histories_keep_the_last_value_of_searches_that_ended(outputs: Path) -> None:
     results = solved(outputs, "corsepius_ball")
     table = posture_history.history_table(results)
-    assert (table["begun"] == 2).all()
-    assert table.groupby("quantity")["running"].max().tolist() == [2, 2]
+    assert (table["begun"] == FEW).all()
+    assert table.groupby("quantity")["running"].max().tolist() == [FEW, FEW]
     last = table[table["quantity"] == posture_history.DISTANCE].sort_values("cycle").iloc[-1]
     assert last["median"] == pytest.approx(np.median(measures.residuals(results.conditions[0])))
     assert drawn(table, posture_history.draw_history)

@@ -59,7 +59,8 @@ def tasks(results: Results, setting: str, of: str = "ga") -> tuple[Task, ...]:
 
 def _task(group: list[ConditionResults], setting: str, of: str) -> Task:
     def value(c: ConditionResults) -> float:
-        return float(getattr(getattr(c.planner, of) if of else c.planner, setting))
+        found = getattr(getattr(c.planner, of) if of else c.planner, setting)
+        return float(found[0] if isinstance(found, tuple) else found)  # a scope that all joints share
 
     ordered = sorted(group, key=value)
     return Task(ordered[0].label.split(", ")[0], tuple(value(c) for c in ordered), tuple(ordered))

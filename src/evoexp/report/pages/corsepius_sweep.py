@@ -98,7 +98,7 @@ def _p(p: float | None) -> str:
 
 def _scopes(results: Results) -> tuple[Task, ...]:
     """Return the tasks whose scopes differ and that never end by reaching the goal."""
-    if any(not isinstance(c.planner.scope, float) for c in results.main):
+    if any(len(set(c.planner.scope)) > 1 for c in results.main):  # joint by joint another one
         return ()
     found = measures.tasks(results, "scope", "")
     return tuple(t for t in found if len(t.values) > 1 and not any(c.solved for c in t.conditions))

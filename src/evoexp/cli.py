@@ -19,6 +19,7 @@ COMMANDS = {
     "report": "draw an experiment's figures and tables again, from outputs alone",
     "reproduce": "run stored replicates again: MATCH, or the first generation that differs",
     "evaluate": "judge a given motion by an experiment's criteria",
+    "view": "write a motion as an offline page that plays it",
     "list": "list experiments and stored runs",
     "show": "show one stored run: configuration, replicates, environment",
 }

@@ -1,0 +1,136 @@
+"""Which motions a command is about: stored replicates, logs, or a motion of the user's own."""
+
+import argparse
+import math
+from pathlib import Path
+
+from evoexp import compose, shipped
+from evoexp.commands.evaluate import flatten, motion_file, read_motion, shape_text
+from evoexp.commands.hashes import with_candidates
+from evoexp.errors import EvoexpError, MotionFileError, NothingStored, RevisionMismatch, SettingError, UnknownHash
+from evoexp.playback.recording import Heading, Recording, record
+from evoexp.playback.stored import CHOICES, chosen_log, stored_recording
+from evoexp.playback.timing import SpeedLimits
+from evoexp.store.files import write_file
+from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
+
+FOLDER = "motions"  # of the outputs
+MANY = 4  # motions on one page
+
+
+def add_motion_arguments(parser: argparse.ArgumentParser, ending: str) -> None:
+    """Declare what chooses motions, how fast they are, and where they go."""
+    parser.add_argument(
+        "what",
+        nargs="+",
+        metavar="HASH | LOG.mcap | MOTION KEY=VALUE",
+        help="any unique prefix of a run's hash, or a replicate's log; or a motion file (.json, .npy) in the planner's "
+        "documented shape, as for evaluate, with an experiment",
+    )
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--replicate", type=int, metavar="K", help="this replicate of the run")
+    for name, text in zip(CHOICES, ("of least cost (the default)", "of greatest cost", "first refuted one"), strict=True):
+        which.add_argument(f"--{name}", dest="choice", action="store_const", const=name, help=f"the replicate: {text}")
+    parser.add_argument("--only", default="", metavar="LABEL", help="of an experiment's conditions, this one")
+    parser.add_argument("--turn-speed", type=float, default=45.0, metavar="DEG/S", help="limit of joints that turn")
+    parser.add_argument("--slide-speed", type=float, metavar="UNIT/S", help="limit of joints that slide")
+    parser.add_argument("-o", "--output", type=Path, metavar=f"FILE{ending}", help="by default in outputs/motions/")
+
+
+def recordings(arguments: argparse.Namespace) -> list[Recording]:
+    """Return the motions that the arguments choose, in their order.
+
+    Raises:
+        EvoexpError: One line says what is wrong.
+    """
+    words: list[str] = arguments.what
+    limits = _limits(arguments)
+    if any("=" in word for word in words):
+        return _own(words, arguments.only, limits)
+    if len(words) > MANY:
+        raise MotionFileError(f"motions: at most {MANY} go together, got {len(words)}")
+    return [_stored(word, arguments, limits) for word in words]
+
+
+def single(arguments: argparse.Namespace) -> Recording:
+    """Return the one motion that the arguments choose.
+
+    Raises:
+        MotionFileError: If it is not one.
+    """
+    found = recordings(arguments)
+    if len(found) != 1:
+        raise MotionFileError(f"motion: one at a time, got {len(found)}; choose with --only LABEL")
+    return found[0]
+
+
+def output_path(arguments: argparse.Namespace, found: list[Recording], ending: str) -> Path:
+    """Return where the file goes."""
+    if arguments.output is not None:
+        return Path(arguments.output)
+    files = [word for word in arguments.what if "=" not in word and any("=" in other for other in arguments.what)]
+    names = [f"{r.condition_id[:12]}-{r.heading.replicate:04d}" for r in found] if not files else [Path(files[0]).stem]
+    return outputs_root() / FOLDER / ("+".join(names) + ending)
+
+
+def write(path: Path, content: bytes) -> None:
+    """Write a file whole or not at all, and say where it is and how large."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_file(path, content)
+    size = len(content) / 1000
+    print(f"{path}  ({f'{size / 1000:.2f} MB' if size >= 1000 else f'{size:.0f} kB'})")
+
+
+def _limits(arguments: argparse.Namespace) -> SpeedLimits:
+    for name in ("turn_speed", "slide_speed"):
+        value = getattr(arguments, name)
+        if value is not None and not 0.0 < value < math.inf:
+            raise SettingError(f"--{name.replace('_', '-')}", "greater than 0", value)
+    return SpeedLimits(math.radians(arguments.turn_speed), arguments.slide_speed)
+
+
+def _stored(word: str, arguments: argparse.Namespace, limits: SpeedLimits) -> Recording:
+    path = Path(word)
+    if path.suffix == ".mcap" or path.is_file():
+        return stored_recording(path, path.name, limits)
+    try:
+        run = resolve(outputs_root(), word)
+    except UnknownHash as error:
+        raise _not_here(word, error) from None
+    choice = arguments.replicate if arguments.replicate is not None else arguments.choice or CHOICES[0]
+    try:
+        return stored_recording(chosen_log(run, choice), _title(run), limits)
+    except RevisionMismatch as error:
+        known = run.manifest().get("command", "evoexp run experiment=…")
+        raise RevisionMismatch(f"run {run.hash12}: {error}; run it anew with what is installed: {known}") from None
+
+
+def _not_here(word: str, error: UnknownHash) -> EvoexpError:
+    found = shipped.find(word)
+    if len(found) == 1:
+        return NothingStored(f"condition {found[0].condition_id[:12]}: not run here; run it: {found[0].command}")
+    return with_candidates(error, outputs_root())
+
+
+def _title(run: RunDirectory) -> str:
+    manifest = run.manifest()
+    names = [str(manifest[name]) for name in ("experiment", "label") if manifest.get(name)]
+    return " · ".join(dict.fromkeys(names)) or run.hash12
+
+
+def _own(words: list[str], only: str, limits: SpeedLimits) -> list[Recording]:
+    """Return a motion of the user's own in every condition that it fits."""
+    overrides, path = motion_file(words)
+    values, found, misfits = read_motion(path), [], []
+    for experiment in compose.expand(overrides, only=(only,) if only else ()):
+        for label, condition in experiment.conditions:
+            planner, problem = condition.prepare()
+            shape = planner.shape(problem)
+            solution = flatten(values, shape)
+            if solution is None:
+                misfits.append(f"{label}: {shape_text(shape)}")
+            elif len(found) < MANY:
+                found.append(record(condition, solution, Heading(f"{path.name} · {label}"), limits))
+    if not found:
+        raise MotionFileError(f"{path}: must be {'; '.join(dict.fromkeys(misfits))} (start and goal included)")
+    return found

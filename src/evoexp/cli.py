@@ -20,6 +20,7 @@ COMMANDS = {
     "reproduce": "run stored replicates again: MATCH, or the first generation that differs",
     "evaluate": "judge a given motion by an experiment's criteria",
     "view": "write a motion as an offline page that plays it",
+    "play": "write a motion as a log that plays in Foxglove",
     "list": "list experiments and stored runs",
     "show": "show one stored run: configuration, replicates, environment",
 }

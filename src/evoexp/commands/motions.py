@@ -29,7 +29,9 @@ def add_motion_arguments(parser: argparse.ArgumentParser, ending: str) -> None:
     )
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--replicate", type=int, metavar="K", help="this replicate of the run")
-    for name, text in zip(CHOICES, ("of least cost (the default)", "of greatest cost", "first refuted one"), strict=True):
+    for name, text in zip(
+        CHOICES, ("of least cost (the default)", "of greatest cost", "first refuted one"), strict=True
+    ):
         which.add_argument(f"--{name}", dest="choice", action="store_const", const=name, help=f"the replicate: {text}")
     parser.add_argument("--only", default="", metavar="LABEL", help="of an experiment's conditions, this one")
     parser.add_argument("--turn-speed", type=float, default=45.0, metavar="DEG/S", help="limit of joints that turn")
@@ -121,7 +123,9 @@ def _title(run: RunDirectory) -> str:
 def _own(words: list[str], only: str, limits: SpeedLimits) -> list[Recording]:
     """Return a motion of the user's own in every condition that it fits."""
     overrides, path = motion_file(words)
-    values, found, misfits = read_motion(path), [], []
+    values = read_motion(path)
+    found: list[Recording] = []
+    misfits: list[str] = []
     for experiment in compose.expand(overrides, only=(only,) if only else ()):
         for label, condition in experiment.conditions:
             planner, problem = condition.prepare()

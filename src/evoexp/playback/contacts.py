@@ -97,7 +97,7 @@ class _Watch:
 
 
 def _contacts(watch: _Watch, part: Part, motion: Motion, ticks: FloatArray) -> list[Contact]:
-    """Return the contacts of one piece: the certifier finds each beginning, continuously, ticks and bisection its end."""
+    """Return the contacts of one piece: the certifier finds where each begins, ticks and bisection where it ends."""
     found: list[Contact] = []
     t = float(part.first)
     while t < part.last or (t == part.last == part.first and not found):

@@ -1,7 +1,7 @@
 """One motion, ready to be watched: the neutral record that pages, playable logs and trajectories are written from."""
 
 from itertools import product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -134,7 +134,9 @@ def record(
     planner, problem = condition.prepare()
     motion = planner.motion(problem, solution)
     if motion is None or getattr(problem, "scene", None) is None:
-        raise NoMotion(f"{heading.title}: the answer of '{type(planner).component}' is no motion here: nothing to watch")
+        raise NoMotion(
+            f"{heading.title}: the answer of '{type(planner).component}' is no motion here: nothing to watch"
+        )
     robot = condition.robot
     assert isinstance(robot, Robot)
     assembly, parts = robot.build(), parts_of(problem, motion)
@@ -206,7 +208,7 @@ def _tools(assembly: Assembly) -> list[tuple[int, FloatArray]]:
 
 
 def _view(shapes: tuple[Shape, ...], world: FloatArray, places: tuple[Target, ...]) -> View:
-    """Return what has to be seen: everything that moves, wherever it goes, obstacles that are not too large, targets."""
+    """Return what has to be seen: what moves, wherever it goes, obstacles that are not too large, targets."""
     moving = [shape for shape in shapes if shape.role == "arm"]
     ways = [_corners(shape, world) for shape in moving]
     room = float(np.ptp(np.concatenate(ways), axis=0).max())

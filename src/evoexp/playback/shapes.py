@@ -18,8 +18,8 @@ class Outline(NamedTuple):
 
     Attributes:
         kind: What it is.
-        size: box: the edges | sphere: radius | ellipsoid: semi-axes | capsule, cylinder, cone: radius, length (a capsule's is
-            that of its segment) | half-space (all points with z ≤ 0) and mesh: nothing.
+        size: box: the edges | sphere: radius | ellipsoid: semi-axes | capsule, cylinder, cone: radius, length (that of
+            a capsule is its segment's) | half-space (all points with z ≤ 0) and mesh: nothing.
         points: (points, 3) corners of a mesh; None otherwise.
         triangles: (triangles, 3) indices of corners.
     """

@@ -4,6 +4,7 @@ import base64
 import html
 import json
 import math
+import re
 from collections.abc import Sequence
 from importlib import resources
 from typing import Any
@@ -35,9 +36,7 @@ def page(recordings: Sequence[Recording]) -> bytes:
     values = {name: (assets / f"{FILES[name]}.{kind}").read_text(encoding="utf-8") for name, kind in PARTS.items()}
     values["title"] = html.escape(" | ".join(recording.heading.title for recording in recordings))
     values["motions"] = data.replace("<", "\\u003c")  # nothing in it can end the script element
-    for name, value in values.items():
-        text = text.replace(f"{{{{{name}}}}}", value, 1)
-    return text.encode()
+    return re.sub(r"\{\{(\w+)\}\}", lambda found: values[found[1]], text).encode()
 
 
 def _motion(recording: Recording) -> dict[str, Any]:

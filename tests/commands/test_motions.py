@@ -75,3 +75,13 @@ def test_a_condition_that_was_not_run_here_says_how(refused: Refused) -> None:
 def test_play_writes_a_log_and_its_layout(evoexp: Evoexp, stored: Path, runs: list[str]) -> None:
     assert evoexp("play", runs[0]).code == 0
     assert {path.suffix for path in (stored / "motions").iterdir()} == {".mcap", ".json"}
+
+
+def test_export_writes_trajectories(evoexp: Evoexp, stored: Path, runs: list[str]) -> None:
+    assert evoexp("export", runs[0]).code == 0
+    assert evoexp("export", runs[0], "--format", "csv", "--timing", "optimal").code == 0
+    assert {path.suffix for path in (stored / "motions").iterdir()} == {".csv", ".json"}
+
+
+def test_export_refuses_what_cannot_be(refused: Refused, runs: list[str]) -> None:
+    assert refused("export", runs[0], "--ramp", "-1") == "--ramp: must be greater than 0, was -1.0"

@@ -46,7 +46,7 @@ def recordings(arguments: argparse.Namespace) -> list[Recording]:
         EvoexpError: One line says what is wrong.
     """
     words: list[str] = arguments.what
-    limits = _limits(arguments)
+    limits = speed_limits(arguments)
     if any("=" in word for word in words):
         return _own(words, arguments.only, limits)
     if len(words) > MANY:
@@ -83,7 +83,12 @@ def write(path: Path, content: bytes) -> None:
     print(f"{path}  ({f'{size / 1000:.2f} MB' if size >= 1000 else f'{size:.0f} kB'})")
 
 
-def _limits(arguments: argparse.Namespace) -> SpeedLimits:
+def speed_limits(arguments: argparse.Namespace) -> SpeedLimits:
+    """Return the joints' limits.
+
+    Raises:
+        SettingError: If one is not above 0.
+    """
     for name in ("turn_speed", "slide_speed"):
         value = getattr(arguments, name)
         if value is not None and not 0.0 < value < math.inf:

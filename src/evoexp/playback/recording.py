@@ -85,6 +85,7 @@ class Recording(NamedTuple):
         q: (ticks, nq) [rad, length unit].
         dq: (ticks, nq) [rad/s, length unit/s].
         seconds: From instant to instant.
+        size: Of the scene, by which lengths are judged [length unit].
         frames: What moves bodies.
         poses: Of the frames, at the ticks.
         shapes: The bodies: every coal shape once.
@@ -106,6 +107,7 @@ class Recording(NamedTuple):
     q: FloatArray
     dq: FloatArray
     seconds: float
+    size: float
     frames: tuple[Frame, ...]
     poses: Poses
     shapes: tuple[Shape, ...]
@@ -161,6 +163,7 @@ def record(
         q=np.array([motion.at(float(t)) for t in times]),
         dq=velocities(motion, times, seconds),
         seconds=seconds,
+        size=size,
         frames=frames_of(model, carried),
         poses=where,
         shapes=shapes,

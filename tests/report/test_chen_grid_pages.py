@@ -104,3 +104,11 @@ def test_the_page_of_fig_1_names_every_slip(outputs: Path) -> None:
 def test_other_planners_get_the_generic_page(outputs: Path, figures: str) -> None:
     results = smoke_results(outputs, "rana_planar", "ga.population_size=8", "ga.num_generations=1")
     assert page_of(results, page_settings("rana_planar", figures)).claims == ()
+
+
+def test_the_page_of_the_mission_shows_path_posture_and_verdict(outputs: Path) -> None:
+    directory = smoke_report(outputs, "chen_mission")
+    assert figure_stems(directory) == {"mission"}
+    text = (directory / "index.md").read_text()
+    assert "2 of 2 (34–100 %) free of contact over the whole motion; 0 touch" in text
+    assert "from the last node to the docking place" in text

@@ -12,6 +12,7 @@ longer one.
 import numpy as np
 
 from evoexp.numerics import kernel
+from evoexp.records import FloatArray
 
 
 @kernel
@@ -35,7 +36,7 @@ def draw_index(draws, count):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def walk(draws, neighbours, potentials, steps, ends, erase, path, place):  # type: ignore[no-untyped-def]
+def walk(draws, neighbours, potentials, steps, choices, ends, erase, path, place):  # type: ignore[no-untyped-def]
     """Write a random path: every step draws one of the permitted moves, weighted toward the target.
 
     A neighbour of potential U has the weight U_max − U + 1, U_max being the greatest among the neighbours (Chen &
@@ -46,16 +47,24 @@ def walk(draws, neighbours, potentials, steps, ends, erase, path, place):  # typ
         neighbours: (nodes, moves), see `grids.Grid`.
         potentials: (≥ greatest number of steps + 1,) potential after so many steps of the front from the target.
         steps: (nodes,) of the front from the target, see `grids.front`.
+        choices: What `choice_table` made of all that, or empty arrays.
         ends: Indices of the node it starts at and of the target, which the front must reach.
         erase: Whether loops are erased as they arise.
         path: (≥ nodes + 1,) written; see above.
         place: (nodes,) scratch.
     """
+    uniforms, taken = draws
+    added, targets = choices
     node, target = ends
+    at, num = taken[0], len(uniforms)
     path[1], count = node, 1
     place[node] = 1
-    while node != target and not used_up(draws):
-        node = _next_node(draws, neighbours[node], potentials, steps, node)
+    while node != target and at < num:
+        if len(added) > 0:
+            node = _choose(uniforms[at], added, targets, node)
+        else:
+            node = _next_node(uniforms[at], neighbours, potentials, steps, node)
+        at += 1
         if not erase and count == len(path) - 1:  # full: what has no loops fits always
             count = erase_loops(path, count, path, place)
         known = place[node]
@@ -65,27 +74,61 @@ def walk(draws, neighbours, potentials, steps, ends, erase, path, place):  # typ
             count += 1
             path[count] = node
             place[node] = count
+    taken[0] = at if node == target else num + 1
     path[0] = count
 
 
+def choice_table(neighbours: np.ndarray, potentials: FloatArray, steps: np.ndarray) -> tuple[FloatArray, np.ndarray]:
+    """Return the choices of walks to one target at every node, which many walks share.
+
+    Args:
+        neighbours: (nodes, moves), see `grids.Grid`.
+        potentials: See `walk`.
+        steps: (nodes,) of the front from the target.
+
+    Returns:
+        Weights of the moves added up, and where each move leads to, (nodes, moves); a move that is not permitted adds
+        nothing and leads where the one before it does.
+    """
+    permitted = neighbours >= 0
+    potential = np.where(permitted, potentials[steps[neighbours]], -np.inf)
+    greatest = np.maximum(potential.max(axis=1, keepdims=True), 0.0)
+    weights = np.where(permitted, greatest - potential + 1.0, 0.0)
+    targets = np.where(permitted, neighbours, -1)
+    before = np.arange(len(targets))
+    for move in range(targets.shape[1]):
+        targets[:, move] = before = np.where(permitted[:, move], targets[:, move], before)
+    return np.cumsum(weights, axis=1), targets.astype(np.int32)
+
+
 @kernel
-def _next_node(draws, neighbours, potentials, steps, node):  # type: ignore[no-untyped-def]
-    """Draw one of a node's neighbours; the node itself if it has none."""
+def _choose(uniform, added, targets, node):  # type: ignore[no-untyped-def]
+    """Choose one of a node's neighbours as `_next_node` does, from a `choice_table`."""
+    last = added.shape[1] - 1
+    place, move = uniform * added[node, last], 0
+    while move < last and added[node, move] <= place:
+        move += 1
+    return targets[node, move]
+
+
+@kernel
+def _next_node(uniform, neighbours, potentials, steps, node):  # type: ignore[no-untyped-def]
+    """Choose one of a node's neighbours by a uniform number; the node itself if it has none."""
     greatest, total, count = 0.0, 0.0, 0
-    for move in range(len(neighbours)):
-        other = neighbours[move]
+    for move in range(neighbours.shape[1]):
+        other = neighbours[node, move]
         if other >= 0:
             potential = potentials[steps[other]]
             greatest = max(greatest, potential)
             total += potential
             count += 1
-    left = draw(draws) * (count * (greatest + 1.0) - total)
-    for move in range(len(neighbours)):
-        other = neighbours[move]
+    left, chosen = uniform * (count * (greatest + 1.0) - total), node
+    for move in range(neighbours.shape[1]):
+        other = neighbours[node, move]
         if other >= 0 and left >= 0.0:
-            node = other
+            chosen = other
             left -= greatest - potentials[steps[other]] + 1.0
-    return node
+    return chosen
 
 
 @kernel

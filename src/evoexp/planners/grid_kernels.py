@@ -23,7 +23,8 @@ def begin(draws, world, weights, erase, paths, results, place):  # type: ignore[
     Args:
         draws: See `paths.grid_walks`.
         world: (neighbours, moves of a front, coordinates, kinds, unsafeness, potentials, fronts, steps from the goal,
-            (start, goal)); `fronts` (nodes, nodes) holds the steps to every node from every other, or nothing.
+            (start, goal), choices of walks to the goal, the same of no walk); `fronts` (nodes, nodes) holds the steps
+            to every node from every other, or nothing.
         weights: ε and λ of Eq. 1.
         erase: Whether loops are erased.
         paths: (individuals, nodes + 1) written.
@@ -34,7 +35,7 @@ def begin(draws, world, weights, erase, paths, results, place):  # type: ignore[
         Whether the draws sufficed; if not, the population is not complete.
     """
     for k in range(len(paths)):
-        walk(draws, world[0], world[5], world[7], world[8], erase, paths[k], place)
+        walk(draws, world[0], world[5], world[7], world[9], world[8], erase, paths[k], place)
         if used_up(draws):
             return False
         measure(paths[k], world, weights, results, k)
@@ -296,7 +297,7 @@ def connection(draws, neighbours, one, two):  # type: ignore[no-untyped-def]
 @kernel
 def mutate(draws, world, erase, path, scratch):  # type: ignore[no-untyped-def]
     """Replace what lies between two nodes of a path, drawn at random, by a random walk from one to the other."""
-    neighbours, num_moves, _, _, _, potentials, fronts, _, _ = world
+    neighbours, num_moves, _, _, _, potentials, fronts, _, _, _, none = world
     place, joined, _, steps, queue, walked = scratch
     count = path[0]
     first = draw_index(draws, count) + 1
@@ -305,10 +306,10 @@ def mutate(draws, world, erase, path, scratch):  # type: ignore[no-untyped-def]
     low, high = min(first, second), max(first, second)
     ends = (path[low], path[high])
     if len(fronts) > 0:
-        walk(draws, neighbours, potentials, fronts[ends[1]], ends, erase, walked, place)
+        walk(draws, neighbours, potentials, fronts[ends[1]], none, ends, erase, walked, place)
     else:
         spread_front(neighbours, num_moves, path[high : high + 1], steps, queue)
-        walk(draws, neighbours, potentials, steps, ends, erase, walked, place)
+        walk(draws, neighbours, potentials, steps, none, ends, erase, walked, place)
     last = low - 1
     for k in range(1, low):
         joined[k] = path[k]

@@ -20,6 +20,7 @@ from evoexp.errors import SettingError
 from evoexp.evolution.scaled_settings import ScaledGenetic
 from evoexp.evolution.statistics import cost_statistics
 from evoexp.objectives.path_cost import PathCost
+from evoexp.paths.grid_walks import choice_table
 from evoexp.paths.grids import UNREACHED, spread_front
 from evoexp.paths.motion import Motion
 from evoexp.planners import grid_kernels
@@ -122,10 +123,19 @@ class GridPathGa(Component):
         if steps[start] == UNREACHED:
             must = f"a node that can be reached from the start {list(scenario.start)}; obstacles are between"
             raise SettingError("scenario.goal", must, list(scenario.goal))
-        world = (own.neighbours, fields.num_moves, own.coordinates, own.kinds, fields.unsafeness, fields.potentials)
+        world: tuple[Any, ...] = (
+            own.neighbours,
+            fields.num_moves,
+            own.coordinates,
+            own.kinds,
+            fields.unsafeness,
+            fields.potentials,
+        )
         ends = start, goal
         bodies = scene(robot.build(), scenario.bodies())
-        return Problem(fields, steps, ends, (*world, _fronts(fields), steps, ends), bodies, scenario.security_margin)
+        choices = choice_table(own.neighbours, fields.potentials, steps)
+        world += (_fronts(fields), steps, ends, choices, tuple(part[:0] for part in choices))
+        return Problem(fields, steps, ends, world, bodies, scenario.security_margin)
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield the population of random paths, then every generation."""

@@ -31,6 +31,8 @@ class PlacementConventional(Reference):
     - subgradient: see `placement_subgradient`.
     - bounded: sequential quadratic programming again, the greatest torque as a variable above all torques.
 
+    Terms: `<method>_evaluations`: of E per start; derivatives of `newton` and `bounded` are exact and not counted.
+
     Attributes:
         num_starts: Starts.
         num_steps: Steps of the subgradient method.
@@ -54,11 +56,12 @@ class PlacementConventional(Reference):
         arrays = {name: np.array([_row(model, end) for end in found]) for name, found in ends.items()}
         every = np.concatenate(list(arrays.values()))
         best = every[int(np.argmin(every[:, 2]))]
-        evaluations = sum(end.evaluations for found in ends.values() for end in found)
+        spent = {name: sum(end.evaluations for end in found) for name, found in ends.items()}
+        terms = {f"{name}_evaluations": total / self.num_starts for name, total in spent.items()}
         solved = bool(np.isfinite(best[2]))
         solution = best[:2].copy()
         cost = float(problem.model.posture(*solution)[1][0])  # at the angles that are kept
-        return Truth(solution, cost, solved, evaluations, {}, arrays | {"starts": places})
+        return Truth(solution, cost, solved, sum(spent.values()), terms, arrays | {"starts": places})
 
     def _starts(self, problem: Any, model: Directions) -> tuple[list[FloatArray], FloatArray]:
         """Return feasible postures as directions, and as θ1, θ2, θ3 [deg] (starts, 3)."""

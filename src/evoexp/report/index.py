@@ -27,6 +27,7 @@ def render(page: Page, results: Results, settings: ReportSettings, command: str)
         f"{page.introduction}\n" if page.introduction else "",
         _section("Conditions", _conditions(results, settings)),
         _section("Results", _quantities(page, results)),
+        *(_section(t.heading, markdown.table(t.headers, t.rows) + f"\n{t.note}\n" * bool(t.note)) for t in page.tables),
         _section("Claims", _claims(page.claims)),
         _section("Known defects and checks", _checks(page.checks)),
         *(_section(heading, _comparison(rows, settings)) for heading, rows in page.comparisons),

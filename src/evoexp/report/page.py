@@ -41,6 +41,22 @@ class Quantity(NamedTuple):
     spreads: dict[str, Spread]  # by label
 
 
+class Table(NamedTuple):
+    """A table of a page's own.
+
+    Attributes:
+        heading: Above it.
+        headers: Of its columns.
+        rows: Their cells, as text or numbers.
+        note: Below it.
+    """
+
+    heading: str
+    headers: tuple[str, ...]
+    rows: tuple[tuple[object, ...], ...]
+    note: str = ""
+
+
 class Page(NamedTuple):
     """A report before it is written.
 
@@ -48,6 +64,7 @@ class Page(NamedTuple):
         title: Heading.
         introduction: One paragraph.
         quantities: The table of results.
+        tables: Of its own.
         claims: With verdicts; empty where there is no paper to judge.
         checks: (what, finding): known defects and checks of the scene, shown at every budget.
         comparisons: Of conditions on common seeds, by heading.
@@ -57,6 +74,7 @@ class Page(NamedTuple):
     title: str
     introduction: str
     quantities: tuple[Quantity, ...] = ()
+    tables: tuple[Table, ...] = ()
     claims: tuple[Claim, ...] = ()
     checks: tuple[tuple[str, str], ...] = ()
     comparisons: tuple[tuple[str, tuple[Comparison, ...]], ...] = ()

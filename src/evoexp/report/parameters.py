@@ -87,14 +87,26 @@ def option(path: Path) -> dict[str, Entry]:
     node = yaml.compose(text)
     entries: dict[str, Entry] = {}
     for base in yaml.safe_load(text).get("defaults", ()):
-        if isinstance(base, str) and base != "_self_":
-            entries |= option(path.parent / f"{base}.yaml")
+        if base != "_self_" and (isinstance(base, str) or all("@" in key for key in base)):
+            entries |= _taken_in(base, path, entries)
     for key, leaf in _leaves(node, ""):
         value = yaml.safe_load(yaml.serialize(leaf))
         if key.endswith(f".{FILE}"):  # conditions know files by their content
             key, value = key.removesuffix(FILE) + SHA256, keep((path.parent / value).read_bytes())
         entries[key] = Entry(value, *_comment(text.splitlines(), leaf))
     return entries
+
+
+def _taken_in(base: Any, path: Path, entries: dict[str, Entry]) -> dict[str, Entry]:
+    """Return the entries of an option that another one takes in: `name`, `name@part` or `/group@part: name`."""
+    key, name = next(iter(base.items())) if isinstance(base, dict) else ("", str(base))
+    name, _, part = name.partition("@")
+    if key:
+        group, _, part = key.removeprefix("/").partition("@")
+        entries.pop(part, None)  # what stood there was taken from a group
+        return {f"{part}.{own}": entry for own, entry in option(path.parents[1] / group / f"{name}.yaml").items()}
+    prefix = f"{part}." if part else ""
+    return {prefix + own: entry for own, entry in option(path.parent / f"{name}.yaml").items()}
 
 
 def _leaves(node: Any, prefix: str) -> Iterator[tuple[str, Any]]:
@@ -128,10 +140,21 @@ def _component(group: str, config: dict[str, Any], preferred: dict[str, str]) ->
     for key, value in config.items():
         if key in (TARGET, "revision"):
             continue
-        reference = _REFERENCE.fullmatch(str(entries[key].value)) if key in entries else None
-        if reference and isinstance(value, dict):
-            yield from _component(reference[1], value, preferred)
-            continue
+        yield from _setting(group, key, value, entries, preferred)
+
+
+def _setting(
+    group: str, key: str, value: Any, entries: dict[str, Entry], preferred: dict[str, str]
+) -> Iterator[Parameter]:
+    """Yield a setting; of a component in a component its settings."""
+    reference = _REFERENCE.fullmatch(str(entries[key].value)) if key in entries else None
+    if reference and isinstance(value, dict):
+        yield from _component(reference[1], value, preferred)
+    elif isinstance(value, dict) and TARGET in value:
+        for name, item in value.items():
+            if name not in (TARGET, "revision"):
+                yield from _setting(group, f"{key}.{name}", item, entries, preferred)
+    else:
         for path, leaf in _flat(value, key):
             yield _parameter(f"{group}.{path}", leaf, entries.get(path), OVERRIDE)
 

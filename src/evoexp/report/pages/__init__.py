@@ -13,7 +13,10 @@ if TYPE_CHECKING:  # pandas: `evoexp run` asks for the names of the pages before
 PAGES = {
     "chen_fields": "evoexp.report.pages.chen_fields:page",
     "chen_lingering": "evoexp.report.pages.chen_lingering:page",
+    "chen_mission": "evoexp.report.pages.chen_mission:page",
     "chen_path": "evoexp.report.pages.chen_path:page",
+    "chen_landscapes": "evoexp.report.pages.chen_landscapes:page",
+    "chen_placement": "evoexp.report.pages.chen_placement:page",
     "curkovic": "evoexp.report.pages.curkovic:page",
     "curkovic_motion": "evoexp.report.pages.curkovic_motion:page",
     "curkovic_pareto": "evoexp.report.pages.curkovic_pareto:page",

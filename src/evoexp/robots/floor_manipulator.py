@@ -1,0 +1,63 @@
+"""A platform that moves over a floor, with an arm of three links upright on it (Chen & Zalzala 1995, both examples)."""
+
+from typing import ClassVar
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from evoexp.robots.assembly import Assembly, Link, Robot, link_capsule
+from evoexp.robots.floor_platform import FloorPlatform
+from evoexp.robots.kinematics import kinematic_table
+from evoexp.robots.mobile_arm import MobileArm
+from evoexp.validation import NonNegative, Positive
+
+NUM_JOINTS = 5
+
+
+class FloorManipulator(Robot):
+    """Prismatic joints along x and y, then three revolute ones in the upright plane through x; q = (x, y, θ1, θ2, θ3).
+
+    Positive angles lift a link that points to +x. The platform is an upright cylinder; the arm's first joint stands in
+    the middle of its top.
+
+    Attributes:
+        body_radius: Of the platform [length unit of the scene].
+        body_height: Of the platform.
+        link_lengths: l1, l2, l3.
+        link_radius: Half the thickness of every link; 0: a line.
+    """
+
+    component: ClassVar[str] = "floor_manipulator"
+
+    body_radius: Positive
+    body_height: Positive
+    link_lengths: tuple[Positive, Positive, Positive]
+    link_radius: NonNegative = 0.0
+
+    def build(self) -> Assembly:
+        """Return the model with the platform as its first body and the links of the arm behind it."""
+        model, geometry = pin.Model(), pin.GeometryModel()
+        first = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "platform_x")
+        parent = model.addJoint(first, pin.JointModelPY(), pin.SE3.Identity(), "platform_y")
+        top = np.array([0.0, 0.0, self.body_height])
+        body = pin.SE3(np.eye(3), 0.5 * top)
+        shape = coal.Cylinder(self.body_radius, self.body_height)
+        geometry.addGeometryObject(pin.GeometryObject("link_0", parent, 0, body, shape))
+        links, place = [Link(0, parent, np.zeros(3), top, self.body_radius)], top
+        for k, length in enumerate(self.link_lengths):
+            joint = pin.JointModelRevoluteUnaligned(np.array([0.0, -1.0, 0.0]))
+            parent = model.addJoint(parent, joint, pin.SE3(np.eye(3), place), f"arm_joint_{k}")
+            place = np.array([length, 0.0, 0.0])
+            links.append(Link(0, parent, np.zeros(3), place, self.link_radius))
+            geometry.addGeometryObject(link_capsule(links[-1], f"link_{k + 1}"))
+        return Assembly(model, geometry, tuple(links), np.array([[0, model.nq]]), kinematic_table(model))
+
+    def platform(self) -> FloorPlatform:
+        """Return the platform alone."""
+        return FloorPlatform(body_radius=self.body_radius, body_height=self.body_height)
+
+    def arm(self) -> MobileArm:
+        """Return the arm on a platform that moves along a line."""
+        size = (2.0 * self.body_radius, min(self.body_height, self.body_radius))
+        return MobileArm(link_lengths=self.link_lengths, platform_size=size, link_radius=self.link_radius)

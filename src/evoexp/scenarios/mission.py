@@ -1,0 +1,31 @@
+"""A platform drives over a grid to where its arm has a task."""
+
+from typing import ClassVar
+
+from evoexp.scenarios.docking import Docking
+from evoexp.scenarios.grid_motion import GridMotion
+from evoexp.validation import Component
+
+
+class Mission(Component):
+    """Both examples of Chen & Zalzala 1995 together.
+
+    Attributes:
+        grid: The floor; its goal is where the platform is expected to dock.
+        docking: The task of the arm, in a plane whose origin is at `task_origin`.
+        task_origin: Where on the floor the task's X = 0 is (x, y); X points along x, the task's Y = 0 is the height of
+            the arm's first joint [length unit].
+        travel_posture: θ1, θ2, θ3 while the platform drives [deg].
+    """
+
+    component: ClassVar[str] = "mission"
+
+    grid: GridMotion
+    docking: Docking
+    task_origin: tuple[float, float]
+    travel_posture: tuple[float, float, float]
+
+    @property
+    def length_unit(self) -> str:
+        """Of the grid."""
+        return self.grid.length_unit

@@ -19,9 +19,8 @@ from omegaconf import DictConfig, ListConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 from pydantic import ValidationError
 
-from evoexp.attachments import with_files
 from evoexp.batch.settings import RunnerSettings
-from evoexp.condition import PARTS, Condition, component_class
+from evoexp.condition import PARTS, Condition, component_class, read_files
 from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting, nearest
 from evoexp.report.settings import ReportSettings
 from evoexp.shipped import config_directory
@@ -176,7 +175,7 @@ def _condition(config: DictConfig, budget: Budget) -> Condition:
     _cap_generations(config, budget)
     raw = str(OmegaConf.to_container(config.planner, resolve=False))
     try:
-        plain: Any = with_files(OmegaConf.to_container(config, resolve=True), config_directory() / "scenario")
+        plain: Any = read_files(OmegaConf.to_container(config, resolve=True), config_directory() / "scenario")
     except OmegaConfBaseException as error:
         if absent := [group for group in PLANNER_PARTS if f"key '{group}' not found" in str(error)]:
             raise SettingError(absent[0], f"chosen: {', '.join(options(absent[0]))}", None) from None

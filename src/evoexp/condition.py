@@ -9,11 +9,12 @@ import hashlib
 import importlib
 import importlib.metadata
 import json
+from pathlib import Path
 from typing import Any, NamedTuple, cast, get_type_hints
 
 import numpy as np
 
-from evoexp.attachments import attached
+from evoexp.attachments import attached, with_files
 from evoexp.errors import RevisionMismatch, SettingError, UnknownSetting, nearest
 from evoexp.validation import TARGET, Component, build
 
@@ -22,6 +23,7 @@ REGISTRY = {
     "mobile_arm": "evoexp.robots.mobile_arm:MobileArm",
     "planar_chain": "evoexp.robots.planar_chain:PlanarChain",
     "serial_chain": "evoexp.robots.serial_chain:SerialChain",
+    "urdf": "evoexp.robots.urdf:Urdf",
     "dh_chain": "evoexp.robots.dh_chain:DhChain",
     "floor_platform": "evoexp.robots.floor_platform:FloorPlatform",
     "floor_manipulator": "evoexp.robots.floor_manipulator:FloorManipulator",
@@ -86,6 +88,30 @@ def component_class(name: str, field: str = TARGET) -> type[Component]:
 def _registry() -> dict[str, str]:
     plugins = {point.name: point.value for point in importlib.metadata.entry_points(group="evoexp.components")}
     return plugins | REGISTRY
+
+
+def read_files(config: Any, shipped: Path) -> Any:
+    """Return plain data with the contents' hashes in the place of paths; the contents are kept.
+
+    Besides `{file: path}` (see `attachments.with_files`), components may have files of their own: those have a class
+    method `read_files(settings, field)`. Only what a user typed is read; what a log holds names no paths.
+
+    Args:
+        config: Any nesting of mappings, lists and scalars.
+        shipped: Where paths are looked for that are not there from the current directory.
+    """
+    return with_files(_component_files(config, ""), shipped)
+
+
+def _component_files(value: Any, field: str) -> Any:
+    if isinstance(value, list):
+        return [_component_files(item, f"{field}[{k}]") for k, item in enumerate(value)]
+    if not isinstance(value, dict):
+        return value
+    if isinstance(value.get(TARGET), str):
+        reads = getattr(component_class(value[TARGET], field), "read_files", None)
+        value = reads(value, field) if reads is not None else value
+    return {key: _component_files(item, f"{field}.{key}" if field else str(key)) for key, item in value.items()}
 
 
 class Prepared(NamedTuple):

@@ -25,6 +25,7 @@ class SettingError(EvoexpError):
         field: Dotted path of the setting, as one would type it (`ga.population_size`).
         must: What the setting must be.
         was: The value given, as text.
+        hint: What was perhaps meant.
     """
 
     def __init__(self, field: str, must: str, was: object, hint: str = "") -> None:
@@ -32,6 +33,7 @@ class SettingError(EvoexpError):
         self.field = field
         self.must = must
         self.was = was
+        self.hint = hint
 
 
 class UnknownSetting(EvoexpError):

@@ -86,7 +86,7 @@ def _construct(kind: type[Component], settings: dict[str, Any], field: str) -> C
     except ValidationError as error:
         raise settings_error(kind, error, settings, field) from None
     except SettingError as error:
-        raise SettingError(_join(field, error.field), error.must, error.was) from None
+        raise SettingError(_join(field, error.field), error.must, error.was, error.hint) from None
 
 
 def settings_error(
@@ -96,8 +96,10 @@ def settings_error(
     first = error.errors(include_url=False)[0]
     path, here = field, settings
     for part in first["loc"]:
-        if isinstance(part, int):
+        if isinstance(part, int) and isinstance(here, list | tuple):
             path, here = f"{path}[{part}]", here[part] if part < len(here) else {}
+        elif isinstance(part, int):  # one value in the place of a list
+            continue
         elif part in here or part == first["loc"][-1]:  # else: the tag of a union, which nobody typed
             path, here = _join(path, part), here.get(part, {}) if isinstance(here, Mapping) else {}
     if first["type"] == "extra_forbidden":

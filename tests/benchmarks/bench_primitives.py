@@ -1,4 +1,4 @@
-"""Spheres and capsules of a 6R arm among ten obstacles, batches of 128, beside Pinocchio with coal and beside numpy.
+"""Spheres and capsules of a 6R arm among ten obstacles, batches of 100, beside Pinocchio with coal and beside numpy.
 
 Two kinds of batches: configurations at random, of which two in five collide, and configurations of a converged
 population, which hardly differ. coal answers for the same arm as 11 capsules and as the same 59 spheres; it stops at a
@@ -16,7 +16,7 @@ from evoexp.collision.primitives import PrimitiveCollision, shapes_of_geometry
 from evoexp.scenarios.obstacles import obstacle_table
 from references import arms_6r, primitives_numpy
 
-SIZE = 128
+SIZE = 100
 IGNORED = [(1, arms_6r.FLOOR)]
 DRAWN = {"random": arms_6r.random_configurations, "population": arms_6r.population}
 

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 import coal
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from evoexp.collision.body_table import UnsupportedShape
 from evoexp.records import FloatArray
@@ -61,7 +60,7 @@ def sphere_cover(item: Any, inflation: float) -> Cover:
     best = _column(shape) if isinstance(shape, coal.Cylinder | coal.Cone) else None
     for counts in _lattices(solid.high - solid.low):
         centers, radius = _cells(solid, counts)
-        found = _Spheres(centers, radius, float((solid.distance(centers) + radius).max()))
+        found = _Spheres(centers, radius, float((solid.far(centers) + radius).max()))
         if best is None or found.reach < best.reach:
             best = found
         if best.reach <= inflation:
@@ -120,35 +119,53 @@ def capsule_cover(item: Any) -> Cover:
 
 
 class _Solid(NamedTuple):
-    """A convex body in its own frame: the box around it, and a function (points, 3) → signed distance or more."""
+    """A convex body in its own frame: the box around it, and bounds (points, 3) → (points,) of signed distances."""
 
     low: FloatArray
     high: FloatArray
-    distance: Any
+    near: Any  # at most the distance
+    far: Any  # at least the distance
 
 
 def _solid(item: Any) -> _Solid:
     shape = item.geometry
     if isinstance(shape, coal.Box):
         half = np.array(shape.halfSide)
-        return _Solid(-half, half, lambda points: _box_distance(points, half))
+        return _exact(half, lambda points: _box_distance(points, half))
     if isinstance(shape, coal.Cylinder):
         half = np.array([shape.radius, shape.radius, shape.halfLength])
-        return _Solid(-half, half, lambda points: _cylinder_distance(points, shape.radius, shape.halfLength))
+        return _exact(half, lambda points: _cylinder_distance(points, shape.radius, shape.halfLength))
     if isinstance(shape, coal.Ellipsoid):
         half = np.array(shape.radii)
-        return _Solid(-half, half, lambda points: _box_distance(points, half))
+        return _Solid(-half, half, lambda points: _box_distance(points, half), lambda p: _ellipsoid_bound(p, half))
+    if isinstance(shape, coal.Cone):
+        half = np.array([shape.radius, shape.radius, shape.halfLength])
+        around = _exact(half, lambda points: _cylinder_distance(points, shape.radius, shape.halfLength))
+        return around._replace(far=lambda points: np.maximum(_coal_distance(points, shape), 0.0))
     if isinstance(shape, coal.ConvexBase):
         corners = np.array([shape.point(i) for i in range(shape.num_points)])
     elif isinstance(shape, coal.BVHModelBase):
         corners = np.array([shape.vertex(i) for i in range(shape.num_vertices)])
-    elif isinstance(shape, coal.Cone):
-        half = np.array([shape.radius, shape.radius, shape.halfLength])
-        return _Solid(-half, half, lambda points: _cylinder_distance(points, shape.radius, shape.halfLength))
     else:
         raise UnsupportedShape(f"robot: body '{item.name}' must be a solid, was a {type(shape).__name__}")
+    from scipy.spatial import ConvexHull  # only meshes need it, and it takes long to load
+
     planes = ConvexHull(corners).equations  # outward normals, unit length
-    return _Solid(corners.min(axis=0), corners.max(axis=0), lambda points: _hull_distance(points, planes, shape))
+
+    def near(points: FloatArray) -> FloatArray:
+        return np.asarray((points @ planes[:, :3].T + planes[:, 3]).max(axis=1))
+
+    def far(points: FloatArray) -> FloatArray:
+        found: FloatArray = near(points)
+        outside = np.flatnonzero(found > 0.0)
+        found[outside] = np.maximum(found[outside], _coal_distance(points[outside], shape))
+        return found
+
+    return _Solid(corners.min(axis=0), corners.max(axis=0), near, far)
+
+
+def _exact(half: FloatArray, distance: Any) -> _Solid:
+    return _Solid(-half, half, distance, distance)
 
 
 def _lattices(edges: FloatArray) -> list[tuple[int, ...]]:
@@ -171,7 +188,7 @@ def _cells(solid: _Solid, counts: tuple[int, ...]) -> tuple[FloatArray, float]:
     axes = [solid.low[k] + cell[k] * (np.arange(counts[k]) + 0.5) for k in range(3)]
     centers = np.array(list(product(*axes)))
     radius = float(np.sqrt(np.sum(cell * cell))) / 2.0
-    return centers[solid.distance(centers) <= radius], radius
+    return centers[solid.near(centers) <= radius], radius
 
 
 def _box_distance(points: FloatArray, half: FloatArray) -> FloatArray:
@@ -185,15 +202,22 @@ def _cylinder_distance(points: FloatArray, radius: float, half: float) -> FloatA
     return _box_distance(flat, np.array([radius, half]))
 
 
-def _hull_distance(points: FloatArray, planes: FloatArray, shape: Any) -> FloatArray:
-    """Return signed distances from a hull: inside from its planes, outside as coal has them from the body itself."""
-    found = (points @ planes[:, :3].T + planes[:, 3]).max(axis=1)
+def _ellipsoid_bound(points: FloatArray, half: FloatArray) -> FloatArray:
+    """Return upper bounds of signed distances: outside by the way to the middle, inside by the thinnest axis."""
+    scale = np.sqrt(((points / half) ** 2).sum(axis=1))
+    away = np.sqrt((points**2).sum(axis=1))
+    outside = away * (1.0 - 1.0 / np.maximum(scale, 1.0))
+    return np.asarray(np.where(scale > 1.0, outside, (scale - 1.0) * half.min()))
+
+
+def _coal_distance(points: FloatArray, shape: Any) -> FloatArray:
+    """Return the distances of points from a body as coal has them."""
     here, ball, request, result = coal.Transform3s(), coal.Sphere(1e-9), coal.DistanceRequest(), coal.DistanceResult()
-    for k in np.flatnonzero(found > 0.0):
+    found = np.empty(len(points))
+    for k, point in enumerate(points):
         result.clear()
-        there = coal.Transform3s(np.eye(3), points[k])
-        found[k] = max(float(found[k]), coal.distance(ball, there, shape, here, request, result))
-    return np.asarray(found)
+        found[k] = coal.distance(ball, coal.Transform3s(np.eye(3), point), shape, here, request, result)
+    return found
 
 
 def _placed(item: Any, start: FloatArray, end: FloatArray, radius: FloatArray, inflation: float) -> Cover:

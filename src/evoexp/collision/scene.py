@@ -67,14 +67,15 @@ def scene(assembly: Assembly, obstacles: ObstacleTable | tuple[Any, ...] = (), s
     geometry = pin.GeometryModel()
     counts = [0] * assembly.num_arms
     bodies = list(assembly.geometry.geometryObjects)
-    for arm, item in zip(assembly.body_arms, bodies, strict=True):
+    arms = assembly.body_arms or tuple(0 for _ in bodies)
+    for arm, item in zip(arms, bodies, strict=True):
         counts[arm] += 1
-        own = not item.name.startswith("link_")  # bodies that have names of their own keep them
+        own = item.name != f"link_{sum(counts) - 1}"  # bodies that have names of their own keep them
         name = item.name if own else f"arm_{arm + 1}_link_{counts[arm]}"
         geometry.addGeometryObject(pin.GeometryObject(name, item.parentJoint, 0, item.placement, item.geometry))
     for k, (shape, placement) in enumerate(obstacle_shapes(table)):
         geometry.addGeometryObject(pin.GeometryObject(f"obstacle_{k + 1}", 0, 0, placement, shape))
-    parents, arms = assembly.model.parents, assembly.body_arms
+    parents = assembly.model.parents
     joints = [item.parentJoint for item in bodies]
     for a, one in enumerate(joints):
         for b, two in enumerate(joints[a + 1 :], start=a + 1):

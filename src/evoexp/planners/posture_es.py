@@ -19,7 +19,7 @@ from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from evoexp.collision.body_models import CollisionModel
 from evoexp.evolution.statistics import cost_statistics
@@ -53,6 +53,11 @@ class Judgement:
         return named(self.rows[:, individual], self._chosen)
 
 
+def _one_or_several(value: Any) -> Any:
+    """Return one number as a tuple of one."""
+    return (value,) if isinstance(value, int | float) and not isinstance(value, bool) else value
+
+
 class PostureEs(Component):
     """The evolution strategy of Corsépius, section 4.
 
@@ -67,7 +72,7 @@ class PostureEs(Component):
 
     component: ClassVar[str] = "posture_es"
 
-    scope: Positive | Annotated[tuple[Positive, ...], Field(min_length=1)]
+    scope: Annotated[tuple[Positive, ...], Field(min_length=1), BeforeValidator(_one_or_several)]
     edge_check: NonNegativeCount
     ga: StrategySettings
     objective: PostureCost

@@ -1,7 +1,5 @@
 """What a posture search is asked: robot, task and objective, checked against each other."""
 
-from typing import Any
-
 import numpy as np
 import pinocchio as pin
 
@@ -19,7 +17,9 @@ from evoexp.scenarios.obstacles import CAPSULE, CYLINDER, ObstacleTable, obstacl
 from evoexp.scenarios.posture_task import Phase, PointGoal, PoseGoal, PostureTask, ShiftGoal, SurfaceGoal
 
 
-def prepare(robot: Robot, task: PostureTask, scope: Any, objective: PostureCost, collision: CollisionModel) -> Problem:
+def prepare(
+    robot: Robot, task: PostureTask, scope: tuple[float, ...], objective: PostureCost, collision: CollisionModel
+) -> Problem:
     """Return the problem of a task.
 
     Raises:
@@ -34,6 +34,9 @@ def prepare(robot: Robot, task: PostureTask, scope: Any, objective: PostureCost,
     obstacles = obstacle_table(task.obstacles).without_ellipses()
     bodies = collision.bind(assembly)
     tool = assembly.tools[0]
+    for k, name in enumerate(task.names):
+        if name in bodies.names:
+            raise SettingError(f"scenario.obstacles[{k}].name", "a name that no body of the robot has", name)
     phases = task.all_phases
     problem = Problem(
         assembly,
@@ -105,8 +108,8 @@ def _start(task: PostureTask, assembly: Assembly, limits: FloatArray) -> FloatAr
     return start
 
 
-def _scope(scope: Any, nq: int) -> FloatArray:
-    given = (scope,) * nq if isinstance(scope, float | int) else scope
+def _scope(scope: tuple[float, ...], nq: int) -> FloatArray:
+    given = scope * nq if len(scope) == 1 else scope
     if len(given) != nq:
         raise SettingError("planner.scope", f"one number, or one per joint ({nq})", list(given))
     return np.array(given, dtype=np.float64)
@@ -190,24 +193,25 @@ def _stroke(assembly: Assembly, limits: FloatArray, joint: int) -> float:
 
 
 def _check_reach(problem: Problem) -> None:
-    """Refuse goals that the stretched arm cannot reach while it holds nothing."""
+    """Refuse goals that the stretched arm cannot reach while it holds nothing, in the scene as it begins."""
     task = problem.task
     center, far = reach(problem.assembly, problem.limits)
-    held = False
+    held, ways = False, len(task.subgoals)
     for k, phase in enumerate(problem.phases):
-        goal, point = phase.goal, None
+        goal, point, size = phase.goal, None, 0.0
+        field = f"scenario.subgoals[{k}]" if k < ways else f"scenario.phases[{k - ways}].goal.point"
         if isinstance(goal, PointGoal | PoseGoal) and not held:
             point = np.array(goal.point)
+        elif isinstance(goal, SurfaceGoal):
+            index = task.names.index(goal.object)
+            point, field = problem.obstacles.center[index], f"scenario.phases[{k - ways}].goal.object"
+            size = float(np.sum(problem.obstacles.size[index]))  # no point of it is farther from its middle
         if point is not None:
-            away = float(np.sqrt(np.sum((point - center) ** 2)))
+            away = float(np.sqrt(np.sum((point - center) ** 2))) - size
             if away - task.position_tolerance > far:
-                ways = len(task.subgoals)
-                field = f"scenario.subgoals[{k}]" if k < ways else f"scenario.phases[{k - ways}].goal.point"
                 where = ", ".join(f"{value:g}" for value in center)
-                must = (
-                    f"within reach, {far:.4g} {task.length_unit} from ({where}) (check_reach=false searches it anyway)"
-                )
-                raise SettingError(field, must, f"{away:.4g} away")
+                must = f"within reach, {far:.4g} {task.length_unit} from ({where})"
+                raise SettingError(field, f"{must} (check_reach=false searches it anyway)", f"{away:.4g} away")
         held = {"attach": True, "detach": False}.get(phase.then, held)
 
 

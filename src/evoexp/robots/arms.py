@@ -1,10 +1,11 @@
 """Several arms as one robot."""
 
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
 from evoexp.robots.assembly import Chain, Robot
+from evoexp.validation import TARGET
 
 
 class Arms(Robot):
@@ -17,6 +18,16 @@ class Arms(Robot):
     component: ClassVar[str] = "arms"
 
     arms: Annotated[tuple[Chain, ...], Field(min_length=1)]
+
+    @classmethod
+    def read_files(cls, settings: dict[str, Any], field: str) -> dict[str, Any]:
+        """Return settings whose `path` and `srdf`, where given, are those of all arms out of a URDF."""
+        settings = dict(settings)
+        given = {name: settings.pop(name) for name in ("path", "srdf") if name in settings}
+        shared = {name: path for name, path in given.items() if path is not None}
+        if shared and isinstance(settings.get("arms"), list):
+            settings["arms"] = [{**shared, **arm} if arm.get(TARGET) == "urdf" else arm for arm in settings["arms"]]
+        return settings
 
     def chains(self) -> tuple[Chain, ...]:
         """Return the arms."""

@@ -44,7 +44,7 @@ class Assembly(NamedTuple):
         links: Links as segments.
         arm_slices: (arms, 2) first and one-past-last index of each arm in q.
         table: The kinematic table of the model.
-        body_arms: Which arm each body belongs to.
+        body_arms: Which arm each body belongs to; empty: all to one.
         tools: The tool's frame of each arm.
         disabled: Pairs of bodies' names that are never judged (an SRDF's).
     """
@@ -85,9 +85,8 @@ class Robot(Component):
             own = chain.append_to(model, k)
             bodies = chain.append_bodies(model, k, joint, own)
             for body in bodies:
-                body.name = body.name or f"link_{geometry.ngeoms}"
-                if len(self.chains()) > 1 and geometry.existGeometryName(body.name):
-                    body.name = f"arm_{k + 1}_{body.name}"
+                several = f"arm_{k + 1}_" if len(self.chains()) > 1 else ""
+                body.name = several + body.name if body.name else f"link_{geometry.ngeoms}"
                 geometry.addGeometryObject(body)
             links += own
             arms += [k] * len(bodies)

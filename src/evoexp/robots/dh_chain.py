@@ -27,12 +27,6 @@ class DhJoint(Settings):
     limits: tuple[float, float]
     kind: Literal["revolute", "prismatic"] = "revolute"
 
-    @model_validator(mode="after")
-    def _limits_are_in_order(self) -> Self:
-        if not self.limits[0] < self.limits[1]:
-            raise SettingError("limits", "[least, greatest] with least < greatest", list(self.limits))
-        return self
-
     def behind(self) -> Any:
         """Return the `pin.SE3` from the frame that the joint moves to the next joint's frame: a, α, d, θ at q = 0."""
         a, alpha, d, theta = self.dh
@@ -68,6 +62,10 @@ class DhChain(Chain):
 
     @model_validator(mode="after")
     def _bodies_fit(self) -> Self:
+        for k, joint in enumerate(self.joints):
+            if not joint.limits[0] < joint.limits[1]:
+                must = "[least, greatest] with least < greatest"
+                raise SettingError(f"joints[{k}].limits", must, list(joint.limits))
         names = [body.name for body in self.bodies]
         for k, body in enumerate(self.bodies):
             if body.joint > len(self.joints):

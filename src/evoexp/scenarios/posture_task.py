@@ -78,12 +78,6 @@ class Phase(Settings):
     then: Literal["go_on", "attach", "detach"] = "go_on"
     object: str = ""
 
-    @model_validator(mode="after")
-    def _object_is_named(self) -> Self:
-        if (self.then == "attach") != bool(self.object):
-            raise SettingError("object", "given with then: attach, and only then", self.object or None)
-        return self
-
 
 class PostureTask(Component):
     """Start posture, phases and surroundings of one arm.
@@ -116,9 +110,14 @@ class PostureTask(Component):
 
     @model_validator(mode="after")
     def _holds_one_thing_at_a_time(self) -> Self:
+        for k, name in enumerate(self.names):
+            if name in self.names[:k]:
+                raise SettingError(f"obstacles[{k}].name", "a name that no other obstacle has", name)
         held = ""
         for k, phase in enumerate(self.phases):
             field = f"phases[{k}]"
+            if (phase.then == "attach") != bool(phase.object):
+                raise SettingError(f"{field}.object", "given with then: attach, and only then", phase.object or None)
             if phase.then == "attach" and held:
                 raise SettingError(f"{field}.then", f"detach before anything else is taken ({held} is held)", "attach")
             if phase.then == "detach" and not held:

@@ -16,6 +16,7 @@ SAMPLES = {  # name: overrides, label, whether the search is run to its end
     "co-evolution": (["experiment=curkovic_motion", "budget=smoke"], "cubic spline", False),
     "redundant arm": (["experiment=lavoie_7dof", "budget=smoke"], "", True),
     "grid": (["experiment=chen_path", "budget=smoke"], "(c)", False),
+    "mission": (["experiment=chen_mission", "budget=smoke"], "(b)", True),
     "placement": (["experiment=chen_placement", "budget=smoke"], "A torque norm", True),
     "postures": (["experiment=corsepius_gate_narrow", "budget=smoke"], "scope .10 rad", True),
     "pick and place": (["experiment=corsepius_pick_and_place"], "", True),

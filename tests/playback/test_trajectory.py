@@ -88,7 +88,9 @@ def test_optimal_curves_keep_the_limits_and_are_faster_than_uniform_ones() -> No
     found = along_curve(motion, np.full(2, 0.5), np.full(2, 1.0))
     assert found is not None
     times, positions, velocities = found
-    check_limits(times, positions, velocities, 0.05)  # between points the Hermite curve is near the path only
+    assert np.abs(velocities).max() <= 0.5 * 1.001
+    assert np.abs(np.diff(velocities, axis=0) / np.diff(times)[:, None]).max() <= 1.0 * 1.001
+    assert np.abs(velocities[[0, -1]]).max() < 1e-9
     truth = np.array([motion.at(t) for t in np.linspace(0.0, 2.0, 4001)])
     assert max(np.linalg.norm(truth - point, axis=1).min() for point in positions) < 1e-3
     assert np.allclose(positions[[0, -1]], motion.q[[0, -1]], atol=1e-6)

@@ -150,7 +150,7 @@ def record(
     where = poses(model, motion, times, parts, carried)
     seconds = seconds_per_instant(motion, (limits or SpeedLimits()).of(prismatic, size))
     shapes = _shapes(parts[0].scene, assembly, carried)
-    places = targets(condition.scenario)
+    places = targets(condition.scenario, robot)
     names = [str(model.names[int(joint)]) for joint in np.argsort(assembly.table.index_q) + 1]
     return Recording(
         heading=heading,
@@ -189,7 +189,8 @@ def _carried(parts: list[Part]) -> list[str]:
 
 
 def _shapes(scene: Scene, assembly: Assembly, carried: list[str]) -> tuple[Shape, ...]:
-    arms, joints = assembly.body_arms, assembly.model.njoints - 1
+    arms = assembly.body_arms or (0,) * assembly.geometry.ngeoms
+    joints = assembly.model.njoints - 1
     found = []
     for k, (name, (shape, joint, placement)) in enumerate(zip(scene.names, scene.shapes, strict=True)):
         drawn, shift = outline(shape)

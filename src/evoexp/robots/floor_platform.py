@@ -38,4 +38,4 @@ class FloorPlatform(Robot):
         placement = pin.SE3(np.eye(3), 0.5 * (start + end))
         geometry.addGeometryObject(pin.GeometryObject("link_0", parent, 0, placement, shape))
         links = (Link(0, parent, start, end, self.body_radius),)
-        return Assembly(model, geometry, links, np.array([[0, model.nq]]), kinematic_table(model), (0,))
+        return Assembly(model, geometry, links, np.array([[0, model.nq]]), kinematic_table(model))

@@ -338,6 +338,7 @@
     for (const [name, value] of motion.facts) facts.append(element("dt", { textContent: name }), element("dd", { textContent: value }));
     side.append(chart, facts); box.append(head, stage, side); $("motions-here").append(box);
     const clock = new Clock(motion), view = new Stage(motion, clock, stage), graph = new Chart(motion, clock, chart);
+    if (motion.moves) legend.append(element("span", { textContent: "○ start  ● end" }));
     legend.append(element("span", { textContent: view.step ? `grid ${shown(view.step)} ${motion.unit}` : "" }));
     stage.append(legend);
     for (const [begin, end] of motion.contacts) {

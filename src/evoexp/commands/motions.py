@@ -2,6 +2,7 @@
 
 import argparse
 import math
+from collections.abc import Mapping
 from pathlib import Path
 
 from evoexp import compose, shipped
@@ -51,7 +52,12 @@ def recordings(arguments: argparse.Namespace) -> list[Recording]:
         return _own(words, arguments.only, limits)
     if len(words) > MANY:
         raise MotionFileError(f"motions: at most {MANY} go together, got {len(words)}")
-    return [_stored(word, arguments, limits) for word in words]
+    runs = [_run(word) for word in words]
+    titles = _titles([run for run in runs if isinstance(run, RunDirectory)])
+    return [
+        stored_recording(run, run.name, limits) if isinstance(run, Path) else _stored(run, titles, arguments, limits)
+        for run in runs
+    ]
 
 
 def single(arguments: argparse.Namespace) -> Recording:
@@ -96,17 +102,23 @@ def speed_limits(arguments: argparse.Namespace) -> SpeedLimits:
     return SpeedLimits(math.radians(arguments.turn_speed), arguments.slide_speed)
 
 
-def _stored(word: str, arguments: argparse.Namespace, limits: SpeedLimits) -> Recording:
+def _run(word: str) -> RunDirectory | Path:
+    """Return the run that a hash names, or the path of a log."""
     path = Path(word)
     if path.suffix == ".mcap" or path.is_file():
-        return stored_recording(path, path.name, limits)
+        return path
     try:
-        run = resolve(outputs_root(), word)
+        return resolve(outputs_root(), word)
     except UnknownHash as error:
         raise _not_here(word, error) from None
+
+
+def _stored(
+    run: RunDirectory, titles: Mapping[str, str], arguments: argparse.Namespace, limits: SpeedLimits
+) -> Recording:
     choice = arguments.replicate if arguments.replicate is not None else arguments.choice or CHOICES[0]
     try:
-        return stored_recording(chosen_log(run, choice), _title(run), limits)
+        return stored_recording(chosen_log(run, choice), titles[run.condition_id], limits)
     except RevisionMismatch as error:
         known = run.manifest().get("command", "evoexp run experiment=…")
         raise RevisionMismatch(f"run {run.hash12}: {error}; run it anew with what is installed: {known}") from None
@@ -119,10 +131,22 @@ def _not_here(word: str, error: UnknownHash) -> EvoexpError:
     return with_candidates(error, outputs_root())
 
 
-def _title(run: RunDirectory) -> str:
-    manifest = run.manifest()
-    names = [str(manifest[name]) for name in ("experiment", "label") if manifest.get(name)]
-    return " · ".join(dict.fromkeys(names)) or run.hash12
+def _titles(runs: list[RunDirectory]) -> dict[str, str]:
+    """Return what to call runs: an experiment that has all of them, and their labels in it; else what they ran as."""
+    names: dict[str, dict[str, str]] = {run.condition_id: {} for run in runs}
+    for row in shipped.shipped() if len(names) > 1 else ():
+        if row.condition_id in names:
+            names[row.condition_id].setdefault(row.experiment, row.label)
+    common = set.intersection(*(set(labels) for labels in names.values())) if names else set()
+    if common:
+        first = next(name for name in next(iter(names.values())) if name in common)
+        return {condition_id: f"{first} · {labels[first]}" for condition_id, labels in names.items()}
+    found = {}
+    for run in runs:
+        manifest = run.manifest()
+        words = [str(manifest[name]) for name in ("experiment", "label") if manifest.get(name)]
+        found[run.condition_id] = " · ".join(dict.fromkeys(words)) or run.hash12
+    return found
 
 
 def _own(words: list[str], only: str, limits: SpeedLimits) -> list[Recording]:

@@ -54,6 +54,7 @@ def _motion(recording: Recording) -> dict[str, Any]:
         "center": recording.view.center.tolist(),
         "extent": recording.view.extent.tolist(),
         "radius": recording.view.radius,
+        "moves": bool(np.ptp(recording.traces, axis=1).any()),
         "frames": len(recording.frames),
         "times": _packed(recording.times),
         "poses": _packed(recording.poses.world),

@@ -35,7 +35,8 @@ def stored_recording(log: Path, title: str = "", limits: SpeedLimits | None = No
     condition = Condition.from_json(contents.config_json)
     improvements = tuple((row.generation, row.cost) for row in contents.solutions)
     heading = Heading(title or contents.condition_id[:12], contents.replicate, improvements)
-    return record(condition, contents.solutions[-1].values, heading, limits)
+    found = record(condition, contents.solutions[-1].values, heading, limits)
+    return found._replace(condition_id=contents.condition_id, config_json=contents.config_json)
 
 
 def chosen_log(run: RunDirectory, choice: str | int) -> Path:

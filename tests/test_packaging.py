@@ -88,7 +88,7 @@ def test_contents(wheel: Path) -> None:
 
 
 def test_the_installed_package_is_the_one_that_runs(installed: Path, tmp_path: Path) -> None:
-    code = "import evoexp, evoexp.compose as c; print(evoexp.__file__, c.config_directory(), sep='\\n')"
+    code = "import evoexp, evoexp.shipped as s; print(evoexp.__file__, s.config_directory(), sep='\\n')"
     printed = execute(sys.executable, "-c", code, cwd=tmp_path, PYTHONPATH=str(installed))
     assert printed.splitlines() == [f"{installed}/evoexp/__init__.py", f"{installed}/evoexp/conf"]
 

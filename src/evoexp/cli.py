@@ -19,6 +19,9 @@ COMMANDS = {
     "report": "draw an experiment's figures and tables again, from outputs alone",
     "reproduce": "run stored replicates again: MATCH, or the first generation that differs",
     "evaluate": "judge a given motion by an experiment's criteria",
+    "view": "write a motion as an offline page that plays it",
+    "play": "write a motion as a log that plays in Foxglove",
+    "export": "write a motion as a joint trajectory for a robot or MoveIt",
     "list": "list experiments and stored runs",
     "show": "show one stored run: configuration, replicates, environment",
 }

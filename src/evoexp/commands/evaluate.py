@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Print terms and exact verdict of the motion, one column per condition that it fits."""
-    overrides, path = _split(arguments.overrides)
+    overrides, path = motion_file(arguments.overrides)
     values = read_motion(path)
     rows: list[dict[str, Any]] = []
     misfits = []
@@ -47,7 +47,7 @@ def main(arguments: argparse.Namespace) -> int:
             shape = planner.shape(problem)
             solution = flatten(values, shape)
             if solution is None:
-                misfits.append(f"{label}: {_shape_text(shape)}")
+                misfits.append(f"{label}: {shape_text(shape)}")
                 continue
             verdict = certificate(problem, planner.motion(problem, solution))._asdict()
             head = dict(zip(HEAD, (label, condition.id, condition.length_unit), strict=True))
@@ -116,8 +116,12 @@ def flatten(values: list[Any], shape: Any) -> FloatArray | None:
     return np.concatenate(parts)
 
 
-def _split(words: list[str]) -> tuple[list[str], Path]:
-    """Tell the motion file from the overrides."""
+def motion_file(words: list[str]) -> tuple[list[str], Path]:
+    """Tell the motion file from the overrides.
+
+    Raises:
+        MotionFileError: If there is not one.
+    """
     files = [word for word in words if "=" not in word]
     if len(files) != 1:
         raise MotionFileError(
@@ -140,9 +144,10 @@ def _counted(shape: Any, count: int) -> Any:
     return tuple(shape[1:]) * count if len(shape) and shape[0] is ... else shape
 
 
-def _shape_text(shape: Any) -> str:
+def shape_text(shape: Any) -> str:
+    """Say a planner's documented shape."""
     if len(shape) and shape[0] is ...:
-        return f"any number × {_shape_text(shape[1:]).removeprefix('1 × ')}"
+        return f"any number × {shape_text(shape[1:]).removeprefix('1 × ')}"
     if not any(shape):
         return f"{len(shape)} numbers"
     parts = [" × ".join(map(str, part)) for part in shape]

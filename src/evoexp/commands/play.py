@@ -1,0 +1,20 @@
+"""`evoexp play`: a motion as an MCAP that plays in Foxglove."""
+
+import argparse
+
+from evoexp.commands.motions import add_motion_arguments, output_path, single, write
+from evoexp.playback.playable_log import LAYOUT, layout, playable_log
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    add_motion_arguments(parser, ".mcap")
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Write the log, and the layout file beside it."""
+    found = single(arguments)
+    path = output_path(arguments, [found], ".mcap")
+    write(path, playable_log(found))
+    write(path.with_name(LAYOUT), layout())
+    return 0

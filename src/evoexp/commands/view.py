@@ -1,0 +1,18 @@
+"""`evoexp view`: motions as one offline page that plays them."""
+
+import argparse
+
+from evoexp.commands.motions import add_motion_arguments, output_path, recordings, write
+from evoexp.playback.page import page
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    add_motion_arguments(parser, ".html")
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Write the page."""
+    found = recordings(arguments)
+    write(output_path(arguments, found, ".html"), page(found))
+    return 0

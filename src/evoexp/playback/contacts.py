@@ -1,0 +1,163 @@
+"""How far the bodies are apart over a motion, and every stretch of it in which they touch."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from evoexp.collision.certificate import PAIR, Part
+from evoexp.collision.certifier import certify
+from evoexp.collision.certifier_coal import CoalDistance
+from evoexp.collision.scene import Scene
+from evoexp.paths.motion import Motion
+from evoexp.records import FloatArray
+
+UNLIMITED = 10**12  # queries of coal
+END_RESOLUTION = 1e-6  # [instants] of the end of a contact
+
+
+class Contact(NamedTuple):
+    """Bodies touch.
+
+    Attributes:
+        begin: Of the contact [instants].
+        end: Of it, to 1e-6; where bodies part for less than a tick, they are said to touch all the same.
+        pair: The bodies that touch first.
+    """
+
+    begin: float
+    end: float
+    pair: str
+
+
+class Clearance(NamedTuple):
+    """Exact distances.
+
+    Attributes:
+        least: (ticks,) between any two bodies that are watched [length unit]; 0 where they touch, inf if none are.
+        pairs: (ticks,) the two that are nearest; empty if none are watched.
+        contacts: In the order of time.
+    """
+
+    least: FloatArray
+    pairs: tuple[str, ...]
+    contacts: tuple[Contact, ...]
+
+
+def parts_of(problem: Any, motion: Motion) -> list[Part]:
+    """Return the pieces of a motion that have bodies of their own; of most problems the whole motion is one."""
+    if hasattr(problem, "parts"):
+        return list(problem.parts(motion))
+    return [Part(problem.scene, 0, motion.num_segments)]
+
+
+def part_at(parts: list[Part], t: float) -> Part:
+    """Return the piece that an instant lies in; where one ends, the next one has begun."""
+    return next((part for part in parts if t < part.last), parts[-1])
+
+
+def clearance(parts: list[Part], motion: Motion, times: FloatArray) -> Clearance:
+    """Return distances at ticks, and all contacts.
+
+    Args:
+        parts: From `parts_of`.
+        motion: The motion.
+        times: (ticks,) from 0 to the end [instants].
+    """
+    least, pairs, contacts = [], [], []
+    watches = {id(part): _Watch(part.scene, motion) for part in parts}
+    for t in times:
+        watch = watches[id(part_at(parts, t))]
+        distance, pair = watch.nearest(t)
+        least.append(max(distance, 0.0))
+        pairs.append(watch.name(pair))
+    for part in parts:
+        inside = times[(times > part.first) & (times < part.last)]
+        contacts += _contacts(watches[id(part)], part, motion, np.array([*inside, float(part.last)]))
+    return Clearance(np.array(least), tuple(pairs), _joined(contacts))
+
+
+class _Watch:
+    """The pairs of one scene, watched along a motion by coal."""
+
+    def __init__(self, scene: Scene, motion: Motion) -> None:
+        self.scene, self._distance = scene, CoalDistance(scene, motion, UNLIMITED)
+
+    def nearest(self, t: float) -> tuple[float, int]:
+        """Return the least distance and its pair; inf and −1 without pairs."""
+        found = [(self._distance(pair, t), pair) for pair in range(len(self.scene.pairs))]
+        return min(found, default=(np.inf, -1))
+
+    def name(self, pair: int) -> str:
+        """Return the names of a pair."""
+        return PAIR.join(self.scene.pair_names(pair)) if pair >= 0 else ""
+
+    def touching(self, t: float) -> bool:
+        """Return whether any pair is in contact."""
+        return any(self._distance(pair, t) <= level for pair, level in enumerate(self.scene.tolerances))
+
+
+def _contacts(watch: _Watch, part: Part, motion: Motion, ticks: FloatArray) -> list[Contact]:
+    """Return the contacts of one piece: the certifier finds where each begins, ticks and bisection where it ends."""
+    found: list[Contact] = []
+    t = float(part.first)
+    while t < part.last or (t == part.last == part.first and not found):
+        rest = remainder(motion, t, part.last)
+        verdict = certify(watch.scene, rest)
+        if verdict.status != "refuted":
+            break
+        begin = at_instant(verdict.refuted_at, t)
+        pair = PAIR.join(verdict.refuted_pair or ())
+        touching, free = begin, float(part.last)
+        for tick in ticks[ticks > begin]:
+            if not watch.touching(float(tick)):
+                free = float(tick)
+                break
+            touching = float(tick)
+        if touching == part.last:
+            found.append(Contact(begin, touching, pair))
+            break
+        t = free
+        while free - touching > END_RESOLUTION:
+            middle = 0.5 * (free + touching)
+            if watch.touching(middle):
+                touching = middle
+            else:
+                free = middle
+        found.append(Contact(begin, max(touching, begin), pair))
+    return found
+
+
+def remainder(motion: Motion, t: float, last: int) -> Motion:
+    """Return what is left of a motion from t on up to an instant; its first segment is what is left of one."""
+    segment = min(int(t), max(motion.num_segments - 1, 0))
+    u = t - segment
+    q = motion.q[segment : last + 1]
+    if motion.coefficients is None:
+        return Motion(np.vstack([motion.at(t)[None], q[1:]]))
+    left = motion.coefficients[segment:last].copy()
+    c0, c1, c2, c3 = motion.coefficients[segment]
+    w = 1.0 - u  # u + w v takes the place of u
+    left[0] = (
+        c0 + u * (c1 + u * (c2 + u * c3)),
+        w * (c1 + u * (2.0 * c2 + 3.0 * u * c3)),
+        w * w * (c2 + 3.0 * u * c3),
+        w * w * w * c3,
+    )
+    return Motion(np.vstack([left[:1, 0], q[1:]]), left)
+
+
+def at_instant(t: float, begin: float) -> float:
+    """Return an instant of the whole motion for one of its remainder from `begin` on."""
+    segment = int(begin)
+    return begin + t * (segment + 1 - begin) if t < 1.0 else segment + t
+
+
+def _joined(contacts: list[Contact]) -> tuple[Contact, ...]:
+    """Return contacts of which none begins where another ends."""
+    joined: list[Contact] = []
+    for contact in contacts:
+        if joined and contact.begin <= joined[-1].end + END_RESOLUTION:
+            joined[-1] = joined[-1]._replace(end=max(contact.end, joined[-1].end))
+        else:
+            joined.append(contact)
+    return tuple(joined)

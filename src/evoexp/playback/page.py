@@ -1,0 +1,153 @@
+"""Motions as one self-contained page: plays offline in any browser, asks the network for nothing."""
+
+import base64
+import html
+import json
+import math
+import re
+from collections.abc import Sequence
+from importlib import resources
+from typing import Any
+
+import numpy as np
+
+from evoexp.playback.colours import arm_colour
+from evoexp.playback.recording import Recording
+from evoexp.playback.shapes import Shape
+from evoexp.records import FloatArray
+
+DIGITS = 6  # significant, of distances
+PARTS = {"style": "css", "geometry": "js", "script": "js"}
+FILES = {"style": "motion_page", "geometry": "motion_geometry", "script": "motion_page"}
+
+
+def page(recordings: Sequence[Recording]) -> bytes:
+    """Return a page that plays one motion, or several side by side on one clock.
+
+    Args:
+        recordings: The motions.
+
+    Returns:
+        HTML; the same motions give the same bytes.
+    """
+    assets = resources.files("evoexp") / "assets"
+    text = (assets / "motion_page.html").read_text(encoding="utf-8")
+    data = json.dumps([_motion(recording) for recording in recordings], separators=(",", ":"), allow_nan=False)
+    values = {name: (assets / f"{FILES[name]}.{kind}").read_text(encoding="utf-8") for name, kind in PARTS.items()}
+    values["title"] = html.escape(" | ".join(recording.heading.title for recording in recordings))
+    values["motions"] = data.replace("<", "\\u003c")  # nothing in it can end the script element
+    return re.sub(r"\{\{(\w+)\}\}", lambda found: values[found[1]], text).encode()
+
+
+def _motion(recording: Recording) -> dict[str, Any]:
+    """Return what the page's script reads of one motion."""
+    clearance, verdict = recording.clearance, recording.verdict
+    pairs = list(dict.fromkeys(clearance.pairs))
+    return {
+        "title": recording.heading.title,
+        "status": {True: "certified", False: "refuted", None: "undecided"}[verdict.certified],
+        "verdict": _verdict(recording),
+        "facts": _facts(recording),
+        "legend": _legend(recording),
+        "unit": recording.length_unit,
+        "planar": recording.view.planar,
+        "center": recording.view.center.tolist(),
+        "extent": recording.view.extent.tolist(),
+        "radius": recording.view.radius,
+        "moves": bool(np.ptp(recording.traces, axis=1).any()),
+        "frames": len(recording.frames),
+        "times": _packed(recording.times),
+        "poses": _packed(recording.poses.world),
+        "shapes": [_shape(shape) for shape in recording.shapes],
+        "dots": _dots(recording),
+        "ways": [{"colour": arm_colour(k), "points": _packed(way)} for k, way in enumerate(recording.traces)],
+        "targets": [{"name": target.name, "point": target.point.tolist()} for target in recording.targets],
+        "clearance": [_number(value) for value in clearance.least],
+        "pairs": pairs,
+        "nearest": [pairs.index(pair) for pair in clearance.pairs],
+        "contacts": [list(contact) for contact in clearance.contacts],
+        "margin": recording.margin,
+        "least": _number(verdict.clearance),
+        "least_at": verdict.clearance_at,
+    }
+
+
+def _shape(shape: Shape) -> dict[str, Any]:
+    outline = shape.outline
+    row: dict[str, Any] = {
+        "name": shape.name,
+        "kind": outline.kind,
+        "size": list(outline.size),
+        "frame": shape.frame,
+        "pose": shape.pose.tolist(),
+        "role": shape.role,
+        "line": outline.is_line,
+        "colour": arm_colour(max(shape.arm, 0)),
+    }
+    if outline.points is not None and outline.triangles is not None:
+        row |= {"points": outline.points.tolist(), "triangles": outline.triangles.tolist()}
+    return row
+
+
+def _dots(recording: Recording) -> list[dict[str, Any]]:
+    """Return the joints of links that are lines, which nothing else shows."""
+    lines = {shape.frame: shape.arm for shape in recording.shapes if shape.role == "arm" and shape.outline.is_line}
+    return [{"frame": frame, "colour": arm_colour(arm)} for frame, arm in lines.items() if frame >= 0]
+
+
+def _legend(recording: Recording) -> list[tuple[str, str]]:
+    arms = sorted({shape.arm for shape in recording.shapes if shape.role == "arm"})
+    names = [(f"arm {arm + 1}" if len(arms) > 1 else "robot", arm_colour(arm)) for arm in arms]
+    roles = {shape.role for shape in recording.shapes}
+    return names + [(role, role) for role in ("obstacle", "object") if role in roles]
+
+
+def _verdict(recording: Recording) -> str:
+    verdict, unit = recording.verdict, recording.length_unit
+    if verdict.refuted_at is not None:
+        more = len(recording.clearance.contacts) - 1
+        again = f", and {more} time{'s' if more > 1 else ''} more" if more > 0 else ""
+        return f"{verdict.refuted_pair} touch at instant {verdict.refuted_at:.4g}{again}"
+    if verdict.clearance_at is None:
+        return "nothing that could touch"
+    return f"least clearance {verdict.clearance:.4g} {unit} at instant {verdict.clearance_at:.4g}"
+
+
+def _facts(recording: Recording) -> list[tuple[str, str]]:
+    verdict, heading = recording.verdict, recording.heading
+    margin = {True: "kept", False: "not kept", None: "undecided"}[verdict.certified_margin]
+    rows = [("condition", recording.condition_id[:12])]
+    if heading.replicate >= 0:
+        rows.append(("replicate", str(heading.replicate)))
+    if heading.improvements:
+        generation, cost = heading.improvements[-1]
+        rows.append(("best cost", f"{cost:.6g}, of generation {generation}"))
+    rows.append(("least clearance", f"{_shown(verdict.clearance)} {recording.length_unit}"))
+    if verdict.clearance_pair:
+        rows.append(("nearest", verdict.clearance_pair))
+    if recording.margin > 0.0:
+        rows.append(("required", f"{recording.margin:g} {recording.length_unit}: {margin}"))
+    rows += [
+        (f"contact {k + 1}", f"{contact.begin:.4g} to {contact.end:.4g}: {contact.pair}")
+        for k, contact in enumerate(recording.clearance.contacts)
+    ]
+    length = float(np.sqrt((np.diff(recording.traces, axis=1) ** 2).sum(axis=-1)).sum())
+    rows += [
+        ("instants", str(recording.motion.num_segments + 1)),
+        ("curve", "straight" if recording.motion.coefficients is None else "cubic"),
+        ("tools’ ways", f"{length:.4g} {recording.length_unit}"),
+        ("bodies", f"{len(recording.shapes)}, as coal judges them"),
+    ]
+    return rows
+
+
+def _packed(values: FloatArray) -> str:
+    return base64.b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode()
+
+
+def _number(value: float) -> float | None:
+    return float(f"{value:.{DIGITS}g}") if math.isfinite(value) else None
+
+
+def _shown(value: float) -> str:
+    return f"{value:.4g}" if math.isfinite(value) else "–"

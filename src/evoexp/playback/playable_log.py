@@ -1,0 +1,192 @@
+"""A motion as an MCAP that plays: in Foxglove's own schemas, without URDF, layout or ROS.
+
+The clock is the trajectory's: 0 at the start, as fast as the joints' speed limits permit. How the search went has
+another axis, its generations: it stands in one message at the start, whose arrays a plot takes as they are.
+"""
+
+import io
+import json
+from importlib import resources
+from typing import Any
+
+import numpy as np
+from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from foxglove_schemas_protobuf.JointState_pb2 import JointState
+from foxglove_schemas_protobuf.JointStates_pb2 import JointStates
+from foxglove_schemas_protobuf.Log_pb2 import Log
+from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
+from google.protobuf.timestamp_pb2 import Timestamp
+from mcap.writer import CompressionType, Writer
+from mcap_protobuf.schema import register_schema
+
+from evoexp.playback.drawing import WORLD, bodies, frame_names, ghosts, marks
+from evoexp.playback.recording import Recording
+
+LIBRARY = "evoexp"
+MOTION = "evoexp.motion"  # name of the metadata record
+LAYOUT = "foxglove_layout.json"
+SECOND = 1_000_000_000  # [ns]
+CHUNK_SIZE = 56 * 1024  # [B]
+NUMBER, NUMBERS, TEXT = {"type": "number"}, {"type": "array", "items": {"type": "number"}}, {"type": "string"}
+CLEARANCE = {
+    "title": "evoexp.Clearance",
+    "type": "object",
+    "properties": {"instant": NUMBER, "clearance": NUMBER, "required": NUMBER, "contact": NUMBER, "pair": TEXT},
+}
+IMPROVEMENTS = {
+    "title": "evoexp.Improvements",
+    "type": "object",
+    "properties": {"generation": NUMBERS, "best_cost": NUMBERS},
+}
+
+
+def playable_log(recording: Recording) -> bytes:
+    """Return a motion as an MCAP; the same motion gives the same bytes."""
+    out = _Playable()
+    out.writer.add_metadata(MOTION, _metadata(recording))
+    for name, kind, data in (
+        ("config.json", "application/json", recording.config_json),
+        (LAYOUT, "application/json", layout()),
+    ):
+        out.writer.add_attachment(create_time=0, log_time=0, name=name, media_type=kind, data=data)
+    out.scene("/scene/robot", bodies(recording, ("arm", "object")))
+    out.scene("/scene/obstacles", bodies(recording, ("obstacle",)))
+    out.scene("/scene/ghosts", ghosts(recording))
+    out.scene("/scene/ways", marks(recording))
+    found = [row for row in recording.heading.improvements if np.isfinite(row[1])]
+    if found:
+        generations, costs = zip(*found, strict=True)
+        out.json("/improvements", IMPROVEMENTS, 0, {"generation": list(generations), "best_cost": list(costs)})
+    said = _said(recording)
+    for k, instant in enumerate(recording.times):
+        now = nanoseconds(recording, instant)
+        while said and said[0][0] <= now:
+            out.message("/log", *said.pop(0))
+        out.message("/tf", now, _transforms(recording, k, now))
+        out.message("/joint_states", now, _joints(recording, k, now))
+        out.json("/clearance", CLEARANCE, now, _clearance(recording, k))
+    for moment, message in said:
+        out.message("/log", moment, message)
+    return out.finish()
+
+
+def layout() -> bytes:
+    """Return Foxglove's layout file for these logs."""
+    return (resources.files("evoexp") / "assets" / LAYOUT).read_bytes()
+
+
+def nanoseconds(recording: Recording, instant: float) -> int:
+    """Return when an instant is [ns]."""
+    return round(float(instant) * recording.seconds * SECOND)
+
+
+class _Playable:
+    """An MCAP being written in memory; channels are registered with their first message."""
+
+    def __init__(self) -> None:
+        self._buffer = io.BytesIO()
+        self.writer = Writer(self._buffer, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD)
+        self.writer.start(profile="", library=LIBRARY)
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[str, list[int]] = {}  # topic → id, messages so far
+
+    def message(self, topic: str, moment: int, message: Any) -> None:
+        """Append a message of a protobuf schema."""
+        name = message.DESCRIPTOR.full_name
+        if name not in self._schemas:
+            self._schemas[name] = register_schema(self.writer, type(message))
+        self._add(topic, "protobuf", name, moment, message.SerializeToString(deterministic=True))
+
+    def json(self, topic: str, schema: dict[str, Any], moment: int, values: dict[str, Any]) -> None:
+        """Append a message of one of our own schemas."""
+        name = str(schema["title"])
+        if name not in self._schemas:
+            data = json.dumps(schema, separators=(",", ":")).encode()
+            self._schemas[name] = self.writer.register_schema(name, "jsonschema", data)
+        self._add(topic, "json", name, moment, json.dumps(values, allow_nan=False).encode())
+
+    def scene(self, topic: str, entities: list[Any]) -> None:
+        """Append what is drawn, once and for all."""
+        if entities:
+            self.message(topic, 0, SceneUpdate(entities=entities))
+
+    def finish(self) -> bytes:
+        """Return the file."""
+        self.writer.finish()
+        return self._buffer.getvalue()
+
+    def _add(self, topic: str, encoding: str, schema: str, moment: int, data: bytes) -> None:
+        if topic not in self._channels:
+            self._channels[topic] = [self.writer.register_channel(topic, encoding, self._schemas[schema]), 0]
+        channel = self._channels[topic]
+        self.writer.add_message(channel[0], moment, data, moment, channel[1])
+        channel[1] += 1
+
+
+def _stamp(now: int) -> Any:
+    return Timestamp(seconds=now // SECOND, nanos=now % SECOND)
+
+
+def _transforms(recording: Recording, k: int, now: int) -> Any:
+    """Return where every frame is in its parent's: one transform per link."""
+    names, rows = frame_names(recording), []
+    for frame, row in zip(recording.frames, recording.poses.local[k].tolist(), strict=True):
+        x, y, z, qx, qy, qz, qw = row
+        rows.append(
+            FrameTransform(
+                timestamp=_stamp(now),
+                parent_frame_id=names[frame.parent],
+                child_frame_id=frame.name,
+                translation=Vector3(x=x, y=y, z=z),
+                rotation=Quaternion(x=qx, y=qy, z=qz, w=qw),
+            )
+        )
+    return FrameTransforms(transforms=rows)
+
+
+def _joints(recording: Recording, k: int, now: int) -> Any:
+    rows = zip(recording.joints, recording.q[k].tolist(), recording.dq[k].tolist(), strict=True)
+    states = [JointState(name=joint.name, position=q, velocity=dq) for joint, q, dq in rows]
+    return JointStates(timestamp=_stamp(now), joints=states)
+
+
+def _clearance(recording: Recording, k: int) -> dict[str, Any]:
+    least, instant = float(recording.clearance.least[k]), float(recording.times[k])
+    touching = any(contact.begin <= instant <= contact.end for contact in recording.clearance.contacts)
+    values: dict[str, Any] = {"instant": instant, "required": recording.margin, "contact": float(touching)}
+    values["pair"] = recording.clearance.pairs[k]
+    return values | ({"clearance": least} if np.isfinite(least) else {})
+
+
+def _said(recording: Recording) -> list[tuple[int, Any]]:
+    """Return what there is to say of the motion, each at its moment, in the order of time."""
+    verdict, unit, rows = recording.verdict, recording.length_unit, []
+    answer = {True: "certified: no two bodies ever touch", False: "refuted: bodies touch", None: "undecided"}
+    rows.append((0.0, Log.INFO, f"{recording.heading.title}: {answer[verdict.certified]}"))
+    if verdict.certified is not False and verdict.clearance_at is not None:
+        kept = verdict.certified_margin is not False
+        text = f"least clearance {verdict.clearance:.6g} {unit}: {verdict.clearance_pair}"
+        text += "" if kept else f", less than the required {recording.margin:g} {unit}"
+        rows.append((verdict.clearance_at, Log.INFO if kept else Log.WARNING, text))
+    for contact in recording.clearance.contacts:
+        rows.append((contact.begin, Log.ERROR, f"refuted at instant {contact.begin:.9g}: {contact.pair} touch"))
+        rows.append((contact.end, Log.INFO, f"free again at instant {contact.end:.6g}"))
+    messages = []
+    for instant, level, text in sorted(rows, key=lambda row: row[0]):
+        now = nanoseconds(recording, instant)
+        messages.append((now, Log(timestamp=_stamp(now), level=level, message=text, name="certifier")))
+    return messages
+
+
+def _metadata(recording: Recording) -> dict[str, str]:
+    return {
+        "condition": recording.condition_id,
+        "replicate": str(recording.heading.replicate),
+        "title": recording.heading.title,
+        "length_unit": recording.length_unit,
+        "seconds_per_instant": repr(recording.seconds),
+        "fixed_frame": WORLD,
+    }

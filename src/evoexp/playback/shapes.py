@@ -1,0 +1,110 @@
+"""Bodies as they are drawn: read off the very coal shapes that the certifier judges."""
+
+from typing import Any, Literal, NamedTuple
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from evoexp.collision.body_table import UnsupportedShape
+from evoexp.records import FloatArray
+
+Kind = Literal["box", "sphere", "ellipsoid", "capsule", "cylinder", "cone", "half_space", "mesh"]
+Role = Literal["arm", "obstacle", "object"]
+
+
+class Outline(NamedTuple):
+    """A shape in its own frame; capsules, cylinders and cones lie along z and are centred.
+
+    Attributes:
+        kind: What it is.
+        size: box: the edges | sphere: radius | ellipsoid: semi-axes | capsule, cylinder, cone: radius, length (that of
+            a capsule is its segment's) | half-space (all points with z ≤ 0) and mesh: nothing.
+        points: (points, 3) corners of a mesh; None otherwise.
+        triangles: (triangles, 3) indices of corners.
+    """
+
+    kind: Kind
+    size: tuple[float, ...]
+    points: FloatArray | None = None
+    triangles: np.ndarray | None = None
+
+    @property
+    def is_line(self) -> bool:
+        """Whether it has no thickness, so that whoever draws it must choose one."""
+        return self.kind == "capsule" and self.size[0] == 0.0
+
+    @property
+    def reach(self) -> float:
+        """Greatest distance of its points from its frame's origin; 0 of a half-space, which has no end."""
+        if self.points is not None:
+            return float(np.sqrt((self.points**2).sum(axis=1).max()))
+        if self.kind == "box":
+            return 0.5 * float(np.sqrt(np.square(self.size).sum()))
+        if self.kind == "capsule":
+            return self.size[0] + 0.5 * self.size[1]
+        if self.kind in ("cylinder", "cone"):
+            return float(np.hypot(self.size[0], 0.5 * self.size[1]))
+        return max(self.size, default=0.0)
+
+
+class Shape(NamedTuple):
+    """One body.
+
+    Attributes:
+        name: As verdicts speak of it.
+        frame: The frame that moves it, an index of `Recording.frames`; −1: the world.
+        pose: (7,) of the outline in that frame: position, quaternion x, y, z, w.
+        outline: What it looks like.
+        role: A part of an arm, an obstacle, or an object, which is an obstacle that is carried for a while.
+        arm: Which arm it belongs to; −1: none.
+    """
+
+    name: str
+    frame: int
+    pose: FloatArray
+    outline: Outline
+    role: Role
+    arm: int
+
+
+def outline(shape: Any) -> tuple[Outline, Any]:
+    """Return a coal shape as it is drawn, and where its outline's frame lies in the shape's, a `pin.SE3`.
+
+    Raises:
+        UnsupportedShape: If there is no way to draw it.
+    """
+    here = pin.SE3.Identity()
+    if isinstance(shape, coal.Box):
+        return Outline("box", tuple(2.0 * float(half) for half in shape.halfSide)), here
+    if isinstance(shape, coal.Sphere):
+        return Outline("sphere", (float(shape.radius),)), here
+    if isinstance(shape, coal.Ellipsoid):
+        return Outline("ellipsoid", tuple(float(axis) for axis in shape.radii)), here
+    for kind, name in ((coal.Capsule, "capsule"), (coal.Cylinder, "cylinder"), (coal.Cone, "cone")):
+        if isinstance(shape, kind):
+            return Outline(name, (float(shape.radius), 2.0 * float(shape.halfLength))), here  # type: ignore[arg-type]
+    if isinstance(shape, coal.Halfspace):
+        normal = np.array(shape.n)
+        turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), normal).toRotationMatrix()
+        return Outline("half_space", ()), pin.SE3(turn, float(shape.d) * normal)
+    points, triangles = _mesh(shape)
+    return Outline("mesh", (), points, triangles), here
+
+
+def _mesh(shape: Any) -> tuple[FloatArray, np.ndarray]:
+    """Return corners and triangles of a mesh."""
+    if hasattr(shape, "polygons") and callable(shape.polygons):  # a convex hull
+        points = np.array([shape.point(k) for k in range(shape.num_points)])
+        faces = [shape.polygons(k) for k in range(shape.num_polygons)]
+    elif hasattr(shape, "tri_indices"):
+        points = np.array([shape.vertex(k) for k in range(shape.num_vertices)])
+        faces = [shape.tri_indices(k) for k in range(shape.num_tris)]
+    else:
+        raise UnsupportedShape(f"body: a {type(shape).__name__} cannot be drawn")
+    return points, np.array([[int(face[k]) for k in range(3)] for face in faces], dtype=np.int64)
+
+
+def pose(placement: Any) -> FloatArray:
+    """Return a `pin.SE3` as position and quaternion x, y, z, w, (7,)."""
+    return np.asarray(pin.SE3ToXYZQUAT(placement))

@@ -1,0 +1,61 @@
+"""From instants to seconds: as fast as the joints' speed limits permit, in equal times from instant to instant."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from evoexp.paths.motion import Motion, top_speeds
+from evoexp.records import FloatArray
+
+
+class SpeedLimits(NamedTuple):
+    """What joints may do; the papers print no limits.
+
+    Attributes:
+        turn: Of revolute joints [rad/s].
+        slide: Of prismatic joints [length unit/s]; None: a quarter of the scene's size per second.
+    """
+
+    turn: float = np.pi / 4.0
+    slide: float | None = None
+
+    def of(self, prismatic: np.ndarray, size: float) -> FloatArray:
+        """Return the limit of every coordinate (nq,).
+
+        Args:
+            prismatic: (nq,) which coordinates are lengths.
+            size: Of the scene [length unit].
+        """
+        slide = 0.25 * size if self.slide is None else self.slide
+        return np.where(prismatic, slide, self.turn)
+
+
+def seconds_per_instant(motion: Motion, limits: FloatArray) -> float:
+    """Return the least time from instant to instant in which no joint exceeds its limit anywhere [s].
+
+    Args:
+        motion: The motion.
+        limits: (nq,) greatest |dq/dt| [rad/s or length unit/s].
+
+    Returns:
+        1 for a motion that stands still.
+    """
+    if motion.num_segments == 0:
+        return 1.0
+    return float((top_speeds(motion) / limits).max()) or 1.0
+
+
+def velocities(motion: Motion, times: FloatArray, seconds: float) -> FloatArray:
+    """Return dq/dt at instants, (ticks, nq) [rad/s or length unit/s]; where straight lines meet, that of the later one.
+
+    Args:
+        motion: The motion.
+        times: (ticks,) [instants].
+        seconds: From instant to instant.
+    """
+    if motion.num_segments == 0:
+        return np.zeros((len(times), motion.q.shape[1]))
+    segments = np.minimum(times.astype(int), motion.num_segments - 1)
+    u = (times - segments)[:, None]
+    _, c1, c2, c3 = motion.polynomials[segments].transpose(1, 0, 2)
+    return np.asarray((c1 + u * (2.0 * c2 + 3.0 * u * c3)) / seconds)

@@ -1,0 +1,107 @@
+"""A motion as a joint trajectory, for a robot or MoveIt: names, times, positions, and velocities where they say more.
+
+What a controller makes of the points is the motion that was judged: without velocities it goes straight from point to
+point; with velocities it goes along the cubic that they determine: the spline's own piece (uniform timing), or a
+straight piece's ramp up, run and ramp down (optimal timing).
+"""
+
+import csv
+import io
+import json
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from evoexp.errors import EvoexpError
+from evoexp.playback.optimal_timing import along_curve, along_lines
+from evoexp.playback.recording import Recording
+from evoexp.playback.timing import SpeedLimits, velocities
+from evoexp.records import FloatArray
+
+Timing = Literal["uniform", "optimal"]
+
+
+class BadTiming(EvoexpError):
+    """A timing that cannot be."""
+
+
+class Trajectory(NamedTuple):
+    """Points of a motion in time.
+
+    Attributes:
+        joints: (nq) names.
+        units: (nq) rad, or the scene's unit of length.
+        times: (points,) from the start [s].
+        positions: (points, nq).
+        velocities: (points, nq) per second; None: straight from point to point.
+    """
+
+    joints: tuple[str, ...]
+    units: tuple[str, ...]
+    times: FloatArray
+    positions: FloatArray
+    velocities: FloatArray | None
+
+
+def trajectory(recording: Recording, timing: Timing, limits: SpeedLimits, ramp: float) -> Trajectory:
+    """Return a motion in time.
+
+    Args:
+        recording: The motion, whose `seconds` come from the same limits.
+        timing: uniform: equal times from instant to instant, as short as the speed limits permit | optimal: as fast as
+            speed and acceleration limits permit along the path, with a stop wherever straight lines meet.
+        limits: Of speeds.
+        ramp: Time from rest to a joint's greatest speed [s]: limits accelerations, of the optimal timing only.
+
+    Raises:
+        BadTiming: If there is no such timing, or what it needs is not installed.
+    """
+    motion = recording.motion
+    prismatic = np.array([joint.prismatic for joint in recording.joints])
+    if timing == "uniform":
+        instants = np.arange(float(motion.num_segments + 1))
+        speeds = None if motion.coefficients is None else velocities(motion, instants, recording.seconds)
+        times, positions = recording.seconds * instants, motion.q
+    else:
+        speed = limits.of(prismatic, recording.size)
+        along = along_lines if motion.coefficients is None else along_curve
+        found = along(motion, speed, speed / ramp)
+        if found is None:
+            raise BadTiming("--timing optimal of a curve needs toppra: pip install 'evoexp[timing]'")
+        times, positions, speeds = found
+    names = tuple(joint.name for joint in recording.joints)
+    units = tuple(recording.length_unit if slides else "rad" for slides in prismatic)
+    return Trajectory(names, units, times, positions, speeds)
+
+
+def as_json(recording: Recording, found: Trajectory) -> bytes:
+    """Return a trajectory with the fields of `trajectory_msgs/JointTrajectory`, times in seconds."""
+    points = []
+    for k, time in enumerate(found.times.tolist()):
+        point: dict[str, Any] = {"time_from_start": time, "positions": found.positions[k].tolist()}
+        if found.velocities is not None:
+            point["velocities"] = found.velocities[k].tolist()
+        points.append(point)
+    data = {
+        "condition": recording.condition_id,
+        "replicate": recording.heading.replicate,
+        "interpolation": "linear" if found.velocities is None else "cubic",
+        "joint_names": list(found.joints),
+        "units": list(found.units),
+        "points": points,
+    }
+    return json.dumps(data, indent=1, allow_nan=False).encode() + b"\n"
+
+
+def as_csv(found: Trajectory) -> bytes:
+    """Return a trajectory as a table: time, positions, and velocities if there are any."""
+    columns = [found.times[:, None], found.positions]
+    names = ["time_s", *(f"{joint}_{unit}" for joint, unit in zip(found.joints, found.units, strict=True))]
+    if found.velocities is not None:
+        columns.append(found.velocities)
+        names += [f"{joint}_{unit}_per_s" for joint, unit in zip(found.joints, found.units, strict=True)]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(names)
+    writer.writerows([repr(value) for value in row] for row in np.hstack(columns).tolist())
+    return text.getvalue().encode()

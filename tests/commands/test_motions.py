@@ -1,0 +1,87 @@
+"""`view`, `play` and `export` on stored runs, logs, and motions of one's own."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from command_samples import SMALL, Evoexp
+
+from evoexp.store.run_directory import find_runs
+
+Refused = Callable[..., str]
+STRAIGHT = [[[180.0, 90.0], [0.0, 90.0]]] * 2
+
+
+@pytest.fixture
+def runs(stored: Path) -> list[str]:
+    return [run.hash12 for run in find_runs(stored)]
+
+
+def test_view_writes_a_page_of_the_best_replicate(evoexp: Evoexp, stored: Path, runs: list[str]) -> None:
+    said = evoexp("view", runs[0])
+    assert said.code == 0
+    (path,) = (stored / "motions").glob("*.html")
+    assert path.name.startswith(f"{runs[0]}-000")
+    assert str(path) in said.out and "kB" in said.out
+    assert "rana_planar · " in path.read_text()
+
+
+def test_view_puts_two_runs_side_by_side(evoexp: Evoexp, tmp_path: Path, runs: list[str]) -> None:
+    path = tmp_path / "deep" / "two.html"
+    assert evoexp("view", *runs, "--worst", "-o", str(path)).code == 0
+    text = path.read_text()
+    assert all(run in text for run in runs)
+
+
+def test_a_log_alone_is_enough(evoexp: Evoexp, stored: Path, runs: list[str], tmp_path: Path) -> None:
+    log = tmp_path / "log.mcap"
+    log.write_bytes((stored / "runs" / runs[0] / "replicates" / "0001.mcap").read_bytes())
+    from_run, from_log = tmp_path / "a.html", tmp_path / "b.html"
+    assert evoexp("view", runs[0], "--replicate", "1", "-o", str(from_run)).code == 0
+    assert evoexp("view", str(log), "-o", str(from_log)).code == 0
+    assert '"replicate","1"' in from_run.read_text()
+    assert '"replicate","1"' in from_log.read_text()
+
+
+def test_view_of_a_motion_of_ones_own(evoexp: Evoexp, tmp_path: Path, outputs: Path) -> None:
+    motion = tmp_path / "mine.json"
+    ends = [[[90.0 + 9.0 * k, 9.0 * k] for k in range(21)], [[0.0, -9.0 * k] for k in range(21)]]
+    motion.write_text(json.dumps(ends))
+    said = evoexp("view", "experiment=rana_planar", str(motion), *SMALL, "--only", "via-point GA")
+    assert said.code == 0, said
+    assert "mine.json · via-point GA" in (outputs / "motions" / "mine.html").read_text()
+
+
+def test_what_cannot_be_shown_is_said(refused: Refused, runs: list[str], tmp_path: Path) -> None:
+    assert refused("view", runs[0], "--replicate", "9") == (f"run {runs[0]}: no finished replicate 9 (finished: 0, 1)")
+    assert "hash: no run 'ffffffff' among the 2 in " in refused("view", "ffffffff")
+    assert refused("view", *runs * 3) == "motions: at most 4 go together, got 6"
+    assert refused("view", "experiment=rana_planar") == ("motion file: one is needed (.json or .npy), got 0: none")
+    short = tmp_path / "short.json"
+    short.write_text(json.dumps(STRAIGHT))
+    assert "must be via-point GA: 2 × 21 × 2" in refused("view", "experiment=rana_planar", str(short))
+    assert refused("view", runs[0], "--turn-speed", "0") == "--turn-speed: must be greater than 0, was 0.0"
+    assert refused("play", *runs) == "motion: one at a time, got 2; choose with --only LABEL"
+
+
+def test_a_condition_that_was_not_run_here_says_how(refused: Refused) -> None:
+    said = refused("view", "4da921ed6875")
+    assert (
+        said == "condition 4da921ed6875: not run here; run it: evoexp run experiment=rana_planar --only 'via-point GA'"
+    )
+
+
+def test_play_writes_a_log_and_its_layout(evoexp: Evoexp, stored: Path, runs: list[str]) -> None:
+    assert evoexp("play", runs[0]).code == 0
+    assert {path.suffix for path in (stored / "motions").iterdir()} == {".mcap", ".json"}
+
+
+def test_export_writes_trajectories(evoexp: Evoexp, stored: Path, runs: list[str]) -> None:
+    assert evoexp("export", runs[0]).code == 0
+    assert evoexp("export", runs[0], "--format", "csv", "--timing", "optimal").code == 0
+    assert {path.suffix for path in (stored / "motions").iterdir()} == {".csv", ".json"}
+
+
+def test_export_refuses_what_cannot_be(refused: Refused, runs: list[str]) -> None:
+    assert refused("export", runs[0], "--ramp", "-1") == "--ramp: must be greater than 0, was -1.0"

@@ -1,0 +1,118 @@
+"""A headless Chromium, driven over the pipe of its DevTools protocol: no driver, no further packages."""
+
+import base64
+import json
+import os
+import select
+import shutil
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+CHROMIUM = next(
+    (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None
+)
+FLAGS = (
+    "--headless=new",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--no-first-run",
+    "--window-size=1000,700",
+)
+PATIENCE = 120.0  # [s] for any one answer, on a busy machine
+SPEED = "GPU stall due to ReadPixels"  # a driver's word on how fast pictures are read back
+
+
+class Browser:
+    """One browser with one page; everything that the page asks for or complains of is noted."""
+
+    def __init__(self, profile: Path) -> None:
+        """Start it with an empty profile."""
+        (read_here, write_there), (read_there, write_here) = os.pipe(), os.pipe()
+        command = f'exec "$@" 3<&{read_there} 4>&{write_there}'  # the protocol's pipes have these numbers
+        words = [str(CHROMIUM), *FLAGS, "--remote-debugging-pipe", f"--user-data-dir={profile}", "about:blank"]
+        self._process = subprocess.Popen(
+            ["bash", "-c", command, "bash", *words],
+            pass_fds=(read_there, write_there),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        os.close(read_there)
+        os.close(write_there)
+        self._read, self._write, self._left, self._count = read_here, write_here, b"", 0
+        self._session: str | None = None
+        self.requests: list[str] = []
+        self.complaints: list[str] = []
+        target = self._call("Target.createTarget", url="about:blank")["targetId"]
+        self._session = self._call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        for domain in ("Page", "Runtime", "Network", "Log"):
+            self._call(f"{domain}.enable")
+
+    def open(self, url: str) -> None:
+        """Load a page anew and wait for it."""
+        self._call("Page.navigate", url="about:blank")
+        self.run("0")
+        self.requests.clear()
+        self.complaints.clear()
+        self._call("Page.navigate", url=url)
+        end = time.monotonic() + PATIENCE
+        while not self.run("document.readyState === 'complete' && typeof motionPage === 'object'"):
+            assert time.monotonic() < end, f"{url} does not load: {self.complaints}"
+            time.sleep(0.05)
+
+    def run(self, script: str) -> Any:
+        """Return the value of an expression in the page."""
+        answer = self._call("Runtime.evaluate", expression=script, returnByValue=True, userGesture=True)
+        assert "exceptionDetails" not in answer, answer
+        return answer["result"].get("value")
+
+    def screenshot(self) -> bytes:
+        """Return a picture of the whole page, PNG."""
+        return base64.b64decode(self._call("Page.captureScreenshot", format="png")["data"])
+
+    def close(self) -> None:
+        """End it."""
+        os.close(self._write)  # it ends with its pipe
+        try:
+            self._process.wait(10.0)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        os.close(self._read)
+
+    def _call(self, method: str, **parameters: Any) -> dict[str, Any]:
+        self._count += 1
+        message: dict[str, Any] = {"id": self._count, "method": method, "params": parameters}
+        if self._session is not None:
+            message["sessionId"] = self._session
+        os.write(self._write, json.dumps(message).encode() + b"\0")
+        while True:
+            answer = self._next()
+            if answer.get("id") == self._count:
+                assert "error" not in answer, answer
+                return dict(answer["result"])
+            self._note(answer.get("method", ""), answer.get("params", {}))
+
+    def _next(self) -> dict[str, Any]:
+        while b"\0" not in self._left:
+            ready, _, _ = select.select([self._read], [], [], PATIENCE)
+            assert ready, "the browser does not answer"
+            part = os.read(self._read, 1 << 20)
+            assert part, "the browser is gone"
+            self._left += part
+        text, _, self._left = self._left.partition(b"\0")
+        return dict(json.loads(text))
+
+    def _note(self, event: str, parameters: dict[str, Any]) -> None:
+        if event == "Network.requestWillBeSent":
+            self.requests.append(parameters["request"]["url"])
+        elif event in ("Runtime.exceptionThrown", "Runtime.consoleAPICalled", "Log.entryAdded"):
+            text = json.dumps(parameters)
+            if SPEED not in text:
+                self.complaints.append(text)

@@ -1,0 +1,58 @@
+"""Motions of every kind of planner, recorded once per test process."""
+
+import functools
+
+import numpy as np
+
+from evoexp import compose
+from evoexp.condition import Condition
+from evoexp.playback.recording import Heading, Recording, record
+
+SAMPLES = {  # name: overrides, label, whether the search is run to its end
+    "two arms": (["experiment=rana_planar", "budget=smoke"], "via-point GA", False),
+    "two arms in space": (["experiment=rana_puma", "budget=smoke"], "via-point GA", False),
+    "three arms": (["experiment=rana_three_arms", "budget=smoke"], "", False),
+    "among obstacles": (["experiment=rana_obstacles", "budget=smoke"], "", False),
+    "co-evolution": (["experiment=curkovic_motion", "budget=smoke"], "cubic spline", False),
+    "redundant arm": (["experiment=lavoie_7dof", "budget=smoke"], "", True),
+    "grid": (["experiment=chen_path", "budget=smoke"], "(c)", False),
+    "mission": (["experiment=chen_mission", "budget=smoke"], "(b)", True),
+    "placement": (["experiment=chen_placement", "budget=smoke"], "A torque norm", True),
+    "postures": (["experiment=corsepius_gate_narrow", "budget=smoke"], "scope .10 rad", True),
+    "pick and place": (["experiment=corsepius_pick_and_place"], "", True),
+}
+REPLICATE = {"pick and place": 2}  # one that puts the bottle down, hence holds it on the way
+CROSSING = [[[180.0, 0.0], [0.0, 0.0]]] * 2  # [deg] both arms of the planar scene stay, crossed
+
+
+@functools.cache
+def condition(name: str) -> Condition:
+    """Return a sample's condition."""
+    overrides, label, _ = SAMPLES[name]
+    found = compose.expand(overrides, only=(label,) if label else ())[0].conditions
+    return found[0].condition
+
+
+@functools.cache
+def recording(name: str) -> Recording:
+    """Return a sample's motion."""
+    own = condition(name)
+    planner, problem = own.prepare()
+    generations = planner.evolve(problem, own.rng(REPLICATE.get(name, 0)))
+    best = np.array(next(generations).best)
+    improvements = [(0, 2.0)]
+    if SAMPLES[name][2]:
+        for generation in generations:
+            best = np.array(generation.best)
+            improvements.append((generation.index, float(generation.best_cost)))
+    return record(own, best, Heading(name, 0, tuple(improvements)))
+
+
+@functools.cache
+def refuted() -> Recording:
+    """Return a motion of two arms that cross each other twice: they go there and back, twice."""
+    own = condition("two arms")
+    _, problem = own.prepare()
+    share = np.abs(np.sin(np.linspace(0.0, 2.0 * np.pi, 21)))[:, None]
+    parts = [problem.start[a:b] + share * (problem.goal - problem.start)[a:b] for a, b in problem.arm_slices]
+    return record(own, np.concatenate([part.ravel() for part in parts]), Heading("refuted"))

@@ -66,20 +66,27 @@ def measure_posture(theta_1, theta_2, branch, task, weights, avoided, limits, ou
     xx = jx1 * jx1 + jx2 * jx2 + jx3 * jx3
     yy = jy1 * jy1 + jy2 * jy2 + jy3 * jy3
     xy = jx1 * jy1 + jx2 * jy2 + jx3 * jy3
-    obstacles = 0.0
-    for n in range(len(avoided)):
-        link, place = avoided[n, 1], avoided[n, 2]
-        x = platform + (place if link == 1.0 else 1.0) * x1 * (link >= 1.0)
-        y = (place if link == 1.0 else 1.0) * y1 * (link >= 1.0)
-        x += (place if link == 2.0 else 1.0) * x2 * (link >= 2.0) + place * x3 * (link >= 3.0)
-        y += (place if link == 2.0 else 1.0) * y2 * (link >= 2.0) + place * y3 * (link >= 3.0)
-        dx, dy = x - avoided[n, 3], y - avoided[n, 4]
-        obstacles += avoided[n, 0] * _inverse(dx * dx + dy * dy, cap)  # Eq. 12
+    obstacles = _obstacle_costs(platform, (x1, x2, x3), (y1, y2, y3), avoided, cap)
     out[TORQUE_NORM], out[TORQUE_MAX] = min(norm, cap), min(largest, cap)
     out[OBSTACLE], out[MANIPULABILITY] = min(obstacles, cap), _inverse(xx * yy - xy * xy, cap)  # Eq. 13
     total = obstacles + weights[0] * norm + weights[1] * largest + weights[2] * out[MANIPULABILITY]  # Eq. 14
     out[COST] = min(total, cap) if within else cap
     return within
+
+
+@kernel
+def _obstacle_costs(platform, xs, ys, avoided, cap):  # type: ignore[no-untyped-def]
+    """Return Σ γ E_obs (Eq. 12) of a platform's place and the links' extents; `avoided` as in `measure_posture`."""
+    total = 0.0
+    for n in range(len(avoided)):
+        link, place = avoided[n, 1], avoided[n, 2]
+        x = platform + (place if link == 1.0 else 1.0) * xs[0] * (link >= 1.0)
+        y = (place if link == 1.0 else 1.0) * ys[0] * (link >= 1.0)
+        x += (place if link == 2.0 else 1.0) * xs[1] * (link >= 2.0) + place * xs[2] * (link >= 3.0)
+        y += (place if link == 2.0 else 1.0) * ys[1] * (link >= 2.0) + place * ys[2] * (link >= 3.0)
+        dx, dy = x - avoided[n, 3], y - avoided[n, 4]
+        total += avoided[n, 0] * _inverse(dx * dx + dy * dy, cap)
+    return total
 
 
 @kernel

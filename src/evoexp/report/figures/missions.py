@@ -59,7 +59,7 @@ def missions_table(shown: list[Shown]) -> pd.DataFrame:
 
 
 def draw_missions(table: pd.DataFrame) -> Figure:
-    """Draw one row per motion: from above, and from the side."""
+    """Draw one row per motion: from above, and from the side, which the axes say; titles have little room."""
     names = list(dict.fromkeys(table["row"]))
     figure = style.figure(3.1 * len(names) + 0.3)
     panels = figure.subplots(len(names), 2, squeeze=False)
@@ -68,10 +68,10 @@ def draw_missions(table: pd.DataFrame) -> Figure:
         _draw_side(side, rows)
         label, _, told = str(name).partition(", ")
         above.set_title(f"{label}: from above")
-        side.set_title(f"from the side: {told}")
+        side.set_title(told)
     handles, labels = panels[0][1].get_legend_handles_labels()
     own, words = panels[0][0].get_legend_handles_labels()
-    figure.legend(own + handles, words + labels, loc="outside lower center", ncols=4)
+    figure.legend(own + handles, words + labels, loc="outside lower center", ncols=3)
     return figure
 
 

@@ -116,8 +116,7 @@ def draw_gaps(table: pd.DataFrame) -> Figure:
         axes.set_xlabel("gap E / E* − 1 [-]")
         axes.set_ylabel("share with a smaller gap")
         axes.set_title(rows["case"].iloc[0])
-    most = max(range(len(places)), key=lambda k: len(places[k].get_legend_handles_labels()[1]))
-    style.legend_below(figure, places[most], 3)
+    _legend_of_all(figure, places, 3)
     return figure
 
 
@@ -196,11 +195,7 @@ def draw_postures(table: pd.DataFrame) -> Figure:
         axes.set_ylim(*_around(table, "y"))
         axes.xaxis.set_major_locator(style.few_ticks())
         axes.set_title(rows["case"].iloc[0])
-    handles: dict[str, Any] = {}
-    for axes in places:
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            handles.setdefault(label, handle)
-    figure.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=5)
+    _legend_of_all(figure, places, 5)
     return figure
 
 
@@ -232,3 +227,12 @@ def _panels(count: int, height: float) -> tuple[Figure, list[Axes]]:
     for axes in places[count:]:
         axes.set_axis_off()
     return figure, list(places[:count])
+
+
+def _legend_of_all(figure: Figure, places: list[Axes], columns: int) -> None:
+    """Draw one legend below all panels, of whatever any of them shows."""
+    handles: dict[str, Any] = {}
+    for axes in places:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            handles.setdefault(label, handle)
+    figure.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=columns)

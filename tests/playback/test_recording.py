@@ -70,6 +70,17 @@ def test_shapes_that_no_scenario_has_are_drawn_too() -> None:
     assert drawn.points is not None and np.array_equal(drawn.points, points)
     assert drawn.triangles is not None
     assert drawn.triangles.tolist() == [[2, 1, 0], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+    mesh = coal.BVHModelOBBRSS()
+    mesh.beginModel(4, 4)
+    mesh.addVertices(points)
+    for face in ((0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)):  # all the wrong way round
+        mesh.addTriangles(np.array([face]))
+    mesh.endModel()
+    turned, _ = outline(mesh)
+    assert turned.points is not None
+    assert np.array_equal(turned.points, points)
+    assert turned.triangles is not None
+    assert turned.triangles.tolist() == [[2, 1, 0], [1, 3, 0], [3, 2, 0], [2, 3, 1]]
     assert outline(coal.Cone(0.5, 2.0))[0].size == (0.5, 2.0)
     wall, place = outline(coal.Halfspace(np.array([1.0, 0.0, 0.0]), 2.0))
     assert wall.kind == "half_space"

@@ -37,7 +37,12 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         hint = ""
-        if "invalid choice" in message:
+        choices = {text: action.choices for action in self._actions for text in action.option_strings}
+        option = message.removeprefix("argument ").split(":")[0]
+        if "invalid choice" in message and choices.get(option):
+            word, known = message.split("'")[1], list(choices[option] or ())
+            message = f"{option}: must be one of {', '.join(known)}, was '{word}'{nearest(word, known)}"
+        elif "invalid choice" in message:
             word = message.split("'")[1]
             message = f"no command '{word}'{nearest(word, COMMANDS)} (commands: {', '.join(COMMANDS)})"
         elif "unrecognized arguments" in message:

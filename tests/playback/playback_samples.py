@@ -7,6 +7,7 @@ import numpy as np
 from evoexp import compose
 from evoexp.condition import Condition
 from evoexp.playback.recording import Heading, Recording, record
+from evoexp.playback.shapes import Outline
 
 SAMPLES = {  # name: overrides, label, whether the search is run to its end
     "two arms": (["experiment=rana_planar", "budget=smoke"], "via-point GA", False),
@@ -22,7 +23,6 @@ SAMPLES = {  # name: overrides, label, whether the search is run to its end
     "pick and place": (["experiment=corsepius_pick_and_place"], "", True),
 }
 REPLICATE = {"pick and place": 2}  # one that puts the bottle down, hence holds it on the way
-CROSSING = [[[180.0, 0.0], [0.0, 0.0]]] * 2  # [deg] both arms of the planar scene stay, crossed
 
 
 @functools.cache
@@ -56,3 +56,28 @@ def refuted() -> Recording:
     share = np.abs(np.sin(np.linspace(0.0, 2.0 * np.pi, 21)))[:, None]
     parts = [problem.start[a:b] + share * (problem.goal - problem.start)[a:b] for a, b in problem.arm_slices]
     return record(own, np.concatenate([part.ravel() for part in parts]), Heading("refuted"))
+
+
+def matrix(row: np.ndarray) -> np.ndarray:
+    """Return a position and a quaternion as a matrix, without Pinocchio."""
+    x, y, z, w = row[3:] / np.sqrt((row[3:] ** 2).sum())
+    m = np.eye(4)
+    m[:3, :3] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    m[:3, 3] = row[:3]
+    return m
+
+
+def half_extent(drawn: Outline) -> np.ndarray:
+    """Return half the edges of the box around a shape, in its own frame."""
+    kind, size = drawn.kind, drawn.size
+    if kind == "box":
+        return 0.5 * np.array(size)
+    if kind == "sphere":
+        return np.full(3, size[0])
+    if kind == "ellipsoid":
+        return np.array(size)
+    return np.array([size[0], size[0], 0.5 * size[1] + (size[0] if kind == "capsule" else 0.0)])

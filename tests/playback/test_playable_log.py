@@ -8,8 +8,7 @@ import pinocchio as pin
 import pytest
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from mcap.reader import make_reader
-from playback_samples import SAMPLES, condition, recording, refuted
-from test_recording import half_extent, matrix
+from playback_samples import SAMPLES, condition, half_extent, matrix, recording, refuted
 
 from evoexp.playback.playable_log import LAYOUT, SECOND, layout, playable_log
 

@@ -2,7 +2,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
-from playback_samples import SAMPLES, condition, recording, refuted
+from playback_samples import SAMPLES, condition, half_extent, matrix, recording, refuted
 
 from evoexp.collision.certificate import Part, certificate
 from evoexp.collision.scene import geometry_scene
@@ -19,19 +19,6 @@ NAMES = sorted(SAMPLES)
 @pytest.fixture(params=NAMES)
 def shown(request: pytest.FixtureRequest) -> Recording:
     return recording(request.param)
-
-
-def matrix(row: np.ndarray) -> np.ndarray:
-    """Return a position and a quaternion as a matrix, without Pinocchio."""
-    x, y, z, w = row[3:] / np.sqrt((row[3:] ** 2).sum())
-    m = np.eye(4)
-    m[:3, :3] = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    m[:3, 3] = row[:3]
-    return m
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -71,28 +58,29 @@ def test_every_coal_shape_is_drawn_once_and_of_the_same_size(name: str) -> None:
             assert np.abs(where - np.eye(4)).max() < 1e-12
 
 
-def half_extent(drawn: object) -> np.ndarray:
-    kind, size = drawn.kind, drawn.size  # type: ignore[attr-defined]
-    if kind == "box":
-        return 0.5 * np.array(size)
-    if kind == "sphere":
-        return np.full(3, size[0])
-    if kind == "ellipsoid":
-        return np.array(size)
-    return np.array([size[0], size[0], 0.5 * size[1] + (size[0] if kind == "capsule" else 0.0)])
-
-
 def test_shapes_that_no_scenario_has_are_drawn_too() -> None:
     points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     faces = coal.StdVec_Triangle()
-    for a, b, c in ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)):
+    for a, b, c in ((0, 1, 2), (0, 1, 3), (0, 3, 2), (1, 2, 3)):  # the first one the wrong way round
         faces.append(coal.Triangle(a, b, c))
     vertices = coal.StdVec_Vec3s()
     vertices.extend(points)
     drawn, _ = outline(coal.Convex(vertices, faces))
     assert drawn.kind == "mesh"
     assert drawn.points is not None and np.array_equal(drawn.points, points)
-    assert drawn.triangles is not None and drawn.triangles.shape == (4, 3)
+    assert drawn.triangles is not None
+    assert drawn.triangles.tolist() == [[2, 1, 0], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+    mesh = coal.BVHModelOBBRSS()
+    mesh.beginModel(4, 4)
+    mesh.addVertices(points)
+    for face in ((0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)):  # all the wrong way round
+        mesh.addTriangles(np.array([face]))
+    mesh.endModel()
+    turned, _ = outline(mesh)
+    assert turned.points is not None
+    assert np.array_equal(turned.points, points)
+    assert turned.triangles is not None
+    assert turned.triangles.tolist() == [[2, 1, 0], [1, 3, 0], [3, 2, 0], [2, 3, 1]]
     assert outline(coal.Cone(0.5, 2.0))[0].size == (0.5, 2.0)
     wall, place = outline(coal.Halfspace(np.array([1.0, 0.0, 0.0]), 2.0))
     assert wall.kind == "half_space"

@@ -75,7 +75,7 @@
       const made = new Map();
       this.shapes = this.motion.shapes.map(shape => {
         const key = JSON.stringify([shape.kind, shape.size, shape.points]);
-        if (!made.has(key)) made.set(key, this.upload(G.surface(shape, this.motion.radius, this.motion.planar)));
+        if (!made.has(key)) made.set(key, { ...this.upload(G.surface(shape, this.motion.radius, this.motion.planar)), open: shape.kind === "mesh" });
         return { ...shape, local: G.fromPose(shape.pose), buffer: made.get(key) };
       });
       this.floor = this.upload(this.grid());
@@ -176,7 +176,7 @@
     swell(shape) {  // links without thickness get that of a line
       return shape.line ? LINE * this.pixel : shape.kind === "capsule" ? Math.max(0, THIN * this.pixel - shape.size[0]) : 0;
     }
-    put({ buffer, count }, model, tint, opacity, swell, mode = this.gl.TRIANGLES) {
+    put({ buffer, count, open }, model, tint, opacity, swell, mode = this.gl.TRIANGLES) {
       const gl = this.gl;
       gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
       for (const [name, offset] of [["at", 0], ["normal", 12]]) {
@@ -188,6 +188,7 @@
       gl.uniform1f(this.u_swell, swell);
       gl.uniform4f(this.u_colour, ...tint, opacity);
       if (mode === gl.LINES) gl.uniform1f(this.u_lit, 0);
+      if (open) gl.disable(gl.CULL_FACE); else gl.enable(gl.CULL_FACE);
       gl.drawArrays(mode, 0, count);
       if (mode === gl.LINES) gl.uniform1f(this.u_lit, this.eye.planar ? 0 : 1);
     }

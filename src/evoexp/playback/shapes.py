@@ -93,8 +93,9 @@ def outline(shape: Any) -> tuple[Outline, Any]:
 
 
 def _mesh(shape: Any) -> tuple[FloatArray, np.ndarray]:
-    """Return corners and triangles of a mesh."""
-    if hasattr(shape, "polygons") and callable(shape.polygons):  # a convex hull
+    """Return corners and triangles of a mesh, turned as seen from outside if the file has them all the wrong way."""
+    convex = hasattr(shape, "polygons")
+    if convex:
         points = np.array([shape.point(k) for k in range(shape.num_points)])
         faces = [shape.polygons(k) for k in range(shape.num_polygons)]
     elif hasattr(shape, "tri_indices"):
@@ -102,7 +103,12 @@ def _mesh(shape: Any) -> tuple[FloatArray, np.ndarray]:
         faces = [shape.tri_indices(k) for k in range(shape.num_tris)]
     else:
         raise UnsupportedShape(f"body: a {type(shape).__name__} cannot be drawn")
-    return points, np.array([[int(face[k]) for k in range(3)] for face in faces], dtype=np.int64)
+    triangles = np.array([[int(face[k]) for k in range(3)] for face in faces], dtype=np.int64)
+    a, b, c = points[triangles].transpose(1, 0, 2)
+    volumes = (np.cross(b - a, c - a) * (a - points.mean(axis=0))).sum(axis=1)
+    inward = volumes < 0.0 if convex else np.full(len(volumes), volumes.sum() < 0.0)
+    triangles[inward] = triangles[inward, ::-1]
+    return points, triangles
 
 
 def pose(placement: Any) -> FloatArray:

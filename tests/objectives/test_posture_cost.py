@@ -85,9 +85,27 @@ def test_distances_from_surfaces_against_coal(name: str) -> None:
         result.clear()
         point = coal.Transform3s(np.eye(3), position)
         expected = coal.distance(coal.Sphere(1e-9), point, shape, body, request, result)
-        inside += expected < 0.0
-        assert rows[DISTANCE, n] == pytest.approx(expected, abs=1e-5)
+        if expected >= 0.0:
+            assert rows[DISTANCE, n] == pytest.approx(expected, abs=1e-5)
+        else:  # coal finds the way out by iterations, near round bodies a longer one than the shortest
+            inside += 1
+            assert expected - 1e-5 <= rows[DISTANCE, n] <= 0.0
+            assert rows[DISTANCE, n] == pytest.approx(depth(name, place.inv().apply(position - aim[9:12])), abs=1e-12)
     assert inside > 3
+
+
+def depth(name: str, point: np.ndarray) -> float:
+    """Return minus how far a point inside of a body, in its own frame, is from getting out of it."""
+    x, y, z = np.abs(point)
+    away = np.hypot(x, y)
+    return float(
+        {
+            "sphere": np.hypot(away, z) - 0.3,
+            "capsule": np.hypot(away, max(z - 0.4, 0.0)) - 0.2,
+            "cylinder": max(away - 0.2, z - 0.4),
+            "box": max(x - 0.2, y - 0.3, z - 0.4),
+        }[name]
+    )
 
 
 def test_axial_and_heading_against_their_definitions() -> None:

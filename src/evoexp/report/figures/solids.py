@@ -94,7 +94,7 @@ def space(figure: Figure, place: Any, points: FloatArray, unit: str, view: tuple
         getattr(axes, f"set_{name}lim")(least, greatest)
         getattr(axes, f"set_{name}label")(f"{name} [{unit}]", labelpad=-7, fontsize=7)
     spans = high - low + 2.0 * pad
-    axes.set_box_aspect(spans, zoom=1.0)
+    axes.set_box_aspect(spans, zoom=0.92)
     axes.patch.set_visible(False)
     axes.tick_params(labelsize=6, pad=-2)
     for axis, span in zip((axes.xaxis, axes.yaxis, axes.zaxis), spans, strict=True):

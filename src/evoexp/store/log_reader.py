@@ -7,6 +7,7 @@ only `read_log` also decodes every message and compares the content digest.
 import io
 import operator
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -108,16 +109,23 @@ def read_summary(source: Source) -> ReplicateSummary:
         return _summary(_metadata(container, index, written.SUMMARY, name), run, name)
 
 
+@contextmanager
+def _indexed(source: Source) -> Iterator[tuple[Container, "_Index"]]:
+    """Open a log of a run by its index; what cannot be read in the body is a damaged log."""
+    container, name = _open(source)
+    with unreadable_is_corrupt(name):
+        index = _index(container)
+        _run(container, index, name)
+        yield container, index
+
+
 def read_solution(source: Source) -> SolutionRow:
     """Return a log's last solution, the best of the replicate; only the chunk that holds it is decompressed.
 
     Raises:
         CorruptLog: As `read_log`, except that the content digest is not compared.
     """
-    container, name = _open(source)
-    with unreadable_is_corrupt(name):
-        index = _index(container)
-        _run(container, index, name)
+    with _indexed(source) as (container, index):
         channel_id = index.channels[written.SOLUTION_TOPIC].id
         last = [chunk for chunk in index.chunks if channel_id in chunk.message_index_offsets][-1]
         solutions = [data for channel, _, _, data in container.messages_at(last) if channel == channel_id]
@@ -130,10 +138,7 @@ def array_names(source: Source) -> list[str]:
     Raises:
         CorruptLog: As `read_log`, except that the content digest is not compared.
     """
-    container, name = _open(source)
-    with unreadable_is_corrupt(name):
-        index = _index(container)
-        _run(container, index, name)
+    with _indexed(source) as (_, index):
         return sorted(n.removesuffix(written.ARRAY) for n in index.attachments if n.endswith(written.ARRAY))
 
 
@@ -148,10 +153,7 @@ def read_array(source: Source, array: str) -> NDArray[Any]:
         KeyError: There is none of this name.
         CorruptLog: As `read_log`, except that the content digest is not compared.
     """
-    container, name = _open(source)
-    with unreadable_is_corrupt(name):
-        index = _index(container)
-        _run(container, index, name)
+    with _indexed(source) as (container, index):
         offset = index.attachments.get(array + written.ARRAY)
         if offset is not None:
             return decode_array(parse(Attachment, container.record_at(offset)).data)
@@ -172,10 +174,7 @@ def generation_columns(source: Source) -> dict[str, NDArray[Any]]:
     Raises:
         CorruptLog: As `read_log`, except that the content digest is not compared.
     """
-    container, name = _open(source)
-    with unreadable_is_corrupt(name):
-        index = _index(container)
-        _run(container, index, name)
+    with _indexed(source) as (container, index):
         channel_id = index.channels[written.GENERATION_TOPIC].id
         data = [data for channel, _, _, data in _all_messages(container) if channel == channel_id]
         return _columns(orjson.loads(b"[" + b",".join(data) + b"]"))

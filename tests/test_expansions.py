@@ -6,11 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from evoexp import compose, expansions, shipped
+from evoexp import attachments, compose, expansions, shipped
 from evoexp.errors import EvoexpError
 from evoexp.experiment import Experiment
 
 WORDS = ["experiment=rana_planar", "budget=smoke"]
+ROBOT = ["robot=urdf", "scenario=urdf_reach", "planner=posture_es", "ga=corsepius", "objective=corsepius_reach"]
+ROBOT += ["collision=corsepius_spheres"]
+SIX_R = Path(__file__).parent / "robots" / "data" / "ur5_like" / "ur5_like.urdf"
 
 
 @pytest.fixture
@@ -69,13 +72,32 @@ def test_damage_is_noticed_and_mended(composed: Callable[[], int], tmp_path: Pat
     assert composed() == 2
 
 
-@pytest.mark.parametrize("words", [["experiment=chen_fields"], [*WORDS, "seed=${num_replicates}"]])
-def test_what_files_or_interpolations_have_a_say_in_is_not_kept(
+@pytest.mark.parametrize("words", [[*WORDS, "seed=${num_replicates}"], [*ROBOT, f"robot.path={SIX_R}"]])
+def test_what_urdf_files_or_interpolations_have_a_say_in_is_not_kept(
     composed: Callable[[], int], tmp_path: Path, words: list[str]
 ) -> None:
     assert expansions.expand(words) == expansions.expand(words)
     assert composed() == 2
     assert not (tmp_path / "cache" / "expansions").exists()
+
+
+def test_files_are_read_again(composed: Callable[[], int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = ["experiment=chen_fields"]
+    first = expansions.expand(words)
+    condition = first[0].conditions[0].condition
+    files = condition.files()
+    monkeypatch.setattr(attachments, "_contents", {})  # as in another process
+    assert expansions.expand(words) == first
+    assert composed() == 1
+    assert len(files) == 1
+    assert condition.files() == files
+    shadow = tmp_path / "chen_fig_1.txt"  # what lies in the current directory comes before what is shipped
+    shadow.write_text((shipped.file_directory() / "chen_fig_1.txt").read_text().replace("*", ".", 1))
+    other = expansions.expand(words)
+    assert other[0].conditions[0].condition.id != condition.id
+    shadow.unlink()
+    assert expansions.expand(words) == first
 
 
 def test_errors_are_not_kept(composed: Callable[[], int]) -> None:

@@ -19,6 +19,7 @@ FILE, SHA256 = "file", "sha256"
 PREFIX = "files/"  # of the names of such attachments in a log
 
 _contents: dict[str, bytes] = {}
+_origins: dict[str, set[str]] = {}  # the paths that a content was read from, as configurations gave them
 
 
 class MissingFile(EvoexpError):
@@ -76,12 +77,28 @@ def with_files(value: Any, shipped: Path, field: str = "") -> Any:
         return value
     if set(value) != {FILE}:
         return {key: with_files(item, shipped, f"{field}.{key}" if field else str(key)) for key, item in value.items()}
-    path = Path(str(value[FILE]))
     try:
-        return {SHA256: keep((path if path.exists() else shipped / path).read_bytes())}
+        return {SHA256: read(str(value[FILE]), shipped)}
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise SettingError(f"{field}.{FILE}", f"a file that can be read ({reason})", str(value[FILE])) from None
+
+
+def read(path: str, shipped: Path) -> str:
+    """Read a file as a configuration gives it and keep its content; return the SHA-256.
+
+    Raises:
+        OSError: If it cannot be read, neither from the current directory nor from `shipped`.
+    """
+    here = Path(path)
+    sha256 = keep((here if here.exists() else shipped / here).read_bytes())
+    _origins.setdefault(sha256, set()).add(path)
+    return sha256
+
+
+def origins(sha256: str) -> list[str]:
+    """Return the paths that `read` had a content from; none if it came another way."""
+    return sorted(_origins.get(sha256, ()))
 
 
 def attached(config: Any) -> dict[str, bytes]:

@@ -132,7 +132,7 @@ def _condition(config: DictConfig, budget: Budget) -> Condition:
     _cap_generations(config, budget)
     raw = str(OmegaConf.to_container(config.planner, resolve=False))
     try:
-        plain: Any = read_files(OmegaConf.to_container(config, resolve=True), shipped.config_directory() / "scenario")
+        plain: Any = read_files(OmegaConf.to_container(config, resolve=True), shipped.file_directory())
     except OmegaConfBaseException as error:
         if absent := [group for group in PLANNER_PARTS if f"key '{group}' not found" in str(error)]:
             raise SettingError(absent[0], f"chosen: {', '.join(options(absent[0]))}", None) from None

@@ -1,8 +1,9 @@
 """Experiments that were composed before, kept on disk: Hydra takes some 85 ms per condition, of up to 56.
 
 An expansion follows from what was typed, from `conf/` and from evoexp's own code; all three, as content, are the name
-that it is kept under, so whatever changes is composed anew. It is not kept where more has a say: files that conditions
-read, interpolations (which may ask the environment), plug-ins. Errors are never kept.
+that it is kept under, so whatever changes is composed anew. Files that conditions refer to are read again, and must say
+what they said. It is not kept where more has a say: URDF files with their meshes, interpolations (which may ask the
+environment), plug-ins. Errors are never kept.
 """
 
 import contextlib
@@ -16,7 +17,7 @@ from typing import Any
 import orjson
 import pydantic
 
-from evoexp import shipped
+from evoexp import attachments, shipped
 from evoexp.batch.settings import RunnerSettings
 from evoexp.condition import Condition
 from evoexp.experiment import Experiment, Labelled
@@ -39,9 +40,18 @@ def expand(overrides: Sequence[str], *, multirun: bool = False, only: Sequence[s
     from evoexp import compose  # and Hydra
 
     experiments = compose.expand(overrides, multirun=multirun, only=only)
-    if path is not None and not any(c.condition.files() for e in experiments for c in e.conditions):
-        _write(path, experiments)
+    if path is not None and (files := _files(experiments)) is not None:
+        _write(path, experiments, files)
     return experiments
+
+
+def _files(experiments: Sequence[Experiment]) -> list[tuple[str, str]] | None:
+    """Return (path, SHA-256) of all files that conditions refer to; None if one did not come from a path alone."""
+    contents = {name for e in experiments for c in e.conditions for name in c.condition.files()}
+    hashes = sorted(name.removeprefix(attachments.PREFIX) for name in contents)
+    if not all(attachments.origins(sha256) for sha256 in hashes):
+        return None
+    return [(path, sha256) for sha256 in hashes for path in attachments.origins(sha256)]
 
 
 def _path(asked: list[Any]) -> Path | None:
@@ -68,7 +78,13 @@ def _read(path: Path) -> list[Experiment] | None:
         return None
     with contextlib.suppress(OSError):
         os.utime(path)
-    return [_experiment(plain) for plain in orjson.loads(text)]
+    kept = orjson.loads(text)
+    try:
+        if any(attachments.read(file, shipped.file_directory()) != sha256 for file, sha256 in kept["files"]):
+            return None
+    except OSError:
+        return None
+    return [_experiment(plain) for plain in kept["experiments"]]
 
 
 def _experiment(plain: dict[str, Any]) -> Experiment:
@@ -78,9 +94,9 @@ def _experiment(plain: dict[str, Any]) -> Experiment:
     return Experiment(**(plain | {"conditions": tuple(conditions), "runner": runner, "report": report}))
 
 
-def _write(path: Path, experiments: Sequence[Experiment]) -> None:
+def _write(path: Path, experiments: Sequence[Experiment], files: Sequence[tuple[str, str]]) -> None:
     """Keep an expansion, and not too many of them; silent where that cannot be done."""
-    text = orjson.dumps([_plain(experiment) for experiment in experiments])
+    text = orjson.dumps({"experiments": [_plain(experiment) for experiment in experiments], "files": files})
     temporary = path.with_suffix(f".{os.getpid()}.tmp")
     with contextlib.suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -20,6 +20,11 @@ def config_directory() -> Path:
     return inside if inside.is_dir() else Path(__file__).parents[2] / "conf"
 
 
+def file_directory() -> Path:
+    """Return where files lie that shipped configurations refer to: beside the scenarios."""
+    return config_directory() / "scenario"
+
+
 class Shipped(NamedTuple):
     """One shipped condition at one budget.
 

@@ -1,11 +1,16 @@
 """What every planner keeps to, in every kind of shipped condition."""
 
+import functools
+
 import numpy as np
+import pyarrow as pa
 import pytest
 
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
-from evoexp.store.log_reader import read_log
+from evoexp.records import flatten
+from evoexp.store.log import Finished
+from evoexp.store.log_reader import read_log, read_summary
 from shipped_conditions import kinds_of_conditions
 
 SHIPPED = [pytest.param(condition, id=name) for name, condition in sorted(kinds_of_conditions("smoke").items())]
@@ -17,14 +22,19 @@ def condition(request: pytest.FixtureRequest) -> Condition:
     return found
 
 
+@functools.cache
+def finished(condition: Condition, replicate: int) -> Finished:
+    return run_replicate(condition, replicate)
+
+
 def test_same_seed_same_bits_other_replicate_other_bits(condition: Condition) -> None:
-    first, again, other = (run_replicate(condition, k) for k in (0, 0, 1))
+    first, again, other = finished(condition, 0), run_replicate(condition, 0), finished(condition, 1)
     assert first.summary.digest == again.summary.digest
     assert first.summary.digest != other.summary.digest
 
 
 def test_records_are_consistent(condition: Condition) -> None:
-    log = read_log(run_replicate(condition, 0).content)
+    log = read_log(finished(condition, 0).content)
     rows = log.generations
     assert [row.index for row in rows] == list(range(len(rows)))
     assert all(b.best_cost <= a.best_cost for a, b in zip(rows, rows[1:], strict=False)), "best so far is monotone"
@@ -37,9 +47,16 @@ def test_records_are_consistent(condition: Condition) -> None:
     assert log.summary.solved == rows[-1].solved
 
 
+def test_the_summary_is_the_row_that_its_log_gives(condition: Condition) -> None:
+    content, summary = finished(condition, 0)
+    given, read = (pa.Table.from_pylist([flatten(each)]) for each in (summary, read_summary(content)))
+    assert set(given.schema) == set(read.schema)
+    assert repr(sorted(given.to_pylist()[0].items())) == repr(sorted(read.to_pylist()[0].items()))  # NaN equals NaN
+
+
 def test_the_best_solution_is_worth_what_was_recorded(condition: Condition) -> None:
     planner, problem = condition.prepare()
-    log = read_log(run_replicate(condition, 0).content)
+    log = read_log(finished(condition, 0).content)
     terms = planner.evaluate(problem, log.solutions[-1].values)
     recorded = log.generations[-1].terms
     if not condition.is_reference:  # whose own numbers are not a solution's

@@ -86,6 +86,16 @@ def test_more_replicates_read_only_themselves(run: RunDirectory, add: Add, reads
     assert [row["status"] for row in incremental.to_pylist()] == ["done"] * 5
 
 
+def test_what_was_just_written_is_not_read_again(run: RunDirectory, add: Add, reads: list[str]) -> None:
+    add(0)
+    write_summary(run)
+    written = {1: add(1, best_cost=math.nan, terms={"new": -math.inf}).summary, 2: add(2, solved=True).summary}
+    table = write_summary(run, written)
+    assert reads == ["0000.mcap"]
+    run.summary_path.unlink()
+    assert rows(write_summary(run)) == rows(table)
+
+
 def test_a_term_that_no_row_has_any_more_is_dropped(run: RunDirectory, add: Add) -> None:
     add(0)
     add(1, terms={"old": 1.0})

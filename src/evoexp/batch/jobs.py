@@ -10,6 +10,7 @@ from typing import NamedTuple
 from evoexp.attachments import keep_all
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
+from evoexp.records import ReplicateSummary
 
 
 class Job(NamedTuple):
@@ -43,6 +44,7 @@ class Outcome(NamedTuple):
         traceback: Of the failure.
         content: The finished log; dropped once it is written.
         wall_s: How long it took.
+        summary: The row that the log holds; None for a failed one.
     """
 
     condition_id: str
@@ -51,6 +53,7 @@ class Outcome(NamedTuple):
     traceback: str
     content: bytes
     wall_s: float
+    summary: ReplicateSummary | None = None
 
     @property
     def failed(self) -> bool:
@@ -66,12 +69,12 @@ def run_jobs(jobs: Sequence[Job]) -> list[Outcome]:
         try:
             keep_all(job.files)
             condition = _condition(job.condition_json)
-            content, reason, trace = run_replicate(condition, job.replicate, job.condition_json).content, "", ""
+            (content, summary), reason, trace = run_replicate(condition, job.replicate, job.condition_json), "", ""
         except Exception as error:
-            content, trace = b"", traceback.format_exc()
+            content, summary, trace = b"", None, traceback.format_exc()
             reason = f"{type(error).__name__}: {error}".splitlines()[0]
         seconds = time.perf_counter() - start
-        outcomes.append(Outcome(job.condition_id, job.replicate, reason, trace, content, seconds))
+        outcomes.append(Outcome(job.condition_id, job.replicate, reason, trace, content, seconds, summary))
     return outcomes
 
 

@@ -21,6 +21,7 @@ from evoexp.batch.workers import in_workers, loading, num_cores
 from evoexp.collision.certificate import certificate
 from evoexp.condition import Condition
 from evoexp.paths.motion import Motion
+from evoexp.records import ReplicateSummary
 from evoexp.store.manifest import manifest
 from evoexp.store.run_directory import RunDirectory, lock_all
 from evoexp.store.summaries import write_summary
@@ -57,6 +58,7 @@ class Batch:
             self._wanted[condition.id] = (condition, max(count, known[1] if known else 0), known[2] if known else notes)
         self.runs = {key: RunDirectory(outputs, key) for key in self._wanted}
         self.jobs = self._missing()
+        self._finished: dict[str, dict[int, ReplicateSummary]] = {}  # by this batch, per condition
 
     def prepare(self) -> None:
         """Check every condition against its robot and scenario, before anything is written.
@@ -87,8 +89,8 @@ class Batch:
                 for outcomes in fan_out(self.jobs, num_workers):
                     yield from self._store(outcomes)
             finally:
-                for run in self.runs.values():
-                    write_summary(run)
+                for key, run in self.runs.items():
+                    write_summary(run, self._finished.pop(key, {}))
 
     def _missing(self) -> list[Job]:
         jobs = []
@@ -102,11 +104,12 @@ class Batch:
     def _store(self, outcomes: Sequence[Outcome]) -> list[Outcome]:
         by_run: dict[str, dict[int, bytes]] = {}
         for outcome in outcomes:
-            if outcome.failed:
+            if outcome.summary is None:
                 run = self.runs[outcome.condition_id]
                 run.write_failure(outcome.replicate, outcome.reason, outcome.traceback)
             else:
                 by_run.setdefault(outcome.condition_id, {})[outcome.replicate] = outcome.content
+                self._finished.setdefault(outcome.condition_id, {})[outcome.replicate] = outcome.summary
         for key, contents in by_run.items():
             self.runs[key].write_logs(contents)
         return [outcome._replace(content=b"") for outcome in outcomes]

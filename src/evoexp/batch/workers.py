@@ -23,10 +23,7 @@ _GIVEN_UP = r"\d+ tasks (which were still being processed|have been successfully
 warnings.filterwarnings("ignore", _GIVEN_UP, UserWarning)
 
 
-_NEEDED = ["evoexp.batch.jobs", "coal", "pinocchio", "joblib.externals.loky.process_executor"]
-"""What every worker loads, whatever it runs."""
-
-
+_PRELOADED = ["evoexp.batch.preloaded"]
 _SERVED = "forkserver"  # the name of this way to start processes
 _NUM_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
@@ -40,7 +37,7 @@ def start_server() -> None:
     if num_cores() == 1 or _SERVED not in multiprocessing.get_all_start_methods():
         return
     set_start_method(_SERVED, force=True)
-    multiprocessing.set_forkserver_preload(_NEEDED)
+    multiprocessing.set_forkserver_preload(_PRELOADED)
     with _children_ignore_interrupts(), _one_thread_each():
         forkserver.ensure_running()
 

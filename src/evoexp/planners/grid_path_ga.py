@@ -8,8 +8,8 @@ A population is a table of whole numbers, see `paths.grid_walks`; a solution is 
 y[, z] of one after the other, as many as there are.
 """
 
+import functools
 from collections.abc import Iterator
-from itertools import pairwise
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -108,34 +108,7 @@ class GridPathGa(Component):
         Raises:
             SettingError: If it cannot, or start or goal is no place to be, or the parts do not fit.
         """
-        if robot.dimensions != len(scenario.size):
-            raise SettingError("robot.dimensions", f"as many as the grid has ({len(scenario.size)})", robot.dimensions)
-        fields = self.collision.bind(scenario.blocked())
-        own = fields.grid
-        start, goal = own.index_of(scenario.start), own.index_of(scenario.goal)
-        for name, node in (("start", start), ("goal", goal)):
-            if not own.free.flat[node]:
-                must = (
-                    f"a node of an unsafeness of at most collision.max_unsafeness ({self.collision.max_unsafeness:g})"
-                )
-                raise SettingError(f"scenario.{name}", must, float(fields.unsafeness[node]))
-        steps = fields.steps_to(goal)
-        if steps[start] == UNREACHED:
-            must = f"a node that can be reached from the start {list(scenario.start)}; obstacles are between"
-            raise SettingError("scenario.goal", must, list(scenario.goal))
-        world: tuple[Any, ...] = (
-            own.neighbours,
-            fields.num_moves,
-            own.coordinates,
-            own.kinds,
-            fields.unsafeness,
-            fields.potentials,
-        )
-        ends = start, goal
-        bodies = scene(robot.build(), scenario.bodies())
-        choices = choice_table(own.neighbours, fields.potentials, steps)
-        world += (_fronts(fields), steps, ends, choices, tuple(part[:0] for part in choices))
-        return Problem(fields, steps, ends, world, bodies, scenario.security_margin)
+        return _prepared(self.collision, robot, scenario)
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield the population of random paths, then every generation."""
@@ -206,19 +179,20 @@ class GridPathGa(Component):
         last = np.array(own.free.shape) - 3
         if len(nodes) < 2:
             raise SettingError("path", "two nodes at least", nodes.tolist())
-        for k, node in enumerate(nodes):
-            if (node != np.floor(node)).any() or (node < 0).any() or (node > last).any():
-                inside = " × ".join(f"0..{value}" for value in last)
-                raise SettingError(f"path[{k}]", f"a node of the grid, whole numbers ({inside})", node.tolist())
-        path = np.array([len(nodes), *(own.index_of(tuple(map(int, node))) for node in nodes)], dtype=np.int32)
-        made = [after in own.neighbours[before] for before, after in pairwise(path[1:])]
+        outside = ((nodes != np.floor(nodes)) | (nodes < 0) | (nodes > last)).any(axis=1)
+        if outside.any():
+            k, inside = int(outside.argmax()), " × ".join(f"0..{value}" for value in last)
+            raise SettingError(f"path[{k}]", f"a node of the grid, whole numbers ({inside})", nodes[k].tolist())
+        indices = np.ravel_multi_index(tuple(nodes.T.astype(np.int64) + 1), own.free.shape)
+        path = np.array([len(nodes), *indices], dtype=np.int32)
+        made = (own.neighbours[path[1:-1]] == path[2:, None]).any(axis=1)
         faults = {
             "blocked_nodes": float(np.count_nonzero(~own.free.ravel()[path[1:]])),
-            "forbidden_moves": float(made.count(False)),
+            "forbidden_moves": float(np.count_nonzero(~made)),
             "missed_ends": float((path[1] != problem.ends[0]) + (path[-1] != problem.ends[1])),
         }
         results = np.full((RESULTS, 1), np.inf)
-        if all(made):
+        if made.all():
             grid_kernels.measure(path, problem.world, self.objective.weights, results, 0)
         else:
             results[DISTANCE] = np.sqrt(((nodes[1:] - nodes[:-1]) ** 2).sum(axis=1)).sum()
@@ -268,6 +242,37 @@ class _Search:
         while not grid_kernels.advance((uniforms, taken), *fixed, self.population, self._other, self._memory):
             uniforms, taken[0] = np.concatenate([uniforms, rng.random(len(uniforms))]), 0
         self.population, self._other = self._other, self.population
+
+
+@functools.lru_cache(maxsize=32)
+def _prepared(collision: PotentialFields, robot: FloorPlatform, scenario: GridMotion) -> Problem:
+    """Prepare what many planners share that differ in weights and rates alone."""
+    if robot.dimensions != len(scenario.size):
+        raise SettingError("robot.dimensions", f"as many as the grid has ({len(scenario.size)})", robot.dimensions)
+    fields = collision.bind(scenario.blocked())
+    own = fields.grid
+    start, goal = own.index_of(scenario.start), own.index_of(scenario.goal)
+    for name, node in (("start", start), ("goal", goal)):
+        if not own.free.flat[node]:
+            must = f"a node of an unsafeness of at most collision.max_unsafeness ({collision.max_unsafeness:g})"
+            raise SettingError(f"scenario.{name}", must, float(fields.unsafeness[node]))
+    steps = fields.steps_to(goal)
+    if steps[start] == UNREACHED:
+        must = f"a node that can be reached from the start {list(scenario.start)}; obstacles are between"
+        raise SettingError("scenario.goal", must, list(scenario.goal))
+    world: tuple[Any, ...] = (
+        own.neighbours,
+        fields.num_moves,
+        own.coordinates,
+        own.kinds,
+        fields.unsafeness,
+        fields.potentials,
+    )
+    ends = start, goal
+    bodies = scene(robot.build(), scenario.bodies())
+    choices = choice_table(own.neighbours, fields.potentials, steps)
+    world += (_fronts(fields), steps, ends, choices, tuple(part[:0] for part in choices))
+    return Problem(fields, steps, ends, world, bodies, scenario.security_margin)
 
 
 def named_terms(results: FloatArray, num_nodes: Any) -> dict[str, float]:

@@ -1,7 +1,7 @@
 """`summary.parquet`: one row per replicate, derived from the logs and always rebuildable."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -25,10 +25,14 @@ _ARROW = _PLAIN | {kind | None: arrow for kind, arrow in _PLAIN.items()}
 _BASE = [pa.field(name, _ARROW[kind]) for name, kind in field_types(ReplicateSummary).items()]
 
 
-def write_summary(run: RunDirectory) -> pa.Table:
+def write_summary(run: RunDirectory, written: Mapping[int, ReplicateSummary] | None = None) -> pa.Table:
     """Bring `summary.parquet` up to date with the logs and failures of a run, whose lock the caller holds.
 
     Rows of files that did not change since the table was written are taken from it.
+
+    Args:
+        run: Whose.
+        written: Summaries of logs that the caller has just written, by replicate: those are not read again.
 
     Returns:
         One row per replicate, done or failed, in order; a failed one has condition, replicate, status and stop_reason,
@@ -41,7 +45,8 @@ def write_summary(run: RunDirectory) -> pa.Table:
     stamps = _stamps(run)
     if stored is not None and _stored_stamps(stored) == stamps:
         return stored
-    table = _build(run, stored, stamps)
+    rows = {run.log_path(replicate).name: flatten(summary) for replicate, summary in (written or {}).items()}
+    table = _build(run, stored, stamps, rows)
     sink = pa.BufferOutputStream()
     pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
     write_file(run.summary_path, sink.getvalue().to_pybytes())
@@ -101,7 +106,8 @@ def _stamps(run: RunDirectory) -> Stamps:
 def _stored(run: RunDirectory) -> pa.Table | None:
     """Return the table as it was written, or None where there is no valid one of this version."""
     try:
-        table = pq.read_table(run.summary_path, page_checksum_verification=True)
+        with pq.ParquetFile(run.summary_path, page_checksum_verification=True) as file:
+            table = file.read()
         notes = json.loads(table.schema.metadata[_KEY])
         valid = notes["version"] == _VERSION and notes["condition"] == run.condition_id
         valid = valid and len(notes["files"]) == table.num_rows
@@ -116,12 +122,15 @@ def _stored_stamps(table: pa.Table) -> Stamps:
     return stamps
 
 
-def _build(run: RunDirectory, stored: pa.Table | None, stamps: Stamps) -> pa.Table:
+def _build(
+    run: RunDirectory, stored: pa.Table | None, stamps: Stamps, written: Mapping[str, dict[str, Any]] | None = None
+) -> pa.Table:
     known: dict[str, dict[str, Any]] = {}
     if stored is not None:
         old = _stored_stamps(stored)
         rows = zip(old, stored.to_pylist(), strict=True)
         known = {name: row for name, row in rows if stamps.get(name) == old[name]}
+    known |= written or {}
     rows_now = [known.get(name) or _row(run, run.replicates / name) for name in stamps]
     base = {field.name for field in _BASE}
     # A stored row has null for the terms that only its neighbours have.

@@ -1,0 +1,14 @@
+"""What worker processes are forked with: importing this loads whatever all of them need.
+
+So does the first call of a kernel: numba sets up its tables then, which takes a third of a second.
+"""
+
+import coal  # noqa: F401
+import numpy as np
+import pinocchio  # noqa: F401
+from joblib.externals.loky import process_executor  # noqa: F401
+
+from evoexp.batch import jobs  # noqa: F401
+from evoexp.evolution.statistics import cost_statistics
+
+cost_statistics(np.zeros(1))

@@ -7,6 +7,7 @@ import shutil
 import tempfile
 from pathlib import Path
 
+import llvmlite.binding
 import numba
 import platformdirs
 
@@ -33,6 +34,23 @@ def use_keyed_cache() -> None:
     directory = cache_root() / "kernels" / digest.hexdigest()[:16]
     numba.config.CACHE_DIR = str(directory)  # type: ignore[attr-defined]
     _prune_caches(directory)
+
+
+def is_compiled(kind: str) -> bool:
+    """Return whether `note_compiled` was told so, in this state of the sources."""
+    return _note(kind).exists()
+
+
+def note_compiled(kind: str) -> None:
+    """Note that every kernel is in the cache which something of this kind needs; silent where that cannot be done."""
+    with contextlib.suppress(OSError):
+        _note(kind).parent.mkdir(parents=True, exist_ok=True)
+        _note(kind).touch()
+
+
+def _note(kind: str) -> Path:
+    digest = hashlib.sha256(f"{llvmlite.binding.get_host_cpu_name()}\0{kind}".encode()).hexdigest()
+    return Path(str(numba.config.CACHE_DIR)) / "compiled" / digest[:32]  # type: ignore[attr-defined]
 
 
 def cache_root() -> Path:

@@ -18,7 +18,7 @@ from evoexp.batch import jobs
 from evoexp.batch.jobs import Job, Outcome, run_jobs
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.runner import MAX_BUNDLE, TASK_S, _Bundles, fan_out
-from evoexp.batch.workers import in_workers, loading
+from evoexp.batch.workers import in_workers, start_loading
 from evoexp.cli import main
 from evoexp.condition import Condition
 from evoexp.errors import Busy, SettingError
@@ -105,8 +105,7 @@ def test_a_worker_loads_neither_tables_nor_the_command_line() -> None:
 
 
 def test_a_worker_that_dies_while_it_loads_is_replaced(fresh_workers: None) -> None:
-    with loading(2, os._exit, 1):
-        pass
+    start_loading(2, os._exit, 1)()
     assert sorted(in_workers(2, (joblib.delayed(abs)(-k) for k in range(4)))) == [0, 1, 2, 3]
 
 

@@ -6,8 +6,9 @@ so an interrupted batch is resumed by asking for it again.
 
 import contextlib
 import itertools
+import re
 from collections import deque
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -17,9 +18,10 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from evoexp.batch.jobs import Job, Outcome, load, run_jobs
 from evoexp.batch.settings import RunnerSettings
-from evoexp.batch.workers import in_workers, loading, num_cores
+from evoexp.batch.workers import in_workers, num_cores, start_loading
 from evoexp.collision.certificate import certificate
 from evoexp.condition import Condition
+from evoexp.kernel_cache import is_compiled, note_compiled
 from evoexp.paths.motion import Motion
 from evoexp.records import ReplicateSummary
 from evoexp.store.manifest import manifest
@@ -28,6 +30,7 @@ from evoexp.store.summaries import write_summary
 
 TASK_S = 0.05  # [s] replicates are bundled into tasks of about this length
 MAX_BUNDLE = 64  # replicates per task at most, so that results keep streaming
+_NUMBER = re.compile(r"-?\d+(\.\d+)?([eE][-+]?\d+)?")
 
 
 class Batch:
@@ -58,14 +61,16 @@ class Batch:
             self._wanted[condition.id] = (condition, max(count, known[1] if known else 0), known[2] if known else notes)
         self.runs = {key: RunDirectory(outputs, key) for key in self._wanted}
         self.jobs = self._missing()
+        self._loaded: Callable[[], None] | None = None
         self._finished: dict[str, dict[int, ReplicateSummary]] = {}  # by this batch, per condition
 
     def prepare(self) -> None:
-        """Check every condition against its robot and scenario, before anything is written.
+        """Check every condition against its robot and scenario, before anything is written; so do the workers.
 
         Raises:
             SettingError: If one contradicts itself.
         """
+        self._loading()
         for condition, _, _ in self._wanted.values():
             condition.prepare()
 
@@ -76,21 +81,31 @@ class Batch:
             Busy: If another process writes one of the runs.
         """
         with lock_all(self.runs.values()):
+            self.jobs = self._missing()
+            wait = self._loading()
             for key, run in self.runs.items():
                 condition, _, notes = self._wanted[key]
                 run.create(condition.to_json(), manifest(key) | notes, condition.files())
-            self.jobs = self._missing()
-            num_workers = max(1, min(self._settings.num_workers or num_cores(), len(self.jobs)))
-            config_jsons = list(dict.fromkeys(job.condition_json for job in self.jobs))
-            files = list(dict.fromkeys(content for job in self.jobs for content in job.files))
-            with loading(num_workers, load, config_jsons, files):
-                _warm(config_jsons)
+            _compile(dict.fromkeys(job.condition_json for job in self.jobs))
+            wait()
             try:
-                for outcomes in fan_out(self.jobs, num_workers):
+                for outcomes in fan_out(self.jobs, self._num_workers):
                     yield from self._store(outcomes)
             finally:
                 for key, run in self.runs.items():
                     write_summary(run, self._finished.pop(key, {}))
+
+    @property
+    def _num_workers(self) -> int:
+        return max(1, min(self._settings.num_workers or num_cores(), len(self.jobs)))
+
+    def _loading(self) -> Callable[[], None]:
+        """Have the workers load what they need, if they do not yet; return what waits for them."""
+        if self._loaded is None:
+            config_jsons = list(dict.fromkeys(job.condition_json for job in self.jobs))
+            files = list(dict.fromkeys(content for job in self.jobs for content in job.files))
+            self._loaded = start_loading(self._num_workers, load, config_jsons, files)
+        return self._loaded
 
     def _missing(self) -> list[Job]:
         jobs = []
@@ -175,9 +190,12 @@ def _run_alone(job: Job) -> Outcome:
     return Outcome(job.condition_id, job.replicate, "worker process died twice", trace, b"", 0.0)
 
 
-def _warm(config_jsons: Iterable[bytes]) -> None:
-    """Compile every kernel that some conditions need, once and here."""
+def _compile(config_jsons: Iterable[bytes]) -> None:
+    """Compile every kernel that some conditions need, once and here, unless they are in the cache."""
     for text in config_jsons:
+        kind = _NUMBER.sub("0", text.decode())  # another number needs no other kernel
+        if is_compiled(kind):
+            continue
         with contextlib.suppress(Exception):  # a planner that fails does so again in its replicate, and is noted there
             condition = Condition.from_json(text)
             planner, problem = condition.prepare()
@@ -189,3 +207,4 @@ def _warm(config_jsons: Iterable[bytes]) -> None:
                 certificate(problem, motion)
                 if motion is not None:  # and one that touches nothing, whose closest approach is sought
                     certificate(problem, Motion(np.repeat(motion.q[:1], 2, axis=0)))
+            note_compiled(kind)

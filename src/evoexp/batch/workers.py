@@ -68,21 +68,20 @@ def in_workers(num_workers: int, tasks: Iterable[Any], ordered: bool = False) ->
     return results
 
 
-@contextmanager
-def loading(num_workers: int, load: Callable[..., None], *arguments: Any) -> Iterator[None]:
-    """Have worker processes load what they will need, while the body does something else; wait for them at its end.
+def start_loading(num_workers: int, load: Callable[..., None], *arguments: Any) -> Callable[[], None]:
+    """Have worker processes load what they will need from now on; return what waits for them.
 
     A worker that dies meanwhile is no error: whoever gives work to workers starts new ones.
     """
     if num_workers == 1:
-        yield
-        return
+        return lambda: None
     loaded = in_workers(num_workers, (joblib.delayed(load)(*arguments) for _ in range(num_workers)))
-    try:
-        yield
-    finally:
+
+    def wait() -> None:
         with suppress(TerminatedWorkerError):
             deque(loaded, maxlen=0)
+
+    return wait
 
 
 def leave_with_parent(parent: int, served: bool) -> None:

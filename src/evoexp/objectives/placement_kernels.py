@@ -29,18 +29,33 @@ def measure_posture(theta_1, theta_2, branch, task, weights, avoided, limits, ou
         limits: (6, 2) of θ1, θ2, θ3 [deg] and τ1, τ2, τ3.
         out: (RESULTS,) written; of what cannot be reached θ3, X_p and torques are NaN.
     """
-    cap = weights[6]
-    for k in range(CRITERIA):
-        out[k] = cap
-    for k in range(CRITERIA, RESULTS):
-        out[k] = np.nan
+    return _measure_branch(_directions(theta_1, theta_2, task), branch, task, weights, avoided, limits, out)
+
+
+@kernel
+def _directions(theta_1, theta_2, task):  # type: ignore[no-untyped-def]
+    """Return θ1, θ2, s1, c1, s12, c12, s123, c123, θ1 + θ2 + θ3 [deg]; the last two NaN where unreachable."""
     s1, c1 = sincos(DEGREE * theta_1)
     s12, c12 = sincos(DEGREE * (theta_1 + theta_2))
     s123 = (task[4] - task[0] * s1 - task[1] * s12) / task[2]
+    c123, absolute = np.nan, np.nan
+    if abs(s123) <= 1.0:
+        c123 = np.sqrt((1.0 - s123) * (1.0 + s123))
+        absolute = asin(s123) / DEGREE
+    return theta_1, theta_2, s1, c1, s12, c12, s123, c123, absolute
+
+
+@kernel
+def _measure_branch(directions, branch, task, weights, avoided, limits, out):  # type: ignore[no-untyped-def]
+    """Measure one posture as `measure_posture` does, from `_directions`."""
+    theta_1, theta_2, s1, c1, s12, c12, s123, c123, absolute = directions
+    cap = weights[6]
     if not abs(s123) <= 1.0:
+        for k in range(CRITERIA):
+            out[k] = cap
+        for k in range(CRITERIA, RESULTS):
+            out[k] = np.nan
         return False
-    c123 = np.sqrt((1.0 - s123) * (1.0 + s123))
-    absolute = asin(s123) / DEGREE
     if branch == 1:
         c123, absolute = -c123, 180.0 - absolute
     theta_3 = absolute - theta_1 - theta_2
@@ -102,8 +117,9 @@ def measure_both(theta_1, theta_2, task, weights, avoided, limits, out, other): 
     Returns:
         Its branch, −1 where neither is feasible.
     """
-    one = measure_posture(theta_1, theta_2, 0, task, weights, avoided, limits, out)
-    two = measure_posture(theta_1, theta_2, 1, task, weights, avoided, limits, other)
+    directions = _directions(theta_1, theta_2, task)
+    one = _measure_branch(directions, 0, task, weights, avoided, limits, out)
+    two = _measure_branch(directions, 1, task, weights, avoided, limits, other)
     branch = 0 if one else -1
     if two and not (one and out[COST] <= other[COST]):
         branch = 1
@@ -117,8 +133,9 @@ def measure_branches(angles, task, weights, avoided, limits, costs, theta_3):  #
     """Measure both values of θ3 of every posture: costs and θ3 [deg], both (2, individuals), are written."""
     out = np.empty(RESULTS)
     for k in range(angles.shape[1]):
+        directions = _directions(angles[0, k], angles[1, k], task)
         for branch in range(2):
-            measure_posture(angles[0, k], angles[1, k], branch, task, weights, avoided, limits, out)
+            _measure_branch(directions, branch, task, weights, avoided, limits, out)
             costs[branch, k], theta_3[branch, k] = out[COST], out[THETA_3]
 
 

@@ -28,7 +28,7 @@ from evoexp.store.manifest import manifest
 from evoexp.store.run_directory import RunDirectory, lock_all
 from evoexp.store.summaries import write_summary
 
-TASK_S = 0.05  # [s] replicates are bundled into tasks of about this length
+TASK_S = 0.2  # [s] replicates are bundled into tasks of about this length; a task costs the parent some 2 ms
 MAX_BUNDLE = 64  # replicates per task at most, so that results keep streaming
 _NUMBER = re.compile(r"-?\d+(\.\d+)?([eE][-+]?\d+)?")
 

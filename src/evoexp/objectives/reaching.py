@@ -48,28 +48,68 @@ def measure_reach(  # type: ignore[no-untyped-def]
         error: (individuals,) written: Eq. 1 [length unit].
         displacement: (individuals,) written: Eq. 2 [rad].
     """
-    num, rows = len(starts), len(starts) * LANES
+    rows = len(starts) * LANES
     begin, end = np.empty(rows), np.empty(rows)
     x, y = np.empty(rows + LANES), np.empty(rows + LANES)
     value, off, turned = np.empty(LANES), np.empty(LANES), np.empty(LANES)
     for first in range(0, count, LANES):
         load_lanes(starts, lanes, first, count, begin)
         load_lanes(ends, lanes, first, count, end)
-        block_ends(begin, end, arm, 1, 1, value, off, turned, x, y)
-        turned[:] = 0.0
-        for k in range(num):
-            for n in range(LANES):
-                turn = begin[U(k) * U(LANES) + U(n)] - end[U(k) * U(LANES) + U(n)]
-                turned[n] += turn * turn
-        for n in range(LANES):
-            tip_x, tip_y = x[U(rows) + U(n)], y[U(rows) + U(n)]
-            off_x, off_y = tip_x - target[0], tip_y - target[1]
-            off[n], turned[n] = np.sqrt(off_x * off_x + off_y * off_y), np.sqrt(turned[n])
-            worth = weights[0] * off[n] + weights[1] * turned[n]
-            worth = worth if box[0] <= tip_x else np.inf
-            worth = worth if tip_x <= box[1] else np.inf
-            worth = worth if box[2] <= tip_y else np.inf
-            value[n] = worth if tip_y <= box[3] else np.inf
+        _measure_block(begin, end, arm, target, box, weights, x, y, value, off, turned)
         for n in range(min(LANES, count - first)):
             individual = lanes[first + n]
             cost[individual], error[individual], displacement[individual] = value[n], off[n], turned[n]
+
+
+@kernel
+def measure_reach_from(  # type: ignore[no-untyped-def]
+    start, ends, arm, target, box, weights, cost, error, displacement
+):
+    """Measure as `measure_reach` does, a whole table of individuals on the way from one start: nothing is gathered.
+
+    Args:
+        start: (N,) [rad].
+        ends: (N, whole blocks of `LANES`).
+        arm: See `planar_ends.block_ends`.
+        target: As of `measure_reach`, and so are `box` and `weights`.
+        box: See there.
+        weights: See there.
+        cost: (whole blocks of `LANES`,) written, and so are `error` and `displacement`.
+        error: See there.
+        displacement: See there.
+    """
+    rows = len(start) * LANES
+    begin, end = np.repeat(start, LANES), np.empty(rows)
+    x, y = np.empty(rows + LANES), np.empty(rows + LANES)
+    value, off, turned = np.empty(LANES), np.empty(LANES), np.empty(LANES)
+    for first in range(0, ends.shape[1], LANES):
+        for k in range(len(start)):
+            for n in range(LANES):
+                end[U(k) * U(LANES) + U(n)] = ends[k, U(first) + U(n)]
+        _measure_block(begin, end, arm, target, box, weights, x, y, value, off, turned)
+        for n in range(LANES):
+            lane = U(first) + U(n)
+            cost[lane], error[lane], displacement[lane] = value[n], off[n], turned[n]
+
+
+@kernel
+def _measure_block(  # type: ignore[no-untyped-def]
+    begin, end, arm, target, box, weights, x, y, value, off, turned
+):
+    """Measure a block of individuals: cost into `value`, position error into `off`, displacement into `turned`."""
+    rows = len(begin)
+    block_ends(begin, end, arm, 1, 1, value, off, turned, x, y)
+    turned[:] = 0.0
+    for k in range(rows // LANES):
+        for n in range(LANES):
+            turn = begin[U(k) * U(LANES) + U(n)] - end[U(k) * U(LANES) + U(n)]
+            turned[n] += turn * turn
+    for n in range(LANES):
+        tip_x, tip_y = x[U(rows) + U(n)], y[U(rows) + U(n)]
+        off_x, off_y = tip_x - target[0], tip_y - target[1]
+        off[n], turned[n] = np.sqrt(off_x * off_x + off_y * off_y), np.sqrt(turned[n])
+        worth = weights[0] * off[n] + weights[1] * turned[n]
+        worth = worth if box[0] <= tip_x else np.inf
+        worth = worth if tip_x <= box[1] else np.inf
+        worth = worth if box[2] <= tip_y else np.inf
+        value[n] = worth if tip_y <= box[3] else np.inf

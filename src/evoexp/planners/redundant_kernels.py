@@ -16,7 +16,7 @@ from evoexp.evolution.selection import choose_elites, inverse_weights, spin_roul
 from evoexp.evolution.statistics import summarise
 from evoexp.evolution.succession import succeed_rows
 from evoexp.numerics import kernel
-from evoexp.objectives.reaching import measure_reach
+from evoexp.objectives.reaching import measure_reach, measure_reach_from
 
 TOURNAMENT, ROULETTE, RANK = range(3)
 RESULTS = 3  # rows of cost, position error, joint displacement
@@ -31,8 +31,8 @@ def advance(draws, breeding, judging, starts, memory):  # type: ignore[no-untype
         breeding: See `breed`.
         judging: See `judge`.
         starts: (joints, ≥ offspring) start of the sub-path, the same for all [rad].
-        memory: Tables of the population and of its offspring; parents (offspring,), places of the elites, scratch
-            (individuals + LANES,) for indices, (individuals,) for hits.
+        memory: Tables of the population and of its offspring, the latter whole blocks of `LANES` wide; parents
+            (offspring,), places of the elites, scratch (individuals + LANES,) for indices, (individuals,) for hits.
 
     Returns:
         See `summary`.
@@ -46,8 +46,7 @@ def advance(draws, breeding, judging, starts, memory):  # type: ignore[no-untype
     angles = offspring[first : first + num_joints]
     if binary:
         decode_bits(offspring[:num_genes], len(parents), breeding[5], angles)
-    count = inherit(population, offspring, parents, num_genes, lanes)
-    judge(starts, angles, lanes, count, judging, offspring[len(offspring) - RESULTS :], hit)
+    judge_children(starts, angles, population, offspring, parents, num_genes, judging, lanes, hit)
     succeed_rows(population, offspring, len(parents), elites)
     return summary(costs)
 
@@ -98,23 +97,43 @@ def breed(draws, breeding, costs, genomes, parents, out):  # type: ignore[no-unt
 
 
 @kernel
-def inherit(population, offspring, parents, num_genes, lanes):  # type: ignore[no-untyped-def]
-    """Give children that are equal to their parent its results; list the others in `lanes` and return their number."""
-    changed = np.zeros(len(parents), dtype=np.bool_)
-    for gene in range(num_genes):
-        own, source = offspring[gene], population[gene]
-        for k in range(len(parents)):
-            changed[k] |= own[k] != source[parents[k]]
-    rows = len(population)
-    for row in range(rows - RESULTS, rows):
-        own, source = offspring[row], population[row]
-        for k in range(len(parents)):
-            own[k] = source[parents[k]]
-    count = 0
+def judge_children(  # type: ignore[no-untyped-def]
+    starts, angles, population, offspring, parents, num_genes, judging, lanes, hit
+):
+    """Write Eq. 4 and its parts for all offspring; who ends outside the box, or is its own parent, is not tested.
+
+    Args:
+        starts: (joints, ≥ offspring), the same for all [rad].
+        angles: (joints, whole blocks of `LANES`) of the offspring [rad].
+        population: Table of the parents' generation.
+        offspring: Table of the offspring, its last rows written.
+        parents: (offspring,).
+        num_genes: Rows that make a child its own parent if they are equal; it then costs what the parent does.
+        judging: See `judge`.
+        lanes: (≥ offspring + LANES) scratch.
+        hit: (≥ offspring,) scratch.
+    """
+    arm, ellipses, path, target, box, weights = judging
+    row = len(population) - RESULTS
+    cost, known = offspring[row], population[row]
+    measure_reach_from(
+        starts[:, 0].copy(), angles, arm, target, box, weights, cost, offspring[row + 1], offspring[row + 2]
+    )
+    inside = 0
     for k in range(len(parents)):
-        lanes[count] = k
-        count += changed[k]
-    return count
+        lanes[inside] = k
+        inside += cost[k] < np.inf
+    left = 0
+    for n in range(inside):
+        child = lanes[n]
+        parent, gene = parents[child], 0
+        while gene < num_genes and offspring[gene, child] == population[gene, parent]:
+            gene += 1
+        if gene == num_genes:
+            cost[child] = known[parent]
+        lanes[left] = child
+        left += gene < num_genes
+    _drop_collisions(starts, angles, lanes, left, arm, ellipses, path, cost, hit)
 
 
 @kernel
@@ -138,7 +157,13 @@ def judge(starts, ends, lanes, count, judging, results, hit):  # type: ignore[no
         individual = lanes[k]
         lanes[left] = individual
         left += cost[individual] < np.inf
-    paths_collide(starts, ends, lanes, left, arm, ellipses, path, hit)
-    for k in range(left):
+    _drop_collisions(starts, ends, lanes, left, arm, ellipses, path, cost, hit)
+
+
+@kernel
+def _drop_collisions(starts, ends, lanes, count, arm, ellipses, path, cost, hit):  # type: ignore[no-untyped-def]
+    """Write inf as the cost of those among `lanes` that collide on their way."""
+    paths_collide(starts, ends, lanes, count, arm, ellipses, path, hit)
+    for k in range(count):
         individual = lanes[k]
         cost[individual] = np.inf if hit[individual] else cost[individual]

@@ -8,7 +8,7 @@ import contextlib
 import itertools
 import re
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -18,7 +18,7 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from evoexp.batch.jobs import Job, Outcome, load, run_jobs
 from evoexp.batch.settings import RunnerSettings
-from evoexp.batch.workers import in_workers, num_cores, start_loading
+from evoexp.batch.workers import Loading, in_workers, num_cores
 from evoexp.collision.certificate import certificate
 from evoexp.condition import Condition
 from evoexp.kernel_cache import is_compiled, note_compiled
@@ -61,7 +61,7 @@ class Batch:
             self._wanted[condition.id] = (condition, max(count, known[1] if known else 0), known[2] if known else notes)
         self.runs = {key: RunDirectory(outputs, key) for key in self._wanted}
         self.jobs = self._missing()
-        self._loaded: Callable[[], None] | None = None
+        self._loading: Loading | None = None
         self._finished: dict[str, dict[int, ReplicateSummary]] = {}  # by this batch, per condition
 
     def prepare(self) -> None:
@@ -70,9 +70,13 @@ class Batch:
         Raises:
             SettingError: If one contradicts itself.
         """
-        self._loading()
-        for condition, _, _ in self._wanted.values():
-            condition.prepare()
+        workers = self._workers_loading()
+        try:
+            for condition, _, _ in self._wanted.values():
+                condition.prepare()
+        except BaseException:
+            workers.give_up()
+            raise
 
     def run(self) -> Generator[Outcome, None, None]:
         """Run what is missing; yield every outcome once it is stored. Closing the iterator keeps what is finished.
@@ -80,32 +84,38 @@ class Batch:
         Raises:
             Busy: If another process writes one of the runs.
         """
-        with lock_all(self.runs.values()):
-            self.jobs = self._missing()
-            wait = self._loading()
-            for key, run in self.runs.items():
-                condition, _, notes = self._wanted[key]
-                run.create(condition.to_json(), manifest(key) | notes, condition.files())
-            _compile(dict.fromkeys(job.condition_json for job in self.jobs))
-            wait()
-            try:
-                for outcomes in fan_out(self.jobs, self._num_workers):
-                    yield from self._store(outcomes)
-            finally:
+        workers = self._workers_loading()
+        try:
+            with lock_all(self.runs.values()):
+                self.jobs = self._missing()
                 for key, run in self.runs.items():
-                    write_summary(run, self._finished.pop(key, {}))
+                    condition, _, notes = self._wanted[key]
+                    run.create(condition.to_json(), manifest(key) | notes, condition.files())
+                _compile(dict.fromkeys(job.condition_json for job in self.jobs))
+                workers.wait()
+                yield from self._run()
+        finally:
+            workers.give_up()  # if another process writes, say
+
+    def _run(self) -> Generator[Outcome, None, None]:
+        try:
+            for outcomes in fan_out(self.jobs, self._num_workers):
+                yield from self._store(outcomes)
+        finally:
+            for key, run in self.runs.items():
+                write_summary(run, self._finished.pop(key, {}))
 
     @property
     def _num_workers(self) -> int:
         return max(1, min(self._settings.num_workers or num_cores(), len(self.jobs)))
 
-    def _loading(self) -> Callable[[], None]:
-        """Have the workers load what they need, if they do not yet; return what waits for them."""
-        if self._loaded is None:
+    def _workers_loading(self) -> Loading:
+        """Have the workers load what they need, if they do not yet."""
+        if self._loading is None:
             config_jsons = list(dict.fromkeys(job.condition_json for job in self.jobs))
             files = list(dict.fromkeys(content for job in self.jobs for content in job.files))
-            self._loaded = start_loading(self._num_workers, load, config_jsons, files)
-        return self._loaded
+            self._loading = Loading(self._num_workers, load, config_jsons, files)
+        return self._loading
 
     def _missing(self) -> list[Job]:
         jobs = []

@@ -7,7 +7,7 @@ import threading
 import time
 import warnings
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from multiprocessing import forkserver
 from typing import Any
@@ -68,20 +68,25 @@ def in_workers(num_workers: int, tasks: Iterable[Any], ordered: bool = False) ->
     return results
 
 
-def start_loading(num_workers: int, load: Callable[..., None], *arguments: Any) -> Callable[[], None]:
-    """Have worker processes load what they will need from now on; return what waits for them.
+class Loading:
+    """Worker processes loading what they will need. One that dies meanwhile is no error: new ones are started."""
 
-    A worker that dies meanwhile is no error: whoever gives work to workers starts new ones.
-    """
-    if num_workers == 1:
-        return lambda: None
-    loaded = in_workers(num_workers, (joblib.delayed(load)(*arguments) for _ in range(num_workers)))
+    def __init__(self, num_workers: int, load: Callable[..., None], *arguments: Any) -> None:
+        """Have so many of them load, from now on; one is no other than this process, and loads nothing."""
+        tasks = (joblib.delayed(load)(*arguments) for _ in range(num_workers))
+        self._results = in_workers(num_workers, tasks) if num_workers > 1 else iter(())
 
-    def wait() -> None:
+    def wait(self) -> None:
+        """Wait until they have."""
         with suppress(TerminatedWorkerError):
-            deque(loaded, maxlen=0)
+            deque(self._results, maxlen=0)
 
-    return wait
+    def give_up(self) -> None:
+        """End them if they have not."""
+        if isinstance(self._results, Generator):
+            with warnings.catch_warnings():
+                warnings.filterwarnings("ignore", _GIVEN_UP, UserWarning)
+                self._results.close()
 
 
 def leave_with_parent(parent: int, served: bool) -> None:

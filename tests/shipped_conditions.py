@@ -3,7 +3,7 @@
 import functools
 import re
 
-from evoexp import compose
+from evoexp import expansions
 from evoexp.condition import Condition
 from evoexp.experiment import options
 
@@ -14,7 +14,7 @@ def shipped_conditions(budget: str) -> dict[tuple[str, str], Condition]:
     return {
         (name, label): condition
         for name in options("experiment")
-        for label, condition in compose.expand([f"experiment={name}", f"budget={budget}"])[0].conditions
+        for label, condition in expansions.expand([f"experiment={name}", f"budget={budget}"])[0].conditions
     }
 
 

@@ -9,7 +9,6 @@ y[, z] of one after the other, as many as there are.
 """
 
 from collections.abc import Iterator
-from itertools import pairwise
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -206,19 +205,20 @@ class GridPathGa(Component):
         last = np.array(own.free.shape) - 3
         if len(nodes) < 2:
             raise SettingError("path", "two nodes at least", nodes.tolist())
-        for k, node in enumerate(nodes):
-            if (node != np.floor(node)).any() or (node < 0).any() or (node > last).any():
-                inside = " × ".join(f"0..{value}" for value in last)
-                raise SettingError(f"path[{k}]", f"a node of the grid, whole numbers ({inside})", node.tolist())
-        path = np.array([len(nodes), *(own.index_of(tuple(map(int, node))) for node in nodes)], dtype=np.int32)
-        made = [after in own.neighbours[before] for before, after in pairwise(path[1:])]
+        are_nodes = ((nodes == np.floor(nodes)) & (nodes >= 0) & (nodes <= last)).all(axis=1)
+        if not are_nodes.all():
+            k, inside = int(are_nodes.argmin()), " × ".join(f"0..{value}" for value in last)
+            raise SettingError(f"path[{k}]", f"a node of the grid, whole numbers ({inside})", nodes[k].tolist())
+        indices = np.ravel_multi_index(tuple(nodes.astype(np.int64).T + 1), own.free.shape)
+        path = np.array([len(nodes), *indices], dtype=np.int32)
+        made = (own.neighbours[indices[:-1]] == indices[1:, None]).any(axis=1)
         faults = {
             "blocked_nodes": float(np.count_nonzero(~own.free.ravel()[path[1:]])),
-            "forbidden_moves": float(made.count(False)),
+            "forbidden_moves": float(np.count_nonzero(~made)),
             "missed_ends": float((path[1] != problem.ends[0]) + (path[-1] != problem.ends[1])),
         }
         results = np.full((RESULTS, 1), np.inf)
-        if all(made):
+        if made.all():
             grid_kernels.measure(path, problem.world, self.objective.weights, results, 0)
         else:
             results[DISTANCE] = np.sqrt(((nodes[1:] - nodes[:-1]) ** 2).sum(axis=1)).sum()

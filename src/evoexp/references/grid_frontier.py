@@ -10,6 +10,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from evoexp.errors import SettingError
 from evoexp.numerics import kernel
 from evoexp.records import FloatArray
 from evoexp.references.truth import Reference, Truth
@@ -17,6 +18,7 @@ from evoexp.validation import Count, Positive
 
 BLOCK = 16  # numbers of nodes whose walks are bounded together
 LANES = 32  # numbers of nodes whose walks are looked for together
+VECTOR = 16  # numbers of them are filled up to a multiple
 TILE = 4  # moves that are compared together
 SAFEST_OF_SHORTEST = 1e-6  # [1] weight of ΣS where length alone counts: decides among equally short paths only
 
@@ -148,6 +150,9 @@ def best_walk(
         lam: λ.
         known: Cost of some path: numbers of nodes at which no walk can be better are left out.
         max_nodes: The greatest number looked at.
+
+    Raises:
+        SettingError: If no walk has as few nodes.
     """
     free = np.unique(network.tails)
     slack = known - lam * network.unsafeness[free].min()
@@ -155,18 +160,20 @@ def best_walk(
     arrivals = arrivals_of(network, epsilon)
     costs = np.full(most + 1, np.inf)
     lasts = np.arange(BLOCK, most + BLOCK, BLOCK)
-    below = _walk_costs(*arrivals, lam / lasts, most)  # for the numbers of a block λ / N is at least that of its last
+    below = walk_costs(arrivals, lam / lasts, most)  # for the numbers of a block λ / N is at least that of its last
     whole = np.flatnonzero(lasts <= most)
     costs[lasts[whole]] = below[lasts[whole], whole]
-    others = np.array([count for count in range(2, most + 1) if count % BLOCK])
+    others = np.setdiff1d(np.arange(2, most + 1), lasts)
     bounds = below[others, others // BLOCK]
     others, bounds = others[bounds < costs.min()], bounds[bounds < costs.min()]
     for k in range(0, len(others), LANES):
         counts = others[k : k + LANES]
-        exact = _walk_costs(*arrivals, lam / counts, int(counts[-1]))[counts, np.arange(len(counts))]
+        exact = walk_costs(arrivals, lam / counts, int(counts[-1]))[counts, np.arange(len(counts))]
         for count, bound, cost in zip(counts, bounds[k : k + LANES], exact, strict=True):
             if bound < costs.min():  # which may be less by now
                 costs[count] = cost
+    if not np.isfinite(costs.min()):
+        raise SettingError("reference.max_nodes", "as many as a path from start to goal has", max_nodes)
     best = int(costs.argmin())
     walk = _best_walk(*arrivals, lam / best, best)
     numbers = np.flatnonzero(np.isfinite(costs))
@@ -201,15 +208,19 @@ def arrivals_of(network: Network, epsilon: float) -> Arrivals:
     return Arrivals(tails, lengths, network.unsafeness, network.ends)
 
 
+def walk_costs(arrivals: Arrivals, weights: FloatArray, count: int) -> FloatArray:
+    """Return the least ε D + μ ΣS of walks of 0 … `count` nodes, for several μ: (count + 1, weights)."""
+    filled = np.pad(weights, (0, -len(weights) % VECTOR), mode="edge")  # what is left over would not be vector code
+    costs: FloatArray = _walk_costs(*arrivals, filled, count)[:, : len(weights)]
+    return costs
+
+
 @kernel
 def _walk_costs(tails, lengths, unsafeness, ends, weights, count):  # type: ignore[no-untyped-def]
-    """Return the least ε D + μ ΣS of walks of 0 … `count` nodes, for several μ together: (count + 1, weights).
+    """Do what `walk_costs` says, for all weights together.
 
     Args:
-        tails: As of `Arrivals`, and so are the next three.
-        lengths: …
-        unsafeness: …
-        ends: …
+        tails: As of `Arrivals`, and so are `lengths`, `unsafeness` and `ends`.
         weights: (weights,) values of μ.
         count: Of nodes.
     """

@@ -1,5 +1,7 @@
 """The criteria of a mobile arm's posture over the links' directions, by numpy, with derivatives by complex steps.
 
+The slow and obvious versions of what `references.placement_*` compiles.
+
 All functions take x (3, …) = (φ1, φ2, φ3) [rad], complex numbers, too: a complex step gives derivatives without any
 cancellation.
 """
@@ -86,3 +88,29 @@ def gradient(function: Any, x: np.ndarray) -> np.ndarray:
     """Return the derivatives of a function of x at one place, (…, len(x)), by complex steps."""
     steps = x[:, None] + 1j * STEP * np.eye(len(x))
     return np.asarray(np.imag(function(steps)) / STEP)
+
+
+def slide(model: Directions, x: np.ndarray, steps: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return the best place of the projected subgradient method from one start, and E there."""
+
+    def normal(x: np.ndarray) -> np.ndarray:
+        return model.lengths * np.cos(x)
+
+    h, least, end = 1e-6, float(cost(model, x)), x
+    for step in steps:
+        slope = np.array([cost(model, x + h * unit) - cost(model, x - h * unit) for unit in np.eye(3)]) / (2 * h)
+        slope = slope - (slope @ normal(x)) / (normal(x) @ normal(x)) * normal(x)
+        x = x - step * slope / np.linalg.norm(slope)
+        for _ in range(3):
+            x = x - height(model, x) / (normal(x) @ normal(x)) * normal(x)
+        if cost(model, x) < least and abs(height(model, x)) < 1e-9:
+            least, end = float(cost(model, x)), x
+    return end, least
+
+
+def minima(costs: np.ndarray, in_reach: np.ndarray, cap: float) -> np.ndarray:
+    """Return which places of two sheets (2, n, n) are minima, where both angles go all around."""
+    shifts = [(one, two) for one in (-1, 0, 1) for two in (-1, 0, 1)]
+    lowest_around = np.stack([np.roll(costs, shift, axis=(1, 2)) for shift in shifts]).min(axis=0)
+    at_edge = np.stack([np.roll(~in_reach, shift, axis=(0, 1)) for shift in shifts]).any(axis=0)
+    return (costs <= lowest_around) & (~at_edge | (costs <= lowest_around[::-1])) & (costs < cap)

@@ -36,7 +36,8 @@ class PlacementOptimum(Reference):
     def truth(self, problem: Any) -> Truth:
         """Search, polish, and judge the best by the planner's own kernels."""
         model, cap = directions_of(problem.model, problem.angle_limits), float(problem.model.weights[6])
-        programme, ends, exact = Programme(model), [], []
+        programme, ends = Programme(model), []
+        exact: list[FloatArray] = []
         evaluations = 2 * self.num_angles * self.num_angles
         for x in lowest(model, problem.angle_limits, self.num_angles, cap, self.num_polished):
             end = descend(programme, x)

@@ -32,7 +32,7 @@ def lowest(model: Directions, angle_limits: FloatArray, num_angles: int, cap: fl
     angles = np.radians(angle_limits[:, :1] + (angle_limits[:, 1:] - angle_limits[:, :1]) * share)
     costs, sines = search(model, angles)
     least = np.zeros(costs.shape, dtype=np.bool_)
-    _mark_minima(costs, np.abs(sines) <= 1.0, angle_limits[:, 1] - angle_limits[:, 0] >= TURN, cap, least)
+    mark_minima(costs, np.abs(sines) <= 1.0, angle_limits[:, 1] - angle_limits[:, 0] >= TURN, cap, least)
     found = np.flatnonzero(least)
     found = found[np.argsort(costs.ravel()[found], kind="stable")][:count]
     places = zip(*np.unravel_index(found, costs.shape), strict=True)
@@ -109,7 +109,7 @@ def _directions(one: float, two: float, sine: float, branch: int) -> FloatArray:
 
 
 @kernel
-def _mark_minima(costs, in_reach, turns, cap, least):  # type: ignore[no-untyped-def]
+def mark_minima(costs, in_reach, turns, cap, least):  # type: ignore[no-untyped-def]
     """Mark what is not above anything around it.
 
     Args:
@@ -124,8 +124,8 @@ def _mark_minima(costs, in_reach, turns, cap, least):  # type: ignore[no-untyped
         for i in range(num):
             for j in range(num):
                 cost = costs[branch, i, j]
-                if not cost < cap:
-                    continue
+                if not cost < cap or (0 < j < num - 1 and min(costs[branch, i, j - 1], costs[branch, i, j + 1]) < cost):
+                    continue  # as almost all are
                 on_own, on_other, at_edge = True, True, False
                 for k in range(9):
                     a, b = i + k // 3 - 1, j + k % 3 - 1

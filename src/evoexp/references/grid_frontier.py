@@ -211,24 +211,25 @@ def arrivals_of(network: Network, epsilon: float) -> Arrivals:
 def walk_costs(arrivals: Arrivals, weights: FloatArray, count: int) -> FloatArray:
     """Return the least ε D + μ ΣS of walks of 0 … `count` nodes, for several μ: (count + 1, weights)."""
     filled = np.pad(weights, (0, -len(weights) % VECTOR), mode="edge")  # what is left over would not be vector code
-    costs: FloatArray = _walk_costs(*arrivals, filled, count)[:, : len(weights)]
-    return costs
+    costs, present = np.full((count + 1, len(filled)), np.inf), np.full((len(arrivals.tails), len(filled)), np.inf)
+    present[arrivals.ends[0]] = filled * arrivals.unsafeness[arrivals.ends[0]]
+    _walk_costs(*arrivals, filled, costs, present, np.full_like(present, np.inf))
+    return costs[:, : len(weights)]
 
 
 @kernel
-def _walk_costs(tails, lengths, unsafeness, ends, weights, count):  # type: ignore[no-untyped-def]
+def _walk_costs(tails, lengths, unsafeness, ends, weights, costs, present, following):  # type: ignore[no-untyped-def]
     """Do what `walk_costs` says, for all weights together.
 
     Args:
         tails: As of `Arrivals`, and so are `lengths`, `unsafeness` and `ends`.
         weights: (weights,) values of μ.
-        count: Of nodes.
+        costs: (numbers of nodes, weights) inf; written from two nodes on.
+        present: (nodes, weights) what the walk of one node costs, inf where it does not end; overwritten.
+        following: (nodes, weights) inf; overwritten.
     """
     num, lanes = len(unsafeness), len(weights)
-    costs = np.full((count + 1, lanes), np.inf)
-    present, following = np.full((num, lanes), np.inf), np.full((num, lanes), np.inf)
-    present[ends[0]] = weights * unsafeness[ends[0]]
-    for k in range(2, count + 1):
+    for k in range(2, len(costs)):
         for node in range(num):
             if lengths[node, 0] == np.inf:
                 continue  # nothing arrives: infinite at all times
@@ -242,8 +243,8 @@ def _walk_costs(tails, lengths, unsafeness, ends, weights, count):  # type: igno
                     least = min(least, present[c, lane] + to_c, present[d, lane] + to_d) + weights[lane] * own
                     following[node, lane] = least if tile == 0 else min(following[node, lane], least)
         present, following = following, present
-        costs[k] = present[ends[1]]
-    return costs
+        for lane in range(lanes):
+            costs[k, lane] = present[ends[1], lane]
 
 
 @kernel

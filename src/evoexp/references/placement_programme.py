@@ -88,7 +88,7 @@ def measure(z, numbers, avoided, bounds, values, slopes):  # type: ignore[no-unt
         values: (2 + margins,) written: what is minimised, the height, the margins.
         slopes: (2 + margins, len(z)) written: their derivatives.
     """
-    epsilon, delta, minimax = numbers[7], numbers[9], len(z) == 4
+    epsilon, delta = numbers[7], numbers[9]
     across, up, torques, turns = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for k in range(3):
         s, c = sincos(z[k])
@@ -115,17 +115,32 @@ def measure(z, numbers, avoided, bounds, values, slopes):  # type: ignore[no-unt
     for n in range(len(avoided)):
         total += _avoid(avoided[n], numbers[3] - reach, across, up, slopes[0])
     values[0], values[1] = total, up[0] + up[1] + up[2] - numbers[4]
-    slopes[1, :3] = across
-    row = 2
-    if minimax:
+    for k in range(3):
+        slopes[1, k] = across[k]
+    if len(z) == 4:
         values[0] += numbers[8] * z[3]
         slopes[0, 3] = numbers[8]
+    _measure_margins(z, numbers[10:], bounds, torques, turns, values, slopes)
+
+
+@kernel
+def _measure_margins(z, alphas, bounds, torques, turns, values, slopes):  # type: ignore[no-untyped-def]
+    """Measure what must not be negative, and its derivatives where they are not 0.
+
+    Args:
+        z: As of `measure`, and so are `bounds`, `values` and `slopes`.
+        alphas: (3,) α1, α2, α3.
+        torques: (3,).
+        turns: (3,) derivative by each direction of every torque from its joint inwards.
+    """
+    row = 2
+    if len(z) == 4:
         for sign in (-1.0, 1.0):
             for k in range(3):
-                values[row] = z[3] + sign * numbers[10 + k] * torques[k]
+                values[row] = z[3] + sign * alphas[k] * torques[k]
                 slopes[row, 3] = 1.0
                 for j in range(k, 3):
-                    slopes[row, j] = sign * numbers[10 + k] * turns[j]
+                    slopes[row, j] = sign * alphas[k] * turns[j]
                 row += 1
     for m in range(len(bounds)):
         k, sign = int(bounds[m, 0]), bounds[m, 1]

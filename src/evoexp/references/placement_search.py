@@ -71,6 +71,7 @@ def _search(angles, lengths, target, force, weights, avoided, numbers, bounds, c
     num = angles.shape[1]
     kept, upward = np.empty(num, dtype=np.int64), np.empty(num)
     x, across, up, found = np.empty((3, num)), np.empty((3, num)), np.empty((3, num)), np.empty(num)
+    z = np.empty(3)
     values, slopes = np.empty(MARGINS + len(bounds)), np.empty((MARGINS + len(bounds), 3))
     for i in range(num):
         one, left, count = angles[0, i], target[1] - lengths[0] * sin(angles[0, i]), 0
@@ -88,8 +89,8 @@ def _search(angles, lengths, target, force, weights, avoided, numbers, bounds, c
                 x[2, n] = PI - upward[n] if branch else upward[n]
             costs_of(x, lengths, target, force, weights, avoided, across, up, found[:count])
             for n in range(count * (len(bounds) > 0)):
-                x[2, n] = _wrapped(x[1, n], x[2, n])
-                measure(x[:, n].copy(), numbers, avoided, bounds, values, slopes)
+                z[0], z[1], z[2] = x[0, n], x[1, n], _wrapped(x[1, n], x[2, n])
+                measure(z, numbers, avoided, bounds, values, slopes)
                 for row in range(MARGINS, len(values)):
                     found[n] = np.inf if values[row] < -ON_LIMIT else found[n]
             for n in range(count):

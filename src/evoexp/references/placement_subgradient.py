@@ -38,11 +38,9 @@ def costs_of(x, lengths, target, force, weights, avoided, across, up, costs):  #
         t1, t2, t3 = jx1 * force[0] + jy1 * force[1], jx2 * force[0] + jy2 * force[1], jx3 * force[0] + jy3 * force[1]
         norm = t3 * t3 + t2 * t2 + t1 * t1
         largest = max(max(abs(weights[5] * t3), abs(weights[4] * t2)), abs(weights[3] * t1))
-        xx, yy, xy = (
-            jx3 * jx3 + jx2 * jx2 + jx1 * jx1,
-            jy3 * jy3 + jy2 * jy2 + jy1 * jy1,
-            jx3 * jy3 + jx2 * jy2 + jx1 * jy1,
-        )
+        xx = jx3 * jx3 + jx2 * jx2 + jx1 * jx1
+        yy = jy3 * jy3 + jy2 * jy2 + jy1 * jy1
+        xy = jx3 * jy3 + jx2 * jy2 + jx1 * jy1
         manipulability = weights[2] / max(xx * yy - xy * xy, 1e-300)
         costs[n] = weights[0] * norm + weights[1] * largest + manipulability
     for m in range(len(avoided)):
@@ -69,16 +67,19 @@ def slide(x, steps, lengths, target, force, weights, avoided, ends, costs):  # t
         costs: (starts,) written: E there.
     """
     num = len(costs)
-    across, up, slope, normal, probe = rows(num), rows(num), rows(num), rows(num), rows(num)
+    scratch = np.empty((5, 3, num))
+    across, up, slope, normal, probe = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4]
     above, below, along, moves = np.empty(num), np.empty(num), np.empty(num), np.ones(num)
     costs_of(x, lengths, target, force, weights, avoided, across, up, costs)
-    ends[:, :] = x
+    _copy(x, ends)
     for step in steps:
         for k in range(3):
-            probe[:, :] = x
-            probe[k] += H
+            _copy(x, probe)
+            for n in range(num):
+                probe[k, n] = x[k, n] + H
             costs_of(probe, lengths, target, force, weights, avoided, across, up, above)
-            probe[k] = x[k] - H
+            for n in range(num):
+                probe[k, n] = x[k, n] - H
             costs_of(probe, lengths, target, force, weights, avoided, across, up, below)
             for n in range(num):
                 slope[k, n] = (above[n] - below[n]) / (2.0 * H)
@@ -106,9 +107,11 @@ def slide(x, steps, lengths, target, force, weights, avoided, ends, costs):  # t
 
 
 @kernel
-def rows(num):  # type: ignore[no-untyped-def]
-    """Return memory for three numbers of every start, (3, num)."""
-    return np.empty((3, num))
+def _copy(x, out):  # type: ignore[no-untyped-def]
+    """Write directions (3, starts) into `out`."""
+    for k in range(3):
+        for n in range(x.shape[1]):
+            out[k, n] = x[k, n]
 
 
 @kernel

@@ -68,11 +68,11 @@ class PlacementConventional(Reference):
         """Return feasible postures as directions, and as θ1, θ2, θ3 [deg] (starts, 3)."""
         low, high = problem.angle_limits.T
         count = MOST_TRIES * self.num_starts
-        tried = low[:, None] + (high - low)[:, None] * ((0.5 + np.arange(1, count + 1) * R2[:, None]) % 1.0)
         chunk = 64 * self.num_starts
         found: list[FloatArray] = []
         for first in range(0, count, chunk):
-            pairs = tried[:, first : first + chunk]
+            numbers = np.arange(first + 1, min(first + chunk, count) + 1)
+            pairs = low[:, None] + (high - low)[:, None] * ((0.5 + numbers * R2[:, None]) % 1.0)
             costs, theta_3 = problem.model.measure_branches(pairs)
             rows = np.stack([*np.repeat(pairs[:, :, None], 2, axis=2), theta_3.T], axis=2).reshape(-1, 3)
             found += list(rows[(problem.model.weights[6] > costs.T).ravel()])

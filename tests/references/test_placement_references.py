@@ -5,11 +5,10 @@ import functools
 import numpy as np
 import pytest
 
-from evoexp import compose
 from evoexp.references.placement_model import directions_of
 from references import placement_complex as slow
 from references.placement_numpy import dense_least
-from references.placement_samples import found
+from references.placement_samples import conditions, found
 
 CASES = {  # E of the optimum as first found; see the test with another parametrisation
     "torque_norm": 1.7276170655,
@@ -52,11 +51,10 @@ def test_the_minimax_optimum_has_equal_torques() -> None:
     ("limit", "k"), [([[-180, 60], [-180, 180], [-180, 180]], 0), ([[-180, 180], [60, 90], [-180, 180]], 1)]
 )
 def test_optima_within_joint_limits_lie_on_them(limit: list[list[int]], k: int) -> None:
-    words = ["experiment=chen_placement", f"+robot.joint_limits={limit}".replace(" ", "")]
-    (planner, problem), *_ = (
-        one.prepare() for _, one in compose.expand(words, only=["A torque norm, optimum"])[0].conditions
-    )
-    truth = planner.truth(problem)
+    own = conditions("chen_placement")["A torque norm, optimum"]
+    robot = own.robot.model_copy(update={"joint_limits": tuple((float(low), float(high)) for low, high in limit)})
+    problem = own.planner.prepare(robot, own.scenario)
+    truth = own.planner.truth(problem)
     assert truth.solved
     assert truth.cost > CASES["torque_norm"] + 1e-3
     fine = np.stack(np.meshgrid(np.linspace(-180, 180, 1801), np.linspace(-180, 180, 1801))).reshape(2, -1)

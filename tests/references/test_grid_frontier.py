@@ -1,12 +1,15 @@
 """The truth about grid paths: against all paths of small grids, and against what walks cannot be below."""
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.sparse import csgraph, csr_array
 
 from evoexp import compose
-from evoexp.references.grid_frontier import GridFrontier, best_walk, frontier, network_of
+from evoexp.errors import SettingError
+from evoexp.references.grid_frontier import GridFrontier, arrivals_of, best_walk, frontier, network_of, walk_costs
 from planners.grid_samples import planner, robot, scenario, solvable
 
 SETTINGS = {"num_weights": 40, "least_weight": 1e-3, "greatest_weight": 10.0, "max_nodes": 60}
@@ -53,7 +56,7 @@ def test_no_path_is_below_the_bound_and_the_best_known_is_a_path(weights: tuple[
         assert truth.cost == pytest.approx(min(everything))
 
 
-def walk_costs(problem: Any, epsilon: float, lam: float, most: int) -> list[float]:
+def costs_of_all_walks(problem: Any, epsilon: float, lam: float, most: int) -> list[float]:
     """Return the cost of the best walk of 2 … most nodes, over all walks."""
     own, unsafeness = problem.fields.grid, problem.fields.unsafeness
     start, goal = problem.ends
@@ -80,7 +83,7 @@ def test_the_best_walk_is_the_best_of_all_walks(weights: tuple[float, float]) ->
     blocked = np.zeros((6, 6), dtype=bool)
     blocked[0, 2] = blocked[3, 1] = True
     problem = own.prepare(robot(), scenario(blocked))
-    expected = walk_costs(problem, *weights, 24)
+    expected = costs_of_all_walks(problem, *weights, 24)
     walks, walk = best_walk(network_of(problem), *weights, 1e3, 24)
     assert walks[:, 1].min() == pytest.approx(min(expected), rel=1e-12)
     for count, found in walks:
@@ -89,6 +92,52 @@ def test_the_best_walk_is_the_best_of_all_walks(weights: tuple[float, float]) ->
     assert GridFrontier(planner=own, **(SETTINGS | {"max_nodes": 24})).truth(problem).cost == pytest.approx(
         min(expected)
     )
+
+
+def slow_walk_costs(network: Any, epsilon: float, mu: float, most: int) -> list[float]:
+    """Return the least ε D + μ ΣS of walks of 0 … most nodes, one number of nodes after the other."""
+    present = {network.ends[0]: mu * network.unsafeness[network.ends[0]]}
+    costs = [np.inf, np.inf]
+    for _ in range(2, most + 1):
+        following: dict[int, float] = {}
+        for tail, head, length in zip(network.tails, network.heads, network.lengths, strict=True):
+            if tail in present:
+                cost = present[tail] + epsilon * length + mu * network.unsafeness[head]
+                following[head] = min(following.get(head, np.inf), cost)
+        present = following
+        costs.append(present.get(network.ends[1], np.inf))
+    return costs
+
+
+@pytest.mark.parametrize("num_weights", [1, 16, 19])
+@pytest.mark.parametrize("size", [(7, 6), (4, 4, 3)])
+def test_walks_for_many_weights_are_those_for_each(size: tuple[int, ...], num_weights: int) -> None:
+    network, epsilon = network_of(solvable(size, 0.3, 1, planner())), 0.3
+    weights = np.linspace(0.1, 2.0, num_weights)
+    found = walk_costs(arrivals_of(network, epsilon), weights, 20)
+    expected = np.array([slow_walk_costs(network, epsilon, mu, 20) for mu in weights]).T
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+def test_walks_too_short_to_arrive_are_refused() -> None:
+    problem = solvable((6, 6), 0.2, 1, planner())
+    with pytest.raises(SettingError, match=r"reference\.max_nodes: must be as many as a path from .*, was 3"):
+        best_walk(network_of(problem), 0.3, 1.0, 1e3, 3)
+
+
+@pytest.mark.parametrize("mu", [1e-6, 0.1, 3.0])
+def test_the_shortest_weighted_path_is_that_of_a_graph_made_anew(mu: float) -> None:
+    network = network_of(solvable((12, 12), 0.3, 2, planner()))
+    ((_, path),) = frontier(network, np.array([mu]))
+    found = frontier(network, np.array([5.0, mu]))  # the second one with the first one's graph
+    costs = network.lengths + mu * network.unsafeness[network.heads]
+    least = csgraph.bellman_ford(
+        csr_array((costs, (network.tails, network.heads)), shape=(len(network.unsafeness),) * 2),
+        indices=network.ends[0],
+    )[network.ends[1]]
+    edges = dict(zip(zip(network.tails.tolist(), network.heads.tolist(), strict=True), costs, strict=True))
+    for nodes in (path, found[-1][1]):
+        assert sum(edges[pair] for pair in pairwise(nodes.tolist())) == pytest.approx(least, rel=1e-12)
 
 
 def test_the_frontier_goes_from_the_shortest_to_the_safest() -> None:

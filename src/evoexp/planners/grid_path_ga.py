@@ -179,13 +179,13 @@ class GridPathGa(Component):
         last = np.array(own.free.shape) - 3
         if len(nodes) < 2:
             raise SettingError("path", "two nodes at least", nodes.tolist())
-        outside = ((nodes != np.floor(nodes)) | (nodes < 0) | (nodes > last)).any(axis=1)
-        if outside.any():
-            k, inside = int(outside.argmax()), " × ".join(f"0..{value}" for value in last)
+        are_nodes = ((nodes == np.floor(nodes)) & (nodes >= 0) & (nodes <= last)).all(axis=1)
+        if not are_nodes.all():
+            k, inside = int(are_nodes.argmin()), " × ".join(f"0..{value}" for value in last)
             raise SettingError(f"path[{k}]", f"a node of the grid, whole numbers ({inside})", nodes[k].tolist())
-        indices = np.ravel_multi_index(tuple(nodes.T.astype(np.int64) + 1), own.free.shape)
+        indices = np.ravel_multi_index(tuple(nodes.astype(np.int64).T + 1), own.free.shape)
         path = np.array([len(nodes), *indices], dtype=np.int32)
-        made = (own.neighbours[path[1:-1]] == path[2:, None]).any(axis=1)
+        made = (own.neighbours[indices[:-1]] == indices[1:, None]).any(axis=1)
         faults = {
             "blocked_nodes": float(np.count_nonzero(~own.free.ravel()[path[1:]])),
             "forbidden_moves": float(np.count_nonzero(~made)),

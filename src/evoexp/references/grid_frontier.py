@@ -10,13 +10,16 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from evoexp.errors import SettingError
 from evoexp.numerics import kernel
 from evoexp.records import FloatArray
 from evoexp.references.truth import Reference, Truth
 from evoexp.validation import Count, Positive
 
 BLOCK = 16  # numbers of nodes whose walks are bounded together
-NOTHING = np.zeros((0, 0), dtype=np.int32)
+LANES = 32  # numbers of nodes whose walks are looked for together
+VECTOR = 16  # numbers of them are filled up to a multiple
+TILE = 4  # moves that are compared together
 SAFEST_OF_SHORTEST = 1e-6  # [1] weight of ΣS where length alone counts: decides among equally short paths only
 
 
@@ -119,11 +122,13 @@ def frontier(network: Network, weights: FloatArray) -> list[tuple[float, np.ndar
     from scipy.sparse import csgraph, csr_array
 
     dijkstra: Any = csgraph.dijkstra
-    count = len(network.unsafeness)
+    count, edges = len(network.unsafeness), np.arange(1.0, len(network.tails) + 1.0)
+    graph: Any = csr_array((edges, (network.tails, network.heads)), shape=(count, count))
+    order = graph.data.astype(np.int64) - 1  # of the edges in the graph: with another μ only its numbers change
+    lengths, unsafeness = network.lengths[order], network.unsafeness[network.heads[order]]
     found: dict[tuple[int, ...], float] = {}
     for mu in weights:
-        costs = network.lengths + mu * network.unsafeness[network.heads]
-        graph: Any = csr_array((costs, (network.tails, network.heads)), shape=(count, count))
+        graph.data[:] = lengths + mu * unsafeness
         _, before = dijkstra(graph, indices=network.ends[0], return_predecessors=True)
         path = [network.ends[1]]
         while path[-1] != network.ends[0]:
@@ -145,61 +150,121 @@ def best_walk(
         lam: λ.
         known: Cost of some path: numbers of nodes at which no walk can be better are left out.
         max_nodes: The greatest number looked at.
+
+    Raises:
+        SettingError: If no walk has as few nodes.
     """
     free = np.unique(network.tails)
     slack = known - lam * network.unsafeness[free].min()
     most = min(max_nodes, int(slack / epsilon) + 2) if epsilon > 0.0 else max_nodes
-    order = np.argsort(network.heads, kind="stable")
-    tails, heads, lengths = (values[order] for values in (network.tails, network.heads, network.lengths))
-    first = np.searchsorted(heads, np.arange(len(network.unsafeness) + 1))
-    edges = (tails, lengths, first, network.unsafeness, network.ends, epsilon)
+    arrivals = arrivals_of(network, epsilon)
     costs = np.full(most + 1, np.inf)
-    for count in range(BLOCK, most + 1, BLOCK):
-        costs[count] = _walk_costs(*edges, lam / count, count, NOTHING)[count]
-    for last in range(BLOCK, most + BLOCK, BLOCK):  # for all these numbers λ / N is at least that of the last
-        below = _walk_costs(*edges, lam / last, min(last, most), NOTHING)
-        for count in range(max(last - BLOCK + 1, 2), min(last - 1, most) + 1):
-            if below[count] < costs.min():
-                costs[count] = _walk_costs(*edges, lam / count, count, NOTHING)[count]
+    lasts = np.arange(BLOCK, most + BLOCK, BLOCK)
+    below = walk_costs(arrivals, lam / lasts, most)  # for the numbers of a block λ / N is at least that of its last
+    whole = np.flatnonzero(lasts <= most)
+    costs[lasts[whole]] = below[lasts[whole], whole]
+    others = np.setdiff1d(np.arange(2, most + 1), lasts)
+    bounds = below[others, others // BLOCK]
+    others, bounds = others[bounds < costs.min()], bounds[bounds < costs.min()]
+    for k in range(0, len(others), LANES):
+        counts = others[k : k + LANES]
+        exact = walk_costs(arrivals, lam / counts, int(counts[-1]))[counts, np.arange(len(counts))]
+        for count, bound, cost in zip(counts, bounds[k : k + LANES], exact, strict=True):
+            if bound < costs.min():  # which may be less by now
+                costs[count] = cost
+    if not np.isfinite(costs.min()):
+        raise SettingError("reference.max_nodes", "as many as a path from start to goal has", max_nodes)
     best = int(costs.argmin())
-    before = np.zeros((best + 1, len(network.unsafeness)), dtype=np.int32)
-    _walk_costs(*edges, lam / best, best, before)
-    walk = [network.ends[1]]
-    for k in range(best, 1, -1):
-        walk.append(int(before[k, walk[-1]]))
+    walk = _best_walk(*arrivals, lam / best, best)
     numbers = np.flatnonzero(np.isfinite(costs))
-    return np.column_stack([numbers.astype(np.float64), costs[numbers]]), np.array(walk[::-1])
+    return np.column_stack([numbers.astype(np.float64), costs[numbers]]), walk
+
+
+class Arrivals(NamedTuple):
+    """The permitted moves by the nodes where they end, each with as many: the missing ones have infinite lengths.
+
+    Attributes:
+        tails: (nodes, moves) node where each comes from; a multiple of `TILE` moves.
+        lengths: (nodes, moves) times ε.
+        unsafeness: (nodes,).
+        ends: Start and goal.
+    """
+
+    tails: np.ndarray
+    lengths: FloatArray
+    unsafeness: FloatArray
+    ends: tuple[int, int]
+
+
+def arrivals_of(network: Network, epsilon: float) -> Arrivals:
+    """Return the permitted moves by their ends; see `best_walk`."""
+    order = np.argsort(network.heads, kind="stable")
+    heads, count = network.heads[order], len(network.unsafeness)
+    rank = np.arange(len(heads)) - np.searchsorted(heads, heads)  # among the moves that end at the same node
+    moves = -(-(int(rank.max()) + 1) // TILE) * TILE
+    tails, lengths = np.zeros((count, moves), dtype=np.int64), np.full((count, moves), np.inf)
+    tails[heads, rank] = network.tails[order]
+    lengths[heads, rank] = epsilon * network.lengths[order]
+    return Arrivals(tails, lengths, network.unsafeness, network.ends)
+
+
+def walk_costs(arrivals: Arrivals, weights: FloatArray, count: int) -> FloatArray:
+    """Return the least ε D + μ ΣS of walks of 0 … `count` nodes, for several μ: (count + 1, weights)."""
+    filled = np.pad(weights, (0, -len(weights) % VECTOR), mode="edge")  # what is left over would not be vector code
+    costs, present = np.full((count + 1, len(filled)), np.inf), np.full((len(arrivals.tails), len(filled)), np.inf)
+    present[arrivals.ends[0]] = filled * arrivals.unsafeness[arrivals.ends[0]]
+    _walk_costs(*arrivals, filled, costs, present, np.full_like(present, np.inf))
+    return costs[:, : len(weights)]
 
 
 @kernel
-def _walk_costs(tails, lengths, first, unsafeness, ends, epsilon, mu, count, before):  # type: ignore[no-untyped-def]
-    """Return the least ε D + μ ΣS of walks of 0 … `count` nodes, (count + 1,).
+def _walk_costs(tails, lengths, unsafeness, ends, weights, costs, present, following):  # type: ignore[no-untyped-def]
+    """Do what `walk_costs` says, for all weights together.
 
     Args:
-        tails: (edges,) node where each edge starts, in the order of the nodes where edges end.
-        lengths: (edges,) theirs.
-        first: (nodes + 1,) first edge that ends at each node.
-        unsafeness: (nodes,).
-        ends: Start and goal.
-        epsilon: ε.
-        mu: μ.
-        count: Of nodes.
-        before: (count + 1, nodes) written: where the best walk of so many nodes to each node comes from; or empty.
+        tails: As of `Arrivals`, and so are `lengths`, `unsafeness` and `ends`.
+        weights: (weights,) values of μ.
+        costs: (numbers of nodes, weights) inf; written from two nodes on.
+        present: (nodes, weights) what the walk of one node costs, inf where it does not end; overwritten.
+        following: (nodes, weights) inf; overwritten.
     """
+    num, lanes = len(unsafeness), len(weights)
+    for k in range(2, len(costs)):
+        for node in range(num):
+            if lengths[node, 0] == np.inf:
+                continue  # nothing arrives: infinite at all times
+            own = unsafeness[node]
+            for tile in range(0, tails.shape[1], TILE):
+                a, b, c, d = tails[node, tile], tails[node, tile + 1], tails[node, tile + 2], tails[node, tile + 3]
+                to_a, to_b = lengths[node, tile], lengths[node, tile + 1]
+                to_c, to_d = lengths[node, tile + 2], lengths[node, tile + 3]
+                for lane in range(lanes):
+                    least = min(present[a, lane] + to_a, present[b, lane] + to_b)
+                    least = min(least, present[c, lane] + to_c, present[d, lane] + to_d) + weights[lane] * own
+                    following[node, lane] = least if tile == 0 else min(following[node, lane], least)
+        present, following = following, present
+        for lane in range(lanes):
+            costs[k, lane] = present[ends[1], lane]
+
+
+@kernel
+def _best_walk(tails, lengths, unsafeness, ends, mu, count):  # type: ignore[no-untyped-def]
+    """Return the walk of `count` nodes that has the least ε D + μ ΣS, (count,); arguments as of `_walk_costs`."""
     num = len(unsafeness)
-    costs = np.full(count + 1, np.inf)
+    before = np.zeros((count + 1, num), dtype=np.int64)
     present, following = np.full(num, np.inf), np.full(num, np.inf)
     present[ends[0]] = mu * unsafeness[ends[0]]
     for k in range(2, count + 1):
         for node in range(num):
-            least, source = np.inf, 0
-            for edge in range(first[node], first[node + 1]):
-                cost = present[tails[edge]] + epsilon * lengths[edge]
+            least = np.inf
+            for move in range(tails.shape[1]):
+                cost = present[tails[node, move]] + lengths[node, move]
                 if cost < least:
-                    least, source = cost, tails[edge]
+                    least, before[k, node] = cost, tails[node, move]
             following[node] = least + mu * unsafeness[node]
-            if len(before) > 0:
-                before[k, node] = source
         present, following = following, present
-        costs[k] = present[ends[1]]
-    return costs
+    walk = np.empty(count, dtype=np.int64)
+    walk[count - 1] = ends[1]
+    for k in range(count, 1, -1):
+        walk[k - 2] = before[k, walk[k - 1]]
+    return walk

@@ -11,7 +11,8 @@ from evoexp.errors import SettingError
 from evoexp.records import FloatArray
 from evoexp.references.placement_model import Directions, directions_of
 from evoexp.references.placement_polish import End, descend
-from evoexp.references.placement_subgradient import slide
+from evoexp.references.placement_programme import Programme
+from evoexp.references.placement_subgradient import LANES, slide
 from evoexp.references.truth import Reference, Truth
 from evoexp.validation import Count, Positive
 
@@ -50,9 +51,10 @@ class PlacementConventional(Reference):
         """Run all methods."""
         model = directions_of(problem.model, problem.angle_limits)
         starts, places = self._starts(problem, model)
-        ends = {"bounded" if model.weights[1] else "newton": [descend(model, x) for x in starts]}
+        programme = Programme(model)
+        ends = {"bounded" if programme.minimax else "newton": [descend(programme, x) for x in starts]}
         ends["subgradient"] = self._slide(model, starts)
-        arrays = {name: np.array([_row(model, end) for end in found]) for name, found in ends.items()}
+        arrays = {name: np.array([_row(model, programme, end) for end in found]) for name, found in ends.items()}
         every = np.concatenate(list(arrays.values()))
         best = min(every, key=lambda row: (round(float(row[2]), 6), *row[:2]))  # of mirror images always the same
         spent = {name: sum(end.evaluations for end in found) for name, found in ends.items()}
@@ -66,11 +68,11 @@ class PlacementConventional(Reference):
         """Return feasible postures as directions, and as θ1, θ2, θ3 [deg] (starts, 3)."""
         low, high = problem.angle_limits.T
         count = MOST_TRIES * self.num_starts
-        tried = low[:, None] + (high - low)[:, None] * ((0.5 + np.arange(1, count + 1) * R2[:, None]) % 1.0)
         chunk = 64 * self.num_starts
         found: list[FloatArray] = []
         for first in range(0, count, chunk):
-            pairs = tried[:, first : first + chunk]
+            numbers = np.arange(first + 1, min(first + chunk, count) + 1)
+            pairs = low[:, None] + (high - low)[:, None] * ((0.5 + numbers * R2[:, None]) % 1.0)
             costs, theta_3 = problem.model.measure_branches(pairs)
             rows = np.stack([*np.repeat(pairs[:, :, None], 2, axis=2), theta_3.T], axis=2).reshape(-1, 3)
             found += list(rows[(problem.model.weights[6] > costs.T).ravel()])
@@ -83,13 +85,13 @@ class PlacementConventional(Reference):
 
     def _slide(self, model: Directions, starts: list[FloatArray]) -> list[End]:
         steps = self.first_step / np.sqrt(np.arange(1.0, self.num_steps + 1.0))
-        x, ends, costs = np.column_stack(starts), np.empty((3, len(starts))), np.empty(len(starts))
+        x = np.pad(np.column_stack(starts), ((0, 0), (0, -len(starts) % LANES)), mode="edge")
+        ends, costs = np.empty(x.shape), np.empty(x.shape[1])
         slide(x, steps, model.lengths, model.target, model.force, model.weights, model.avoided, ends, costs)
         evaluations = 7 * self.num_steps
-        return [End(end, float(cost), evaluations) for end, cost in zip(ends.T, costs, strict=True)]
+        return [End(ends[:, k].copy(), float(costs[k]), evaluations) for k in range(len(starts))]
 
 
-def _row(model: Directions, end: End) -> FloatArray:
+def _row(model: Directions, programme: Programme, end: End) -> FloatArray:
     """Return θ1, θ2 [deg] and E of an end; E is inf where the end is no posture that was asked for."""
-    legal = abs(model.height(end.x)) < 1e-6 and np.all(model.margins(end.x) > -1e-6)
-    return np.array([*np.round(model.theta(end.x), DIGITS), end.cost if legal else np.inf])
+    return np.array([*np.round(model.theta(end.x), DIGITS), end.cost if programme.is_legal(end.x, 1e-6) else np.inf])

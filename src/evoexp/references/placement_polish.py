@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from evoexp.records import FloatArray
-from evoexp.references.placement_model import Directions, gradient
+from evoexp.references.placement_programme import HEIGHT, MARGINS, OBJECTIVE, Programme
 
 ACTIVE = 1e-6  # a margin below it is taken to be 0
 MOST_STEPS = 12  # of Newton's method; it takes three or four
@@ -25,91 +25,47 @@ class End(NamedTuple):
     evaluations: int
 
 
-class Programme:
-    """The task as a smooth programme over z = (x, t): least smooth(x) + λ t, t above every |α τ|, margins above 0."""
-
-    def __init__(self, model: Directions) -> None:
-        """Take the criteria; t is left out where λ is 0."""
-        self.model, self.minimax = model, bool(model.weights[1])
-
-    def objective(self, z: Any) -> Any:
-        """Return what is minimised."""
-        return self.model.smooth(z[:3]) + (self.model.weights[1] * z[3] if self.minimax else 0.0)
-
-    def height(self, z: Any) -> Any:
-        """Return what must be 0."""
-        return self.model.height(z[:3])
-
-    def margins(self, z: Any) -> Any:
-        """Return what must not be negative."""
-        margins = self.model.margins(z[:3])
-        if not self.minimax:
-            return margins
-        torques = self.model.weighted_torques(z[:3])
-        return np.concatenate([z[3] - torques, z[3] + torques, margins])
-
-    def start(self, x: FloatArray) -> FloatArray:
-        """Return z at x."""
-        if not self.minimax:
-            return x
-        return np.append(x, np.abs(self.model.weighted_torques(x)).max())
-
-
-def descend(model: Directions, x: FloatArray, most_steps: int = 200) -> End:
+def descend(programme: Programme, x: FloatArray, most_steps: int = 200) -> End:
     """Minimise E from x by sequential quadratic programming (scipy's SLSQP), the minimax term as a bound t."""
     from scipy import optimize  # takes long to load
 
-    programme = Programme(model)
-    constraints: list[Any] = [
-        {"type": "eq", "fun": programme.height, "jac": lambda z: gradient(programme.height, z)},
-    ]
-    z = programme.start(x)
-    if len(programme.margins(z)):
-        constraints.append(
-            {"type": "ineq", "fun": programme.margins, "jac": lambda z: gradient(programme.margins, z)},
-        )
     minimize: Any = optimize.minimize  # whose overloads no callable of ours fits
     found = minimize(
-        lambda z: float(programme.objective(z)),
-        z,
-        jac=lambda z: gradient(programme.objective, z),
-        constraints=constraints,
+        lambda z: float(programme.measured(z)[0][OBJECTIVE]),
+        programme.start(x),
+        jac=lambda z: programme.measured(z)[1][OBJECTIVE].copy(),  # scipy keeps it
+        constraints=programme.constraints(),
         method="SLSQP",
         options={"ftol": 1e-14, "maxiter": most_steps},
     )
-    return End(found.x[:3], float(model.cost(found.x[:3])), int(found.nfev))
+    return End(found.x[:3], programme.cost(found.x[:3]), int(found.nfev))
 
 
-def polish(model: Directions, x: FloatArray) -> End:
+def polish(programme: Programme, x: FloatArray) -> End | None:
     """Return the local minimum near the end of `descend`, to rounding: Newton on the Karush–Kuhn–Tucker conditions.
 
-    The conditions that hold with equality are taken from x; where Newton does not converge x itself is returned.
+    The conditions that hold with equality are taken from x; None where Newton does not converge.
     """
-    programme = Programme(model)
     z = programme.start(x)
-    active = np.flatnonzero(np.asarray(programme.margins(z)) < ACTIVE)
-
-    def binding(z: Any) -> Any:
-        return np.concatenate([programme.height(z)[None], programme.margins(z)[active]])
+    values, slopes = programme.measured(z)
+    binding = np.array([HEIGHT, *(MARGINS + np.flatnonzero(values[MARGINS:] < ACTIVE))])
 
     def conditions(y: FloatArray) -> FloatArray:
-        z, multipliers = y[: len(x) + programme.minimax], y[len(x) + programme.minimax :]
-        slope = gradient(programme.objective, z) - multipliers @ gradient(binding, z)
-        return np.concatenate([slope, np.real(binding(z))])
+        values, slopes = programme.measured(y[: len(z)])
+        return np.concatenate([slopes[OBJECTIVE] - y[len(z) :] @ slopes[binding], values[binding]])
 
-    slopes = gradient(binding, z)
-    multipliers = np.linalg.lstsq(slopes.T, gradient(programme.objective, z), rcond=None)[0]
+    multipliers = np.linalg.lstsq(slopes[binding].T, slopes[OBJECTIVE], rcond=None)[0]
     y, steps = np.concatenate([z, multipliers]), 0
     while steps < MOST_STEPS:
-        values = conditions(y)
-        if np.abs(values).max() < 1e-13:
+        off = conditions(y)
+        if np.abs(off).max() < 1e-13:
             break
-        step, *_ = np.linalg.lstsq(_jacobian(conditions, y), values, rcond=None)
+        step, *_ = np.linalg.lstsq(_jacobian(conditions, y), off, rcond=None)
         y, steps = y - step, steps + 1
     moved = float(np.abs(y[:3] - x).max())
     if not np.isfinite(y).all() or moved > 1e-3 or np.abs(conditions(y)).max() > 1e-9:
-        return End(x, float(model.cost(x)), 0)
-    return End(y[:3], float(model.cost(y[:3])), steps)
+        return None
+    return End(y[:3], programme.cost(y[:3]), steps)
 
 
 def _jacobian(function: Any, y: FloatArray) -> FloatArray:

@@ -2,7 +2,7 @@
 
 Pin & Culioli (1992), whom Chen & Zalzala (1995) compare with, solved the minimax problem by one; its details are not
 printed. Here: steps of given lengths against the slope of E along the surface of postures that reach the target, each
-followed by a projection onto that surface.
+followed by a projection onto that surface. All starts go together, innermost in memory.
 """
 
 import numpy as np
@@ -11,94 +11,138 @@ from evoexp.numerics import kernel, sincos
 
 H = 1e-6  # [rad] of central differences; beside a kink the slope is that of the side where x is, or between both
 PROJECTIONS = 3  # Newton steps back to the surface
+LANES = 32  # starts come in multiples of it: what is left over would not be vector code
 
 
 @kernel
-def cost_of(x, lengths, target, force, weights, avoided):  # type: ignore[no-untyped-def]
-    """Return E of Eq. 14 at directions x (3,) [rad], without any cap; see `placement_model.Directions`."""
-    across, up = np.empty(3), np.empty(3)
-    for k in range(3):
-        s, c = sincos(x[k])
-        across[k], up[k] = lengths[k] * c, lengths[k] * s
-    jx, jy, norm, largest, xx, yy, xy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for k in range(2, -1, -1):
-        jx -= up[k]
-        jy += across[k]
-        torque = jx * force[0] + jy * force[1]
-        norm += torque * torque
-        largest = max(largest, abs(weights[3 + k] * torque))
-        xx += jx * jx
-        yy += jy * jy
-        xy += jx * jy
-    total = weights[0] * norm + weights[1] * largest + weights[2] / max(xx * yy - xy * xy, 1e-300)
-    for n in range(len(avoided)):
-        px, py = target[0] - jy - avoided[n, 3], -avoided[n, 4]
-        for k in range(int(avoided[n, 1])):
-            share = avoided[n, 2] if k + 1 == int(avoided[n, 1]) else 1.0
-            px += share * across[k]
-            py += share * up[k]
-        total += avoided[n, 0] / max(px * px + py * py, 1e-300)
-    return total
+def costs_of(x, lengths, target, force, weights, avoided, across, up, costs):  # type: ignore[no-untyped-def]
+    """Write E of Eq. 14, without any cap, at many places.
+
+    Args:
+        x: (3, ≥ places) directions [rad].
+        lengths: See `placement_model.Directions`, and so `target`, `force`, `weights` and `avoided`.
+        across: (3, ≥ places) written: the links' extents along x.
+        up: (3, ≥ places) written: along y.
+        costs: (places,) written.
+    """
+    for n in range(len(costs)):
+        s1, c1 = sincos(x[0, n])
+        s2, c2 = sincos(x[1, n])
+        s3, c3 = sincos(x[2, n])
+        up[0, n], up[1, n], up[2, n] = lengths[0] * s1, lengths[1] * s2, lengths[2] * s3
+        across[0, n], across[1, n], across[2, n] = lengths[0] * c1, lengths[1] * c2, lengths[2] * c3
+    for n in range(len(costs)):
+        jx3, jy3 = -up[2, n], across[2, n]
+        jx2, jy2 = jx3 - up[1, n], jy3 + across[1, n]
+        jx1, jy1 = jx2 - up[0, n], jy2 + across[0, n]
+        t1, t2, t3 = jx1 * force[0] + jy1 * force[1], jx2 * force[0] + jy2 * force[1], jx3 * force[0] + jy3 * force[1]
+        norm = t3 * t3 + t2 * t2 + t1 * t1
+        largest = max(max(abs(weights[5] * t3), abs(weights[4] * t2)), abs(weights[3] * t1))
+        xx = jx3 * jx3 + jx2 * jx2 + jx1 * jx1
+        yy = jy3 * jy3 + jy2 * jy2 + jy1 * jy1
+        xy = jx3 * jy3 + jx2 * jy2 + jx1 * jy1
+        manipulability = weights[2] / max(xx * yy - xy * xy, 1e-300)
+        costs[n] = weights[0] * norm + weights[1] * largest + manipulability
+    for m in range(len(avoided)):
+        link = int(avoided[m, 1])
+        one = (avoided[m, 2] if link == 1 else 1.0) if link >= 1 else 0.0  # of each link: what lies before the point
+        two = (avoided[m, 2] if link == 2 else 1.0) if link >= 2 else 0.0
+        three = avoided[m, 2] if link == 3 else 0.0
+        for n in range(len(costs)):
+            dx = target[0] - (across[2, n] + across[1, n] + across[0, n]) - avoided[m, 3]
+            dx = dx + one * across[0, n] + two * across[1, n] + three * across[2, n]
+            dy = -avoided[m, 4] + one * up[0, n] + two * up[1, n] + three * up[2, n]
+            costs[n] += avoided[m, 0] / max(dx * dx + dy * dy, 1e-300)
 
 
 @kernel
-def slide(starts, steps, lengths, target, force, weights, avoided, ends, costs):  # type: ignore[no-untyped-def]
+def slide(x, steps, lengths, target, force, weights, avoided, ends, costs):  # type: ignore[no-untyped-def]
     """Follow the method from every start.
 
     Args:
-        starts: (3, starts) directions that reach the target [rad].
+        x: (3, starts) directions that reach the target [rad]; overwritten. A multiple of `LANES` starts.
         steps: (steps,) their lengths [rad].
-        lengths: As of `cost_of`, and so are the next four.
+        lengths: As of `costs_of`, and so are the next four.
         ends: (3, starts) written: the best place of every way.
         costs: (starts,) written: E there.
     """
-    slope, normal, x, probe = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    for start in range(starts.shape[1]):
-        x[:] = starts[:, start]
-        costs[start] = cost_of(x, lengths, target, force, weights, avoided)
-        ends[:, start] = x
-        for step in steps:
-            inner, square = 0.0, 0.0
-            for k in range(3):
-                probe[:] = x
-                probe[k] = x[k] + H
-                above = cost_of(probe, lengths, target, force, weights, avoided)
-                probe[k] = x[k] - H
-                slope[k] = (above - cost_of(probe, lengths, target, force, weights, avoided)) / (2.0 * H)
-                normal[k] = lengths[k] * sincos(x[k])[1]
-                inner += slope[k] * normal[k]
-                square += normal[k] * normal[k]
-            along = 0.0
-            for k in range(3):
-                slope[k] -= inner / square * normal[k] if square > 0.0 else 0.0
-                along += slope[k] * slope[k]
-            if not along > 0.0:
-                break
-            for k in range(3):
-                x[k] -= step * slope[k] / np.sqrt(along)
-            _project(x, lengths, target)
-            cost = cost_of(x, lengths, target, force, weights, avoided)
-            if cost < costs[start] and abs(_height(x, lengths, target)) < 1e-9:
-                costs[start] = cost
-                ends[:, start] = x
-
-
-@kernel
-def _project(x, lengths, target):  # type: ignore[no-untyped-def]
-    """Bring the end-effector back to its height, by the shortest way to first order."""
-    for _ in range(PROJECTIONS):
-        off, square = _height(x, lengths, target), 0.0
+    num = len(costs)
+    scratch = np.empty((5, 3, num))
+    across, up, slope, normal, probe = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4]
+    above, below, along, moves = np.empty(num), np.empty(num), np.empty(num), np.ones(num)
+    costs_of(x, lengths, target, force, weights, avoided, across, up, costs)
+    _copy(x, ends)
+    for step in steps:
         for k in range(3):
-            square += (lengths[k] * sincos(x[k])[1]) ** 2
-        if square > 0.0:
-            for k in range(3):
-                x[k] -= off / square * lengths[k] * sincos(x[k])[1]
+            _copy(x, probe)
+            for n in range(num):
+                probe[k, n] = x[k, n] + H
+            costs_of(probe, lengths, target, force, weights, avoided, across, up, above)
+            for n in range(num):
+                probe[k, n] = x[k, n] - H
+            costs_of(probe, lengths, target, force, weights, avoided, across, up, below)
+            for n in range(num):
+                slope[k, n] = (above[n] - below[n]) / (2.0 * H)
+                normal[k, n] = lengths[k] * sincos(x[k, n])[1]
+        for n in range(num):
+            a, b, c = normal[0, n], normal[1, n], normal[2, n]
+            inner, square = slope[0, n] * a + slope[1, n] * b + slope[2, n] * c, a * a + b * b + c * c
+            share = inner / square if square > 0.0 else 0.0
+            a, b, c = slope[0, n] - share * a, slope[1, n] - share * b, slope[2, n] - share * c
+            slope[0, n], slope[1, n], slope[2, n] = a, b, c
+            along[n] = a * a + b * b + c * c
+        for n in range(num):
+            moves[n] = moves[n] if along[n] > 0.0 else 0.0  # a way ends where there is no slope
+            along[n] = np.sqrt(along[n] if along[n] > 0.0 else 1.0)
+        for k in range(3):
+            for n in range(num):
+                x[k, n] -= moves[n] * step * slope[k, n] / along[n]
+        _project(x, lengths, target, moves, normal, above)
+        costs_of(x, lengths, target, force, weights, avoided, across, up, below)
+        _heights(x, lengths, target, normal, above)
+        for n in range(num):
+            if below[n] < costs[n] and abs(above[n]) < 1e-9:
+                costs[n] = below[n]
+                ends[0, n], ends[1, n], ends[2, n] = x[0, n], x[1, n], x[2, n]
 
 
 @kernel
-def _height(x, lengths, target):  # type: ignore[no-untyped-def]
-    """Return by how much the end-effector is above its target."""
-    height = -target[1]
+def _copy(x, out):  # type: ignore[no-untyped-def]
+    """Write directions (3, starts) into `out`."""
     for k in range(3):
-        height += lengths[k] * sincos(x[k])[0]
-    return height
+        for n in range(x.shape[1]):
+            out[k, n] = x[k, n]
+
+
+@kernel
+def _project(x, lengths, target, moves, normal, heights):  # type: ignore[no-untyped-def]
+    """Bring the end-effectors back to their height, by the shortest way to first order; with `moves` 0 nothing moves.
+
+    Args:
+        x: (3, starts) directions [rad].
+        lengths: As of `costs_of`, and so is `target`.
+        moves: (starts,) 1 or 0.
+        normal: (3, starts) overwritten.
+        heights: (starts,) overwritten.
+    """
+    for _ in range(PROJECTIONS):
+        _heights(x, lengths, target, normal, heights)
+        for n in range(len(heights)):
+            a, b, c = normal[0, n], normal[1, n], normal[2, n]
+            square = a * a + b * b + c * c
+            heights[n] = moves[n] * heights[n] / square if square > 0.0 else 0.0
+        for k in range(3):
+            for n in range(len(heights)):
+                x[k, n] -= heights[n] * normal[k, n]
+
+
+@kernel
+def _heights(x, lengths, target, normal, heights):  # type: ignore[no-untyped-def]
+    """Write by how much the end-effectors are above their target (starts,), and its derivatives (3, starts)."""
+    for n in range(len(heights)):
+        heights[n] = -target[1]
+    for k in range(3):
+        for n in range(len(heights)):
+            s, c = sincos(x[k, n])
+            heights[n] += lengths[k] * s
+            normal[k, n] = lengths[k] * c

@@ -1,0 +1,178 @@
+"""A mobile arm's posture as a smooth programme, compiled: what is minimised, what binds, and all derivatives.
+
+z = (φ1, φ2, φ3) [rad] are the directions of the three links; one equation ties them: the end-effector's height. The
+minimax term is a bound: z = (φ1, φ2, φ3, t), t above every |α τ|. Nothing is shared with the planner's own kernels,
+which know joint angles only.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from evoexp.numerics import kernel, sincos
+from evoexp.records import FloatArray
+from evoexp.references.placement_model import Directions
+
+OBJECTIVE, HEIGHT, MARGINS = 0, 1, 2  # rows of what is measured: what is minimised, must be 0, must not be negative
+TORQUE_BOUNDS = 6  # margins of the minimax term: t − α τ and t + α τ
+
+
+class Programme:
+    """Least smooth(x) + λ t, t above every |α τ|, height 0, margins not negative; t is left out where λ is 0.
+
+    Attributes:
+        minimax: Whether there is t.
+        num_margins: Number of margins.
+    """
+
+    def __init__(self, model: Directions) -> None:
+        """Take the criteria."""
+        self._numbers, self._avoided, self._bounds = model.numbers(), model.avoided, model.bounds()
+        self.minimax = bool(model.weights[1])
+        self.num_margins = TORQUE_BOUNDS * self.minimax + len(self._bounds)
+        self._values = np.empty(MARGINS + self.num_margins)
+        self._slopes = np.empty((MARGINS + self.num_margins, 3 + self.minimax))
+        self._where = b""
+
+    def measured(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the objective, the height and the margins at z, (2 + margins,), and their derivatives (…, len(z)).
+
+        Both arrays are used again: they hold until the next call.
+        """
+        where = z.tobytes()
+        if where != self._where:
+            measure(z, self._numbers, self._avoided, self._bounds, self._values, self._slopes)
+            self._where = where
+        return self._values, self._slopes
+
+    def start(self, x: FloatArray) -> FloatArray:
+        """Return z at directions x."""
+        if not self.minimax:
+            return x
+        values, _ = self.measured(np.append(x, 0.0))
+        return np.append(x, -values[MARGINS : MARGINS + TORQUE_BOUNDS].min())
+
+    def cost(self, x: FloatArray) -> float:
+        """Return E of Eq. 14 at directions x, without any cap."""
+        return float(self.measured(self.start(x))[0][OBJECTIVE])
+
+    def is_legal(self, x: FloatArray, tolerance: float) -> bool:
+        """Return whether directions reach the target within all limits."""
+        values, _ = self.measured(self.start(x))
+        return bool(abs(values[HEIGHT]) < tolerance and (values[MARGINS:] > -tolerance).all())
+
+    def constraints(self) -> list[dict[str, Any]]:
+        """Return what binds in the words of `scipy.optimize.minimize`."""
+        height, margins = slice(HEIGHT, MARGINS), slice(MARGINS, None)
+        kinds = [("eq", height), ("ineq", margins)][: 1 + (self.num_margins > 0)]
+        return [
+            {
+                "type": kind,
+                "fun": lambda z, rows=rows: self.measured(z)[0][rows],
+                "jac": lambda z, rows=rows: self.measured(z)[1][rows],
+            }
+            for kind, rows in kinds
+        ]
+
+
+@kernel
+def measure(z, numbers, avoided, bounds, values, slopes):  # type: ignore[no-untyped-def]
+    """Measure the programme at one place.
+
+    Args:
+        z: (3,) or, with t, (4,).
+        numbers: (13,) l1, l2, l3, X_e, Y_e, F_x, F_y, ε, λ, δ, α1, α2, α3; see `placement_model.Directions`.
+        avoided: (n, 5) γ, link, place, X_o, Y_o of Eq. 12.
+        bounds: (m, 3) what is limited (0, 1, 2: a joint angle; 3, 4, 5: a torque), 1.0 or −1.0: from below or above,
+            the limit.
+        values: (2 + margins,) written: what is minimised, the height, the margins.
+        slopes: (2 + margins, len(z)) written: their derivatives.
+    """
+    epsilon, delta = numbers[7], numbers[9]
+    across, up, torques, turns = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    for k in range(3):
+        s, c = sincos(z[k])
+        across[k], up[k] = numbers[k] * c, numbers[k] * s
+        turns[k] = -numbers[5] * across[k] - numbers[6] * up[k]  # of every torque from the k-th joint inwards
+    slopes[:, :] = 0.0
+    jx, jy, xx, yy, xy, total = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(2, -1, -1):
+        jx, jy = jx - up[k], jy + across[k]
+        torques[k] = jx * numbers[5] + jy * numbers[6]  # Eq. 8
+        total += epsilon * torques[k] * torques[k]
+        xx, yy, xy = xx + jx * jx, yy + jy * jy, xy + jx * jy
+    determinant = xx * yy - xy * xy
+    if delta != 0.0:
+        total += delta / determinant
+    reach, sum_x, sum_y, sum_torques = jy, 0.0, 0.0, 0.0
+    for k in range(3):
+        sum_x, sum_y, sum_torques = sum_x + jx, sum_y + jy, sum_torques + torques[k]  # of joints up to the k-th
+        slopes[0, k] = 2.0 * epsilon * sum_torques * turns[k]
+        if delta != 0.0:
+            of_xx, of_yy, of_xy = -2.0 * sum_x * across[k], -2.0 * sum_y * up[k], -sum_y * across[k] - sum_x * up[k]
+            slopes[0, k] -= delta * (of_xx * yy + xx * of_yy - 2.0 * xy * of_xy) / (determinant * determinant)
+        jx, jy = jx + up[k], jy - across[k]
+    for n in range(len(avoided)):
+        total += _avoid(avoided[n], numbers[3] - reach, across, up, slopes[0])
+    values[0], values[1] = total, up[0] + up[1] + up[2] - numbers[4]
+    for k in range(3):
+        slopes[1, k] = across[k]
+    if len(z) == 4:
+        values[0] += numbers[8] * z[3]
+        slopes[0, 3] = numbers[8]
+    _measure_margins(z, numbers[10:], bounds, torques, turns, values, slopes)
+
+
+@kernel
+def _measure_margins(z, alphas, bounds, torques, turns, values, slopes):  # type: ignore[no-untyped-def]
+    """Measure what must not be negative, and its derivatives where they are not 0.
+
+    Args:
+        z: As of `measure`, and so are `bounds`, `values` and `slopes`.
+        alphas: (3,) α1, α2, α3.
+        torques: (3,).
+        turns: (3,) derivative by each direction of every torque from its joint inwards.
+    """
+    row = 2
+    if len(z) == 4:
+        for sign in (-1.0, 1.0):
+            for k in range(3):
+                values[row] = z[3] + sign * alphas[k] * torques[k]
+                slopes[row, 3] = 1.0
+                for j in range(k, 3):
+                    slopes[row, j] = sign * alphas[k] * turns[j]
+                row += 1
+    for m in range(len(bounds)):
+        k, sign = int(bounds[m, 0]), bounds[m, 1]
+        if k < 3:
+            values[row] = sign * ((z[k] - z[k - 1] if k > 0 else z[k]) - bounds[m, 2])
+            slopes[row, k] = sign
+            if k > 0:
+                slopes[row, k - 1] = -sign
+        else:
+            values[row] = sign * (torques[k - 3] - bounds[m, 2])
+            for j in range(k - 3, 3):
+                slopes[row, j] = sign * turns[j]
+        row += 1
+
+
+@kernel
+def _avoid(one, platform, across, up, slope):  # type: ignore[no-untyped-def]
+    """Return one term of Eq. 12; its derivatives are added to `slope`.
+
+    Args:
+        one: (5,) γ, link, place, X_o, Y_o.
+        platform: X_p.
+        across: (3,) the links' extents along x.
+        up: (3,) along y.
+        slope: (≥ 3,).
+    """
+    dx, dy = platform - one[3], -one[4]
+    for k in range(int(one[1])):
+        share = one[2] if k + 1 == int(one[1]) else 1.0
+        dx, dy = dx + share * across[k], dy + share * up[k]
+    square = dx * dx + dy * dy
+    for k in range(3):
+        share = (one[2] if k + 1 == int(one[1]) else 1.0) if k < int(one[1]) else 0.0
+        slope[k] -= 2.0 * one[0] * (dx * (1.0 - share) * up[k] + dy * share * across[k]) / (square * square)
+    return one[0] / square

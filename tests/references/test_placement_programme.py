@@ -1,0 +1,170 @@
+"""What references compile of postures: against numpy and complex steps, and against the planner's own kernels."""
+
+import functools
+from typing import Any
+
+import numpy as np
+import pytest
+
+from evoexp.objectives.placement_criteria import Model
+from evoexp.references.placement_model import Directions, directions_of
+from evoexp.references.placement_polish import descend, polish
+from evoexp.references.placement_programme import HEIGHT, MARGINS, OBJECTIVE, Programme, measure
+from evoexp.references.placement_search import lowest, mark_minima, search
+from evoexp.references.placement_subgradient import LANES, costs_of, slide
+from references import placement_complex as slow
+from references.placement_samples import LABELS, problem
+
+AROUND = np.array([[-180.0, 180.0], [-180.0, 180.0]])
+POINTS = np.array([[2.0, 0, 0.5, 5.2, 1.0], [1.0, 1, 0.3, 4.0, 0.1], [3.0, 2, 0.5, 5.2, 1.0], [0.7, 3, 0.9, 5.0, 2.0]])
+
+
+def directions(case: str, **changes: Any) -> Directions:
+    return directions_of(problem(case).model, problem(case).angle_limits)._replace(**changes)
+
+
+def limited(case: str) -> Directions:
+    joints = np.array([[-2.5, 3.0], [-np.inf, 2.5], [-2.0, np.inf]])
+    return directions(case, avoided=POINTS, joint_limits=joints, torque_limits=np.array([[-6.0, 8.0]] * 3))
+
+
+@pytest.mark.parametrize("with_limits", [False, True])
+@pytest.mark.parametrize("case", LABELS)
+def test_the_programme_and_its_derivatives_are_those_of_complex_steps(case: str, with_limits: bool) -> None:
+    model = limited(case) if with_limits else directions(case)
+    programme, rng = Programme(model), np.random.default_rng(2)
+    function = functools.partial(slow.programme, model)
+    for z in rng.uniform(-3.0, 3.0, (40, 3 + programme.minimax)):
+        values, slopes = programme.measured(z)
+        assert len(values) == MARGINS + programme.num_margins
+        np.testing.assert_allclose(values, function(z), rtol=1e-11, atol=1e-13)
+        expected = slow.gradient(function, z)
+        np.testing.assert_allclose(slopes, expected, rtol=1e-9, atol=1e-11 * np.abs(expected).max())
+
+
+def test_complex_steps_are_derivatives() -> None:
+    model, x, h = directions("manipulability"), np.array([1.1, 1.9, 4.4]), 1e-6
+    smooth = functools.partial(slow.smooth, model)
+    plain = [(smooth(x + h * e) - smooth(x - h * e)) / (2 * h) for e in np.eye(3)]
+    np.testing.assert_allclose(slow.gradient(smooth, x), plain, rtol=1e-7)
+
+
+def test_what_is_remembered_is_what_is_measured() -> None:
+    model = directions("minimax")
+    programme, fresh = Programme(model), Programme(model)
+    first, second = np.array([1.1, 1.9, 4.4, 2.0]), np.array([1.1, 1.9, 4.4, 2.5])
+    for z in (first, first, second, first):
+        own = [values.copy() for values in programme.measured(z)]
+        fresh._where = b""
+        for known, expected in zip(own, fresh.measured(z), strict=True):
+            np.testing.assert_array_equal(known, expected)
+
+
+def test_costs_and_legality_at_directions() -> None:
+    model, rng = limited("minimax"), np.random.default_rng(4)
+    programme, legal = Programme(model), 0
+    for x in rng.uniform(-3.0, 3.0, (200, 3)):
+        assert programme.cost(x) == pytest.approx(slow.cost(model, x), rel=1e-11)
+        expected = abs(slow.height(model, x)) < 0.5 and (slow.margins(model, x) > -0.5).all()
+        assert programme.is_legal(x, 0.5) == expected
+        legal += expected
+    assert 5 < legal < 150
+
+
+@pytest.mark.parametrize("case", LABELS)
+def test_many_costs_at_once_are_the_planners(case: str) -> None:
+    own, model, rng = problem(case), directions(case), np.random.default_rng(1)
+    pairs = rng.uniform(-180.0, 180.0, (2, 300))
+    costs, theta_3 = own.model.measure_branches(pairs)
+    kept = costs < 250.0
+    x = np.array([model.directions(pairs[:, k], theta_3[b, k]) for b, k in zip(*np.nonzero(kept), strict=True)]).T
+    assert x.shape[1] > 60
+    np.testing.assert_allclose(many_costs(model, x), costs[kept], rtol=1e-9)
+    assert np.abs(slow.height(model, x)).max() < 1e-12
+    everything = model._replace(avoided=POINTS)
+    np.testing.assert_allclose(many_costs(everything, x), slow.cost(everything, x), rtol=1e-11)
+
+
+def many_costs(model: Directions, x: np.ndarray) -> np.ndarray:
+    costs, across, up = np.empty(x.shape[1]), np.empty(x.shape), np.empty(x.shape)
+    costs_of(np.ascontiguousarray(x), *model[:5], across, up, costs)
+    return costs
+
+
+@pytest.mark.parametrize("case", ["torque_norm", "obstacle_link", "manipulability"])
+def test_the_subgradient_method_is_the_slow_one(case: str) -> None:
+    model = directions(case)
+    starts = lowest(model, AROUND, 60, 250.0, 6)
+    steps = 0.3 / np.sqrt(np.arange(1.0, 41.0))
+    x = np.resize(np.array(starts), (LANES, 3)).T.copy()
+    ends, costs = np.empty(x.shape), np.empty(LANES)
+    slide(x, steps, *model[:5], ends, costs)
+    for k, start in enumerate(starts):
+        end, least = slow.slide(model, start, steps)
+        assert costs[k] == pytest.approx(least, rel=1e-5)  # differences of 1e-6 rad: ten digits of the slope
+        np.testing.assert_allclose(ends[:, k], end, atol=1e-5)
+        np.testing.assert_array_equal(ends[:, k], ends[:, k + len(starts)])
+
+
+@pytest.mark.parametrize("case", LABELS)
+def test_the_dense_search_has_the_planners_costs(case: str) -> None:
+    own = problem(case)
+    one, two = np.meshgrid(np.arange(-180.0, 180.0, 4.0), np.arange(-180.0, 180.0, 4.0), indexing="ij")
+    expected, theta_3 = own.model.measure_branches(np.stack([one.ravel(), two.ravel()]))
+    costs, sines = search(directions(case), np.radians(np.stack([one[:, 0], two[0]])))
+    expected = np.where(np.isnan(theta_3), np.inf, expected).reshape(costs.shape)
+    np.testing.assert_array_equal(np.isinf(costs), np.isinf(expected))
+    np.testing.assert_array_equal(np.abs(sines) <= 1.0, np.isfinite(costs[0]))
+    np.testing.assert_allclose(np.minimum(costs, np.where(np.isinf(costs), np.inf, 250.0)), expected, rtol=1e-8)
+
+
+def test_the_dense_search_keeps_to_limits() -> None:
+    own, limits = problem("torque_norm"), np.array([[-170.0, 95.0], [-60.0, 151.0], [-101.0, 77.0]])
+    torques = np.array([[-8.1, 6.2], [-np.inf, 5.6], [-1.3, np.inf]])
+    model = Model(own.model.task, own.model.weights, own.model.avoided, np.concatenate([limits, torques]))
+    one, two = np.meshgrid(np.arange(-180.0, 180.0, 2.0), np.arange(-180.0, 180.0, 2.0), indexing="ij")
+    expected, _ = model.measure_branches(np.stack([one.ravel(), two.ravel()]))
+    costs, _ = search(directions_of(model, AROUND), np.radians(np.stack([one[:, 0], two[0]])))
+    feasible = expected.reshape(costs.shape) < 250.0
+    assert 100 < np.count_nonzero(feasible) < 5000
+    np.testing.assert_array_equal(np.isfinite(costs), feasible)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_minima_are_marked_as_by_rolling(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    costs = rng.integers(0, 6, (2, 17, 17)).astype(float)  # with ties
+    in_reach = rng.random((17, 17)) < 0.9
+    costs[:, ~in_reach] = np.inf
+    least = np.zeros(costs.shape, dtype=bool)
+    mark_minima(costs, in_reach, np.array([True, True]), 5.0, least)
+    np.testing.assert_array_equal(least, slow.minima(costs, in_reach, 5.0))
+
+
+def test_a_range_that_is_no_turn_has_ends() -> None:
+    costs = np.full((2, 9, 9), 3.0)
+    costs[0, 0, 4], costs[0, 8, 4] = 2.0, 1.0
+    for turns, expected in ((True, 1), (False, 2)):
+        least = np.zeros(costs.shape, dtype=bool)
+        mark_minima(costs, np.ones((9, 9), dtype=bool), np.array([turns, True]), 2.5, least)
+        assert np.count_nonzero(least) == expected
+
+
+def test_a_polished_minimum_meets_its_conditions_and_others_are_refused() -> None:
+    model = directions("minimax")
+    programme, start = Programme(model), lowest(model, AROUND, 60, 250.0, 1)[0]
+    end = descend(programme, start)
+    found = polish(programme, end.x)
+    assert found is not None
+    torques = np.abs(slow.weighted_torques(model, found.x))
+    np.testing.assert_allclose(torques, found.cost, atol=1e-12)
+    assert abs(slow.height(model, found.x)) < 1e-13
+    assert polish(programme, start) is None, "Newton's method leads far away from there"
+
+
+def test_rows_of_what_is_measured() -> None:
+    model = directions("torque_norm")
+    values, slopes = np.empty(MARGINS), np.empty((MARGINS, 3))
+    measure(np.array([0.1, 0.2, 0.3]), model.numbers(), model.avoided, model.bounds(), values, slopes)
+    assert values[OBJECTIVE] == pytest.approx(slow.smooth(model, np.array([0.1, 0.2, 0.3])))
+    assert values[HEIGHT] == pytest.approx(slow.height(model, np.array([0.1, 0.2, 0.3])))

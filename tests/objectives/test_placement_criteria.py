@@ -77,6 +77,21 @@ def test_singular_and_infeasible_postures_are_capped_and_never_nan() -> None:
     assert own[1] == pytest.approx(0.0, abs=1e-20)
 
 
+@pytest.mark.parametrize("count", [1, 7, 50, 400])
+@pytest.mark.parametrize("avoided", [[], [[1.0, 2, 0.5, 5.2, 1.0]], [[2.0, 0, 0.3, 4.0, 0.1], [1.5, 3, 0.9, 5.1, 1.3]]])
+def test_a_population_is_measured_as_its_postures_are(count: int, avoided: object) -> None:
+    narrow = np.array([[-100.0, 150.0], [-170.0, 90.0], [-120.0, 179.0], [-5.0, 7.0], [-4.0, 6.0], [-3.0, 2.0]])
+    weights = {"torque_max_weight": 0.5, "manipulability_weight": 2.0, "torque_weights": (1.0, 2.0, 3.0)}
+    rng = np.random.default_rng(count)
+    angles = np.round(rng.uniform(-180.0, 180.0, (2, count)), 0 if count == 400 else 9)  # round ones: singular ones
+    for limits in (ANYTHING, narrow):
+        found = model((1.0, -5.0), avoided, limits, **(weights | {"greatest": 40.0}))
+        out = found.measure(angles)
+        for k, (one, two) in enumerate(angles.T):
+            branch, own, _ = found.posture(one, two)
+            assert out[:, k].tolist() == [*own[:5], branch]
+
+
 def test_an_obstacle_at_the_very_point_is_capped() -> None:
     _, own, _ = model().posture(70.0, 40.0)
     _, free, hit = model(avoided=[[1.0, 0, 0.5, own[9], 0.0]]).posture(70.0, 40.0)

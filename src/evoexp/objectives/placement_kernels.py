@@ -149,9 +149,74 @@ def measure_postures(angles, count, task, weights, avoided, limits, out):  # typ
         task: As of `measure_posture`, and so are `weights`, `avoided` and `limits`.
         out: (CRITERIA + 1, ≥ count) written: the criteria, and the branch (−1: infeasible).
     """
-    one, two = np.empty(RESULTS), np.empty(RESULTS)
+    links, branches = np.empty((7, count)), np.empty((2, CRITERIA, count))
+    within = np.empty((2, count), dtype=np.bool_)
     for k in range(count):
-        branch = measure_both(angles[0, k], angles[1, k], task, weights, avoided, limits, one, two)
+        _, _, s1, c1, s12, c12, s123, c123, absolute = _directions(angles[0, k], angles[1, k], task)
+        links[0, k], links[1, k], links[2, k], links[3, k] = s1, c1, s12, c12
+        links[4, k], links[5, k], links[6, k] = s123, c123, absolute
+    for branch in range(2):
+        _measure_lanes(angles, count, links, branch, task, weights, avoided, limits, branches[branch], within[branch])
+    for k in range(count):
+        one, two = within[0, k], within[1, k]
+        other = two & ((not one) | (branches[0, COST, k] > branches[1, COST, k]))
         for row in range(CRITERIA):
-            out[row, k] = one[row]
-        out[CRITERIA, k] = branch
+            out[row, k] = branches[1, row, k] if other else branches[0, row, k]
+        out[CRITERIA, k] = 1.0 if other else (0.0 if one else -1.0)
+
+
+@kernel
+def _measure_lanes(  # type: ignore[no-untyped-def]
+    angles, count, links, branch, task, weights, avoided, limits, out, within
+):
+    """Measure one branch of a population as `_measure_branch` does, bit for bit, individuals innermost."""
+    l1, l2, l3, x_e, f_x, f_y, cap = task[0], task[1], task[2], task[3], task[5], task[6], weights[6]
+    a1, a2, a3, sign = weights[3], weights[4], weights[5], -1.0 if branch == 1 else 1.0
+    s1, c1, s12, c12, s123, c123, absolute = links[0], links[1], links[2], links[3], links[4], links[5], links[6]
+    obstacles = out[OBSTACLE]
+    obstacles[:] = 0.0
+    for n in range(len(avoided)):
+        weight, link, place, x_o, y_o = avoided[n, 0], avoided[n, 1], avoided[n, 2], avoided[n, 3], avoided[n, 4]
+        first = (place if link == 1.0 else 1.0) * (link >= 1.0)
+        second, third = (place if link == 2.0 else 1.0) * (link >= 2.0), place * (link >= 3.0)
+        for k in range(count):
+            x1, x2, x3 = l1 * c1[k], l2 * c12[k], l3 * (sign * c123[k])
+            y1, y2, y3 = l1 * s1[k], l2 * s12[k], l3 * s123[k]
+            platform = x_e - (x1 + x2 + x3)
+            x, y = platform + first * x1, first * y1
+            x += second * x2 + third * x3
+            y += second * y2 + third * y3
+            dx, dy = x - x_o, y - y_o
+            obstacles[k] += weight * _inverse(dx * dx + dy * dy, cap)
+    low_1, high_1, low_2, high_2 = limits[0, 0], limits[0, 1], limits[1, 0], limits[1, 1]
+    low_3, high_3, least_1, most_1 = limits[2, 0], limits[2, 1], limits[3, 0], limits[3, 1]
+    least_2, most_2, least_3, most_3 = limits[4, 0], limits[4, 1], limits[5, 0], limits[5, 1]
+    for k in range(count):
+        theta_1, theta_2 = angles[0, k], angles[1, k]
+        theta_3 = (180.0 - absolute[k] if branch == 1 else absolute[k]) - theta_1 - theta_2
+        theta_3 -= 360.0 * np.floor((theta_3 + 180.0) / 360.0)
+        x1, x2, x3 = l1 * c1[k], l2 * c12[k], l3 * (sign * c123[k])
+        y1, y2, y3 = l1 * s1[k], l2 * s12[k], l3 * s123[k]
+        jx1, jx2, jx3 = -(y1 + y2 + y3), -(y2 + y3), -y3
+        jy1, jy2, jy3 = x1 + x2 + x3, x2 + x3, x3
+        t1, t2, t3 = jx1 * f_x + jy1 * f_y, jx2 * f_x + jy2 * f_y, jx3 * f_x + jy3 * f_y  # Eq. 8
+        norm = 0.0 + t1 * t1 + t2 * t2 + t3 * t3  # Eq. 10
+        b1, b2, b3 = abs(a1 * t1), abs(a2 * t2), abs(a3 * t3)
+        largest = b1 if b1 > b2 else b2
+        largest = b3 if b3 > largest else largest  # Eq. 11
+        reached = abs(s123[k]) <= 1.0
+        free = reached & (low_1 <= theta_1) & (theta_1 <= high_1) & (low_2 <= theta_2) & (theta_2 <= high_2)
+        free = free & (low_3 <= theta_3) & (theta_3 <= high_3) & (least_1 <= t1) & (t1 <= most_1)
+        free = free & (least_2 <= t2) & (t2 <= most_2) & (least_3 <= t3) & (t3 <= most_3)
+        xx = jx1 * jx1 + jx2 * jx2 + jx3 * jx3
+        yy = jy1 * jy1 + jy2 * jy2 + jy3 * jy3
+        xy = jx1 * jy1 + jx2 * jy2 + jx3 * jy3
+        singular = _inverse(xx * yy - xy * xy, cap)  # Eq. 13
+        obstacle = obstacles[k]
+        total = obstacle + weights[0] * norm + weights[1] * largest + weights[2] * singular  # Eq. 14
+        out[TORQUE_NORM, k] = norm if reached & (norm < cap) else cap
+        out[TORQUE_MAX, k] = largest if reached & (largest < cap) else cap
+        out[MANIPULABILITY, k] = singular if reached else cap
+        out[OBSTACLE, k] = obstacle if reached & (obstacle < cap) else cap
+        out[COST, k] = total if free & (total < cap) else cap
+        within[k] = free

@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 
 from collision.certifier_scenes import random_motion, random_scene
 from evoexp.collision.certifier import Limits, _Judgement
-from evoexp.collision.certifier_sweep import least_separation, move_to, pair_distance, work_space
+from evoexp.collision.certifier_sweep import Task, least_separation, move_to, pair_distance, work_space
 from evoexp.collision.motion_bounds import approach_bounds
 from evoexp.collision.scene import geometry_scene
 from evoexp.paths.motion import Motion, cubic_motion, spline_motion
@@ -23,13 +23,18 @@ def judgement(seed: int) -> _Judgement:
     return _Judgement(scene, motion, 0.0, scene.tolerances, 1e-3, Limits())
 
 
+def write_bounds(task: Task, begin: float, end: float, bounds: np.ndarray) -> None:
+    scratch = np.empty(len(task.table[0]))
+    approach_bounds(task.table, task.coefficients[0], begin, end, task.weights, bounds, scratch)
+
+
 @settings(max_examples=150, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 2**32 - 1), begin=st.floats(0.0, 0.99), width=st.floats(1e-3, 1.0))
 def test_distances_never_change_faster_than_the_bound(seed: int, begin: float, width: float) -> None:
     judged = judgement(seed)
     end = min(begin + width, 1.0)
     bounds = np.empty((2, len(judged.scene.pairs)))
-    approach_bounds(judged.task.table, judged.task.coefficients[0], begin, end, judged.task.weights, bounds)
+    write_bounds(judged.task, begin, end, bounds)
     t = np.linspace(begin, end, 9)
     for pair, bound in enumerate(bounds[0]):
         d = np.array([max(judged.coal(pair, float(instant)), 0.0) for instant in t])
@@ -45,7 +50,7 @@ def test_bodies_stay_as_far_apart_as_their_velocities_and_accelerations_say(
     judged = judgement(seed)
     task, work, end = judged.task, work_space(judged.task), min(begin + width, 1.0)
     bounds, u, half = np.empty((2, len(judged.scene.pairs))), 0.5 * (begin + end), 0.5 * (end - begin)
-    approach_bounds(task.table, task.coefficients[0], begin, end, task.weights, bounds)
+    write_bounds(task, begin, end, bounds)
     move_to(task, work, 0, u)
     assert task.by_one.all()
     for pair in range(len(task.pairs)):
@@ -69,7 +74,7 @@ def test_the_bound_is_reached() -> None:
         geometry_scene(model, geometry), Motion(np.array([[0.0], [0.5]])), 0.0, np.ones(1), 1e-3, Limits()
     )
     bounds = np.empty((2, 1))
-    approach_bounds(judged.task.table, judged.task.coefficients[0], 0.0, 1.0, judged.task.weights, bounds)
+    write_bounds(judged.task, 0.0, 1.0, bounds)
     assert bounds[0, 0] == pytest.approx(0.5 * 2.1)
     slope = (judged.coal(0, 0.0) - judged.coal(0, 1e-6)) / 1e-6
     assert slope == pytest.approx(0.5 * 2.0, rel=1e-4)

@@ -239,9 +239,9 @@ class _Judgement:
             if contact is not None and begin >= contact.t:
                 break
             p, segment = int(pair), min(int(begin), len(self.task.coefficients) - 1)
-            speeds = np.empty((2, len(self.scene.pairs)))
+            speeds, scratch = np.empty((2, len(self.scene.pairs))), np.empty(len(self.task.table[0]))
             piece = self.task.coefficients[segment]
-            approach_bounds(self.task.table, piece, begin - segment, end - segment, self.task.weights, speeds)
+            approach_bounds(self.task.table, piece, begin - segment, end - segment, self.task.weights, speeds, scratch)
             known = min(self.best.distance, found.least)
             goals = LeafGoals(goal[p], level[p], self.tolerances[p], known, resolution, self.floor)
             end = min(end, float(self.motion.num_segments))

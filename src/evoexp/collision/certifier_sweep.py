@@ -20,7 +20,7 @@ from evoexp.collision.motion_bounds import (
     pair_reaches,
     reaches,
 )
-from evoexp.numerics import kernel
+from evoexp.numerics import borrowed, inlined, kernel
 from evoexp.records import FloatArray
 
 DEPTH = 64
@@ -127,12 +127,20 @@ def sweep_motion(task: Task, goal: Goal, work: tuple[np.ndarray, ...]) -> Sweep:
     num_pairs = len(task.pairs)
     leaves, state = np.empty((MAX_LEAVES + num_pairs, 3)), np.array([goal.known, np.inf, -1.0, np.inf, 0.0, 0.0])
     least, at = np.full(num_pairs, np.inf), np.zeros(num_pairs)
-    done = _sweep(task, goal, work, (leaves, state, least, at))
+    done = _sweep(task, goal, work, (leaves, state, least, at), _stack(num_pairs, len(task.table[0])))
     count = int(state[LEAVES])
     first_pair = int(state[FIRST_PAIR])
     return Sweep(
         state[LEAST], state[FIRST], first_pair, state[PROVEN], int(state[NODES]), done, leaves[:count], least, at
     )
+
+
+def _stack(num_pairs: int, num_joints: int) -> tuple[np.ndarray, ...]:
+    """Scratch of a sweep: speeds and accelerations, of joints, too; the pairs left on each level; where it stands."""
+    lists, counts = np.empty((DEPTH + 2, num_pairs), dtype=np.int64), np.empty(DEPTH + 2, dtype=np.int64)
+    lists[0], counts[0] = np.arange(num_pairs), num_pairs
+    begins, ends, depths = np.empty(DEPTH + 2), np.empty(DEPTH + 2), np.empty(DEPTH + 2, dtype=np.int64)
+    return np.empty((2, num_pairs)), np.empty(num_joints), lists, counts, depths, begins, ends
 
 
 @kernel
@@ -151,7 +159,7 @@ def work_space(task: Task) -> tuple[np.ndarray, ...]:
     return q, frames, world, stamps, np.ones((len(task.pairs), 3)), np.zeros((4, 3)), np.zeros((3, 3)), twists
 
 
-@kernel
+@inlined
 def move_to(task, work, segment, u):  # type: ignore[no-untyped-def]
     """Place the joints at u on a segment."""
     q, frames, _, stamps, _, _, _, _ = work
@@ -160,7 +168,7 @@ def move_to(task, work, segment, u):  # type: ignore[no-untyped-def]
     joint_frames(task.table, q, frames)
 
 
-@kernel
+@inlined
 def pair_distance(task, work, pair, need, enough):  # type: ignore[no-untyped-def]
     """`distance_bounds` of a pair, whose bodies are placed first unless they are already."""
     _, frames, world, stamps, normals, simplex, scratch, _ = work
@@ -174,7 +182,7 @@ def pair_distance(task, work, pair, need, enough):  # type: ignore[no-untyped-de
     return distance_bounds(task.bodies, world, one, two, need, enough, normals[pair], simplex, scratch)
 
 
-@kernel
+@inlined
 def _place_body(frame, rotation, translation, out):  # type: ignore[no-untyped-def]
     for e in range(3):
         a, b, c = frame[3 * e], frame[3 * e + 1], frame[3 * e + 2]
@@ -184,19 +192,17 @@ def _place_body(frame, rotation, translation, out):  # type: ignore[no-untyped-d
 
 
 @kernel
-def _sweep(task, goal, work, found):  # type: ignore[no-untyped-def]
+def _sweep(task, goal, work, found, stack):  # type: ignore[no-untyped-def]
     """Judge a motion; returns whether all of it was."""
+    task, goal, work, found, stack = borrowed((task, goal, work, found, stack))
+    bounds, above, lists, counts, depths, begins, ends = stack
     num_pairs, num_segments = len(task.pairs), len(task.coefficients)
-    bounds = np.zeros((2, num_pairs))
-    lists, counts = np.zeros((DEPTH + 2, num_pairs), dtype=np.int64), np.zeros(DEPTH + 2, dtype=np.int64)
-    begins, ends, depths = np.zeros(DEPTH + 2), np.zeros(DEPTH + 2), np.zeros(DEPTH + 2, dtype=np.int64)
-    lists[0], counts[0] = np.arange(num_pairs), num_pairs
     leaves, state, _, _ = found
     if goal.instants:
         _judge_instants(task, goal, work, found)
     for segment in range(num_segments):
         if task.straight:
-            approach_bounds(task.table, task.coefficients[segment], 0.0, 1.0, task.weights, bounds)
+            approach_bounds(task.table, task.coefficients[segment], 0.0, 1.0, task.weights, bounds, above)
         begins[0], ends[0], depths[0], waiting = 0.0, 1.0, 0, 1
         while waiting > 0:
             waiting -= 1
@@ -208,7 +214,7 @@ def _sweep(task, goal, work, found):  # type: ignore[no-untyped-def]
             if state[NODES] >= goal.max_nodes or state[LEAVES] + num_pairs > len(leaves):
                 return False
             if not task.straight:
-                approach_bounds(task.table, task.coefficients[segment], a, b, task.weights, bounds)
+                approach_bounds(task.table, task.coefficients[segment], a, b, task.weights, bounds, above)
             counts[depth + 1] = _judge_interval(
                 task, goal, work, found, segment, a, b, depth, bounds, lists[depth, : counts[depth]], lists[depth + 1]
             )
@@ -220,7 +226,7 @@ def _sweep(task, goal, work, found):  # type: ignore[no-untyped-def]
     return True
 
 
-@kernel
+@inlined
 def _judge_instants(task, goal, work, found):  # type: ignore[no-untyped-def]
     """All pairs at the instants themselves: a good upper bound from the start."""
     _, state, least, at = found
@@ -241,7 +247,7 @@ def _judge_instants(task, goal, work, found):  # type: ignore[no-untyped-def]
                 state[FIRST], state[FIRST_PAIR] = float(instant), pair
 
 
-@kernel
+@inlined
 def _judge_interval(task, goal, work, found, segment, a, b, depth, bounds, given, left):  # type: ignore[no-untyped-def]
     """Judge the given pairs on [a, b] from its middle; write those for its halves to `left`, return their number."""
     leaves, state, least, at = found
@@ -278,7 +284,7 @@ def _judge_interval(task, goal, work, found, segment, a, b, depth, bounds, given
     return count
 
 
-@kernel
+@inlined
 def least_separation(task, work, pair, segment, u, half):  # type: ignore[no-untyped-def]
     """Least gap across a pair's last normal within `half` before and after u, if velocities did not change."""
     _, frames, world, stamps, normals, _, scratch, twists = work
@@ -293,6 +299,7 @@ def least_separation(task, work, pair, segment, u, half):  # type: ignore[no-unt
 @kernel
 def polish(task, work, pair, t, step):  # type: ignore[no-untyped-def]
     """Walk from t to a local minimum of a pair's distance, in steps that are halved; return t and the distance."""
+    task, work = borrowed((task, work))
     best, tried = np.inf, t
     for move in range(1000):
         for k in range(3):

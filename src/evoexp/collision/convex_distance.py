@@ -11,14 +11,14 @@ import numpy as np
 
 from evoexp.collision.body_table import BOX, CONE, CYLINDER, ELLIPSOID, HALF_SPACE, HULL, SEGMENT
 from evoexp.collision.simplex import closest_of_simplex
-from evoexp.numerics import kernel
+from evoexp.numerics import inlined
 
 MAX_ITERATIONS = 100
 
 CONVERGED = 1e-13  # [-] of the distance: gap between the bounds at which GJK ends
 
 
-@kernel
+@inlined
 def distance_bounds(bodies, world, one, two, need, enough, normal, simplex, scratch):  # type: ignore[no-untyped-def]
     """A lower and an upper bound of the distance of two bodies; equal up to rounding unless stopped early.
 
@@ -57,7 +57,7 @@ def distance_bounds(bodies, world, one, two, need, enough, normal, simplex, scra
     return low - radii, high - radii
 
 
-@kernel
+@inlined
 def _gjk(bodies, world, one, two, need, enough, v, simplex, scratch):  # type: ignore[no-untyped-def]
     """`distance_bounds` of the two cores, from the direction v on."""
     here, there = scratch[0], scratch[1]
@@ -88,7 +88,7 @@ def _gjk(bodies, world, one, two, need, enough, v, simplex, scratch):  # type: i
     return min(low, high), high
 
 
-@kernel
+@inlined
 def _holds(simplex, count, x, y, z):  # type: ignore[no-untyped-def]
     found = False
     for k in range(count):
@@ -96,7 +96,7 @@ def _holds(simplex, count, x, y, z):  # type: ignore[no-untyped-def]
     return found
 
 
-@kernel
+@inlined
 def _support(bodies, world, body, direction, sign, out):  # type: ignore[no-untyped-def]
     """Write the farthest point of a body's core in a direction, times a sign."""
     kind, size, corners, points = bodies[1][body], bodies[5], bodies[7], bodies[8]
@@ -137,7 +137,7 @@ def _support(bodies, world, body, direction, sign, out):  # type: ignore[no-unty
         out[e] = w[9 + e] + (w[3 * e] * x + w[3 * e + 1] * y + w[3 * e + 2] * z)
 
 
-@kernel
+@inlined
 def segment_distance(one, half_one, two, half_two, across):  # type: ignore[no-untyped-def]
     """Distance of two segments of given half lengths along the z axes of their frames, centred; writes its vector."""
     rx, ry, rz = one[9] - two[9], one[10] - two[10], one[11] - two[11]
@@ -165,7 +165,7 @@ def segment_distance(one, half_one, two, half_two, across):  # type: ignore[no-u
     return np.sqrt(best)
 
 
-@kernel
+@inlined
 def _nearer(x, y, z, best, across):  # type: ignore[no-untyped-def]
     squared = x * x + y * y + z * z
     if squared < best:
@@ -174,7 +174,7 @@ def _nearer(x, y, z, best, across):  # type: ignore[no-untyped-def]
     return best
 
 
-@kernel
+@inlined
 def separation_later(bodies, world, twists, one, two, normal, later, scratch):  # type: ignore[no-untyped-def]
     """The gap of two bodies across a normal, `later` ahead, if all their points kept their velocities.
 

@@ -11,6 +11,7 @@ from scipy.interpolate import CubicSpline
 from collision.certifier_scenes import random_motion, random_scene
 from evoexp.collision.certifier import Limits, _Judgement
 from evoexp.collision.certifier_sweep import Task, least_separation, move_to, pair_distance, work_space
+from evoexp.collision.convex_distance import CONVERGED
 from evoexp.collision.motion_bounds import approach_bounds
 from evoexp.collision.scene import geometry_scene
 from evoexp.paths.motion import Motion, cubic_motion, spline_motion
@@ -54,7 +55,7 @@ def test_bodies_stay_as_far_apart_as_their_velocities_and_accelerations_say(
     move_to(task, work, 0, u)
     assert task.by_one.all()
     for pair in range(len(task.pairs)):
-        low, _ = pair_distance(task, work, pair, np.inf, -np.inf)
+        low, _ = pair_distance(task, work, pair, np.inf, -np.inf, CONVERGED)
         assert least_separation(task, work, pair, 0, u, 0.0) <= low + 1e-9
         bound = least_separation(task, work, pair, 0, u, half) - 0.5 * half * half * bounds[1, pair]
         distances = [judged.coal(pair, float(t)) for t in np.linspace(begin, end, 15)]
@@ -89,12 +90,17 @@ def test_bounds_of_distances_hold_however_early_they_stop(seed: int, u: float, s
     for pair in range(len(task.pairs)):
         exact = judged.coal(pair, u)
         for need, enough in ((np.inf, -np.inf), (stop, stop), (stop, -np.inf), (np.inf, stop)):
-            low, high = pair_distance(task, work, pair, need, enough)
+            low, high = pair_distance(task, work, pair, need, enough, CONVERGED)
             assert low <= max(exact, 0.0) + 1e-6
             if task.exact[pair]:
                 assert high >= min(exact, 0.0) - 1e-6 and (high >= exact - 1e-6 or high <= 0.0)
             if need == np.inf and enough == -np.inf and task.exact[pair] and exact > 0.0:
                 assert low == pytest.approx(exact, abs=1e-6) and high == pytest.approx(exact, abs=1e-6)
+        low, high = pair_distance(task, work, pair, np.inf, -np.inf, 1e-3)
+        assert low <= max(exact, 0.0) + 1e-6
+        if task.exact[pair] and exact > 0.0:
+            cores = exact + task.bodies[6][task.pairs[pair]].sum()  # what is swept around them is taken off
+            assert exact - 1e-6 <= high <= low + 1e-3 * cores + 1e-5
 
 
 @settings(max_examples=100, deadline=None, derandomize=True)

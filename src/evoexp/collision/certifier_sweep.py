@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.convex_distance import distance_bounds, separation_later
+from evoexp.collision.convex_distance import CONVERGED, distance_bounds, separation_later
 from evoexp.collision.motion_bounds import (
     FRAME,
     approach_bounds,
@@ -175,7 +175,7 @@ def move_to(task, work, segment, u):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def pair_distance(task, work, pair, need, enough):  # type: ignore[no-untyped-def]
+def pair_distance(task, work, pair, need, enough, converged):  # type: ignore[no-untyped-def]
     """`distance_bounds` of a pair, whose bodies are placed first unless they are already."""
     _, frames, world, stamps, normals, simplex, scratch, _ = work
     for side in range(2):
@@ -185,7 +185,7 @@ def pair_distance(task, work, pair, need, enough):  # type: ignore[no-untyped-de
             stamps[body] = stamps[-1]
             _place_body(frames[joint], task.bodies[3][body], task.bodies[4][body], world[body])
     one, two = task.pairs[pair, 0], task.pairs[pair, 1]
-    return distance_bounds(task.bodies, world, one, two, need, enough, normals[pair], simplex, scratch)
+    return distance_bounds(task.bodies, world, one, two, need, enough, converged, normals[pair], simplex, scratch)
 
 
 @inlined
@@ -233,6 +233,12 @@ def _sweep(task, goal, work, found, stack):  # type: ignore[no-untyped-def]
 
 
 @inlined
+def _closely(goal):  # type: ignore[no-untyped-def]
+    """How closely distances are bounded: a thousandth of what shall be told apart; around a level, exactly."""
+    return max(CONVERGED, 0.001 * goal.resolution) if goal.resolution < 1.0 else CONVERGED
+
+
+@inlined
 def _judge_instants(task, goal, work, found):  # type: ignore[no-untyped-def]
     """All pairs at the instants themselves: a good upper bound from the start."""
     _, state, least, at = found
@@ -243,7 +249,7 @@ def _judge_instants(task, goal, work, found):  # type: ignore[no-untyped-def]
         move_to(task, work, segment, float(instant - segment))
         for pair in range(len(task.pairs)):
             wanted = max(state[LEAST], goal.level[pair])
-            low, high = pair_distance(task, work, pair, wanted, -np.inf)
+            low, high = pair_distance(task, work, pair, wanted, -np.inf, _closely(goal))
             distance = high if task.exact[pair] else low
             if distance < least[pair]:
                 least[pair], at[pair] = distance, float(instant)
@@ -265,7 +271,7 @@ def _judge_interval(task, goal, work, found, segment, a, b, depth, bounds, given
         upper = state[LEAST]
         if goal.resolution < np.inf and 0.0 < upper < np.inf:
             wanted = max(wanted, upper - min(max(goal.resolution * upper, goal.floor), 0.5 * upper))
-        low, high = pair_distance(task, work, pair, wanted + way, wanted)
+        low, high = pair_distance(task, work, pair, wanted + way, wanted, _closely(goal))
         if task.exact[pair] and high < least[pair]:
             least[pair], at[pair] = high, segment + u
             state[LEAST] = min(state[LEAST], high)
@@ -336,7 +342,7 @@ def polish(task, work, pairs, t, distances):  # type: ignore[no-untyped-def]
                     continue
                 segment = min(int(tried), len(task.coefficients) - 1)
                 move_to(task, work, segment, tried - segment)
-                _, distance = pair_distance(task, work, pairs[walk], np.inf, -np.inf)
+                _, distance = pair_distance(task, work, pairs[walk], np.inf, -np.inf, CONVERGED)
                 after = distance if k == 1 else after
                 before = distance if k == 2 else before
                 if distance < best:

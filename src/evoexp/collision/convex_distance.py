@@ -15,11 +15,11 @@ from evoexp.numerics import inlined
 
 MAX_ITERATIONS = 100
 
-CONVERGED = 1e-13  # [-] of the distance: gap between the bounds at which GJK ends
+CONVERGED = 1e-13  # [-] of the distance: gap between the bounds at which GJK ends where the distance itself is wanted
 
 
 @inlined
-def distance_bounds(bodies, world, one, two, need, enough, normal, simplex, scratch):  # type: ignore[no-untyped-def]
+def distance_bounds(bodies, world, one, two, need, enough, converged, normal, simplex, scratch):  # type: ignore[no-untyped-def]
     """A lower and an upper bound of the distance of two bodies; equal up to rounding unless stopped early.
 
     Args:
@@ -29,6 +29,7 @@ def distance_bounds(bodies, world, one, two, need, enough, normal, simplex, scra
         two: Index of the other.
         need: Stops when the lower bound is not below it.
         enough: Stops when the upper bound is below it.
+        converged: And when the two are apart by this part of the distance of the cores [-].
         normal: (3,) a direction to begin with, from the second to the first; the last one, across which the lower
             bound was found, is written back.
         simplex: (4, 3) scratch.
@@ -53,12 +54,12 @@ def distance_bounds(bodies, world, one, two, need, enough, normal, simplex, scra
     apart = np.sqrt(x * x + y * y + z * z) - bodies[11][one] - bodies[11][two]
     if apart >= need:
         return apart, np.inf
-    low, high = _gjk(bodies, world, one, two, need + radii, enough + radii, normal, simplex, scratch)
+    low, high = _gjk(bodies, world, one, two, need + radii, enough + radii, converged, normal, simplex, scratch)
     return low - radii, high - radii
 
 
 @inlined
-def _gjk(bodies, world, one, two, need, enough, v, simplex, scratch):  # type: ignore[no-untyped-def]
+def _gjk(bodies, world, one, two, need, enough, converged, v, simplex, scratch):  # type: ignore[no-untyped-def]
     """`distance_bounds` of the two cores, from the direction v on."""
     here, there = scratch[0], scratch[1]
     count, low, high = 0, -np.inf, np.inf
@@ -73,7 +74,7 @@ def _gjk(bodies, world, one, two, need, enough, v, simplex, scratch):  # type: i
         low = max(low, gap)
         if low >= need or high < enough or _holds(simplex, count, x, y, z):
             break
-        if count > 0 and high - low <= CONVERGED * high:
+        if count > 0 and high - low <= converged * high:
             break
         simplex[count, 0], simplex[count, 1], simplex[count, 2] = x, y, z
         count = closest_of_simplex(simplex, count + 1, scratch[2])

@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 
 from collision.certifier_scenes import random_motion, random_scene
 from evoexp.collision.certifier import Limits, _Judgement
-from evoexp.collision.certifier_sweep import Task, least_separation, move_to, pair_distance, work_space
+from evoexp.collision.certifier_sweep import Task, least_separation, move_to, pair_distance, polish, work_space
 from evoexp.collision.convex_distance import CONVERGED
 from evoexp.collision.motion_bounds import approach_bounds
 from evoexp.collision.scene import geometry_scene
@@ -101,6 +101,35 @@ def test_bounds_of_distances_hold_however_early_they_stop(seed: int, u: float, s
         if task.exact[pair] and exact > 0.0:
             cores = exact + task.bodies[6][task.pairs[pair]].sum()  # what is swept around them is taken off
             assert exact - 1e-6 <= high <= low + 1e-3 * cores + 1e-5
+
+
+def slow_walk(judged: _Judgement, pair: int, t: float) -> float:
+    """Down to a local minimum of coal's distance in steps that are halved."""
+    step, least = 0.02, judged.coal(pair, t)
+    while step > 1e-9:
+        nearby = [min(max(t + ahead, 0.0), judged.task.last) for ahead in (step, -step)]
+        distances = [judged.coal(pair, tried) for tried in nearby]
+        if min(distances) < least:
+            least, t = min(zip(distances, nearby, strict=True))
+        else:
+            step *= 0.5
+    return least
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 2**32 - 1), t=st.floats(0.0, 1.0))
+def test_local_minima_are_found(seed: int, t: float) -> None:
+    """As by halving steps, from the same instant; the two may end in different minima, if each is one."""
+    judged = judgement(seed)
+    pairs = np.flatnonzero(judged.task.exact)
+    at, distances = np.full(len(pairs), t), np.empty(len(pairs))
+    polish(judged.task, judged.work, pairs, at, distances)
+    for pair, end, distance in zip(pairs, at, np.maximum(distances, 0.0), strict=True):  # how deep is not known
+        assert 0.0 <= end <= judged.task.last
+        assert distance == pytest.approx(max(judged.coal(int(pair), float(end)), 0.0), abs=1e-6)
+        slow = max(slow_walk(judged, int(pair), t), 0.0)
+        if abs(distance - slow) > 1e-6:
+            assert max(slow_walk(judged, int(pair), float(end)), 0.0) == pytest.approx(distance, abs=1e-6)
 
 
 @settings(max_examples=100, deadline=None, derandomize=True)

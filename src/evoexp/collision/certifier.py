@@ -264,15 +264,16 @@ class _Judgement:
             self._note(_Candidate(distance, t, self.best.pair))
 
     def _polish_from(self, pairs: np.ndarray, begins: FloatArray) -> None:
-        """Ask coal for the least of some pairs' local minima."""
+        """Ask coal for the least of some pairs' local minima; of equal ones, the first."""
         t = np.minimum(begins, self.task.last)  # a motion of one instant is swept as a segment without movement
         seen = (pairs == self.best.pair) & (np.abs(t - self.best.t) < SAME)
         pairs, t = pairs[~seen], t[~seen]
         if len(pairs) > 0:
             distances = np.empty(len(pairs))
             polish(self.task, self.work, pairs, t, distances)
-            least = np.argmin(distances)
-            at, pair = float(t[least]), int(pairs[least])
+            tied = distances <= distances.min() + ROUNDING * self.scene.size
+            first = np.argmax(tied & (t <= t[tied].min() + SAME))
+            at, pair = float(t[first]), int(pairs[first])
             self._note(_Candidate(self.coal(pair, at), at, pair))
 
     def _note(self, seen: _Candidate) -> None:

@@ -280,8 +280,8 @@ def _judge_interval(task, goal, work, found, segment, a, b, depth, bounds, given
         slack = goal.slack[pair]
         near = way <= 0.25 * slack and low > goal.level[pair] - 0.5 * slack and high > goal.level[pair]
         bound = low - way
-        if bound < wanted and low > wanted and task.by_one[pair]:
-            change = 0.5 * half * half * bounds[1, pair] + goal.rounding
+        change = 0.5 * half * half * bounds[1, pair] + goal.rounding
+        if bound < wanted <= low - change and task.by_one[pair]:  # the least gap is not above the gap now
             bound = max(bound, least_separation(task, work, pair, segment, u, half) - change)
         if bound >= wanted or near:
             state[PROVEN] = min(state[PROVEN], bound)

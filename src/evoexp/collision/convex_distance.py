@@ -15,6 +15,8 @@ from evoexp.numerics import inlined
 
 MAX_ITERATIONS = 100
 
+LOOSE = 0.05  # [-] of what is left above `enough`: gap at which GJK ends where `need` is out of reach
+
 CONVERGED = 1e-13  # [-] of the distance: gap between the bounds at which GJK ends where the distance itself is wanted
 
 
@@ -28,7 +30,8 @@ def distance_bounds(bodies, world, one, two, need, enough, converged, normal, si
         one: Index of a body.
         two: Index of the other.
         need: Stops when the lower bound is not below it.
-        enough: Stops when the upper bound is below it.
+        enough: Stops when the upper bound is below it; where `need` is out of reach, when it is known how far: `LOOSE`.
+            −inf: never.
         converged: And when the two are apart by this part of the distance of the cores [-].
         normal: (3,) a direction to begin with, from the second to the first; the last one, across which the lower
             bound was found, is written back.
@@ -75,6 +78,8 @@ def _gjk(bodies, world, one, two, need, enough, converged, v, simplex, scratch):
         if low >= need or high < enough or _holds(simplex, count, x, y, z):
             break
         if count > 0 and high - low <= converged * high:
+            break
+        if enough > -np.inf and high < need and high - low <= LOOSE * (high - enough):
             break
         simplex[count, 0], simplex[count, 1], simplex[count, 2] = x, y, z
         count = closest_of_simplex(simplex, count + 1, scratch[2])

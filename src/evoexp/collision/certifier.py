@@ -272,7 +272,7 @@ class _Judgement:
             distances = np.empty(len(pairs))
             polish(self.task, self.work, pairs, t, distances)
             tied = distances <= distances.min() + ROUNDING * self.scene.size
-            first = np.argmax(tied & (t <= t[tied].min() + SAME))
+            first = np.argmin(np.where(tied & (t <= t[tied].min() + SAME), distances, np.inf))
             at, pair = float(t[first]), int(pairs[first])
             self._note(_Candidate(self.coal(pair, at), at, pair))
 

@@ -10,7 +10,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -19,7 +19,7 @@ import scipy.stats
 from numpy.typing import NDArray
 
 from evoexp import kernel_cache, numerics
-from evoexp.numerics import acos, asin, atan2, cos, exp, kernel, log, pow_int, sin, sincos, standard_normal
+from evoexp.numerics import acos, asin, atan2, borrowed, cos, exp, kernel, log, pow_int, sin, sincos, standard_normal
 
 Array = NDArray[Any]
 INF = math.inf
@@ -387,3 +387,36 @@ def test_pruning_is_silent_where_it_cannot_write(tmp_path: Path) -> None:
     blocked.touch()
     kernel_cache._prune_caches(blocked / "0123456789abcdef")
     assert blocked.is_file()
+
+
+class Rows(NamedTuple):
+    first: Array
+    rest: tuple[Array, int, tuple[Array, Array]]
+
+
+@kernel
+def add_borrowed(rows, count):  # type: ignore[no-untyped-def]
+    """Add all to the first, `count` times, through what was borrowed."""
+    first, (second, scale, (third, fourth)) = borrowed(rows)
+    for _ in range(count):
+        for k in range(len(first)):
+            first[k] += scale * second[k] + third[0, k] + fourth[k]
+
+
+def test_borrowed_arrays_are_the_same_arrays() -> None:
+    """Values, shapes and strides; nothing is lost and nothing is freed."""
+    rng = np.random.default_rng(0)
+    first, second, third, fourth = rng.random(50), rng.random(100)[::2], rng.random((2, 50)), rng.random(50)
+    fourth.flags.writeable = False
+    expected = first + 3 * (2 * second + third[0] + fourth)
+    references = [sys.getrefcount(array) for array in (first, second, third, fourth)]
+    add_borrowed(Rows(first, (second, 2, (third, fourth))), 3)
+    assert first == pytest.approx(expected, rel=1e-14)
+    assert [sys.getrefcount(array) for array in (first, second, third, fourth)] == references
+
+
+def test_borrowed_arrays_are_not_counted() -> None:
+    """In the loop no count remains; there are some where a kernel takes its arguments."""
+    add_borrowed(Rows(np.zeros(3), (np.zeros(3), 2, (np.zeros((2, 3)), np.zeros(3)))), 1)
+    for signature in add_borrowed.signatures:
+        assert "call void @NRT_incref" not in add_borrowed.inspect_llvm(signature)

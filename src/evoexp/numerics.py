@@ -13,11 +13,11 @@ provided that this notice is preserved"), here without branches and with short c
 
 import math
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
-from numba.core import types
+from numba.core import cgutils, types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
@@ -35,11 +35,41 @@ def kernel(function: Any) -> Any:
     return numba.njit(cache=True, fastmath=False, error_model="numpy", nogil=True, boundscheck=False)(function)
 
 
-def _inlined(function: Function) -> Function:
+def inlined(function: Function) -> Function:
     """Compile like `kernel`, and have LLVM inline every call: a loop around a true call stays scalar."""
     options: dict[str, Any] = {"error_model": "numpy", "nogil": True, "boundscheck": False, "forceinline": True}
     compiled: Function = numba.njit(cache=True, fastmath=False, **options)(function)
     return compiled
+
+
+def _borrow(typing_context: Any, value: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return _without_owner(context, builder, value, arguments[0])
+
+    return value(value), generate
+
+
+def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+    if isinstance(kind, types.Array):
+        array = context.make_array(kind)(context, builder, value)
+        array.meminfo = cgutils.get_null_value(array.meminfo.type)
+        array.parent = cgutils.get_null_value(array.parent.type)
+        return array._getvalue()
+    if isinstance(kind, types.BaseTuple):
+        items: Any = kind
+        for k, item in enumerate(items):
+            part = _without_owner(context, builder, item, builder.extract_value(value, k))
+            value = builder.insert_value(value, part, k)
+    return value
+
+
+borrowed: Callable[[Any], Any] = cast(Any, intrinsic(_borrow))
+"""Return arrays, or tuples of them to any depth, as views that own nothing: no counting of references.
+
+numba counts a reference, atomically, wherever an array is read out of a tuple or handed on; in a kernel that takes
+dozens of arrays and calls small `inlined` functions that is most of the time. For arguments only: their caller keeps
+them alive, while an array born in a kernel is freed where its name is last used.
+"""
 
 
 def _reinterpretation(source: Any, target: Any) -> Any:
@@ -81,7 +111,7 @@ _C = (
 )  # fmt: skip
 
 
-@_inlined
+@inlined
 def _reduce(x: float) -> tuple[float, int]:
     """Return r in [−π/4, π/4] and an integer n (modulo 4) with x = r + n π/2 (two-term Cody-Waite)."""
     t = x * _TWO_OVER_PI + _ROUND
@@ -89,7 +119,7 @@ def _reduce(x: float) -> tuple[float, int]:
     return (x - n * _HALF_PI_HI) - n * _HALF_PI_LO, _bits(t)
 
 
-@_inlined
+@inlined
 def _sin_polynomial(r: float) -> float:
     """Return sin r for |r| ≤ π/4 (k_sin.c)."""
     z = r * r
@@ -99,7 +129,7 @@ def _sin_polynomial(r: float) -> float:
     return r if r == 0.0 else s  # keeps the sign of zero
 
 
-@_inlined
+@inlined
 def _cos_polynomial(r: float) -> float:
     """Return cos r for |r| ≤ π/4 (k_cos.c); what 1 − r²/2 loses is added back."""
     z = r * r
@@ -110,13 +140,13 @@ def _cos_polynomial(r: float) -> float:
     return head + (((1.0 - head) - half) + w * p)
 
 
-@_inlined
+@inlined
 def _quadrant(s: float, c: float, n: int) -> float:
     """Return sin(r + n π/2) from s = sin r and c = cos r."""
     return _from_bits(_bits(c if n & 1 else s) ^ ((n & 2) << 62))
 
 
-@_inlined
+@inlined
 def sin(x: float) -> float:
     """Return the sine of x [rad].
 
@@ -127,14 +157,14 @@ def sin(x: float) -> float:
     return _quadrant(_sin_polynomial(r), _cos_polynomial(r), n)
 
 
-@_inlined
+@inlined
 def cos(x: float) -> float:
     """Return the cosine of x [rad]; error and domain as of `sin`."""
     r, n = _reduce(x)
     return _quadrant(_sin_polynomial(r), _cos_polynomial(r), n + 1)
 
 
-@_inlined
+@inlined
 def sincos(x: float) -> tuple[float, float]:
     """Return (sin x, cos x) of x [rad], the same bits as `sin` and `cos` for the price of one."""
     r, n = _reduce(x)
@@ -162,7 +192,7 @@ _Q = (
 )  # fmt: skip
 
 
-@_inlined
+@inlined
 def atan2(y: float, x: float) -> float:
     """Return the angle [rad] of the point (x, y), in [−π, π].
 
@@ -200,7 +230,7 @@ def atan2(y: float, x: float) -> float:
     return _from_bits(_bits(angle) ^ sign_y)
 
 
-@_inlined
+@inlined
 def _asin_core(x: float) -> tuple[float, float]:
     """Return s and asin s − s, where s = |x| ≤ 1/2, or above s = sqrt((1 − |x|)/2): |asin x| = π/2 − 2 asin s."""
     x = abs(x)
@@ -214,7 +244,7 @@ def _asin_core(x: float) -> tuple[float, float]:
     return s, s * (p / q)
 
 
-@_inlined
+@inlined
 def asin(x: float) -> float:
     """Return the arcsine of x, an angle in [−π/2, π/2] [rad]; relative error ≤ 3e-16; NaN for |x| > 1."""
     x = x * 1.0
@@ -224,7 +254,7 @@ def asin(x: float) -> float:
     return _from_bits(_bits(angle) ^ (_bits(x) & _SIGN))
 
 
-@_inlined
+@inlined
 def acos(x: float) -> float:
     """Return the arccosine of x, an angle in [0, π] [rad]; relative error ≤ 2.4e-16; NaN for |x| > 1."""
     x = x * 1.0
@@ -251,7 +281,7 @@ _X = (
 )  # fmt: skip
 
 
-@_inlined
+@inlined
 def log(x: float) -> float:
     """Return the natural logarithm of x [-]; relative error ≤ 1.6e-16; −inf for ±0, NaN for x < 0, inf for inf."""
     tiny = x < 2.0**-1022
@@ -270,7 +300,7 @@ def log(x: float) -> float:
     return below if x <= 0.0 else value
 
 
-@_inlined
+@inlined
 def exp(x: float) -> float:
     """Return e to the power x [-]; relative error ≤ 1.5e-16 (subnormal results: the last bit); inf above 709.79."""
     x = 710.0 if x > 710.0 else x * 1.0
@@ -289,7 +319,7 @@ def exp(x: float) -> float:
     return y * _from_bits((first - 1) << 52) * _from_bits((doubled - first - 1) << 52)
 
 
-@_inlined
+@inlined
 def pow_int(x: float, n: int) -> float:
     """Return x to the integer power n, by squaring; 1 for n = 0, whatever x; 1 / x^−n for n < 0.
 

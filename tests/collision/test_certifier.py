@@ -9,6 +9,7 @@ import pytest
 
 from collision.certifier_scenes import mesh
 from evoexp.collision.certifier import Limits, certify
+from evoexp.collision.certifier_coal import CoalDistance
 from evoexp.collision.scene import Scene, geometry_scene, scene
 from evoexp.paths.motion import Motion, cubic_motion
 from evoexp.robots.arms import Arms
@@ -161,6 +162,28 @@ def test_a_margin_around_a_smooth_minimum() -> None:
         assert verdict.margin_status == expected
         assert verdict.clearance == pytest.approx(0.3, abs=1e-9)
         assert verdict.clearance_at == pytest.approx(1.0 / 2.1, abs=1e-4)
+
+
+def test_of_equal_clearances_the_first_is_named() -> None:
+    """Past two balls at the same distance, the second in the list first; and back again."""
+    balls = tuple(SphereObstacle(shape="sphere", center=(x, 2.0), radius=0.5) for x in (2.0, -2.0))
+    built = scene(Slider(base=(0.0, 0.0, 0.0), radius=0.1).build(), balls)
+    verdict = certify(built, Motion(np.array([[-4.0], [3.0], [-4.0]])))
+    assert verdict.clearance == pytest.approx(1.4, abs=1e-9)
+    assert verdict.clearance_pair == ("arm_1_link_1", "obstacle_2")
+    assert 1.0 / 7.0 - 1e-6 <= verdict.clearance_at <= 2.0 / 7.0 + 1e-6  # a finger of length 1 passes
+    assert verdict.queries == 1
+
+
+def test_two_motions_of_one_scene_are_asked_in_turns() -> None:
+    """Coal's placements are shared by all judgements of a thread."""
+    built = scene(Slider(base=(0.0, 0.0, 0.0), radius=0.1).build(), (wall(3.0, 0.5),))
+    one, two = (CoalDistance(built, Motion(np.array([[0.0], [end]])), 100) for end in (1.0, -1.0))
+    other = scene(link(3.0, (0.0, 0.0)).build(), (wall(5.0, 0.5),))
+    for _ in range(2):
+        assert one(0, 0.5) == pytest.approx(1.4)
+        assert two(0, 0.5) == pytest.approx(2.4)
+        assert CoalDistance(other, Motion(np.zeros((2, 1))), 100)(0, 0.5) == pytest.approx(2.0)
 
 
 def test_a_cubic_that_bulges_into_an_obstacle() -> None:

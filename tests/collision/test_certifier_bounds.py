@@ -10,7 +10,8 @@ from scipy.interpolate import CubicSpline
 
 from collision.certifier_scenes import random_motion, random_scene
 from evoexp.collision.certifier import Limits, _Judgement
-from evoexp.collision.certifier_sweep import least_separation, move_to, pair_distance, work_space
+from evoexp.collision.certifier_sweep import Task, least_separation, move_to, pair_distance, polish, work_space
+from evoexp.collision.convex_distance import CONVERGED
 from evoexp.collision.motion_bounds import approach_bounds
 from evoexp.collision.scene import geometry_scene
 from evoexp.paths.motion import Motion, cubic_motion, spline_motion
@@ -23,13 +24,18 @@ def judgement(seed: int) -> _Judgement:
     return _Judgement(scene, motion, 0.0, scene.tolerances, 1e-3, Limits())
 
 
+def write_bounds(task: Task, begin: float, end: float, bounds: np.ndarray) -> None:
+    scratch = np.empty(len(task.table[0]))
+    approach_bounds(task.table, task.coefficients[0], begin, end, task.weights, bounds, scratch)
+
+
 @settings(max_examples=150, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 2**32 - 1), begin=st.floats(0.0, 0.99), width=st.floats(1e-3, 1.0))
 def test_distances_never_change_faster_than_the_bound(seed: int, begin: float, width: float) -> None:
     judged = judgement(seed)
     end = min(begin + width, 1.0)
     bounds = np.empty((2, len(judged.scene.pairs)))
-    approach_bounds(judged.task.table, judged.task.coefficients[0], begin, end, judged.task.weights, bounds)
+    write_bounds(judged.task, begin, end, bounds)
     t = np.linspace(begin, end, 9)
     for pair, bound in enumerate(bounds[0]):
         d = np.array([max(judged.coal(pair, float(instant)), 0.0) for instant in t])
@@ -45,11 +51,11 @@ def test_bodies_stay_as_far_apart_as_their_velocities_and_accelerations_say(
     judged = judgement(seed)
     task, work, end = judged.task, work_space(judged.task), min(begin + width, 1.0)
     bounds, u, half = np.empty((2, len(judged.scene.pairs))), 0.5 * (begin + end), 0.5 * (end - begin)
-    approach_bounds(task.table, task.coefficients[0], begin, end, task.weights, bounds)
+    write_bounds(task, begin, end, bounds)
     move_to(task, work, 0, u)
     assert task.by_one.all()
     for pair in range(len(task.pairs)):
-        low, _ = pair_distance(task, work, pair, np.inf, -np.inf)
+        low, _ = pair_distance(task, work, pair, np.inf, -np.inf, CONVERGED)
         assert least_separation(task, work, pair, 0, u, 0.0) <= low + 1e-9
         bound = least_separation(task, work, pair, 0, u, half) - 0.5 * half * half * bounds[1, pair]
         distances = [judged.coal(pair, float(t)) for t in np.linspace(begin, end, 15)]
@@ -69,7 +75,7 @@ def test_the_bound_is_reached() -> None:
         geometry_scene(model, geometry), Motion(np.array([[0.0], [0.5]])), 0.0, np.ones(1), 1e-3, Limits()
     )
     bounds = np.empty((2, 1))
-    approach_bounds(judged.task.table, judged.task.coefficients[0], 0.0, 1.0, judged.task.weights, bounds)
+    write_bounds(judged.task, 0.0, 1.0, bounds)
     assert bounds[0, 0] == pytest.approx(0.5 * 2.1)
     slope = (judged.coal(0, 0.0) - judged.coal(0, 1e-6)) / 1e-6
     assert slope == pytest.approx(0.5 * 2.0, rel=1e-4)
@@ -84,12 +90,46 @@ def test_bounds_of_distances_hold_however_early_they_stop(seed: int, u: float, s
     for pair in range(len(task.pairs)):
         exact = judged.coal(pair, u)
         for need, enough in ((np.inf, -np.inf), (stop, stop), (stop, -np.inf), (np.inf, stop)):
-            low, high = pair_distance(task, work, pair, need, enough)
+            low, high = pair_distance(task, work, pair, need, enough, CONVERGED)
             assert low <= max(exact, 0.0) + 1e-6
             if task.exact[pair]:
                 assert high >= min(exact, 0.0) - 1e-6 and (high >= exact - 1e-6 or high <= 0.0)
             if need == np.inf and enough == -np.inf and task.exact[pair] and exact > 0.0:
                 assert low == pytest.approx(exact, abs=1e-6) and high == pytest.approx(exact, abs=1e-6)
+        low, high = pair_distance(task, work, pair, np.inf, -np.inf, 1e-3)
+        assert low <= max(exact, 0.0) + 1e-6
+        if task.exact[pair] and exact > 0.0:
+            cores = exact + task.bodies[6][task.pairs[pair]].sum()  # what is swept around them is taken off
+            assert exact - 1e-6 <= high <= low + 1e-3 * cores + 1e-5
+
+
+def slow_walk(judged: _Judgement, pair: int, t: float) -> float:
+    """Down to a local minimum of coal's distance in steps that are halved."""
+    step, least = 0.02, judged.coal(pair, t)
+    while step > 1e-9:
+        nearby = [min(max(t + ahead, 0.0), judged.task.last) for ahead in (step, -step)]
+        distances = [judged.coal(pair, tried) for tried in nearby]
+        if min(distances) < least:
+            least, t = min(zip(distances, nearby, strict=True))
+        else:
+            step *= 0.5
+    return least
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 2**32 - 1), t=st.floats(0.0, 1.0))
+def test_local_minima_are_found(seed: int, t: float) -> None:
+    """As by halving steps, from the same instant; the two may end in different minima, if each is one."""
+    judged = judgement(seed)
+    pairs = np.flatnonzero(judged.task.exact)
+    at, distances = np.full(len(pairs), t), np.empty(len(pairs))
+    polish(judged.task, judged.work, pairs, at, distances)
+    for pair, end, distance in zip(pairs, at, np.maximum(distances, 0.0), strict=True):  # how deep is not known
+        assert 0.0 <= end <= judged.task.last
+        assert distance == pytest.approx(max(judged.coal(int(pair), float(end)), 0.0), abs=1e-6)
+        slow = max(slow_walk(judged, int(pair), t), 0.0)
+        if abs(distance - slow) > 1e-6:
+            assert max(slow_walk(judged, int(pair), float(end)), 0.0) == pytest.approx(distance, abs=1e-6)
 
 
 @settings(max_examples=100, deadline=None, derandomize=True)

@@ -29,8 +29,6 @@ Status = Literal["certified", "refuted", "undecided"]
 ROUNDING = 1e-12
 """[-] of the scene's size: error of the sweep's own distances."""
 
-POLISH_STEP = 0.02  # [segments] first step towards a local minimum
-
 SAME = 1e-4  # [segments] a local minimum so close is the same one
 
 MAX_POLISHED = 8  # pairs whose local minimum is sought, those with the least distances
@@ -190,8 +188,9 @@ class _Judgement:
         goal = np.full(len(self.tolerances), self.margin)
         low, bound = self._search(np.inf, goal, self.margin - self.tolerances)
         if low is not None:
+            if self.task.exact[low.pair]:
+                self._polish_from(np.array([low.pair]), np.array([low.t]))
             self._note(low)
-            self._polish_from(low.pair, low.t)
             return "refuted"
         return "certified" if bound > -np.inf else "undecided"
 
@@ -239,9 +238,9 @@ class _Judgement:
             if contact is not None and begin >= contact.t:
                 break
             p, segment = int(pair), min(int(begin), len(self.task.coefficients) - 1)
-            speeds = np.empty((2, len(self.scene.pairs)))
+            speeds, scratch = np.empty((2, len(self.scene.pairs))), np.empty(len(self.task.table[0]))
             piece = self.task.coefficients[segment]
-            approach_bounds(self.task.table, piece, begin - segment, end - segment, self.task.weights, speeds)
+            approach_bounds(self.task.table, piece, begin - segment, end - segment, self.task.weights, speeds, scratch)
             known = min(self.best.distance, found.least)
             goals = LeafGoals(goal[p], level[p], self.tolerances[p], known, resolution, self.floor)
             end = min(end, float(self.motion.num_segments))
@@ -257,20 +256,25 @@ class _Judgement:
         least = self.sweep.pair_least
         worth = least <= self.sweep.least + max(self.resolution * self.sweep.least, self.floor)
         pairs = np.flatnonzero(worth & self.task.exact)
-        for pair in pairs[np.argsort(least[pairs], kind="stable")][:MAX_POLISHED]:
-            self._polish_from(int(pair), self.sweep.pair_least_at[pair])
+        pairs = pairs[np.argsort(least[pairs], kind="stable")][:MAX_POLISHED]
+        self._polish_from(pairs, self.sweep.pair_least_at[pairs])
         if self.best.pair >= 0 and not self.task.exact[self.best.pair]:
             distance, t = self.best.distance, self.best.t
             t, distance = walk_down(self.coal, self.best.pair, t, 1e-3)
             self._note(_Candidate(distance, t, self.best.pair))
 
-    def _polish_from(self, pair: int, t: float) -> None:
-        t = min(t, self.task.last)  # a motion of one instant is swept as a segment without movement
-        if pair == self.best.pair and abs(t - self.best.t) < SAME:
-            return
-        if self.task.exact[pair]:
-            t, _ = polish(self.task, self.work, pair, t, POLISH_STEP)
-        self._note(_Candidate(self.coal(pair, float(t)), float(t), pair))
+    def _polish_from(self, pairs: np.ndarray, begins: FloatArray) -> None:
+        """Ask coal for the least of some pairs' local minima; of equal ones, the first."""
+        t = np.minimum(begins, self.task.last)  # a motion of one instant is swept as a segment without movement
+        seen = (pairs == self.best.pair) & (np.abs(t - self.best.t) < SAME)
+        pairs, t = pairs[~seen], t[~seen]
+        if len(pairs) > 0:
+            distances = np.empty(len(pairs))
+            polish(self.task, self.work, pairs, t, distances)
+            tied = distances <= distances.min() + ROUNDING * self.scene.size
+            first = np.argmin(np.where(tied & (t <= t[tied].min() + SAME), distances, np.inf))
+            at, pair = float(t[first]), int(pairs[first])
+            self._note(_Candidate(self.coal(pair, at), at, pair))
 
     def _note(self, seen: _Candidate) -> None:
         if seen.distance < self.best.distance:

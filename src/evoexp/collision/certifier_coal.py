@@ -1,5 +1,6 @@
 """The last word of the certifier: distances of coal at Pinocchio's placements, and what is settled by them alone."""
 
+import threading
 from typing import Any, NamedTuple
 
 import coal
@@ -24,12 +25,25 @@ class QueryLimit(EvoexpError):
     """Coal was asked as often as it may be."""
 
 
+class _Scratch(threading.local):
+    """A thread's last `pin.Data`, which takes as long to make as two distances, and whose placements it holds."""
+
+    model: Any = None
+    data: Any = None
+    owner: object = None
+
+
+_scratch = _Scratch()
+
+
 class CoalDistance:
     """Distances of a scene's pairs along a motion, counted."""
 
     def __init__(self, scene: Scene, motion: Motion, limit: int) -> None:
         self.scene, self.motion, self.limit, self.queries = scene, motion, limit, 0
-        self._model, self._data = scene.model, scene.model.createData()
+        if _scratch.model is not scene.model:
+            _scratch.model, _scratch.data = scene.model, scene.model.createData()
+        self._model, self._data, self._token = scene.model, _scratch.data, object()
         self._shapes = scene.shapes
         self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
         self._request.gjk_tolerance, self._request.gjk_max_iterations = GJK_TOLERANCE, GJK_ITERATIONS
@@ -44,9 +58,9 @@ class CoalDistance:
         if self.queries >= self.limit:
             raise QueryLimit
         self.queries += 1
-        if t != self._t:
+        if t != self._t or _scratch.owner is not self._token:
             pin.forwardKinematics(self._model, self._data, self.motion.at(t))
-            self._t = t
+            self._t, _scratch.owner = t, self._token
         (one, first), (two, second) = (self._placed(int(body)) for body in self.scene.pairs[pair])
         self._result.clear()
         return float(coal.distance(one, first, two, second, self._request, self._result))

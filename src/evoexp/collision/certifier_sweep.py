@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.convex_distance import distance_bounds, separation_later
+from evoexp.collision.convex_distance import CONVERGED, distance_bounds, separation_later
 from evoexp.collision.motion_bounds import (
     FRAME,
     approach_bounds,
@@ -20,7 +20,7 @@ from evoexp.collision.motion_bounds import (
     pair_reaches,
     reaches,
 )
-from evoexp.numerics import kernel
+from evoexp.numerics import borrowed, inlined, kernel
 from evoexp.records import FloatArray
 
 DEPTH = 64
@@ -31,7 +31,13 @@ NARROW = 1e-13  # [segments] an interval that is not halved any more
 MAX_LEAVES = 100_000
 """Of a sweep; more count as a limit used up."""
 
-FINEST = 1e-10  # [segments] last step towards a local minimum
+POLISH_STEP = 0.02  # [segments] first step towards a local minimum
+
+FINEST = 1e-10  # [segments] the last one is not less
+
+SHRINK = 0.0625  # [-] of the step where neither side is closer
+
+MAX_MOVES = 1000  # on the way to a local minimum
 
 ROUGH_DEPTH = 5  # halvings after which a body known only by its hull is left to coal
 
@@ -127,12 +133,20 @@ def sweep_motion(task: Task, goal: Goal, work: tuple[np.ndarray, ...]) -> Sweep:
     num_pairs = len(task.pairs)
     leaves, state = np.empty((MAX_LEAVES + num_pairs, 3)), np.array([goal.known, np.inf, -1.0, np.inf, 0.0, 0.0])
     least, at = np.full(num_pairs, np.inf), np.zeros(num_pairs)
-    done = _sweep(task, goal, work, (leaves, state, least, at))
+    done = _sweep(task, goal, work, (leaves, state, least, at), _stack(num_pairs, len(task.table[0])))
     count = int(state[LEAVES])
     first_pair = int(state[FIRST_PAIR])
     return Sweep(
         state[LEAST], state[FIRST], first_pair, state[PROVEN], int(state[NODES]), done, leaves[:count], least, at
     )
+
+
+def _stack(num_pairs: int, num_joints: int) -> tuple[np.ndarray, ...]:
+    """Scratch of a sweep: speeds and accelerations, of joints, too; the pairs left on each level; where it stands."""
+    lists, counts = np.empty((DEPTH + 2, num_pairs), dtype=np.int64), np.empty(DEPTH + 2, dtype=np.int64)
+    lists[0], counts[0] = np.arange(num_pairs), num_pairs
+    begins, ends, depths = np.empty(DEPTH + 2), np.empty(DEPTH + 2), np.empty(DEPTH + 2, dtype=np.int64)
+    return np.empty((2, num_pairs)), np.empty(num_joints), lists, counts, depths, begins, ends
 
 
 @kernel
@@ -151,7 +165,7 @@ def work_space(task: Task) -> tuple[np.ndarray, ...]:
     return q, frames, world, stamps, np.ones((len(task.pairs), 3)), np.zeros((4, 3)), np.zeros((3, 3)), twists
 
 
-@kernel
+@inlined
 def move_to(task, work, segment, u):  # type: ignore[no-untyped-def]
     """Place the joints at u on a segment."""
     q, frames, _, stamps, _, _, _, _ = work
@@ -160,8 +174,8 @@ def move_to(task, work, segment, u):  # type: ignore[no-untyped-def]
     joint_frames(task.table, q, frames)
 
 
-@kernel
-def pair_distance(task, work, pair, need, enough):  # type: ignore[no-untyped-def]
+@inlined
+def pair_distance(task, work, pair, need, enough, converged):  # type: ignore[no-untyped-def]
     """`distance_bounds` of a pair, whose bodies are placed first unless they are already."""
     _, frames, world, stamps, normals, simplex, scratch, _ = work
     for side in range(2):
@@ -171,10 +185,10 @@ def pair_distance(task, work, pair, need, enough):  # type: ignore[no-untyped-de
             stamps[body] = stamps[-1]
             _place_body(frames[joint], task.bodies[3][body], task.bodies[4][body], world[body])
     one, two = task.pairs[pair, 0], task.pairs[pair, 1]
-    return distance_bounds(task.bodies, world, one, two, need, enough, normals[pair], simplex, scratch)
+    return distance_bounds(task.bodies, world, one, two, need, enough, converged, normals[pair], simplex, scratch)
 
 
-@kernel
+@inlined
 def _place_body(frame, rotation, translation, out):  # type: ignore[no-untyped-def]
     for e in range(3):
         a, b, c = frame[3 * e], frame[3 * e + 1], frame[3 * e + 2]
@@ -184,19 +198,17 @@ def _place_body(frame, rotation, translation, out):  # type: ignore[no-untyped-d
 
 
 @kernel
-def _sweep(task, goal, work, found):  # type: ignore[no-untyped-def]
+def _sweep(task, goal, work, found, stack):  # type: ignore[no-untyped-def]
     """Judge a motion; returns whether all of it was."""
+    task, goal, work, found, stack = borrowed((task, goal, work, found, stack))
+    bounds, above, lists, counts, depths, begins, ends = stack
     num_pairs, num_segments = len(task.pairs), len(task.coefficients)
-    bounds = np.zeros((2, num_pairs))
-    lists, counts = np.zeros((DEPTH + 2, num_pairs), dtype=np.int64), np.zeros(DEPTH + 2, dtype=np.int64)
-    begins, ends, depths = np.zeros(DEPTH + 2), np.zeros(DEPTH + 2), np.zeros(DEPTH + 2, dtype=np.int64)
-    lists[0], counts[0] = np.arange(num_pairs), num_pairs
     leaves, state, _, _ = found
     if goal.instants:
         _judge_instants(task, goal, work, found)
     for segment in range(num_segments):
         if task.straight:
-            approach_bounds(task.table, task.coefficients[segment], 0.0, 1.0, task.weights, bounds)
+            approach_bounds(task.table, task.coefficients[segment], 0.0, 1.0, task.weights, bounds, above)
         begins[0], ends[0], depths[0], waiting = 0.0, 1.0, 0, 1
         while waiting > 0:
             waiting -= 1
@@ -208,7 +220,7 @@ def _sweep(task, goal, work, found):  # type: ignore[no-untyped-def]
             if state[NODES] >= goal.max_nodes or state[LEAVES] + num_pairs > len(leaves):
                 return False
             if not task.straight:
-                approach_bounds(task.table, task.coefficients[segment], a, b, task.weights, bounds)
+                approach_bounds(task.table, task.coefficients[segment], a, b, task.weights, bounds, above)
             counts[depth + 1] = _judge_interval(
                 task, goal, work, found, segment, a, b, depth, bounds, lists[depth, : counts[depth]], lists[depth + 1]
             )
@@ -220,7 +232,13 @@ def _sweep(task, goal, work, found):  # type: ignore[no-untyped-def]
     return True
 
 
-@kernel
+@inlined
+def _closely(goal):  # type: ignore[no-untyped-def]
+    """How closely distances are bounded: a thousandth of what shall be told apart; around a level, exactly."""
+    return max(CONVERGED, 0.001 * goal.resolution) if goal.resolution < 1.0 else CONVERGED
+
+
+@inlined
 def _judge_instants(task, goal, work, found):  # type: ignore[no-untyped-def]
     """All pairs at the instants themselves: a good upper bound from the start."""
     _, state, least, at = found
@@ -231,7 +249,7 @@ def _judge_instants(task, goal, work, found):  # type: ignore[no-untyped-def]
         move_to(task, work, segment, float(instant - segment))
         for pair in range(len(task.pairs)):
             wanted = max(state[LEAST], goal.level[pair])
-            low, high = pair_distance(task, work, pair, wanted, -np.inf)
+            low, high = pair_distance(task, work, pair, wanted, -np.inf, _closely(goal))
             distance = high if task.exact[pair] else low
             if distance < least[pair]:
                 least[pair], at[pair] = distance, float(instant)
@@ -241,7 +259,7 @@ def _judge_instants(task, goal, work, found):  # type: ignore[no-untyped-def]
                 state[FIRST], state[FIRST_PAIR] = float(instant), pair
 
 
-@kernel
+@inlined
 def _judge_interval(task, goal, work, found, segment, a, b, depth, bounds, given, left):  # type: ignore[no-untyped-def]
     """Judge the given pairs on [a, b] from its middle; write those for its halves to `left`, return their number."""
     leaves, state, least, at = found
@@ -253,7 +271,7 @@ def _judge_interval(task, goal, work, found, segment, a, b, depth, bounds, given
         upper = state[LEAST]
         if goal.resolution < np.inf and 0.0 < upper < np.inf:
             wanted = max(wanted, upper - min(max(goal.resolution * upper, goal.floor), 0.5 * upper))
-        low, high = pair_distance(task, work, pair, wanted + way, wanted)
+        low, high = pair_distance(task, work, pair, wanted + way, wanted, _closely(goal))
         if task.exact[pair] and high < least[pair]:
             least[pair], at[pair] = high, segment + u
             state[LEAST] = min(state[LEAST], high)
@@ -262,8 +280,8 @@ def _judge_interval(task, goal, work, found, segment, a, b, depth, bounds, given
         slack = goal.slack[pair]
         near = way <= 0.25 * slack and low > goal.level[pair] - 0.5 * slack and high > goal.level[pair]
         bound = low - way
-        if bound < wanted and low > wanted and task.by_one[pair]:
-            change = 0.5 * half * half * bounds[1, pair] + goal.rounding
+        change = 0.5 * half * half * bounds[1, pair] + goal.rounding
+        if bound < wanted <= low - change and task.by_one[pair]:  # the least gap is not above the gap now
             bound = max(bound, least_separation(task, work, pair, segment, u, half) - change)
         if bound >= wanted or near:
             state[PROVEN] = min(state[PROVEN], bound)
@@ -278,7 +296,7 @@ def _judge_interval(task, goal, work, found, segment, a, b, depth, bounds, given
     return count
 
 
-@kernel
+@inlined
 def least_separation(task, work, pair, segment, u, half):  # type: ignore[no-untyped-def]
     """Least gap across a pair's last normal within `half` before and after u, if velocities did not change."""
     _, frames, world, stamps, normals, _, scratch, twists = work
@@ -291,23 +309,47 @@ def least_separation(task, work, pair, segment, u, half):  # type: ignore[no-unt
 
 
 @kernel
-def polish(task, work, pair, t, step):  # type: ignore[no-untyped-def]
-    """Walk from t to a local minimum of a pair's distance, in steps that are halved; return t and the distance."""
-    best, tried = np.inf, t
-    for move in range(1000):
-        for k in range(3):
-            tried = t if k == 0 else min(max(t + (step if k == 1 else -step), 0.0), task.last)
-            if k == 0 and move > 0:
-                continue
-            segment = min(int(tried), len(task.coefficients) - 1)
-            move_to(task, work, segment, tried - segment)
-            _, distance = pair_distance(task, work, pair, np.inf, -np.inf)
-            if distance < best:
-                best, t = distance, tried
-                if k > 0:
-                    break
-        else:
-            step *= 0.5
-        if step < FINEST:
-            break
-    return t, best
+def polish(task, work, pairs, t, distances):  # type: ignore[no-untyped-def]
+    """Walk from given instants to local minima of pairs' distances.
+
+    At a step to both sides that finds nothing less, the vertex of the parabola through the three is tried, and the
+    step shrinks: a smooth minimum takes some 25 distances, one at an instant, where the motion bends, no more.
+
+    Args:
+        task: The motion.
+        work: From `work_space`.
+        pairs: (walks,) whose distance.
+        t: (walks,) where to begin; where the walk ended is written.
+        distances: (walks,) written.
+    """
+    task, work, pairs, t, distances = borrowed((task, work, pairs, t, distances))
+    for walk in range(len(pairs)):
+        here, best, step = t[walk], np.inf, POLISH_STEP
+        for move in range(MAX_MOVES):
+            after = before = np.inf
+            closer = False
+            for k in range(1 if move > 0 else 0, 4):
+                ahead = 0.0
+                if k == 1:
+                    ahead = step
+                elif k == 2:
+                    ahead = -step
+                elif k == 3:
+                    bend = (after - best) + (before - best)
+                    ahead = 0.5 * step * (before - after) / bend if 0.0 < bend < np.inf else 0.0
+                tried = min(max(here + ahead, 0.0), task.last)
+                if tried == here and k > 0:
+                    continue
+                segment = min(int(tried), len(task.coefficients) - 1)
+                move_to(task, work, segment, tried - segment)
+                _, distance = pair_distance(task, work, pairs[walk], np.inf, -np.inf, CONVERGED)
+                after = distance if k == 1 else after
+                before = distance if k == 2 else before
+                if distance < best:
+                    here, best, closer = tried, distance, k in (1, 2)
+                    if closer:
+                        break
+            step *= 1.0 if closer else SHRINK
+            if step < FINEST:
+                break
+        t[walk], distances[walk] = here, best

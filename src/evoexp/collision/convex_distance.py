@@ -11,15 +11,17 @@ import numpy as np
 
 from evoexp.collision.body_table import BOX, CONE, CYLINDER, ELLIPSOID, HALF_SPACE, HULL, SEGMENT
 from evoexp.collision.simplex import closest_of_simplex
-from evoexp.numerics import kernel
+from evoexp.numerics import inlined
 
 MAX_ITERATIONS = 100
 
-CONVERGED = 1e-13  # [-] of the distance: gap between the bounds at which GJK ends
+LOOSE = 0.05  # [-] of what is left above `enough`: gap at which GJK ends where `need` is out of reach
+
+CONVERGED = 1e-13  # [-] of the distance: gap between the bounds at which GJK ends where the distance itself is wanted
 
 
-@kernel
-def distance_bounds(bodies, world, one, two, need, enough, normal, simplex, scratch):  # type: ignore[no-untyped-def]
+@inlined
+def distance_bounds(bodies, world, one, two, need, enough, converged, normal, simplex, scratch):  # type: ignore[no-untyped-def]
     """A lower and an upper bound of the distance of two bodies; equal up to rounding unless stopped early.
 
     Args:
@@ -28,7 +30,9 @@ def distance_bounds(bodies, world, one, two, need, enough, normal, simplex, scra
         one: Index of a body.
         two: Index of the other.
         need: Stops when the lower bound is not below it.
-        enough: Stops when the upper bound is below it.
+        enough: Stops when the upper bound is below it; where `need` is out of reach, when it is known how far: `LOOSE`.
+            −inf: never.
+        converged: And when the two are apart by this part of the distance of the cores [-].
         normal: (3,) a direction to begin with, from the second to the first; the last one, across which the lower
             bound was found, is written back.
         simplex: (4, 3) scratch.
@@ -53,12 +57,12 @@ def distance_bounds(bodies, world, one, two, need, enough, normal, simplex, scra
     apart = np.sqrt(x * x + y * y + z * z) - bodies[11][one] - bodies[11][two]
     if apart >= need:
         return apart, np.inf
-    low, high = _gjk(bodies, world, one, two, need + radii, enough + radii, normal, simplex, scratch)
+    low, high = _gjk(bodies, world, one, two, need + radii, enough + radii, converged, normal, simplex, scratch)
     return low - radii, high - radii
 
 
-@kernel
-def _gjk(bodies, world, one, two, need, enough, v, simplex, scratch):  # type: ignore[no-untyped-def]
+@inlined
+def _gjk(bodies, world, one, two, need, enough, converged, v, simplex, scratch):  # type: ignore[no-untyped-def]
     """`distance_bounds` of the two cores, from the direction v on."""
     here, there = scratch[0], scratch[1]
     count, low, high = 0, -np.inf, np.inf
@@ -73,7 +77,9 @@ def _gjk(bodies, world, one, two, need, enough, v, simplex, scratch):  # type: i
         low = max(low, gap)
         if low >= need or high < enough or _holds(simplex, count, x, y, z):
             break
-        if count > 0 and high - low <= CONVERGED * high:
+        if count > 0 and high - low <= converged * high:
+            break
+        if enough > -np.inf and high < need and high - low <= LOOSE * (high - enough):
             break
         simplex[count, 0], simplex[count, 1], simplex[count, 2] = x, y, z
         count = closest_of_simplex(simplex, count + 1, scratch[2])
@@ -88,7 +94,7 @@ def _gjk(bodies, world, one, two, need, enough, v, simplex, scratch):  # type: i
     return min(low, high), high
 
 
-@kernel
+@inlined
 def _holds(simplex, count, x, y, z):  # type: ignore[no-untyped-def]
     found = False
     for k in range(count):
@@ -96,7 +102,7 @@ def _holds(simplex, count, x, y, z):  # type: ignore[no-untyped-def]
     return found
 
 
-@kernel
+@inlined
 def _support(bodies, world, body, direction, sign, out):  # type: ignore[no-untyped-def]
     """Write the farthest point of a body's core in a direction, times a sign."""
     kind, size, corners, points = bodies[1][body], bodies[5], bodies[7], bodies[8]
@@ -137,7 +143,7 @@ def _support(bodies, world, body, direction, sign, out):  # type: ignore[no-unty
         out[e] = w[9 + e] + (w[3 * e] * x + w[3 * e + 1] * y + w[3 * e + 2] * z)
 
 
-@kernel
+@inlined
 def segment_distance(one, half_one, two, half_two, across):  # type: ignore[no-untyped-def]
     """Distance of two segments of given half lengths along the z axes of their frames, centred; writes its vector."""
     rx, ry, rz = one[9] - two[9], one[10] - two[10], one[11] - two[11]
@@ -165,7 +171,7 @@ def segment_distance(one, half_one, two, half_two, across):  # type: ignore[no-u
     return np.sqrt(best)
 
 
-@kernel
+@inlined
 def _nearer(x, y, z, best, across):  # type: ignore[no-untyped-def]
     squared = x * x + y * y + z * z
     if squared < best:
@@ -174,7 +180,7 @@ def _nearer(x, y, z, best, across):  # type: ignore[no-untyped-def]
     return best
 
 
-@kernel
+@inlined
 def separation_later(bodies, world, twists, one, two, normal, later, scratch):  # type: ignore[no-untyped-def]
     """The gap of two bodies across a normal, `later` ahead, if all their points kept their velocities.
 

@@ -8,7 +8,7 @@ other.
 
 import numpy as np
 
-from evoexp.numerics import kernel, sincos
+from evoexp.numerics import inlined, kernel, sincos
 
 FRAME = 12
 """Numbers of a frame: nine of its rotation, row by row, three of its origin."""
@@ -16,7 +16,7 @@ FRAME = 12
 PARALLEL = 1e-12  # [-] an axis is parallel to its parent's if the cosine between them differs from ±1 by less
 
 
-@kernel
+@inlined
 def configuration(coefficients, u, q):  # type: ignore[no-untyped-def]
     """Write q (nq,) at u on the segment of `coefficients` (4, nq)."""
     for k in range(len(q)):
@@ -24,7 +24,7 @@ def configuration(coefficients, u, q):  # type: ignore[no-untyped-def]
         q[k] = coefficients[0, k] + u * (c1 + u * (c2 + u * c3))
 
 
-@kernel
+@inlined
 def joint_frames(table, q, frames):  # type: ignore[no-untyped-def]
     """Write the frames (joints, FRAME) of a kinematic table's joints at one configuration."""
     parent, index_q, prismatic, turned, rotation, translation = table
@@ -51,7 +51,7 @@ def joint_frames(table, q, frames):  # type: ignore[no-untyped-def]
             frames[k, 9 + e] = origin + z * slide
 
 
-@kernel
+@inlined
 def joint_twists(table, coefficients, u, frames, twists):  # type: ignore[no-untyped-def]
     """Write how joints' frames move (joints, 6) per u: turning ω, and the velocity of what is at the world's origin.
 
@@ -136,8 +136,8 @@ def pair_reaches(pairs, reach):  # type: ignore[no-untyped-def]
     return out
 
 
-@kernel
-def approach_bounds(table, coefficients, begin, end, by_joint, out):  # type: ignore[no-untyped-def]
+@inlined
+def approach_bounds(table, coefficients, begin, end, by_joint, out, above):  # type: ignore[no-untyped-def]
     """Write bounds (2, pairs) of |d distance / du| and of points' |accelerations| on [begin, end] of a segment.
 
     Joint j adds to the acceleration of what it carries, at a distance r from its axis, at most
@@ -150,10 +150,10 @@ def approach_bounds(table, coefficients, begin, end, by_joint, out):  # type: ig
         end: Of the interval.
         by_joint: (pairs, joints) from `pair_reaches`; accelerations hold for pairs that are `moved_by_one` only.
         out: (2, pairs), written.
+        above: (joints,) scratch: the sum of |q̇| of the turning joints up to each.
     """
     parent, index_q, prismatic = table[0], table[1], table[2]
     out[:] = 0.0
-    above = np.zeros(len(parent))  # sum of |q̇| of the turning joints up to this one
     for k in range(len(parent)):
         j, p = index_q[k], parent[k]
         c1, c2, c3 = coefficients[1, j], 2.0 * coefficients[2, j], 3.0 * coefficients[3, j]

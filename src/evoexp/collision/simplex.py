@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from evoexp.numerics import kernel
+from evoexp.numerics import inlined
 
 
-@kernel
+@inlined
 def closest_of_simplex(p, count, out):  # type: ignore[no-untyped-def]
     """Write the point closest to the origin to `out` and keep the corners that carry it; return their number.
 
@@ -36,7 +36,7 @@ def closest_of_simplex(p, count, out):  # type: ignore[no-untyped-def]
     return kept
 
 
-@kernel
+@inlined
 def _edge(p, i, j, best, keep, out):  # type: ignore[no-untyped-def]
     """Improve the best squared distance, its point and its corners (bits) by those of an edge."""
     ax, ay, az = p[i, 0], p[i, 1], p[i, 2]
@@ -57,7 +57,7 @@ def _edge(p, i, j, best, keep, out):  # type: ignore[no-untyped-def]
     return best, keep
 
 
-@kernel
+@inlined
 def _face(p, i, j, k, best, keep, out):  # type: ignore[no-untyped-def]
     """The same by a triangle: its interior if the origin's foot lies there, else its edges."""
     ax, ay, az, bx, by, bz, cx, cy, cz = (
@@ -84,7 +84,7 @@ def _face(p, i, j, k, best, keep, out):  # type: ignore[no-untyped-def]
     return _edge(p, j, k, best, keep, out)
 
 
-@kernel
+@inlined
 def _within(p):  # type: ignore[no-untyped-def]
     """Whether the origin lies strictly within the tetrahedron."""
     for k in range(4):
@@ -100,6 +100,6 @@ def _within(p):  # type: ignore[no-untyped-def]
     return True
 
 
-@kernel
+@inlined
 def _cross(ax, ay, az, bx, by, bz):  # type: ignore[no-untyped-def]
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx

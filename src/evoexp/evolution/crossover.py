@@ -107,17 +107,15 @@ def single_point_crossover(
 def cross_single_point(uniforms, genomes, parents, rate, out):  # type: ignore[no-untyped-def]
     """The kernel of `single_point_crossover`, for other kernels; per pair: decision, site."""
     num_genes, num_offspring = len(genomes), len(parents)
-    mates = parents.copy()
-    sites = np.full(num_offspring, num_genes)  # beyond the end: a copy
-    for pair in range(num_offspring // 2):
-        if num_genes < 2 or not uniforms[2 * pair] < rate:
-            continue
-        first, second = 2 * pair, 2 * pair + 1
-        site = 1 + min(int(uniforms[second] * (num_genes - 1)), num_genes - 2)  # 1 … genes − 1
-        sites[first], sites[second] = site, site
-        mates[first], mates[second] = parents[second], parents[first]
     for gene in range(num_genes):
         source, target = genomes[gene], out[gene]
         for k in range(num_offspring):
-            own, other = source[parents[k]], source[mates[k]]
-            target[k] = own if gene < sites[k] else other
+            target[k] = source[np.uint64(parents[k])]  # numba would look whether it counts from the end
+    if num_genes < 2:
+        return
+    for pair in range(num_offspring // 2):
+        if uniforms[2 * pair] < rate:
+            first, second = 2 * pair, 2 * pair + 1
+            site = 1 + min(int(uniforms[second] * (num_genes - 1)), num_genes - 2)  # 1 … genes − 1
+            for gene in range(site, num_genes):
+                out[gene, first], out[gene, second] = out[gene, second], out[gene, first]

@@ -4,7 +4,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from evoexp.numerics import kernel
+from evoexp.numerics import kernel, sincos
 from evoexp.robots.kinematics import U
 from evoexp.robots.planar_ends import LANES, block_ends, load_lanes
 from evoexp.validation import Component, NonNegative
@@ -55,7 +55,21 @@ def measure_reach(  # type: ignore[no-untyped-def]
     for first in range(0, count, LANES):
         load_lanes(starts, lanes, first, count, begin)
         load_lanes(ends, lanes, first, count, end)
-        _measure_block(begin, end, arm, target, box, weights, x, y, value, off, turned)
+        block_ends(begin, end, arm, 1, 1, value, off, turned, x, y)
+        turned[:] = 0.0
+        for k in range(len(starts)):
+            for n in range(LANES):
+                turn = begin[U(k) * U(LANES) + U(n)] - end[U(k) * U(LANES) + U(n)]
+                turned[n] += turn * turn
+        for n in range(LANES):
+            tip_x, tip_y = x[U(rows) + U(n)], y[U(rows) + U(n)]
+            off_x, off_y = tip_x - target[0], tip_y - target[1]
+            off[n], turned[n] = np.sqrt(off_x * off_x + off_y * off_y), np.sqrt(turned[n])
+            worth = weights[0] * off[n] + weights[1] * turned[n]
+            worth = worth if box[0] <= tip_x else np.inf
+            worth = worth if tip_x <= box[1] else np.inf
+            worth = worth if box[2] <= tip_y else np.inf
+            value[n] = worth if tip_y <= box[3] else np.inf
         for n in range(min(LANES, count - first)):
             individual = lanes[first + n]
             cost[individual], error[individual], displacement[individual] = value[n], off[n], turned[n]
@@ -63,53 +77,45 @@ def measure_reach(  # type: ignore[no-untyped-def]
 
 @kernel
 def measure_reach_from(  # type: ignore[no-untyped-def]
-    start, ends, arm, target, box, weights, cost, error, displacement
+    start, ends, count, arm, target, box, weights, cost, error, displacement
 ):
-    """Measure as `measure_reach` does, a whole table of individuals on the way from one start: nothing is gathered.
+    """Measure as `measure_reach` does, bit for bit, a whole table of individuals on the way from one start.
+
+    Nothing is gathered, and of the arm only the tip is known: joint after joint, all individuals at once.
 
     Args:
         start: (N,) [rad].
-        ends: (N, whole blocks of `LANES`).
+        ends: (N, ≥ count).
+        count: How many.
         arm: See `planar_ends.block_ends`.
         target: As of `measure_reach`, and so are `box` and `weights`.
         box: See there.
         weights: See there.
-        cost: (whole blocks of `LANES`,) written, and so are `error` and `displacement`.
+        cost: (≥ count,) written, and so are `error` and `displacement`.
         error: See there.
         displacement: See there.
     """
-    rows = len(start) * LANES
-    begin, end = np.repeat(start, LANES), np.empty(rows)
-    x, y = np.empty(rows + LANES), np.empty(rows + LANES)
-    value, off, turned = np.empty(LANES), np.empty(LANES), np.empty(LANES)
-    for first in range(0, ends.shape[1], LANES):
-        for k in range(len(start)):
-            for n in range(LANES):
-                end[U(k) * U(LANES) + U(n)] = ends[k, U(first) + U(n)]
-        _measure_block(begin, end, arm, target, box, weights, x, y, value, off, turned)
-        for n in range(LANES):
-            lane = U(first) + U(n)
-            cost[lane], error[lane], displacement[lane] = value[n], off[n], turned[n]
-
-
-@kernel
-def _measure_block(  # type: ignore[no-untyped-def]
-    begin, end, arm, target, box, weights, x, y, value, off, turned
-):
-    """Measure a block of individuals: cost into `value`, position error into `off`, displacement into `turned`."""
-    rows = len(begin)
-    block_ends(begin, end, arm, 1, 1, value, off, turned, x, y)
-    turned[:] = 0.0
-    for k in range(rows // LANES):
-        for n in range(LANES):
-            turn = begin[U(k) * U(LANES) + U(n)] - end[U(k) * U(LANES) + U(n)]
+    lengths, base_x, base_y, base_angle = arm
+    angle = np.empty(count)
+    tip_x, tip_y, turned = cost, error, displacement  # sums, until the last joint
+    for n in range(count):
+        angle[n], tip_x[n], tip_y[n], turned[n] = base_angle, base_x, base_y, 0.0
+    for k in range(len(start)):
+        row, begin, length = ends[k], start[k], lengths[k]
+        for n in range(count):
+            direction, turn = angle[n] + row[n], begin - row[n]
+            s, c = sincos(direction)
+            tip_x[n] += length * c
+            tip_y[n] += length * s
             turned[n] += turn * turn
-    for n in range(LANES):
-        tip_x, tip_y = x[U(rows) + U(n)], y[U(rows) + U(n)]
-        off_x, off_y = tip_x - target[0], tip_y - target[1]
-        off[n], turned[n] = np.sqrt(off_x * off_x + off_y * off_y), np.sqrt(turned[n])
-        worth = weights[0] * off[n] + weights[1] * turned[n]
-        worth = worth if box[0] <= tip_x else np.inf
-        worth = worth if tip_x <= box[1] else np.inf
-        worth = worth if box[2] <= tip_y else np.inf
-        value[n] = worth if tip_y <= box[3] else np.inf
+            angle[n] = direction
+    for n in range(count):
+        x, y = tip_x[n], tip_y[n]
+        off_x, off_y = x - target[0], y - target[1]
+        off, way = np.sqrt(off_x * off_x + off_y * off_y), np.sqrt(turned[n])
+        worth = weights[0] * off + weights[1] * way
+        worth = worth if box[0] <= x else np.inf
+        worth = worth if x <= box[1] else np.inf
+        worth = worth if box[2] <= y else np.inf
+        worth = worth if y <= box[3] else np.inf
+        cost[n], error[n], displacement[n] = worth, off, way

@@ -31,8 +31,8 @@ def advance(draws, breeding, judging, starts, memory):  # type: ignore[no-untype
         breeding: See `breed`.
         judging: See `judge`.
         starts: (joints, ≥ offspring) start of the sub-path, the same for all [rad].
-        memory: Tables of the population and of its offspring, the latter whole blocks of `LANES` wide; parents
-            (offspring,), places of the elites, scratch (individuals + LANES,) for indices, (individuals,) for hits.
+        memory: Tables of the population and of its offspring; parents (offspring,), places of the elites, scratch
+            (individuals + LANES,) for indices, (individuals,) for hits.
 
     Returns:
         See `summary`.
@@ -104,7 +104,7 @@ def judge_children(  # type: ignore[no-untyped-def]
 
     Args:
         starts: (joints, ≥ offspring), the same for all [rad].
-        angles: (joints, whole blocks of `LANES`) of the offspring [rad].
+        angles: (joints, ≥ offspring) theirs [rad].
         population: Table of the parents' generation.
         offspring: Table of the offspring, its last rows written.
         parents: (offspring,).
@@ -116,11 +116,10 @@ def judge_children(  # type: ignore[no-untyped-def]
     arm, ellipses, path, target, box, weights = judging
     row = len(population) - RESULTS
     cost, known = offspring[row], population[row]
-    measure_reach_from(
-        starts[:, 0].copy(), angles, arm, target, box, weights, cost, offspring[row + 1], offspring[row + 2]
-    )
+    start, count, error, displacement = starts[:, 0].copy(), len(parents), offspring[row + 1], offspring[row + 2]
+    measure_reach_from(start, angles, count, arm, target, box, weights, cost, error, displacement)
     inside = 0
-    for k in range(len(parents)):
+    for k in range(count):
         lanes[inside] = k
         inside += cost[k] < np.inf
     left = 0

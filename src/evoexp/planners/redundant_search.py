@@ -73,8 +73,7 @@ class Search:
         self._binary = isinstance(ga, BinaryGenetic)
         self._num_genes = joints * ga.bits_per_gene if isinstance(ga, BinaryGenetic) else joints
         first = self._num_genes if self._binary else 0
-        rows, blocks = first + joints + RESULTS, -(-count // LANES)
-        table, offspring = np.empty((rows, size)), np.zeros((rows, blocks * LANES))
+        table, offspring = np.empty((first + joints + RESULTS, size)), np.empty((first + joints + RESULTS, count))
         parents, elites = np.empty(count, dtype=np.int64), np.empty(ga.num_elites, dtype=np.int64)
         self._lanes, self._hit = np.arange(size + LANES), np.zeros(size, dtype=np.bool_)
         self._memory = (table, offspring, parents, elites, self._lanes, self._hit)

@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 import sys
-import time
 from collections import deque
 from pathlib import Path
 
@@ -19,7 +18,7 @@ from evoexp.batch import jobs
 from evoexp.batch.jobs import Job, Outcome, run_jobs
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.runner import MAX_BUNDLE, TASK_S, _Bundles, fan_out
-from evoexp.batch.workers import Loading, in_workers
+from evoexp.batch.workers import in_workers, loading
 from evoexp.cli import main
 from evoexp.condition import Condition
 from evoexp.errors import Busy, SettingError
@@ -106,14 +105,8 @@ def test_a_worker_loads_neither_tables_nor_the_command_line() -> None:
 
 
 def test_a_worker_that_dies_while_it_loads_is_replaced(fresh_workers: None) -> None:
-    Loading(2, os._exit, 1).wait()
-    assert sorted(in_workers(2, (joblib.delayed(abs)(-k) for k in range(4)))) == [0, 1, 2, 3]
-
-
-def test_loading_given_up_ends_at_once(fresh_workers: None) -> None:
-    loading = Loading(2, time.sleep, 3600.0)
-    loading.give_up()
-    loading.wait()
+    with loading(2, os._exit, 1):
+        pass
     assert sorted(in_workers(2, (joblib.delayed(abs)(-k) for k in range(4)))) == [0, 1, 2, 3]
 
 

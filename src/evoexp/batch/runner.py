@@ -18,7 +18,7 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from evoexp.batch.jobs import Job, Outcome, load, run_jobs
 from evoexp.batch.settings import RunnerSettings
-from evoexp.batch.workers import Loading, in_workers, num_cores
+from evoexp.batch.workers import in_workers, loading, num_cores
 from evoexp.collision.certificate import certificate
 from evoexp.condition import Condition
 from evoexp.kernel_cache import is_compiled, note_compiled
@@ -61,22 +61,16 @@ class Batch:
             self._wanted[condition.id] = (condition, max(count, known[1] if known else 0), known[2] if known else notes)
         self.runs = {key: RunDirectory(outputs, key) for key in self._wanted}
         self.jobs = self._missing()
-        self._loading: Loading | None = None
         self._finished: dict[str, dict[int, ReplicateSummary]] = {}  # by this batch, per condition
 
     def prepare(self) -> None:
-        """Check every condition against its robot and scenario, before anything is written; so do the workers.
+        """Check every condition against its robot and scenario, before anything is written.
 
         Raises:
             SettingError: If one contradicts itself.
         """
-        workers = self._workers_loading()
-        try:
-            for condition, _, _ in self._wanted.values():
-                condition.prepare()
-        except BaseException:
-            workers.give_up()
-            raise
+        for condition, _, _ in self._wanted.values():
+            condition.prepare()
 
     def run(self) -> Generator[Outcome, None, None]:
         """Run what is missing; yield every outcome once it is stored. Closing the iterator keeps what is finished.
@@ -84,38 +78,22 @@ class Batch:
         Raises:
             Busy: If another process writes one of the runs.
         """
-        workers = self._workers_loading()
-        try:
-            with lock_all(self.runs.values()):
-                self.jobs = self._missing()
+        with lock_all(self.runs.values()):
+            self.jobs = self._missing()
+            num_workers = max(1, min(self._settings.num_workers or num_cores(), len(self.jobs)))
+            config_jsons = list(dict.fromkeys(job.condition_json for job in self.jobs))
+            files = list(dict.fromkeys(content for job in self.jobs for content in job.files))
+            with loading(num_workers, load, config_jsons, files):
                 for key, run in self.runs.items():
                     condition, _, notes = self._wanted[key]
                     run.create(condition.to_json(), manifest(key) | notes, condition.files())
-                _compile(dict.fromkeys(job.condition_json for job in self.jobs))
-                workers.wait()
-                yield from self._run()
-        finally:
-            workers.give_up()  # if another process writes, say
-
-    def _run(self) -> Generator[Outcome, None, None]:
-        try:
-            for outcomes in fan_out(self.jobs, self._num_workers):
-                yield from self._store(outcomes)
-        finally:
-            for key, run in self.runs.items():
-                write_summary(run, self._finished.pop(key, {}))
-
-    @property
-    def _num_workers(self) -> int:
-        return max(1, min(self._settings.num_workers or num_cores(), len(self.jobs)))
-
-    def _workers_loading(self) -> Loading:
-        """Have the workers load what they need, if they do not yet."""
-        if self._loading is None:
-            config_jsons = list(dict.fromkeys(job.condition_json for job in self.jobs))
-            files = list(dict.fromkeys(content for job in self.jobs for content in job.files))
-            self._loading = Loading(self._num_workers, load, config_jsons, files)
-        return self._loading
+                _compile(config_jsons)
+            try:
+                for outcomes in fan_out(self.jobs, num_workers):
+                    yield from self._store(outcomes)
+            finally:
+                for key, run in self.runs.items():
+                    write_summary(run, self._finished.pop(key, {}))
 
     def _missing(self) -> list[Job]:
         jobs = []

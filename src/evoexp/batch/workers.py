@@ -1,5 +1,6 @@
 """Worker processes: silent when Ctrl-C reaches all processes of a terminal, and gone when their parent is."""
 
+import gc
 import multiprocessing
 import os
 import signal
@@ -7,7 +8,7 @@ import threading
 import time
 import warnings
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from multiprocessing import forkserver
 from typing import Any
@@ -68,25 +69,27 @@ def in_workers(num_workers: int, tasks: Iterable[Any], ordered: bool = False) ->
     return results
 
 
-class Loading:
-    """Worker processes loading what they will need. One that dies meanwhile is no error: new ones are started."""
+@contextmanager
+def loading(num_workers: int, load: Callable[..., None], *arguments: Any) -> Iterator[None]:
+    """Have worker processes load what they will need, while the body does something else; wait for them at its end.
 
-    def __init__(self, num_workers: int, load: Callable[..., None], *arguments: Any) -> None:
-        """Have so many of them load, from now on; one is no other than this process, and loads nothing."""
-        tasks = (joblib.delayed(load)(*arguments) for _ in range(num_workers))
-        self._results = in_workers(num_workers, tasks) if num_workers > 1 else iter(())
-
-    def wait(self) -> None:
-        """Wait until they have."""
+    A worker that dies meanwhile is no error: whoever gives work to workers starts new ones.
+    """
+    if num_workers == 1:
+        yield
+        return
+    loaded = in_workers(num_workers, (joblib.delayed(_load)(load, *arguments) for _ in range(num_workers)))
+    try:
+        yield
+    finally:
         with suppress(TerminatedWorkerError):
-            deque(self._results, maxlen=0)
+            deque(loaded, maxlen=0)
 
-    def give_up(self) -> None:
-        """End them if they have not."""
-        if isinstance(self._results, Generator):
-            with warnings.catch_warnings():
-                warnings.filterwarnings("ignore", _GIVEN_UP, UserWarning)
-                self._results.close()
+
+def _load(load: Callable[..., None], *arguments: Any) -> None:
+    """Load, and keep what is there now from being searched for garbage: every worker searches once per second."""
+    load(*arguments)
+    gc.freeze()
 
 
 def leave_with_parent(parent: int, served: bool) -> None:

@@ -7,8 +7,6 @@ import sys
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.compute as pc
 from rich.console import Console
 from rich.table import Table
 
@@ -99,22 +97,21 @@ def summary_table(experiment: Experiment) -> Table:
     for label, condition in experiment.conditions:
         rows = stored_summaries(RunDirectory(outputs_root(), condition.id))
         planned = condition.num_replicates(experiment.num_replicates)
-        wanted = pc.less(rows["replicate"], planned)
-        done = rows.filter(pc.and_(pc.equal(rows["status"], "done"), wanted))
-        num_done, num_solved = done.num_rows, pc.sum(done["solved"]).as_py() or 0
+        columns = rows.select(["replicate", "status", "solved", "best_cost", "cpu_s"]).to_pylist()
+        done = [row for row in columns if row["status"] == "done" and row["replicate"] < planned]
         table.add_row(
             label,
             condition.id[:12],
-            f"{num_done} of {planned}",
-            f"{num_solved} of {num_done}",
-            _median(done["best_cost"], ".4g"),
-            _median(done["cpu_s"], ".3f"),
+            f"{len(done)} of {planned}",
+            f"{sum(row['solved'] for row in done)} of {len(done)}",
+            _median([row["best_cost"] for row in done], ".4g"),
+            _median([row["cpu_s"] for row in done], ".3f"),
         )
     return table
 
 
-def _median(column: pa.ChunkedArray, form: str) -> str:
-    return format(np.median(column.to_numpy()), form) if len(column) else "–"
+def _median(values: list[float], form: str) -> str:
+    return format(np.median(values), form) if values else "–"
 
 
 def _failure_table(batch: Batch, failures: list[Outcome]) -> Table:

@@ -1,10 +1,11 @@
 """`summary.parquet`: one row per replicate, derived from the logs and always rebuildable."""
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -65,7 +66,7 @@ def summary_table(runs: Runs) -> pa.Table:
         CorruptLog: A log is damaged or of another replicate.
     """
     tables = [_current(run) for run in distinct(runs)]
-    table = pa.concat_tables([pa.schema(_BASE).empty_table(), *tables], promote_options="default")
+    table = pa.concat_tables([_table([], pa.schema(_BASE)), *tables], promote_options="default")
     names = [field.name for field in _BASE]
     return table.select(names + sorted(set(table.column_names) - set(names))).replace_schema_metadata(None)
 
@@ -81,7 +82,7 @@ def _current(run: RunDirectory) -> pa.Table:
     if stored is not None and _stored_stamps(stored) == stamps:
         return stored
     if not stamps:
-        return pa.schema(_BASE).empty_table()
+        return _table([], pa.schema(_BASE))
     try:
         with run.lock():
             return write_summary(run)
@@ -137,7 +138,26 @@ def _build(
     used = {name for row in rows_now for name, value in row.items() if value is not None} - base
     schema = pa.schema(_BASE + [pa.field(name, pa.float64()) for name in sorted(used)])
     notes = {"version": _VERSION, "condition": run.condition_id, "files": stamps}
-    return pa.Table.from_pylist(rows_now, schema=schema.with_metadata({_KEY: json.dumps(notes).encode()}))
+    return _table(rows_now, schema.with_metadata({_KEY: json.dumps(notes).encode()}))
+
+
+def _table(rows: Sequence[Mapping[str, Any]], schema: pa.Schema) -> pa.Table:
+    columns = [_column([row.get(field.name) for row in rows], field.type) for field in schema]
+    return pa.Table.from_arrays(columns, schema=schema)
+
+
+def _column(values: list[Any], kind: pa.DataType) -> pa.Array:
+    """Return values, None where there is none, as a column: `pa.array` would load pandas, a third of a second."""
+    given = np.array([value is not None for value in values], dtype=np.bool_)
+    buffers = [None if given.all() else pa.py_buffer(np.packbits(given, bitorder="little"))]
+    if kind == pa.string():
+        texts = [(value or "").encode() for value in values]
+        ends = np.cumsum([0, *map(len, texts)], dtype=np.int32)
+        buffers += [pa.py_buffer(ends), pa.py_buffer(b"".join(texts))]
+    else:
+        numbers = np.array([0 if value is None else value for value in values], dtype=kind.to_pandas_dtype())
+        buffers.append(pa.py_buffer(np.packbits(numbers, bitorder="little") if kind == pa.bool_() else numbers))
+    return pa.Array.from_buffers(kind, len(values), buffers)
 
 
 def _row(run: RunDirectory, path: Path) -> dict[str, Any]:

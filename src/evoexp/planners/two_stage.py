@@ -85,8 +85,11 @@ class TwoStage(Component):
         """Search the docking posture; return the last generation."""
         start = problem.scenario.grid.start
         last: Record | None = None
+        terms, cost = {}, None
         for last in self.placement.evolve(problem.placement, rng):
-            terms = self._posture_terms(problem, last.best) | dict.fromkeys(PATH, 0.0) | {"sub_path": 1.0}
+            if last.best_cost != cost:
+                terms = self._posture_terms(problem, last.best) | dict.fromkeys(PATH, 0.0) | {"sub_path": 1.0}
+                cost = last.best_cost
             yield last._replace(
                 best=np.concatenate([last.best, start]),
                 best_cost=np.inf,
@@ -100,7 +103,7 @@ class TwoStage(Component):
 
     def _drive(self, problem: Problem, rng: np.random.Generator, docked: Record) -> Iterator[Record]:
         """Search the path to the docking place that was found."""
-        posture = self._posture_terms(problem, docked.best)
+        posture = self._posture_terms(problem, docked.best) | {"sub_path": 2.0}
         for found in self.path.evolve(self._path_problem(problem, docked.best), rng):
             yield found._replace(
                 index=docked.index + 1 + found.index,
@@ -109,7 +112,7 @@ class TwoStage(Component):
                 best_cost_in_generation=docked.best_cost + found.best_cost_in_generation,
                 evaluations=docked.evaluations + found.evaluations,
                 solved=docked.solved and found.solved,
-                terms=posture | {name: found.terms[name] for name in PATH} | {"sub_path": 2.0},
+                terms=posture | {name: found.terms[name] for name in PATH},
                 costs=found.costs[None, :],
             )
 

@@ -27,6 +27,10 @@ warnings.filterwarnings("ignore", _GIVEN_UP, UserWarning)
 _PRELOADED = ["evoexp.batch.preloaded"]
 _SERVED = "forkserver"  # the name of this way to start processes
 _NUM_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(2**26), "MALLOC_TRIM_THRESHOLD_": str(2**28)}
+_ENVIRONMENT = dict.fromkeys(_NUM_THREADS, "1") | _MEMORY
+"""Of workers: their libraries compute in one thread, as the replicates keep all cores busy, and (where the C library is
+glibc) memory that one generation gives back serves the next, instead of being fetched page by page from the system."""
 
 
 def start_server() -> None:
@@ -39,7 +43,7 @@ def start_server() -> None:
         return
     set_start_method(_SERVED, force=True)
     multiprocessing.set_forkserver_preload(_PRELOADED)
-    with _children_ignore_interrupts(), _one_thread_each():
+    with _children_ignore_interrupts(), _environment_of_workers():
         forkserver.ensure_running()
 
 
@@ -121,10 +125,10 @@ def _children_ignore_interrupts() -> Iterator[None]:
 
 
 @contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """Start processes whose libraries compute in one thread: the replicates keep all cores busy."""
-    before = {name: os.environ.get(name) for name in _NUM_THREADS}
-    os.environ.update(dict.fromkeys(_NUM_THREADS, "1"))
+def _environment_of_workers() -> Iterator[None]:
+    """Start processes with that environment."""
+    before = {name: os.environ.get(name) for name in _ENVIRONMENT}
+    os.environ.update(_ENVIRONMENT)
     try:
         yield
     finally:

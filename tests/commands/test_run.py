@@ -1,8 +1,11 @@
 """`evoexp run` and `evoexp reproduce` on small experiments."""
 
 import json
+import os
 import re
 import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -32,6 +35,17 @@ def test_a_run_says_what_is_there_and_runs_nothing_twice(
     assert again.out.startswith("nothing to run: every replicate is there\n")
     assert again.out.split("\n", 1)[1] == first.out[first.out.index("rana_planar@smoke") :]
     assert not (outputs / "reports").exists()
+
+
+def test_a_run_without_report_loads_neither_pandas_nor_matplotlib(outputs: Path) -> None:
+    """The two take as long to load as two hundred replicates of some planners."""
+    words = ["run", *PLANAR, "num_replicates=1", "--no-report"]
+    code = f"import sys; from evoexp.cli import main; assert main({words!r}) == 0\n"
+    code += "assert not {'pandas', 'matplotlib'} & set(sys.modules)"
+    environment = os.environ | {"EVOEXP_OUTPUTS": str(outputs)}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert len(find_runs(outputs)) == 2
 
 
 def test_a_run_ends_with_its_report(evoexp: Evoexp, outputs: Path) -> None:

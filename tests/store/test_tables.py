@@ -96,6 +96,25 @@ def test_what_was_just_written_is_not_read_again(run: RunDirectory, add: Add, re
     assert rows(write_summary(run)) == rows(table)
 
 
+@pytest.mark.parametrize(
+    ("kind", "values"),
+    [
+        (pa.float64(), [1.0, None, math.nan, -0.0, 0.0, -math.inf, None, 5e-324, 2.0]),
+        (pa.int64(), [0, None, -(2**63), 2**63 - 1]),
+        (pa.bool_(), [True, None, False, True, True, False, False, True, None, True]),
+        (pa.string(), ["", None, "é – ∞", "\0", "a" * 1000]),
+    ],
+)
+def test_columns_hold_what_they_are_given(kind: pa.DataType, values: list[Any]) -> None:
+    for count in range(len(values) + 1):
+        for given in (values[:count], [value for value in values[:count] if value is not None]):
+            column = summaries._column(given, kind)
+            column.validate(full=True)
+            assert column.type == kind
+            assert repr(column.to_pylist()) == repr(given)
+            assert column.null_count == given.count(None)
+
+
 def test_a_term_that_no_row_has_any_more_is_dropped(run: RunDirectory, add: Add) -> None:
     add(0)
     add(1, terms={"old": 1.0})

@@ -11,32 +11,32 @@ def condition(*words: str, label: str = "(a)") -> Condition:
     return compose.expand(["experiment=chen_path", *words], only=[label])[0].conditions[0].condition
 
 
-def test_walks(benchmark: Any) -> None:
+def bench_grid_walks(benchmark: Any) -> None:
     found = condition()
     planner, problem = found.prepare()
     rng = found.rng(0)
     benchmark(planner.sample, problem, rng, 100)
 
 
-def test_costs(benchmark: Any) -> None:
+def bench_grid_costs(benchmark: Any) -> None:
     found = condition()
     planner, problem = found.prepare()
     population = planner.sample(problem, found.rng(0), 100)
     benchmark(planner.cost, problem, population)
 
 
-def test_run(benchmark: Any) -> None:
+def bench_grid_run(benchmark: Any) -> None:
     found = condition()
     planner, problem = found.prepare()
     benchmark(lambda: [generation.best_cost for generation in planner.evolve(problem, found.rng(0))])
 
 
-def test_replicate(benchmark: Any) -> None:
+def bench_grid_replicate(benchmark: Any) -> None:
     found = condition()
     text = found.to_json()
     benchmark(run_replicate, found, 0, text)
 
 
-def test_frontier(benchmark: Any) -> None:
+def bench_grid_frontier(benchmark: Any) -> None:
     planner, problem = condition(label="(b), exact").prepare()
     benchmark.pedantic(planner.truth, (problem,), rounds=3)

@@ -362,6 +362,19 @@ def test_normal_deviates_refuse_a_negative_size() -> None:
         standard_normal(np.random.default_rng(0), -1)
 
 
+def test_kernels_do_not_load_scipy_but_those_that_need_blas_find_it() -> None:
+    code = """
+import sys, numba, numpy as np
+from evoexp.evolution.statistics import cost_statistics
+assert cost_statistics(np.array([2.0, 1.0])).best == 1
+assert "scipy.linalg" not in sys.modules
+dot = numba.njit(lambda a, b: np.dot(a, b))
+assert dot(np.eye(3), np.ones(3)).sum() == 3.0 and np.isclose(numba.njit(lambda a: np.linalg.det(a))(np.eye(2)), 1.0)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
 def test_old_caches_go_but_recent_and_claimed_ones_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     fcntl: Any = importlib.import_module("fcntl") if os.name == "posix" else pytest.skip("nothing is pruned here")
     states = [tmp_path / f"{age:016x}" for age in range(8)]

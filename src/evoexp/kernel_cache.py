@@ -2,6 +2,7 @@
 
 import contextlib
 import hashlib
+import importlib
 import os
 import shutil
 import tempfile
@@ -34,6 +35,21 @@ def use_keyed_cache() -> None:
     directory = cache_root() / "kernels" / digest.hexdigest()[:16]
     numba.config.CACHE_DIR = str(directory)  # type: ignore[attr-defined]
     _prune_caches(directory)
+    _spare_blas()
+
+
+def _spare_blas() -> None:
+    """Have numba believe in BLAS unseen: to look for it, it loads scipy.linalg, a fifth of a second in every process.
+
+    A kernel that does use it loads it when it is compiled; none of ours does, as BLAS is not reproducible bit by bit.
+    """
+    from numba.np import linalg
+
+    look, linalg.ensure_blas = linalg.ensure_blas, lambda: None
+    try:
+        importlib.import_module("numba.np.arraymath")
+    finally:
+        linalg.ensure_blas = look
 
 
 def is_compiled(kind: str) -> bool:

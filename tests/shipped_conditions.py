@@ -1,21 +1,29 @@
-"""Every condition of every shipped experiment, composed once per test process: composing is what takes long."""
+"""Every condition of every shipped experiment, composed once: composing is what takes long."""
 
 import functools
+import os
 import re
 
 from evoexp import expansions
 from evoexp.condition import Condition
-from evoexp.experiment import options
+from evoexp.experiment import Experiment, options
 
 
 @functools.cache
 def shipped_conditions(budget: str) -> dict[tuple[str, str], Condition]:
-    """Return (experiment, label) → condition."""
-    return {
-        (name, label): condition
-        for name in options("experiment")
-        for label, condition in expansions.expand([f"experiment={name}", f"budget={budget}"])[0].conditions
-    }
+    """Return (experiment, label) → condition.
+
+    Test processes begin at both ends of the list: each finds on disk what another has composed.
+    """
+    names = options("experiment")
+    from_behind = os.environ.get("PYTEST_XDIST_WORKER", "gw0")[-1] in "13579"
+    found = {name: expanded(name, budget) for name in (reversed(names) if from_behind else names)}
+    return {(name, label): condition for name in names for label, condition in found[name].conditions}
+
+
+def expanded(name: str, budget: str) -> Experiment:
+    """Return a shipped experiment at a budget; kept on disk under the content of `conf` and the code."""
+    return expansions.expand([f"experiment={name}", f"budget={budget}"])[0]
 
 
 def different_conditions(budget: str) -> dict[str, Condition]:

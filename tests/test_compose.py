@@ -16,6 +16,7 @@ from evoexp import shipped
 from evoexp.compose import expand
 from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting
 from evoexp.experiment import Experiment, description, options
+from shipped_conditions import expanded
 
 PLAIN = ("experiment=rana_obstacles",)  # one condition
 BUDGETS = ("paper", "quick", "smoke")
@@ -65,11 +66,11 @@ def write_experiment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callabl
 @pytest.mark.parametrize("experiment", options("experiment"))
 @pytest.mark.parametrize("budget", BUDGETS)
 def test_every_experiment_composes_at_every_budget(experiment: str, budget: str) -> None:
-    (expanded,) = expand([f"experiment={experiment}", f"budget={budget}"])
-    assert (expanded.name, expanded.budget, expanded.changed) == (experiment, budget, False)
-    assert expanded.report_name == (experiment if budget == "paper" else f"{experiment}@{budget}")
-    assert len({label for label, _ in expanded.conditions}) == len(expanded.conditions) > 0
-    for _, condition in expanded.conditions:
+    found = expanded(experiment, budget)
+    assert (found.name, found.budget, found.changed) == (experiment, budget, False)
+    assert found.report_name == (experiment if budget == "paper" else f"{experiment}@{budget}")
+    assert len({label for label, _ in found.conditions}) == len(found.conditions) > 0
+    for _, condition in found.conditions:
         assert len(condition.id) == 64
         condition.prepare()
 

@@ -64,7 +64,7 @@ def write_experiment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callabl
 
 
 @pytest.mark.parametrize("experiment", options("experiment"))
-@pytest.mark.parametrize("budget", BUDGETS)
+@pytest.mark.parametrize("budget", ["paper", "smoke"])
 def test_every_experiment_composes_at_every_budget(experiment: str, budget: str) -> None:
     found = expanded(experiment, budget)
     assert (found.name, found.budget, found.changed) == (experiment, budget, False)
@@ -73,6 +73,16 @@ def test_every_experiment_composes_at_every_budget(experiment: str, budget: str)
     for _, condition in found.conditions:
         assert len(condition.id) == 64
         condition.prepare()
+
+
+@pytest.mark.parametrize("experiment", options("experiment"))
+def test_a_quick_budget_has_the_conditions_of_the_papers(experiment: str) -> None:
+    paper = expanded(experiment, "paper")
+    label, condition = paper.conditions[0]
+    (quick,) = expand([f"experiment={experiment}", "budget=quick"], only=[label])
+    assert (quick.name, quick.budget) == (experiment, "quick")
+    assert [(each.label, each.condition.id) for each in quick.conditions] == [(label, condition.id)]
+    assert quick.num_replicates == min(paper.num_replicates, 5)
 
 
 @pytest.mark.parametrize("experiment", options("experiment"))

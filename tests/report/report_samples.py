@@ -3,8 +3,9 @@
 import functools
 from pathlib import Path
 
-from evoexp import compose
+from evoexp import expansions
 from evoexp.batch.replicate import run_replicate
+from evoexp.experiment import Experiment
 from evoexp.report import build
 from evoexp.report.results import Results, gather
 from evoexp.report.settings import ReportSettings
@@ -23,13 +24,13 @@ REPORT = {
 }
 
 
-def expand(name: str, *overrides: str) -> compose.Experiment:
+def expand(name: str, *overrides: str) -> Experiment:
     """Return an experiment, small."""
     words = {word.split("=")[0]: word for word in (*SMALL, *overrides)}
-    return compose.expand([f"experiment={name}", *words.values()])[0]
+    return expansions.expand([f"experiment={name}", *words.values()])[0]
 
 
-def store(outputs: Path, experiment: compose.Experiment) -> None:
+def store(outputs: Path, experiment: Experiment) -> None:
     """Run and store every replicate of an experiment."""
     for label, condition in experiment.conditions:
         run = RunDirectory(outputs, condition.id)
@@ -39,9 +40,9 @@ def store(outputs: Path, experiment: compose.Experiment) -> None:
 
 
 @functools.cache
-def smoke_experiment(name: str, *overrides: str) -> compose.Experiment:
+def smoke_experiment(name: str, *overrides: str) -> Experiment:
     """Return an experiment with two replicates of ten generations; composing it is most of the work."""
-    return compose.expand([f"experiment={name}", "budget=smoke", *overrides])[0]
+    return expansions.expand([f"experiment={name}", "budget=smoke", *overrides])[0]
 
 
 @functools.cache

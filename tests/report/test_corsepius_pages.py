@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from report_samples import REPORT, figure_stems, page_settings, smoke_experiment, smoke_report, smoke_results, store
 
-from evoexp import compose
+from evoexp import expansions
 from evoexp.numerics import DEGREE
 from evoexp.report import style
 from evoexp.report.figures import (
@@ -40,7 +40,7 @@ def outputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @functools.cache
 def solved(outputs: Path, name: str) -> Results:
     """Return results of three runs at the paper's budget, whose cycles the smoke budget would cut."""
-    experiment = compose.expand([f"experiment={name}", f"num_replicates={FEW}"])[0]
+    experiment = expansions.expand([f"experiment={name}", f"num_replicates={FEW}"])[0]
     store(outputs, experiment)
     return gather(outputs, experiment.conditions, FEW, name, experiment.budget, "")
 

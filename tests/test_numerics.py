@@ -375,6 +375,19 @@ assert dot(np.eye(3), np.ones(3)).sum() == 3.0 and np.isclose(numba.njit(lambda 
     assert done.returncode == 0, done.stderr
 
 
+def test_what_is_compiled_is_noted_beside_the_kernels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "state"))
+    assert not kernel_cache.is_compiled("a planner")
+    kernel_cache.note_compiled("a planner")
+    assert kernel_cache.is_compiled("a planner")
+    assert not kernel_cache.is_compiled("another")
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "another state"))
+    assert not kernel_cache.is_compiled("a planner")
+    (tmp_path / "file").touch()
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "file"))
+    kernel_cache.note_compiled("a planner")  # cannot be written: no error
+
+
 def test_old_caches_go_but_recent_and_claimed_ones_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     fcntl: Any = importlib.import_module("fcntl") if os.name == "posix" else pytest.skip("nothing is pruned here")
     states = [tmp_path / f"{age:016x}" for age in range(8)]

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evoexp import compose
-from evoexp.batch import jobs
+from evoexp.batch import jobs, runner
 from evoexp.batch.jobs import Job, Outcome, run_jobs
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.runner import MAX_BUNDLE, TASK_S, _Bundles, fan_out
@@ -108,6 +108,25 @@ def test_a_worker_that_dies_while_it_loads_is_replaced(fresh_workers: None) -> N
     with loading(2, os._exit, 1):
         pass
     assert sorted(in_workers(2, (joblib.delayed(abs)(-k) for k in range(4)))) == [0, 1, 2, 3]
+
+
+def test_kernels_are_compiled_once_for_conditions_that_differ_in_numbers(
+    faulty: Condition, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    noted: set[str] = set()
+    asked: list[bytes] = []
+    from_json = Condition.from_json
+    monkeypatch.setattr(runner, "is_compiled", lambda kind: kind in noted)
+    monkeypatch.setattr(runner, "note_compiled", noted.add)
+    monkeypatch.setattr(Condition, "from_json", lambda text: (asked.append(text), from_json(text))[1])
+    texts = [faulty._replace(seed=seed).to_json() for seed in (0, 7, 12345)]
+    runner._compile([texts[0], *texts])
+    assert asked == texts[:1]
+    assert len(noted) == 1
+    runner._compile([b"{}"])  # no condition: nothing is noted, and it is asked again
+    runner._compile([b"{}"])
+    assert asked[1:] == [b"{}", b"{}"]
+    assert len(noted) == 1
 
 
 def test_a_condition_wanted_twice_runs_once(faulty: Condition, tmp_path: Path) -> None:

@@ -15,24 +15,6 @@ RESULTS = 10  # … and τ1, τ2, τ3, θ3 [deg], X_p
 
 
 @kernel
-def measure_posture(theta_1, theta_2, branch, task, weights, avoided, limits, out):  # type: ignore[no-untyped-def]
-    """Measure one posture; return whether it is feasible: reachable, and within the limits.
-
-    Args:
-        theta_1: [deg].
-        theta_2: Relative to the first link [deg].
-        branch: Of θ3: 0: the third link points to +x, 1: to −x.
-        task: (7,) l1, l2, l3, X_e, Y_e, F_x, F_y.
-        weights: (7,) ε, λ, δ of Eq. 14, α1, α2, α3 of Eq. 11, and the greatest value of E and of every criterion, which
-            is what singular and infeasible postures have.
-        avoided: (n, 5) γ, link (0: the platform), place on it in [0, 1], X_o, Y_o of Eq. 12.
-        limits: (6, 2) of θ1, θ2, θ3 [deg] and τ1, τ2, τ3.
-        out: (RESULTS,) written; of what cannot be reached θ3, X_p and torques are NaN.
-    """
-    return _measure_branch(_directions(theta_1, theta_2, task), branch, task, weights, avoided, limits, out)
-
-
-@kernel
 def _directions(theta_1, theta_2, task):  # type: ignore[no-untyped-def]
     """Return θ1, θ2, s1, c1, s12, c12, s123, c123, θ1 + θ2 + θ3 [deg]; the last two NaN where unreachable."""
     s1, c1 = sincos(DEGREE * theta_1)
@@ -46,8 +28,19 @@ def _directions(theta_1, theta_2, task):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _measure_branch(directions, branch, task, weights, avoided, limits, out):  # type: ignore[no-untyped-def]
-    """Measure one posture as `measure_posture` does, from `_directions`."""
+def measure_posture(directions, branch, task, weights, avoided, limits, out):  # type: ignore[no-untyped-def]
+    """Measure one posture; return whether it is feasible: reachable, and within the limits.
+
+    Args:
+        directions: What `_directions` makes of θ1 and θ2, which is relative to the first link [deg].
+        branch: Of θ3: 0: the third link points to +x, 1: to −x.
+        task: (7,) l1, l2, l3, X_e, Y_e, F_x, F_y.
+        weights: (7,) ε, λ, δ of Eq. 14, α1, α2, α3 of Eq. 11, and the greatest value of E and of every criterion, which
+            is what singular and infeasible postures have.
+        avoided: (n, 5) γ, link (0: the platform), place on it in [0, 1], X_o, Y_o of Eq. 12.
+        limits: (6, 2) of θ1, θ2, θ3 [deg] and τ1, τ2, τ3.
+        out: (RESULTS,) written; of what cannot be reached θ3, X_p and torques are NaN.
+    """
     theta_1, theta_2, s1, c1, s12, c12, s123, c123, absolute = directions
     cap = weights[6]
     if not abs(s123) <= 1.0:
@@ -118,8 +111,8 @@ def measure_both(theta_1, theta_2, task, weights, avoided, limits, out, other): 
         Its branch, −1 where neither is feasible.
     """
     directions = _directions(theta_1, theta_2, task)
-    one = _measure_branch(directions, 0, task, weights, avoided, limits, out)
-    two = _measure_branch(directions, 1, task, weights, avoided, limits, other)
+    one = measure_posture(directions, 0, task, weights, avoided, limits, out)
+    two = measure_posture(directions, 1, task, weights, avoided, limits, other)
     branch = 0 if one else -1
     if two and not (one and out[COST] <= other[COST]):
         branch = 1
@@ -135,7 +128,7 @@ def measure_branches(angles, task, weights, avoided, limits, costs, theta_3):  #
     for k in range(angles.shape[1]):
         directions = _directions(angles[0, k], angles[1, k], task)
         for branch in range(2):
-            _measure_branch(directions, branch, task, weights, avoided, limits, out)
+            measure_posture(directions, branch, task, weights, avoided, limits, out)
             costs[branch, k], theta_3[branch, k] = out[COST], out[THETA_3]
 
 
@@ -169,7 +162,7 @@ def measure_postures(angles, count, task, weights, avoided, limits, out):  # typ
 def _measure_lanes(  # type: ignore[no-untyped-def]
     angles, count, links, branch, task, weights, avoided, limits, out, within
 ):
-    """Measure one branch of a population as `_measure_branch` does, bit for bit, individuals innermost."""
+    """Measure one branch of a population as `measure_posture` does, bit for bit, individuals innermost."""
     l1, l2, l3, x_e, f_x, f_y, cap = task[0], task[1], task[2], task[3], task[5], task[6], weights[6]
     a1, a2, a3, sign = weights[3], weights[4], weights[5], -1.0 if branch == 1 else 1.0
     s1, c1, s12, c12, s123, c123, absolute = links[0], links[1], links[2], links[3], links[4], links[5], links[6]

@@ -53,36 +53,6 @@ def walk(draws, neighbours, potentials, steps, choices, ends, erase, path, place
         path: (≥ nodes + 1,) written; see above.
         place: (nodes,) scratch.
     """
-    if erase and len(choices[0]) > 0:
-        _walk_by_table(draws, choices, ends, path, place)
-        return
-    uniforms, taken = draws
-    node, target = ends
-    at, num = taken[0], len(uniforms)
-    path[1], count = node, 1
-    place[node] = 1
-    while node != target and at < num:
-        if len(choices[0]) > 0:
-            node = _choose(uniforms[at], choices[0], choices[1], node)
-        else:
-            node = _next_node(uniforms[at], neighbours, potentials, steps, node)
-        at += 1
-        if not erase and count == len(path) - 1:  # full: what has no loops fits always
-            count = erase_loops(path, count, path, place)
-        known = place[node]
-        if erase and 1 <= known <= count and path[known] == node:
-            count = known
-        else:
-            count += 1
-            path[count] = node
-            place[node] = count
-    taken[0] = at if node == target else num + 1
-    path[0] = count
-
-
-@kernel
-def _walk_by_table(draws, choices, ends, path, place):  # type: ignore[no-untyped-def]
-    """Walk as `walk` does from a `choice_table`, loops erased; no branch but the loop's, see `_choose`."""
     uniforms, taken = draws
     added, targets = choices
     node, target = ends
@@ -90,12 +60,17 @@ def _walk_by_table(draws, choices, ends, path, place):  # type: ignore[no-untype
     path[1], count = node, 1
     place[node] = 1
     while node != target and at < num:
-        node = _choose(uniforms[at], added, targets, node)
+        if len(added) > 0:
+            node = _choose(uniforms[at], added, targets, node)
+        else:
+            node = _next_node(uniforms[at], neighbours, potentials, steps, node)
         at += 1
+        if not erase and count == len(path) - 1:  # full: what has no loops fits always
+            count = erase_loops(path, count, path, place)
         known = place[node]
-        looked = (known >= 1) & (known <= count)
+        looked = erase & (known >= 1) & (known <= count)
         known = known if looked else 1
-        count = known if looked & (path[known] == node) else count + 1
+        count = known if looked & (path[known] == node) else count + 1  # a branch here would be guessed wrong often
         path[count] = node
         place[node] = count
     taken[0] = at if node == target else num + 1

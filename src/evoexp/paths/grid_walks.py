@@ -14,6 +14,9 @@ import numpy as np
 from evoexp.numerics import kernel
 from evoexp.records import FloatArray
 
+LANES = 4  # walks at a time
+MAX_SLOTS = 256  # of a node in a table of choices
+
 
 @kernel
 def draw(draws):  # type: ignore[no-untyped-def]
@@ -36,7 +39,7 @@ def draw_index(draws, count):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def walk(draws, neighbours, potentials, steps, choices, ends, erase, path, place):  # type: ignore[no-untyped-def]
+def walk(draws, moves, ends, erase, path, place):  # type: ignore[no-untyped-def]
     """Write a random path: every step draws one of the permitted moves, weighted toward the target.
 
     A neighbour of potential U has the weight U_max − U + 1, U_max being the greatest among the neighbours (Chen &
@@ -44,41 +47,90 @@ def walk(draws, neighbours, potentials, steps, choices, ends, erase, path, place
 
     Args:
         draws: One number is taken per step; if they are used up, the walk breaks off.
-        neighbours: (nodes, moves), see `grids.Grid`.
-        potentials: (≥ greatest number of steps + 1,) potential after so many steps of the front from the target.
-        steps: (nodes,) of the front from the target, see `grids.front`.
-        choices: What `choice_table` made of all that, or empty arrays.
+        moves: Neighbours (nodes, moves), see `grids.Grid`; potential after so many steps of the front from the target
+            (≥ greatest number of steps + 1,); those steps (nodes,), see `grids.front`.
         ends: Indices of the node it starts at and of the target, which the front must reach.
-        erase: Whether loops are erased as they arise.
+        erase: Whether loops are erased.
         path: (≥ nodes + 1,) written; see above.
         place: (nodes,) scratch.
     """
     uniforms, taken = draws
-    added, targets = choices
+    neighbours, potentials, steps = moves
     node, target = ends
     at, num = taken[0], len(uniforms)
-    path[1], count = node, 1
+    trail = np.empty(num - min(at, num) + 2, np.int32)
+    count = 1
+    trail[1] = node
     place[node] = 1
     while node != target and at < num:
-        if len(added) > 0:
-            node = _choose(uniforms[at], added, targets, node)
-        else:
-            node = _next_node(uniforms[at], neighbours, potentials, steps, node)
+        node = _next_node(uniforms[at], neighbours, potentials, steps, node)
         at += 1
-        if not erase and count == len(path) - 1:  # full: what has no loops fits always
-            count = erase_loops(path, count, path, place)
-        known = place[node]
-        looked = erase & (known >= 1) & (known <= count)
-        known = known if looked else 1
-        count = known if looked & (path[known] == node) else count + 1  # a branch here would be guessed wrong often
-        path[count] = node
+        count += 1
+        trail[count] = node
         place[node] = count
     taken[0] = at if node == target else num + 1
-    path[0] = count
+    _write(trail, count, erase, path, place)
+
+
+@kernel
+def walk_all(uniforms, moves, choices, ends, erase, first, paths):  # type: ignore[no-untyped-def]
+    """Write random paths, as `walk` does, all between the same nodes: some at a time, one step of each after the other.
+
+    A step waits for the one before it, which says where to look; meanwhile the other walks take theirs.
+
+    Args:
+        uniforms: One number is taken per step.
+        moves: See `walk`.
+        choices: What `choice_table` made of them.
+        ends: See `walk`.
+        erase: Whether loops are erased.
+        first: The path to begin with.
+        paths: (paths, nodes + 1) written.
+
+    Returns:
+        How many paths are complete, those before `first` included, and how many numbers it took. If they are used up,
+        it is to go on there with more of them, the rest of these being the first.
+    """
+    neighbours, potentials, steps = moves
+    totals, slots = choices
+    start, target = np.uint64(ends[0]), np.uint64(ends[1])  # without a sign, as an index might count from the end
+    walkers, counts = np.empty(LANES, np.uint64), np.empty(LANES, np.int64)
+    trails = np.empty((LANES, len(uniforms) + 2), np.int32)
+    places = np.empty((LANES, len(neighbours)), np.int32)
+    taken = 0
+    while first < len(paths):
+        before, walking = taken, start != target
+        for lane in range(LANES):
+            walkers[lane] = start if first + lane < len(paths) else target
+            counts[lane] = 1
+            trails[lane, 1] = walkers[lane]
+            places[lane, walkers[lane]] = 1
+        while walking:
+            if taken + LANES > len(uniforms):
+                return first, before
+            walking = False
+            for lane in range(LANES):  # who has arrived stays, without a branch that would be guessed wrong
+                node, count = walkers[lane], counts[lane]
+                goes = node != target
+                if len(slots) > 0:
+                    chosen = np.uint64(slots[node, np.uint64(uniforms[taken] * totals[node])])
+                else:
+                    chosen = np.uint64(_next_node(uniforms[taken], neighbours, potentials, steps, node))
+                node = chosen if goes else node
+                taken += goes
+                count += goes
+                trails[lane, count] = node
+                places[lane, node] = count
+                walkers[lane], counts[lane] = node, count
+                walking |= goes
+        for lane in range(min(LANES, len(paths) - first)):
+            _write(trails[lane], counts[lane], erase, paths[first + lane], places[lane])
+        first = min(first + LANES, len(paths))
+    return first, taken
 
 
 def choice_table(neighbours: np.ndarray, potentials: FloatArray, steps: np.ndarray) -> tuple[FloatArray, np.ndarray]:
-    """Return the choices of walks to one target at every node, which many walks share.
+    """Return the choices of walks to one target at every node, for many walks: every move as often as it weighs.
 
     Args:
         neighbours: (nodes, moves), see `grids.Grid`.
@@ -86,31 +138,20 @@ def choice_table(neighbours: np.ndarray, potentials: FloatArray, steps: np.ndarr
         steps: (nodes,) of the front from the target.
 
     Returns:
-        Weights of the moves added up, and where each move leads to, (nodes, moves); a move that is not permitted adds
-        nothing and leads where the one before it does.
+        Sums of the weights (nodes,), and where such a move leads to, (nodes, greatest sum). The latter is empty if the
+        weights are no whole numbers, or if the table would be large; then moves are to be weighed at every step.
     """
     permitted = neighbours >= 0
     potential = np.where(permitted, potentials[steps[neighbours]], -np.inf)
     greatest = np.maximum(potential.max(axis=1, keepdims=True), 0.0)
     weights = np.where(permitted, greatest - potential + 1.0, 0.0)
-    targets = np.where(permitted, neighbours, -1)
-    before = np.arange(len(targets))
-    for move in range(targets.shape[1]):
-        targets[:, move] = before = np.where(permitted[:, move], targets[:, move], before)
-    return np.cumsum(weights, axis=1), targets.astype(np.int32)
-
-
-@kernel
-def _choose(uniform, added, targets, node):  # type: ignore[no-untyped-def]
-    """Choose one of a node's neighbours as `_next_node` does, from a `choice_table`.
-
-    All moves are compared: where to stop is what no processor can foresee, and a wrong guess takes longer.
-    """
-    last = added.shape[1] - 1
-    place, move = uniform * added[node, last], 0
-    for other in range(last):
-        move += added[node, other] <= place
-    return targets[node, move]
+    totals = weights.sum(axis=1)
+    whole = bool((weights == np.floor(weights)).all()) and totals.max() <= MAX_SLOTS and len(totals) < 2**15
+    slots = np.zeros((len(totals) if whole else 0, int(totals.max()) if whole else 0), dtype=np.int16)
+    places = np.arange(slots.shape[1])
+    for move, ends in enumerate(np.cumsum(weights, axis=1).T[:, : len(slots), None]):
+        np.copyto(slots, neighbours[:, move, None], where=(places < ends) & (places >= ends - weights[:, move, None]))
+    return totals, slots
 
 
 @kernel
@@ -142,22 +183,38 @@ def erase_loops(nodes, count, path, place):  # type: ignore[no-untyped-def]
         count: Number of its nodes.
         path: (≥ nodes + 1,) written; so is its number of nodes.
         place: (nodes,) scratch.
-
-    Returns:
-        The number of nodes left.
     """
+    for k in range(1, count + 1):
+        place[nodes[k]] = k
+    _leap(nodes, count, path, place)
+
+
+@kernel
+def _leap(nodes, count, path, place):  # type: ignore[no-untyped-def]
+    """Write a path without its loops, by the last place of every node: from there it never comes back."""
+    kept, k = 0, 1
+    while k <= count:
+        node = nodes[k]
+        kept += 1
+        path[kept] = node
+        k = place[node] + 1
+    path[0] = kept
+
+
+@kernel
+def _write(trail, count, erase, path, place):  # type: ignore[no-untyped-def]
+    """Write a walk of `count` nodes as a path; `place` tells the last place of every node."""
+    if erase:
+        _leap(trail, count, path, place)
+        return
     kept = 0
     for k in range(1, count + 1):
-        node = nodes[k]
-        known = place[node]
-        if 1 <= known <= kept and path[known] == node:
-            kept = known
-        else:
-            kept += 1
-            path[kept] = node
-            place[node] = kept
+        if kept == len(path) - 1:  # full: what has no loops fits always
+            erase_loops(path, kept, path, place)
+            kept = path[0]
+        kept += 1
+        path[kept] = trail[k]
     path[0] = kept
-    return kept
 
 
 @kernel

@@ -17,32 +17,6 @@ NOT_CONNECTED, CONNECTED = -1, -2
 
 
 @kernel
-def begin(draws, world, weights, erase, paths, results, place):  # type: ignore[no-untyped-def]
-    """Fill a population with random walks from start to goal, and measure them.
-
-    Args:
-        draws: See `paths.grid_walks`.
-        world: (neighbours, moves of a front, coordinates, kinds, unsafeness, potentials, fronts, steps from the goal,
-            (start, goal), choices of walks to the goal, the same of no walk); `fronts` (nodes, nodes) holds the steps
-            to every node from every other, or nothing.
-        weights: ε and λ of Eq. 1.
-        erase: Whether loops are erased.
-        paths: (individuals, nodes + 1) written.
-        results: (3, individuals) written.
-        place: (nodes,) scratch.
-
-    Returns:
-        Whether the draws sufficed; if not, the population is not complete.
-    """
-    for k in range(len(paths)):
-        walk(draws, world[0], world[5], world[7], world[9], world[8], erase, paths[k], place)
-        if used_up(draws):
-            return False
-        measure(paths[k], world, weights, results, k)
-    return True
-
-
-@kernel
 def measure(path, world, weights, results, k):  # type: ignore[no-untyped-def]
     """Write D, S and C = ε D + λ S of a path (Eqs. 1 to 3) into column k of `results`."""
     distance, mean = measure_path(path, world[3], world[4])
@@ -63,7 +37,8 @@ def advance(draws, world, weights, breeding, population, following, memory):  # 
 
     Args:
         draws: See `paths.grid_walks`.
-        world: See `begin`.
+        world: (neighbours, moves of a front, coordinates, kinds, unsafeness, potentials, fronts); `fronts`
+            (nodes, nodes) holds the steps to every node from every other, or nothing.
         weights: ε and λ of Eq. 1.
         breeding: Whether loops are erased; multiple of the scaling; crossover's rate and reach; mutation's rate.
         population: Paths (individuals, nodes + 1) and results (3, individuals).
@@ -80,11 +55,11 @@ def advance(draws, world, weights, breeding, population, following, memory):  # 
     num, count = len(paths), len(parents)
     choose_elites(results[COST], elites)
     scale_costs(results[COST], count, multiple, expected)
-    selecting = num_remainder_uniforms(num, count)
-    if selecting > len(draws[0]):
+    first = draws[1][0]
+    draws[1][0] += num_remainder_uniforms(num, count)
+    if used_up(draws):
         return False
-    choose_by_remainders(draws[0][:selecting], expected, order, parents)
-    draws[1][0] = selecting
+    choose_by_remainders(draws[0][first : draws[1][0]], expected, order, parents)
     for first in range(0, count, 2):
         crossed = False
         if first + 1 < count and draw(draws) < crossover_rate:
@@ -128,7 +103,7 @@ def cross(draws, world, parents, settings, children, scratch):  # type: ignore[n
 
     Args:
         draws: See `paths.grid_walks`.
-        world: See `begin`.
+        world: See `advance`.
         parents: Two paths.
         settings: Whether loops are erased; reach.
         children: Two paths, written if the parents are crossed.
@@ -297,7 +272,7 @@ def connection(draws, neighbours, one, two):  # type: ignore[no-untyped-def]
 @kernel
 def mutate(draws, world, erase, path, scratch):  # type: ignore[no-untyped-def]
     """Replace what lies between two nodes of a path, drawn at random, by a random walk from one to the other."""
-    neighbours, num_moves, _, _, _, potentials, fronts, _, _, _, none = world
+    neighbours, num_moves, _, _, _, potentials, fronts = world
     place, joined, _, steps, queue, walked = scratch
     count = path[0]
     first = draw_index(draws, count) + 1
@@ -306,10 +281,10 @@ def mutate(draws, world, erase, path, scratch):  # type: ignore[no-untyped-def]
     low, high = min(first, second), max(first, second)
     ends = (path[low], path[high])
     if len(fronts) > 0:
-        walk(draws, neighbours, potentials, fronts[ends[1]], none, ends, erase, walked, place)
+        walk(draws, (neighbours, potentials, fronts[ends[1]]), ends, erase, walked, place)
     else:
         spread_front(neighbours, num_moves, path[high : high + 1], steps, queue)
-        walk(draws, neighbours, potentials, steps, none, ends, erase, walked, place)
+        walk(draws, (neighbours, potentials, steps), ends, erase, walked, place)
     last = low - 1
     for k in range(1, low):
         joined[k] = path[k]

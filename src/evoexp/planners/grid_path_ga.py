@@ -20,7 +20,7 @@ from evoexp.errors import SettingError
 from evoexp.evolution.scaled_settings import ScaledGenetic
 from evoexp.evolution.statistics import cost_statistics
 from evoexp.objectives.path_cost import PathCost
-from evoexp.paths.grid_walks import choice_table
+from evoexp.paths.grid_walks import choice_table, walk_all
 from evoexp.paths.grids import UNREACHED, spread_front
 from evoexp.paths.motion import Motion
 from evoexp.planners import grid_kernels
@@ -31,7 +31,9 @@ from evoexp.scenarios.grid_motion import GridMotion
 from evoexp.validation import Component, NonNegativeCount
 
 FEW_NODES = 2048  # of grids so small the steps between all nodes are worked out once: at most 16 MB
-BLOCK = 1024  # uniform numbers drawn at once
+BLOCK = 16384  # uniform numbers drawn at once, at least: what one generation leaves of them is for the next
+SMALL_BLOCK = 1024  # the same, for the walks of one population, whose rest is thrown away
+STEPS_PER_WALK = 2.5  # as a multiple of the fewest: for so many numbers are drawn at first
 
 
 class Problem(NamedTuple):
@@ -39,15 +41,17 @@ class Problem(NamedTuple):
 
     Attributes:
         fields: Grid, unsafeness, potentials.
-        steps: (nodes,) from every node to the goal.
+        moves: What walks to the goal need, see `grid_walks.walk`; the last of it are the steps of every node to it.
+        choices: The same as a table, see `grid_walks.choice_table`.
         ends: Indices of start and goal.
-        world: The same as kernels take it, see `grid_kernels.begin`.
+        world: What the kernels of a generation need, see `grid_kernels.advance`.
         scene: The bodies themselves, for the exact verdict on a motion.
         security_margin: Clearance that the task requires [length unit].
     """
 
     fields: Fields
-    steps: np.ndarray
+    moves: tuple[np.ndarray, FloatArray, np.ndarray]
+    choices: tuple[FloatArray, np.ndarray]
     ends: tuple[int, int]
     world: tuple[Any, ...]
     scene: Scene
@@ -95,6 +99,7 @@ class GridPathGa(Component):
     """
 
     component: ClassVar[str] = "grid_path_ga"
+    revision: ClassVar[int] = 2
 
     revisits: bool
     crossover_reach: NonNegativeCount
@@ -143,7 +148,15 @@ class GridPathGa(Component):
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> np.ndarray:
         """Return random paths as the initial population has them, (count, nodes + 1)."""
-        return _begin(self, problem, rng, count)[0]
+        paths, _ = _table(count, problem.fields.grid.num_nodes)
+        arguments = (problem.moves, problem.choices, problem.ends, not self.revisits)
+        uniforms = rng.random(int(STEPS_PER_WALK * count * problem.moves[2][problem.ends[0]]) + 1)
+        complete, taken = walk_all(uniforms, *arguments, 0, paths)
+        while complete < count:
+            left = uniforms[taken:]
+            uniforms = np.concatenate([left, rng.random(max(SMALL_BLOCK, len(left)))])
+            complete, taken = walk_all(uniforms, *arguments, complete, paths)
+        return paths
 
     def cost(self, problem: Problem, population: np.ndarray) -> Judgement:
         """Judge paths (individuals, nodes + 1), valid ones.
@@ -218,7 +231,7 @@ class _Search:
     def __init__(self, planner: GridPathGa, problem: Problem) -> None:
         ga, nodes = planner.ga, problem.fields.grid.num_nodes
         self._planner, self._problem = planner, problem
-        self.population = self._other = _table(ga.population_size, nodes)
+        self.population, self._other = _table(ga.population_size, nodes), _table(ga.population_size, nodes)
         count = ga.num_offspring
         parents, elites = np.empty(count, dtype=np.int64), np.empty(ga.num_elites, dtype=np.int64)
         choosing = parents, elites, np.empty(ga.population_size), np.empty(ga.population_size, dtype=np.int64)
@@ -228,19 +241,23 @@ class _Search:
         self._memory = choosing, (place, joined, sites, steps, queue, walked)
         rates = ga.scaling_multiple, ga.crossover_rate, planner.crossover_reach, ga.mutation_rate
         self._breeding = (not planner.revisits, *rates)
+        self._uniforms, self._taken = np.empty(0), np.zeros(1, dtype=np.int64)
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw the initial population."""
-        ga = self._planner.ga
-        self.population = _begin(self._planner, self._problem, rng, ga.population_size)
-        self._other = _table(ga.population_size, self._problem.fields.grid.num_nodes)
+        planner, (paths, results) = self._planner, self._other
+        paths[:] = planner.sample(self._problem, rng, len(paths))
+        grid_kernels.measure_all(paths, self._problem.world, planner.objective.weights, results)
+        self.population, self._other = self._other, self.population
 
     def advance(self, rng: np.random.Generator) -> None:
         """Go on to the next generation."""
-        planner, taken, uniforms = self._planner, np.zeros(1, dtype=np.int64), rng.random(BLOCK)
-        fixed = (self._problem.world, planner.objective.weights, self._breeding)
-        while not grid_kernels.advance((uniforms, taken), *fixed, self.population, self._other, self._memory):
-            uniforms, taken[0] = np.concatenate([uniforms, rng.random(len(uniforms))]), 0
+        fixed = (self._problem.world, self._planner.objective.weights, self._breeding)
+        taken, before = self._taken, self._taken[0]
+        while not grid_kernels.advance((self._uniforms, taken), *fixed, self.population, self._other, self._memory):
+            left = self._uniforms[before:]
+            self._uniforms = np.concatenate([left, rng.random(max(BLOCK, len(left)))])
+            taken[0] = before = 0
         self.population, self._other = self._other, self.population
 
 
@@ -270,29 +287,15 @@ def _prepared(collision: PotentialFields, robot: FloorPlatform, scenario: GridMo
     )
     ends = start, goal
     bodies = scene(robot.build(), scenario.bodies())
-    choices = choice_table(own.neighbours, fields.potentials, steps)
-    world += (_fronts(fields), steps, ends, choices, tuple(part[:0] for part in choices))
-    return Problem(fields, steps, ends, world, bodies, scenario.security_margin)
+    moves = own.neighbours, fields.potentials, steps
+    world += (_fronts(fields),)
+    return Problem(fields, moves, choice_table(*moves), ends, world, bodies, scenario.security_margin)
 
 
 def named_terms(results: FloatArray, num_nodes: Any) -> dict[str, float]:
     """Return D, S and the number of nodes of a path by name."""
     named = {"distance": float(results[DISTANCE]), "unsafeness": float(results[UNSAFENESS])}
     return named | {"num_nodes": float(num_nodes)}
-
-
-def _begin(
-    planner: GridPathGa, problem: Problem, rng: np.random.Generator, count: int
-) -> tuple[np.ndarray, FloatArray]:
-    """Draw random paths; return them and their results."""
-    nodes = problem.fields.grid.num_nodes
-    paths, results = _table(count, nodes)
-    place, taken = np.zeros(nodes, dtype=np.int32), np.zeros(1, dtype=np.int64)
-    uniforms = rng.random(count * 4 * int(problem.steps[problem.ends[0]]) + BLOCK)
-    arguments = (problem.world, planner.objective.weights, not planner.revisits, paths, results, place)
-    while not grid_kernels.begin((uniforms, taken), *arguments):
-        uniforms, taken[0] = np.concatenate([uniforms, rng.random(len(uniforms))]), 0
-    return paths, results
 
 
 def _table(count: int, nodes: int) -> tuple[np.ndarray, FloatArray]:

@@ -19,6 +19,7 @@ from evoexp.store.messages import (
     encode_solution,
     encode_summary,
     encode_values,
+    generation_row,
     json_schema,
 )
 
@@ -39,9 +40,9 @@ _TICK = 1_000_000_000  # [ns] the synthetic clock: one second per generation
 
 
 class _Pending(NamedTuple):
-    """A generation that waits to be encoded, with copies of what the planner will overwrite."""
+    """What is kept of a generation that waits to be encoded; nothing of the planner's memory, which is large."""
 
-    generation: Generation
+    row: dict[str, Any]
     costs: FloatArray
     best: bytes
     state: bytes
@@ -159,8 +160,10 @@ class Log:
         What the planner may change is copied here; encoding waits for a batch of generations, because between kernels
         its code would run from a cold cache each time (a fifth of a replicate's time).
         """
-        best = array_bytes(np.asarray(generation.best, dtype=np.float64))
-        self._pending.append(_Pending(generation, generation.costs.copy(), best, self._chain.state()))
+        if generation.terms.keys() != self._terms.keys():
+            self._terms = {name: TERM + name for name in sorted(generation.terms)}
+        row, best = generation_row(generation, self._terms.items()), np.asarray(generation.best, dtype=np.float64)
+        self._pending.append(_Pending(row, generation.costs.copy(), array_bytes(best), self._chain.state()))
         self._last = generation
         if len(self._pending) >= _BATCH:
             self._flush()
@@ -171,16 +174,13 @@ class Log:
                 self.write_front(FrontRow(generation.index, population, criteria.T))
 
     def _flush(self) -> None:
-        for generation, costs, best, state in self._pending:
-            first = GENERATION_TOPIC not in self._channels
-            self._best, self._best_cost = best, float(generation.best_cost)
-            link = self._chain.update(costs, best, state)
-            if generation.terms.keys() != self._terms.keys():
-                self._terms = {name: TERM + name for name in sorted(generation.terms)}
-            data = encode_generation(generation, self._terms.items(), link)
-            self._add(GENERATION_TOPIC, GenerationRow, generation.index, data)
+        for row, costs, best, state in self._pending:
+            first, index = GENERATION_TOPIC not in self._channels, row["index"]
+            self._best, self._best_cost = best, row["best_cost"]
+            data = encode_generation(row, self._chain.update(costs, best, state))
+            self._add(GENERATION_TOPIC, GenerationRow, index, data)
             if first or self._best_cost < self._written_cost:
-                self._write_solution(generation.index)
+                self._write_solution(index)
         self._pending.clear()
 
     def write_front(self, front: FrontRow) -> None:

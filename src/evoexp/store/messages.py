@@ -46,13 +46,12 @@ def json_schema(record: type, terms: tuple[str, ...] = ()) -> bytes:
     return orjson.dumps({"title": title, "type": "object", "properties": properties})
 
 
-def encode_generation(generation: Generation, terms: Iterable[tuple[str, str]], chain: str) -> bytes:
-    """Return the message of one generation.
+def generation_row(generation: Generation, terms: Iterable[tuple[str, str]]) -> dict[str, Any]:
+    """Return what is recorded of a generation as plain values, for `encode_generation`.
 
     Args:
         generation: What the planner yielded; its arrays are left out.
         terms: (name, column) of every term, in the order of the columns.
-        chain: The generation's link, 32 hex digits.
     """
     row: dict[str, Any] = {
         "index": int(generation.index),
@@ -68,6 +67,16 @@ def encode_generation(generation: Generation, terms: Iterable[tuple[str, str]], 
     values = generation.terms
     for name, column in terms:
         row[column] = float(values[name])
+    return row
+
+
+def encode_generation(row: dict[str, Any], chain: str) -> bytes:
+    """Return the message of one generation.
+
+    Args:
+        row: Of `generation_row`; becomes complete here.
+        chain: The generation's link, 32 hex digits.
+    """
     # One addition per number decides the usual case; a sum that overflows only takes the longer way.
     total = sum(row.values())
     row["chain"] = chain

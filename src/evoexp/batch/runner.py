@@ -25,7 +25,7 @@ from evoexp.kernel_cache import is_compiled, note_compiled
 from evoexp.paths.motion import Motion
 from evoexp.records import ReplicateSummary
 from evoexp.store.manifest import manifest
-from evoexp.store.run_directory import RunDirectory, lock_all
+from evoexp.store.run_directory import RunDirectory, create_all, lock_all
 from evoexp.store.summaries import write_summary
 
 TASK_S = 0.2  # [s] replicates are bundled into tasks of about this length; a task costs the parent some 2 ms
@@ -62,6 +62,7 @@ class Batch:
         self.runs = {key: RunDirectory(outputs, key) for key in self._wanted}
         self.jobs = self._missing()
         self._finished: dict[str, dict[int, ReplicateSummary]] = {}  # by this batch, per condition
+        self._summarised: set[str] = set()  # conditions whose table is written
 
     def prepare(self) -> None:
         """Check every condition against its robot and scenario, before anything is written.
@@ -84,16 +85,15 @@ class Batch:
             config_jsons = list(dict.fromkeys(job.condition_json for job in self.jobs))
             files = list(dict.fromkeys(content for job in self.jobs for content in job.files))
             with loading(num_workers, load, config_jsons, files):
-                for key, run in self.runs.items():
-                    condition, _, notes = self._wanted[key]
-                    run.create(condition.to_json(), manifest(key) | notes, condition.files())
+                wanted = ((run, *self._wanted[key]) for key, run in self.runs.items())
+                create_all((run, own.to_json(), manifest(own.id) | notes, own.files()) for run, own, _, notes in wanted)
                 _compile(config_jsons)
             try:
                 for outcomes in fan_out(self.jobs, num_workers):
                     yield from self._store(outcomes)
             finally:
-                for key, run in self.runs.items():
-                    write_summary(run, self._finished.pop(key, {}))
+                for key in self.runs.keys() - self._summarised:
+                    self._summarise(key)
 
     def _missing(self) -> list[Job]:
         jobs = []
@@ -115,7 +115,13 @@ class Batch:
                 self._finished.setdefault(outcome.condition_id, {})[outcome.replicate] = outcome.summary
         for key, contents in by_run.items():
             self.runs[key].write_logs(contents)
+            if len(self._finished[key]) == self._wanted[key][1]:  # now, while the workers go on
+                self._summarise(key)
         return [outcome._replace(content=b"") for outcome in outcomes]
+
+    def _summarise(self, key: str) -> None:
+        write_summary(self.runs[key], self._finished.pop(key, {}))
+        self._summarised.add(key)
 
 
 def fan_out(jobs: Sequence[Job], num_workers: int) -> Iterator[list[Outcome]]:

@@ -1,12 +1,13 @@
 """Files that are either whole or not there, whenever the process or the machine dies."""
 
 import os
+from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 
-FEW = 8  # files from which on they are synced by that many threads; starting those costs as much as syncing two
+FEW = 8  # files from which on they are written by that many threads; starting those costs as much as syncing two
 _SUFFIX = ".tmp"
 
 
@@ -16,17 +17,15 @@ def write_files(contents: Mapping[Path, bytes]) -> None:
     No file is renamed before its bytes are on the disk: a name always means a whole file. A batch is cheaper than its
     files one by one: they are synced at once, which the disk answers together, and the directory once.
     """
-    written: list[tuple[Path, Path]] = []
+    files = [(path.with_name(f".{path.name}.{os.getpid()}{_SUFFIX}"), path) for path in contents]
+    renamed = 0
     try:
-        for path, content in contents.items():
-            temporary = path.with_name(f".{path.name}.{os.getpid()}{_SUFFIX}")
-            written.append((temporary, path))
-            temporary.write_bytes(content)
-        _sync_files([temporary for temporary, _ in written])
-        for temporary, path in written:
+        _write_all([temporary for temporary, _ in files], list(contents.values()))
+        for temporary, path in files:
             os.replace(temporary, path)
+            renamed += 1
     finally:
-        for temporary, _ in written:
+        for temporary, _ in files[renamed:]:
             temporary.unlink(missing_ok=True)
     for directory in {path.parent for path in contents}:
         sync_directory(directory)
@@ -37,21 +36,20 @@ def write_file(path: Path, content: bytes) -> None:
     write_files({path: content})
 
 
-def _sync_files(paths: Sequence[Path]) -> None:
+def _write_all(paths: Sequence[Path], contents: Sequence[bytes]) -> None:
     if len(paths) < FEW:
-        for path in paths:
-            _sync(path)
+        deque(map(_write, paths, contents), maxlen=0)
         return
     with ThreadPoolExecutor(FEW) as threads:
-        list(threads.map(_sync, paths))
+        deque(threads.map(_write, paths, contents), maxlen=0)
 
 
-def _sync(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDWR)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+def _write(path: Path, content: bytes) -> None:
+    """Write a file; return when it is on the disk."""
+    with open(path, "wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
 
 
 def sync_directory(path: Path) -> None:

@@ -81,19 +81,26 @@ class RunDirectory:
         Raises:
             StoreError: The directory is damaged or belongs to another condition.
         """
+        create_all([(self, config_json, manifest, files or {})])
+
+    def _missing_files(
+        self, config_json: bytes, manifest: Mapping[str, Any], files: Mapping[str, bytes]
+    ) -> dict[Path, bytes]:
+        """Return what `create` is to write, the configuration behind the files that it refers to; make directories."""
         if hashlib.sha256(config_json).hexdigest() != self.condition_id:
             raise ValueError(f"config_json: is not of condition {self.hash12}")
         self.replicates.mkdir(parents=True, exist_ok=True)
+        missing = {}
         if (self.path / "config.json").exists():
             self.check()
         else:
-            for name, content in (files or {}).items():
+            for name, content in files.items():
                 (self.path / name).parent.mkdir(exist_ok=True)
-                write_file(self.path / name, content)
-            write_file(self.path / "config.json", config_json)
-            sync_directory(self.path.parent)
+                missing[self.path / name] = content
+            missing[self.path / "config.json"] = config_json
         if not (self.path / "manifest.json").exists():
-            write_file(self.path / "manifest.json", json.dumps(manifest, indent=2, sort_keys=True).encode() + b"\n")
+            missing[self.path / "manifest.json"] = json.dumps(manifest, indent=2, sort_keys=True).encode() + b"\n"
+        return missing
 
     def check(self) -> None:
         """Raise unless `config.json` is this very condition's.
@@ -197,6 +204,20 @@ def lock_all(runs: Iterable[RunDirectory]) -> Iterator[None]:
         for _, run in sorted({run.path: run for run in runs}.items(), key=lambda item: item[1].condition_id):
             stack.enter_context(run.lock())
         yield
+
+
+def create_all(runs: Iterable[tuple[RunDirectory, bytes, Mapping[str, Any], Mapping[str, bytes]]]) -> None:
+    """Create several runs as `RunDirectory.create` does, given its arguments; cheaper than one by one.
+
+    Raises:
+        StoreError: A directory is damaged or belongs to another condition; no file is then written.
+    """
+    missing: dict[Path, bytes] = {}
+    for run, *arguments in runs:
+        missing |= run._missing_files(*arguments)
+    write_files(missing)
+    for root in {path.parents[1] for path in missing if path.name == "config.json"}:
+        sync_directory(root)
 
 
 def outputs_root() -> Path:

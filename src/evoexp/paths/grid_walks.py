@@ -115,7 +115,7 @@ def walk_all(uniforms, moves, choices, ends, erase, first, paths):  # type: igno
                 if len(slots) > 0:
                     chosen = np.uint64(slots[node, np.uint64(uniforms[taken] * totals[node])])
                 else:
-                    chosen = np.uint64(_next_node(uniforms[taken], neighbours, potentials, steps, node))
+                    chosen = np.uint64(_next_node(uniforms[taken], neighbours, potentials, steps, np.int64(node)))
                 node = chosen if goes else node
                 taken += goes
                 count += goes
@@ -156,21 +156,25 @@ def choice_table(neighbours: np.ndarray, potentials: FloatArray, steps: np.ndarr
 
 @kernel
 def _next_node(uniform, neighbours, potentials, steps, node):  # type: ignore[no-untyped-def]
-    """Choose one of a node's neighbours by a uniform number; the node itself if it has none."""
+    """Choose one of a node's neighbours by a uniform number; the node itself if it has none.
+
+    All moves are looked at, without a branch: which ones are permitted or chosen no processor can foresee.
+    """
     greatest, total, count = 0.0, 0.0, 0
     for move in range(neighbours.shape[1]):
         other = neighbours[node, move]
-        if other >= 0:
-            potential = potentials[steps[other]]
-            greatest = max(greatest, potential)
-            total += potential
-            count += 1
+        permitted = other >= 0
+        potential = potentials[steps[other if permitted else node]]
+        greatest = max(greatest, potential if permitted else 0.0)
+        total += potential if permitted else 0.0
+        count += permitted
     left, chosen = uniform * (count * (greatest + 1.0) - total), node
     for move in range(neighbours.shape[1]):
         other = neighbours[node, move]
-        if other >= 0 and left >= 0.0:
-            chosen = other
-            left -= greatest - potentials[steps[other]] + 1.0
+        permitted = other >= 0
+        weight = greatest - potentials[steps[other if permitted else node]] + 1.0
+        chosen = other if permitted & (left >= 0.0) else chosen
+        left -= weight if permitted else 0.0
     return chosen
 
 

@@ -154,8 +154,9 @@ def exchange_without_loops(head, tail, i, j, sites, child):  # type: ignore[no-u
     """
     least, behind = i, j
     for k in range(sites.shape[1]):
-        if sites[1, k] > j and sites[0, k] < least:
-            least, behind = sites[0, k], sites[1, k]
+        sooner = (sites[1, k] > j) & (sites[0, k] < least)
+        least = sites[0, k] if sooner else least
+        behind = sites[1, k] if sooner else behind
     for k in range(1, least + 1):
         child[k] = head[k]
     shift = least - behind
@@ -190,9 +191,9 @@ def coincident_sites(one, two, place, sites):  # type: ignore[no-untyped-def]
     count = 0
     for k in range(2, two[0]):
         known = place[two[k]]
-        if 2 <= known < one[0] and one[known] == two[k] and count < sites.shape[1]:
-            sites[0, count], sites[1, count] = known, k
-            count += 1
+        known = known if (known >= 2) & (known < one[0]) else 0
+        sites[0, count], sites[1, count] = known, k  # kept by counting it: a branch would be guessed wrong often
+        count += (known > 0) & (one[known] == two[k])
     return count
 
 

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from collections import deque
+from collections.abc import Sequence
 from pathlib import Path
 
 import joblib
@@ -275,12 +276,16 @@ def test_a_killed_worker_costs_its_own_replicate_a_retry(
 # Bundles
 
 
+def outcomes_of(jobs: Sequence[Job], wall_s: float) -> list[Outcome]:
+    return [Outcome(job.condition_id, job.replicate, "", "", b"", wall_s) for job in jobs]
+
+
 @given(
     st.integers(0, 300),
     st.integers(2, 8),
-    st.lists(st.floats(1e-5, 1.0), min_size=1, max_size=20),
+    st.lists(st.tuples(st.floats(1e-5, 1.0), st.integers(1, MAX_BUNDLE)), min_size=1, max_size=20),
 )
-def test_every_job_is_bundled_once(num_jobs: int, num_workers: int, walls: list[float]) -> None:
+def test_every_job_is_run_once_and_in_order(num_jobs: int, num_workers: int, tasks: list[tuple[float, int]]) -> None:
     waiting = [Job("0" * 64, b"", k) for k in range(num_jobs)]
     in_flight: dict[tuple[str, int], Job] = {}
     bundles = _Bundles(deque(waiting), in_flight, num_workers)
@@ -289,9 +294,9 @@ def test_every_job_is_bundled_once(num_jobs: int, num_workers: int, walls: list[
         assert 1 <= len(bundle) <= MAX_BUNDLE
         assert len(bundle) <= max(1, -(-(num_jobs - len(seen)) // (2 * num_workers))), "nobody waits for one worker"
         assert all(in_flight[job.key] == job for job in bundle)
-        seen += bundle
-        wall = walls[count % len(walls)]
-        bundles.took([Outcome(job.condition_id, job.replicate, "", "", b"", wall) for job in bundle])
+        wall, done = tasks[count % len(tasks)]
+        seen += bundle[:done]  # the worker stopped there
+        bundles.took(outcomes_of(bundle[:done], wall))
         assert not in_flight
     assert seen == waiting
 
@@ -300,14 +305,25 @@ def test_bundles_are_as_long_as_a_task() -> None:
     waiting = [Job("0" * 64, b"", k) for k in range(1000)]
     bundles = _Bundles(deque(waiting), {}, 2)
     iterator = iter(bundles)
-    assert len(next(iterator)) == 1, "nothing is known yet"
-    bundles.took([Outcome("0" * 64, 0, "", "", b"", TASK_S / 10)])
-    assert len(next(iterator)) == 10
-    bundles.took([Outcome("0" * 64, k, "", "", b"", 1.0) for k in range(10)])
+    first = next(iterator)
+    assert len(first) == MAX_BUNDLE, "nothing is known yet"
+    bundles.took(outcomes_of(first[:3], TASK_S / 10))
+    second = next(iterator)
+    assert second == waiting[3:13]
+    bundles.took(outcomes_of(second, 1.0))
     assert len(next(iterator)) == 1
-    for _ in range(12):
-        bundles.took([Outcome("0" * 64, k, "", "", b"", TASK_S / 10) for k in range(10)])
-    assert len(next(iterator)) == 9, "slow ones are forgotten"
+    for _ in range(60):
+        bundle = next(iterator)
+        bundles.took(outcomes_of(bundle, TASK_S / 10))
+    assert len(next(iterator)) in (9, 10), "slow ones are forgotten"
+
+
+def test_a_task_that_takes_long_begins_no_further_replicate(faulty: Condition, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = [Job(faulty.id, faulty.to_json(), k) for k in range(3)]
+    assert [outcome.replicate for outcome in run_jobs(asked)] == [0, 1, 2]
+    monkeypatch.setattr(jobs, "LONGEST_TASK_S", 0.0)
+    assert [outcome.replicate for outcome in run_jobs(asked)] == [0]
+    assert run_jobs([]) == []
 
 
 def test_no_jobs_are_no_outcomes() -> None:

@@ -14,7 +14,7 @@ import pytest
 from store_samples import CONDITION, CONFIG
 
 from evoexp.errors import AmbiguousHash, Busy, EvoexpError, UnknownHash
-from evoexp.store.files import FEW
+from evoexp.store.files import NUM_THREADS
 from evoexp.store.log import Finished
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory, StoreError, find_runs, lock_all, outputs_root, resolve
@@ -100,7 +100,7 @@ def test_a_failed_write_leaves_nothing(run: RunDirectory, monkeypatch: pytest.Mo
     assert os.listdir(run.replicates) == []
 
 
-@pytest.mark.parametrize("count", [1, FEW - 1, FEW, 3 * FEW])
+@pytest.mark.parametrize("count", [1, 2, NUM_THREADS, 3 * NUM_THREADS])
 def test_nothing_gets_its_name_before_its_bytes_are_on_the_disk(
     run: RunDirectory, monkeypatch: pytest.MonkeyPatch, count: int
 ) -> None:

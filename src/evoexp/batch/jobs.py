@@ -12,6 +12,8 @@ from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.records import ReplicateSummary
 
+LONGEST_TASK_S = 2.0  # [s] a task that has taken so long begins no further replicate
+
 
 class Job(NamedTuple):
     """One replicate to run.
@@ -62,10 +64,17 @@ class Outcome(NamedTuple):
 
 
 def run_jobs(jobs: Sequence[Job]) -> list[Outcome]:
-    """Run some replicates, here; a failure is an outcome."""
-    outcomes = []
+    """Run some replicates, here, one after the other; a failure is an outcome.
+
+    Returns:
+        Their outcomes; of fewer than were asked for if they take longer than `LONGEST_TASK_S`, of one at least.
+    """
+    outcomes: list[Outcome] = []
+    begun = time.perf_counter()
     for job in jobs:
         start = time.perf_counter()
+        if outcomes and start - begun > LONGEST_TASK_S:
+            break
         try:
             keep_all(job.files)
             condition = _condition(job.condition_json)

@@ -147,24 +147,37 @@ def fan_out(jobs: Sequence[Job], num_workers: int) -> Iterator[list[Outcome]]:
 
 
 class _Bundles:
-    """Takes waiting jobs into tasks of about `TASK_S`, by the times seen of late."""
+    """Takes waiting jobs into tasks of about `TASK_S`, by the times seen of late.
+
+    Before any is seen, tasks are long, and end when they take too long: replicates that need the same library stand
+    together, and are best run where it is loaded.
+    """
 
     def __init__(self, waiting: deque[Job], in_flight: dict[tuple[str, int], Job], num_workers: int) -> None:
         self._waiting, self._in_flight, self._num_workers = waiting, in_flight, num_workers
+        self._bundles: dict[tuple[str, int], list[Job]] = {}  # those in flight, by their first jobs
         self._seconds, self._count = 0.0, 0.0
 
     def __iter__(self) -> Iterator[list[Job]]:
         while self._waiting:
-            mean = self._seconds / self._count if self._count else TASK_S
+            mean = self._seconds / self._count if self._count else 0.0
             fair = -(-len(self._waiting) // (2 * self._num_workers))
             size = max(1, min(MAX_BUNDLE, fair, int(TASK_S / max(mean, 1e-6))))
             bundle = [self._waiting.popleft() for _ in range(min(size, len(self._waiting)))]
             for job in bundle:
                 self._in_flight[job.key] = job
+            self._bundles[bundle[0].key] = bundle
             yield bundle
 
     def took(self, outcomes: Sequence[Outcome]) -> None:
-        """Note what came back; what came before counts half from now on, so that slow first jobs are soon forgotten."""
+        """Note what came back; what came before counts half from now on, so that slow first jobs are soon forgotten.
+
+        What a task did not begin is to wait again.
+        """
+        left = self._bundles.pop((outcomes[0].condition_id, outcomes[0].replicate))[len(outcomes) :]
+        for job in reversed(left):
+            del self._in_flight[job.key]
+            self._waiting.appendleft(job)
         self._seconds, self._count = self._seconds / 2.0, self._count / 2.0
         for outcome in outcomes:
             self._seconds += outcome.wall_s

@@ -146,12 +146,14 @@ def choice_table(neighbours: np.ndarray, potentials: FloatArray, steps: np.ndarr
     greatest = np.maximum(potential.max(axis=1, keepdims=True), 0.0)
     weights = np.where(permitted, greatest - potential + 1.0, 0.0)
     totals = weights.sum(axis=1)
-    whole = bool((weights == np.floor(weights)).all()) and totals.max() <= MAX_SLOTS and len(totals) < 2**15
-    slots = np.zeros((len(totals) if whole else 0, int(totals.max()) if whole else 0), dtype=np.int16)
-    places = np.arange(slots.shape[1])
-    for move, ends in enumerate(np.cumsum(weights, axis=1).T[:, : len(slots), None]):
-        np.copyto(slots, neighbours[:, move, None], where=(places < ends) & (places >= ends - weights[:, move, None]))
-    return totals, slots
+    whole = bool((weights == np.floor(weights)).all())
+    if not whole or totals.max() > MAX_SLOTS or len(totals) > 2**15:
+        return totals, np.empty((0, 0), dtype=np.int16)
+    slot = np.arange(int(totals.max()))
+    move = np.zeros((len(totals), len(slot)), dtype=np.int64)
+    for ends in np.cumsum(weights, axis=1).T[:-1]:
+        move += slot >= ends[:, None]
+    return totals, np.take_along_axis(neighbours, move, axis=1).astype(np.int16)
 
 
 @kernel

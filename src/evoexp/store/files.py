@@ -1,13 +1,13 @@
 """Files that are either whole or not there, whenever the process or the machine dies."""
 
 import os
-from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 
-FEW = 8  # files from which on they are written by that many threads; starting those costs as much as syncing two
+NUM_THREADS = 8  # that write files at the same time
 _SUFFIX = ".tmp"
 
 
@@ -37,11 +37,19 @@ def write_file(path: Path, content: bytes) -> None:
 
 
 def _write_all(paths: Sequence[Path], contents: Sequence[bytes]) -> None:
-    if len(paths) < FEW:
-        deque(map(_write, paths, contents), maxlen=0)
+    if len(paths) == 1:
+        _write(paths[0], contents[0])
         return
-    with ThreadPoolExecutor(FEW) as threads:
-        deque(threads.map(_write, paths, contents), maxlen=0)
+    writing = [_threads().submit(_write, *file) for file in zip(paths, contents, strict=True)]
+    wait(writing)  # for all of them, whatever happens to one
+    for one in writing:
+        one.result()
+
+
+@cache
+def _threads() -> ThreadPoolExecutor:
+    """Return the threads that write, which stay: starting them takes as long as syncing two files."""
+    return ThreadPoolExecutor(NUM_THREADS, "write")
 
 
 def _write(path: Path, content: bytes) -> None:

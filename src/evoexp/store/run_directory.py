@@ -213,8 +213,8 @@ def create_all(runs: Iterable[tuple[RunDirectory, bytes, Mapping[str, Any], Mapp
         StoreError: A directory is damaged or belongs to another condition; no file is then written.
     """
     missing: dict[Path, bytes] = {}
-    for run, *arguments in runs:
-        missing |= run._missing_files(*arguments)
+    for run, config_json, manifest, files in runs:
+        missing |= run._missing_files(config_json, manifest, files)
     write_files(missing)
     for root in {path.parents[1] for path in missing if path.name == "config.json"}:
         sync_directory(root)

@@ -21,6 +21,7 @@ Stamps = dict[str, list[int]]  # file name → size [B], modification time [ns]
 
 _VERSION = 2  # of the table's columns; another one is rebuilt
 _KEY = b"evoexp"
+_KNOWN: dict[Path, tuple[tuple[int, int, int], pa.Table]] = {}  # tables that this process wrote or read
 _PLAIN: dict[Any, pa.DataType] = {str: pa.string(), int: pa.int64(), float: pa.float64(), bool: pa.bool_()}
 _ARROW = _PLAIN | {kind | None: arrow for kind, arrow in _PLAIN.items()}
 _BASE = [pa.field(name, _ARROW[kind]) for name, kind in field_types(ReplicateSummary).items()]
@@ -51,6 +52,7 @@ def write_summary(run: RunDirectory, written: Mapping[int, ReplicateSummary] | N
     sink = pa.BufferOutputStream()
     pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
     write_file(run.summary_path, sink.getvalue().to_pybytes())
+    _KNOWN[run.summary_path] = _stamp(run.summary_path), table
     return table
 
 
@@ -105,8 +107,15 @@ def _stamps(run: RunDirectory) -> Stamps:
 
 
 def _stored(run: RunDirectory) -> pa.Table | None:
-    """Return the table as it was written, or None where there is no valid one of this version."""
+    """Return the table as it was written, or None where there is no valid one of this version.
+
+    What this process has written or read is not read again, as long as the file is the same.
+    """
     try:
+        stamp = _stamp(run.summary_path)
+        known = _KNOWN.get(run.summary_path)
+        if known is not None and known[0] == stamp:
+            return known[1]
         with pq.ParquetFile(run.summary_path, page_checksum_verification=True) as file:
             table = file.read()
         notes = json.loads(table.schema.metadata[_KEY])
@@ -115,7 +124,16 @@ def _stored(run: RunDirectory) -> pa.Table | None:
         valid = valid and all(table.schema.field(field.name).equals(field) for field in _BASE)
     except (pa.ArrowException, OSError, ValueError, LookupError, TypeError):
         return None
-    return table if valid else None
+    if not valid:
+        return None
+    _KNOWN[run.summary_path] = stamp, table
+    return table
+
+
+def _stamp(path: Path) -> tuple[int, int, int]:
+    """Return what tells whether a file is another one or was written again."""
+    status = path.stat()
+    return status.st_ino, status.st_size, status.st_mtime_ns
 
 
 def _stored_stamps(table: pa.Table) -> Stamps:

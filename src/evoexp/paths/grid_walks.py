@@ -11,7 +11,7 @@ longer one.
 
 import numpy as np
 
-from evoexp.numerics import kernel
+from evoexp.numerics import borrowed, kernel
 from evoexp.records import FloatArray
 
 LANES = 4  # walks at a time
@@ -91,6 +91,7 @@ def walk_all(uniforms, moves, choices, ends, erase, first, paths):  # type: igno
         How many paths are complete, those before `first` included, and how many numbers it took. If they are used up,
         it is to go on there with more of them, the rest of these being the first.
     """
+    uniforms, moves, choices, paths = borrowed((uniforms, moves, choices, paths))
     neighbours, potentials, steps = moves
     totals, slots = choices
     start, target = np.uint64(ends[0]), np.uint64(ends[1])  # without a sign, as an index might count from the end

@@ -7,7 +7,7 @@ mean unsafenesses and costs (3, individuals). A whole generation is one call; se
 from evoexp.evolution.remainder import choose_by_remainders, num_remainder_uniforms
 from evoexp.evolution.scaling import scale_costs
 from evoexp.evolution.selection import choose_elites
-from evoexp.numerics import kernel
+from evoexp.numerics import borrowed, kernel
 from evoexp.paths.grid_walks import draw, draw_index, erase_loops, measure_path, used_up, walk
 from evoexp.paths.grids import spread_front
 
@@ -27,6 +27,7 @@ def measure(path, world, weights, results, k):  # type: ignore[no-untyped-def]
 @kernel
 def measure_all(paths, world, weights, results):  # type: ignore[no-untyped-def]
     """Write D, S and C of all paths of a population."""
+    paths, world, results = borrowed((paths, world, results))
     for k in range(len(paths)):
         measure(paths[k], world, weights, results, k)
 
@@ -49,6 +50,7 @@ def advance(draws, world, weights, breeding, population, following, memory):  # 
     Returns:
         Whether the draws sufficed; if not, what is written is not complete.
     """
+    draws, world, population, following, memory = borrowed((draws, world, population, following, memory))
     erase, multiple, crossover_rate, reach, mutation_rate = breeding
     (paths, results), (children, values) = population, following
     (parents, elites, expected, order), scratch = memory

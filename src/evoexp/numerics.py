@@ -55,6 +55,10 @@ def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
         array.meminfo = cgutils.get_null_value(array.meminfo.type)
         array.parent = cgutils.get_null_value(array.parent.type)
         return array._getvalue()
+    if isinstance(kind, types.NumPyRandomGeneratorType):
+        generator = cgutils.create_struct_proxy(kind)(context, builder, value)
+        generator.meminfo = cgutils.get_null_value(generator.meminfo.type)
+        return generator._getvalue()
     if isinstance(kind, types.BaseTuple):
         items: Any = kind
         for k, item in enumerate(items):
@@ -341,6 +345,7 @@ def pow_int(x: float, n: int) -> float:
 @kernel
 def fill_standard_normal(rng: np.random.Generator, out: NDArray[np.float64]) -> None:
     """Fill out  # (n,) float64 with standard normal deviates; see `standard_normal`, for use inside kernels."""
+    rng = borrowed(rng)
     num_pairs = (out.size + 1) // 2
     pairs = np.empty(2 * num_pairs)
     s = np.empty(num_pairs)

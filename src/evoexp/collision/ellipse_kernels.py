@@ -13,7 +13,7 @@ blocks that `load_lanes` gathers.
 
 import numpy as np
 
-from evoexp.numerics import kernel
+from evoexp.numerics import borrowed, kernel
 from evoexp.robots.kinematics import U
 from evoexp.robots.planar_ends import LANES, begin_turning, block_ends, load_lanes, turned_ends
 
@@ -37,29 +37,39 @@ def paths_collide(starts, ends, lanes, count, arm, ellipses, path, hit):  # type
         path: M; the positions (1 … M) that are tested first; whether all positions follow, with chords swept.
         hit: (individuals,) written for those tested: whether each collides.
     """
-    num_positions, first_positions, chords = path
+    rows, num, num_ellipses = len(starts) * LANES, len(starts), len(ellipses[0])
     alive = np.empty(count + LANES, dtype=np.int64)
+    block = np.empty(rows), np.empty(rows), np.empty(LANES)
+    at = np.empty(LANES), np.empty(LANES), np.empty(LANES), np.empty(rows + LANES), np.empty(rows + LANES)
+    mapped = np.empty((2, num_ellipses * (rows + LANES))), np.empty((2, num_ellipses * (rows + LANES)))
+    codes = np.empty((num_ellipses, num + 1), dtype=np.int64), np.empty((num_ellipses, num + 1), dtype=np.int64)
+    memory = alive, block, at, np.empty((4, rows)), mapped, codes
+    _test_paths(starts, ends, lanes, count, arm, ellipses, path, hit, memory)
+
+
+@kernel
+def _test_paths(starts, ends, lanes, count, arm, ellipses, path, hit, memory):  # type: ignore[no-untyped-def]
+    """Do what `paths_collide` says, given its memory; so that no references are counted in the innermost loops."""
+    starts, ends, lanes, arm, ellipses, hit, memory = borrowed((starts, ends, lanes, arm, ellipses, hit, memory))
+    num_positions, first_positions, chords = path
+    alive = memory[0]
     alive[:count] = lanes[:count]
     for k in range(count):
         hit[lanes[k]] = False
     left = count if len(ellipses[0]) > 0 else 0
     for position in first_positions:
-        left = _drop_colliding(starts, ends, alive, left, arm, ellipses, position, num_positions, hit)
+        left = _drop_colliding(starts, ends, left, arm, ellipses, position, num_positions, hit, memory)
     if chords:
-        _sweep(starts, ends, alive, left, arm, ellipses, num_positions, hit)
+        _sweep(starts, ends, left, arm, ellipses, num_positions, hit, memory)
 
 
 @kernel
 def _drop_colliding(  # type: ignore[no-untyped-def]
-    starts, ends, alive, count, arm, ellipses, position, num_positions, hit
+    starts, ends, count, arm, ellipses, position, num_positions, hit, memory
 ):
     """Test one position; mark who collides, keep the others in front of `alive` and return how many they are."""
-    num, rows = len(starts), len(starts) * LANES
-    begin, end, least = np.empty(rows), np.empty(rows), np.empty(LANES)
-    angle, at_x, at_y = np.empty(LANES), np.empty(LANES), np.empty(LANES)
-    x, y = np.empty(rows + LANES), np.empty(rows + LANES)
-    mapped, codes = np.empty((2, rows + LANES)), np.empty(num + 1, dtype=np.int64)
-    kept = 0
+    alive, (begin, end, least), (angle, at_x, at_y, x, y), _, (mapped, _), (codes, _) = borrowed(memory)
+    num, kept = len(starts), 0
     for first in range(0, count, LANES):
         load_lanes(starts, alive, first, count, begin)
         load_lanes(ends, alive, first, count, end)
@@ -67,8 +77,8 @@ def _drop_colliding(  # type: ignore[no-untyped-def]
         least[:] = 1.0
         for e in range(len(ellipses[0])):
             reached = ellipses[1][e]
-            _map(ellipses[0][e], reached, num, x, y, U(0), mapped, codes)
-            _test_links(reached, num, U(0), mapped, codes, least)
+            _map(ellipses[0][e], reached, num, x, y, U(0), mapped, codes[0])
+            _test_links(reached, num, U(0), mapped, codes[0], least)
         for n in range(min(LANES, count - first)):
             individual, free = alive[first + n], least[n] > 0.0
             hit[individual] = not free
@@ -78,16 +88,11 @@ def _drop_colliding(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _sweep(starts, ends, alive, count, arm, ellipses, num_positions, hit):  # type: ignore[no-untyped-def]
+def _sweep(starts, ends, count, arm, ellipses, num_positions, hit, memory):  # type: ignore[no-untyped-def]
     """Test all positions, and the chords of all link ends between them."""
+    alive, (begin, end, least), (angle, at_x, at_y, x, y), turn, mapped, codes_of = borrowed(memory)
     num, rows = len(starts), len(starts) * LANES
-    begin, end, least = np.empty(rows), np.empty(rows), np.empty(LANES)
-    angle, at_x, at_y = np.empty(LANES), np.empty(LANES), np.empty(LANES)
-    x, y = np.empty(rows + LANES), np.empty(rows + LANES)
-    turn, size = np.empty((4, rows)), len(ellipses[0]) * (rows + LANES)
-    before, now = np.empty((2, size)), np.empty((2, size))
-    codes_before = np.empty((len(ellipses[0]), num + 1), dtype=np.int64)
-    codes = np.empty((len(ellipses[0]), num + 1), dtype=np.int64)
+    (before, now), (codes_before, codes) = mapped, codes_of
     for first in range(0, count, LANES):
         load_lanes(starts, alive, first, count, begin)
         load_lanes(ends, alive, first, count, end)

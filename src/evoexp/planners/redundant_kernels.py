@@ -15,7 +15,7 @@ from evoexp.evolution.ranking import choose_by_tournament, rank_weights
 from evoexp.evolution.selection import choose_elites, inverse_weights, spin_roulette
 from evoexp.evolution.statistics import summarise
 from evoexp.evolution.succession import succeed_rows
-from evoexp.numerics import kernel
+from evoexp.numerics import borrowed, kernel
 from evoexp.objectives.reaching import measure_reach, measure_reach_from
 
 TOURNAMENT, ROULETTE, RANK = range(3)
@@ -37,6 +37,7 @@ def advance(draws, breeding, judging, starts, memory):  # type: ignore[no-untype
     Returns:
         See `summary`.
     """
+    draws, breeding, judging, starts, memory = borrowed((draws, breeding, judging, starts, memory))
     population, offspring, parents, elites, lanes, hit = memory
     num_joints, num_genes, binary = len(starts), breeding[0], breeding[1]
     costs = population[len(population) - RESULTS]
@@ -148,6 +149,7 @@ def judge(starts, ends, lanes, count, judging, results, hit):  # type: ignore[no
         results: (3, individuals) written: cost, position error, joint displacement.
         hit: (individuals,) scratch.
     """
+    starts, ends, lanes, judging, results, hit = borrowed((starts, ends, lanes, judging, results, hit))
     arm, ellipses, path, target, box, weights = judging
     cost = results[0]
     measure_reach(starts, ends, lanes, count, arm, target, box, weights, cost, results[1], results[2])

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from evoexp.numerics import kernel
+from evoexp.numerics import borrowed, kernel
 from evoexp.robots.kinematics import BLOCK, U
 from evoexp.scenarios.obstacles import BOX, CAPSULE, CYLINDER, HALF_SPACE, SPHERE
 
@@ -37,11 +37,11 @@ def _below(rotation, origin, points, i, within):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def to_obstacles(obstacles, bounds, limit, centers, middles, scratch, out):  # type: ignore[no-untyped-def]
+def to_obstacles(obstacles, bounds, limit, centers, middles, scratch, place, out):  # type: ignore[no-untyped-def]
     """Lower `out` (BLOCK,), the limit, to the signed distance of any centre to any obstacle's surface."""
-    _, _, reach, spheres, _ = bounds
-    kind, center, rotation, size = obstacles
-    place = np.empty(ROWS)
+    _, _, reach, spheres, _ = borrowed(bounds)
+    kind, center, rotation, size = borrowed(obstacles)
+    centers, middles, scratch, place, out = borrowed((centers, middles, scratch, place, out))
     for o in range(len(kind)):
         for row in range(3):
             place[row * BLOCK : (row + 1) * BLOCK] = center[o, row]

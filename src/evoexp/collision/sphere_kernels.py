@@ -12,20 +12,29 @@ are far apart in a whole block.
 import numpy as np
 
 from evoexp.collision.obstacle_kernels import MARGIN, ROWS, meet, to_obstacles
-from evoexp.numerics import DEGREE, kernel
+from evoexp.numerics import DEGREE, borrowed, kernel
 from evoexp.robots.kinematics import BLOCK, PLANAR_ROWS, SPATIAL_ROWS, U, block_frames, block_planar_frames, load_block
 
 
 @kernel
 def clearances(tables, limit, q, out):  # type: ignore[no-untyped-def]
     """The kernel of `SphereCollision.clearance`, for other kernels; writes (2, configurations), q in degrees."""
+    num_spheres, num_bounds, num_joints = len(tables[2][0]), len(tables[3][0]), len(tables[0][0])
+    block_q, frames = np.zeros(q.shape[0] * BLOCK), np.empty(num_joints * SPATIAL_ROWS * BLOCK)
+    points = np.empty(num_spheres * ROWS), np.empty(num_bounds * ROWS)
+    scratch = np.empty(SPATIAL_ROWS * BLOCK), np.empty(ROWS)
+    memory = block_q, frames, points, scratch, np.empty(BLOCK), np.empty(BLOCK)
+    _clearances(tables, limit, q, out, memory)
+
+
+@kernel
+def _clearances(tables, limit, q, out, memory):  # type: ignore[no-untyped-def]
+    """Do what `clearances` says, given its memory; so that no references are counted in the innermost loops."""
+    tables, q, out, memory = borrowed((tables, q, out, memory))
     table, space, spheres, bounds, obstacles = tables
     joint, local, radius = spheres
     bound_joint, bound_local = bounds[0], bounds[1]
-    block_q = np.zeros(q.shape[0] * BLOCK)
-    frames = np.empty(len(table[0]) * SPATIAL_ROWS * BLOCK)
-    centers, middles = np.empty(len(joint) * ROWS), np.empty(len(bound_joint) * ROWS)
-    scratch, between, outside = np.empty(SPATIAL_ROWS * BLOCK), np.empty(BLOCK), np.empty(BLOCK)
+    block_q, frames, (centers, middles), (scratch, place), between, outside = memory
     _heights(space, table, joint, local, centers)
     _heights(space, table, bound_joint, bound_local, middles)
     for first in range(0, q.shape[1], BLOCK):
@@ -37,7 +46,7 @@ def clearances(tables, limit, q, out):  # type: ignore[no-untyped-def]
         _between_arms(space, bounds, max(limit + 2.0 * radius, 0.0), centers, middles, scratch, between)
         outside[:] = limit + radius
         if len(obstacles[0]) > 0:
-            to_obstacles(obstacles, bounds, limit + radius, centers, middles, scratch, outside)
+            to_obstacles(obstacles, bounds, limit + radius, centers, middles, scratch, place, outside)
         for lane in range(count):
             out[0, first + lane] = between[lane] - 2.0 * radius
             out[1, first + lane] = outside[lane] - radius
@@ -102,6 +111,7 @@ def _spatial_centers(joint, local, frames, centers):  # type: ignore[no-untyped-
 @kernel
 def _between_arms(space, bounds, limit, centers, middles, least, out):  # type: ignore[no-untyped-def]
     """Least centre distance over all pairs of arms, (BLOCK,), as far as it is below the limit."""
+    bounds, centers, middles, least, out = borrowed((bounds, centers, middles, least, out))
     _, _, reach, spheres, arm_links = bounds
     out[:] = limit
     for a in range(len(arm_links)):

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evoexp.numerics import kernel
+from evoexp.numerics import borrowed, kernel
 from evoexp.paths.arc_length import integrate_speed
 from evoexp.paths.layout import check_arm_slices, check_via_points, padded
 from evoexp.paths.spline import fit_spline
@@ -153,6 +153,7 @@ def redistribute_arms(
     via_points: Any, arm_slices: Any, num_lanes: int, samples_per_segment: int, pivots: Any, w: Any, integers: Any
 ) -> None:
     """See `redistribute`; num_lanes is a multiple of eight here."""
+    via_points, pivots, w, integers = borrowed((via_points, pivots, w, integers))
     N, S = np.uint64(via_points.shape[1] - 1), np.uint64(samples_per_segment)
     entered = integers[: (N + U1) * ROW]
     segment = integers[(N + U1) * ROW : (N + np.uint64(2)) * ROW]

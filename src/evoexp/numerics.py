@@ -68,11 +68,11 @@ def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
 
 
 borrowed: Callable[[Any], Any] = cast(Any, intrinsic(_borrow))
-"""Return arrays, or tuples of them to any depth, as views that own nothing: no counting of references.
+"""Return arrays, generators, or tuples of them to any depth, as views that own nothing: no counting of references.
 
-numba counts a reference, atomically, wherever an array is read out of a tuple or handed on; in a kernel that takes
-dozens of arrays and calls small `inlined` functions that is most of the time. For arguments only: their caller keeps
-them alive, while an array born in a kernel is freed where its name is last used.
+numba counts a reference, atomically, wherever an array is read out of a tuple or handed on, and wherever a number is
+drawn; in a kernel that takes dozens of arrays and calls small `inlined` functions that is most of the time. For
+arguments only: their caller keeps them alive, while an array born in a kernel is freed where its name is last used.
 """
 
 

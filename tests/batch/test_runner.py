@@ -22,7 +22,7 @@ from evoexp.batch.runner import MAX_BUNDLE, TASK_S, _Bundles, fan_out
 from evoexp.batch.workers import in_workers, loading
 from evoexp.cli import main
 from evoexp.condition import Condition
-from evoexp.errors import Busy, SettingError
+from evoexp.errors import Busy, CorruptLog, SettingError
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.tables import read_summaries
@@ -150,6 +150,17 @@ def test_planning_and_preparing_write_nothing(faulty: Condition, tmp_path: Path)
     with pytest.raises(SettingError, match="scenario.q_start: must be free of collision"):
         new_batch(tmp_path / "outputs", (faulty, 2), (bad, 2)).prepare()
     assert not (tmp_path / "outputs").exists()
+
+
+def test_an_older_damaged_log_is_said_when_everything_has_run(faulty: Condition, tmp_path: Path) -> None:
+    other = faulty._replace(seed=1)
+    run(tmp_path, (faulty, 1))
+    RunDirectory(tmp_path, faulty.id).log_path(0).rename(RunDirectory(tmp_path, faulty.id).log_path(7))
+    with pytest.raises(CorruptLog, match=r"0007\.mcap"):
+        run(tmp_path, (faulty, 2), (other, 2))
+    assert sorted(RunDirectory(tmp_path, faulty.id).completed()) == [0, 1, 7]
+    assert sorted(RunDirectory(tmp_path, other.id).completed()) == [0, 1]
+    assert RunDirectory(tmp_path, other.id).summary_path.exists()
 
 
 def test_a_failed_replicate_is_a_row_and_a_file_and_the_others_go_on(

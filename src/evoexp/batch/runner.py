@@ -21,6 +21,7 @@ from evoexp.batch.settings import RunnerSettings
 from evoexp.batch.workers import in_workers, loading, num_cores
 from evoexp.collision.certificate import certificate
 from evoexp.condition import Condition
+from evoexp.errors import CorruptLog
 from evoexp.kernel_cache import is_compiled, note_compiled
 from evoexp.paths.motion import Motion
 from evoexp.records import ReplicateSummary
@@ -116,11 +117,13 @@ class Batch:
         for key, contents in by_run.items():
             self.runs[key].write_logs(contents)
             if len(self._finished[key]) == self._wanted[key][1]:  # now, while the workers go on
-                self._summarise(key)
+                with contextlib.suppress(CorruptLog):  # an older log's damage is said at the end
+                    self._summarise(key)
         return [outcome._replace(content=b"") for outcome in outcomes]
 
     def _summarise(self, key: str) -> None:
-        write_summary(self.runs[key], self._finished.pop(key, {}))
+        write_summary(self.runs[key], self._finished.get(key, {}))
+        self._finished.pop(key, None)
         self._summarised.add(key)
 
 

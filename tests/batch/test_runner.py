@@ -1,6 +1,7 @@
 """A batch runs what is missing, keeps what is there, and survives what fails."""
 
 import json
+import math
 import os
 import subprocess
 import sys
@@ -89,6 +90,7 @@ def test_of_two_thousand_the_missing_ones_are_found_without_opening_a_log(
 
 
 def test_a_condition_is_built_once_per_process(faulty: Condition, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(jobs, "LONGEST_TASK_S", math.inf)  # kernels may have to be compiled
     jobs._condition.cache_clear()
     build, calls = Condition.from_config, []
     monkeypatch.setattr(Condition, "from_config", lambda config: calls.append(config) or build(config))  # type: ignore[func-returns-value]
@@ -331,6 +333,7 @@ def test_bundles_are_as_long_as_a_task() -> None:
 
 def test_a_task_that_takes_long_begins_no_further_replicate(faulty: Condition, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = [Job(faulty.id, faulty.to_json(), k) for k in range(3)]
+    monkeypatch.setattr(jobs, "LONGEST_TASK_S", math.inf)
     assert [outcome.replicate for outcome in run_jobs(asked)] == [0, 1, 2]
     monkeypatch.setattr(jobs, "LONGEST_TASK_S", 0.0)
     assert [outcome.replicate for outcome in run_jobs(asked)] == [0]

@@ -11,7 +11,7 @@ from evoexp.collision.certificate import certificate
 from evoexp.collision.potential_fields import PotentialFields
 from evoexp.errors import SettingError
 from evoexp.objectives.path_cost import PathCost
-from evoexp.planners import grid_kernels
+from evoexp.planners import grid_kernels, grid_path_ga
 from evoexp.planners.random_search import RandomSearch
 from planners.grid_samples import FIELDS, faults, planner, robot, scenario, solvable
 
@@ -124,6 +124,19 @@ def test_blocks_of_uniform_numbers_grow_where_walks_are_long() -> None:
     problem = own.prepare(robot(), scenario(blocked))
     for generation in own.evolve(problem, rng(5)):
         assert all(faults(problem, path, revisits=False) == [] for path in generation.population)
+
+
+@pytest.mark.parametrize("block", [1, 300, 2000])
+def test_generations_do_not_depend_on_how_numbers_are_drawn_in_blocks(
+    block: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = planner(mutation_rate=1.0)
+    problem = solvable((9, 9), 0.3, 4, own)
+    expected = [generation.population.copy() for generation in own.evolve(problem, rng(6))]
+    monkeypatch.setattr(grid_path_ga, "BLOCK", block)
+    found = [generation.population.copy() for generation in own.evolve(problem, rng(6))]
+    for one, two in zip(expected, found, strict=True):
+        assert [nodes_of(path) for path in one] == [nodes_of(path) for path in two]
 
 
 def test_large_grids_work_out_fronts_as_they_go() -> None:

@@ -17,7 +17,7 @@ class Generation(NamedTuple):
     """One generation of one replicate, as a planner yields it.
 
     `costs` and `population` are views into the planner's memory: valid until the next generation is asked for, hashed
-    into the digest and not recorded.
+    into the digest and not recorded. `best` is never changed: a better one is another array.
     """
 
     index: int  # type: ignore[assignment]  # 0 is the initial population

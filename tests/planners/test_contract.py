@@ -79,6 +79,14 @@ def test_costs_and_populations_are_views_that_hold_until_the_next_generation(con
         assert generation.num_feasible <= generation.costs.size
 
 
+def test_a_best_solution_is_never_changed(condition: Condition) -> None:
+    planner, problem = condition.prepare()
+    best, values = np.empty(0), np.empty(0)
+    for generation in planner.evolve(problem, condition.rng(0)):
+        assert np.array_equal(best, values)
+        best, values = generation.best, generation.best.copy()
+
+
 def test_the_last_population_is_left_alone_after_its_generation(condition: Condition) -> None:
     planner, problem = condition.prepare()
     generations = planner.evolve(problem, condition.rng(0))

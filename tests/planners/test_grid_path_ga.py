@@ -61,7 +61,7 @@ def test_exchange_without_loops_is_exchange_and_then_erasing_loops(
     problem = solvable(shape, share, seed, own)
     paths = own.sample(problem, rng(seed), 12)
     place, sites = np.zeros(problem.fields.grid.num_nodes, dtype=np.int32), np.zeros((2, 400), dtype=np.int32)
-    child = np.zeros_like(paths[0])
+    child = np.zeros(problem.fields.grid.num_nodes + 1, dtype=np.int32)
     for one, two in zip(paths[:-1], paths[1:], strict=True):
         count = grid_kernels.coincident_sites(one, two, place, sites)
         common = set(nodes_of(one)[1:-1]) & set(nodes_of(two)[1:-1])
@@ -126,17 +126,41 @@ def test_blocks_of_uniform_numbers_grow_where_walks_are_long() -> None:
         assert all(faults(problem, path, revisits=False) == [] for path in generation.population)
 
 
-@pytest.mark.parametrize("block", [1, 300, 2000])
-def test_generations_do_not_depend_on_how_numbers_are_drawn_in_blocks(
-    block: int, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("block", "stretch"), [(1, 8), (300, 8), (2000, 8), (16384, 1), (16384, 3), (400, 5)])
+def test_generations_do_not_depend_on_how_numbers_and_they_are_made_in_blocks(
+    block: int, stretch: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    own = planner(mutation_rate=1.0)
+    own = planner(mutation_rate=1.0, num_elites=2)
     problem = solvable((9, 9), 0.3, 4, own)
-    expected = [generation.population.copy() for generation in own.evolve(problem, rng(6))]
+
+    def run() -> list[tuple[list[list[int]], list[float], list[float]]]:
+        return [
+            ([nodes_of(path) for path in g.population], g.costs.tolist(), [g.best_cost, g.mean_cost, g.std_cost])
+            for g in own.evolve(problem, rng(6))
+        ]
+
+    expected = run()
     monkeypatch.setattr(grid_path_ga, "BLOCK", block)
-    found = [generation.population.copy() for generation in own.evolve(problem, rng(6))]
-    for one, two in zip(expected, found, strict=True):
-        assert [nodes_of(path) for path in one] == [nodes_of(path) for path in two]
+    monkeypatch.setattr(grid_path_ga, "STRETCH", stretch)
+    assert run() == expected
+
+
+def test_the_last_population_is_only_its_paths() -> None:
+    own = planner()
+    problem = solvable((9, 9), 0.3, 4, own)
+    *_, last = own.evolve(problem, rng(6))
+    assert last.population.shape[1] == last.population[:, 0].max() + 1
+    assert all(not path[path[0] + 1 :].any() for path in last.population)
+    np.testing.assert_array_equal(own.cost(problem, last.population).cost, last.costs)
+
+
+def test_walks_whose_moves_weigh_no_whole_numbers_take_the_longer_way() -> None:
+    fields = PotentialFields(**(FIELDS | {"goal_potentials": (0.5, 1.75)}))
+    own = planner(collision=fields)
+    problem = solvable((9, 9), 0.3, 4, own)
+    assert len(problem.choices[0]) == 0
+    for path in own.sample(problem, rng(2), 200):
+        assert faults(problem, path, revisits=False) == []
 
 
 def test_large_grids_work_out_fronts_as_they_go() -> None:
@@ -238,7 +262,7 @@ def test_random_search_draws_the_same_first_paths() -> None:
     problem = solvable((9, 9), 0.3, 4, own)
     control = RandomSearch(planner=own)
     first, drawn = next(own.evolve(problem, rng(7))), next(control.evolve(problem, rng(7)))
-    assert np.array_equal(first.population, drawn.population)
+    assert [nodes_of(path) for path in first.population] == [nodes_of(path) for path in drawn.population]
     assert np.array_equal(first.costs, drawn.costs)
 
 

@@ -2,14 +2,12 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from evoexp import compose
 from evoexp.batch.replicate import run_replicate
 from evoexp.collision.certificate import certificate
 from evoexp.errors import EvoexpError
-from evoexp.evolution.bit_coding import gray_to_binary
+from evoexp.planners import placement_ga
 from evoexp.planners.placement_ga import Problem
 
 BASE = ("experiment=chen_placement",)
@@ -19,22 +17,11 @@ def prepared(*words: str) -> tuple[object, Problem]:
     return compose.expand([*BASE, *words], only=["A torque norm"])[0].conditions[0].condition.prepare()
 
 
-@given(st.integers(0, 2**16 - 1), st.integers(0, 2**16 - 1))
-def test_gray_codes(one: int, two: int) -> None:
-    codes = [value ^ (value >> 1) for value in (one, two)]
-    gray = np.array([float(code >> bit & 1) for code in codes for bit in range(15, -1, -1)])[:, None]
-    plain = np.array([float(value >> bit & 1) for value in (one, two) for bit in range(15, -1, -1)])[:, None]
-    out = np.empty_like(gray)
-    gray_to_binary(gray, 1, 2, out)
-    np.testing.assert_array_equal(out, plain)
-
-
 @pytest.mark.parametrize("coding", ["binary", "gray"])
 def test_the_ends_of_the_range_are_values(coding: str) -> None:
     planner, problem = prepared(f"planner.coding={coding}")
-    bits = np.zeros((32, 2))
-    bits[0 if coding == "gray" else slice(0, 16), 1] = 1.0
-    low, high = (planner.solution(problem, bits, k) for k in range(2))  # type: ignore[attr-defined]
+    strings = np.array([[0, 0x8000 if coding == "gray" else 0xFFFF], [0, 0]])
+    low, high = (planner.solution(problem, strings, k) for k in range(2))  # type: ignore[attr-defined]
     assert (low[0], low[1], high[0], high[1]) == (-180.0, -180.0, 180.0, -180.0)
 
 
@@ -46,6 +33,37 @@ def test_cost_and_solution_are_those_of_evolve() -> None:
         np.testing.assert_array_equal(judged.cost, generation.costs)
         assert generation.num_feasible == np.count_nonzero(judged.feasible)
         assert planner.evaluate(problem, generation.best)["cost"] == generation.best_cost  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(("block", "stretch"), [(1, 16), (500, 16), (8192, 1), (8192, 5), (700, 3)])
+@pytest.mark.parametrize("elites", [0, 2])
+def test_generations_do_not_depend_on_how_numbers_and_they_are_made_in_blocks(
+    elites: int, block: int, stretch: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    planner, problem = prepared("ga.num_generations=20", f"ga.num_elites={elites}")
+
+    def run() -> list[tuple[list[list[int]], list[float], list[float]]]:
+        generations = planner.evolve(problem, np.random.Generator(np.random.PCG64(3)))  # type: ignore[attr-defined]
+        return [
+            (g.population.tolist(), g.costs.tolist(), [g.best_cost, g.mean_cost, g.std_cost, g.num_feasible])
+            for g in generations
+        ]
+
+    expected = run()
+    monkeypatch.setattr(placement_ga, "BLOCK", block)
+    monkeypatch.setattr(placement_ga, "STRETCH", stretch)
+    assert run() == expected
+
+
+def test_records_are_those_of_the_costs() -> None:
+    planner, problem = prepared("ga.num_generations=20", "ga.num_elites=2")
+    before = np.empty(0)
+    for g in planner.evolve(problem, np.random.Generator(np.random.PCG64(3))):  # type: ignore[attr-defined]
+        assert g.best_cost_in_generation == g.costs.min()
+        assert (g.mean_cost, g.std_cost) == pytest.approx((g.costs.mean(), g.costs.std()), rel=1e-12)
+        if g.index:  # the elites stand behind the offspring, best first
+            assert g.costs[-2:].tolist() == np.sort(before)[:2].tolist()
+        before = g.costs.copy()
 
 
 def test_without_elitism_the_best_can_get_lost_and_with_it_never() -> None:

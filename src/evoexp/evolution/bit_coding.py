@@ -1,22 +1,86 @@
-"""Gray code: neighbouring numbers differ in one bit. Plain binary numbers are decoded in `gene_mutation`."""
+"""Individuals as strings of bits, one whole number per gene: decoding, crossover, mutation.
 
-from evoexp.numerics import kernel
+A gene of B bits is a number in [0, 2^B), its highest bit the first of its part of the string; B ≤ 52.
+"""
+
+from evoexp.draws import draw
+from evoexp.numerics import kernel, log
 
 
 @kernel
-def gray_to_binary(gray, count, num_genes, out):  # type: ignore[no-untyped-def]
-    """Turn reflected Gray codes into plain binary numbers: every bit is the parity of all Gray bits above and its own.
+def decode_strings(strings, bits, gray, limits, out):  # type: ignore[no-untyped-def]
+    """Decode numbers n of B bits: l + (h − l) n / (2^B − 1).
 
     Args:
-        gray: (genes × bits, ≥ count) 0.0 or 1.0, gene by gene, the highest bit first.
-        count: Individuals.
-        num_genes: Number of genes.
-        out: Of the same shape, written; may be `gray` itself.
+        strings: (genes, individuals).
+        bits: B.
+        gray: Whether they are reflected Gray codes: then every bit of n is the parity of all Gray bits above and its
+            own.
+        limits: (genes, 2) l and h of each gene.
+        out: (genes, ≥ individuals), written.
     """
-    bits = len(gray) // num_genes
-    for gene in range(num_genes):
+    greatest = float((1 << bits) - 1)
+    for gene in range(len(strings)):
+        low, high = limits[gene, 0], limits[gene, 1]
+        for k in range(strings.shape[1]):
+            number = strings[gene, k]
+            if gray:
+                for shift in (1, 2, 4, 8, 16, 32):
+                    number ^= number >> shift
+            out[gene, k] = low + (high - low) * (float(number) / greatest)
+
+
+@kernel
+def cross_strings(uniforms, strings, bits, parents, rate, out):  # type: ignore[no-untyped-def]
+    """Cut pairs of parents at one site and exchange what follows (Chen & Zalzala 1995, section 3.2).
+
+    Parents 2k and 2k + 1 form a pair; an odd last one stays alone. A pair is cut with probability `rate`, before one of
+    the bits 1 … all − 1, each equally likely. What is not cut is copied.
+
+    Args:
+        uniforms: (2 × pairs,): decision, site.
+        strings: (genes, individuals).
+        bits: Of a gene.
+        parents: (offspring,) indices of individuals.
+        rate: Probability in [0, 1].
+        out: (genes, ≥ offspring), written.
+    """
+    genes, count = len(strings), len(parents)
+    for gene in range(genes):
         for k in range(count):
-            bit = 0.0
-            for row in range(gene * bits, (gene + 1) * bits):
-                bit = abs(bit - gray[row, k])
-                out[row, k] = bit
+            out[gene, k] = strings[gene, parents[k]]
+    last = genes * bits - 1
+    for pair in range(count // 2):
+        first, second = 2 * pair, 2 * pair + 1
+        if last > 0 and uniforms[first] < rate:
+            site = 1 + min(int(uniforms[second] * last), last - 1)
+            for gene in range(genes):
+                behind = min(max((gene + 1) * bits - site, 0), bits)
+                different = (out[gene, first] ^ out[gene, second]) & ((1 << behind) - 1)
+                out[gene, first] ^= different
+                out[gene, second] ^= different
+
+
+@kernel
+def flip_strings(draws, strings, bits, count, rate):  # type: ignore[no-untyped-def]
+    """Flip every bit with probability p, in place (Holland 1975).
+
+    Most bits stay: how many do before the next one is flipped is geometrically distributed, ⌊ln(1 − u) / ln(1 − p)⌋
+    (Devroye 1986, section X.2), which takes a number per flipped bit and not per bit.
+
+    Args:
+        draws: See `evoexp.draws`.
+        strings: (genes, ≥ count), changed.
+        bits: Of a gene.
+        count: Individuals.
+        rate: p, a probability in [0, 1].
+    """
+    num = len(strings) * bits
+    staying, place = log(1.0 - rate), -1  # −inf if every bit is to be flipped: then none stays
+    while staying < 0.0:
+        passed = log(1.0 - draw(draws)) / staying
+        if not passed < num * count - 1 - place:
+            break
+        place += 1 + int(passed)
+        individual, bit = place // num, place % num
+        strings[bit // bits, individual] ^= 1 << (bits - 1 - bit % bits)

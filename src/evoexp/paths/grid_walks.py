@@ -3,39 +3,12 @@
 A path is written into one row of a table: its number of nodes, then their indices. Its first node is the start, its
 last the goal. Which nodes a path has is looked up in `place` (nodes,): a node is in the path if the path has it at its
 place; so nothing needs to be cleared between paths.
-
-Uniform numbers come out of a block: `draws` is the block and, as an array of one number, how many were taken. How
-many a walk takes is not known before; if a block is used up, whatever was made with it is to be made again with a
-longer one.
 """
 
 import numpy as np
 
+from evoexp.draws import used_up
 from evoexp.numerics import borrowed, kernel
-from evoexp.records import FloatArray
-
-LANES = 4  # walks at a time
-MAX_SLOTS = 256  # of a node in a table of choices
-
-
-@kernel
-def draw(draws):  # type: ignore[no-untyped-def]
-    """Return the next uniform number of a block; 0 behind its end."""
-    uniforms, taken = draws
-    taken[0] += 1
-    return uniforms[taken[0] - 1] if taken[0] <= len(uniforms) else 0.0
-
-
-@kernel
-def used_up(draws):  # type: ignore[no-untyped-def]
-    """Return whether more numbers were asked for than the block has."""
-    return draws[1][0] > len(draws[0])
-
-
-@kernel
-def draw_index(draws, count):  # type: ignore[no-untyped-def]
-    """Return one of 0 … count − 1."""
-    return min(int(draw(draws) * count), count - 1)
 
 
 @kernel
@@ -73,88 +46,25 @@ def walk(draws, moves, ends, erase, path, place):  # type: ignore[no-untyped-def
 
 
 @kernel
-def walk_all(uniforms, moves, choices, ends, erase, first, paths):  # type: ignore[no-untyped-def]
-    """Write random paths, as `walk` does, all between the same nodes: some at a time, one step of each after the other.
-
-    A step waits for the one before it, which says where to look; meanwhile the other walks take theirs.
+def walk_each(draws, moves, ends, erase, first, paths, place):  # type: ignore[no-untyped-def]
+    """Write random paths between the same nodes, one after the other, each as `walk` does.
 
     Args:
-        uniforms: One number is taken per step.
-        moves: See `walk`.
-        choices: What `choice_table` made of them.
-        ends: See `walk`.
-        erase: Whether loops are erased.
+        draws: See `walk`, and so are `moves`, `ends`, `erase` and `place`.
         first: The path to begin with.
         paths: (paths, nodes + 1) written.
 
     Returns:
-        How many paths are complete, those before `first` included, and how many numbers it took. If they are used up,
-        it is to go on there with more of them, the rest of these being the first.
+        How many paths are complete, those before `first` included: fewer than all if the draws did not suffice.
     """
-    uniforms, moves, choices, paths = borrowed((uniforms, moves, choices, paths))
-    neighbours, potentials, steps = moves
-    totals, slots = choices
-    start, target = np.uint64(ends[0]), np.uint64(ends[1])  # without a sign, as an index might count from the end
-    walkers, counts = np.empty(LANES, np.uint64), np.empty(LANES, np.int64)
-    trails = np.empty((LANES, len(uniforms) + 2), np.int32)
-    places = np.empty((LANES, len(neighbours)), np.int32)
-    taken = 0
-    while first < len(paths):
-        before, walking = taken, start != target
-        for lane in range(LANES):
-            walkers[lane] = start if first + lane < len(paths) else target
-            counts[lane] = 1
-            trails[lane, 1] = walkers[lane]
-            places[lane, walkers[lane]] = 1
-        while walking:
-            if taken + LANES > len(uniforms):
-                return first, before
-            walking = False
-            for lane in range(LANES):  # who has arrived stays, without a branch that would be guessed wrong
-                node, count = walkers[lane], counts[lane]
-                goes = node != target
-                if len(slots) > 0:
-                    chosen = np.uint64(slots[node, np.uint64(uniforms[taken] * totals[node])])
-                else:
-                    chosen = np.uint64(_next_node(uniforms[taken], neighbours, potentials, steps, np.int64(node)))
-                node = chosen if goes else node
-                taken += goes
-                count += goes
-                trails[lane, count] = node
-                places[lane, node] = count
-                walkers[lane], counts[lane] = node, count
-                walking |= goes
-        for lane in range(min(LANES, len(paths) - first)):
-            _write(trails[lane], counts[lane], erase, paths[first + lane], places[lane])
-        first = min(first + LANES, len(paths))
-    return first, taken
-
-
-def choice_table(neighbours: np.ndarray, potentials: FloatArray, steps: np.ndarray) -> tuple[FloatArray, np.ndarray]:
-    """Return the choices of walks to one target at every node, for many walks: every move as often as it weighs.
-
-    Args:
-        neighbours: (nodes, moves), see `grids.Grid`.
-        potentials: See `walk`.
-        steps: (nodes,) of the front from the target.
-
-    Returns:
-        Sums of the weights (nodes,), and where such a move leads to, (nodes, greatest sum). The latter is empty if the
-        weights are no whole numbers, or if the table would be large; then moves are to be weighed at every step.
-    """
-    permitted = neighbours >= 0
-    potential = np.where(permitted, potentials[steps[neighbours]], -np.inf)
-    greatest = np.maximum(potential.max(axis=1, keepdims=True), 0.0)
-    weights = np.where(permitted, greatest - potential + 1.0, 0.0)
-    totals = weights.sum(axis=1)
-    whole = bool((weights == np.floor(weights)).all())
-    if not whole or totals.max() > MAX_SLOTS or len(totals) > 2**15:
-        return totals, np.empty((0, 0), dtype=np.int16)
-    slot = np.arange(int(totals.max()))
-    move = np.zeros((len(totals), len(slot)), dtype=np.int64)
-    for ends in np.cumsum(weights, axis=1).T[:-1]:
-        move += slot >= ends[:, None]
-    return totals, np.take_along_axis(neighbours, move, axis=1).astype(np.int16)
+    draws, moves, paths = borrowed((draws, moves, paths))
+    for k in range(first, len(paths)):
+        before = draws[1][0]
+        walk(draws, moves, ends, erase, paths[k], place)
+        if used_up(draws):
+            draws[1][0] = before
+            return k
+    return len(paths)
 
 
 @kernel

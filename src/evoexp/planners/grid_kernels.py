@@ -1,14 +1,16 @@
-"""One generation of paths over a grid, compiled (Chen & Zalzala 1995, section 2.3).
+"""Generations of paths over a grid, compiled (Chen & Zalzala 1995, section 2.3).
 
 A population is a table of paths (individuals, nodes + 1), each row as `paths.grid_walks` says, and of their lengths,
-mean unsafenesses and costs (3, individuals). A whole generation is one call; settings travel as plain tuples.
+mean unsafenesses and costs (3, individuals). Many generations are one call; settings travel as plain tuples.
 """
 
+from evoexp.draws import draw, draw_index, draw_many, used_up
 from evoexp.evolution.remainder import choose_by_remainders, num_remainder_uniforms
 from evoexp.evolution.scaling import scale_costs
 from evoexp.evolution.selection import choose_elites
+from evoexp.evolution.statistics import summarise
 from evoexp.numerics import borrowed, kernel
-from evoexp.paths.grid_walks import draw, draw_index, erase_loops, measure_path, used_up, walk
+from evoexp.paths.grid_walks import erase_loops, measure_path, walk
 from evoexp.paths.grids import spread_front
 
 RESULTS = 3
@@ -33,11 +35,45 @@ def measure_all(paths, world, weights, results):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def evolve(draws, generations, world, weights, breeding, tables, memory, records):  # type: ignore[no-untyped-def]
+    """Go on from one generation to another; what each is worth is noted beside it.
+
+    Args:
+        draws: See `evoexp.draws`.
+        generations: The present one, and the one to reach.
+        world: See `advance`, and so are `weights`, `breeding` and `memory`.
+        tables: Paths (places, individuals, nodes + 1) and results (places, 3, individuals) of some generations; number
+            g has place g modulo the number of places.
+        records: (places, 3) what `evolution.statistics.summarise` says of their costs.
+
+    Returns:
+        The generation reached: an earlier one if the draws did not suffice. Then it is to go on there with more.
+    """
+    draws, world, tables, memory, records = borrowed((draws, world, tables, memory, records))
+    paths, results = tables
+    first, last = generations
+    for generation in range(first, last):
+        before, own, other = draws[1][0], generation % len(paths), (generation + 1) % len(paths)
+        population, following = (paths[own], results[own]), (paths[other], results[other])
+        if not advance(draws, world, weights, breeding, population, following, memory):
+            draws[1][0] = before
+            return generation
+        record(results[other], records[other])
+    return last
+
+
+@kernel
+def record(results, out):  # type: ignore[no-untyped-def]
+    """Note index of the best, mean and standard deviation of the costs in `out` (3,)."""
+    out[0], out[1], out[2] = summarise(results[COST])
+
+
+@kernel
 def advance(draws, world, weights, breeding, population, following, memory):  # type: ignore[no-untyped-def]
     """Write the population that follows another: its offspring, then the elites, best first.
 
     Args:
-        draws: See `paths.grid_walks`.
+        draws: See `evoexp.draws`.
         world: (neighbours, moves of a front, coordinates, kinds, unsafeness, potentials, fronts); `fronts`
             (nodes, nodes) holds the steps to every node from every other, or nothing.
         weights: ε and λ of Eq. 1.
@@ -50,18 +86,16 @@ def advance(draws, world, weights, breeding, population, following, memory):  # 
     Returns:
         Whether the draws sufficed; if not, what is written is not complete.
     """
-    draws, world, population, following, memory = borrowed((draws, world, population, following, memory))
     erase, multiple, crossover_rate, reach, mutation_rate = breeding
     (paths, results), (children, values) = population, following
     (parents, elites, expected, order), scratch = memory
     num, count = len(paths), len(parents)
     choose_elites(results[COST], elites)
     scale_costs(results[COST], count, multiple, expected)
-    first = draws[1][0]
-    draws[1][0] += num_remainder_uniforms(num, count)
+    choosing = draw_many(draws, num_remainder_uniforms(num, count))
     if used_up(draws):
         return False
-    choose_by_remainders(draws[0][first : draws[1][0]], expected, order, parents)
+    choose_by_remainders(choosing, expected, order, parents)
     for first in range(0, count, 2):
         crossed = False
         if first + 1 < count and draw(draws) < crossover_rate:
@@ -89,6 +123,14 @@ def advance(draws, world, weights, breeding, population, following, memory):  # 
 
 
 @kernel
+def copy_paths(paths, out):  # type: ignore[no-untyped-def]
+    """Copy paths into another table, whatever the width of either."""
+    paths, out = borrowed((paths, out))
+    for k in range(len(paths)):
+        copy_path(paths[k], out[k])
+
+
+@kernel
 def copy_path(path, out):  # type: ignore[no-untyped-def]
     """Copy a path; what stands behind its last node stays."""
     for k in range(path[0] + 1):
@@ -104,7 +146,7 @@ def cross(draws, world, parents, settings, children, scratch):  # type: ignore[n
     is connected, by a move or by a node between. Start and goal, which all paths have in common, are no sites.
 
     Args:
-        draws: See `paths.grid_walks`.
+        draws: See `evoexp.draws`.
         world: See `advance`.
         parents: Two paths.
         settings: Whether loops are erased; reach.
@@ -204,7 +246,7 @@ def near_sites(draws, coordinates, one, two, reach):  # type: ignore[no-untyped-
     """Draw a pair of nodes of two paths that are at most `reach` apart in every coordinate; (0, 0) if there is none.
 
     Args:
-        draws: See `paths.grid_walks`.
+        draws: See `evoexp.draws`.
         coordinates: (nodes, dimensions).
         one: A path.
         two: A path.

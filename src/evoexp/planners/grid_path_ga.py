@@ -16,24 +16,27 @@ import numpy as np
 
 from evoexp.collision.potential_fields import Fields, PotentialFields
 from evoexp.collision.scene import Scene, scene
+from evoexp.draws import Draws
 from evoexp.errors import SettingError
 from evoexp.evolution.scaled_settings import ScaledGenetic
-from evoexp.evolution.statistics import cost_statistics
 from evoexp.objectives.path_cost import PathCost
-from evoexp.paths.grid_walks import choice_table, walk_all
+from evoexp.paths.grid_walks import walk_each
 from evoexp.paths.grids import UNREACHED, spread_front
 from evoexp.paths.motion import Motion
+from evoexp.paths.walkers import LANES, WORDS, Walkers, choice_table
 from evoexp.planners import grid_kernels
 from evoexp.planners.grid_kernels import COST, DISTANCE, RESULTS, UNSAFENESS
+from evoexp.planners.stretches import Stretches
 from evoexp.records import FloatArray, Generation
 from evoexp.robots.floor_platform import FloorPlatform
 from evoexp.scenarios.grid_motion import GridMotion
 from evoexp.validation import Component, NonNegativeCount
 
-FEW_NODES = 2048  # of grids so small the steps between all nodes are worked out once: at most 16 MB
-BLOCK = 16384  # uniform numbers drawn at once, at least: what one generation leaves of them is for the next
-SMALL_BLOCK = 1024  # the same, for the walks of one population, whose rest is thrown away
-STEPS_PER_WALK = 2.5  # as a multiple of the fewest: for so many numbers are drawn at first
+FEW_NODES = 2048  # of grids so small the steps between all nodes are worked out once: at most 8 MB
+STRETCH = 8  # generations that are computed in one call of a kernel, at most
+BLOCK = 16384  # uniform numbers drawn at once, at least
+STEPS_PER_WALK = 3.5  # as a multiple of the fewest: for so many steps random words are drawn at first
+FEW_WORDS = 512  # (a multiple of `WORDS`) are drawn whenever these do not suffice; what is left at the end is lost
 
 
 class Problem(NamedTuple):
@@ -42,7 +45,7 @@ class Problem(NamedTuple):
     Attributes:
         fields: Grid, unsafeness, potentials.
         moves: What walks to the goal need, see `grid_walks.walk`; the last of it are the steps of every node to it.
-        choices: The same as a table, see `grid_walks.choice_table`.
+        choices: The same as a table, see `walkers.choice_table`.
         ends: Indices of start and goal.
         world: What the kernels of a generation need, see `grid_kernels.advance`.
         scene: The bodies themselves, for the exact verdict on a motion.
@@ -51,7 +54,7 @@ class Problem(NamedTuple):
 
     fields: Fields
     moves: tuple[np.ndarray, FloatArray, np.ndarray]
-    choices: tuple[FloatArray, np.ndarray]
+    choices: tuple[np.ndarray, np.ndarray]
     ends: tuple[int, int]
     world: tuple[Any, ...]
     scene: Scene
@@ -99,7 +102,7 @@ class GridPathGa(Component):
     """
 
     component: ClassVar[str] = "grid_path_ga"
-    revision: ClassVar[int] = 2
+    revision: ClassVar[int] = 3
 
     revisits: bool
     crossover_reach: NonNegativeCount
@@ -117,57 +120,69 @@ class GridPathGa(Component):
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield the population of random paths, then every generation."""
-        search = _Search(self, problem)
+        search, final = _Search(self, problem), self.ga.num_generations
         best_cost, best, terms = np.inf, np.empty(0), {}
-        for index in range(self.ga.num_generations + 1):
-            if index:
-                search.advance(rng)
-            else:
-                search.begin(rng)
-            paths, results = search.population
-            statistics = cost_statistics(results[COST])
-            lowest = float(results[COST, statistics.best])
+        for index in range(final + 1):
+            place = search.place(index, rng)
+            paths, results, (found, mean, std) = (
+                search.paths[place],
+                search.results[place],
+                search.records[place].tolist(),
+            )
+            individual, lowest = int(found), float(results[COST, int(found)])
             if lowest < best_cost:
-                best_cost, best = lowest, self.solution(problem, paths, statistics.best)
-                terms = named_terms(results[:, statistics.best], paths[statistics.best, 0])
+                best_cost, best = lowest, self.solution(problem, paths, individual)
+                terms = named_terms(results[:, individual], paths[individual, 0])
             yield Generation(
                 index=index,
                 best=best,
                 best_cost=best_cost,
                 best_cost_in_generation=lowest,
-                mean_cost=statistics.mean,
-                std_cost=statistics.std,
+                mean_cost=mean,
+                std_cost=std,
                 num_feasible=len(paths),
                 evaluations=self.ga.population_size + index * self.ga.num_offspring,
                 collision_queries=0,
                 solved=True,
                 terms=terms,
                 costs=results[COST],
-                population=paths,
+                population=paths if index < final else trimmed(paths),
             )
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> np.ndarray:
-        """Return random paths as the initial population has them, (count, nodes + 1)."""
-        paths, _ = _table(count, problem.fields.grid.num_nodes)
-        arguments = (problem.moves, problem.choices, problem.ends, not self.revisits)
-        uniforms = rng.random(int(STEPS_PER_WALK * count * problem.moves[2][problem.ends[0]]) + 1)
-        complete, taken = walk_all(uniforms, *arguments, 0, paths)
-        while complete < count:
-            left = uniforms[taken:]
-            uniforms = np.concatenate([left, rng.random(max(SMALL_BLOCK, len(left)))])
-            complete, taken = walk_all(uniforms, *arguments, complete, paths)
-        return paths
+        """Return random paths as the initial population has them, (count, longest + 1)."""
+        paths = np.empty((count, problem.fields.grid.num_nodes + 1), dtype=np.int32)
+        if len(problem.choices[0]):
+            self._fill(problem, rng, paths)
+        else:
+            self._fill_one_by_one(problem, rng, paths)
+        return trimmed(paths)
+
+    def _fill(self, problem: Problem, rng: np.random.Generator, paths: np.ndarray) -> None:
+        """Let walkers fill a table of paths."""
+        walkers = Walkers(problem.choices, problem.ends, not self.revisits, paths)
+        steps = STEPS_PER_WALK * len(paths) * problem.moves[2][problem.ends[0]]
+        num_words = WORDS * (int(steps / LANES) + 1)
+        while walkers.complete < len(paths):
+            walkers.go(rng.bit_generator.random_raw(num_words))
+            num_words = FEW_WORDS
+
+    def _fill_one_by_one(self, problem: Problem, rng: np.random.Generator, paths: np.ndarray) -> None:
+        """Fill a table of paths where moves weigh such that there is no table of choices."""
+        draws, complete = Draws(BLOCK), 0
+        place = np.zeros(problem.fields.grid.num_nodes, dtype=np.int32)
+        arguments = problem.moves, problem.ends, not self.revisits
+        while (complete := walk_each(draws.block, *arguments, complete, paths, place)) < len(paths):
+            draws.extend(rng)
 
     def cost(self, problem: Problem, population: np.ndarray) -> Judgement:
-        """Judge paths (individuals, nodes + 1), valid ones.
+        """Judge paths (individuals, longest + 1), valid ones.
 
         Raises:
-            ValueError: If the table has another width.
+            ValueError: If a path is empty or longer than the table is wide.
         """
-        if population.ndim != 2 or population.shape[1] != problem.fields.grid.num_nodes + 1:
-            raise ValueError(
-                f"paths must be (individuals, {problem.fields.grid.num_nodes + 1}), was {population.shape}"
-            )
+        if population.ndim != 2 or not 1 <= population[:, 0].min() <= population[:, 0].max() < population.shape[1]:
+            raise ValueError(f"paths must be (individuals, longest + 1), was {population.shape}")
         results = np.empty((RESULTS, len(population)))
         grid_kernels.measure_all(population, problem.world, self.objective.weights, results)
         return Judgement(results, population[:, 0])
@@ -221,44 +236,56 @@ class GridPathGa(Component):
         return np.asarray(solution).reshape(-1, problem.fields.grid.free.ndim)
 
 
-class _Search:
-    """Two populations that take turns, and memory for the kernels.
+class _Search(Stretches):
+    """One run: its last generations, and memory for the kernels.
 
     Attributes:
-        population: Paths and results of the present one.
+        paths: (places, individuals, nodes + 1).
+        results: (places, 3, individuals).
+        records: (places, 3), see `grid_kernels.record`.
     """
 
     def __init__(self, planner: GridPathGa, problem: Problem) -> None:
         ga, nodes = planner.ga, problem.fields.grid.num_nodes
+        super().__init__(ga.num_generations, STRETCH, BLOCK)
         self._planner, self._problem = planner, problem
-        self.population, self._other = _table(ga.population_size, nodes), _table(ga.population_size, nodes)
+        self.paths = np.empty((self.num_places, ga.population_size, nodes + 1), dtype=np.int32)
+        self.results = np.empty((self.num_places, RESULTS, ga.population_size))
+        self.records = np.empty((self.num_places, 3))
         count = ga.num_offspring
         parents, elites = np.empty(count, dtype=np.int64), np.empty(ga.num_elites, dtype=np.int64)
         choosing = parents, elites, np.empty(ga.population_size), np.empty(ga.population_size, dtype=np.int64)
         integers = [np.zeros(size, dtype=np.int32) for size in (nodes, 3 * nodes + 3, nodes, nodes, nodes + 1)]
         place, joined, steps, queue, walked = integers
         sites = np.zeros((2, nodes + 1), dtype=np.int32)
-        self._memory = choosing, (place, joined, sites, steps, queue, walked)
-        rates = ga.scaling_multiple, ga.crossover_rate, planner.crossover_reach, ga.mutation_rate
-        self._breeding = (not planner.revisits, *rates)
-        self._uniforms, self._taken = np.empty(0), np.zeros(1, dtype=np.int64)
+        memory = choosing, (place, joined, sites, steps, queue, walked)
+        breeding = (
+            not planner.revisits,
+            ga.scaling_multiple,
+            ga.crossover_rate,
+            planner.crossover_reach,
+            ga.mutation_rate,
+        )
+        self._world = problem.world, planner.objective.weights
+        self._arguments = (*self._world, breeding, (self.paths, self.results), memory, self.records)
 
     def begin(self, rng: np.random.Generator) -> None:
-        """Draw the initial population."""
-        planner, (paths, results) = self._planner, self._other
-        paths[:] = planner.sample(self._problem, rng, len(paths))
-        grid_kernels.measure_all(paths, self._problem.world, planner.objective.weights, results)
-        self.population, self._other = self._other, self.population
+        """Draw and measure the initial population."""
+        drawn = self._planner.sample(self._problem, rng, self.paths.shape[1])
+        self.paths[0, :, : drawn.shape[1]] = drawn
+        grid_kernels.measure_all(self.paths[0], *self._world, self.results[0])
+        grid_kernels.record(self.results[0], self.records[0])
 
-    def advance(self, rng: np.random.Generator) -> None:
-        """Go on to the next generation."""
-        fixed = (self._problem.world, self._planner.objective.weights, self._breeding)
-        taken, before = self._taken, self._taken[0]
-        while not grid_kernels.advance((self._uniforms, taken), *fixed, self.population, self._other, self._memory):
-            left = self._uniforms[before:]
-            self._uniforms = np.concatenate([left, rng.random(max(BLOCK, len(left)))])
-            taken[0] = before = 0
-        self.population, self._other = self._other, self.population
+    def go_on(self, draws: tuple[np.ndarray, np.ndarray], first: int, last: int) -> int:
+        """Compute generations."""
+        return int(grid_kernels.evolve(draws, (first, last), *self._arguments))
+
+
+def trimmed(paths: np.ndarray) -> np.ndarray:
+    """Return a copy of paths as wide as the longest one; zeros stand behind the others."""
+    out = np.zeros((len(paths), int(paths[:, 0].max()) + 1), dtype=np.int32)
+    grid_kernels.copy_paths(paths, out)
+    return out
 
 
 @functools.lru_cache(maxsize=32)
@@ -298,14 +325,10 @@ def named_terms(results: FloatArray, num_nodes: Any) -> dict[str, float]:
     return named | {"num_nodes": float(num_nodes)}
 
 
-def _table(count: int, nodes: int) -> tuple[np.ndarray, FloatArray]:
-    return np.zeros((count, nodes + 1), dtype=np.int32), np.zeros((RESULTS, count))
-
-
 def _fronts(fields: Fields) -> np.ndarray:
     """Return the steps to every node from every other, (nodes, nodes), of small grids; else (0, nodes)."""
     nodes = fields.grid.num_nodes
-    fronts = np.empty((nodes if nodes <= FEW_NODES else 0, nodes), dtype=np.int32)
+    fronts = np.empty((nodes if nodes <= FEW_NODES else 0, nodes), dtype=np.int16)
     queue, source = np.empty(nodes, dtype=np.int32), np.empty(1, dtype=np.int32)
     for node, steps in enumerate(fronts):
         source[0] = node

@@ -4,26 +4,25 @@ A genetic algorithm over θ1 and θ2 in binary code; θ3 and the platform's plac
 shall be (Eqs. 17 and 18). θ3 has two values, both are evaluated and the better one is kept. The cost is E of Eq. 14;
 infeasible postures cost E_m, the paper's fitness is f = E_m − E.
 
-A population is an array (bits, individuals) of 0.0 and 1.0. A solution is flat: θ1, θ2 [deg].
+A population is an array (2, individuals) of strings of bits, a number per angle. A solution is flat: θ1, θ2 [deg].
 """
 
 from collections.abc import Iterator
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
-from evoexp.evolution.crossover import num_single_point_uniforms
-from evoexp.evolution.remainder import num_remainder_uniforms
 from evoexp.evolution.scaled_settings import ScaledGenetic
 from evoexp.numerics import DEGREE
 from evoexp.objectives.placement_criteria import Model, PlacementCriteria
-from evoexp.objectives.placement_kernels import CRITERIA, PLATFORM, THETA_3, TORQUE
+from evoexp.objectives.placement_kernels import PLATFORM, THETA_3, TORQUE
 from evoexp.paths.motion import Motion
 from evoexp.planners import placement_kernels
-from evoexp.planners.placement_kernels import GENES, RESULTS
+from evoexp.planners.placement_kernels import GENES, RECORD, ROWS
+from evoexp.planners.stretches import Stretches
 from evoexp.records import FloatArray, Generation
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.mobile_arm import MobileArm
@@ -32,6 +31,9 @@ from evoexp.validation import Component
 
 NAMES = ("torque_norm", "torque_max", "obstacle", "manipulability")  # E1, E2, Σ γ E_obs, E_man
 BRANCHES = ("", "other_")
+FIRST_CRITERION = GENES  # row of the costs, which the other criteria and the branch follow
+STRETCH = 16  # generations that are computed in one call of a kernel, at most
+BLOCK = 8192  # uniform numbers drawn at once, at least
 
 
 class Problem(NamedTuple):
@@ -83,6 +85,7 @@ class PlacementGa(Component):
     """
 
     component: ClassVar[str] = "placement_ga"
+    revision: ClassVar[int] = 2
 
     angle_range: tuple[float, float]
     bits_per_gene: Annotated[int, Field(ge=1, le=52)]
@@ -115,49 +118,51 @@ class PlacementGa(Component):
         search = _Search(self, problem)
         best, best_cost, terms, solved = np.empty(0), np.inf, {}, False
         for index in range(self.ga.num_generations + 1):
-            found, mean, std, num_feasible = search.advance(rng) if index else search.begin(rng)
-            costs = search.costs
-            if costs[found] < best_cost:
-                best_cost, best, terms = float(costs[found]), search.angles[:, found].copy(), search.terms(found)
-                solved = bool(search.branches[found] >= 0.0)
+            place = search.place(index, rng)
+            rows, (found, mean, std, num_feasible) = search.rows[place], search.records[place].tolist()
+            costs, individual = rows[FIRST_CRITERION], int(found)
+            lowest = float(costs[individual])
+            if lowest < best_cost:
+                best_cost, best, solved = lowest, rows[:GENES, individual].copy(), bool(rows[-1, individual] >= 0.0)
+                terms = dict(zip(NAMES, rows[FIRST_CRITERION + 1 : -1, individual].tolist(), strict=True))
             yield Generation(
                 index=index,
                 best=best,
                 best_cost=best_cost,
-                best_cost_in_generation=float(costs[found]),
+                best_cost_in_generation=lowest,
                 mean_cost=mean,
                 std_cost=std,
-                num_feasible=num_feasible,
+                num_feasible=int(num_feasible),
                 evaluations=self.ga.population_size + index * self.ga.num_offspring,
                 collision_queries=0,
                 solved=solved,
                 terms=terms,
                 costs=costs,
-                population=search.bits,
+                population=search.strings[place],
             )
 
-    def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
-        """Return random bits, (bits, count)."""
-        return np.floor(2.0 * rng.random((GENES * self.bits_per_gene, count)))
+    def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> np.ndarray:
+        """Return random strings, (2, count)."""
+        return np.floor(2.0**self.bits_per_gene * rng.random((GENES, count))).astype(np.int64)
 
-    def cost(self, problem: Problem, population: FloatArray) -> Judgement:
-        """Judge a population of bits (bits, individuals)."""
-        table = self._judged(problem, population)
-        results = table[len(population) + GENES :]
-        return Judgement(results[0], results[CRITERIA] >= 0.0, results[1:CRITERIA])
+    def cost(self, problem: Problem, population: np.ndarray) -> Judgement:
+        """Judge a population of strings (2, individuals)."""
+        criteria = self._judged(problem, population)[FIRST_CRITERION:]
+        return Judgement(criteria[0], criteria[-1] >= 0.0, criteria[1:-1])
 
-    def solution(self, problem: Problem, population: FloatArray, individual: int) -> FloatArray:
+    def solution(self, problem: Problem, population: np.ndarray, individual: int) -> FloatArray:
         """Return θ1 and θ2 of an individual [deg]."""
-        table = self._judged(problem, population[:, individual : individual + 1])
-        return table[len(population) : len(population) + GENES, 0].copy()
+        return self._judged(problem, population[:, individual : individual + 1])[:GENES, 0].copy()
 
-    def _judged(self, problem: Problem, population: FloatArray) -> FloatArray:
-        num_bits, count = population.shape
-        table, plain = np.empty((num_bits + GENES + RESULTS, count)), np.empty((num_bits, count))
-        table[:num_bits] = population
-        model, gray = tuple(problem.model), self.coding == "gray"
-        placement_kernels.judge(table, count, gray, problem.angle_limits, model, plain)
-        return table
+    def _judged(self, problem: Problem, population: np.ndarray) -> FloatArray:
+        rows = np.empty((ROWS, population.shape[1]))
+        strings = np.ascontiguousarray(population, dtype=np.int64)
+        placement_kernels.judge(strings, self.coded(problem), tuple(problem.model), population.shape[1], rows)
+        return rows
+
+    def coded(self, problem: Problem) -> tuple[int, bool, FloatArray]:
+        """Return what kernels decode strings by: bits per gene, whether they are Gray codes, limits [deg]."""
+        return self.bits_per_gene, self.coding == "gray", problem.angle_limits
 
     def motion(self, problem: Problem, solution: FloatArray) -> Motion | None:
         """Return the posture of a solution as a motion that stays there; None if it is infeasible.
@@ -194,49 +199,37 @@ class PlacementGa(Component):
         return ((),) * GENES
 
 
-class _Search:
-    """The memory of one run, and its calls of kernels."""
+class _Search(Stretches):
+    """One run: its last generations, and memory for the kernels.
+
+    Attributes:
+        strings: (places, 2, individuals).
+        rows: (places, ROWS, individuals), see `placement_kernels`.
+        records: (places, RECORD), see `placement_kernels.record`.
+    """
 
     def __init__(self, planner: PlacementGa, problem: Problem) -> None:
-        ga, num_bits = planner.ga, GENES * planner.bits_per_gene
-        size, count = ga.population_size, ga.num_offspring
-        rows = num_bits + GENES + RESULTS
-        table, self._plain = np.empty((rows, size)), np.empty((num_bits, size))
-        scratch = np.empty(size), np.empty(size, dtype=np.int64), np.empty(count, dtype=np.int64)
-        elites = np.empty(ga.num_elites, dtype=np.int64)
-        self._memory = (table, np.empty((rows, count)), self._plain, *scratch, elites)
-        self._table, self._problem, self._gray = table, problem, planner.coding == "gray"
-        self.bits, self.angles = table[:num_bits], table[num_bits : num_bits + GENES]
-        results = table[num_bits + GENES :]
-        self.costs, self._terms, self.branches = results[0], results[1:CRITERIA], results[CRITERIA]
-        crossing = num_remainder_uniforms(size, count)
-        mutating = crossing + num_single_point_uniforms(count // 2)
-        self._num_uniforms = mutating + num_bits * count
+        ga, size = planner.ga, planner.ga.population_size
+        super().__init__(ga.num_generations, STRETCH, BLOCK)
+        self._planner, self._problem = planner, problem
+        self.strings = np.empty((self.num_places, GENES, size), dtype=np.int64)
+        self.rows, self.records = np.empty((self.num_places, ROWS, size)), np.empty((self.num_places, RECORD))
+        parents, elites = np.empty(ga.num_offspring, dtype=np.int64), np.empty(ga.num_elites, dtype=np.int64)
+        memory = np.empty(size), np.empty(size, dtype=np.int64), parents, elites
         rates = ga.scaling_multiple, ga.crossover_rate, ga.mutation_rate
-        self._breeding = (crossing, mutating, *rates, self._gray, problem.angle_limits)
-        self._model = tuple(problem.model)
+        self._judging = planner.coded(problem), tuple(problem.model)
+        self._arguments = (rates, *self._judging, (self.strings, self.rows), memory, self.records)
 
-    def begin(self, rng: np.random.Generator) -> tuple[int, float, float, int]:
-        """Draw and judge the initial population; return what `placement_kernels.summary` does."""
-        self.bits[:] = np.floor(2.0 * rng.random(self.bits.shape))
-        size = len(self.costs)
-        limits = self._problem.angle_limits
-        placement_kernels.judge(self._table, size, self._gray, limits, self._model, self._plain)
-        return _plain(placement_kernels.summary(self.costs, self.branches))
+    def begin(self, rng: np.random.Generator) -> None:
+        """Draw and judge the initial population."""
+        size = self.strings.shape[2]
+        self.strings[0] = self._planner.sample(self._problem, rng, size)
+        placement_kernels.judge(self.strings[0], *self._judging, size, self.rows[0])
+        placement_kernels.record(self.rows[0], self.records[0])
 
-    def advance(self, rng: np.random.Generator) -> tuple[int, float, float, int]:
-        """Replace the population by the next one; return what `placement_kernels.summary` does."""
-        uniforms = rng.random(self._num_uniforms)
-        return _plain(placement_kernels.advance(uniforms, self._breeding, self._model, self._memory))
-
-    def terms(self, individual: int) -> dict[str, float]:
-        """Return the criteria of one individual by name."""
-        return dict(zip(NAMES, self._terms[:, individual].tolist(), strict=True))
-
-
-def _plain(found: Any) -> tuple[int, float, float, int]:
-    best, mean, std, feasible = found
-    return int(best), float(mean), float(std), int(feasible)
+    def go_on(self, draws: tuple[np.ndarray, np.ndarray], first: int, last: int) -> int:
+        """Compute generations."""
+        return int(placement_kernels.evolve(draws, (first, last), *self._arguments))
 
 
 def _two(solution: FloatArray) -> tuple[float, float]:

@@ -1,72 +1,101 @@
-"""One generation of the placement search, compiled (Chen & Zalzala 1995, section 3.2).
+"""Generations of the placement search, compiled (Chen & Zalzala 1995, section 3.2).
 
-A population is a table of rows, individuals innermost: the bits, θ1 and θ2 [deg], the criteria, the branch of θ3.
+A population is strings of bits (2, individuals), see `evolution.bit_coding`, and what they are worth in rows,
+individuals innermost: θ1 and θ2 [deg], the criteria, the branch of θ3.
 """
 
-from evoexp.evolution.bit_coding import gray_to_binary
-from evoexp.evolution.crossover import cross_single_point
-from evoexp.evolution.gene_mutation import decode_bits, flip_bits
-from evoexp.evolution.remainder import choose_by_remainders
+from evoexp.draws import draw_many, used_up
+from evoexp.evolution.bit_coding import cross_strings, decode_strings, flip_strings
+from evoexp.evolution.remainder import choose_by_remainders, num_remainder_uniforms
 from evoexp.evolution.scaling import scale_costs
 from evoexp.evolution.selection import choose_elites
 from evoexp.evolution.statistics import summarise
-from evoexp.evolution.succession import succeed_rows
-from evoexp.numerics import kernel
-from evoexp.objectives.placement_kernels import CRITERIA, measure_postures
+from evoexp.numerics import borrowed, kernel
+from evoexp.objectives.placement_kernels import COST, CRITERIA, measure_postures
 
 GENES = 2  # θ1, θ2
-RESULTS = CRITERIA + 1  # rows behind the angles: criteria and branch
+ROWS = GENES + CRITERIA + 1  # angles, criteria, branch
+RECORD = 4  # what `record` notes
 
 
 @kernel
-def advance(uniforms, breeding, model, memory):  # type: ignore[no-untyped-def]
-    """Replace a population by the next one.
+def evolve(draws, generations, breeding, coding, model, tables, memory, records):  # type: ignore[no-untyped-def]
+    """Go on from one generation to another; what each is worth is noted beside it.
 
     Args:
-        uniforms: For selection, crossover and mutation, one after the other.
-        breeding: Where those of crossover and of mutation begin; scaling multiple, crossover rate, mutation rate;
-            whether bits are Gray codes; (2, 2) limits of the angles [deg].
+        draws: See `evoexp.draws`.
+        generations: The present one, and the one to reach.
+        breeding: Scaling multiple, crossover rate, mutation rate.
+        coding: Bits per gene, whether they are Gray codes, (2, 2) limits of the angles [deg].
         model: See `objectives.placement_kernels.measure_posture`: task, weights, avoided, limits.
-        memory: Tables of the population and of its offspring; (bits, offspring) plain bits, (individuals,) expected
-            numbers of copies, (individuals,) order of the scan, (offspring,) parents, (elites,).
+        tables: Strings (places, 2, individuals) and rows (places, ROWS, individuals) of some generations; number g has
+            place g modulo the number of places.
+        memory: (individuals,) expected numbers of copies, (individuals,) order of the scan, (offspring,) parents,
+            (elites,).
+        records: (places, RECORD) see `record`.
 
     Returns:
-        See `summary`.
+        The generation reached: an earlier one if the draws did not suffice. Then it is to go on there with more.
     """
-    crossing, mutating, multiple, crossover_rate, mutation_rate, gray, limits = breeding
-    population, offspring, plain, expected, order, parents, elites = memory
-    num_bits, count = len(plain), len(parents)
-    costs = population[num_bits + GENES]
+    draws, coding, model, tables, memory, records = borrowed((draws, coding, model, tables, memory, records))
+    strings, rows = tables
+    first, last = generations
+    for generation in range(first, last):
+        before, own, other = draws[1][0], generation % len(strings), (generation + 1) % len(strings)
+        population, following = (strings[own], rows[own]), (strings[other], rows[other])
+        if not advance(draws, breeding, coding, model, population, following, memory):
+            draws[1][0] = before
+            return generation
+        record(rows[other], records[other])
+    return last
+
+
+@kernel
+def advance(draws, breeding, coding, model, population, following, memory):  # type: ignore[no-untyped-def]
+    """Write the population that follows another: its offspring, then the elites, best first.
+
+    Returns:
+        Whether the draws sufficed; if not, what is written is not complete.
+    """
+    multiple, crossover_rate, mutation_rate = breeding
+    (strings, rows), (children, values) = population, following
+    expected, order, parents, elites = memory
+    bits, num, count = coding[0], strings.shape[1], len(parents)
+    costs = rows[GENES + COST]
     choose_elites(costs, elites)
     scale_costs(costs, count, multiple, expected)
-    choose_by_remainders(uniforms[:crossing], expected, order, parents)
-    bits = offspring[:num_bits]
-    cross_single_point(uniforms[crossing:mutating], population[:num_bits], parents, crossover_rate, bits)
-    flip_bits(uniforms[mutating:], bits, count, mutation_rate)
-    judge(offspring, count, gray, limits, model, plain)
-    succeed_rows(population, offspring, count, elites)
-    return summary(costs, population[len(population) - 1])
+    choosing = draw_many(draws, num_remainder_uniforms(num, count))
+    crossing = draw_many(draws, 2 * (count // 2))
+    if used_up(draws):
+        return False
+    choose_by_remainders(choosing, expected, order, parents)
+    cross_strings(crossing, strings, bits, parents, crossover_rate, children)
+    flip_strings(draws, children, bits, count, mutation_rate)
+    if used_up(draws):
+        return False
+    judge(children, coding, model, count, values)
+    for e in range(len(elites)):
+        for gene in range(GENES):
+            children[gene, count + e] = strings[gene, elites[e]]
+        for row in range(ROWS):
+            values[row, count + e] = rows[row, elites[e]]
+    return True
 
 
 @kernel
-def judge(table, count, gray, limits, model, plain):  # type: ignore[no-untyped-def]
-    """Decode and measure individuals: fill the rows of a table behind its bits; `plain` is scratch."""
-    num_bits = len(plain)
+def judge(strings, coding, model, count, rows):  # type: ignore[no-untyped-def]
+    """Decode and measure the first individuals: fill their rows."""
+    bits, gray, limits = coding
     task, weights, avoided, joint_limits = model
-    angles, results = table[num_bits : num_bits + GENES], table[num_bits + GENES :]
-    if gray:
-        gray_to_binary(table[:num_bits], count, GENES, plain)
-        decode_bits(plain, count, limits, angles)
-    else:
-        decode_bits(table[:num_bits], count, limits, angles)
-    measure_postures(angles, count, task, weights, avoided, joint_limits, results)
+    decode_strings(strings[:, :count], bits, gray, limits, rows[:GENES])
+    measure_postures(rows[:GENES], count, task, weights, avoided, joint_limits, rows[GENES:])
 
 
 @kernel
-def summary(costs, branches):  # type: ignore[no-untyped-def]
-    """Return index of the best, mean and standard deviation of the costs, and how many postures are feasible."""
-    best, mean, std = summarise(costs)
+def record(rows, out):  # type: ignore[no-untyped-def]
+    """Note in `out` index of the best, mean and standard deviation of the costs, and how many postures are feasible."""
+    out[0], out[1], out[2] = summarise(rows[GENES + COST])
     feasible = 0
-    for k in range(len(costs)):
-        feasible += branches[k] >= 0.0
-    return best, mean, std, feasible
+    for k in range(rows.shape[1]):
+        feasible += rows[ROWS - 1, k] >= 0.0
+    out[3] = feasible

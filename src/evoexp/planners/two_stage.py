@@ -85,13 +85,13 @@ class TwoStage(Component):
         """Search the docking posture; return the last generation."""
         start = problem.scenario.grid.start
         last: Record | None = None
-        terms, cost = {}, None
+        terms, cost, best = {}, None, np.empty(0)
         for last in self.placement.evolve(problem.placement, rng):
             if last.best_cost != cost:
                 terms = self._posture_terms(problem, last.best) | dict.fromkeys(PATH, 0.0) | {"sub_path": 1.0}
-                cost = last.best_cost
+                cost, best = last.best_cost, np.concatenate([last.best, start])
             yield last._replace(
-                best=np.concatenate([last.best, start]),
+                best=best,
                 best_cost=np.inf,
                 best_cost_in_generation=np.inf,
                 solved=False,
@@ -104,15 +104,19 @@ class TwoStage(Component):
     def _drive(self, problem: Problem, rng: np.random.Generator, docked: Record) -> Iterator[Record]:
         """Search the path to the docking place that was found."""
         posture = self._posture_terms(problem, docked.best) | {"sub_path": 2.0}
+        terms, path, best = posture, np.empty(0), np.empty(0)
         for found in self.path.evolve(self._path_problem(problem, docked.best), rng):
+            if found.best is not path:
+                path, best = found.best, np.concatenate([docked.best, found.best])
+                terms = posture | {name: found.terms[name] for name in PATH}
             yield found._replace(
                 index=docked.index + 1 + found.index,
-                best=np.concatenate([docked.best, found.best]),
+                best=best,
                 best_cost=docked.best_cost + found.best_cost,
                 best_cost_in_generation=docked.best_cost + found.best_cost_in_generation,
                 evaluations=docked.evaluations + found.evaluations,
                 solved=docked.solved and found.solved,
-                terms=posture | {name: found.terms[name] for name in PATH},
+                terms=terms,
                 costs=found.costs[None, :],
             )
 

@@ -34,16 +34,15 @@ class Chain:
         """Return the state of the generator now, for `update`."""
         return self._state()
 
-    def update(self, costs: NDArray[Any], best: bytes, state: bytes | None = None) -> str:
+    def update(self, costs: bytes, best: bytes, state: bytes) -> str:
         """Append one generation and return its link in hex.
 
         Args:
-            costs: Costs of the generation, (individuals,).
+            costs: `array_bytes` of the costs of the generation.
             best: `array_bytes` of the best solution so far.
-            state: What `state` returned at that generation; None: as it is now.
+            state: What `state` returned at that generation.
         """
-        generator = self._state() if state is None else state
-        self.link = xxhash.xxh3_128(b"".join((self.link, array_bytes(costs), best, generator))).digest()
+        self.link = xxhash.xxh3_128_digest(b"".join((self.link, costs, best, state)))
         return self.link.hex()
 
     def finish(self, population: NDArray[Any]) -> str:

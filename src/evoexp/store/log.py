@@ -10,7 +10,7 @@ import xxhash
 from mcap.writer import CompressionType, IndexType, Writer
 from numpy.typing import NDArray
 
-from evoexp.records import FloatArray, FrontRow, Generation, GenerationRow, ReplicateSummary, SolutionRow
+from evoexp.records import FrontRow, Generation, GenerationRow, ReplicateSummary, SolutionRow
 from evoexp.store.digests import Chain, array_bytes
 from evoexp.store.messages import (
     TERM,
@@ -43,7 +43,7 @@ class _Pending(NamedTuple):
     """What is kept of a generation that waits to be encoded; nothing of the planner's memory, which is large."""
 
     row: dict[str, Any]
-    costs: FloatArray
+    costs: bytes
     best: bytes
     state: bytes
 
@@ -133,7 +133,8 @@ class Log:
         self._terms: dict[str, str] = {}  # name → column, in the order of the columns
         self._last: Generation | None = None
         self._pending: list[_Pending] = []
-        self._best = self._written = b""  # array_bytes of the best so far, and of the last solution written
+        self._best_bytes = b""  # array_bytes of the best so far
+        self._best = self._written = b""  # of the generation encoded last, and of the last solution written
         self._best_cost = self._written_cost = np.inf
         self._buffer = io.BytesIO()
         self._writer = Writer(
@@ -162,13 +163,16 @@ class Log:
         """
         if generation.terms.keys() != self._terms.keys():
             self._terms = {name: TERM + name for name in sorted(generation.terms)}
-        row, best = generation_row(generation, self._terms.items()), np.asarray(generation.best, dtype=np.float64)
-        self._pending.append(_Pending(row, generation.costs.copy(), array_bytes(best), self._chain.state()))
+        if self._last is None or generation.best is not self._last.best:
+            self._best_bytes = array_bytes(np.asarray(generation.best, dtype=np.float64))
+        row, costs = generation_row(generation, self._terms.items()), array_bytes(generation.costs)
+        self._pending.append(_Pending(row, costs, self._best_bytes, self._chain.state()))
         self._last = generation
         if len(self._pending) >= _BATCH:
             self._flush()
-        for name, array in sorted((generation.arrays or {}).items()):
-            self._attach(name + ARRAY, array_file(array))
+        if generation.arrays:
+            for name, array in sorted(generation.arrays.items()):
+                self._attach(name + ARRAY, array_file(array))
         if generation.criteria is not None:
             for population, criteria in enumerate(generation.criteria):
                 self.write_front(FrontRow(generation.index, population, criteria.T))

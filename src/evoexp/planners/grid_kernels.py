@@ -44,7 +44,7 @@ def evolve(draws, generations, world, weights, breeding, tables, memory, records
         world: See `advance`, and so are `weights`, `breeding` and `memory`.
         tables: Paths (places, individuals, nodes + 1) and results (places, 3, individuals) of some generations; number
             g has place g modulo the number of places.
-        records: (places, 3) what `evolution.statistics.summarise` says of their costs.
+        records: (places, 4) see `record`.
 
     Returns:
         The generation reached: an earlier one if the draws did not suffice. Then it is to go on there with more.
@@ -64,8 +64,9 @@ def evolve(draws, generations, world, weights, breeding, tables, memory, records
 
 @kernel
 def record(results, out):  # type: ignore[no-untyped-def]
-    """Note index of the best, mean and standard deviation of the costs in `out` (3,)."""
+    """Note in `out` (4,) index of the best, mean and deviation of the costs, and the number of paths: all are valid."""
     out[0], out[1], out[2] = summarise(results[COST])
+    out[3] = results.shape[1]
 
 
 @kernel

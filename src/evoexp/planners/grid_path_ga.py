@@ -26,7 +26,7 @@ from evoexp.paths.motion import Motion
 from evoexp.paths.walkers import LANES, WORDS, Walkers, choice_table
 from evoexp.planners import grid_kernels
 from evoexp.planners.grid_kernels import COST, DISTANCE, RESULTS, UNSAFENESS
-from evoexp.planners.stretches import Stretches
+from evoexp.planners.stretches import Found, Stretches
 from evoexp.records import FloatArray, Generation
 from evoexp.robots.floor_platform import FloorPlatform
 from evoexp.scenarios.grid_motion import GridMotion
@@ -120,34 +120,7 @@ class GridPathGa(Component):
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield the population of random paths, then every generation."""
-        search, final = _Search(self, problem), self.ga.num_generations
-        best_cost, best, terms = np.inf, np.empty(0), {}
-        for index in range(final + 1):
-            place = search.place(index, rng)
-            paths, results, (found, mean, std) = (
-                search.paths[place],
-                search.results[place],
-                search.records[place].tolist(),
-            )
-            individual, lowest = int(found), float(results[COST, int(found)])
-            if lowest < best_cost:
-                best_cost, best = lowest, self.solution(problem, paths, individual)
-                terms = named_terms(results[:, individual], paths[individual, 0])
-            yield Generation(
-                index=index,
-                best=best,
-                best_cost=best_cost,
-                best_cost_in_generation=lowest,
-                mean_cost=mean,
-                std_cost=std,
-                num_feasible=len(paths),
-                evaluations=self.ga.population_size + index * self.ga.num_offspring,
-                collision_queries=0,
-                solved=True,
-                terms=terms,
-                costs=results[COST],
-                population=paths if index < final else trimmed(paths),
-            )
+        return _Search(self, problem).generations(rng)
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> np.ndarray:
         """Return random paths as the initial population has them, (count, longest + 1)."""
@@ -237,21 +210,15 @@ class GridPathGa(Component):
 
 
 class _Search(Stretches):
-    """One run: its last generations, and memory for the kernels.
-
-    Attributes:
-        paths: (places, individuals, nodes + 1).
-        results: (places, 3, individuals).
-        records: (places, 3), see `grid_kernels.record`.
-    """
+    """One run, and memory for its kernels."""
 
     def __init__(self, planner: GridPathGa, problem: Problem) -> None:
         ga, nodes = planner.ga, problem.fields.grid.num_nodes
-        super().__init__(ga.num_generations, STRETCH, BLOCK)
+        super().__init__(ga, STRETCH, BLOCK)
         self._planner, self._problem = planner, problem
-        self.paths = np.empty((self.num_places, ga.population_size, nodes + 1), dtype=np.int32)
-        self.results = np.empty((self.num_places, RESULTS, ga.population_size))
-        self.records = np.empty((self.num_places, 3))
+        self._paths = np.empty((self.num_places, ga.population_size, nodes + 1), dtype=np.int32)
+        self._results = np.empty((self.num_places, RESULTS, ga.population_size))
+        self.costs = self._results[:, COST]
         count = ga.num_offspring
         parents, elites = np.empty(count, dtype=np.int64), np.empty(ga.num_elites, dtype=np.int64)
         choosing = parents, elites, np.empty(ga.population_size), np.empty(ga.population_size, dtype=np.int64)
@@ -259,26 +226,31 @@ class _Search(Stretches):
         place, joined, steps, queue, walked = integers
         sites = np.zeros((2, nodes + 1), dtype=np.int32)
         memory = choosing, (place, joined, sites, steps, queue, walked)
-        breeding = (
-            not planner.revisits,
-            ga.scaling_multiple,
-            ga.crossover_rate,
-            planner.crossover_reach,
-            ga.mutation_rate,
-        )
+        rates = ga.scaling_multiple, ga.crossover_rate, planner.crossover_reach, ga.mutation_rate
         self._world = problem.world, planner.objective.weights
-        self._arguments = (*self._world, breeding, (self.paths, self.results), memory, self.records)
+        tables = self._paths, self._results
+        self._arguments = (*self._world, (not planner.revisits, *rates), tables, memory, self.records)
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw and measure the initial population."""
-        drawn = self._planner.sample(self._problem, rng, self.paths.shape[1])
-        self.paths[0, :, : drawn.shape[1]] = drawn
-        grid_kernels.measure_all(self.paths[0], *self._world, self.results[0])
-        grid_kernels.record(self.results[0], self.records[0])
+        drawn = self._planner.sample(self._problem, rng, self._paths.shape[1])
+        self._paths[0, :, : drawn.shape[1]] = drawn
+        grid_kernels.measure_all(self._paths[0], *self._world, self._results[0])
+        grid_kernels.record(self._results[0], self.records[0])
 
     def go_on(self, draws: tuple[np.ndarray, np.ndarray], first: int, last: int) -> int:
         """Compute generations."""
         return int(grid_kernels.evolve(draws, (first, last), *self._arguments))
+
+    def found(self, place: int, individual: int) -> Found:
+        """Return a path, which is valid, and its terms."""
+        paths, results = self._paths[place], self._results[place]
+        terms = named_terms(results[:, individual], paths[individual, 0])
+        return Found(self._planner.solution(self._problem, paths, individual), terms, True)
+
+    def population(self, place: int, is_last: bool) -> np.ndarray:
+        """Return the paths; of the last generation without what stands behind them."""
+        return trimmed(self._paths[place]) if is_last else self._paths[place]
 
 
 def trimmed(paths: np.ndarray) -> np.ndarray:

@@ -21,8 +21,8 @@ from evoexp.objectives.placement_criteria import Model, PlacementCriteria
 from evoexp.objectives.placement_kernels import PLATFORM, THETA_3, TORQUE
 from evoexp.paths.motion import Motion
 from evoexp.planners import placement_kernels
-from evoexp.planners.placement_kernels import GENES, RECORD, ROWS
-from evoexp.planners.stretches import Stretches
+from evoexp.planners.placement_kernels import GENES, ROWS
+from evoexp.planners.stretches import Found, Stretches
 from evoexp.records import FloatArray, Generation
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.mobile_arm import MobileArm
@@ -114,32 +114,8 @@ class PlacementGa(Component):
         return Problem(assembly, model, limits, bodies, scenario.security_margin)
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
-        """Yield the generations."""
-        search = _Search(self, problem)
-        best, best_cost, terms, solved = np.empty(0), np.inf, {}, False
-        for index in range(self.ga.num_generations + 1):
-            place = search.place(index, rng)
-            rows, (found, mean, std, num_feasible) = search.rows[place], search.records[place].tolist()
-            costs, individual = rows[FIRST_CRITERION], int(found)
-            lowest = float(costs[individual])
-            if lowest < best_cost:
-                best_cost, best, solved = lowest, rows[:GENES, individual].copy(), bool(rows[-1, individual] >= 0.0)
-                terms = dict(zip(NAMES, rows[FIRST_CRITERION + 1 : -1, individual].tolist(), strict=True))
-            yield Generation(
-                index=index,
-                best=best,
-                best_cost=best_cost,
-                best_cost_in_generation=lowest,
-                mean_cost=mean,
-                std_cost=std,
-                num_feasible=int(num_feasible),
-                evaluations=self.ga.population_size + index * self.ga.num_offspring,
-                collision_queries=0,
-                solved=solved,
-                terms=terms,
-                costs=costs,
-                population=search.strings[place],
-            )
+        """Yield the initial population, then every generation."""
+        return _Search(self, problem).generations(rng)
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> np.ndarray:
         """Return random strings, (2, count)."""
@@ -200,36 +176,41 @@ class PlacementGa(Component):
 
 
 class _Search(Stretches):
-    """One run: its last generations, and memory for the kernels.
-
-    Attributes:
-        strings: (places, 2, individuals).
-        rows: (places, ROWS, individuals), see `placement_kernels`.
-        records: (places, RECORD), see `placement_kernels.record`.
-    """
+    """One run, and memory for its kernels."""
 
     def __init__(self, planner: PlacementGa, problem: Problem) -> None:
         ga, size = planner.ga, planner.ga.population_size
-        super().__init__(ga.num_generations, STRETCH, BLOCK)
+        super().__init__(ga, STRETCH, BLOCK)
         self._planner, self._problem = planner, problem
-        self.strings = np.empty((self.num_places, GENES, size), dtype=np.int64)
-        self.rows, self.records = np.empty((self.num_places, ROWS, size)), np.empty((self.num_places, RECORD))
+        self._strings = np.empty((self.num_places, GENES, size), dtype=np.int64)
+        self._rows = np.empty((self.num_places, ROWS, size))
+        self.costs = self._rows[:, FIRST_CRITERION]
         parents, elites = np.empty(ga.num_offspring, dtype=np.int64), np.empty(ga.num_elites, dtype=np.int64)
         memory = np.empty(size), np.empty(size, dtype=np.int64), parents, elites
         rates = ga.scaling_multiple, ga.crossover_rate, ga.mutation_rate
         self._judging = planner.coded(problem), tuple(problem.model)
-        self._arguments = (rates, *self._judging, (self.strings, self.rows), memory, self.records)
+        self._arguments = (rates, *self._judging, (self._strings, self._rows), memory, self.records)
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw and judge the initial population."""
-        size = self.strings.shape[2]
-        self.strings[0] = self._planner.sample(self._problem, rng, size)
-        placement_kernels.judge(self.strings[0], *self._judging, size, self.rows[0])
-        placement_kernels.record(self.rows[0], self.records[0])
+        size = self._strings.shape[2]
+        self._strings[0] = self._planner.sample(self._problem, rng, size)
+        placement_kernels.judge(self._strings[0], *self._judging, size, self._rows[0])
+        placement_kernels.record(self._rows[0], self.records[0])
 
     def go_on(self, draws: tuple[np.ndarray, np.ndarray], first: int, last: int) -> int:
         """Compute generations."""
         return int(placement_kernels.evolve(draws, (first, last), *self._arguments))
+
+    def found(self, place: int, individual: int) -> Found:
+        """Return angles, criteria and whether they are feasible."""
+        angles, own = self._rows[place, :GENES, individual].copy(), self._rows[place, FIRST_CRITERION:, individual]
+        _, *criteria, branch = own.tolist()
+        return Found(angles, dict(zip(NAMES, criteria, strict=True)), branch >= 0.0)
+
+    def population(self, place: int, is_last: bool) -> np.ndarray:
+        """Return the strings."""
+        return np.asarray(self._strings[place])
 
 
 def _two(solution: FloatArray) -> tuple[float, float]:

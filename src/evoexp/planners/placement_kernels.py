@@ -15,7 +15,6 @@ from evoexp.objectives.placement_kernels import COST, CRITERIA, measure_postures
 
 GENES = 2  # θ1, θ2
 ROWS = GENES + CRITERIA + 1  # angles, criteria, branch
-RECORD = 4  # what `record` notes
 
 
 @kernel
@@ -32,7 +31,7 @@ def evolve(draws, generations, breeding, coding, model, tables, memory, records)
             place g modulo the number of places.
         memory: (individuals,) expected numbers of copies, (individuals,) order of the scan, (offspring,) parents,
             (elites,).
-        records: (places, RECORD) see `record`.
+        records: (places, 4) see `record`.
 
     Returns:
         The generation reached: an earlier one if the draws did not suffice. Then it is to go on there with more.
@@ -93,7 +92,7 @@ def judge(strings, coding, model, count, rows):  # type: ignore[no-untyped-def]
 
 @kernel
 def record(rows, out):  # type: ignore[no-untyped-def]
-    """Note in `out` index of the best, mean and standard deviation of the costs, and how many postures are feasible."""
+    """Note in `out` (4,) index of the best, mean and deviation of the costs, and how many postures are feasible."""
     out[0], out[1], out[2] = summarise(rows[GENES + COST])
     feasible = 0
     for k in range(rows.shape[1]):

@@ -9,6 +9,8 @@ from collision.certifier_scenes import hull
 from evoexp.collision.body_table import UnsupportedShape
 from evoexp.collision.scene import geometry_scene, obstacle_shapes, scene
 from evoexp.robots.arms import Arms
+from evoexp.robots.floor_manipulator import FloorManipulator
+from evoexp.robots.mobile_arm import MobileArm
 from evoexp.robots.planar_chain import PlanarChain
 from evoexp.scenarios.obstacles import (
     BoxObstacle,
@@ -35,6 +37,16 @@ def test_links_of_different_arms_and_links_with_obstacles_are_watched() -> None:
     named = {built.pair_names(k) for k in range(len(built.pairs))}
     assert ("arm_1_link_3", "arm_2_link_2") in named and ("arm_2_link_1", "obstacle_2") in named
     assert not any(one[:5] == two[:5] for one, two in named)
+
+
+def test_a_platform_is_called_so_and_the_links_on_it_are_counted_as_ever() -> None:
+    arm = ("arm_1_link_1", "arm_1_link_2", "arm_1_link_3")
+    size = {"link_lengths": (1.0, 1.0, 0.5), "link_radius": 0.05}
+    on_a_line = MobileArm(platform_size=(0.8, 0.4), **size)
+    on_a_floor = FloorManipulator(body_radius=0.4, body_height=0.5, **size)
+    for robot in (on_a_line, on_a_floor):
+        assert scene(robot.build(), (BALL,)).names == ("platform", *arm, "obstacle_1")
+    assert scene(on_a_floor.platform().build()).names == ("platform",)
 
 
 def test_links_of_one_arm_are_watched_if_wanted() -> None:

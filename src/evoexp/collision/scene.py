@@ -59,7 +59,7 @@ def scene(assembly: Assembly, obstacles: ObstacleTable | tuple[Any, ...] = (), s
     """Return a robot among obstacles: links of different arms, and every link with every obstacle.
 
     Args:
-        assembly: The robot; its links are named `arm_1_link_1` and so on.
+        assembly: The robot; links without names of their own are named `arm_1_link_1` and so on.
         obstacles: Settings of obstacles, or their table; named `obstacle_1` and so on.
         self_pairs: Whether links of one arm are watched, too, unless one joint carries both or they meet at a joint.
     """
@@ -68,9 +68,9 @@ def scene(assembly: Assembly, obstacles: ObstacleTable | tuple[Any, ...] = (), s
     counts = [0] * assembly.num_arms
     bodies = list(assembly.geometry.geometryObjects)
     arms = assembly.body_arms
-    for arm, item in zip(arms, bodies, strict=True):
-        counts[arm] += 1
-        own = item.name != f"link_{sum(counts) - 1}"  # bodies that have names of their own keep them
+    for k, (arm, item) in enumerate(zip(arms, bodies, strict=True)):
+        own = item.name != f"link_{k}"  # bodies that have names of their own keep them, and are not counted
+        counts[arm] += not own
         name = item.name if own else f"arm_{arm + 1}_link_{counts[arm]}"
         geometry.addGeometryObject(pin.GeometryObject(name, item.parentJoint, 0, item.placement, item.geometry))
     for k, (shape, placement) in enumerate(obstacle_shapes(table)):

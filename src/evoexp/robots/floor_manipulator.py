@@ -43,7 +43,7 @@ class FloorManipulator(Robot):
         top = np.array([0.0, 0.0, self.body_height])
         body = pin.SE3(np.eye(3), 0.5 * top)
         shape = coal.Cylinder(self.body_radius, self.body_height)
-        geometry.addGeometryObject(pin.GeometryObject("link_0", parent, 0, body, shape))
+        geometry.addGeometryObject(pin.GeometryObject("platform", parent, 0, body, shape))
         links, place = [Link(0, parent, np.zeros(3), top, self.body_radius)], top
         for k, length in enumerate(self.link_lengths):
             joint = pin.JointModelRevoluteUnaligned(np.array([0.0, -1.0, 0.0]))

@@ -36,6 +36,6 @@ class FloorPlatform(Robot):
         start, end = np.array([0.0, 0.0, low]), np.array([0.0, 0.0, low + self.body_height])
         shape = coal.Cylinder(self.body_radius, self.body_height)
         placement = pin.SE3(np.eye(3), 0.5 * (start + end))
-        geometry.addGeometryObject(pin.GeometryObject("link_0", parent, 0, placement, shape))
+        geometry.addGeometryObject(pin.GeometryObject("platform", parent, 0, placement, shape))
         links = (Link(0, parent, start, end, self.body_radius),)
         return Assembly(model, geometry, links, np.array([[0, model.nq]]), kinematic_table(model), (0,))

@@ -8,7 +8,7 @@ from pydantic import model_validator
 
 from evoexp.errors import SettingError
 from evoexp.records import FloatArray
-from evoexp.robots.assembly import Chain, Link
+from evoexp.robots.assembly import Chain, Link, link_capsule
 from evoexp.validation import NonNegative, Positive
 
 Range = tuple[float, float]
@@ -69,3 +69,8 @@ class MobileArm(Chain):
             links.append(Link(arm, parent, np.zeros(3), tip, self.link_radius))
             placement = pin.SE3(np.eye(3), tip)
         return links
+
+    def append_bodies(self, model: Any, arm: int, first_joint: int, links: list[Link]) -> list[Any]:
+        """Return the platform, by that name, and the arm's links."""
+        platform, *own = links
+        return [link_capsule(platform, "platform"), *super().append_bodies(model, arm, first_joint, own)]

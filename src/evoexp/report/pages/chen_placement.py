@@ -120,11 +120,8 @@ def _checks(cases: list[Case]) -> tuple[tuple[str, str], ...]:
 
 
 def _named(pair: str) -> str:
-    """Return the names of two bodies as the paper counts links: the certifier's first one is the platform."""
-    words = pair.replace("arm_1_link_1", "platform").replace("obstacle_1", "obstacle")
-    for k in (2, 3, 4):
-        words = words.replace(f"arm_1_link_{k}", f"link {k - 1}")
-    return words
+    """Return the names of two bodies as the paper has them."""
+    return pair.replace("arm_1_link_", "link ").replace("obstacle_1", "obstacle")
 
 
 def _drawings(cases: list[Case]) -> tuple[Drawing, ...]:

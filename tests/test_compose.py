@@ -12,11 +12,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from omegaconf import DictConfig
 
-from evoexp import shipped
+from evoexp import compose, shipped
 from evoexp.compose import expand
 from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting
 from evoexp.experiment import Experiment, description, options
-from shipped_conditions import expanded
+from shipped_conditions import expanded, kinds_of_conditions
 
 PLAIN = ("experiment=rana_obstacles",)  # one condition
 BUDGETS = ("paper", "quick", "smoke")
@@ -72,7 +72,11 @@ def test_every_experiment_composes_at_every_budget(experiment: str, budget: str)
     assert len({label for label, _ in found.conditions}) == len(found.conditions) > 0
     for _, condition in found.conditions:
         assert len(condition.id) == 64
-        condition.prepare()
+
+
+@pytest.mark.parametrize("kind", kinds_of_conditions("paper"))
+def test_every_kind_of_condition_can_be_prepared(kind: str) -> None:
+    kinds_of_conditions("paper")[kind].prepare()
 
 
 @pytest.mark.parametrize("experiment", options("experiment"))
@@ -83,6 +87,20 @@ def test_a_quick_budget_has_the_conditions_of_the_papers(experiment: str) -> Non
     assert (quick.name, quick.budget) == (experiment, "quick")
     assert [(each.label, each.condition.id) for each in quick.conditions] == [(label, condition.id)]
     assert quick.num_replicates == min(paper.num_replicates, 5)
+
+
+@pytest.mark.parametrize(
+    "overrides", [("experiment=rana_planar_ablations",), ("experiment=rana_planar", "++ga.population_size=9", "seed=3")]
+)
+def test_conditions_are_those_that_hydra_composes_one_by_one(
+    overrides: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (found,) = expand(overrides)
+    monkeypatch.setattr(compose._Composed, "__call__", lambda _, texts: compose._compose(texts))
+    (plain,) = expand(overrides)
+    assert [(label, c.to_json()) for label, c in found.conditions] == [
+        (label, c.to_json()) for label, c in plain.conditions
+    ]
 
 
 @pytest.mark.parametrize("experiment", options("experiment"))

@@ -13,7 +13,7 @@ from evoexp import condition
 from evoexp.condition import REGISTRY, Condition, component_class, revisions
 from evoexp.errors import EvoexpError, RevisionMismatch, SettingError, UnknownSetting
 from evoexp.validation import Component
-from shipped_conditions import different_conditions, shipped_conditions
+from shipped_conditions import different_conditions, kinds_of_conditions, shipped_conditions
 
 Path_ = tuple[str | int, ...]
 
@@ -40,11 +40,12 @@ WORDS = (  # that one setting takes
     ("sine", "step"),
 )
 SHIPPED = different_conditions("paper")
+KINDS = kinds_of_conditions("paper")
 
 
-@pytest.fixture(params=SHIPPED)
+@pytest.fixture(params=KINDS)
 def shipped(request: pytest.FixtureRequest) -> Condition:
-    return SHIPPED[request.param]
+    return KINDS[request.param]
 
 
 @pytest.fixture

@@ -3,19 +3,19 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from evoexp import compose
 from evoexp.collision.body_models import BodyCapsules, BodyModel, SphereSets
 from evoexp.collision.scene import obstacle_shapes
 from evoexp.errors import SettingError
 from evoexp.robots.assembly import Assembly
 from evoexp.scenarios.obstacles import ObstacleTable, obstacle_table
+from shipped_conditions import expanded
 
 MODELS = {"spheres": SphereSets(inflation=0.01), "capsules": BodyCapsules(padding=0.0)}
 EXPERIMENTS = {"manus": "corsepius_bottle", "puma560": "corsepius_shelf", "snake16": "corsepius_gate_wide"}
 
 
 def robot(name: str) -> tuple[Assembly, ObstacleTable]:
-    found = compose.expand([f"experiment={EXPERIMENTS[name]}"])[0].conditions[0].condition
+    found = expanded(EXPERIMENTS[name], "paper").conditions[0].condition
     return found.robot.build(), obstacle_table(found.scenario.obstacles)  # type: ignore[attr-defined]
 
 

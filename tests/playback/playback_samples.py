@@ -4,7 +4,7 @@ import functools
 
 import numpy as np
 
-from evoexp import compose
+from evoexp import expansions
 from evoexp.condition import Condition
 from evoexp.playback.recording import Heading, Recording, record
 from evoexp.playback.shapes import Outline
@@ -29,7 +29,7 @@ REPLICATE = {"pick and place": 2}  # one that puts the bottle down, hence holds 
 def condition(name: str) -> Condition:
     """Return a sample's condition."""
     overrides, label, _ = SAMPLES[name]
-    found = compose.expand(overrides, only=(label,) if label else ())[0].conditions
+    found = expansions.expand(overrides, only=(label,) if label else ())[0].conditions
     return found[0].condition
 
 

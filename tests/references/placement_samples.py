@@ -3,9 +3,9 @@
 import functools
 from typing import Any
 
-from evoexp import compose
 from evoexp.condition import Condition
 from evoexp.references.truth import Truth
+from shipped_conditions import expanded
 
 LABELS = {
     "torque_norm": "A torque norm",
@@ -18,7 +18,7 @@ LABELS = {
 
 @functools.cache
 def conditions(experiment: str) -> dict[str, Condition]:
-    return dict(compose.expand([f"experiment={experiment}"])[0].conditions)
+    return dict(expanded(experiment, "paper").conditions)
 
 
 def problem(case: str) -> Any:

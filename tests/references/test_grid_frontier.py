@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.sparse import csgraph, csr_array
 
-from evoexp import compose
 from evoexp.errors import SettingError
 from evoexp.references.grid_frontier import GridFrontier, arrivals_of, best_walk, frontier, network_of, walk_costs
 from planners.grid_samples import planner, robot, scenario, solvable
+from shipped_conditions import expanded
 
 SETTINGS = {"num_weights": 40, "least_weight": 1e-3, "greatest_weight": 10.0, "max_nodes": 60}
 
@@ -152,7 +152,7 @@ def test_the_frontier_goes_from_the_shortest_to_the_safest() -> None:
 
 
 def test_lingering_pays_in_the_papers_own_workspace() -> None:
-    experiment = compose.expand(["experiment=chen_lingering"])[0]
+    experiment = expanded("chen_lingering", "paper")
     found = {label: condition.prepare() for label, condition in experiment.conditions if condition.is_reference}
     truths = {label: planner.truth(problem) for label, (planner, problem) in found.items()}
     free, simple = truths["(b), revisits, exact"], truths["(b), loops erased, exact"]

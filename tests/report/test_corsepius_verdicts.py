@@ -8,13 +8,14 @@ import pandas as pd
 import pytest
 from report_samples import REPORT
 
-from evoexp import compose
+from evoexp.experiment import Experiment
 from evoexp.report.claims import CONTRADICTED, INCONCLUSIVE, NOT_JUDGED, REPRODUCED, Claim
 from evoexp.report.pages import corsepius_measures as measures
 from evoexp.report.pages import corsepius_population_verdicts as verdicts
 from evoexp.report.pages import corsepius_verdicts
 from evoexp.report.results import ConditionResults, Results, StoredLogs
 from evoexp.report.settings import ReportSettings
+from shipped_conditions import expanded
 
 SETTINGS = ReportSettings(**REPORT, figures="corsepius")  # type: ignore[arg-type]
 NO_LOGS = StoredLogs(None, (), None)  # type: ignore[arg-type]
@@ -23,8 +24,8 @@ Effort = Callable[[str, float], tuple[float, int]]  # task, size → cycles of e
 
 
 @functools.cache
-def conditions_of(name: str) -> compose.Experiment:
-    return compose.expand([f"experiment={name}"])[0]
+def conditions_of(name: str) -> Experiment:
+    return expanded(name, "paper")
 
 
 def made_up(name: str, rows: Callable[[str], dict[str, object]]) -> Results:

@@ -7,7 +7,8 @@ import pandas as pd
 import pytest
 from report_samples import REPORT
 
-from evoexp import compose
+from evoexp import expansions
+from evoexp.experiment import Experiment
 from evoexp.report.claims import CONTRADICTED, INCONCLUSIVE, NOT_JUDGED, REPRODUCED, Claim
 from evoexp.report.pages import lavoie_measures, lavoie_sweep_verdicts, lavoie_verdicts
 from evoexp.report.pages.lavoie_measures import Refuted
@@ -21,8 +22,8 @@ NO_LOGS = StoredLogs(None, (), None)  # type: ignore[arg-type]
 
 
 @functools.cache
-def conditions_of(*words: str) -> compose.Experiment:
-    return compose.expand([f"experiment={words[0]}", *words[1:]])[0]
+def conditions_of(*words: str) -> Experiment:
+    return expansions.expand([f"experiment={words[0]}", *words[1:]])[0]
 
 
 def made_up(errors: dict[str, np.ndarray], *words: str) -> Results:

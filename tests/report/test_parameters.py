@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 from report_samples import expand
 
-from evoexp import compose
+from evoexp import compose, expansions
 from evoexp.experiment import options
 from evoexp.report import parameters
 from evoexp.report.parameters import Parameter, option, overridden
@@ -12,7 +12,7 @@ from evoexp.report.results import ConditionResults, Results
 
 def of(*overrides: str, name: str = "rana_planar", budget: str = "paper", label: int = 0) -> dict[str, Parameter]:
     """Return the parameters of a condition that nobody ran, by name."""
-    experiment = compose.expand([f"experiment={name}", f"budget={budget}", *overrides])[0]
+    experiment = expansions.expand([f"experiment={name}", f"budget={budget}", *overrides])[0]
     text, condition = experiment.conditions[label]
     found = ConditionResults(text, condition, experiment.num_replicates, None, {}, None, {})  # type: ignore[arg-type]
     rows = parameters.parameters(Results(name, budget, (found,)), found)

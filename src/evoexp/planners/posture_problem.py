@@ -1,10 +1,12 @@
 """What a posture search is asked: robot, task and objective, checked against each other."""
 
+import functools
+
 import numpy as np
 import pinocchio as pin
 
 from evoexp.collision.body_covers import Cover
-from evoexp.collision.body_models import CollisionModel
+from evoexp.collision.body_models import BodyModel, CollisionModel
 from evoexp.collision.scene import obstacle_shapes
 from evoexp.errors import SettingError, nearest
 from evoexp.numerics import DEGREE
@@ -26,13 +28,13 @@ def prepare(
         SettingError: If a joint has no limits, the start or the scope does not fit the robot, the start collides, a
             goal is out of reach, a contact names nothing, or a goal and the terms that rate it contradict each other.
     """
-    assembly = robot.build()
+    assembly = _built(robot)
     if assembly.num_arms != 1:
         raise SettingError("robot", "one arm", f"{assembly.num_arms} arms")
     limits = _limits(assembly)
     start = _start(task, assembly, limits)
     obstacles = obstacle_table(task.obstacles).without_ellipses()
-    bodies = collision.bind(assembly)
+    bodies = _bodies(robot, collision)
     tool = assembly.tools[0]
     for k, name in enumerate(task.names):
         if name in bodies.names:
@@ -63,6 +65,17 @@ def prepare(
     if not judge(stage, start[:, None]).feasible[0]:
         raise _infeasible(problem, start)
     return problem
+
+
+@functools.lru_cache(maxsize=16)
+def _built(robot: Robot) -> Assembly:
+    return robot.build()
+
+
+@functools.lru_cache(maxsize=16)
+def _bodies(robot: Robot, collision: CollisionModel) -> BodyModel:
+    """Return a robot's bodies, kept: finding those that never touch takes longer than preparing all else."""
+    return collision.bind(_built(robot))
 
 
 def notes(problem: Problem) -> tuple[str, ...]:

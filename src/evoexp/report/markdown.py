@@ -19,7 +19,7 @@ def number(value: float) -> str:
     if math.isinf(value):
         return "∞" if value > 0 else "−∞"
     whole = value == round(value) and abs(value) < 1e9
-    return (f"{value:.0f}" if whole else f"{value:.4g}").replace("-", "−")
+    return (f"{value + 0.0:.0f}" if whole else f"{value:.4g}").replace("-", "−")  # −0.0 is 0
 
 
 def p_value(p: float) -> str:

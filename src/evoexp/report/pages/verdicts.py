@@ -27,9 +27,14 @@ def claim(text: str, source: str, evidence: str, verdict: str, reason: str) -> C
 
 
 def evidence(comparison: Comparison, better: str) -> str:
-    """Return a comparison in words: "lower in 80 % of pairs of runs (…)"."""
+    """Return a comparison in words: "lower in 80 % of pairs of runs (…)".
+
+    Both tests are told, by which the verdict is and the other one: they differ where the runs that are better are more,
+    but those that are worse are worse by more.
+    """
     low, high = comparison.better.interval
     return (
         f"{better} in {100 * comparison.better.a12:.0f} % of pairs of runs (A12 {comparison.better.a12:.3f} "
-        f"[{low:.3f}, {high:.3f}]), p = {markdown.p_value(comparison.p_adjusted)}"
+        f"[{low:.3f}, {high:.3f}]), p = {markdown.p_value(comparison.p_adjusted)} by seeds (signed rank), "
+        f"{markdown.p_value(comparison.unpaired_adjusted)} unpaired (rank sum)"
     )

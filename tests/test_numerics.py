@@ -375,6 +375,15 @@ assert dot(np.eye(3), np.ones(3)).sum() == 3.0 and np.isclose(numba.njit(lambda 
     assert done.returncode == 0, done.stderr
 
 
+def test_every_file_with_kernels_has_a_say_in_where_they_are_kept() -> None:
+    package = Path(kernel_cache.__file__).parent
+    keyed = {path for pattern in kernel_cache.KERNEL_FILES for path in package.glob(pattern)}
+    compiled = re.compile(r"^ *@(kernel|inlined|numba\.|njit)", re.MULTILINE)
+    holding = {path for path in package.rglob("*.py") if compiled.search(path.read_text())}
+    assert len(holding) > 50
+    assert holding <= keyed
+
+
 def test_what_is_compiled_is_noted_beside_the_kernels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "state"))
     assert not kernel_cache.is_compiled("a planner")

@@ -226,28 +226,32 @@ _NOT_COMPOSABLE = (HydraException, OmegaConfBaseException, ValueError, TypeError
 class _Composed:
     """Configurations of one expansion: Hydra composes every choice of options once, values are set in copies of it.
 
-    Hydra takes a quarter of a second, and does the same: options first, then values, in their order.
+    Hydra does the same, options first, then values in their order; but it takes a tenth of a second and more.
     """
 
     def __init__(self) -> None:
         self._of_options: dict[tuple[str, ...], DictConfig] = {}
 
     def __call__(self, overrides: Mapping[str, str]) -> DictConfig:
-        groups = _groups()
-        chosen = {key: text for key, text in overrides.items() if key in groups}
-        values = OverridesParser.create().parse_overrides([overrides[key] for key in sorted(overrides.keys() - chosen)])
-        if not all(value.type is OverrideType.CHANGE for value in values):
-            return _compose(overrides)
-        of_options = tuple(sorted(chosen.values()))
-        if of_options not in self._of_options:
-            self._of_options[of_options] = _compose(chosen)
-        config = copy.deepcopy(self._of_options[of_options])
         try:
-            for value in values:
-                OmegaConf.update(config, value.key_or_group, value.value(), merge=True)
+            groups = _groups()
+            options = [text for key, text in sorted(overrides.items()) if key in groups]
+            values = [text for key, text in sorted(overrides.items()) if key not in groups]
+            parsed = OverridesParser.create().parse_overrides(values)
+            if all(value.type is OverrideType.CHANGE for value in parsed):
+                config = copy.deepcopy(self._chosen(options))
+                for value in parsed:
+                    OmegaConf.update(config, value.key_or_group, value.value(), merge=True)
+                return config
         except _NOT_COMPOSABLE:
-            return _compose(overrides)  # which says what is wrong
-        return config
+            pass  # it is said below, of all overrides
+        return _compose(overrides)
+
+    def _chosen(self, options: list[str]) -> DictConfig:
+        key = tuple(options)
+        if key not in self._of_options:
+            self._of_options[key] = hydra.compose("config", overrides=options)
+        return self._of_options[key]
 
 
 def _compose(overrides: Mapping[str, str]) -> DictConfig:
@@ -280,6 +284,8 @@ def _said_in_one_line(error: Exception, overrides: Mapping[str, str]) -> EvoexpE
 
 def _unknown(field: str, overrides: Mapping[str, str]) -> EvoexpError:
     """Name the first part of an unknown key that does not exist, and what stands there instead."""
+    if (group := field.split("=")[0]) in _groups():
+        return SettingError(group, "an option that is chosen, to be deleted", overrides.get(group))
     node: Any = hydra.compose("config", overrides=[text for key, text in overrides.items() if key in _groups()])
     parts = field.split(".")
     for k, part in enumerate(parts):

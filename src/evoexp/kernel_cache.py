@@ -13,7 +13,7 @@ import numba
 import platformdirs
 
 _ROOMS = ("collision", "evolution", "objectives", "paths", "planners", "references", "robots", "scenarios")
-KERNEL_FILES = ("numerics.py", *(f"{room}/*.py" for room in _ROOMS))
+KERNEL_FILES = ("numerics.py", "draws.py", *(f"{room}/*.py" for room in _ROOMS))
 
 NUM_KEPT_CACHES = 4  # [-] states of the sources whose compiled kernels are kept
 

@@ -105,6 +105,7 @@ OPTIONS = f"(options: {EXPERIMENTS})"
         ("experiment=rana_planar", "experiment: must be given once"),
         ("ga.mutation_rate=${nothing}", "ga.mutation_rate: must be resolvable, was \"Interpolation key 'nothing' not"),
         ("~robot", "robot: must be given, was '~robot'"),
+        ("~control=random_search", "control: must be an option that is chosen, to be deleted, was '~control=random_"),
         ("~seed", "seed: must be given, was '~seed'"),
     ],
 )
@@ -127,6 +128,10 @@ def test_overrides(refused: Refused, override: str, message: str) -> None:
         (("run", "experiment=null"), f"experiment: must be chosen: {EXPERIMENTS}"),
         (("run", "robot=two_planar_2r"), "experiment: must be chosen: "),
         (("run", "experiment=rana_planar,rana_obstacles"), "experiment: must be one value (or add -m"),
+        (
+            ("run", "-m", "experiment=rana_planar", 'scenario.length_unit=choice("foot\'",m)'),
+            "configuration: must be composable, was \"LexerNoViableAltException: scenario.length_unit=foot'",
+        ),
         (("run", "experiment=rana_planar", "--only", "GA"), "--only: no option 'GA'"),
         (("run", "experiment=rana_planar", "--only", " , "), "argument --only: must name a condition, was ' , '"),
         (("run", "experiment=rana_planar", "--nolreport"), "no option '--nolreport'; did you mean '--no-report'?"),

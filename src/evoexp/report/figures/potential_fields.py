@@ -5,6 +5,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from matplotlib.ticker import MaxNLocator
 
 from evoexp.report import style
 from evoexp.report.printed_grids import BLOCKED, MISSING, SURPLUS, WRONG
@@ -42,7 +43,9 @@ def draw_maps(table: pd.DataFrame) -> Figure:
         image = rows.pivot_table(index="y", columns="x", values="value", dropna=False).to_numpy(dtype=float)
         shown = axes.imshow(image, origin="lower", cmap="viridis", interpolation="nearest")
         axes.set_facecolor(style.NEUTRAL)
-        figure.colorbar(shown, ax=axes, label="potential [–]", shrink=0.75)
+        bar = figure.colorbar(shown, ax=axes, label="potential [–]", shrink=0.75)
+        for axis in (axes.xaxis, axes.yaxis, bar.ax.yaxis):
+            axis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
         axes.grid(visible=False)
         axes.set_title(str(name))
         axes.set_xlabel("x [node]")

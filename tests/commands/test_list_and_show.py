@@ -13,6 +13,7 @@ from evoexp.experiment import description, options
 from evoexp.shipped import Shipped
 from evoexp.store.run_directory import RunDirectory, find_runs
 from evoexp.store.tables import read_summaries
+from shipped_conditions import expanded
 
 PLANAR = ("experiment=rana_planar", *SMALL)
 
@@ -51,6 +52,16 @@ def test_stored_runs(evoexp: Evoexp, stored: Path, width: int) -> None:
     assert [row[1:3] for row in rows.values()] == [["2", "1"], ["2", "0"]]
     assert "(changed)" in said.out
     assert "via-point" in said.out
+
+
+@pytest.mark.parametrize("name", ["rana_planar", "rana", "rana_planar_ablations"])
+def test_a_condition_that_experiments_share_is_named_as_it_was_run(
+    name: str, evoexp: Evoexp, outputs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "300")
+    label, condition = expanded(name, "paper").conditions[0]
+    RunDirectory(outputs, condition.id).create(condition.to_json(), {"experiment": name, "label": label})
+    assert cells(evoexp("list").out)[condition.id[:12]][0] == f"{name}, {label}, paper"
 
 
 def test_damaged_runs_are_listed_beside_the_others(

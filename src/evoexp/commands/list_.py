@@ -40,7 +40,6 @@ def _experiments() -> Table:
 
 
 def _runs(runs: list[tuple[str, RunDirectory | EvoexpError]]) -> Table:
-    names = {row.condition_id: f"{row.experiment}, {row.label}, {row.budget}" for row in shipped.shipped()}
     table = new_table(f"runs stored in {outputs_root()}")
     add_hash_column(table)
     add_columns(table, "condition")
@@ -57,7 +56,7 @@ def _runs(runs: list[tuple[str, RunDirectory | EvoexpError]]) -> Table:
         cost = done["best_cost"].median() if len(done) else pd.NA
         table.add_row(
             name,
-            names.get(run.condition_id) or _noted(run),
+            _named(run),
             str(len(done)),
             str(len(rows) - len(done)),
             str(int(done["solved"].sum())),
@@ -66,10 +65,16 @@ def _runs(runs: list[tuple[str, RunDirectory | EvoexpError]]) -> Table:
     return table
 
 
-def _noted(run: RunDirectory) -> str:
-    """Return what the manifest notes of a run that is no shipped condition."""
+def _named(run: RunDirectory) -> str:
+    """Return a run's condition as it was asked for: experiments share conditions."""
     try:
         notes = run.manifest()
     except EvoexpError:
+        notes = {}
+    rows = [row for row in shipped.shipped() if row.condition_id == run.condition_id]
+    asked = [row for row in rows if (row.experiment, row.label) == (notes.get("experiment"), notes.get("label"))]
+    if found := asked or rows:
+        return f"{found[0].experiment}, {found[0].label}, {found[0].budget}"
+    if not notes:
         return "(no manifest)"
     return f"{notes.get('experiment', '?')}, {notes.get('label', '?')}, {notes.get('budget', '?')} (changed)"

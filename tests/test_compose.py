@@ -90,7 +90,12 @@ def test_a_quick_budget_has_the_conditions_of_the_papers(experiment: str) -> Non
 
 
 @pytest.mark.parametrize(
-    "overrides", [("experiment=rana_planar_ablations",), ("experiment=rana_planar", "++ga.population_size=9", "seed=3")]
+    "overrides",
+    [
+        ("experiment=rana_planar_ablations",),
+        ("experiment=rana_planar", "ga.population_size=9", "robot.arms.1.base_position=[0,9]", "seed=3"),
+        ("experiment=rana_planar", "++ga.population_size=9", "seed=3"),  # which Hydra composes as a whole
+    ],
 )
 def test_conditions_are_those_that_hydra_composes_one_by_one(
     overrides: tuple[str, ...], monkeypatch: pytest.MonkeyPatch

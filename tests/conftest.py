@@ -1,4 +1,7 @@
-"""Settings of every test: property tests draw the same examples each time, and no time is an assertion."""
+"""Settings of every test: property tests draw the same examples each time.
+
+And no time is an assertion.
+"""
 
 from hypothesis import settings
 

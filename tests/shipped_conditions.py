@@ -18,23 +18,37 @@ def shipped_conditions(budget: str) -> dict[tuple[str, str], Condition]:
     names = options("experiment")
     from_behind = os.environ.get("PYTEST_XDIST_WORKER", "gw0")[-1] in "13579"
     found = {name: expanded(name, budget) for name in (reversed(names) if from_behind else names)}
-    return {(name, label): condition for name in names for label, condition in found[name].conditions}
+    return {
+        (name, label): condition for name in names for label, condition in found[name].conditions
+    }
 
 
 def expanded(name: str, budget: str) -> Experiment:
-    """Return a shipped experiment at a budget; kept on disk under the content of `conf` and the code."""
+    """Return a shipped experiment at a budget.
+
+    Kept on disk under the content of `conf` and the code.
+    """
     return expansions.expand([f"experiment={name}", f"budget={budget}"])[0]
 
 
 def different_conditions(budget: str) -> dict[str, Condition]:
     """Return "experiment: label" → condition, each condition once: experiments share some."""
-    found = {condition.id: (f"{name}: {label}", condition) for (name, label), condition in _smallest_last(budget)}
+    found = {
+        condition.id: (f"{name}: {label}", condition)
+        for (name, label), condition in _smallest_last(budget)
+    }
     return dict(found.values())
 
 
 def kinds_of_conditions(budget: str) -> dict[str, Condition]:
-    """Return `different_conditions`, of those that differ in numbers only the last: sweeps are long and alike."""
-    found = {_kind(condition): (name, condition) for name, condition in different_conditions(budget).items()}
+    """Return `different_conditions`, of those that differ in numbers only the last.
+
+    Sweeps are long and alike.
+    """
+    found = {
+        _kind(condition): (name, condition)
+        for name, condition in different_conditions(budget).items()
+    }
     return dict(found.values())
 
 

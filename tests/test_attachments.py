@@ -1,4 +1,7 @@
-"""Files of a condition: identity by content, attached to logs, found again from a log or a stored run alone."""
+"""Files of a condition: identity by content, attached to logs.
+
+Found again from a log or a stored run alone.
+"""
 
 from pathlib import Path
 
@@ -26,7 +29,11 @@ def path(tmp_path: Path) -> Path:
 
 
 def condition_with(path: Path) -> Condition:
-    return compose.expand([*OVERRIDES, f"scenario.map={{file: '{path}'}}"], only=["(a)"])[0].conditions[0].condition
+    return (
+        compose.expand([*OVERRIDES, f"scenario.map={{file: '{path}'}}"], only=["(a)"])[0]
+        .conditions[0]
+        .condition
+    )
 
 
 def forget() -> None:
@@ -69,7 +76,13 @@ def test_a_stored_run_has_its_files(path: Path, tmp_path: Path) -> None:
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(SettingError, match=r"scenario\.map\.file: must be a file that can be read .*, was .*nowhere"):
+    with pytest.raises(
+        SettingError,
+        match=r"scenario\.map\.file: must be a file that can be read .*, was .*nowhere",
+    ):
         condition_with(tmp_path / "nowhere.txt")
-    with pytest.raises(SettingError, match=r"scenario\.map\.file: must be a file that can be read \(is a directory\)"):
+    with pytest.raises(
+        SettingError,
+        match=r"scenario\.map\.file: must be a file that can be read \(is a directory\)",
+    ):
         condition_with(tmp_path)

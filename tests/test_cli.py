@@ -27,7 +27,11 @@ def test_help_names_every_command_and_loads_nothing_heavy(tmp_path: Path) -> Non
     loaded = "*sorted({name.split('.')[0] for name in sys.modules})"
     watch = f"import atexit; atexit.register(lambda: print({loaded}, file=sys.stderr))"
     done = subprocess.run(
-        [sys.executable, "-c", f"import sys; {watch}; {code}"], cwd=tmp_path, capture_output=True, text=True, timeout=60
+        [sys.executable, "-c", f"import sys; {watch}; {code}"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=60,
     )
     assert done.returncode == 0
     assert all(f"\n    {name}" in done.stdout for name in COMMANDS)
@@ -77,11 +81,15 @@ def test_a_refusal_is_one_line_and_exit_code_2_in_a_process_too(tmp_path: Path) 
     assert done.returncode == 2
     assert done.stdout == ""
     assert done.stderr.count("\n") == 1
-    assert done.stderr.startswith("evoexp: experiment: no option 'rana_planr'; did you mean 'rana_planar'?")
+    assert done.stderr.startswith(
+        "evoexp: experiment: no option 'rana_planr'; did you mean 'rana_planar'?"
+    )
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_programming_error_keeps_its_traceback(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_programming_error_keeps_its_traceback(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     from evoexp.commands import list_
 
     def broken(*_: object) -> int:
@@ -92,7 +100,9 @@ def test_a_programming_error_keeps_its_traceback(monkeypatch: pytest.MonkeyPatch
         main(["list"])
 
 
-def test_ctrl_c_is_exit_code_130(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_ctrl_c_is_exit_code_130(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     from evoexp.commands import list_
 
     def interrupted(*_: object) -> int:
@@ -105,7 +115,9 @@ def test_ctrl_c_is_exit_code_130(monkeypatch: pytest.MonkeyPatch, capsys: pytest
 
 def test_a_reader_that_closes_the_pipe_is_no_error(tmp_path: Path) -> None:
     command = f"{sys.executable} -m evoexp list | true; echo ${{PIPESTATUS[0]}}"
-    done = subprocess.run(["bash", "-c", command], cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(
+        ["bash", "-c", command], cwd=tmp_path, capture_output=True, text=True, timeout=120
+    )
     assert done.stdout == "0\n"
     assert done.stderr == ""
 
@@ -113,8 +125,20 @@ def test_a_reader_that_closes_the_pipe_is_no_error(tmp_path: Path) -> None:
 def test_outputs_are_in_the_current_directory_unless_said_otherwise(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    small = ("budget=smoke", "ga.population_size=8", "ga.num_generations=1", "planner.num_new_trajectories=0")
-    words = ["run", "experiment=rana_obstacles", *small, "num_replicates=1", "runner=serial", "--no-report"]
+    small = (
+        "budget=smoke",
+        "ga.population_size=8",
+        "ga.num_generations=1",
+        "planner.num_new_trajectories=0",
+    )
+    words = [
+        "run",
+        "experiment=rana_obstacles",
+        *small,
+        "num_replicates=1",
+        "runner=serial",
+        "--no-report",
+    ]
     monkeypatch.delenv("EVOEXP_OUTPUTS", raising=False)
     monkeypatch.chdir(tmp_path)
     assert main(words) == 0

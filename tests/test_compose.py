@@ -1,4 +1,7 @@
-"""From overrides to conditions: identities, labels, budgets, and what makes a report another one."""
+"""From overrides to conditions.
+
+Identities, labels, budgets, and what makes a report another one.
+"""
 
 import copy
 import functools
@@ -55,10 +58,16 @@ def write_experiment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callabl
     conf = tmp_path / "conf"
     shutil.copytree(shipped.config_directory(), conf)
     monkeypatch.setattr(shipped, "config_directory", lambda: conf)
-    head = (conf / "experiment/rana_obstacles.yaml").read_text().replace("rana_obstacles", "rana_planar")
+    head = (
+        (conf / "experiment/rana_obstacles.yaml")
+        .read_text()
+        .replace("rana_obstacles", "rana_planar")
+    )
 
     def write(name: str, conditions: str, extra: str = "") -> None:
-        (conf / f"experiment/{name}.yaml").write_text(f"{head}\n{extra}\nconditions:\n{conditions}\n")
+        (conf / f"experiment/{name}.yaml").write_text(
+            f"{head}\n{extra}\nconditions:\n{conditions}\n"
+        )
 
     return write
 
@@ -93,8 +102,17 @@ def test_a_quick_budget_has_the_conditions_of_the_papers(experiment: str) -> Non
     "overrides",
     [
         ("experiment=rana_planar_ablations",),
-        ("experiment=rana_planar", "ga.population_size=9", "robot.arms.1.base_position=[0,9]", "seed=3"),
-        ("experiment=rana_planar", "++ga.population_size=9", "seed=3"),  # which Hydra composes as a whole
+        (
+            "experiment=rana_planar",
+            "ga.population_size=9",
+            "robot.arms.1.base_position=[0,9]",
+            "seed=3",
+        ),
+        (
+            "experiment=rana_planar",
+            "++ga.population_size=9",
+            "seed=3",
+        ),  # which Hydra composes as a whole
     ],
 )
 def test_conditions_are_those_that_hydra_composes_one_by_one(
@@ -110,7 +128,9 @@ def test_conditions_are_those_that_hydra_composes_one_by_one(
 
 @pytest.mark.parametrize("experiment", options("experiment"))
 def test_an_experiment_file_says_how_it_is_run_and_what_it_is(experiment: str) -> None:
-    lines = (shipped.config_directory() / "experiment" / f"{experiment}.yaml").read_text().splitlines()
+    lines = (
+        (shipped.config_directory() / "experiment" / f"{experiment}.yaml").read_text().splitlines()
+    )
     assert lines[1] == f"# evoexp run experiment={experiment}"
     assert description(experiment) == lines[2].removeprefix("# ") != ""
 
@@ -164,7 +184,9 @@ def test_what_changes_results_changes_the_hash(override: str) -> None:
 
 def test_the_same_condition_under_another_experiment_and_label_has_the_same_hash() -> None:
     planar = ids("experiment=rana_planar")
-    assert ids("experiment=rana_obstacles", "scenario=rana_planar") == {"rana_obstacles": planar["via-point GA"]}
+    assert ids("experiment=rana_obstacles", "scenario=rana_planar") == {
+        "rana_obstacles": planar["via-point GA"]
+    }
     groups = [f"{g}=rana_planar" for g in ("scenario", "planner", "ga", "objective", "collision")]
     assert ids("robot=two_planar_2r", *groups) == {"custom": planar["via-point GA"]}
 
@@ -172,14 +194,22 @@ def test_the_same_condition_under_another_experiment_and_label_has_the_same_hash
 def test_one_hash_from_a_single_run_and_from_a_multirun() -> None:
     swept = ids(*PLAIN, "ga.population_size=20,30", "seed=0,1", multirun=True)
     assert swept == {
-        f"population_size={size} · seed={seed}": one(*PLAIN, f"ga.population_size={size}", f"seed={seed}")
+        f"population_size={size} · seed={seed}": one(
+            *PLAIN, f"ga.population_size={size}", f"seed={seed}"
+        )
         for size in (20, 30)
         for seed in (0, 1)
     }
     assert len(set(swept.values())) == 4
 
 
-SETTINGS = ("seed=3", "ga.population_size=20", "scenario=rana_planar", "scenario.security_margin=2", "control=null")
+SETTINGS = (
+    "seed=3",
+    "ga.population_size=20",
+    "scenario=rana_planar",
+    "scenario.security_margin=2",
+    "control=null",
+)
 
 
 @settings(max_examples=12, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -206,7 +236,12 @@ def test_labels_are_templates_over_sweeps(write_experiment: Callable[..., None])
     )
     (experiment,) = expand(["experiment=mine"])
     found = {
-        label: (c.planner.ga.num_elites, c.planner.ga.population_size, c.planner.ga.crossover_rate, c.seed)
+        label: (
+            c.planner.ga.num_elites,
+            c.planner.ga.population_size,
+            c.planner.ga.crossover_rate,
+            c.seed,
+        )
         for label, c in experiment.conditions
     }
     assert found == {
@@ -223,21 +258,28 @@ def test_labels_are_templates_over_sweeps(write_experiment: Callable[..., None])
     }
 
 
-def test_the_command_line_wins_over_an_entry_which_wins_over_the_file(write_experiment: Callable[..., None]) -> None:
+def test_the_command_line_wins_over_an_entry_which_wins_over_the_file(
+    write_experiment: Callable[..., None],
+) -> None:
     write_experiment("mine", "  a: [ga.population_size=10]\n  b: []", "seed: 5")
     base = (*PLAIN, "scenario=rana_planar", "seed=5")
     assert ids("experiment=mine") == {"a": one(*base, "ga.population_size=10"), "b": one(*base)}
     both = one(*base, "ga.population_size=30")
     assert ids("experiment=mine", "ga.population_size=30") == {"a": both, "b": both}
     swept = ids("experiment=mine", "ga.population_size=30,50", multirun=True)
-    assert list(swept) == [f"{label} · population_size={size}" for label in "ab" for size in (30, 50)]
+    assert list(swept) == [
+        f"{label} · population_size={size}" for label in "ab" for size in (30, 50)
+    ]
     assert swept["a · population_size=30"] == swept["b · population_size=30"] == both
 
 
 def test_groups_of_an_entry_can_be_taken_back_on_the_command_line() -> None:
     plain = ids("experiment=rana_planar")
     without = ids("experiment=rana_planar", "control=null")
-    assert without == {"via-point GA": plain["via-point GA"], "random search": plain["via-point GA"]}
+    assert without == {
+        "via-point GA": plain["via-point GA"],
+        "random search": plain["via-point GA"],
+    }
     both = ids("experiment=rana_planar", "control=random_search")
     assert both == {"via-point GA": plain["random search"], "random search": plain["random search"]}
     swept = ids("experiment=rana_planar", "control=null,random_search", multirun=True, only=())
@@ -246,7 +288,12 @@ def test_groups_of_an_entry_can_be_taken_back_on_the_command_line() -> None:
 
 
 def test_two_swept_settings_of_one_name_are_told_apart() -> None:
-    swept = ids(*PLAIN, "robot.arms.0.link_lengths=[4,4],[3,3]", "robot.arms.1.link_lengths=[4,4],[3,3]", multirun=True)
+    swept = ids(
+        *PLAIN,
+        "robot.arms.0.link_lengths=[4,4],[3,3]",
+        "robot.arms.1.link_lengths=[4,4],[3,3]",
+        multirun=True,
+    )
     label = "robot.arms.0.link_lengths=[4,4] · robot.arms.1.link_lengths=[3,3]"
     assert len(swept) == 4
     assert swept[label] == one(*PLAIN, "robot.arms.1.link_lengths=[3,3]")
@@ -254,7 +301,9 @@ def test_two_swept_settings_of_one_name_are_told_apart() -> None:
 
 def test_only_picks_labels() -> None:
     plain = ids("experiment=rana_planar")
-    assert ids("experiment=rana_planar", only=("random search",)) == {"random search": plain["random search"]}
+    assert ids("experiment=rana_planar", only=("random search",)) == {
+        "random search": plain["random search"]
+    }
     assert ids("experiment=rana_planar", only=("random search", "via-point GA")) == plain
     (picked,) = expand(["experiment=rana_planar"], only=["random search"])
     assert picked.changed
@@ -264,26 +313,43 @@ def test_only_picks_labels() -> None:
 
 def test_a_multirun_drops_no_experiment_and_no_condition() -> None:
     names = ("rana_planar", "rana_obstacles", "rana_three_arms")
-    experiments = expand([f"experiment={','.join(names)}", "budget=smoke", "seed=0,1"], multirun=True)
+    experiments = expand(
+        [f"experiment={','.join(names)}", "budget=smoke", "seed=0,1"], multirun=True
+    )
     assert [e.name for e in experiments] == list(names)
     assert [len(e.conditions) for e in experiments] == [4, 2, 2]
     assert len({c.id for e in experiments for _, c in e.conditions}) == 8
-    assert expand(["experiment=choice(rana_planar,rana_obstacles)"], multirun=True)[1].name == "rana_obstacles"
+    assert (
+        expand(["experiment=choice(rana_planar,rana_obstacles)"], multirun=True)[1].name
+        == "rana_obstacles"
+    )
 
 
 @pytest.mark.parametrize(
     ("overrides", "message"),
     [
-        (["ga.population_size=20,20"], "conditions: must be labels that differ, was 'population_size=20'"),
-        (["budget=smoke,paper"], "budget: must be one value: a sweep is over what changes a condition"),
+        (
+            ["ga.population_size=20,20"],
+            "conditions: must be labels that differ, was 'population_size=20'",
+        ),
+        (
+            ["budget=smoke,paper"],
+            "budget: must be one value: a sweep is over what changes a condition",
+        ),
         (["num_replicates=2,3"], "num_replicates: must be one value"),
         (["runner.num_workers=1,2"], "runner.num_workers: must be one value"),
         (
             ["ga.population_size=glob(*)"],
             "ga.population_size: must be values that can be enumerated: a,b,c or range(…)",
         ),
-        (["ga.crossover_rate=interval(0,1)"], "ga.crossover_rate: must be values that can be enumerated"),
-        (["planner=rana_planar,rana_plan"], "planner: no option 'rana_plan'; did you mean 'rana_planar'?"),
+        (
+            ["ga.crossover_rate=interval(0,1)"],
+            "ga.crossover_rate: must be values that can be enumerated",
+        ),
+        (
+            ["planner=rana_planar,rana_plan"],
+            "planner: no option 'rana_plan'; did you mean 'rana_planar'?",
+        ),
     ],
 )
 def test_sweeps_that_cannot_be(overrides: list[str], message: str) -> None:
@@ -302,18 +368,32 @@ def test_an_experiment_twice_is_refused() -> None:
     [
         ("  a: 3", "conditions.a: must be a list of overrides, was 3"),
         ("  a: [3]", "conditions.a: must be a list of overrides, was [3]"),
-        ('  "{} and {}": ["seed=1,2"]', "conditions.{} and {}: must be a label with one {} per swept override"),
+        (
+            '  "{} and {}": ["seed=1,2"]',
+            "conditions.{} and {}: must be a label with one {} per swept override",
+        ),
         ('  "λ={}": ["seed=1"]', "conditions.λ={}: must be a label with one {} per swept override"),
-        ("  a: [num_replicates=3]", "conditions.a: must be free of num_replicates, which belongs to the whole"),
+        (
+            "  a: [num_replicates=3]",
+            "conditions.a: must be free of num_replicates, which belongs to the whole",
+        ),
         ("  a: [budget=smoke]", "conditions.a: must be free of budget"),
-        ("  a: [ga.population_sise=3]", "ga.population_sise: unknown setting; did you mean 'population_size'?"),
+        (
+            "  a: [ga.population_sise=3]",
+            "ga.population_sise: unknown setting; did you mean 'population_size'?",
+        ),
         ("  a: [ga=other]", "ga: no option 'other' (options: "),
         ("  a: [hydra.run.dir=x]", "nothing of Hydra's own"),
-        ('  a: ["seed=1,2"]\n  "a · seed=1": []', "conditions: must be labels that differ, was 'a · seed=1'"),
+        (
+            '  a: ["seed=1,2"]\n  "a · seed=1": []',
+            "conditions: must be labels that differ, was 'a · seed=1'",
+        ),
         ("  a: [ga.population_size=0]", "ga.population_size: must be at least 1, was 0"),
     ],
 )
-def test_entries_that_cannot_be(write_experiment: Callable[..., None], conditions: str, message: str) -> None:
+def test_entries_that_cannot_be(
+    write_experiment: Callable[..., None], conditions: str, message: str
+) -> None:
     write_experiment("mine", conditions)
     with pytest.raises(EvoexpError) as caught:
         expand(["experiment=mine"])
@@ -325,11 +405,16 @@ def test_entries_that_cannot_be(write_experiment: Callable[..., None], condition
 
 
 def generations(experiment: Experiment) -> list[int]:
-    return [getattr(c.planner, "planner", c.planner).ga.num_generations for _, c in experiment.conditions]
+    return [
+        getattr(c.planner, "planner", c.planner).ga.num_generations
+        for _, c in experiment.conditions
+    ]
 
 
 def test_budgets_cap_and_quick_keeps_the_hashes() -> None:
-    paper, quick, smoke = (expand(["experiment=rana_planar", f"budget={budget}"])[0] for budget in BUDGETS)
+    paper, quick, smoke = (
+        expand(["experiment=rana_planar", f"budget={budget}"])[0] for budget in BUDGETS
+    )
     assert (paper.num_replicates, quick.num_replicates, smoke.num_replicates) == (20, 5, 2)
     assert quick.conditions == paper.conditions
     assert (generations(paper), generations(smoke)) == ([500, 500], [10, 10])
@@ -338,7 +423,9 @@ def test_budgets_cap_and_quick_keeps_the_hashes() -> None:
 
 @pytest.mark.parametrize(("asked", "effective"), [(3, 3), (10, 10), (11, 10), (500, 10)])
 def test_a_budget_caps_and_never_raises(asked: int, effective: int) -> None:
-    (experiment,) = expand(["experiment=rana_planar", "budget=smoke", f"ga.num_generations={asked}"])
+    (experiment,) = expand(
+        ["experiment=rana_planar", "budget=smoke", f"ga.num_generations={asked}"]
+    )
     assert generations(experiment) == [effective, effective]
     assert experiment.changed is (effective != 10)
     assert one("experiment=rana_planar", "budget=smoke", f"ga.num_generations={asked}") == one(
@@ -356,9 +443,9 @@ def test_a_changed_cap_is_another_report() -> None:
     (experiment,) = expand([*PLAIN, "budget=smoke", "budget.max_generations=4"])
     assert generations(experiment) == [4]
     assert experiment.report_name.startswith("rana_obstacles@smoke+")
-    assert expand([*PLAIN, "budget=smoke", "budget.max_generations=4", "num_replicates=1"])[0] == experiment._replace(
-        num_replicates=1
-    )
+    assert expand([*PLAIN, "budget=smoke", "budget.max_generations=4", "num_replicates=1"])[
+        0
+    ] == experiment._replace(num_replicates=1)
 
 
 # Report names
@@ -366,7 +453,13 @@ def test_a_changed_cap_is_another_report() -> None:
 
 def test_a_report_has_a_name_of_its_own_only_where_its_conditions_differ() -> None:
     plain = "rana_planar@smoke"
-    same = ["ga.population_size=50", "seed=0", "num_replicates=1", "report.dpi=20", "ga.num_generations=400"]
+    same = [
+        "ga.population_size=50",
+        "seed=0",
+        "num_replicates=1",
+        "report.dpi=20",
+        "ga.num_generations=400",
+    ]
     assert expand(["experiment=rana_planar", "budget=smoke", *same])[0].report_name == plain
     names = [
         expand(["experiment=rana_planar", "budget=smoke", override])[0].report_name
@@ -413,9 +506,21 @@ def test_a_group_that_the_planner_does_not_take_is_refused(
         (["ga=null"], SettingError, "ga: must be chosen: "),
         (["~objective"], SettingError, "objective: must be chosen: "),
         (["+control.x=1"], SettingError, "control: must be chosen: random_search"),
-        (["control=random_search", "+control.planner=1"], SettingError, "control.planner: must be left out"),
-        (["control=random_search", "planner.walk_step=0"], SettingError, "planner.walk_step: must be greater than 0"),
-        (["control=random_search", "+control.x=1"], UnknownSetting, "planner.x: unknown setting (known here: planner)"),
+        (
+            ["control=random_search", "+control.planner=1"],
+            SettingError,
+            "control.planner: must be left out",
+        ),
+        (
+            ["control=random_search", "planner.walk_step=0"],
+            SettingError,
+            "planner.walk_step: must be greater than 0",
+        ),
+        (
+            ["control=random_search", "+control.x=1"],
+            UnknownSetting,
+            "planner.x: unknown setting (known here: planner)",
+        ),
     ],
 )
 def test_parts_of_a_planner_are_set_in_their_own_group(
@@ -427,5 +532,7 @@ def test_parts_of_a_planner_are_set_in_their_own_group(
 
 
 def test_unknown_labels_of_only_list_those_that_exist() -> None:
-    with pytest.raises(UnknownOption, match=r"--only: no option 'random'.*\(options: random search, via-point GA\)"):
+    with pytest.raises(
+        UnknownOption, match=r"--only: no option 'random'.*\(options: random search, via-point GA\)"
+    ):
         expand(["experiment=rana_planar"], only=["random"])

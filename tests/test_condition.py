@@ -56,7 +56,13 @@ def config() -> dict[str, Any]:
 
 def leaves(data: Any, path: Path_ = ()) -> Iterator[tuple[Path_, Any]]:
     """Yield every setting of plain configuration data and where it stands."""
-    items = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    items = (
+        data.items()
+        if isinstance(data, dict)
+        else enumerate(data)
+        if isinstance(data, list)
+        else ()
+    )
     for key, value in items:
         yield from leaves(value, (*path, key))
     if not isinstance(data, dict | list):
@@ -95,7 +101,10 @@ def test_every_shipped_condition_has_a_hash_of_its_own() -> None:
 
 
 def test_every_setting_is_part_of_the_hash(shipped: Condition) -> None:
-    """Change each setting by the smallest step that stays valid: another hash, or it is refused; never ignored."""
+    """Change each setting by the smallest step that stays valid: another hash, or it is refused.
+
+    Never ignored.
+    """
     config = json.loads(shipped.to_json())
     others = {shipped.id}
     count = 0
@@ -123,10 +132,21 @@ def test_every_setting_is_part_of_the_hash(shipped: Condition) -> None:
             others.add(changed.id)
             break
         else:  # only together with another setting
-            named = path[0] == "scenario" and path[-1] in ("name", "object", "then")  # an obstacle and who names it
-            assert named or path[-1] in ("hall_frozen", "hall_memory"), f"no other value of {path} is accepted"
+            named = path[0] == "scenario" and path[-1] in (
+                "name",
+                "object",
+                "then",
+            )  # an obstacle and who names it
+            assert named or path[-1] in ("hall_frozen", "hall_memory"), (
+                f"no other value of {path} is accepted"
+            )
             ga = config["planner"].get("ga", {})
-            assert named or ga["hall_depth"] == 0.0 or ga["hall_frozen"] or ga["hall_memory"] is not None
+            assert (
+                named
+                or ga["hall_depth"] == 0.0
+                or ga["hall_frozen"]
+                or ga["hall_memory"] is not None
+            )
     assert count > 20
 
 
@@ -168,15 +188,26 @@ def test_parts_that_cannot_be(config: dict[str, Any], part: str, value: Any, mes
 
 def test_components_in_the_wrong_place_are_refused(config: dict[str, Any]) -> None:
     robot, scenario, planner = config["robot"], config["scenario"], config["planner"]
-    assert refusal(config | {"robot": scenario}) == "robot: must be what via_point_ga takes, a Robot, was 'arm_motion'"
-    assert refusal(config | {"scenario": robot}) == "scenario: must be what via_point_ga takes, a ArmMotion, was 'arms'"
+    assert (
+        refusal(config | {"robot": scenario})
+        == "robot: must be what via_point_ga takes, a Robot, was 'arm_motion'"
+    )
+    assert (
+        refusal(config | {"scenario": robot})
+        == "scenario: must be what via_point_ga takes, a ArmMotion, was 'arms'"
+    )
     assert refusal(config | {"planner": robot}) == "planner: must be a planner, was 'arms'"
     search = {"_target_": "random_search", "revision": 1}
-    assert refusal(config | {"planner": search | {"planner": 3}}) == "planner: must be a planner, was 3"
+    assert (
+        refusal(config | {"planner": search | {"planner": 3}})
+        == "planner: must be a planner, was 3"
+    )
     assert "scenario: must be what via_point_ga" in refusal(
         config | {"planner": search | {"planner": planner}, "scenario": robot}
     )
-    assert refusal(config | {"planner": planner | {"ga": robot}}).startswith("planner.ga: must be a GeneticSettings")
+    assert refusal(config | {"planner": planner | {"ga": robot}}).startswith(
+        "planner.ga: must be a GeneticSettings"
+    )
 
 
 @pytest.mark.parametrize(
@@ -190,7 +221,9 @@ def test_a_text_that_is_no_condition_is_refused(text: bytes) -> None:
 
 @pytest.mark.parametrize("value", ["NaN", "Infinity", "-Infinity"])
 def test_numbers_that_are_none_are_refused(config: dict[str, Any], value: str) -> None:
-    text = json.dumps(with_value(config, ("planner", "walk_step"), float(value.replace("Infinity", "inf"))))
+    text = json.dumps(
+        with_value(config, ("planner", "walk_step"), float(value.replace("Infinity", "inf")))
+    )
     assert value in text
     assert refusal(text.encode()).startswith("planner.walk_step: must be a finite number")
 
@@ -202,7 +235,10 @@ def test_another_revision_is_refused_and_names_both(config: dict[str, Any]) -> N
 
 
 def test_revisions_are_listed_for_every_component(shipped: Condition) -> None:
-    found = {field: (stored, installed) for field, stored, installed in revisions(json.loads(shipped.to_json()))}
+    found = {
+        field: (stored, installed)
+        for field, stored, installed in revisions(json.loads(shipped.to_json()))
+    }
     arms = {"robot.arms[0]"} if hasattr(shipped.robot, "arms") else set()
     assert {"robot", "scenario", "planner"} | arms <= set(found)
     assert all(stored == installed for stored, installed in found.values())
@@ -211,13 +247,16 @@ def test_revisions_are_listed_for_every_component(shipped: Condition) -> None:
 def test_an_unknown_setting_in_a_stored_configuration_is_refused(config: dict[str, Any]) -> None:
     config["planner"]["ga"]["population_sise"] = 3
     with pytest.raises(
-        UnknownSetting, match="planner.ga.population_sise: unknown setting; did you mean 'population_si"
+        UnknownSetting,
+        match="planner.ga.population_sise: unknown setting; did you mean 'population_si",
     ):
         Condition.from_json(json.dumps(config).encode())
 
 
 def test_replicates_have_streams_of_their_own_that_conditions_share() -> None:
-    first, other = (SHIPPED[key] for key in ("rana_planar: via-point GA", "rana_planar: random search"))
+    first, other = (
+        SHIPPED[key] for key in ("rana_planar: via-point GA", "rana_planar: random search")
+    )
     draws = [condition.rng(k).random(3).tolist() for condition in (first, other) for k in (0, 1)]
     assert draws[:2] == draws[2:]
     assert draws[0] != draws[1]
@@ -254,6 +293,8 @@ def test_an_installed_plug_in_registers_components(
         config["planner"]["ga"]["_target_"] = "mine"
         mine = Condition.from_config(config)
         assert type(mine.planner.ga).__name__ == "Mine"  # type: ignore[attr-defined]
-        assert component_class("genetic").__name__ == "GeneticSettings", "a plug-in cannot replace evoexp's own"
+        assert component_class("genetic").__name__ == "GeneticSettings", (
+            "a plug-in cannot replace evoexp's own"
+        )
     finally:
         condition._registry.cache_clear()

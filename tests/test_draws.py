@@ -38,5 +38,8 @@ def test_behind_its_end_a_block_gives_zeros_and_says_so() -> None:
 
 
 def test_indices_stay_below_their_count() -> None:
-    block = np.array([0.0, 0.5, np.nextafter(1.0, 0.0), np.nextafter(1.0, 0.0)]), np.zeros(1, dtype=np.int64)
+    block = (
+        np.array([0.0, 0.5, np.nextafter(1.0, 0.0), np.nextafter(1.0, 0.0)]),
+        np.zeros(1, dtype=np.int64),
+    )
     assert [draw_index(block, count) for count in (3, 3, 3, 2**53)] == [0, 1, 2, 2**53 - 1]

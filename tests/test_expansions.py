@@ -1,4 +1,7 @@
-"""Expansions that are kept: the same experiments, composed anew whenever something that has a say changed."""
+"""Expansions that are kept: the same experiments.
+
+Composed anew whenever something that has a say changed.
+"""
 
 import shutil
 from collections.abc import Callable
@@ -11,7 +14,13 @@ from evoexp.errors import EvoexpError
 from evoexp.experiment import Experiment
 
 WORDS = ["experiment=rana_planar", "budget=smoke"]
-ROBOT = ["robot=urdf", "scenario=urdf_reach", "planner=posture_es", "ga=corsepius", "objective=corsepius_reach"]
+ROBOT = [
+    "robot=urdf",
+    "scenario=urdf_reach",
+    "planner=posture_es",
+    "ga=corsepius",
+    "objective=corsepius_reach",
+]
 ROBOT += ["collision=corsepius_spheres"]
 SIX_R = Path(__file__).parent / "robots" / "data" / "ur5_like" / "ur5_like.urdf"
 
@@ -32,18 +41,24 @@ def composed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], in
     return lambda: len(calls)
 
 
-@pytest.mark.parametrize("words", [WORDS, [*WORDS, "runner.num_workers=1", "report.formats=[pdf]", "seed=3"]])
+@pytest.mark.parametrize(
+    "words", [WORDS, [*WORDS, "runner.num_workers=1", "report.formats=[pdf]", "seed=3"]]
+)
 def test_what_is_kept_is_what_was_composed(composed: Callable[[], int], words: list[str]) -> None:
     first, second = expansions.expand(words), expansions.expand(words)
     assert composed() == 1
     assert first == second == compose.expand(words)
-    assert [c.condition.id for c in second[0].conditions] == [c.condition.id for c in first[0].conditions]
+    assert [c.condition.id for c in second[0].conditions] == [
+        c.condition.id for c in first[0].conditions
+    ]
 
 
 def test_other_words_are_composed(composed: Callable[[], int]) -> None:
     plain = expansions.expand(["experiment=rana_planar"])
     seeds = expansions.expand(["experiment=rana_planar", "seed=0,1"], multirun=True)
-    (one,) = expansions.expand(["experiment=rana_planar", "seed=0,1"], multirun=True, only=["random search · seed=1"])
+    (one,) = expansions.expand(
+        ["experiment=rana_planar", "seed=0,1"], multirun=True, only=["random search · seed=1"]
+    )
     assert composed() == 3
     assert (len(plain[0].conditions), len(seeds[0].conditions), len(one.conditions)) == (2, 4, 1)
     assert one.changed
@@ -72,7 +87,9 @@ def test_damage_is_noticed_and_mended(composed: Callable[[], int], tmp_path: Pat
     assert composed() == 2
 
 
-@pytest.mark.parametrize("words", [[*WORDS, "seed=${num_replicates}"], [*ROBOT, f"robot.path={SIX_R}"]])
+@pytest.mark.parametrize(
+    "words", [[*WORDS, "seed=${num_replicates}"], [*ROBOT, f"robot.path={SIX_R}"]]
+)
 def test_what_urdf_files_or_interpolations_have_a_say_in_is_not_kept(
     composed: Callable[[], int], tmp_path: Path, words: list[str]
 ) -> None:
@@ -81,7 +98,9 @@ def test_what_urdf_files_or_interpolations_have_a_say_in_is_not_kept(
     assert not (tmp_path / "cache" / "expansions").exists()
 
 
-def test_files_are_read_again(composed: Callable[[], int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_files_are_read_again(
+    composed: Callable[[], int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     words = ["experiment=chen_fields"]
     first = expansions.expand(words)
@@ -92,8 +111,12 @@ def test_files_are_read_again(composed: Callable[[], int], tmp_path: Path, monke
     assert composed() == 1
     assert len(files) == 1
     assert condition.files() == files
-    shadow = tmp_path / "chen_fig_1.txt"  # what lies in the current directory comes before what is shipped
-    shadow.write_text((shipped.file_directory() / "chen_fig_1.txt").read_text().replace("*", ".", 1))
+    shadow = (
+        tmp_path / "chen_fig_1.txt"
+    )  # what lies in the current directory comes before what is shipped
+    shadow.write_text(
+        (shipped.file_directory() / "chen_fig_1.txt").read_text().replace("*", ".", 1)
+    )
     other = expansions.expand(words)
     assert other[0].conditions[0].condition.id != condition.id
     shadow.unlink()
@@ -107,7 +130,9 @@ def test_errors_are_not_kept(composed: Callable[[], int]) -> None:
     assert composed() == 2
 
 
-def test_only_the_newest_are_kept(composed: Callable[[], int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_the_newest_are_kept(
+    composed: Callable[[], int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(expansions, "NUM_KEPT", 2)
     for seed in range(4):
         expansions.expand(["experiment=rana_planar", f"seed={seed}"])

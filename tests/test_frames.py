@@ -21,7 +21,19 @@ def outputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("frames") / "outputs"
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("EVOEXP_OUTPUTS", str(root))
-        assert main(["run", "experiment=rana_planar", "budget=smoke", *SMALL, "runner=serial", "--no-report"]) == 0
+        assert (
+            main(
+                [
+                    "run",
+                    "experiment=rana_planar",
+                    "budget=smoke",
+                    *SMALL,
+                    "runner=serial",
+                    "--no-report",
+                ]
+            )
+            == 0
+        )
     return root
 
 
@@ -33,11 +45,16 @@ def test_by_experiment(outputs: Path) -> None:
     assert generations["label"].tolist() == [LABELS[0]] * 6 + [LABELS[1]] * 6
     assert generations["index"].tolist() == [0, 1, 2] * 4
     assert {*ReplicateSummary._fields, "label"} - {"terms"} <= set(summaries)
-    assert {*GenerationRow._fields, "label", "condition", "replicate"} - {"terms", "chain"} <= set(generations)
+    assert {*GenerationRow._fields, "label", "condition", "replicate"} - {"terms", "chain"} <= set(
+        generations
+    )
     assert "term_collisions" in set(summaries) & set(generations)
     last = generations[generations["index"] == 2]
     assert last["best_cost"].tolist() == summaries["best_cost"].tolist()
-    ids = [c.id for _, c in compose.expand(["experiment=rana_planar", "budget=smoke", *SMALL])[0].conditions]
+    ids = [
+        c.id
+        for _, c in compose.expand(["experiment=rana_planar", "budget=smoke", *SMALL])[0].conditions
+    ]
     assert summaries["condition"].tolist() == [ids[0]] * 2 + [ids[1]] * 2
 
 
@@ -55,13 +72,20 @@ def test_where_nothing_is_said_the_outputs_are_those_of_the_commands(
 ) -> None:
     monkeypatch.setenv("EVOEXP_OUTPUTS", str(outputs))
     frames = evoexp.load("rana_planar", *SMALL, budget="smoke")
-    assert frames.summaries.equals(evoexp.load("rana_planar", *SMALL, budget="smoke", outputs=str(outputs)).summaries)
+    assert frames.summaries.equals(
+        evoexp.load("rana_planar", *SMALL, budget="smoke", outputs=str(outputs)).summaries
+    )
 
 
 def test_a_sweep_gives_what_is_stored_of_it(outputs: Path) -> None:
     words = [word for word in SMALL if "population" not in word]
     frames = evoexp.load(
-        "rana_planar", *words, "ga.population_size=8,9", budget="smoke", multirun=True, outputs=outputs
+        "rana_planar",
+        *words,
+        "ga.population_size=8,9",
+        budget="smoke",
+        multirun=True,
+        outputs=outputs,
     )
     assert set(frames.summaries["label"]) == {f"{label} · population_size=8" for label in LABELS}
 
@@ -76,7 +100,9 @@ def test_labels_that_share_a_condition_have_its_rows_each(outputs: Path) -> None
 
 
 def test_failed_replicates_are_rows(outputs: Path, tmp_path: Path) -> None:
-    condition = compose.expand(["experiment=rana_obstacles", "budget=smoke"])[0].conditions[0].condition
+    condition = (
+        compose.expand(["experiment=rana_obstacles", "budget=smoke"])[0].conditions[0].condition
+    )
     run = RunDirectory(tmp_path, condition.id)
     run.create(condition.to_json(), {})
     run.write_failure(1, "ArithmeticError: told to fail", "Traceback")
@@ -90,12 +116,16 @@ def test_failed_replicates_are_rows(outputs: Path, tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_loaded(outputs: Path, tmp_path: Path) -> None:
-    with pytest.raises(UnknownOption, match="experiment or hash: no option 'rana_planr'; did you mean 'rana_planar'"):
+    with pytest.raises(
+        UnknownOption,
+        match="experiment or hash: no option 'rana_planr'; did you mean 'rana_planar'",
+    ):
         evoexp.load("rana_planr", outputs=outputs)
     with pytest.raises(UnknownHash, match="hash: no run 'abcdef' among the 2 in"):
         evoexp.load("abcdef", outputs=outputs)
     with pytest.raises(
-        NothingStored, match=r"rana_planar: nothing stored in .*; run it: evoexp run experiment=rana_pla"
+        NothingStored,
+        match=r"rana_planar: nothing stored in .*; run it: evoexp run experiment=rana_pla",
     ):
         evoexp.load("rana_planar", outputs=tmp_path)
     with pytest.raises(SettingError, match="ga.population_size: must be at least 1, was 0"):

@@ -23,7 +23,9 @@ def test_every_number_has_unit_and_source(path: Path) -> None:
         value = code.partition(":")[2] if ":" in code else code
         value = re.sub(r"\"[^\"]*\"|'[^']*'|=\S*", "", value)
         if NUMBER.search(value):
-            assert SOURCE.match("#" + comment), f"{path.name}: no '# [unit] paper: …' or '# [unit] assumed': {line}"
+            assert SOURCE.match("#" + comment), (
+                f"{path.name}: no '# [unit] paper: …' or '# [unit] assumed': {line}"
+            )
 
 
 def test_the_rule_about_numbers_can_fail() -> None:
@@ -35,7 +37,9 @@ def test_the_rule_about_numbers_can_fail() -> None:
     assert SOURCE.match("# [1/deg] paper: Tab. 1, k1")
 
 
-@pytest.mark.parametrize("path", sorted((ROOT / "conf" / "experiment").glob("*.yaml")), ids=lambda p: p.stem)
+@pytest.mark.parametrize(
+    "path", sorted((ROOT / "conf" / "experiment").glob("*.yaml")), ids=lambda p: p.stem
+)
 def test_every_experiment_says_its_command_and_what_it_is(path: Path) -> None:
     first, second, third, *_ = path.read_text().splitlines()
     assert first == "# @package _global_"
@@ -58,12 +62,16 @@ def test_files_and_functions_are_short(path: Path) -> None:
 def test_no_global_randomness_and_nothing_irreproducible(path: Path) -> None:
     text = path.read_text()
     allowed = ("Generator", "PCG64", "SeedSequence")
-    assert all(name in allowed for name in re.findall(r"np\.random\.(\w+)", text) if name != "default_rng")
+    assert all(
+        name in allowed for name in re.findall(r"np\.random\.(\w+)", text) if name != "default_rng"
+    )
     assert not re.search(r"fastmath *= *True", text)
-    if any(room in path.parts for room in ("planners", "evolution", "paths", "objectives", "collision")):
-        assert not re.search(r"np\.(sin|cos|tan|exp|log|power|arc\w+|linalg\.norm|dot|random\.default_rng)\(", text), (
-            path
-        )
+    if any(
+        room in path.parts for room in ("planners", "evolution", "paths", "objectives", "collision")
+    ):
+        assert not re.search(
+            r"np\.(sin|cos|tan|exp|log|power|arc\w+|linalg\.norm|dot|random\.default_rng)\(", text
+        ), path
 
 
 @pytest.mark.parametrize(
@@ -79,13 +87,20 @@ def test_no_global_randomness_and_nothing_irreproducible(path: Path) -> None:
 )
 def test_imports_stay_light(module: str, absent: tuple[str, ...]) -> None:
     code = f"import sys, {module}; print(*[m for m in {absent!r} if m in sys.modules])"
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    found = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
     assert found == []
 
 
 def test_help_imports_next_to_nothing() -> None:
-    code = "import sys, evoexp.cli\ntry: evoexp.cli.main(['--help'])\nexcept SystemExit: pass\nprint(len(sys.modules))"
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    code = (
+        "import sys, evoexp.cli\ntry: evoexp.cli.main(['--help'])\nexcept SystemExit: "
+        "pass\nprint(len(sys.modules))"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
     assert int(result.stdout.splitlines()[-1]) < 250
     assert "reproduce" in result.stdout
 
@@ -97,5 +112,8 @@ def test_scripts_are_executable() -> None:
 
 def test_the_clock_is_read_by_the_batch_only() -> None:
     for path in SOURCES:
-        if any(room in path.parts for room in ("planners", "evolution", "paths", "objectives", "collision", "robots")):
+        if any(
+            room in path.parts
+            for room in ("planners", "evolution", "paths", "objectives", "collision", "robots")
+        ):
             assert "import time" not in path.read_text(), path

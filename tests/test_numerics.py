@@ -1,4 +1,7 @@
-"""The elementary functions against 80-bit arithmetic, and their promise of the same bits everywhere."""
+"""The elementary functions against 80-bit arithmetic.
+
+And their promise of the same bits everywhere.
+"""
 
 import hashlib
 import importlib
@@ -19,7 +22,20 @@ import scipy.stats
 from numpy.typing import NDArray
 
 from evoexp import kernel_cache, numerics
-from evoexp.numerics import acos, asin, atan2, borrowed, cos, exp, kernel, log, pow_int, sin, sincos, standard_normal
+from evoexp.numerics import (
+    acos,
+    asin,
+    atan2,
+    borrowed,
+    cos,
+    exp,
+    kernel,
+    log,
+    pow_int,
+    sin,
+    sincos,
+    standard_normal,
+)
 
 Array = NDArray[Any]
 INF = math.inf
@@ -51,7 +67,10 @@ def binary_loop(function: Callable[..., float]) -> Any:
 
 
 NUM_ARGUMENTS = {"sin": 1, "cos": 1, "atan2": 2, "asin": 1, "acos": 1, "log": 1, "exp": 1}
-LOOPS = {name: (unary_loop, binary_loop)[n - 1](getattr(numerics, name)) for name, n in NUM_ARGUMENTS.items()}
+LOOPS = {
+    name: (unary_loop, binary_loop)[n - 1](getattr(numerics, name))
+    for name, n in NUM_ARGUMENTS.items()
+}
 
 
 def over_array(name: str, *arguments: Array) -> Array:
@@ -99,9 +118,14 @@ NUMPY_NAMES = {"atan2": "arctan2", "asin": "arcsin", "acos": "arccos"}
 
 
 def truth(name: str, *arguments: Array) -> Any:
-    """Return the function's values with at least 64 bits: numpy's longdouble where it has them, else mpmath."""
+    """Return the function's values with at least 64 bits.
+
+    Numpy's longdouble where it has them, else mpmath.
+    """
     if np.finfo(np.longdouble).nmant >= 63:
-        return getattr(np, NUMPY_NAMES.get(name, name))(*(a.astype(np.longdouble) for a in arguments))
+        return getattr(np, NUMPY_NAMES.get(name, name))(
+            *(a.astype(np.longdouble) for a in arguments)
+        )
     mpmath = pytest.importorskip("mpmath")
     with mpmath.workdps(40):
         every = max(1, arguments[0].size // 5000)
@@ -147,9 +171,9 @@ def points(name: str) -> list[tuple[Array, ...]]:
         root_half = neighbours(math.sqrt(0.5) * 2.0 ** np.arange(-1000, 1000))
         subnormal = 5e-324 * rng.integers(1, 2**52, NUM_POINTS)
         every = 10.0 ** rng.uniform(-307, 308, NUM_POINTS)
-        return [(x,) for x in (rng.uniform(0, 1, NUM_POINTS), rng.uniform(1, 100, NUM_POINTS), near_one)] + [
-            (x,) for x in (root_half, subnormal, every)
-        ]
+        return [
+            (x,) for x in (rng.uniform(0, 1, NUM_POINTS), rng.uniform(1, 100, NUM_POINTS), near_one)
+        ] + [(x,) for x in (root_half, subnormal, every)]
     if name == "exp":
         seams = neighbours((np.arange(-1020, 1020) + 0.5) * math.log(2.0))
         largest = np.array([709.78, 709.782712893, 709.782712893384])
@@ -163,7 +187,11 @@ def points(name: str) -> list[tuple[Array, ...]]:
         (1.7e308 * unit, 1.7e308 * ratio),
         (1e-305 * unit, 1e-305 * ratio),
     ]
-    regions += [(seam * ratio, ratio), (ratio, seam * ratio), (ratio, neighbours(ratio)[NUM_POINTS : 2 * NUM_POINTS])]
+    regions += [
+        (seam * ratio, ratio),
+        (ratio, seam * ratio),
+        (ratio, neighbours(ratio)[NUM_POINTS : 2 * NUM_POINTS]),
+    ]
     return regions + [(y, -x) for y, x in regions]
 
 
@@ -201,24 +229,31 @@ def test_exp_of_subnormal_result_errs_by_the_last_bit_at_most() -> None:
 
 
 SPECIAL = [
-    (sin, (0.0,), 0.0), (sin, (-0.0,), -0.0), (sin, (INF,), NAN), (sin, (NAN,), NAN), (sin, (5e-324,), 5e-324),
+    (sin, (0.0,), 0.0), (sin, (-0.0,), -0.0), (sin, (INF,), NAN), (sin, (NAN,), NAN), (sin,
+    (5e-324,), 5e-324),
     (cos, (0.0,), 1.0), (cos, (-INF,), NAN), (cos, (NAN,), NAN), (cos, (1e-300,), 1.0),
-    (asin, (-0.0,), -0.0), (asin, (1.0,), math.pi / 2), (asin, (-1.0,), -math.pi / 2), (asin, (1.0 + 2**-52,), NAN),
+    (asin, (-0.0,), -0.0), (asin, (1.0,), math.pi / 2), (asin, (-1.0,), -math.pi / 2), (asin,
+    (1.0 + 2**-52,), NAN),
     (asin, (NAN,), NAN), (acos, (1.0,), 0.0), (acos, (-1.0,), math.pi), (acos, (0.0,), math.pi / 2),
     (acos, (-1.0 - 2**-52,), NAN), (acos, (INF,), NAN), (acos, (NAN,), NAN),
-    (log, (1.0,), 0.0), (log, (0.0,), -INF), (log, (-0.0,), -INF), (log, (-5e-324,), NAN), (log, (-INF,), NAN),
+    (log, (1.0,), 0.0), (log, (0.0,), -INF), (log, (-0.0,), -INF), (log, (-5e-324,), NAN), (log,
+    (-INF,), NAN),
     (log, (INF,), INF), (log, (NAN,), NAN), (log, (5e-324,), -744.4400719213812),
-    (exp, (0.0,), 1.0), (exp, (-0.0,), 1.0), (exp, (INF,), INF), (exp, (-INF,), 0.0), (exp, (NAN,), NAN),
+    (exp, (0.0,), 1.0), (exp, (-0.0,), 1.0), (exp, (INF,), INF), (exp, (-INF,), 0.0), (exp,
+    (NAN,), NAN),
     (exp, (709.7827128933841,), INF), (exp, (-745.13,), 5e-324),
     (exp, (-745.14,), 0.0), (exp, (1e300,), INF), (exp, (-1e300,), 0.0),
-    (pow_int, (0.0, 0), 1.0), (pow_int, (NAN, 0), 1.0), (pow_int, (-2.0, 3), -8.0), (pow_int, (-0.0, 3), -0.0),
+    (pow_int, (0.0, 0), 1.0), (pow_int, (NAN, 0), 1.0), (pow_int, (-2.0, 3), -8.0), (pow_int,
+    (-0.0, 3), -0.0),
     (pow_int, (2.0, -3), 0.125), (pow_int, (-0.0, -1), -INF), (pow_int, (2.0, 1023), 2.0**1023),
     (pow_int, (2.0, 1024), INF), (pow_int, (INF, -2), 0.0), (pow_int, (3, 2), 9.0),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("function", "arguments", "expected"), SPECIAL)
-def test_special_cases(function: Callable[..., float], arguments: tuple[float, ...], expected: float) -> None:
+def test_special_cases(
+    function: Callable[..., float], arguments: tuple[float, ...], expected: float
+) -> None:
     value = function(*arguments)
     if math.isnan(expected):
         assert math.isnan(value)
@@ -228,9 +263,13 @@ def test_special_cases(function: Callable[..., float], arguments: tuple[float, .
 
 
 @pytest.mark.parametrize("y", [0.0, -0.0, 1.0, -1.0, 5e-324, -5e-324, 1e308, INF, -INF, NAN])
-@pytest.mark.parametrize("x", [0.0, -0.0, 1.0, -1.0, 5e-324, -5e-324, 1e308, -1.7e308, INF, -INF, NAN])
+@pytest.mark.parametrize(
+    "x", [0.0, -0.0, 1.0, -1.0, 5e-324, -5e-324, 1e308, -1.7e308, INF, -INF, NAN]
+)
 def test_atan2_on_axes_diagonals_and_infinities_is_as_c99_has_it(y: float, x: float) -> None:
-    expected = math.atan2(y, x)  # exact multiples of π/4, or arguments themselves: any libm rounds these correctly
+    expected = math.atan2(
+        y, x
+    )  # exact multiples of π/4, or arguments themselves: any libm rounds these correctly
     value = atan2(y, x)
     assert value == expected or (math.isnan(value) and math.isnan(expected))
     assert math.isnan(value) or math.copysign(1.0, value) == math.copysign(1.0, expected)
@@ -249,7 +288,9 @@ def test_scalar_calls_and_vectorised_loops_give_the_same_bits(name: str) -> None
     for region in points(name):
         arguments = tuple(a[rng.integers(0, a.size, 1)[0] % 1000 :: 997].copy() for a in region)
         arguments = tuple(a[: min(b.size for b in arguments)] for a in arguments)
-        scalar = np.array([getattr(numerics, name)(*map(float, point)) for point in zip(*arguments, strict=True)])
+        scalar = np.array(
+            [getattr(numerics, name)(*map(float, point)) for point in zip(*arguments, strict=True)]
+        )
         whole = over_array(name, *arguments)
         assert same_bits(whole, scalar)
         for length in (1, 3, 7, 17, 63):  # the remainder of a vector loop is scalar code
@@ -298,7 +339,9 @@ def digest() -> str:
     x = np.random.default_rng(1).random(20_001)
     out = np.empty((8, x.size))
     every_function_loop(x, out)
-    return hashlib.sha256(out.tobytes() + standard_normal(np.random.default_rng(1), 5001).tobytes()).hexdigest()
+    return hashlib.sha256(
+        out.tobytes() + standard_normal(np.random.default_rng(1), 5001).tobytes()
+    ).hexdigest()
 
 
 @pytest.mark.parametrize(("cpu", "optimisation"), [("haswell", "3"), ("generic", "0")])
@@ -306,18 +349,28 @@ def digest() -> str:
 def test_other_processors_and_optimisation_levels_give_the_same_bits(
     cpu: str, optimisation: str, tmp_path: Path
 ) -> None:
-    target = {"NUMBA_CPU_NAME": cpu, "NUMBA_CPU_FEATURES": "", "NUMBA_OPT": optimisation, "EVOEXP_CACHE": str(tmp_path)}
+    target = {
+        "NUMBA_CPU_NAME": cpu,
+        "NUMBA_CPU_FEATURES": "",
+        "NUMBA_OPT": optimisation,
+        "EVOEXP_CACHE": str(tmp_path),
+    }
     script = (
-        f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r}); import test_numerics as t; print(t.digest())"
+        f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r}); import test_numerics as "
+        "t; print(t.digest())"
     )
     command = [sys.executable, "-c", script]
-    result = subprocess.run(command, env={**os.environ, **target}, capture_output=True, text=True, check=True)
+    result = subprocess.run(
+        command, env={**os.environ, **target}, capture_output=True, text=True, check=True
+    )
     assert result.stdout.strip() == digest()
 
 
 def test_kernels_hold_no_fused_multiply_add() -> None:
     def assembly(compiled: Any, *arguments: Array, **options: Any) -> str:
-        fresh = numba.jit(**{**compiled.targetoptions, **options})(compiled.py_func)  # numba shows no cached code
+        fresh = numba.jit(**{**compiled.targetoptions, **options})(
+            compiled.py_func
+        )  # numba shows no cached code
         fresh(*arguments)
         (code,) = fresh.inspect_asm().values()
         assert re.search(r"v?mul[ps]d|fmul", code) or FUSED.search(code)
@@ -337,12 +390,16 @@ def test_normal_deviates_have_the_moments_and_distribution_of_the_normal() -> No
     assert abs(sample.var() - 1) < 4 * math.sqrt(2 / n)
     assert abs(float(scipy.stats.skew(sample))) < 4 * math.sqrt(6 / n)
     assert abs(float(scipy.stats.kurtosis(sample))) < 4 * math.sqrt(24 / n)
-    assert abs(np.mean(sample[::2] * sample[1::2])) < 4 / math.sqrt(n / 2)  # the two of a pair are independent
+    assert abs(np.mean(sample[::2] * sample[1::2])) < 4 / math.sqrt(
+        n / 2
+    )  # the two of a pair are independent
     assert scipy.stats.kstest(sample, "norm").pvalue > 0.01
 
 
 @pytest.mark.parametrize("size", [0, 1, 2, 7, (3, 5), ()])
-def test_normal_deviates_consume_the_uniform_stream_and_nothing_else(size: int | tuple[int, ...]) -> None:
+def test_normal_deviates_consume_the_uniform_stream_and_nothing_else(
+    size: int | tuple[int, ...],
+) -> None:
     rng, reference = np.random.default_rng(11), np.random.default_rng(11)
     sample = standard_normal(rng, size)
     expected: list[float] = []
@@ -369,7 +426,8 @@ from evoexp.evolution.statistics import cost_statistics
 assert cost_statistics(np.array([2.0, 1.0])).best == 1
 assert "scipy.linalg" not in sys.modules
 dot = numba.njit(lambda a, b: np.dot(a, b))
-assert dot(np.eye(3), np.ones(3)).sum() == 3.0 and np.isclose(numba.njit(lambda a: np.linalg.det(a))(np.eye(2)), 1.0)
+assert dot(np.eye(3), np.ones(3)).sum() == 3.0
+assert np.isclose(numba.njit(lambda a: np.linalg.det(a))(np.eye(2)), 1.0)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
@@ -384,7 +442,9 @@ def test_every_file_with_kernels_has_a_say_in_where_they_are_kept() -> None:
     assert holding <= keyed
 
 
-def test_what_is_compiled_is_noted_beside_the_kernels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_compiled_is_noted_beside_the_kernels(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "state"))
     assert not kernel_cache.is_compiled("a planner")
     kernel_cache.note_compiled("a planner")
@@ -397,8 +457,14 @@ def test_what_is_compiled_is_noted_beside_the_kernels(tmp_path: Path, monkeypatc
     kernel_cache.note_compiled("a planner")  # cannot be written: no error
 
 
-def test_old_caches_go_but_recent_and_claimed_ones_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    fcntl: Any = importlib.import_module("fcntl") if os.name == "posix" else pytest.skip("nothing is pruned here")
+def test_old_caches_go_but_recent_and_claimed_ones_stay(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fcntl: Any = (
+        importlib.import_module("fcntl")
+        if os.name == "posix"
+        else pytest.skip("nothing is pruned here")
+    )
     states = [tmp_path / f"{age:016x}" for age in range(8)]
     for age, state in enumerate(states):
         (state / "evoexp_0").mkdir(parents=True)
@@ -441,7 +507,12 @@ def add_borrowed(rows, count):  # type: ignore[no-untyped-def]
 def test_borrowed_arrays_are_the_same_arrays() -> None:
     """Values, shapes and strides; nothing is lost and nothing is freed."""
     rng = np.random.default_rng(0)
-    first, second, third, fourth = rng.random(50), rng.random(100)[::2], rng.random((2, 50)), rng.random(50)
+    first, second, third, fourth = (
+        rng.random(50),
+        rng.random(100)[::2],
+        rng.random((2, 50)),
+        rng.random(50),
+    )
     fourth.flags.writeable = False
     expected = first + 3 * (2 * second + third[0] + fourth)
     references = [sys.getrefcount(array) for array in (first, second, third, fourth)]
@@ -460,7 +531,10 @@ def add_row(row, weights, out):  # type: ignore[no-untyped-def]
 
 
 def sum_rows(rows, count):  # type: ignore[no-untyped-def]
-    """Hand on an array that the loop keeps and changes: no processor's code does without a count of it."""
+    """Hand on an array that the loop keeps and changes.
+
+    No processor's code does without a count of it.
+    """
     out, (kept, _, (table, weights)) = rows
     for k in range(count):
         if out[0] < k:
@@ -479,7 +553,9 @@ def test_borrowed_arrays_are_not_counted() -> None:
     """Where a kernel hands arrays on, references to them are counted, but not to borrowed ones."""
     counts = []
     for function in (sum_rows, sum_borrowed_rows):
-        compiled = numba.njit(error_model="numpy", nogil=True)(function)  # code from the cache hides its text
+        compiled = numba.njit(error_model="numpy", nogil=True)(
+            function
+        )  # code from the cache hides its text
         compiled(Rows(np.zeros(3), (np.zeros(3), 2, (np.zeros((2, 3)), np.zeros(3)))), 4)
         (text,) = compiled.inspect_llvm().values()
         counts.append(text.count("call void @NRT_incref"))

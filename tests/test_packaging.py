@@ -1,4 +1,7 @@
-"""The built wheel holds what the checkout has, and runs from any directory; nothing here needs a network."""
+"""The built wheel holds what the checkout has, and runs from any directory.
+
+Nothing here needs a network.
+"""
 
 import os
 import shutil
@@ -16,24 +19,39 @@ from evoexp import numerics
 ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "src" / "evoexp"
 
-pytestmark = pytest.mark.skipif(find_spec("hatchling") is None, reason="needs hatchling, from evoexp[build]")
+pytestmark = pytest.mark.skipif(
+    find_spec("hatchling") is None, reason="needs hatchling, from evoexp[build]"
+)
 
 
 def execute(*command: str | Path, cwd: Path, **environment: str) -> str:
     """Run a command; return what it prints."""
-    inherited = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "EVOEXP_OUTPUTS")}
+    inherited = {
+        name: value
+        for name, value in os.environ.items()
+        if name not in ("PYTHONPATH", "EVOEXP_OUTPUTS")
+    }
     words, variables = list(map(str, command)), inherited | environment
-    done = subprocess.run(words, cwd=cwd, env=variables, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        words, cwd=cwd, env=variables, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
 
 def pip() -> list[str]:
-    """Return the command of this environment's pip, or of the one that comes with Python: uv installs none."""
+    """Return the command of this environment's pip, or of the one that comes with Python.
+
+    Uv installs none.
+    """
     if find_spec("pip") is not None:
         return [sys.executable, "-m", "pip"]
     ensurepip = find_spec("ensurepip")
-    bundled = sorted(Path(ensurepip.origin).parent.glob("_bundled/pip-*.whl")) if ensurepip and ensurepip.origin else []
+    bundled = (
+        sorted(Path(ensurepip.origin).parent.glob("_bundled/pip-*.whl"))
+        if ensurepip and ensurepip.origin
+        else []
+    )
     if not bundled:
         pytest.skip("neither this environment nor this Python has a pip")
     return [sys.executable, str(bundled[-1] / "pip")]
@@ -51,24 +69,41 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Install the wheel alone; with this directory as PYTHONPATH it comes before the checkout."""
     directory = tmp_path_factory.mktemp("installed")
-    options = ("--quiet", "--no-deps", "--no-index", "--disable-pip-version-check", "--target", directory)
+    options = (
+        "--quiet",
+        "--no-deps",
+        "--no-index",
+        "--disable-pip-version-check",
+        "--target",
+        directory,
+    )
     execute(*pip(), "install", *options, wheel, cwd=directory)
     return directory
 
 
 @pytest.fixture(scope="module")
 def cache(installed: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Copy the compiled kernels of the checkout to where the installed package looks: compiling takes half a minute.
+    """Copy the compiled kernels of the checkout to where the installed package looks.
 
-    The sources are the same; numba files by path what it compiles. What is not there yet is compiled after all.
+    Compiling takes half a minute.
+
+    The sources are the same; numba files by path what it compiles. What is not there yet is
+    compiled after all.
     """
     compiled = Path(numerics.numba.config.CACHE_DIR)
     directory = tmp_path_factory.mktemp("cache")
     place = UserProvidedCacheLocator.get_suitable_cache_subpath
     for file in SOURCE.rglob("__init__.py"):
-        there = directory / "kernels" / compiled.name / place(str(installed / file.relative_to(SOURCE.parent)))
+        there = (
+            directory
+            / "kernels"
+            / compiled.name
+            / place(str(installed / file.relative_to(SOURCE.parent)))
+        )
         if (compiled / place(str(file))).is_dir():
-            shutil.copytree(compiled / place(str(file)), there, ignore=shutil.ignore_patterns("*.tmp*"))
+            shutil.copytree(
+                compiled / place(str(file)), there, ignore=shutil.ignore_patterns("*.tmp*")
+            )
     return directory
 
 
@@ -76,10 +111,16 @@ def test_contents(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
     ours = {name for name in names if not name.partition("/")[0].endswith(".dist-info")}
     package = {
-        path.relative_to(SOURCE.parent).as_posix() for path in SOURCE.rglob("*") if path.suffix in (".py", ".typed")
+        path.relative_to(SOURCE.parent).as_posix()
+        for path in SOURCE.rglob("*")
+        if path.suffix in (".py", ".typed")
     }
     assets = {path.relative_to(SOURCE.parent).as_posix() for path in (SOURCE / "assets").iterdir()}
-    conf = {f"evoexp/{path.relative_to(ROOT).as_posix()}" for path in (ROOT / "conf").rglob("*") if path.is_file()}
+    conf = {
+        f"evoexp/{path.relative_to(ROOT).as_posix()}"
+        for path in (ROOT / "conf").rglob("*")
+        if path.is_file()
+    }
     assert len(conf) > 20
     assert {"evoexp/py.typed", "evoexp/assets/shipped.json"} <= ours
     assert ours == package | assets | conf
@@ -88,7 +129,10 @@ def test_contents(wheel: Path) -> None:
 
 
 def test_the_installed_package_is_the_one_that_runs(installed: Path, tmp_path: Path) -> None:
-    code = "import evoexp, evoexp.shipped as s; print(evoexp.__file__, s.config_directory(), sep='\\n')"
+    code = (
+        "import evoexp, evoexp.shipped as s; print(evoexp.__file__, s.config_directory(), "
+        "sep='\\n')"
+    )
     printed = execute(sys.executable, "-c", code, cwd=tmp_path, PYTHONPATH=str(installed))
     assert printed.splitlines() == [f"{installed}/evoexp/__init__.py", f"{installed}/evoexp/conf"]
 
@@ -103,6 +147,8 @@ def test_the_installed_package_runs_an_experiment_from_any_directory(
     installed: Path, cache: Path, tmp_path: Path
 ) -> None:
     command = ("-m", "evoexp", "run", "experiment=rana_planar", "budget=smoke", "--no-report")
-    printed = execute(sys.executable, *command, cwd=tmp_path, PYTHONPATH=str(installed), EVOEXP_CACHE=str(cache))
+    printed = execute(
+        sys.executable, *command, cwd=tmp_path, PYTHONPATH=str(installed), EVOEXP_CACHE=str(cache)
+    )
     assert printed.count("2 of 2") >= 2
     assert len(list(tmp_path.glob("outputs/runs/*/replicates/*.mcap"))) == 4

@@ -27,7 +27,11 @@ UPDATE = "then run scripts/update-shipped and commit the table"
 
 
 def rows(budget: str) -> list[Any]:
-    return [pytest.param(row, id=f"{row.experiment}: {row.label}") for row in TABLE if row.budget == budget]
+    return [
+        pytest.param(row, id=f"{row.experiment}: {row.label}")
+        for row in TABLE
+        if row.budget == budget
+    ]
 
 
 @pytest.fixture
@@ -48,11 +52,14 @@ def test_every_shipped_condition_is_in_the_table_and_nothing_else() -> None:
 
 def check_digest(row: Shipped) -> None:
     condition = CONDITIONS[row[:3]]
-    assert condition.id == row.condition_id, f"the condition itself changed: if that was meant, {UPDATE}"
+    assert condition.id == row.condition_id, (
+        f"the condition itself changed: if that was meant, {UPDATE}"
+    )
     found = fingerprint(condition, run_replicate(condition, 0).summary)
     assert same_fingerprint(found, row.digest), (
-        f"{row.experiment}, {row.label}, {row.budget}: the same settings give another result than before. If that was "
-        f"not meant, find out why; else raise `revision` of the component whose results changed, {UPDATE}"
+        f"{row.experiment}, {row.label}, {row.budget}: the same settings give another result than "
+        "before. If that was not meant, find out why; else raise `revision` of the component "
+        f"whose results changed, {UPDATE}"
     )
 
 
@@ -73,15 +80,19 @@ def test_a_raised_revision_is_another_hash(monkeypatch: pytest.MonkeyPatch) -> N
     assert condition.id != before
 
 
-# ------------------------------------------------------------------------------------ reproduce, where nothing was run
+# ----------------------------------------------------------------- reproduce, where nothing was run
 
 
 @pytest.mark.parametrize("row", [*rows("smoke")[:2], *rows("paper")[:1]])
-def test_a_shipped_hash_matches_the_table(row: Shipped, nowhere: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_shipped_hash_matches_the_table(
+    row: Shipped, nowhere: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["reproduce", row.condition_id[:9]]) == 0
     printed = capsys.readouterr().out
     assert "against the shipped table: MATCH" in printed
-    assert any(other.command in printed for other in TABLE if other.condition_id == row.condition_id)
+    assert any(
+        other.command in printed for other in TABLE if other.condition_id == row.condition_id
+    )
     assert main(["reproduce", row.condition_id.upper(), "--replicate", "0"]) == 0
     assert not nowhere.exists()
 
@@ -95,8 +106,12 @@ def test_another_digest_diverges(
     assert "DIVERGES" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("what", [[TABLE[0].condition_id[:9], "--replicate", "3"], ["0123456789abcdef"], ["rana"]])
-def test_nothing_to_compare(what: list[str], nowhere: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    "what", [[TABLE[0].condition_id[:9], "--replicate", "3"], ["0123456789abcdef"], ["rana"]]
+)
+def test_nothing_to_compare(
+    what: list[str], nowhere: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["reproduce", *what]) == 2
     printed = capsys.readouterr()
     assert printed.err.startswith("evoexp: NOTHING TO COMPARE: ")
@@ -114,13 +129,15 @@ def test_an_ambiguous_prefix_lists_the_candidates(
     assert "ambiguous: abc100000000, abc200000000" in capsys.readouterr().err
 
 
-# ------------------------------------------------------------------------------------------- scripts/update-shipped
+# --------------------------------------------------------------------------- scripts/update-shipped
 
 
 @pytest.fixture
 def update(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     """The script, made to write a copy of the table."""
-    spec = spec_from_loader("update_shipped", SourceFileLoader("update_shipped", str(ROOT / "scripts/update-shipped")))
+    spec = spec_from_loader(
+        "update_shipped", SourceFileLoader("update_shipped", str(ROOT / "scripts/update-shipped"))
+    )
     assert spec is not None
     assert spec.loader is not None
     module = module_from_spec(spec)
@@ -130,7 +147,9 @@ def update(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
     return module
 
 
-def test_update_writes_the_table_as_it_is_stored(update: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_update_writes_the_table_as_it_is_stored(
+    update: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(update, "rows", lambda: TABLE)
     assert update.main([]) == 0
     stored = ROOT / "src" / "evoexp" / "assets" / "shipped.json"
@@ -145,7 +164,10 @@ def test_update_refuses_another_digest_under_the_same_hash(
     assert update.main([]) == 1
     assert update.TABLE.read_text() == "untouched"
     printed = capsys.readouterr().out
-    assert f"hash {TABLE[0].condition_id[:12]} as before, digest {TABLE[0].digest} → {'0' * 32}" in printed
+    assert (
+        f"hash {TABLE[0].condition_id[:12]} as before, digest {TABLE[0].digest} → {'0' * 32}"
+        in printed
+    )
     assert "raise `revision` of the component" in printed
     assert update.main(["--force"]) == 0
     assert "0" * 32 in update.TABLE.read_text()

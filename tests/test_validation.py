@@ -48,17 +48,32 @@ def make(**settings: object) -> Outer:
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"population_size": "eight"}, "planner.inner.population_size: must be a whole number, was 'eight'"),
-        ({"population_size": 3.0}, "planner.inner.population_size: must be a whole number, was 3.0"),
-        ({"population_size": True}, "planner.inner.population_size: must be a whole number, was True"),
+        (
+            {"population_size": "eight"},
+            "planner.inner.population_size: must be a whole number, was 'eight'",
+        ),
+        (
+            {"population_size": 3.0},
+            "planner.inner.population_size: must be a whole number, was 3.0",
+        ),
+        (
+            {"population_size": True},
+            "planner.inner.population_size: must be a whole number, was True",
+        ),
         ({"population_size": 0}, "planner.inner.population_size: must be at least 1, was 0"),
         ({"rate": 1.5}, "planner.inner.rate: must be at most 1.0, was 1.5"),
         ({"rate": float("nan")}, "planner.inner.rate: must be a finite number, was nan"),
         ({"rate": "0.5"}, "planner.inner.rate: must be a number, was '0.5'"),
         ({"mode": "clampd"}, "did you mean 'clamped'?"),
         ({"rows": [[1, "a"]]}, r"planner.inner.rows[0][1]: must be a number, was 'a'"),
-        ({"things": [{"shape": "disc", "radius": 0}]}, "planner.inner.things[0].radius: must be greater than 0"),
-        ({"things": [{"shape": "dsc", "radius": 0}]}, "planner.inner.things[0]: must be one of 'disc', 'square'"),
+        (
+            {"things": [{"shape": "disc", "radius": 0}]},
+            "planner.inner.things[0].radius: must be greater than 0",
+        ),
+        (
+            {"things": [{"shape": "dsc", "radius": 0}]},
+            "planner.inner.things[0]: must be one of 'disc', 'square'",
+        ),
         ({"things": [{"radius": 0}]}, "planner.inner.things[0]: must be given with its 'shape'"),
     ],
 )
@@ -72,7 +87,9 @@ def test_what_cannot_be_is_refused(settings: dict[str, object], message: str) ->
 def test_an_unknown_setting_names_the_nearest() -> None:
     with pytest.raises(UnknownSetting) as caught:
         make(population=5)
-    assert "planner.inner.population: unknown setting; did you mean 'population_size'?" in str(caught.value)
+    assert "planner.inner.population: unknown setting; did you mean 'population_size'?" in str(
+        caught.value
+    )
 
 
 def test_a_missing_setting_is_named() -> None:
@@ -105,7 +122,9 @@ def test_settings_are_frozen() -> None:
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
-    lambda children: st.lists(children, max_size=3) | st.dictionaries(st.text(max_size=5), children, max_size=3),
+    lambda children: (
+        st.lists(children, max_size=3) | st.dictionaries(st.text(max_size=5), children, max_size=3)
+    ),
     max_leaves=5,
 )
 

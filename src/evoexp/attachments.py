@@ -1,8 +1,11 @@
-"""Files that a condition needs: known by the hash of their content, which is kept here by the process that needs it.
+"""Files that a condition needs.
 
-The door reads a file where a configuration says `{file: path}` and puts `{sha256: …}` in its place: a condition's
-identity is that of the content, wherever the file lay and whatever it was called. The content travels with the
-descriptions of replicates, is attached to their logs, and lies beside the configuration of a stored run.
+Known by the hash of their content, which is kept here by the process that needs it.
+
+The door reads a file where a configuration says `{file: path}` and puts `{sha256: …}` in its place:
+a condition's identity is that of the content, wherever the file lay and whatever it was called. The
+content travels with the descriptions of replicates, is attached to their logs, and lies beside the
+configuration of a stored run.
 """
 
 import hashlib
@@ -19,7 +22,9 @@ FILE, SHA256 = "file", "sha256"
 PREFIX = "files/"  # of the names of such attachments in a log
 
 _contents: dict[str, bytes] = {}
-_origins: dict[str, set[str]] = {}  # the paths that a content was read from, as configurations gave them
+_origins: dict[
+    str, set[str]
+] = {}  # the paths that a content was read from, as configurations gave them
 
 
 class MissingFile(EvoexpError):
@@ -43,7 +48,9 @@ class File(Settings):
             MissingFile: If this process never saw it.
         """
         if self.sha256 not in _contents:
-            raise MissingFile(f"file of sha256 {self.sha256[:12]}…: its content is not there; give the file again")
+            raise MissingFile(
+                f"file of sha256 {self.sha256[:12]}…: its content is not there; give the file again"
+            )
         return _contents[self.sha256]
 
 
@@ -61,7 +68,9 @@ def keep_all(contents: Iterable[bytes]) -> None:
 
 
 def with_files(value: Any, shipped: Path, field: str = "") -> Any:
-    """Return plain data with the content's hash in the place of every `{file: path}`; the contents are kept.
+    """Return plain data with the content's hash in the place of every `{file: path}`.
+
+    The contents are kept.
 
     Args:
         value: Any nesting of mappings, lists and scalars.
@@ -76,12 +85,17 @@ def with_files(value: Any, shipped: Path, field: str = "") -> Any:
     if not isinstance(value, dict):
         return value
     if set(value) != {FILE}:
-        return {key: with_files(item, shipped, f"{field}.{key}" if field else str(key)) for key, item in value.items()}
+        return {
+            key: with_files(item, shipped, f"{field}.{key}" if field else str(key))
+            for key, item in value.items()
+        }
     try:
         return {SHA256: read(str(value[FILE]), shipped)}
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
-        raise SettingError(f"{field}.{FILE}", f"a file that can be read ({reason})", str(value[FILE])) from None
+        raise SettingError(
+            f"{field}.{FILE}", f"a file that can be read ({reason})", str(value[FILE])
+        ) from None
 
 
 def read(path: str, shipped: Path) -> str:
@@ -102,7 +116,10 @@ def origins(sha256: str) -> list[str]:
 
 
 def attached(config: Any) -> dict[str, bytes]:
-    """Return the contents that a plain configuration refers to, as far as they are there, by their names in a log."""
+    """Return the contents that a plain configuration refers to, as far as they are there.
+
+    By their names in a log.
+    """
     return {PREFIX + sha256: _contents[sha256] for sha256 in _hashes(config) if sha256 in _contents}
 
 

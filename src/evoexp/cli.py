@@ -1,7 +1,7 @@
 """The command line: parses words, calls one command, turns errors into one line and an exit code.
 
-Exit codes: 0 done; 1 something the command did failed (a replicate, a comparison); 2 the command could not be done;
-130 interrupted.
+Exit codes: 0 done; 1 something the command did failed (a replicate, a comparison); 2 the command
+could not be done; 130 interrupted.
 """
 
 import argparse
@@ -30,21 +30,30 @@ WITH_WORKERS = ("run", "reproduce")
 
 
 class _Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line; takes no abbreviated options, whose meaning changes when options are added."""
+    """Says what is wrong in one line.
+
+    Takes no abbreviated options, whose meaning changes when options are added.
+    """
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(allow_abbrev=False, **settings)
 
     def error(self, message: str) -> NoReturn:
         hint = ""
-        choices = {text: action.choices for action in self._actions for text in action.option_strings}
+        choices = {
+            text: action.choices for action in self._actions for text in action.option_strings
+        }
         option = message.removeprefix("argument ").split(":")[0]
         if "invalid choice" in message and choices.get(option):
             word, known = message.split("'")[1], list(choices[option] or ())
-            message = f"{option}: must be one of {', '.join(known)}, was '{word}'{nearest(word, known)}"
+            message = (
+                f"{option}: must be one of {', '.join(known)}, was '{word}'{nearest(word, known)}"
+            )
         elif "invalid choice" in message:
             word = message.split("'")[1]
-            message = f"no command '{word}'{nearest(word, COMMANDS)} (commands: {', '.join(COMMANDS)})"
+            message = (
+                f"no command '{word}'{nearest(word, COMMANDS)} (commands: {', '.join(COMMANDS)})"
+            )
         elif "unrecognized arguments" in message:
             words = message.split(": ", 1)[1].split(" ")
             word = next((word for word in words if word.startswith("-")), words[0])
@@ -56,7 +65,9 @@ class _Parser(argparse.ArgumentParser):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    parser = _Parser(prog="evoexp", description="A laboratory for evolutionary robot motion planning.")
+    parser = _Parser(
+        prog="evoexp", description="A laboratory for evolutionary robot motion planning."
+    )
     parser.add_argument("--version", action="version", version=f"evoexp {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", parser_class=_Parser)
     for name, summary in COMMANDS.items():
@@ -71,7 +82,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments is None and chosen in WITH_WORKERS and not {"-h", "--help"} & set(words):
         importlib.import_module("evoexp.batch.workers").start_server()  # this process is all ours
     module = importlib.import_module(f"evoexp.commands.{'list_' if chosen == 'list' else chosen}")
-    command = _Parser(prog=f"evoexp {chosen}", description=f"{COMMANDS[chosen][0].upper()}{COMMANDS[chosen][1:]}.")
+    command = _Parser(
+        prog=f"evoexp {chosen}", description=f"{COMMANDS[chosen][0].upper()}{COMMANDS[chosen][1:]}."
+    )
     module.add_arguments(command)
     try:
         return int(module.main(command.parse_intermixed_args(words[1:])))
@@ -79,7 +92,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"evoexp: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print("evoexp: interrupted; what was finished is kept, the same command goes on from there", file=sys.stderr)
+        print(
+            "evoexp: interrupted; what was finished is kept, the same command goes on from there",
+            file=sys.stderr,
+        )
         return 130
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

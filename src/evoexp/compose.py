@@ -1,7 +1,7 @@
 """From overrides to conditions; the only file that knows Hydra.
 
-One function expands an experiment for every command. Whatever is wrong with a configuration is found here, before
-anything is computed, and said in one line.
+One function expands an experiment for every command. Whatever is wrong with a configuration is
+found here, before anything is computed, and said in one line.
 """
 
 import copy
@@ -27,7 +27,11 @@ from evoexp.experiment import Experiment, Labelled, options
 from evoexp.report.settings import ReportSettings
 from evoexp.validation import TARGET, Count, Settings, build, settings_error
 
-PLANNER_PARTS = ("ga", "objective", "collision")  # groups that a planner's option takes in by interpolation
+PLANNER_PARTS = (
+    "ga",
+    "objective",
+    "collision",
+)  # groups that a planner's option takes in by interpolation
 AROUND = ("control", "reference")  # groups whose option is put around the chosen planner
 JOIN = " · "
 
@@ -48,11 +52,14 @@ class Budget(Settings):
     max_generations: Count | None
 
 
-def expand(overrides: Sequence[str], *, multirun: bool = False, only: Sequence[str] = ()) -> list[Experiment]:
+def expand(
+    overrides: Sequence[str], *, multirun: bool = False, only: Sequence[str] = ()
+) -> list[Experiment]:
     """Expand overrides into experiments, one per `experiment=` swept over.
 
     Args:
-        overrides: As typed: `experiment=rana_planar ga.population_size=20`; their order does not matter.
+        overrides: As typed: `experiment=rana_planar ga.population_size=20`; their order does not
+            matter.
         multirun: Whether values with commas are swept over.
         only: Labels to keep; empty keeps all.
 
@@ -63,11 +70,19 @@ def expand(overrides: Sequence[str], *, multirun: bool = False, only: Sequence[s
     for key, override in parsed.items():
         if override.is_sweep_override():
             if not multirun:
-                raise SettingError(key, "one value (or add -m to sweep over several)", _value(override))
+                raise SettingError(
+                    key, "one value (or add -m to sweep over several)", _value(override)
+                )
             if key != "experiment" and _root(key) in _NOT_IDENTITY:
-                raise SettingError(key, "one value: a sweep is over what changes a condition", _value(override))
+                raise SettingError(
+                    key, "one value: a sweep is over what changes a condition", _value(override)
+                )
     chosen = parsed.pop("experiment", None)
-    names = [None if name == "null" else name for name in _choices(chosen)] if chosen is not None else [None]
+    names = (
+        [None if name == "null" else name for name in _choices(chosen)]
+        if chosen is not None
+        else [None]
+    )
     if len(set(names)) < len(names):
         raise SettingError("experiment", "names that differ", ",".join(map(str, names)))
     with hydra.initialize_config_dir(str(shipped.config_directory().resolve()), version_base="1.3"):
@@ -77,11 +92,15 @@ def expand(overrides: Sequence[str], *, multirun: bool = False, only: Sequence[s
 _NOT_IDENTITY = ("experiment", "budget", "num_replicates", "runner", "report")
 
 
-def _expand_one(name: str | None, overrides: Mapping[str, Override], only: Sequence[str]) -> Experiment:
+def _expand_one(
+    name: str | None, overrides: Mapping[str, Override], only: Sequence[str]
+) -> Experiment:
     composed = _Composed()
     base, labelled = _labelled(name, overrides, only, composed)
     budget = _settings(Budget, base.budget, "budget")
-    conditions = tuple(Labelled(label, _condition(composed(texts), budget)) for label, texts in labelled.items())
+    conditions = tuple(
+        Labelled(label, _condition(composed(texts), budget)) for label, texts in labelled.items()
+    )
     return Experiment(
         name or "custom",
         budget.name,
@@ -100,7 +119,7 @@ def _changed(
     conditions: tuple[Labelled, ...],
     composed: "_Composed",
 ) -> bool:
-    """Whether the conditions are others than those that the experiment has at this budget by itself."""
+    """Whether the conditions differ from those that the experiment has by itself."""
     plain = {key: override for key, override in overrides.items() if key in _NOT_IDENTITY}
     if name is None or (len(plain) == len(overrides) and not only):
         return name is None
@@ -114,12 +133,17 @@ def _changed(
 def _labelled(
     name: str | None, overrides: Mapping[str, Override], only: Sequence[str], composed: "_Composed"
 ) -> tuple[DictConfig, dict[str, dict[str, str]]]:
-    """Return the first configuration without the experiment's own conditions, and each label's overrides."""
+    """Return the first configuration without the experiment's own conditions.
+
+    And each label's overrides.
+    """
     choice = {"experiment": f"experiment={name}"} if name else {}
     swept = list(_sweep(overrides))
     base = composed(choice | swept[0][1])
     labels: dict[str, dict[str, str]] = {}
-    owner: dict[str, str] = {}  # the file's own label of a condition that the command line sweeps over
+    owner: dict[
+        str, str
+    ] = {}  # the file's own label of a condition that the command line sweeps over
     entries: Any = OmegaConf.to_container(base.conditions) or {"": []}
     for template, entry in entries.items():
         for label, own in _entry(str(template), entry):
@@ -130,7 +154,11 @@ def _labelled(
                 labels[joined], owner[joined] = choice | own | texts, label  # the command line wins
     if unknown := [label for label in only if label not in {*labels, *owner.values()}]:
         raise UnknownOption("--only", unknown[0], labels)
-    return base, {label: texts for label, texts in labels.items() if not only or {label, owner[label]} & set(only)}
+    return base, {
+        label: texts
+        for label, texts in labels.items()
+        if not only or {label, owner[label]} & set(only)
+    }
 
 
 def _condition(config: DictConfig, budget: Budget) -> Condition:
@@ -138,11 +166,17 @@ def _condition(config: DictConfig, budget: Budget) -> Condition:
     _cap_generations(config, budget)
     raw = str(OmegaConf.to_container(config.planner, resolve=False))
     try:
-        plain: Any = read_files(OmegaConf.to_container(config, resolve=True), shipped.file_directory())
+        plain: Any = read_files(
+            OmegaConf.to_container(config, resolve=True), shipped.file_directory()
+        )
     except OmegaConfBaseException as error:
         if absent := [group for group in PLANNER_PARTS if f"key '{group}' not found" in str(error)]:
-            raise SettingError(absent[0], f"chosen: {', '.join(options(absent[0]))}", None) from None
-        raise SettingError(error.full_key or "configuration", "resolvable", _first_line(error)) from None
+            raise SettingError(
+                absent[0], f"chosen: {', '.join(options(absent[0]))}", None
+            ) from None
+        raise SettingError(
+            error.full_key or "configuration", "resolvable", _first_line(error)
+        ) from None
     for group in PLANNER_PARTS:
         if plain.get(group) is not None and group in plain["planner"] and f"${{{group}" not in raw:
             must = f"left as it is; set {group}, the group that it is taken from"
@@ -153,13 +187,17 @@ def _condition(config: DictConfig, budget: Budget) -> Condition:
             build(plain[group], component_class, group)  # errors name the group, as it was typed
     around = [group for group in AROUND if plain.get(group) is not None]
     if len(around) > 1:
-        raise SettingError(around[1], f"left out beside a {around[0]}", plain[around[1]].get(TARGET))
+        raise SettingError(
+            around[1], f"left out beside a {around[0]}", plain[around[1]].get(TARGET)
+        )
     for group in around:
         build(plain["planner"], component_class, "planner")  # likewise
         if TARGET not in plain[group]:
             raise SettingError(group, f"chosen: {', '.join(options(group))}", plain[group])
         if "planner" in plain[group]:
-            raise SettingError(f"{group}.planner", "left out: it is the chosen planner", plain[group]["planner"])
+            raise SettingError(
+                f"{group}.planner", "left out: it is the chosen planner", plain[group]["planner"]
+            )
         plain["planner"] = {**plain[group], "planner": plain["planner"]}
     return Condition.from_config({part: plain[part] for part in (*PARTS, "seed")})
 
@@ -195,7 +233,9 @@ def _entry(template: str, entry: Any) -> Iterator[tuple[str, dict[str, str]]]:
     parsed = _parse(entry)
     for key, override in parsed.items():
         if _root(key) in _NOT_IDENTITY:
-            raise SettingError(field, f"free of {key}, which belongs to the whole experiment", override.input_line)
+            raise SettingError(
+                field, f"free of {key}, which belongs to the whole experiment", override.input_line
+            )
     swept = [key for key, override in parsed.items() if override.is_sweep_override()]
     if template.count("{}") not in (0, len(swept)):
         raise SettingError(field, "a label with one {} per swept override, or none", template)
@@ -203,13 +243,16 @@ def _entry(template: str, entry: Any) -> Iterator[tuple[str, dict[str, str]]]:
         if "{}" in template:
             values = [texts[key].split("=", 1)[1] for key in swept]
             pieces = template.split("{}")
-            yield pieces[0] + "".join(v + piece for v, piece in zip(values, pieces[1:], strict=True)), texts
+            yield (
+                pieces[0] + "".join(v + piece for v, piece in zip(values, pieces[1:], strict=True)),
+                texts,
+            )
         else:
             yield JOIN.join(part for part in (template, suffix) if part), texts
 
 
 def _sweep(overrides: Mapping[str, Override]) -> Iterator[tuple[str, dict[str, str]]]:
-    """Cross all swept overrides; yield a label of the swept ones and all of them as single overrides, by key."""
+    """Cross all swept overrides; yield (label, single overrides by key) of each combination."""
     swept = [key for key, override in overrides.items() if override.is_sweep_override()]
     short = {key: key.rsplit(".", 1)[-1] for key in swept}
     if len(set(short.values())) < len(short):
@@ -224,9 +267,12 @@ _NOT_COMPOSABLE = (HydraException, OmegaConfBaseException, ValueError, TypeError
 
 
 class _Composed:
-    """Configurations of one expansion: Hydra composes every choice of options once, values are set in copies of it.
+    """Configurations of one expansion.
 
-    Hydra does the same, options first, then values in their order; but it takes a tenth of a second and more.
+    Hydra composes every choice of options once, values are set in copies of it.
+
+    Hydra does the same, options first, then values in their order; but it takes a tenth of a second
+    and more.
     """
 
     def __init__(self) -> None:
@@ -256,7 +302,8 @@ class _Composed:
 
 def _compose(overrides: Mapping[str, str]) -> DictConfig:
     try:
-        # In the order of the keys, so that the order in which they were typed does not matter (a.b comes before a.b.c).
+        # In the order of the keys, so that the order in which they were typed does not matter (a.b
+        # comes before a.b.c).
         return hydra.compose("config", overrides=[overrides[key] for key in sorted(overrides)])
     except _NOT_COMPOSABLE as error:
         raise _said_in_one_line(error, overrides) from None
@@ -276,28 +323,42 @@ def _said_in_one_line(error: Exception, overrides: Mapping[str, str]) -> EvoexpE
     if absent := re.search(r"Could not find '([^'/]+)/([^']+)'", text):
         return UnknownOption(absent[1], absent[2], options(absent[1]))
     if there := re.search(r"An item is already at '([^']+)'", text):
-        return SettingError(there[1], "given without +, it is there already", overrides.get(there[1]))
+        return SettingError(
+            there[1], "given without +, it is there already", overrides.get(there[1])
+        )
     if merging := re.search(r"Error merging override \+*([^=\s]+)=(.*)", text):
         return SettingError(merging[1], "a setting that is there and takes this value", merging[2])
-    return SettingError("configuration", "composable", f"{_first_line(error)} ({' '.join(overrides.values())})")
+    return SettingError(
+        "configuration", "composable", f"{_first_line(error)} ({' '.join(overrides.values())})"
+    )
 
 
 def _unknown(field: str, overrides: Mapping[str, str]) -> EvoexpError:
     """Name the first part of an unknown key that does not exist, and what stands there instead."""
     if (group := field.split("=")[0]) in _groups():
         return SettingError(group, "an option that is chosen, to be deleted", overrides.get(group))
-    node: Any = hydra.compose("config", overrides=[text for key, text in overrides.items() if key in _groups()])
+    node: Any = hydra.compose(
+        "config", overrides=[text for key, text in overrides.items() if key in _groups()]
+    )
     parts = field.split(".")
     for k, part in enumerate(parts):
         if isinstance(node, DictConfig) and part in node:
             if OmegaConf.is_interpolation(node, part):
-                return SettingError(field, f"given as {'.'.join(parts[k:])}, the group that {part} is taken from", None)
+                return SettingError(
+                    field,
+                    f"given as {'.'.join(parts[k:])}, the group that {part} is taken from",
+                    None,
+                )
             node = node.get(part)
         elif isinstance(node, ListConfig) and part.isdigit() and int(part) < len(node):
             node = node[int(part)]
         else:
-            known = [str(key) for key in node if key != TARGET] if isinstance(node, DictConfig) else []
-            return UnknownSetting(".".join(parts[: k + 1]), known + (_in_groups(part, node) if k == 0 else []))
+            known = (
+                [str(key) for key in node if key != TARGET] if isinstance(node, DictConfig) else []
+            )
+            return UnknownSetting(
+                ".".join(parts[: k + 1]), known + (_in_groups(part, node) if k == 0 else [])
+            )
     return SettingError(field, "left in place", None)
 
 
@@ -306,7 +367,12 @@ def _in_groups(name: str, config: DictConfig) -> list[str]:
     if nearest(name, map(str, config)):
         return []
     plain: Any = OmegaConf.to_container(config, resolve=False)
-    found = {key: f"{group}.{key}" for group, node in plain.items() if isinstance(node, dict) for key in node}
+    found = {
+        key: f"{group}.{key}"
+        for group, node in plain.items()
+        if isinstance(node, dict)
+        for key in node
+    }
     return [found[near] for near in difflib.get_close_matches(name, list(found), n=1, cutoff=0.8)]
 
 
@@ -337,7 +403,9 @@ def _check_key(override: Override, text: str) -> None:
     if re.split("[./]", key)[0] == "hydra":
         raise SettingError("override", "a setting of evoexp (nothing of Hydra's own)", text)
     if _root(key) == "conditions":
-        raise SettingError("conditions", "left to the experiment's file (choose among them: --only LABEL)", text)
+        raise SettingError(
+            "conditions", "left to the experiment's file (choose among them: --only LABEL)", text
+        )
     if key == "budget.name":
         raise SettingError("budget.name", "left as it is: claims are judged by it", text)
     roots = [*_groups(), "seed", "num_replicates"]
@@ -347,7 +415,11 @@ def _check_key(override: Override, text: str) -> None:
         raise SettingError(key, "given", text)
 
 
-_OPTIONAL = ("experiment", *AROUND, *PLANNER_PARTS)  # groups without which a configuration may be complete
+_OPTIONAL = (
+    "experiment",
+    *AROUND,
+    *PLANNER_PARTS,
+)  # groups without which a configuration may be complete
 
 
 def _check_options(override: Override) -> None:
@@ -362,8 +434,16 @@ def _choices(override: Override) -> list[str]:
     """Return the values of an override, several if it is swept."""
     if not override.is_sweep_override():
         return [_value(override)]
-    if override.value_type not in (ValueType.SIMPLE_CHOICE_SWEEP, ValueType.CHOICE_SWEEP, ValueType.RANGE_SWEEP):
-        raise SettingError(override.key_or_group, "values that can be enumerated: a,b,c or range(…)", _value(override))
+    if override.value_type not in (
+        ValueType.SIMPLE_CHOICE_SWEEP,
+        ValueType.CHOICE_SWEEP,
+        ValueType.RANGE_SWEEP,
+    ):
+        raise SettingError(
+            override.key_or_group,
+            "values that can be enumerated: a,b,c or range(…)",
+            _value(override),
+        )
     return list(override.sweep_string_iterator())
 
 

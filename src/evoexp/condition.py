@@ -1,7 +1,7 @@
 """A condition: everything that can change a result, as one typed value with a hash.
 
-Also the registry: the names a configuration may use for components. A configuration is data; it can name registered
-components only, also when it comes out of somebody else's log.
+Also the registry: the names a configuration may use for components. A configuration is data; it can
+name registered components only, also when it comes out of somebody else's log.
 """
 
 import functools
@@ -65,7 +65,10 @@ REGISTRY = {
     "body_capsules": "evoexp.collision.body_models:BodyCapsules",
     "touching_spheres": "evoexp.collision.touching_spheres:TouchingSpheres",
 }
-"""Registered name → `module:class`. Installed plug-ins add to it through the entry-point group `evoexp.components`."""
+"""Registered name → `module:class`.
+
+Installed plug-ins add to it through the entry-point group `evoexp.components`.
+"""
 
 PARTS = ("robot", "scenario", "planner")
 
@@ -86,15 +89,19 @@ def component_class(name: str, field: str = TARGET) -> type[Component]:
 
 @functools.cache
 def _registry() -> dict[str, str]:
-    plugins = {point.name: point.value for point in importlib.metadata.entry_points(group="evoexp.components")}
+    plugins = {
+        point.name: point.value
+        for point in importlib.metadata.entry_points(group="evoexp.components")
+    }
     return plugins | REGISTRY
 
 
 def read_files(config: Any, shipped: Path) -> Any:
     """Return plain data with the contents' hashes in the place of paths; the contents are kept.
 
-    Besides `{file: path}` (see `attachments.with_files`), components may have files of their own: those have a class
-    method `read_files(settings, field)`. Only what a user typed is read; what a log holds names no paths.
+    Besides `{file: path}` (see `attachments.with_files`), components may have files of their own:
+    those have a class method `read_files(settings, field)`. Only what a user typed is read; what a
+    log holds names no paths.
 
     Args:
         config: Any nesting of mappings, lists and scalars.
@@ -111,7 +118,10 @@ def _component_files(value: Any, field: str) -> Any:
     if isinstance(value.get(TARGET), str):
         reads = getattr(component_class(value[TARGET], field), "read_files", None)
         value = reads(value, field) if reads is not None else value
-    return {key: _component_files(item, f"{field}.{key}" if field else str(key)) for key, item in value.items()}
+    return {
+        key: _component_files(item, f"{field}.{key}" if field else str(key))
+        for key, item in value.items()
+    }
 
 
 class Prepared(NamedTuple):
@@ -134,7 +144,8 @@ class Condition(NamedTuple):
         """Build a condition from plain data.
 
         Args:
-            config: Mapping with `robot`, `scenario`, `planner` (each with its `_target_`) and `seed`.
+            config: Mapping with `robot`, `scenario`, `planner` (each with its `_target_`) and
+                `seed`.
 
         Raises:
             SettingError: For any value that cannot be.
@@ -178,7 +189,10 @@ class Condition(NamedTuple):
         return cls.from_config(config)
 
     def to_json(self) -> bytes:
-        """Return the canonical form: keys sorted, floats by shortest repr. Its SHA-256 is the identity."""
+        """Return the canonical form: keys sorted, floats by shortest repr.
+
+        Its SHA-256 is the identity.
+        """
         config = {part: getattr(self, part).canonical() for part in PARTS} | {"seed": self.seed}
         return json.dumps(config, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
 
@@ -202,15 +216,25 @@ class Condition(NamedTuple):
         return bool(getattr(self.planner, "is_reference", False))
 
     def num_replicates(self, asked: int) -> int:
-        """Return how many replicates this condition gets where so many are asked for: a reference has one."""
+        """Return how many replicates this condition gets where so many are asked for.
+
+        A reference has one.
+        """
         return 1 if self.is_reference else asked
 
     def rng(self, replicate: int) -> np.random.Generator:
-        """Return the replicate's generator; equal seeds give equal streams to all conditions (common seeds)."""
-        return np.random.Generator(np.random.PCG64(np.random.SeedSequence(self.seed, spawn_key=(replicate,))))
+        """Return the replicate's generator.
+
+        Equal seeds give equal streams to all conditions (common seeds).
+        """
+        return np.random.Generator(
+            np.random.PCG64(np.random.SeedSequence(self.seed, spawn_key=(replicate,)))
+        )
 
     def prepare(self) -> Prepared:
-        """Build the robot, check the scenario against it, and let the planner prepare; once per process.
+        """Build the robot, check the scenario against it, and let the planner prepare.
+
+        Once per process.
 
         Raises:
             SettingError: If the parts contradict each other (a start in collision, say).
@@ -219,7 +243,10 @@ class Condition(NamedTuple):
 
 
 def _check_roles(robot: Component, scenario: Component, planner: Component) -> None:
-    """Refuse components that are no planner, or that this planner does not take as robot or scenario."""
+    """Refuse components that are no planner.
+
+    Or that this planner does not take as robot or scenario.
+    """
     inner: Any = planner
     while hasattr(inner, "planner"):  # a control stands around the planner
         inner = inner.planner
@@ -229,7 +256,9 @@ def _check_roles(robot: Component, scenario: Component, planner: Component) -> N
     for part, value in (("robot", robot), ("scenario", scenario)):
         kind = hints.get(part, Any)
         if isinstance(kind, type) and not isinstance(value, kind):
-            raise SettingError(part, f"what {inner.component} takes, a {kind.__name__}", value.component)
+            raise SettingError(
+                part, f"what {inner.component} takes, a {kind.__name__}", value.component
+            )
 
 
 @functools.lru_cache(maxsize=64)
@@ -239,7 +268,10 @@ def _prepare(condition: Condition) -> Prepared:
 
 
 def revisions(config: Any, field: str = "") -> list[tuple[str, Any, int]]:
-    """Return (field, stored revision, installed revision) of every component in plain configuration data."""
+    """Return (field, stored revision.
+
+    Installed revision) of every component in plain configuration data.
+    """
     found: list[tuple[str, Any, int]] = []
     if isinstance(config, dict):
         if TARGET in config:

@@ -1,8 +1,8 @@
 """Uniform numbers in blocks, for kernels that cannot say before how many they take.
 
-In a kernel, `draws` is a block: its numbers and, as an array of one, how many were taken. Asked for more than it has,
-it gives zeros: whatever was made with them is to be made again from the same place of a longer block. So what is drawn
-does not depend on where blocks end.
+In a kernel, `draws` is a block: its numbers and, as an array of one, how many were taken. Asked for
+more than it has, it gives zeros: whatever was made with them is to be made again from the same
+place of a longer block. So what is drawn does not depend on where blocks end.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """One tree of errors: each is one line that a user can act on, and each carries its data.
 
-Every `EvoexpError` reaches the command line as one line on stderr and exit code 2. A programming error is none of
-these: it keeps its traceback.
+Every `EvoexpError` reaches the command line as one line on stderr and exit code 2. A programming
+error is none of these: it keeps its traceback.
 """
 
 import difflib
@@ -13,13 +13,18 @@ class EvoexpError(Exception):
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Return `; did you mean 'x'?` for the closest known name, or an empty string where none is close."""
+    """Return `; did you mean 'x'?` for the closest known name.
+
+    Or an empty string where none is close.
+    """
     matches = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6)
     return f"; did you mean '{matches[0]}'?" if matches else ""
 
 
 class SettingError(EvoexpError):
-    """A setting that cannot be: names the field, what it must be, what it was, and the nearest valid name.
+    """A setting that cannot be: names the field, what it must be, what it was.
+
+    And the nearest valid name.
 
     Attributes:
         field: Dotted path of the setting, as one would type it (`ga.population_size`).
@@ -44,19 +49,24 @@ class UnknownSetting(EvoexpError):
         self.known = sorted(known)
         last = field.rsplit(".", 1)[-1]
         super().__init__(
-            f"{field}: unknown setting{nearest(last, self.known)} (known here: {', '.join(self.known) or 'none'})"
+            f"{field}: unknown setting{nearest(last, self.known)} (known here: "
+            f"{', '.join(self.known) or 'none'})"
         )
 
 
 class UnknownOption(EvoexpError):
-    """A name that is not among the options of its kind (experiment, robot, planner, …); lists them."""
+    """A name that is not among the options of its kind (experiment, robot, planner, …).
+
+    Lists them.
+    """
 
     def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
         self.kind = kind
         self.name = name
         self.known = sorted(known)
         super().__init__(
-            f"{kind}: no option '{name}'{nearest(name, self.known)} (options: {', '.join(self.known) or 'none'})"
+            f"{kind}: no option '{name}'{nearest(name, self.known)} (options: "
+            f"{', '.join(self.known) or 'none'})"
         )
 
 

@@ -26,7 +26,8 @@ class Experiment(NamedTuple):
         num_replicates: Of every condition, but for references (`Condition.num_replicates`).
         runner: How to run them.
         report: How to report them.
-        changed: Whether overrides or `--only` make this another set of conditions than the file's own.
+        changed: Whether overrides or `--only` make this another set of conditions than the file's
+            own.
     """
 
     name: str
@@ -54,5 +55,7 @@ def options(group: str) -> list[str]:
 
 def description(experiment: str) -> str:
     """Return the line of an experiment file that says what it is: its third."""
-    lines = (shipped.config_directory() / "experiment" / f"{experiment}.yaml").read_text().splitlines()
+    lines = (
+        (shipped.config_directory() / "experiment" / f"{experiment}.yaml").read_text().splitlines()
+    )
     return lines[2].removeprefix("# ")

@@ -17,8 +17,10 @@ class Frames(NamedTuple):
     """Results of one or several conditions.
 
     Attributes:
-        generations: One row per generation of every finished replicate, columns of `evoexp.records.GenerationRow`.
-        summaries: One row per replicate, done or failed, columns of `evoexp.records.ReplicateSummary`.
+        generations: One row per generation of every finished replicate, columns of
+            `evoexp.records.GenerationRow`.
+        summaries: One row per replicate, done or failed, columns of
+            `evoexp.records.ReplicateSummary`.
     """
 
     generations: pd.DataFrame
@@ -26,7 +28,11 @@ class Frames(NamedTuple):
 
 
 def load(
-    what: str, *overrides: str, budget: str = "paper", multirun: bool = False, outputs: Path | str | None = None
+    what: str,
+    *overrides: str,
+    budget: str = "paper",
+    multirun: bool = False,
+    outputs: Path | str | None = None,
 ) -> Frames:
     """Load results: `evoexp.load("rana_planar")`, `evoexp.load("9a95c3")`.
 
@@ -48,16 +54,25 @@ def load(
     """
     root = Path(outputs) if outputs is not None else outputs_root()
     if what in options("experiment"):
-        experiments = expansions.expand([f"experiment={what}", f"budget={budget}", *overrides], multirun=multirun)
+        experiments = expansions.expand(
+            [f"experiment={what}", f"budget={budget}", *overrides], multirun=multirun
+        )
         labels = [(c.label, c.condition.id) for e in experiments for c in e.conditions]
-        runs = [RunDirectory(root, condition_id) for condition_id in dict.fromkeys(key for _, key in labels)]
+        runs = [
+            RunDirectory(root, condition_id)
+            for condition_id in dict.fromkeys(key for _, key in labels)
+        ]
         runs = [run for run in runs if run.completed() or run.failed()]
         if not runs:
-            raise NothingStored(f"{what}: nothing stored in {root}; run it: evoexp run experiment={what}")
+            raise NothingStored(
+                f"{what}: nothing stored in {root}; run it: evoexp run experiment={what}"
+            )
     else:
         run = _run(root, what)
         runs, labels = [run], [(run.hash12, run.condition_id)]
-    return Frames(_labelled(read_generations(runs), labels), _labelled(read_summaries(runs), labels))
+    return Frames(
+        _labelled(read_generations(runs), labels), _labelled(read_summaries(runs), labels)
+    )
 
 
 def _run(outputs: Path, what: str) -> RunDirectory:
@@ -71,6 +86,9 @@ def _run(outputs: Path, what: str) -> RunDirectory:
 
 def _labelled(frame: pd.DataFrame, labels: list[tuple[str, str]]) -> pd.DataFrame:
     """Add the label in front; labels that share a condition have its rows each."""
-    parts = [frame[frame["condition"] == condition_id].assign(label=label) for label, condition_id in labels]
+    parts = [
+        frame[frame["condition"] == condition_id].assign(label=label)
+        for label, condition_id in labels
+    ]
     whole = pd.concat(parts, ignore_index=True)
     return whole[["label", *frame.columns]]

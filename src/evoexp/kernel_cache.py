@@ -12,19 +12,31 @@ import llvmlite.binding
 import numba
 import platformdirs
 
-_ROOMS = ("collision", "evolution", "objectives", "paths", "planners", "references", "robots", "scenarios")
+_ROOMS = (
+    "collision",
+    "evolution",
+    "objectives",
+    "paths",
+    "planners",
+    "references",
+    "robots",
+    "scenarios",
+)
 KERNEL_FILES = ("numerics.py", "draws.py", *(f"{room}/*.py" for room in _ROOMS))
 
 NUM_KEPT_CACHES = 4  # [-] states of the sources whose compiled kernels are kept
 
-_cache_claims: list[int] = []  # open descriptors: a shared lock on our cache directory for as long as we live
+_cache_claims: list[
+    int
+] = []  # open descriptors: a shared lock on our cache directory for as long as we live
 
 
 def use_keyed_cache() -> None:
     """Give numba a cache directory of its own per state of the sources and per CPU target.
 
-    numba's cache notices an edit in the file of a kernel but not in the files of the functions it calls; keyed on all
-    sources that hold kernels or their constants, a stale kernel cannot be loaded.
+    numba's cache notices an edit in the file of a kernel but not in the files of the functions it
+    calls; keyed on all sources that hold kernels or their constants, a stale kernel cannot be
+    loaded.
     """
     package = Path(__file__).parent
     target = repr([os.environ.get(f"NUMBA_CPU_{name}") for name in ("NAME", "FEATURES")])
@@ -39,9 +51,12 @@ def use_keyed_cache() -> None:
 
 
 def _spare_blas() -> None:
-    """Have numba believe in BLAS unseen: to look for it, it loads scipy.linalg, a fifth of a second in every process.
+    """Have numba believe in BLAS unseen.
 
-    A kernel that does use it loads it when it is compiled; none of ours does, as BLAS is not reproducible bit by bit.
+    To look for it, it loads scipy.linalg, a fifth of a second in every process.
+
+    A kernel that does use it loads it when it is compiled; none of ours does, as BLAS is not
+    reproducible bit by bit.
     """
     from numba.np import linalg
 
@@ -58,7 +73,10 @@ def is_compiled(kind: str) -> bool:
 
 
 def note_compiled(kind: str) -> None:
-    """Note that every kernel is in the cache which something of this kind needs; silent where that cannot be done."""
+    """Note that every kernel is in the cache which something of this kind needs.
+
+    Silent where that cannot be done.
+    """
     with contextlib.suppress(OSError):
         _note(kind).parent.mkdir(parents=True, exist_ok=True)
         _note(kind).touch()
@@ -70,7 +88,10 @@ def _note(kind: str) -> Path:
 
 
 def cache_root() -> Path:
-    """Return a directory that can be written; numba would fall back to one beside the sources, which is not keyed."""
+    """Return a directory that can be written.
+
+    Numba would fall back to one beside the sources, which is not keyed.
+    """
     user = Path(os.environ.get("EVOEXP_CACHE") or platformdirs.user_cache_dir("evoexp"))
     with contextlib.suppress(OSError):
         user.mkdir(parents=True, exist_ok=True)
@@ -81,10 +102,13 @@ def cache_root() -> Path:
 
 
 def _prune_caches(current: Path) -> None:
-    """Remove the cache directories of older states of the sources; silent where that cannot be done.
+    """Remove the cache directories of older states of the sources.
 
-    The newest `NUM_KEPT_CACHES` stay (an import renews the time stamp), and so does any that a living process uses:
-    each holds a shared lock on its own directory, and only one without can be locked exclusively.
+    Silent where that cannot be done.
+
+    The newest `NUM_KEPT_CACHES` stay (an import renews the time stamp), and so does any that a
+    living process uses: each holds a shared lock on its own directory, and only one without can be
+    locked exclusively.
     """
     with contextlib.suppress(ImportError, OSError):
         import fcntl  # not on Windows: nothing is pruned there
@@ -93,8 +117,12 @@ def _prune_caches(current: Path) -> None:
         _cache_claims.append(os.open(current, os.O_RDONLY))
         fcntl.flock(_cache_claims[-1], fcntl.LOCK_SH | fcntl.LOCK_NB)
         os.utime(current)
-        states = [path for path in current.parent.iterdir() if len(path.name) == 16 and path.is_dir()]
-        for path in sorted(states, key=lambda path: path.stat().st_mtime, reverse=True)[NUM_KEPT_CACHES:]:
+        states = [
+            path for path in current.parent.iterdir() if len(path.name) == 16 and path.is_dir()
+        ]
+        for path in sorted(states, key=lambda path: path.stat().st_mtime, reverse=True)[
+            NUM_KEPT_CACHES:
+        ]:
             descriptor = os.open(path, os.O_RDONLY)
             with contextlib.suppress(OSError):  # in use
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -1,14 +1,16 @@
 """Bit-reproducible elementary functions, and the numba options that every kernel shares.
 
-The functions are scalar and meant to be called inside kernels: LLVM inlines them, and an innermost loop over an array
-becomes vector code. They use only `+ − × ÷ sqrt`, comparisons and the bits of numbers, which IEEE 754 fixes to the last
-bit: no libm, no fused multiply-add. So scalar and vector code, any vector width and any optimisation level give the
-same bits. Integer and float32 arguments count as float64. Error bounds are the largest error measured against 80-bit
-arithmetic, rounded up; u = 1.11e-16 is half a unit in the last place of 1.
+The functions are scalar and meant to be called inside kernels: LLVM inlines them, and an innermost
+loop over an array becomes vector code. They use only `+ − × ÷ sqrt`, comparisons and the bits of
+numbers, which IEEE 754 fixes to the last bit: no libm, no fused multiply-add. So scalar and vector
+code, any vector width and any optimisation level give the same bits. Integer and float32 arguments
+count as float64. Error bounds are the largest error measured against 80-bit arithmetic, rounded up;
+u = 1.11e-16 is half a unit in the last place of 1.
 
-Coefficients and exact-sum tricks: Sun's fdlibm 5.3 (k_sin.c, k_cos.c, s_atan.c, e_asin.c, e_log.c, e_exp.c; Copyright
-(C) 1993 by Sun Microsystems, Inc.: "Permission to use, copy, modify, and distribute this software is freely granted,
-provided that this notice is preserved"), here without branches and with short chains of dependent operations.
+Coefficients and exact-sum tricks: Sun's fdlibm 5.3 (k_sin.c, k_cos.c, s_atan.c, e_asin.c, e_log.c,
+e_exp.c; Copyright (C) 1993 by Sun Microsystems, Inc.: "Permission to use, copy, modify, and
+distribute this software is freely granted, provided that this notice is preserved"), here without
+branches and with short chains of dependent operations.
 """
 
 import math
@@ -31,13 +33,26 @@ use_keyed_cache()
 
 
 def kernel(function: Any) -> Any:
-    """Compile with the options that keep results bit-identical: no fastmath, no contraction, no reassociation."""
-    return numba.njit(cache=True, fastmath=False, error_model="numpy", nogil=True, boundscheck=False)(function)
+    """Compile with the options that keep results bit-identical.
+
+    No fastmath, no contraction, no reassociation.
+    """
+    return numba.njit(
+        cache=True, fastmath=False, error_model="numpy", nogil=True, boundscheck=False
+    )(function)
 
 
 def inlined(function: Function) -> Function:
-    """Compile like `kernel`, and have LLVM inline every call: a loop around a true call stays scalar."""
-    options: dict[str, Any] = {"error_model": "numpy", "nogil": True, "boundscheck": False, "forceinline": True}
+    """Compile like `kernel`, and have LLVM inline every call.
+
+    A loop around a true call stays scalar.
+    """
+    options: dict[str, Any] = {
+        "error_model": "numpy",
+        "nogil": True,
+        "boundscheck": False,
+        "forceinline": True,
+    }
     compiled: Function = numba.njit(cache=True, fastmath=False, **options)(function)
     return compiled
 
@@ -68,11 +83,14 @@ def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
 
 
 borrowed: Callable[[Any], Any] = cast(Any, intrinsic(_borrow))
-"""Return arrays, generators, or tuples of them to any depth, as views that own nothing: no counting of references.
+"""Return arrays, generators, or tuples of them to any depth, as views that own nothing.
 
-numba counts a reference, atomically, wherever an array is read out of a tuple or handed on, and wherever a number is
-drawn; in a kernel that takes dozens of arrays and calls small `inlined` functions that is most of the time. For
-arguments only: their caller keeps them alive, while an array born in a kernel is freed where its name is last used.
+No counting of references.
+
+numba counts a reference, atomically, wherever an array is read out of a tuple or handed on, and
+wherever a number is drawn; in a kernel that takes dozens of arrays and calls small `inlined`
+functions that is most of the time. For arguments only: their caller keeps them alive, while an
+array born in a kernel is freed where its name is last used.
 """
 
 
@@ -99,25 +117,32 @@ _ONE_BITS = 0x3FF0000000000000
 _SQRT_HALF_BITS = 0x3FE6A09E667F3BCD
 _LARGEST = 1.7976931348623157e308  # finite
 
-# --------------------------------------------------------------------------------------------------- sine, cosine
+# ------------------------------------------------------------------------------------- sine, cosine
 
 _TWO_OVER_PI = 6.36619772367581382433e-01
-_HALF_PI_HI = 1.57079632673412561417e00  # the first 33 bits of pi/2: n times it is exact for |n| < 2^20
+_HALF_PI_HI = (
+    1.57079632673412561417e00  # the first 33 bits of pi/2: n times it is exact for |n| < 2^20
+)
 _HALF_PI_LO = 6.07710050650619224932e-11
 
 _S = (
-    -1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04, 2.75573137070700676789e-06,
+    -1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04,
+    2.75573137070700676789e-06,
     -2.50507602534068634195e-08, 1.58969099521155010221e-10,
 )  # fmt: skip
 _C = (
-    4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05, -2.75573143513906633035e-07,
+    4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05,
+    -2.75573143513906633035e-07,
     2.08757232129817482790e-09, -1.13596475577881948265e-11,
 )  # fmt: skip
 
 
 @inlined
 def _reduce(x: float) -> tuple[float, int]:
-    """Return r in [−π/4, π/4] and an integer n (modulo 4) with x = r + n π/2 (two-term Cody-Waite)."""
+    """Return r in [−π/4, π/4] and an integer n (modulo 4) with x = r + n π/2.
+
+    Two-term Cody-Waite.
+    """
     t = x * _TWO_OVER_PI + _ROUND
     n = t - _ROUND
     return (x - n * _HALF_PI_HI) - n * _HALF_PI_LO, _bits(t)
@@ -154,8 +179,8 @@ def _quadrant(s: float, c: float, n: int) -> float:
 def sin(x: float) -> float:
     """Return the sine of x [rad].
 
-    Absolute error ≤ 1.3e-16 for |x| ≤ 1.6e6; it grows beyond, and past 1e15 the result means nothing. sin(±0) = ±0; NaN
-    for infinities and NaN.
+    Absolute error ≤ 1.3e-16 for |x| ≤ 1.6e6; it grows beyond, and past 1e15 the result means
+    nothing. sin(±0) = ±0; NaN for infinities and NaN.
     """
     r, n = _reduce(x)
     return _quadrant(_sin_polynomial(r), _cos_polynomial(r), n)
@@ -176,23 +201,27 @@ def sincos(x: float) -> tuple[float, float]:
     return _quadrant(s, c, n), _quadrant(s, c, n + 1)
 
 
-# ------------------------------------------------------------------------------------------------- inverse functions
+# -------------------------------------------------------------------------------- inverse functions
 
 _QUARTER_PI = 7.85398163397448278999e-01  # three trailing zero bits: up to 4 times it is exact
 _QUARTER_PI_LO = 3.06161699786838301793e-17
 _TAN_EIGHTH_PI = 0.41421356237309503
 
 _A = (
-    3.33333333333329318027e-01, -1.99999999998764832476e-01, 1.42857142725034663711e-01, -1.11111104054623557880e-01,
-    9.09088713343650656196e-02, -7.69187620504482999495e-02, 6.66107313738753120669e-02, -5.83357013379057348645e-02,
+    3.33333333333329318027e-01, -1.99999999998764832476e-01, 1.42857142725034663711e-01,
+    -1.11111104054623557880e-01,
+    9.09088713343650656196e-02, -7.69187620504482999495e-02, 6.66107313738753120669e-02,
+    -5.83357013379057348645e-02,
     4.97687799461593236017e-02, -3.65315727442169155270e-02, 1.62858201153657823623e-02,
 )  # fmt: skip
 _P = (
-    1.66666666666666657415e-01, -3.25565818622400915405e-01, 2.01212532134862925881e-01, -4.00555345006794114027e-02,
+    1.66666666666666657415e-01, -3.25565818622400915405e-01, 2.01212532134862925881e-01,
+    -4.00555345006794114027e-02,
     7.91534994289814532176e-04, 3.47933107596021167570e-05,
 )  # fmt: skip
 _Q = (
-    -2.40339491173441421878e00, 2.02094576023350569471e00, -6.88283971605453293030e-01, 7.70381505559019352791e-02,
+    -2.40339491173441421878e00, 2.02094576023350569471e00, -6.88283971605453293030e-01,
+    7.70381505559019352791e-02,
 )  # fmt: skip
 
 
@@ -200,9 +229,10 @@ _Q = (
 def atan2(y: float, x: float) -> float:
     """Return the angle [rad] of the point (x, y), in [−π, π].
 
-    Relative error ≤ 3e-16. Zeros, infinities and NaN as C99 has them: atan2(±0, −0) = ±π, atan2(±inf, −inf) = ±3π/4.
-    With a the smaller and b the larger of |x| and |y|, a/b or, above tan(π/8), (a − b)/(a + b) lies within ±tan(π/8):
-    one polynomial and one division serve all octants.
+    Relative error ≤ 3e-16. Zeros, infinities and NaN as C99 has them: atan2(±0, −0) = ±π,
+    atan2(±inf, −inf) = ±3π/4. With a the smaller and b the larger of |x| and |y|, a/b or, above
+    tan(π/8), (a − b)/(a + b) lies within ±tan(π/8): one polynomial and one division serve all
+    octants.
     """
     sign_x = _bits(x) & _SIGN
     sign_y = _bits(y) & _SIGN
@@ -236,7 +266,10 @@ def atan2(y: float, x: float) -> float:
 
 @inlined
 def _asin_core(x: float) -> tuple[float, float]:
-    """Return s and asin s − s, where s = |x| ≤ 1/2, or above s = sqrt((1 − |x|)/2): |asin x| = π/2 − 2 asin s."""
+    """Return s and asin s − s, where s = |x| ≤ 1/2, or above s = sqrt((1 − |x|)/2).
+
+    |asin x| = π/2 − 2 asin s.
+    """
     x = abs(x)
     folded = 0.5 * (1.0 - x)
     root = math.sqrt(folded)
@@ -250,7 +283,10 @@ def _asin_core(x: float) -> tuple[float, float]:
 
 @inlined
 def asin(x: float) -> float:
-    """Return the arcsine of x, an angle in [−π/2, π/2] [rad]; relative error ≤ 3e-16; NaN for |x| > 1."""
+    """Return the arcsine of x, an angle in [−π/2, π/2] [rad]; relative error ≤ 3e-16.
+
+    NaN for |x| > 1.
+    """
     x = x * 1.0
     s, excess = _asin_core(x)
     outer = _QUARTER_PI - ((2.0 * excess - 2.0 * _QUARTER_PI_LO) - (_QUARTER_PI - 2.0 * s))
@@ -260,7 +296,10 @@ def asin(x: float) -> float:
 
 @inlined
 def acos(x: float) -> float:
-    """Return the arccosine of x, an angle in [0, π] [rad]; relative error ≤ 2.4e-16; NaN for |x| > 1."""
+    """Return the arccosine of x, an angle in [0, π] [rad]; relative error ≤ 2.4e-16.
+
+    NaN for |x| > 1.
+    """
     x = x * 1.0
     s, excess = _asin_core(x)
     inner = 2.0 * _QUARTER_PI - (x - (2.0 * _QUARTER_PI_LO - (-excess if x < 0.0 else excess)))
@@ -270,27 +309,34 @@ def acos(x: float) -> float:
     return inner if abs(x) <= 0.5 else outer
 
 
-# ------------------------------------------------------------------------------------ logarithm, exponential, powers
+# ------------------------------------------------------------------- logarithm, exponential, powers
 
 _LN2_HI = 6.93147180369123816490e-01
 _LN2_LO = 1.90821492927058770002e-10
 _ONE_OVER_LN2 = 1.44269504088896338700e00
 _L = (
-    6.666666666666735130e-01, 3.999999999940941908e-01, 2.857142874366239149e-01, 2.222219843214978396e-01,
+    6.666666666666735130e-01, 3.999999999940941908e-01, 2.857142874366239149e-01,
+    2.222219843214978396e-01,
     1.818357216161805012e-01, 1.531383769920937332e-01, 1.479819860511658591e-01,
 )  # fmt: skip
 _X = (
-    1.66666666666666019037e-01, -2.77777777770155933842e-03, 6.61375632143793436117e-05, -1.65339022054652515390e-06,
+    1.66666666666666019037e-01, -2.77777777770155933842e-03, 6.61375632143793436117e-05,
+    -1.65339022054652515390e-06,
     4.13813679705723846039e-08,
 )  # fmt: skip
 
 
 @inlined
 def log(x: float) -> float:
-    """Return the natural logarithm of x [-]; relative error ≤ 1.6e-16; −inf for ±0, NaN for x < 0, inf for inf."""
+    """Return the natural logarithm of x [-]; relative error ≤ 1.6e-16.
+
+    −inf for ±0, NaN for x < 0, inf for inf.
+    """
     tiny = x < 2.0**-1022
     bits = _bits(x * 2.0**54 if tiny else x * 1.0)
-    exponent = ((bits + (_ONE_BITS - _SQRT_HALF_BITS)) >> 52) & 0x7FF  # biased: x = 2^k (1 + f), 1 + f in [√½, √2)
+    exponent = (
+        (bits + (_ONE_BITS - _SQRT_HALF_BITS)) >> 52
+    ) & 0x7FF  # biased: x = 2^k (1 + f), 1 + f in [√½, √2)
     f = _from_bits(bits - ((exponent - 1023) << 52)) - 1.0
     k = _from_bits(exponent + _ROUND_BITS) - (_ROUND + (1077.0 if tiny else 1023.0))
     s = f / (2.0 + f)
@@ -306,7 +352,10 @@ def log(x: float) -> float:
 
 @inlined
 def exp(x: float) -> float:
-    """Return e to the power x [-]; relative error ≤ 1.5e-16 (subnormal results: the last bit); inf above 709.79."""
+    """Return e to the power x [-]; relative error ≤ 1.5e-16 (subnormal results: the last bit).
+
+    Inf above 709.79.
+    """
     x = 710.0 if x > 710.0 else x * 1.0
     x = -746.0 if x < -746.0 else x
     t = x * _ONE_OVER_LN2 + _ROUND
@@ -318,7 +367,9 @@ def exp(x: float) -> float:
     w = z * z
     c = r - (z * (_X[0] + w * (_X[2] + w * _X[4])) + w * (_X[1] + w * _X[3]))
     y = 1.0 - ((lo - (r * c) / (2.0 - c)) - hi)
-    doubled = _bits(t) - _ROUND_BITS + 2048  # 2^n in two factors: 2^n itself may overflow or underflow
+    doubled = (
+        _bits(t) - _ROUND_BITS + 2048
+    )  # 2^n in two factors: 2^n itself may overflow or underflow
     first = (doubled >> 1) & 0xFFF
     return y * _from_bits((first - 1) << 52) * _from_bits((doubled - first - 1) << 52)
 
@@ -327,7 +378,8 @@ def exp(x: float) -> float:
 def pow_int(x: float, n: int) -> float:
     """Return x to the integer power n, by squaring; 1 for n = 0, whatever x; 1 / x^−n for n < 0.
 
-    Relative error ≤ |n| u while x^|n| neither overflows nor is subnormal. A constant n lets a loop over x vectorise.
+    Relative error ≤ |n| u while x^|n| neither overflows nor is subnormal. A constant n lets a loop
+    over x vectorise.
     """
     result = 1.0
     base = x * 1.0
@@ -339,12 +391,15 @@ def pow_int(x: float, n: int) -> float:
     return 1.0 / result if n < 0 else result
 
 
-# ------------------------------------------------------------------------------------------------- normal deviates
+# ---------------------------------------------------------------------------------- normal deviates
 
 
 @kernel
 def fill_standard_normal(rng: np.random.Generator, out: NDArray[np.float64]) -> None:
-    """Fill out  # (n,) float64 with standard normal deviates; see `standard_normal`, for use inside kernels."""
+    """Fill out  # (n,) float64 with standard normal deviates.
+
+    See `standard_normal`, for use inside kernels.
+    """
     rng = borrowed(rng)
     num_pairs = (out.size + 1) // 2
     pairs = np.empty(2 * num_pairs)
@@ -364,14 +419,18 @@ def fill_standard_normal(rng: np.random.Generator, out: NDArray[np.float64]) -> 
 
 
 def standard_normal(rng: np.random.Generator, size: int | tuple[int, ...]) -> NDArray[np.float64]:
-    """Draw standard normal deviates from the generator's `random()` stream alone, the same bits everywhere.
+    """Draw standard normal deviates from the generator's `random()` stream alone.
 
-    Marsaglia & Bray 1964, the polar method. (numpy's `Generator.normal` calls libm, which differs between machines.)
+    The same bits everywhere.
+
+    Marsaglia & Bray 1964, the polar method. (numpy's `Generator.normal` calls libm, which differs
+    between machines.)
 
     Args:
-        rng: Advanced by 2 uniforms per attempt; an attempt yields a pair of deviates with probability π/4. So n
-            deviates consume no fixed number of uniforms: 1.27 n on average, 2 ceil(n/2) at least. Nothing is kept
-            between calls: an odd n discards the second deviate of its last pair.
+        rng: Advanced by 2 uniforms per attempt; an attempt yields a pair of deviates with
+            probability π/4. So n deviates consume no fixed number of uniforms: 1.27 n on average, 2
+            ceil(n/2) at least. Nothing is kept between calls: an odd n discards the second deviate
+            of its last pair.
         size: Number of deviates, or the shape of the array.
 
     Returns:

@@ -1,7 +1,8 @@
 """What is written, and nothing else: the only schema of logs and tables.
 
-Records are flat. Quantities carry their unit in the name (`cpu_s`) unless the unit belongs to the scene, which then
-names it (`length_unit`). Costs are minimised; `inf` means infeasible or not evaluated.
+Records are flat. Quantities carry their unit in the name (`cpu_s`) unless the unit belongs to the
+scene, which then names it (`length_unit`). Costs are minimised; `inf` means infeasible or not
+evaluated.
 """
 
 from collections.abc import Mapping
@@ -16,8 +17,9 @@ FloatArray = NDArray[np.float64]
 class Generation(NamedTuple):
     """One generation of one replicate, as a planner yields it.
 
-    `costs` and `population` are views into the planner's memory: valid until the next generation is asked for, hashed
-    into the digest and not recorded. `best` is never changed: a better one is another array.
+    `costs` and `population` are views into the planner's memory: valid until the next generation is
+    asked for, hashed into the digest and not recorded. `best` is never changed: a better one is
+    another array.
     """
 
     index: int  # type: ignore[assignment]  # 0 is the initial population
@@ -31,15 +33,24 @@ class Generation(NamedTuple):
     collision_queries: int  # configurations judged since the start
     solved: bool  # whether the planner's own model accepts the best so far
     terms: dict[str, float]  # the paper's own terms of the best so far; written as term_<name>
-    costs: FloatArray  # (individuals,), with a leading axis for co-evolving populations, whose best cost is a team's
+    # (individuals,), with a leading axis for co-evolving populations, whose best cost is a team's
+    costs: FloatArray
     population: FloatArray  # any shape
-    criteria: FloatArray | None = None  # (populations, criteria, individuals), of generations whose front is recorded
-    stop_reason: str = ""  # of the last generation: why the planner ends, if not because its generations are used up
-    arrays: Mapping[str, NDArray[Any]] | None = None  # of references: attached to the log as <name>.npy
+    criteria: FloatArray | None = (
+        None  # (populations, criteria, individuals), of generations whose front is recorded
+    )
+    # of the last generation: why the planner ends, if not because its generations are used up
+    stop_reason: str = ""
+    arrays: Mapping[str, NDArray[Any]] | None = (
+        None  # of references: attached to the log as <name>.npy
+    )
 
 
 class GenerationRow(NamedTuple):
-    """One generation as it is read back from a log: what was recorded of `Generation`, and its link of the chain."""
+    """One generation as it is read back from a log.
+
+    What was recorded of `Generation`, and its link of the chain.
+    """
 
     index: int  # type: ignore[assignment]  # a tuple has a method of this name
     best_cost: float
@@ -63,7 +74,10 @@ class SolutionRow(NamedTuple):
 
 
 class FrontRow(NamedTuple):
-    """What one population is worth in one generation: its front are those that no other dominates."""
+    """What one population is worth in one generation.
+
+    Its front are those that no other dominates.
+    """
 
     generation: int
     population: int
@@ -83,9 +97,12 @@ class ReplicateSummary(NamedTuple):
     evaluations: int
     collision_queries: int
     solved: bool  # by the paper's own collision model
-    certified: bool | None  # by the exact certifier, over the whole motion; None: undecided, or there is no motion
+    certified: (
+        bool | None
+    )  # by the exact certifier, over the whole motion; None: undecided, or there is no motion
     certified_margin: bool | None  # the same of the clearance that the scenario requires
-    clearance: float  # [length_unit] least distance of the bodies over the motion; 0 in contact, NaN without motion
+    # [length_unit] least distance of the bodies over the motion; 0 in contact, NaN without motion
+    clearance: float
     clearance_at: float | None  # [instant] where the bodies are that close
     clearance_pair: str  # which bodies
     refuted_at: float | None  # [instant] of the first contact

@@ -1,8 +1,8 @@
 """What is shipped beside the code: `conf`, and a table of hashes and digests.
 
-The table has the hash of every shipped condition and the digest of its first replicate. It finds a shipped condition by
-its hash on a machine that never ran it, gives `reproduce` something to compare with, and makes a test fail when results
-change without a raised revision.
+The table has the hash of every shipped condition and the digest of its first replicate. It finds a
+shipped condition by its hash on a machine that never ran it, gives `reproduce` something to compare
+with, and makes a test fail when results change without a raised revision.
 """
 
 import functools
@@ -57,7 +57,14 @@ def shipped() -> tuple[Shipped, ...]:
 
 
 def find(prefix: str) -> list[Shipped]:
-    """Return the shipped conditions whose hash begins with a prefix, each hash once: in its smallest experiment."""
+    """Return the shipped conditions whose hash begins with a prefix, each hash once.
+
+    In its smallest experiment.
+    """
     sizes = Counter((row.experiment, row.budget) for row in shipped())
     rows = sorted(shipped(), key=lambda row: -sizes[row.experiment, row.budget])
-    return list({row.condition_id: row for row in rows if row.condition_id.startswith(prefix.lower())}.values())
+    return list(
+        {
+            row.condition_id: row for row in rows if row.condition_id.startswith(prefix.lower())
+        }.values()
+    )

@@ -1,8 +1,8 @@
 """The base of every component: typed, frozen, checked settings.
 
-A component is a class whose fields are its settings. Building one from plain data (what a YAML file or a log's
-`config.json` holds) checks every type and range and names the offending field as the user typed it; nothing is
-coerced but whole numbers into float fields and lists into tuples.
+A component is a class whose fields are its settings. Building one from plain data (what a YAML file
+or a log's `config.json` holds) checks every type and range and names the offending field as the
+user typed it; nothing is coerced but whole numbers into float fields and lists into tuples.
 """
 
 from collections.abc import Callable, Mapping
@@ -23,15 +23,19 @@ TARGET = "_target_"
 
 
 class Settings(BaseModel):
-    """Frozen, strictly typed settings that are part of a component (an obstacle, say) but no component themselves."""
+    """Frozen, strictly typed settings that are part of a component (an obstacle.
+
+    Say) but no component themselves.
+    """
 
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 
     def canonical(self) -> dict[str, Any]:
         """Return the settings as plain data: the form that is hashed, stored and built from again.
 
-        A field that has a default was added after the first release, or is an extension that a paper's own
-        configuration leaves off; at its default it is left out, so that older identities stay as they were.
+        A field that has a default was added after the first release, or is an extension that a
+        paper's own configuration leaves off; at its default it is left out, so that older
+        identities stay as they were.
         """
         fields = type(self).model_fields
         return {
@@ -46,7 +50,8 @@ class Component(Settings):
 
     Attributes:
         component: The registered name.
-        revision: Raised whenever the same settings give other results than before; part of every identity.
+        revision: Raised whenever the same settings give other results than before; part of every
+            identity.
     """
 
     component: ClassVar[str]
@@ -61,8 +66,10 @@ def build(data: Any, lookup: Callable[[str, str], type[Component]], field: str) 
     """Build plain data into components, the innermost first.
 
     Args:
-        data: A mapping with `_target_`, or any nesting of mappings, lists and scalars around such mappings.
-        lookup: Gives the class of a registered name; its second argument is the field, for its error.
+        data: A mapping with `_target_`, or any nesting of mappings, lists and scalars around such
+            mappings.
+        lookup: Gives the class of a registered name; its second argument is the field, for its
+            error.
         field: Dotted path of `data`, for errors.
 
     Raises:
@@ -70,7 +77,11 @@ def build(data: Any, lookup: Callable[[str, str], type[Component]], field: str) 
         UnknownSetting: If a component has no such setting.
     """
     if isinstance(data, Mapping):
-        children = {key: build(value, lookup, _join(field, str(key))) for key, value in data.items() if key != TARGET}
+        children = {
+            key: build(value, lookup, _join(field, str(key)))
+            for key, value in data.items()
+            if key != TARGET
+        }
         if TARGET not in data:
             return children
         return _construct(lookup(str(data[TARGET]), field), children, field)
@@ -80,7 +91,9 @@ def build(data: Any, lookup: Callable[[str, str], type[Component]], field: str) 
 
 
 def _construct(kind: type[Component], settings: dict[str, Any], field: str) -> Component:
-    settings.pop("revision", None)  # what a stored configuration recorded; compared by whoever reads it
+    settings.pop(
+        "revision", None
+    )  # what a stored configuration recorded; compared by whoever reads it
     try:
         return kind(**settings)
     except ValidationError as error:
@@ -92,7 +105,10 @@ def _construct(kind: type[Component], settings: dict[str, Any], field: str) -> C
 def settings_error(
     kind: type[Settings], error: ValidationError, settings: Any, field: str
 ) -> SettingError | UnknownSetting:
-    """Say the first thing that is wrong with some settings in one line, with the field's path as it was typed."""
+    """Say the first thing that is wrong with some settings in one line.
+
+    With the field's path as it was typed.
+    """
     first = error.errors(include_url=False)[0]
     path, here = field, settings
     for part in first["loc"]:
@@ -100,7 +116,9 @@ def settings_error(
             path, here = f"{path}[{part}]", here[part] if part < len(here) else {}
         elif isinstance(part, int):  # one value in the place of a list
             continue
-        elif part in here or part == first["loc"][-1]:  # else: the tag of a union, which nobody typed
+        elif (
+            part in here or part == first["loc"][-1]
+        ):  # else: the tag of a union, which nobody typed
             path, here = _join(path, part), here.get(part, {}) if isinstance(here, Mapping) else {}
     if first["type"] == "extra_forbidden":
         known = kind.model_fields if len(first["loc"]) == 1 else ()
@@ -139,7 +157,9 @@ def _must(error: Any) -> tuple[str, str]:
     template = _MUST.get(error["type"])
     must = template.format(**context) if template else str(error["msg"])
     hint = (
-        nearest(error["input"], context["expected"].replace("'", "").replace(" or ", ", ").split(", "))
+        nearest(
+            error["input"], context["expected"].replace("'", "").replace(" or ", ", ").split(", ")
+        )
         if (error["type"] == "literal_error" and isinstance(error["input"], str))
         else ""
     )

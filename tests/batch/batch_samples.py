@@ -22,7 +22,9 @@ WORDS = (
 
 def new_batch(outputs: Path, *wanted: tuple[Condition, int], num_workers: int = 1) -> Batch:
     settings = RunnerSettings(num_workers=num_workers)
-    return Batch([(condition, count, {"label": "test"}) for condition, count in wanted], settings, outputs)
+    return Batch(
+        [(condition, count, {"label": "test"}) for condition, count in wanted], settings, outputs
+    )
 
 
 def run(outputs: Path, *wanted: tuple[Condition, int], num_workers: int = 1) -> list[Outcome]:
@@ -32,4 +34,6 @@ def run(outputs: Path, *wanted: tuple[Condition, int], num_workers: int = 1) -> 
 def digests(outputs: Path, condition: Condition) -> dict[int, str]:
     """Return replicate → digest of what is stored, every log verified."""
     directory = RunDirectory(outputs, condition.id)
-    return {k: read_log(directory.log_path(k)).summary.digest for k in sorted(directory.completed())}
+    return {
+        k: read_log(directory.log_path(k)).summary.digest for k in sorted(directory.completed())
+    }

@@ -20,7 +20,9 @@ def plug_in(tmp_path_factory: pytest.TempPathFactory) -> Path:
     information = directory / "faulty-1.0.dist-info"
     information.mkdir()
     (information / "METADATA").write_text("Metadata-Version: 2.1\nName: faulty\nVersion: 1.0\n")
-    (information / "entry_points.txt").write_text("[evoexp.components]\nfaulty = faulty_planner:Faulty\n")
+    (information / "entry_points.txt").write_text(
+        "[evoexp.components]\nfaulty = faulty_planner:Faulty\n"
+    )
     return directory
 
 
@@ -44,7 +46,10 @@ def fresh_workers() -> Iterator[None]:
 
 @pytest.fixture
 def faulty() -> Condition:
-    """Return a condition of the planner that can be told to fail; what it is told is no part of it."""
+    """Return a condition of the planner that can be told to fail.
+
+    What it is told is no part of it.
+    """
     (experiment,) = compose.expand(WORDS)
     return experiment.conditions[0].condition
 

@@ -1,8 +1,10 @@
-"""A plug-in for tests: Rana & Zalzala's planner, which misbehaves where the environment tells it to.
+"""A plug-in for tests: Rana & Zalzala's planner.
 
-`FAULTY` holds `<what>:<replicates>`, several with `;`: `raise:1,3`, `kill:2`, `kill_once:4`, `hang:5,6`, `tell:7`
-(whether a server forked the worker). It is no part of the condition, so that results can be compared with those of an
-undisturbed run.
+Which misbehaves where the environment tells it to.
+
+`FAULTY` holds `<what>:<replicates>`, several with `;`: `raise:1,3`, `kill:2`, `kill_once:4`,
+`hang:5,6`, `tell:7` (whether a server forked the worker). It is no part of the condition, so that
+results can be compared with those of an undisturbed run.
 """
 
 import multiprocessing
@@ -32,9 +34,13 @@ class Faulty(ViaPointGa):
             if "hang" in faults and generation.index == 1 and in_worker():
                 time.sleep(HANG_S)
             if "raise" in faults and generation.index == 1:
-                raise ArithmeticError(f"replicate {seed.spawn_key[0]} is [bold]told[/] to fail\nand says why")
+                raise ArithmeticError(
+                    f"replicate {seed.spawn_key[0]} is [bold]told[/] to fail\nand says why"
+                )
             if "tell" in faults:
-                raise RuntimeError("a server's worker" if forked_from_server() else "the parent's worker")
+                raise RuntimeError(
+                    "a server's worker" if forked_from_server() else "the parent's worker"
+                )
             if faults & {"kill", "kill_once"} and generation.index == 1 and in_worker():
                 die(seed.spawn_key[0], once="kill_once" in faults)
             yield generation

@@ -1,4 +1,7 @@
-"""Ctrl-C and `kill -9` at any moment, then the same command again: the same digests as an undisturbed run."""
+"""Ctrl-C and `kill -9` at any moment, then the same command again.
+
+The same digests as an undisturbed run.
+"""
 
 import os
 import random
@@ -41,7 +44,9 @@ def started(outputs: Path, plug_in: Path, faults: str = HANGING) -> Iterator[sub
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # ignored by what starts in the background
+        preexec_fn=lambda: signal.signal(
+            signal.SIGINT, signal.SIG_DFL
+        ),  # ignored by what starts in the background
     )
     try:
         yield process
@@ -61,7 +66,10 @@ def wait_for(directory: RunDirectory, count: int, process: subprocess.Popen[str]
 
 
 def alive(group: int) -> list[str]:
-    """Return the living processes of a group; a dead one may still wait for whoever inherited it."""
+    """Return the living processes of a group.
+
+    A dead one may still wait for whoever inherited it.
+    """
     found = []
     for stat in Path("/proc").glob("[0-9]*/stat"):
         with suppress(OSError):
@@ -89,12 +97,18 @@ def test_ctrl_c_keeps_what_is_finished_and_the_same_command_goes_on(
         assert main([*COMMAND[:-1], "runner=serial", "--no-report"]) == 2
         said = capsys.readouterr()
         assert said.out == ""
-        assert said.err == f"evoexp: run {faulty.id[:12]}: another process is writing it now ({directory.path})\n"
+        assert (
+            said.err == f"evoexp: run {faulty.id[:12]}: another process is writing it now "
+            f"({directory.path})\n"
+        )
 
         os.killpg(process.pid, signal.SIGINT)  # as a terminal does: parent and workers
         out, err = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 130
-    assert err == "evoexp: interrupted; what was finished is kept, the same command goes on from there\n"
+    assert (
+        err
+        == "evoexp: interrupted; what was finished is kept, the same command goes on from there\n"
+    )
     assert re.search(r"^replicates: \d+ of 12 done, 0 failed, ETA \d+ (s|min)$", out, re.MULTILINE)
     assert "\x1b" not in out, "plain lines in a pipe"
 
@@ -111,17 +125,23 @@ def test_ctrl_c_keeps_what_is_finished_and_the_same_command_goes_on(
     assert read_summaries(directory)["digest"].tolist() == list(undisturbed.values())
 
 
-def test_kill_9_at_any_moment(faulty: Condition, undisturbed: dict[int, str], tmp_path: Path, plug_in: Path) -> None:
+def test_kill_9_at_any_moment(
+    faulty: Condition, undisturbed: dict[int, str], tmp_path: Path, plug_in: Path
+) -> None:
     outputs = tmp_path / "outputs"
     directory = RunDirectory(outputs, faulty.id)
-    moment = random.Random(os.getpid()).uniform(0.0, 0.3)  # any moment will do: the assertions hold at all of them
+    moment = random.Random(os.getpid()).uniform(
+        0.0, 0.3
+    )  # any moment will do: the assertions hold at all of them
     with started(outputs, plug_in) as process:
         wait_for(directory, 1, process)
         time.sleep(moment)
         os.kill(process.pid, signal.SIGKILL)  # the parent alone
         process.wait()
         kept = digests(outputs, faulty)
-        run(outputs, (faulty, 12))  # at once: the lock died with its process, the orphans write nothing
+        run(
+            outputs, (faulty, 12)
+        )  # at once: the lock died with its process, the orphans write nothing
         end = time.monotonic() + PATIENCE_S
         while alive(process.pid) and time.monotonic() < end:
             time.sleep(0.1)
@@ -143,4 +163,6 @@ def test_a_worker_forked_from_the_server_may_die(
     assert reason == "RuntimeError: a server's worker"
     assert RunDirectory(outputs, faulty.id).failure(7)["reason"] == "worker process died twice"
     assert sorted(re.findall(r"^failed: \w+ #(\d+)", err, re.MULTILINE)) == ["7", "9"], out
-    assert digests(outputs, faulty) == {k: digest for k, digest in undisturbed.items() if k not in (7, 9)}
+    assert digests(outputs, faulty) == {
+        k: digest for k, digest in undisturbed.items() if k not in (7, 9)
+    }

@@ -31,12 +31,17 @@ from evoexp.store.tables import read_summaries
 
 def stamps(directory: RunDirectory) -> dict[str, tuple[int, bytes]]:
     """Return name → modification time and content of every log."""
-    return {path.name: (path.stat().st_mtime_ns, path.read_bytes()) for path in directory.replicates.glob("*.mcap")}
+    return {
+        path.name: (path.stat().st_mtime_ns, path.read_bytes())
+        for path in directory.replicates.glob("*.mcap")
+    }
 
 
 def test_only_what_is_missing_runs(faulty: Condition, tmp_path: Path) -> None:
     outcomes = run(tmp_path, (faulty, 5))
-    assert [(o.condition_id, o.replicate, o.reason) for o in outcomes] == [(faulty.id, k, "") for k in range(5)]
+    assert [(o.condition_id, o.replicate, o.reason) for o in outcomes] == [
+        (faulty.id, k, "") for k in range(5)
+    ]
     directory = RunDirectory(tmp_path, faulty.id)
     before, first = digests(tmp_path, faulty), stamps(directory)
     assert len(set(before.values())) == 5
@@ -89,11 +94,15 @@ def test_of_two_thousand_the_missing_ones_are_found_without_opening_a_log(
     assert len(calls) <= 4, "a configuration is put into words per condition, not per replicate"
 
 
-def test_a_condition_is_built_once_per_process(faulty: Condition, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_condition_is_built_once_per_process(
+    faulty: Condition, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(jobs, "LONGEST_TASK_S", math.inf)  # kernels may have to be compiled
     jobs._condition.cache_clear()
     build, calls = Condition.from_config, []
-    monkeypatch.setattr(Condition, "from_config", lambda config: calls.append(config) or build(config))  # type: ignore[func-returns-value]
+    monkeypatch.setattr(
+        Condition, "from_config", lambda config: calls.append(config) or build(config)
+    )  # type: ignore[func-returns-value]
     outcomes = run_jobs([Job(faulty.id, faulty.to_json(), k) for k in range(3)])
     assert [outcome.reason for outcome in outcomes] == ["", "", ""]
     assert len(calls) == 1
@@ -102,7 +111,10 @@ def test_a_condition_is_built_once_per_process(faulty: Condition, monkeypatch: p
 
 
 def test_a_worker_loads_neither_tables_nor_the_command_line() -> None:
-    code = "import sys, evoexp.batch.jobs; print(*sorted({name.split('.')[0] for name in sys.modules}))"
+    code = (
+        "import sys, evoexp.batch.jobs; print(*sorted({name.split('.')[0] for name in "
+        "sys.modules}))"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert not {"pandas", "pyarrow", "matplotlib", "hydra", "rich"} & set(done.stdout.split())
 
@@ -121,7 +133,9 @@ def test_kernels_are_compiled_once_for_conditions_that_differ_in_numbers(
     from_json = Condition.from_json
     monkeypatch.setattr(runner, "is_compiled", lambda kind: kind in noted)
     monkeypatch.setattr(runner, "note_compiled", noted.add)
-    monkeypatch.setattr(Condition, "from_json", lambda text: (asked.append(text), from_json(text))[1])
+    monkeypatch.setattr(
+        Condition, "from_json", lambda text: (asked.append(text), from_json(text))[1]
+    )
     texts = [faulty._replace(seed=seed).to_json() for seed in (0, 7, 12345)]
     runner._compile([texts[0], *texts])
     assert asked == texts[:1]
@@ -154,10 +168,14 @@ def test_planning_and_preparing_write_nothing(faulty: Condition, tmp_path: Path)
     assert not (tmp_path / "outputs").exists()
 
 
-def test_an_older_damaged_log_is_said_when_everything_has_run(faulty: Condition, tmp_path: Path) -> None:
+def test_an_older_damaged_log_is_said_when_everything_has_run(
+    faulty: Condition, tmp_path: Path
+) -> None:
     other = faulty._replace(seed=1)
     run(tmp_path, (faulty, 1))
-    RunDirectory(tmp_path, faulty.id).log_path(0).rename(RunDirectory(tmp_path, faulty.id).log_path(7))
+    RunDirectory(tmp_path, faulty.id).log_path(0).rename(
+        RunDirectory(tmp_path, faulty.id).log_path(7)
+    )
     with pytest.raises(CorruptLog, match=r"0007\.mcap"):
         run(tmp_path, (faulty, 2), (other, 2))
     assert sorted(RunDirectory(tmp_path, faulty.id).completed()) == [0, 1, 7]
@@ -170,7 +188,12 @@ def test_a_failed_replicate_is_a_row_and_a_file_and_the_others_go_on(
 ) -> None:
     monkeypatch.setenv("FAULTY", "raise:0,2")
     outcomes = run(tmp_path, (faulty, 4))
-    assert [(o.replicate, o.failed) for o in outcomes] == [(0, True), (1, False), (2, True), (3, False)]
+    assert [(o.replicate, o.failed) for o in outcomes] == [
+        (0, True),
+        (1, False),
+        (2, True),
+        (3, False),
+    ]
     assert outcomes[2].reason == "ArithmeticError: replicate 2 is [bold]told[/] to fail"
     directory = RunDirectory(tmp_path, faulty.id)
     assert (directory.completed(), directory.failed()) == ({1, 3}, {0, 2})
@@ -193,7 +216,10 @@ def test_a_failed_replicate_is_a_row_and_a_file_and_the_others_go_on(
 
 
 def test_failures_on_the_command_line(
-    faulty: Condition, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    faulty: Condition,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setenv("EVOEXP_OUTPUTS", str(tmp_path))
     monkeypatch.setenv("FAULTY", "raise:1")
@@ -201,11 +227,17 @@ def test_failures_on_the_command_line(
     words = ["run", *WORDS[:-1], "num_replicates=3", "runner=serial", "--no-report"]
     assert main(words) == 1
     out, err = capsys.readouterr()
-    assert err == f"failed: {faulty.id[:12]} #1: ArithmeticError: replicate 1 is [bold]told[/] to fail\n"
+    assert (
+        err
+        == f"failed: {faulty.id[:12]} #1: ArithmeticError: replicate 1 is [bold]told[/] to fail\n"
+    )
     assert "replicates: 2 of 3 done, 1 failed, ETA 0 s" in out
     table = out[out.index("\n1 failed ") :]
     assert all(f"┃ {column} " in table for column in ("hash", "reason", "traceback in"))
-    assert f"│ {faulty.id[:12]} │ 1 │ ArithmeticError: replicate 1 is [bold]told[/] to fail │ " in table
+    assert (
+        f"│ {faulty.id[:12]} │ 1 │ ArithmeticError: replicate 1 is [bold]told[/] to fail │ "
+        in table
+    )
     assert "2 of 3" in out[: out.index("\n1 failed ")]
     monkeypatch.setenv("COLUMNS", "80")
     assert main(words) == 1
@@ -222,18 +254,32 @@ def test_failures_on_the_command_line(
 
 
 def test_where_every_replicate_failed_there_is_still_a_table_and_exit_code_1(
-    faulty: Condition, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    faulty: Condition,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setenv("EVOEXP_OUTPUTS", str(tmp_path))
     monkeypatch.setenv("FAULTY", "raise:0,1")
-    code = main(["run", *WORDS[:-1], "num_replicates=2", "runner=serial", "report=paper", "report.formats=[svg]"])
+    code = main(
+        [
+            "run",
+            *WORDS[:-1],
+            "num_replicates=2",
+            "runner=serial",
+            "report=paper",
+            "report.formats=[svg]",
+        ]
+    )
     out = capsys.readouterr().out
     assert code == 1
     assert "\n2 failed " in out
     assert "report: " in out
 
 
-def test_stopping_keeps_what_is_finished_and_leaves_no_lock(faulty: Condition, tmp_path: Path) -> None:
+def test_stopping_keeps_what_is_finished_and_leaves_no_lock(
+    faulty: Condition, tmp_path: Path
+) -> None:
     batch = new_batch(tmp_path, (faulty, 4))
     outcomes = batch.run()
     assert [next(outcomes).replicate, next(outcomes).replicate] == [0, 1]
@@ -280,7 +326,9 @@ def test_a_killed_worker_costs_its_own_replicate_a_retry(
         9: "ArithmeticError: replicate 9 is [bold]told[/] to fail",
     }
     assert (tmp_path / "3").read_text() == "1"
-    assert (tmp_path / "7").read_text() in ("2", "3"), "twice alone, and before that perhaps in the pool"
+    assert (tmp_path / "7").read_text() in ("2", "3"), (
+        "twice alone, and before that perhaps in the pool"
+    )
     expected = {k: digest for k, digest in undisturbed.items() if k not in reasons}
     assert digests(tmp_path / "outputs", faulty) == expected
     assert "terminated" in RunDirectory(tmp_path / "outputs", faulty.id).failure(7)["traceback"]
@@ -298,14 +346,18 @@ def outcomes_of(jobs: Sequence[Job], wall_s: float) -> list[Outcome]:
     st.integers(2, 8),
     st.lists(st.tuples(st.floats(1e-5, 1.0), st.integers(1, MAX_BUNDLE)), min_size=1, max_size=20),
 )
-def test_every_job_is_run_once_and_in_order(num_jobs: int, num_workers: int, tasks: list[tuple[float, int]]) -> None:
+def test_every_job_is_run_once_and_in_order(
+    num_jobs: int, num_workers: int, tasks: list[tuple[float, int]]
+) -> None:
     waiting = [Job("0" * 64, b"", k) for k in range(num_jobs)]
     in_flight: dict[tuple[str, int], Job] = {}
     bundles = _Bundles(deque(waiting), in_flight, num_workers)
     seen: list[Job] = []
     for count, bundle in enumerate(bundles):
         assert 1 <= len(bundle) <= MAX_BUNDLE
-        assert len(bundle) <= max(1, -(-(num_jobs - len(seen)) // (2 * num_workers))), "nobody waits for one worker"
+        assert len(bundle) <= max(1, -(-(num_jobs - len(seen)) // (2 * num_workers))), (
+            "nobody waits for one worker"
+        )
         assert all(in_flight[job.key] == job for job in bundle)
         wall, done = tasks[count % len(tasks)]
         seen += bundle[:done]  # the worker stopped there
@@ -331,7 +383,9 @@ def test_bundles_are_as_long_as_a_task() -> None:
     assert len(next(iterator)) in (9, 10), "slow ones are forgotten"
 
 
-def test_a_task_that_takes_long_begins_no_further_replicate(faulty: Condition, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_task_that_takes_long_begins_no_further_replicate(
+    faulty: Condition, monkeypatch: pytest.MonkeyPatch
+) -> None:
     asked = [Job(faulty.id, faulty.to_json(), k) for k in range(3)]
     monkeypatch.setattr(jobs, "LONGEST_TASK_S", math.inf)
     assert [outcome.replicate for outcome in run_jobs(asked)] == [0, 1, 2]

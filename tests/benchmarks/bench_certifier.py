@@ -1,4 +1,6 @@
-"""Certifying a motion, beside the check that it replaces: Pinocchio and coal at 100 configurations per segment.
+"""Certifying a motion, beside the check that it replaces.
+
+Pinocchio and coal at 100 configurations per segment.
 
 The check sees contacts only at its samples and proves nothing between them.
 """
@@ -23,7 +25,11 @@ def two_arms(num_joints: int) -> Scene:
     """Two planar arms of links of length 4, 8 apart, as in Rana & Zalzala's scenes."""
     lengths = (4.0,) * num_joints
     return scene(
-        Arms(arms=tuple(PlanarChain(link_lengths=lengths, base_position=(0.0, y)) for y in (0.0, 8.0))).build()
+        Arms(
+            arms=tuple(
+                PlanarChain(link_lengths=lengths, base_position=(0.0, y)) for y in (0.0, 8.0)
+            )
+        ).build()
     )
 
 
@@ -35,7 +41,9 @@ def redundant_arm() -> Scene:
         ((5.0, 2.0, 0.3), (1.0, 4.5, 1.2), (-3.0, 3.0, 2.0), (-2.0, -4.5, 0.5), (4.0, -3.0, 2.5))
     ):
         placement = pin.SE3(pin.exp3(np.array([0.0, 0.0, angle])), np.array([x, y, 0.0]))
-        geometry.addGeometryObject(pin.GeometryObject(f"egg_{k}", 0, 0, placement, coal.Ellipsoid(0.8, 0.4, 0.3)))
+        geometry.addGeometryObject(
+            pin.GeometryObject(f"egg_{k}", 0, 0, placement, coal.Ellipsoid(0.8, 0.4, 0.3))
+        )
         for link in range(7):
             geometry.addCollisionPair(pin.CollisionPair(link, 7 + k))
     return geometry_scene(assembly.model, geometry, assembly.table)
@@ -46,7 +54,9 @@ def free_motions(built: Scene, num_segments: int, spread: float) -> list[Motion]
     rng, found = np.random.default_rng(0), []
     while len(found) < 10:
         start = rng.uniform(-spread, spread, size=built.model.nq)
-        motion = Motion(start + np.cumsum(rng.normal(size=(num_segments + 1, built.model.nq)) * 0.05, axis=0))
+        motion = Motion(
+            start + np.cumsum(rng.normal(size=(num_segments + 1, built.model.nq)) * 0.05, axis=0)
+        )
         if certify(built, motion).status == "certified":
             found.append(motion)
     return found
@@ -57,7 +67,9 @@ def sampled(built: Scene, motion: Motion) -> float:
     data, geometry_data = built.model.createData(), built.geometry.createData()
     least = np.inf
     for t in np.linspace(0.0, motion.num_segments, motion.num_segments * SAMPLES + 1):
-        pair = pin.computeDistances(built.model, data, built.geometry, geometry_data, motion.at(float(t)))
+        pair = pin.computeDistances(
+            built.model, data, built.geometry, geometry_data, motion.at(float(t))
+        )
         least = min(least, geometry_data.distanceResults[int(pair)].min_distance)
     return least
 
@@ -81,7 +93,13 @@ def bench_certify(beside: Any, name: str, build: Any, num_segments: int, spread:
     beside(
         f"certify motions of {name}, {num_segments} segments, {len(built.pairs)} pairs",
         lambda: [certify(built, motion) for motion in motions],
-        {f"Pinocchio + coal at {SAMPLES} samples per segment": (lambda: sampled(built, motions[0]), 1, 1)},
+        {
+            f"Pinocchio + coal at {SAMPLES} samples per segment": (
+                lambda: sampled(built, motions[0]),
+                1,
+                1,
+            )
+        },
         unit="motion",
         amount=len(motions),
         repeat=3,

@@ -1,4 +1,7 @@
-"""Paths over a grid: random walks of a population, its costs, a run, a replicate with its log, the truth beside it."""
+"""Paths over a grid: random walks of a population, its costs, a run, a replicate with its log.
+
+The truth beside it.
+"""
 
 from typing import Any
 
@@ -28,7 +31,9 @@ def bench_grid_costs(benchmark: Any) -> None:
 def bench_grid_run(benchmark: Any) -> None:
     found = condition()
     planner, problem = found.prepare()
-    benchmark(lambda: [generation.best_cost for generation in planner.evolve(problem, found.rng(0))])
+    benchmark(
+        lambda: [generation.best_cost for generation in planner.evolve(problem, found.rng(0))]
+    )
 
 
 def bench_grid_replicate(benchmark: Any) -> None:

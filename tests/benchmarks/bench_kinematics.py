@@ -1,4 +1,7 @@
-"""Forward kinematics of batches beside Pinocchio, called once per configuration, and beside numpy."""
+"""Forward kinematics of batches beside Pinocchio, called once per configuration.
+
+And beside numpy.
+"""
 
 from typing import Any
 
@@ -16,7 +19,10 @@ def two_planar_arms() -> Any:
     return compose.expand(["experiment=rana_planar"])[0].conditions[0].condition.robot.build().model
 
 
-MODELS = {"two planar arms (4 joints)": two_planar_arms, "6R manipulator": pin.buildSampleModelManipulator}
+MODELS = {
+    "two planar arms (4 joints)": two_planar_arms,
+    "6R manipulator": pin.buildSampleModelManipulator,
+}
 
 
 def pinocchio_frames(model: Any, data: Any, q: Any) -> None:
@@ -26,7 +32,10 @@ def pinocchio_frames(model: Any, data: Any, q: Any) -> None:
 
 
 def numpy_frames(table: Any, q: Any) -> tuple[Any, Any]:
-    """Return rotations and origins of the table's frames for q (nq, configurations), all configurations at once."""
+    """Return rotations and origins of the table's frames for q (nq, configurations).
+
+    All configurations at once.
+    """
     rotations, origins = [], []
     for k, before in enumerate(table.parent):
         s, c, zero = np.sin(q[table.index_q[k]]), np.cos(q[table.index_q[k]]), np.zeros(q.shape[1])
@@ -34,7 +43,11 @@ def numpy_frames(table: Any, q: Any) -> tuple[Any, Any]:
         own = table.rotation[k].reshape(3, 3) @ turn
         rotations.append(rotations[before] @ own if before >= 0 else own)
         shift = table.translation[k]
-        origins.append(origins[before] + rotations[before] @ shift if before >= 0 else np.tile(shift, (q.shape[1], 1)))
+        origins.append(
+            origins[before] + rotations[before] @ shift
+            if before >= 0
+            else np.tile(shift, (q.shape[1], 1))
+        )
     return rotations, origins
 
 

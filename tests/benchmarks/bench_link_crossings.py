@@ -1,7 +1,10 @@
-"""Two populations of planar arms of two links, every individual against every other, beside numpy and coal.
+"""Two populations of planar arms of two links, every individual against every other.
 
-100 × 100 pairs in 4 configurations of 4 pairs of links each: 160 000 link tests, fresh and of populations that have
-gathered around one collision-free pair. The paper's closed form is timed, too: on angles, but once per pair.
+Beside numpy and coal.
+
+100 × 100 pairs in 4 configurations of 4 pairs of links each: 160 000 link tests, fresh and of
+populations that have gathered around one collision-free pair. The paper's closed form is timed,
+too: on angles, but once per pair.
 """
 
 from collections.abc import Callable
@@ -30,7 +33,11 @@ def populations(when: str) -> list[Any]:
         for k, (start, goal) in enumerate([((2.6, 1.0), (1.5, 1.0)), ((1.0, 2.0), (0.5, 1.2))]):
             t = np.linspace(0.2, 0.8, CONFIGURATIONS)[:, None]
             best = np.array(start) + t * (np.array(goal) - np.array(start))
-            q[k] = np.where(rng.random(q[k].shape) < 0.05, q[k], best[:, :, None] + rng.normal(0.0, 0.05, q[k].shape))
+            q[k] = np.where(
+                rng.random(q[k].shape) < 0.05,
+                q[k],
+                best[:, :, None] + rng.normal(0.0, 0.05, q[k].shape),
+            )
     return q
 
 
@@ -38,7 +45,12 @@ def coal_counts(points_1: Any, points_2: Any) -> Callable[[], Any]:
     """Return a function that counts by capsules of (nearly) no radius, pair by pair."""
     bodies = []
     for arm, points in ((ONE, points_1), (TWO, points_2)):
-        bodies.append([[placed_links(arm, points[k, :, n]) for n in range(HANDFUL)] for k in range(CONFIGURATIONS)])
+        bodies.append(
+            [
+                [placed_links(arm, points[k, :, n]) for n in range(HANDFUL)]
+                for k in range(CONFIGURATIONS)
+            ]
+        )
     request, result = coal.CollisionRequest(), coal.CollisionResult()
 
     def meet(one: Any, two: Any) -> bool:
@@ -73,18 +85,32 @@ def bench_link_crossings(beside: Any, when: str) -> None:
     points_1, points_2 = ONE.points(q_1), TWO.points(q_2)
     found = count_crossings(ONE, points_1, TWO, points_2)
     by_coal = coal_counts(points_1, points_2)
-    each = [np.repeat(q_1, INDIVIDUALS, axis=2).swapaxes(0, 1), np.tile(q_2, INDIVIDUALS).swapaxes(0, 1)]
+    each = [
+        np.repeat(q_1, INDIVIDUALS, axis=2).swapaxes(0, 1),
+        np.tile(q_2, INDIVIDUALS).swapaxes(0, 1),
+    ]
     each = [np.ascontiguousarray(q.reshape(2, -1)) for q in each]
-    assert np.array_equal(found.counts, plain.counts_of_populations(ONE.base, points_1, TWO.base, points_2))
+    assert np.array_equal(
+        found.counts, plain.counts_of_populations(ONE.base, points_1, TWO.base, points_2)
+    )
     assert np.array_equal(found.counts[:HANDFUL, :HANDFUL], by_coal())
     colliding = closed_form(ONE, each[0], TWO, each[1]).colliding
     assert np.array_equal(found.counts.ravel(), colliding.reshape(CONFIGURATIONS, -1).sum(axis=0))
     beside(
-        f"link tests of {INDIVIDUALS} × {INDIVIDUALS} arms in {CONFIGURATIONS} configurations, {when}",
+        f"link tests of {INDIVIDUALS} × {INDIVIDUALS} arms in {CONFIGURATIONS} configurations, "
+        f"{when}",
         lambda: count_crossings(ONE, ONE.points(q_1), TWO, TWO.points(q_2)),
         {
-            "numpy": (lambda: plain.counts_of_populations(ONE.base, points_1, TWO.base, points_2), LINK_TESTS, 1),
-            "the paper's closed form, compiled": (lambda: closed_form(ONE, each[0], TWO, each[1]), LINK_TESTS, 1),
+            "numpy": (
+                lambda: plain.counts_of_populations(ONE.base, points_1, TWO.base, points_2),
+                LINK_TESTS,
+                1,
+            ),
+            "the paper's closed form, compiled": (
+                lambda: closed_form(ONE, each[0], TWO, each[1]),
+                LINK_TESTS,
+                1,
+            ),
             "coal, pair by pair": (by_coal, HANDFUL * HANDFUL * CONFIGURATIONS * 4, 1),
         },
         unit="link test",

@@ -1,4 +1,7 @@
-"""Our elementary functions beside libm (called from the same compiled loop) and numpy; 4096 elements per round."""
+"""Our elementary functions beside libm (called from the same compiled loop) and numpy.
+
+4096 elements per round.
+"""
 
 import math
 from collections.abc import Callable
@@ -12,7 +15,11 @@ from evoexp.numerics import acos, asin, atan2, cos, exp, log, pow_int, sin, sinc
 
 SIZE = 4096
 rng = np.random.default_rng(0)
-ANGLES, UNIT, POSITIVE = rng.uniform(-7, 7, SIZE), rng.uniform(-1, 1, SIZE), rng.uniform(1e-3, 50, SIZE)
+ANGLES, UNIT, POSITIVE = (
+    rng.uniform(-7, 7, SIZE),
+    rng.uniform(-1, 1, SIZE),
+    rng.uniform(1e-3, 50, SIZE),
+)
 
 
 def fifth_power(x: float) -> float:
@@ -37,7 +44,12 @@ CASES: dict[str, tuple[Any, Any, Any, Any]] = {
     "acos": (acos, math.acos, np.arccos, UNIT),
     "log": (log, math.log, np.log, POSITIVE),
     "exp": (exp, math.exp, np.exp, ANGLES),
-    "pow5": (numba.njit(fifth_power), numba.njit(fifth_power_of_libm), fifth_power_of_numpy, ANGLES),
+    "pow5": (
+        numba.njit(fifth_power),
+        numba.njit(fifth_power_of_libm),
+        fifth_power_of_numpy,
+        ANGLES,
+    ),
 }
 
 

@@ -1,4 +1,7 @@
-"""Redistribution with relaxation, and random walks, of 100 planar paths (50 individuals, two arms) beside numpy."""
+"""Redistribution with relaxation, and random walks, of 100 planar paths (50 individuals.
+
+Two arms) beside numpy.
+"""
 
 import math
 from typing import Any
@@ -80,13 +83,20 @@ def test_redistribution_and_relaxation(benchmark: Any, samples: int) -> None:
 
 def test_relaxation(benchmark: Any) -> None:
     via_points = population()
-    benchmark.pedantic(lambda: relax(via_points, 0.5, STRINGS), rounds=500, iterations=10, warmup_rounds=5)
+    benchmark.pedantic(
+        lambda: relax(via_points, 0.5, STRINGS), rounds=500, iterations=10, warmup_rounds=5
+    )
     assert np.all(np.isfinite(via_points))
 
 
 @pytest.mark.parametrize("chords", [8, 16])
 def test_redistribution_and_relaxation_in_numpy(benchmark: Any, chords: int) -> None:
-    given = population()[:, :, :STRINGS].reshape(2, 2, N + 1, STRINGS).transpose(0, 3, 2, 1).reshape(-1, N + 1, 2)
+    given = (
+        population()[:, :, :STRINGS]
+        .reshape(2, 2, N + 1, STRINGS)
+        .transpose(0, 3, 2, 1)
+        .reshape(-1, N + 1, 2)
+    )
     paths = given.copy()
 
     def run() -> None:
@@ -98,20 +108,31 @@ def test_redistribution_and_relaxation_in_numpy(benchmark: Any, chords: int) -> 
     via_points = population()
     redistribute(via_points, ARMS, STRINGS, prepare_redistribution(N, 2))
     relax(via_points, 0.5, STRINGS)
-    ours = via_points[:, :, :STRINGS].reshape(2, 2, N + 1, STRINGS).transpose(0, 3, 2, 1).reshape(-1, N + 1, 2)
+    ours = (
+        via_points[:, :, :STRINGS]
+        .reshape(2, 2, N + 1, STRINGS)
+        .transpose(0, 3, 2, 1)
+        .reshape(-1, N + 1, 2)
+    )
     assert np.abs(ours - paths).max() < 2.0  # [deg], spacing about 10
 
 
 @pytest.mark.parametrize("strings", [5, 50])
 def test_walk(benchmark: Any, strings: int) -> None:
-    via_points, lanes, uniforms = np.zeros((4, N + 1, LANES)), np.arange(strings), UNIFORMS[:strings]
+    via_points, lanes, uniforms = (
+        np.zeros((4, N + 1, LANES)),
+        np.arange(strings),
+        UNIFORMS[:strings],
+    )
     benchmark.pedantic(
         lambda: walk(via_points, lanes, uniforms, START, GOAL, ARMS, STEP, TURN),
         rounds=300, iterations=10, warmup_rounds=5,
     )  # fmt: skip
     turn = (2 * uniforms[:, : N - 1] - 1) * TURN
     expected = numpy_walk(START[:2], GOAL[:2], turn)
-    assert np.allclose(via_points[:2, :, :strings].transpose(2, 1, 0), expected, rtol=0.0, atol=1e-8)
+    assert np.allclose(
+        via_points[:2, :, :strings].transpose(2, 1, 0), expected, rtol=0.0, atol=1e-8
+    )
 
 
 @pytest.mark.parametrize("strings", [5, 50])
@@ -119,7 +140,10 @@ def test_walk_in_numpy(benchmark: Any, strings: int) -> None:
     turn = (2 * UNIFORMS[:strings].reshape(strings, 2, N - 1) - 1) * TURN
 
     def run() -> Any:
-        return [numpy_walk(START[2 * a : 2 * a + 2], GOAL[2 * a : 2 * a + 2], turn[:, a]) for a in (0, 1)]
+        return [
+            numpy_walk(START[2 * a : 2 * a + 2], GOAL[2 * a : 2 * a + 2], turn[:, a])
+            for a in (0, 1)
+        ]
 
     paths = benchmark.pedantic(run, rounds=100, iterations=1, warmup_rounds=2)
     assert np.array_equal(paths[0][0, -1], GOAL[:2])

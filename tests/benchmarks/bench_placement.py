@@ -1,4 +1,7 @@
-"""Docking postures: criteria of a population, a run, a replicate with its log, the truths beside it."""
+"""Docking postures: criteria of a population, a run, a replicate with its log.
+
+The truths beside it.
+"""
 
 from typing import Any
 
@@ -10,7 +13,11 @@ from evoexp.condition import Condition
 
 
 def condition(*words: str) -> Condition:
-    return compose.expand(["experiment=chen_placement", *words], only=["A torque norm"])[0].conditions[0].condition
+    return (
+        compose.expand(["experiment=chen_placement", *words], only=["A torque norm"])[0]
+        .conditions[0]
+        .condition
+    )
 
 
 def bench_placement_criteria(benchmark: Any) -> None:
@@ -22,7 +29,9 @@ def bench_placement_criteria(benchmark: Any) -> None:
 def bench_placement_run(benchmark: Any) -> None:
     found = condition()
     planner, problem = found.prepare()
-    benchmark(lambda: [generation.best_cost for generation in planner.evolve(problem, found.rng(0))])
+    benchmark(
+        lambda: [generation.best_cost for generation in planner.evolve(problem, found.rng(0))]
+    )
 
 
 def bench_placement_replicate(benchmark: Any) -> None:
@@ -37,5 +46,7 @@ def bench_placement_optimum(benchmark: Any) -> None:
 
 
 def bench_placement_conventional(benchmark: Any) -> None:
-    planner, problem = condition("reference=placement_conventional", "objective=chen_minimax").prepare()
+    planner, problem = condition(
+        "reference=placement_conventional", "objective=chen_minimax"
+    ).prepare()
     benchmark.pedantic(planner.truth, (problem,), rounds=3)

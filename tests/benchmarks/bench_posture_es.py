@@ -1,4 +1,7 @@
-"""Postures as individuals: a whole search, its collisions in batches of 100, beside an obvious version and coal."""
+"""Postures as individuals: a whole search, its collisions in batches of 100.
+
+Beside an obvious version and coal.
+"""
 
 from typing import Any
 
@@ -19,7 +22,10 @@ def condition(experiment: str) -> Condition:
 
 
 def bench_search(beside: Any) -> None:
-    """The same path, bit by bit: ours through records and ancestry, the reference with lists, on the same kernels."""
+    """The same path, bit by bit: ours through records and ancestry, the reference with lists.
+
+    On the same kernels.
+    """
     found = condition("corsepius_bottle")
     planner, problem = found.prepare()
     evaluations = posture_es_python.path(problem, planner.ga, found.rng(0))[1]
@@ -31,7 +37,13 @@ def bench_search(beside: Any) -> None:
     beside(
         f"a search of {evaluations} postures, without its log",
         ours,
-        {"lists": (lambda: posture_es_python.path(problem, planner.ga, found.rng(0)), evaluations, 1)},
+        {
+            "lists": (
+                lambda: posture_es_python.path(problem, planner.ga, found.rng(0)),
+                evaluations,
+                1,
+            )
+        },
         unit="posture",
         amount=evaluations,
         rounds=10,
@@ -50,9 +62,16 @@ def bench_collisions(beside: Any) -> None:
     coals = pin.computeCollisionsInParallel(1, pool, q, True, False)
     assert not np.any(coals & ~collision.collides(q))
     beside(
-        f"collisions of the MANUS arm's {problem.bodies.num_shapes} spheres, {SIZE} random postures",
+        f"collisions of the MANUS arm's {problem.bodies.num_shapes} spheres, {SIZE} random "
+        "postures",
         lambda: collision.collides(q),
-        {"coal, broad phase, the bodies": (lambda: pin.computeCollisionsInParallel(1, pool, q, True, False), SIZE, 1)},
+        {
+            "coal, broad phase, the bodies": (
+                lambda: pin.computeCollisionsInParallel(1, pool, q, True, False),
+                SIZE,
+                1,
+            )
+        },
         unit="posture",
         amount=SIZE,
         repeat=10,
@@ -61,4 +80,9 @@ def bench_collisions(beside: Any) -> None:
 
 def bench_replicate(beside: Any) -> None:
     found = condition("corsepius_ball")
-    beside("a replicate of corsepius_ball, log and verdict included", lambda: run_replicate(found, 0), {}, "replicate")
+    beside(
+        "a replicate of corsepius_ball, log and verdict included",
+        lambda: run_replicate(found, 0),
+        {},
+        "replicate",
+    )

@@ -1,8 +1,10 @@
-"""Spheres and capsules of a 6R arm among ten obstacles, batches of 100, beside Pinocchio with coal and beside numpy.
+"""Spheres and capsules of a 6R arm among ten obstacles, batches of 100.
 
-Two kinds of batches: configurations at random, of which two in five collide, and configurations of a converged
-population, which hardly differ. coal answers for the same arm as 11 capsules and as the same 59 spheres; it stops at a
-configuration's first contact, as `collides` does.
+Beside Pinocchio with coal and beside numpy.
+
+Two kinds of batches: configurations at random, of which two in five collide, and configurations of
+a converged population, which hardly differ. coal answers for the same arm as 11 capsules and as the
+same 59 spheres; it stops at a configuration's first contact, as `collides` does.
 """
 
 from collections.abc import Callable
@@ -24,13 +26,17 @@ DRAWN = {"random": arms_6r.random_configurations, "population": arms_6r.populati
 def collision_of(shapes: str) -> PrimitiveCollision:
     model = arms_6r.model()
     table = obstacle_table(arms_6r.OBSTACLES)
-    return PrimitiveCollision.from_geometry(model, getattr(arms_6r, shapes)(model), table, arms_6r.SELF_PAIRS, IGNORED)
+    return PrimitiveCollision.from_geometry(
+        model, getattr(arms_6r, shapes)(model), table, arms_6r.SELF_PAIRS, IGNORED
+    )
 
 
 def coal_collisions(shapes: str, broad_phase: bool) -> Callable[[Any], Any]:
     """Return a function of q (nq, configurations): which collide, by a pool of one thread."""
     model = arms_6r.model()
-    scene = arms_6r.with_obstacles(getattr(arms_6r, shapes)(model), arms_6r.OBSTACLES, arms_6r.SELF_PAIRS, IGNORED)
+    scene = arms_6r.with_obstacles(
+        getattr(arms_6r, shapes)(model), arms_6r.OBSTACLES, arms_6r.SELF_PAIRS, IGNORED
+    )
     if broad_phase:
         pool = pin.BroadPhaseManagerPool_DynamicAABBTreeCollisionManager(model, scene, 1)
     else:
@@ -43,12 +49,18 @@ def numpy_clearance() -> Callable[[Any], Any]:
     model = arms_6r.model()
     collision, table = collision_of("spheres"), obstacle_table(arms_6r.OBSTACLES)
     shapes = shapes_of_geometry(arms_6r.spheres(model))
-    local = np.array([collision.table.local(j, p) for j, p in zip(shapes.joint, shapes.start, strict=True)])
+    local = np.array(
+        [collision.table.local(j, p) for j, p in zip(shapes.joint, shapes.start, strict=True)]
+    )
     checked = np.ones((len(shapes.joint), len(table.kind)), dtype=bool)
     for joint, k in IGNORED:
         checked[shapes.joint == joint, k] = False
-    scene = arms_6r.with_obstacles(arms_6r.spheres(model), arms_6r.OBSTACLES, arms_6r.SELF_PAIRS, IGNORED)
-    pairs = np.array([(p.first, p.second) for p in scene.collisionPairs if p.second < len(shapes.joint)])
+    scene = arms_6r.with_obstacles(
+        arms_6r.spheres(model), arms_6r.OBSTACLES, arms_6r.SELF_PAIRS, IGNORED
+    )
+    pairs = np.array(
+        [(p.first, p.second) for p in scene.collisionPairs if p.second < len(shapes.joint)]
+    )
 
     def clearance(q: Any) -> Any:
         centers = primitives_numpy.sphere_centers(collision.table, shapes.joint - 1, local, q)
@@ -84,7 +96,12 @@ def bench_collides(beside: Any, shapes: str, drawn: str) -> None:
 def bench_clearance(beside: Any, drawn: str, limit: float) -> None:
     collision, q, plain = collision_of("spheres"), DRAWN[drawn](SIZE), numpy_clearance()
     broad_phase = coal_collisions("capsules", broad_phase=True)
-    assert np.abs(np.minimum(plain(q), limit) - np.minimum(collision.clearance(q, limit).least, limit)).max() < 1e-12
+    assert (
+        np.abs(
+            np.minimum(plain(q), limit) - np.minimum(collision.clearance(q, limit).least, limit)
+        ).max()
+        < 1e-12
+    )
     beside(
         f"clearances of 59 spheres below {limit}, {SIZE} {drawn} configurations",
         lambda: collision.clearance(q, limit),
@@ -100,7 +117,10 @@ def bench_clearance(beside: Any, drawn: str, limit: float) -> None:
 
 @pytest.mark.parametrize("shapes", ["spheres"])
 def bench_collides_one_by_one(beside: Any, shapes: str) -> None:
-    """What a planner pays that asks for one configuration at a time: a block is computed for a single lane."""
+    """What a planner pays that asks for one configuration at a time.
+
+    A block is computed for a single lane.
+    """
     collision, q = collision_of(shapes), arms_6r.random_configurations(SIZE)
     one, broad_phase = np.ascontiguousarray(q[:, :1]), coal_collisions("capsules", broad_phase=True)
     beside(

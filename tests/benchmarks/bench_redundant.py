@@ -1,4 +1,7 @@
-"""Redundant arms among ellipses: path checks, a generation, a replicate; beside straightforward versions."""
+"""Redundant arms among ellipses: path checks, a generation, a replicate.
+
+Beside straightforward versions.
+"""
 
 from collections.abc import Callable
 from typing import Any
@@ -20,15 +23,26 @@ def condition(experiment: str) -> Condition:
 
 
 def num_tests(problem: Problem) -> int:
-    """Return segment–ellipse tests that one path asks for: links at M positions, chords of their ends between them."""
-    return 2 * problem.collision.num_positions * len(problem.start) * len(problem.collision.ellipses[0])
+    """Return segment–ellipse tests that one path asks for.
+
+    Links at M positions, chords of their ends between them.
+    """
+    return (
+        2
+        * problem.collision.num_positions
+        * len(problem.start)
+        * len(problem.collision.ellipses[0])
+    )
 
 
 @numba.njit(cache=True)
 def straightforward(  # type: ignore[no-untyped-def]
     starts, ends, lengths, centers, semi_axes, angles, num_positions, hit
 ):
-    """Everything in its obvious place: libm's sines, one individual, one position, one segment at a time."""
+    """Everything in its obvious place.
+
+    Libm's sines, one individual, one position, one segment at a time.
+    """
     num = len(lengths)
     before, now = np.zeros((num + 1, 2)), np.zeros((num + 1, 2))
     for k in range(starts.shape[1]):
@@ -66,16 +80,29 @@ def touches(p, q, center, semi_axes, angle):  # type: ignore[no-untyped-def]
 
 
 def paths(problem: Problem) -> tuple[FloatArray, FloatArray]:
-    """Return paths from the start that do not collide, so that every test is made: small turns, (N, NUM_PATHS) each."""
+    """Return paths from the start that do not collide, so that every test is made.
+
+    Small turns, (N, NUM_PATHS) each.
+    """
     starts = np.repeat(problem.start[:, None], NUM_PATHS, axis=1)
     return starts, starts + np.random.default_rng(0).uniform(-0.05, 0.05, starts.shape)
 
 
-def obvious_check(problem: Problem, starts: FloatArray, ends: FloatArray) -> Callable[[], np.ndarray]:
-    """Return a function that checks paths the straightforward way; it has found what the kernel finds."""
+def obvious_check(
+    problem: Problem, starts: FloatArray, ends: FloatArray
+) -> Callable[[], np.ndarray]:
+    """Return a function that checks paths the straightforward way.
+
+    It has found what the kernel finds.
+    """
     table, hit = problem.collision.obstacles, np.empty(NUM_PATHS, dtype=np.bool_)
     angles = np.arctan2(table.rotation[:, 3], table.rotation[:, 0])
-    about = (problem.collision.arm.lengths, table.center[:, :2].copy(), table.size[:, :2].copy(), angles)
+    about = (
+        problem.collision.arm.lengths,
+        table.center[:, :2].copy(),
+        table.size[:, :2].copy(),
+        angles,
+    )
 
     def check() -> np.ndarray:
         straightforward(starts, ends, *about, problem.collision.num_positions, hit)
@@ -102,7 +129,10 @@ def bench_free_paths(beside: Any) -> None:
 
 
 def bench_initial_population(beside: Any) -> None:
-    """Paths to random postures as the first generation has them; a collision ends a path's tests."""
+    """Paths to random postures as the first generation has them.
+
+    A collision ends a path's tests.
+    """
     planner, problem = condition("lavoie_10dof").prepare()
     ends = planner.sample(problem, np.random.default_rng(1), NUM_PATHS)[0]
     starts = np.repeat(problem.start[:, None], NUM_PATHS, axis=1)

@@ -1,4 +1,7 @@
-"""What a replicate costs besides its planner: reading its log, beside mcap's own reader, and its way to the disk."""
+"""What a replicate costs besides its planner.
+
+Reading its log, beside mcap's own reader, and its way to the disk.
+"""
 
 import io
 import json
@@ -77,7 +80,10 @@ def bench_store_logs(beside: Any, content: bytes, tmp_path: Path) -> None:
 
 
 def bench_replicate_overhead(beside: Any) -> None:
-    """A replicate of 100 generations with its log, its verdict and its summary beside its planner alone."""
+    """A replicate of 100 generations with its log.
+
+    Its verdict and its summary beside its planner alone.
+    """
     condition = compose.expand(WORDS)[0].conditions[0].condition
     config_json, (planner, problem) = condition.to_json(), condition.prepare()
 
@@ -86,4 +92,9 @@ def bench_replicate_overhead(beside: Any) -> None:
             pass
 
     references = {"its planner alone": (planner_alone, 1.0, 1)}
-    beside("a replicate of 100 generations", lambda: run_replicate(condition, 0, config_json), references, "replicate")
+    beside(
+        "a replicate of 100 generations",
+        lambda: run_replicate(condition, 0, config_json),
+        references,
+        "replicate",
+    )

@@ -1,6 +1,9 @@
-"""The planner of Rana & Zalzala: its steps, a generation and a whole replicate, beside the same planner in numpy.
+"""The planner of Rana & Zalzala.
 
-Both measure arc length equally well: 8 speeds per segment are about as accurate as 16 chords (`paths.redistribution`).
+Its steps, a generation and a whole replicate, beside the same planner in numpy.
+
+Both measure arc length equally well: 8 speeds per segment are about as accurate as 16 chords
+(`paths.redistribution`).
 """
 
 from itertools import islice
@@ -26,9 +29,14 @@ def condition(*overrides: str) -> Condition:
 
 
 def crossed(given: Condition, count: int) -> Any:
-    """Return strings as redistribution meets them, (individuals, arms, N + 1, joints): smooth ones, once crossed."""
+    """Return strings as redistribution meets them, (individuals, arms, N + 1, joints).
+
+    Smooth ones, once crossed.
+    """
     rana, rng = rana_numpy.from_condition(given, crossover_rate=1.0), np.random.default_rng(0)
-    return rana_numpy.crossover(rana, rng, rana_numpy.smooth(rana, rana_numpy.walks(rana, rng, count)))
+    return rana_numpy.crossover(
+        rana, rng, rana_numpy.smooth(rana, rana_numpy.walks(rana, rng, count))
+    )
 
 
 def bench_redistribution_and_relaxation(beside: Any) -> None:
@@ -69,7 +77,13 @@ def bench_walks(beside: Any) -> None:
     beside(
         "50 new trajectories: walk, redistribution, relaxation",
         lambda: planner.sample(problem, rng, 50),
-        {"numpy + scipy": (lambda: rana_numpy.smooth(rana, rana_numpy.walks(rana, other, 50)), 50, 1)},
+        {
+            "numpy + scipy": (
+                lambda: rana_numpy.smooth(rana, rana_numpy.walks(rana, other, 50)),
+                50,
+                1,
+            )
+        },
         unit="individual",
         amount=50,
         repeat=5,
@@ -97,7 +111,10 @@ def bench_generation(beside: Any) -> None:
 
 @pytest.mark.parametrize("label", ["via-point GA", "random search"])
 def bench_replicate(beside: Any, benchmark: Any, label: str) -> None:
-    """A replicate of the paper's budget with its log, and its CPU seconds as the summary has them."""
+    """A replicate of the paper's budget with its log.
+
+    And its CPU seconds as the summary has them.
+    """
     conditions = compose.expand(["experiment=rana_planar"])[0].conditions
     given = next(one.condition for one in conditions if one.label == label)
     cpu: list[float] = []
@@ -116,13 +133,26 @@ def bench_replicate(beside: Any, benchmark: Any, label: str) -> None:
         references["numpy + scipy, a tenth of the generations, no log"] = (tenth, 0.1, 1)
     ours()
     cpu.clear()
-    beside(f"a replicate with its log, {label} (500 generations)", ours, references, unit="replicate", rounds=20)
+    beside(
+        f"a replicate with its log, {label} (500 generations)",
+        ours,
+        references,
+        unit="replicate",
+        rounds=20,
+    )
     cpu = cpu[-20:]  # without the warm-up
-    benchmark.extra_info["cpu_s"] = {"min": min(cpu), "median": float(np.median(cpu)), "replicates": len(cpu)}
+    benchmark.extra_info["cpu_s"] = {
+        "min": min(cpu),
+        "median": float(np.median(cpu)),
+        "replicates": len(cpu),
+    }
 
 
 def bench_log(beside: Any) -> None:
-    """The log's share: the messages of all generations of a replicate, recorded beforehand, beside the run itself."""
+    """The log's share: the messages of all generations of a replicate, recorded beforehand.
+
+    Beside the run itself.
+    """
     given = condition()
     planner, problem = given.prepare()
     recorded = []

@@ -1,4 +1,7 @@
-"""Ours and a reference in turns: the clock speed of a shared machine changes during a run, their ratio hardly does."""
+"""Ours and a reference in turns.
+
+The clock speed of a shared machine changes during a run, their ratio hardly does.
+"""
 
 import statistics
 import time
@@ -12,7 +15,9 @@ Work = Callable[[], object]
 
 @pytest.fixture
 def beside(benchmark: Any) -> Callable[..., None]:
-    """Return a function that times `ours` by pytest-benchmark and, before each of its rounds, the references.
+    """Return a function that times `ours` by pytest-benchmark and, before each of its rounds.
+
+    The references.
 
     Its arguments:
         work: What is done, with its size; a row of the table that `scripts/benchmark` prints.
@@ -44,14 +49,20 @@ def beside(benchmark: Any) -> Callable[..., None]:
                 ours()
 
         ours()  # compiled
-        benchmark.pedantic(repeated, setup=time_references, rounds=rounds, iterations=1, warmup_rounds=1)
+        benchmark.pedantic(
+            repeated, setup=time_references, rounds=rounds, iterations=1, warmup_rounds=1
+        )
         each = [t / (repeat * amount) for t in benchmark.stats.stats.data]
         benchmark.group = benchmark.group or "ratios"
         benchmark.extra_info |= {"work": work, "unit": unit, "ours": spread(each), "references": {}}
         for name, taken in seconds.items():
             taken = taken[-len(each) :]  # the warm-up's is not counted
             ratios = [theirs / mine for theirs, mine in zip(taken, each, strict=True)]
-            row = {"time": spread(taken), "of_minima": min(taken) / min(each), "median": statistics.median(ratios)}
+            row = {
+                "time": spread(taken),
+                "of_minima": min(taken) / min(each),
+                "median": statistics.median(ratios),
+            }
             benchmark.extra_info["references"][name] = row
 
     return measure

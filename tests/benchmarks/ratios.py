@@ -28,13 +28,20 @@ def pair(values: dict[str, float]) -> str:
 def machine(info: dict[str, Any]) -> str:
     """Return the machine and the versions that the times depend on."""
     cpu = info["cpu"]
-    versions = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "numba", "pin", "coal"))
-    return f"{cpu['brand_raw']}, {cpu['count']} cores · Python {platform.python_version()}, {versions}"
+    versions = ", ".join(
+        f"{name} {version(name)}" for name in ("numpy", "scipy", "numba", "pin", "coal")
+    )
+    return (
+        f"{cpu['brand_raw']}, {cpu['count']} cores · Python {platform.python_version()}, {versions}"
+    )
 
 
 def ratio_table(benchmarks: list[dict[str, Any]]) -> Table:
     """Return a row per reference of every benchmark that has one, times per unit of work."""
-    table = Table(title="Times per unit of work: minimum · median. Ratios of interleaved rounds.", title_justify="left")
+    table = Table(
+        title="Times per unit of work: minimum · median. Ratios of interleaved rounds.",
+        title_justify="left",
+    )
     table.add_column("work")
     table.add_column("ours", justify="right", no_wrap=True)
     table.add_column("per")
@@ -45,7 +52,9 @@ def ratio_table(benchmarks: list[dict[str, Any]]) -> Table:
     for info in (b["extra_info"] for b in benchmarks if "work" in b["extra_info"]):
         ours = (info["work"], pair(info["ours"]), info["unit"], f"{1.0 / info['ours']['min']:.3g}")
         for name, row in info["references"].items():
-            table.add_row(*ours, name, pair(row["time"]), f"{row['of_minima']:.3g} · {row['median']:.3g}")
+            table.add_row(
+                *ours, name, pair(row["time"]), f"{row['of_minima']:.3g} · {row['median']:.3g}"
+            )
             ours = ("", "", "", "")
         if not info["references"]:
             table.add_row(*ours)
@@ -53,7 +62,10 @@ def ratio_table(benchmarks: list[dict[str, Any]]) -> Table:
 
 
 def main(path: Path) -> None:
-    """Print the table, the CPU seconds of a replicate, and the times of the benchmarks without a ratio."""
+    """Print the table, the CPU seconds of a replicate.
+
+    And the times of the benchmarks without a ratio.
+    """
     result = json.loads(path.read_text())
     console = Console(width=None if sys.stdout.isatty() else WIDTH)
     console.print(machine(result["machine_info"]))
@@ -61,7 +73,10 @@ def main(path: Path) -> None:
     for benchmark in result["benchmarks"]:
         if cpu := benchmark["extra_info"].get("cpu_s"):
             what = benchmark["extra_info"]["work"]
-            console.print(f"{what}: CPU {cpu['min']:.3f} s · {cpu['median']:.3f} s over {cpu['replicates']} replicates")
+            console.print(
+                f"{what}: CPU {cpu['min']:.3f} s · {cpu['median']:.3f} s over {cpu['replicates']} "
+                "replicates"
+            )
     alone = [b for b in result["benchmarks"] if "work" not in b["extra_info"]]
     if alone:
         table = Table(title="Times per call: minimum · median.", title_justify="left")

@@ -1,4 +1,7 @@
-"""Random scenes for the certifier: arms of turning and sliding joints, bodies of every shape, and their brute force."""
+"""Random scenes for the certifier.
+
+Arms of turning and sliding joints, bodies of every shape, and their brute force.
+"""
 
 from typing import Any, NamedTuple
 
@@ -12,7 +15,9 @@ from evoexp.paths.motion import Motion, cubic_motion
 SAMPLES = 10_000  # per segment
 
 # two tetrahedra with a common base: corners and faces of a convex hull
-HULL_CORNERS = np.array([[1.0, 0.0, 0.0], [-0.5, 0.8, 0.0], [-0.5, -0.8, 0.0], [0.0, 0.1, 0.9], [0.1, 0.0, -0.7]])
+HULL_CORNERS = np.array(
+    [[1.0, 0.0, 0.0], [-0.5, 0.8, 0.0], [-0.5, -0.8, 0.0], [0.0, 0.1, 0.9], [0.1, 0.0, -0.7]]
+)
 HULL_FACES = [(0, 1, 3), (1, 2, 3), (2, 0, 3), (1, 0, 4), (2, 1, 4), (0, 2, 4)]
 
 
@@ -67,13 +72,21 @@ def random_scene(rng: np.random.Generator) -> Scene:
                 axis = rng.normal(size=3)
                 axis /= np.sqrt((axis**2).sum())
                 slides = rng.random() < 0.3
-                joint = pin.JointModelPrismaticUnaligned(axis) if slides else pin.JointModelRevoluteUnaligned(axis)
-            parent = model.addJoint(parent, joint, pin.SE3(random_rotation(rng, planar), place), f"{arm}_{k}")
+                joint = (
+                    pin.JointModelPrismaticUnaligned(axis)
+                    if slides
+                    else pin.JointModelRevoluteUnaligned(axis)
+                )
+            parent = model.addJoint(
+                parent, joint, pin.SE3(random_rotation(rng, planar), place), f"{arm}_{k}"
+            )
             place = rng.uniform(-1.0, 1.0, size=3)
             if planar:
                 place[2] = 0.0
             placement = pin.SE3(random_rotation(rng, planar), 0.5 * place)
-            geometry.addGeometryObject(pin.GeometryObject(f"{arm}_{k}", parent, 0, placement, random_shape(rng)))
+            geometry.addGeometryObject(
+                pin.GeometryObject(f"{arm}_{k}", parent, 0, placement, random_shape(rng))
+            )
             owners.append(arm)
     for k in range(rng.integers(1, 4)):
         shape, place = random_shape(rng), rng.uniform(-2.0, 2.0, size=3)
@@ -95,12 +108,16 @@ def random_scene(rng: np.random.Generator) -> Scene:
 def random_motion(rng: np.random.Generator, nq: int) -> Motion:
     """One or two segments, straight or cubic."""
     segments = 1 if rng.random() < 0.8 else 2
-    q = rng.uniform(-1.5, 1.5, size=nq) + np.cumsum(rng.normal(size=(segments + 1, nq)) * 0.5, axis=0)
+    q = rng.uniform(-1.5, 1.5, size=nq) + np.cumsum(
+        rng.normal(size=(segments + 1, nq)) * 0.5, axis=0
+    )
     if rng.random() < 0.5:
         return Motion(q)
     speed = rng.normal(size=(segments + 1, nq)) * 0.7
     step, m0, m1 = q[1:] - q[:-1], speed[:-1], speed[1:]
-    return cubic_motion(np.stack([q[:-1], m0, 3.0 * step - 2.0 * m0 - m1, m0 + m1 - 2.0 * step], axis=1))
+    return cubic_motion(
+        np.stack([q[:-1], m0, 3.0 * step - 2.0 * m0 - m1, m0 + m1 - 2.0 * step], axis=1)
+    )
 
 
 class Brute(NamedTuple):
@@ -117,6 +134,8 @@ def brute_force(scene: Scene, motion: Motion, samples: int = SAMPLES) -> Brute:
     t = np.linspace(0.0, motion.num_segments, motion.num_segments * samples + 1)
     least, pair = np.empty(len(t)), np.empty(len(t), dtype=np.int64)
     for k, instant in enumerate(t):
-        pair[k] = pin.computeDistances(scene.model, data, scene.geometry, geometry_data, motion.at(instant))
+        pair[k] = pin.computeDistances(
+            scene.model, data, scene.geometry, geometry_data, motion.at(instant)
+        )
         least[k] = geometry_data.distanceResults[int(pair[k])].min_distance
     return Brute(t, least, pair)

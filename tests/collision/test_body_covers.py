@@ -6,7 +6,9 @@ import pytest
 from evoexp.collision.body_covers import MOST_SPHERES, Cover, capsule_cover, sphere_cover
 from evoexp.collision.body_table import UnsupportedShape
 
-PLACE = pin.SE3(pin.Quaternion(0.5, 0.1, -0.7, 0.3).normalized().toRotationMatrix(), np.array([0.3, -0.2, 0.1]))
+PLACE = pin.SE3(
+    pin.Quaternion(0.5, 0.1, -0.7, 0.3).normalized().toRotationMatrix(), np.array([0.3, -0.2, 0.1])
+)
 
 
 SHAPES = {
@@ -32,7 +34,10 @@ def points_of(shape: object, count: int = 4000) -> np.ndarray:
     if isinstance(shape, coal.Ellipsoid):
         return u * shape.radii * inside
     if isinstance(shape, coal.Capsule):
-        return u * shape.radius * inside + [0, 0, 1] * rng.uniform(-1, 1, (count, 1)) * shape.halfLength
+        return (
+            u * shape.radius * inside
+            + [0, 0, 1] * rng.uniform(-1, 1, (count, 1)) * shape.halfLength
+        )
     if isinstance(shape, coal.Box):
         cube = rng.uniform(-1, 1, (count, 3))
         cube[np.arange(count), rng.integers(0, 3, count)] = rng.choice([-1, 1], count)
@@ -44,7 +49,9 @@ def points_of(shape: object, count: int = 4000) -> np.ndarray:
     if isinstance(shape, coal.Cone):
         share = share * 0.5 * (1.0 - height)
     radius = shape.radius * share
-    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), height * shape.halfLength])
+    return np.column_stack(
+        [radius * np.cos(angle), radius * np.sin(angle), height * shape.halfLength]
+    )
 
 
 def distance_to(cover: Cover, points: np.ndarray) -> np.ndarray:
@@ -53,12 +60,16 @@ def distance_to(cover: Cover, points: np.ndarray) -> np.ndarray:
     square = np.maximum((along**2).sum(axis=1), 1e-300)
     share = np.clip(((points[:, None] - cover.start) * along).sum(axis=2) / square, 0.0, 1.0)
     nearest = cover.start + share[..., None] * along
-    return np.asarray((np.linalg.norm(points[:, None] - nearest, axis=2) - cover.radius).min(axis=1))
+    return np.asarray(
+        (np.linalg.norm(points[:, None] - nearest, axis=2) - cover.radius).min(axis=1)
+    )
 
 
 @pytest.mark.parametrize("name", SHAPES)
 @pytest.mark.parametrize("inflation", [0.01, 0.02, 0.05])
-def test_spheres_cover_a_body_and_reach_no_farther_than_they_say(name: str, inflation: float) -> None:
+def test_spheres_cover_a_body_and_reach_no_farther_than_they_say(
+    name: str, inflation: float
+) -> None:
     item = pin.GeometryObject(name, 0, 0, PLACE, SHAPES[name])
     cover = sphere_cover(item, inflation)
     points = points_of(SHAPES[name]) @ PLACE.rotation.T + PLACE.translation
@@ -93,4 +104,9 @@ def test_less_inflation_takes_more_spheres() -> None:
 
 def test_a_half_space_cannot_be_covered() -> None:
     with pytest.raises(UnsupportedShape, match="body 'floor' must be a solid, was a Halfspace"):
-        sphere_cover(pin.GeometryObject("floor", 0, 0, PLACE, coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)), 0.1)
+        sphere_cover(
+            pin.GeometryObject(
+                "floor", 0, 0, PLACE, coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
+            ),
+            0.1,
+        )

@@ -11,7 +11,11 @@ from evoexp.scenarios.obstacles import ObstacleTable, obstacle_table
 from shipped_conditions import expanded
 
 MODELS = {"spheres": SphereSets(inflation=0.01), "capsules": BodyCapsules(padding=0.0)}
-EXPERIMENTS = {"manus": "corsepius_bottle", "puma560": "corsepius_shelf", "snake16": "corsepius_gate_wide"}
+EXPERIMENTS = {
+    "manus": "corsepius_bottle",
+    "puma560": "corsepius_shelf",
+    "snake16": "corsepius_gate_wide",
+}
 
 
 def robot(name: str) -> tuple[Assembly, ObstacleTable]:
@@ -25,7 +29,10 @@ def random_q(assembly: Assembly, count: int) -> np.ndarray:
 
 
 def coal_collisions(model: BodyModel, obstacles: ObstacleTable, q: np.ndarray) -> np.ndarray:
-    """Return which configurations collide on coal's geometry: tested pairs, and all bodies with all obstacles."""
+    """Return which configurations collide on coal's geometry.
+
+    Tested pairs, and all bodies with all obstacles.
+    """
     assembly = model.assembly
     geometry = assembly.geometry.copy()
     count = len(model.names)
@@ -39,7 +46,9 @@ def coal_collisions(model: BodyModel, obstacles: ObstacleTable, q: np.ndarray) -
     data, placements = assembly.model.createData(), geometry.createData()
     return np.array(
         [
-            pin.computeCollisions(assembly.model, data, geometry, placements, np.ascontiguousarray(one), True)
+            pin.computeCollisions(
+                assembly.model, data, geometry, placements, np.ascontiguousarray(one), True
+            )
             for one in q.T
         ]
     )
@@ -90,7 +99,9 @@ def test_the_derived_pairs_are_those_one_would_name() -> None:
 
 def test_covers_that_always_touch_are_refused() -> None:
     assembly, _ = robot("puma560")
-    with pytest.raises(SettingError, match="closer to the bodies: the covers of .* touch in every posture"):
+    with pytest.raises(
+        SettingError, match="closer to the bodies: the covers of .* touch in every posture"
+    ):
         SphereSets(inflation=0.3).bind(assembly)
 
 

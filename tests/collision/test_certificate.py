@@ -13,7 +13,12 @@ def test_the_first_contact_counts() -> None:
 def test_without_contact_the_least_clearance_counts() -> None:
     close = FREE._replace(clearance=0.1, clearance_at=5.0, certified_margin=False)
     found = combined([FREE, close])
-    assert (found.certified, found.certified_margin, found.clearance, found.clearance_at) == (True, False, 0.1, 5.0)
+    assert (found.certified, found.certified_margin, found.clearance, found.clearance_at) == (
+        True,
+        False,
+        0.1,
+        5.0,
+    )
 
 
 def test_one_undecided_part_leaves_the_whole_undecided() -> None:

@@ -1,4 +1,7 @@
-"""The certifier where the answer is known: contact times, clearances, margins, and what must not slip through."""
+"""The certifier where the answer is known.
+
+Contact times, clearances, margins, and what must not slip through.
+"""
 
 from concurrent.futures import ThreadPoolExecutor
 
@@ -26,16 +29,24 @@ class Slider(Chain):
     radius: float
 
     def append_to(self, model: pin.Model, arm: int) -> list[Link]:
-        joint = model.addJoint(0, pin.JointModelPX(), pin.SE3(np.eye(3), np.array(self.base)), f"{arm}_x")
+        joint = model.addJoint(
+            0, pin.JointModelPX(), pin.SE3(np.eye(3), np.array(self.base)), f"{arm}_x"
+        )
         return [Link(arm, joint, np.zeros(3), np.array([1.0, 0.0, 0.0]), self.radius)]
 
 
-def link(length: float, base: tuple[float, float], radius: float = 0.0, angle: float = 0.0) -> PlanarChain:
-    return PlanarChain(link_lengths=(length,), base_position=base, base_angle=angle, link_radius=radius)
+def link(
+    length: float, base: tuple[float, float], radius: float = 0.0, angle: float = 0.0
+) -> PlanarChain:
+    return PlanarChain(
+        link_lengths=(length,), base_position=base, base_angle=angle, link_radius=radius
+    )
 
 
 def wall(x: float, thickness: float) -> BoxObstacle:
-    return BoxObstacle(shape="box", center=(x + 0.5 * thickness, 0.0, 0.0), size=(thickness, 2.0, 2.0))
+    return BoxObstacle(
+        shape="box", center=(x + 0.5 * thickness, 0.0, 0.0), size=(thickness, 2.0, 2.0)
+    )
 
 
 def contact_of(built: Scene, *q: list[float]) -> float:
@@ -47,7 +58,7 @@ def contact_of(built: Scene, *q: list[float]) -> float:
 
 
 def test_a_turning_link_meets_a_sphere() -> None:
-    """A line from the origin touches a ball of radius r at distance c when sin(angle between) = r / c."""
+    """A line from the origin touches a ball of radius r at distance c at the angle asin(r / c)."""
     ball = SphereObstacle(shape="sphere", center=(2.0, 0.0), radius=0.5)
     touching = np.arcsin(0.5 / 2.0)
     built = scene(link(3.0, (0.0, 0.0)).build(), (ball,))
@@ -55,7 +66,9 @@ def test_a_turning_link_meets_a_sphere() -> None:
     # thick, and on a later segment
     built = scene(link(3.0, (0.0, 0.0), radius=0.2).build(), (ball,))
     touching = np.arcsin(0.7 / 2.0)
-    assert contact_of(built, [1.5], [1.4], [0.4], [-0.6]) == pytest.approx(1.0 + (1.4 - touching), abs=1e-9)
+    assert contact_of(built, [1.5], [1.4], [0.4], [-0.6]) == pytest.approx(
+        1.0 + (1.4 - touching), abs=1e-9
+    )
 
 
 def test_a_tip_meets_a_sphere_from_outside() -> None:
@@ -81,8 +94,12 @@ def test_two_links_turn_against_each_other() -> None:
     """Bases 2 apart, both lines of length 1.5, mirrored: their tips meet in the middle."""
     built = scene(Arms(arms=(link(1.5, (0.0, 0.0)), link(1.5, (2.0, 0.0), angle=180.0))).build())
     touching = np.arccos(1.0 / 1.5)
-    assert contact_of(built, [1.5, -1.5], [0.0, 0.0]) == pytest.approx((1.5 - touching) / 1.5, abs=1e-9)
-    assert contact_of(built, [-1.5, 1.5], [0.0, 0.0]) == pytest.approx((1.5 - touching) / 1.5, abs=1e-9)
+    assert contact_of(built, [1.5, -1.5], [0.0, 0.0]) == pytest.approx(
+        (1.5 - touching) / 1.5, abs=1e-9
+    )
+    assert contact_of(built, [-1.5, 1.5], [0.0, 0.0]) == pytest.approx(
+        (1.5 - touching) / 1.5, abs=1e-9
+    )
 
 
 def test_lines_that_cross_touch() -> None:
@@ -98,9 +115,13 @@ def test_lines_that_cross_touch() -> None:
 def test_a_thin_plate_between_the_samples_is_seen(samples: int) -> None:
     """Checks at equal steps pass a plate of 1e-4; the certifier does not."""
     model, geometry = Slider(base=(0.0, 0.0, 0.0), radius=0.1).build().model, pin.GeometryModel()
-    geometry.addGeometryObject(pin.GeometryObject("ball", 1, 0, pin.SE3.Identity(), coal.Sphere(1e-3)))
+    geometry.addGeometryObject(
+        pin.GeometryObject("ball", 1, 0, pin.SE3.Identity(), coal.Sphere(1e-3))
+    )
     placement = pin.SE3(np.eye(3), np.array([0.5107, 0.0, 0.0]))
-    geometry.addGeometryObject(pin.GeometryObject("plate", 0, 0, placement, coal.Box(1e-4, 2.0, 2.0)))
+    geometry.addGeometryObject(
+        pin.GeometryObject("plate", 0, 0, placement, coal.Box(1e-4, 2.0, 2.0))
+    )
     geometry.addCollisionPair(pin.CollisionPair(0, 1))
     built = geometry_scene(model, geometry)
     motion = Motion(np.array([[0.0], [1.0]]))
@@ -134,15 +155,25 @@ def test_no_movement() -> None:
 
 
 def test_a_scene_without_pairs() -> None:
-    verdict = certify(scene(link(3.0, (0.0, 0.0)).build()), Motion(np.zeros((3, 1))), security_margin=1.0)
+    verdict = certify(
+        scene(link(3.0, (0.0, 0.0)).build()), Motion(np.zeros((3, 1))), security_margin=1.0
+    )
     assert (verdict.status, verdict.margin_status) == ("certified", "certified")
     assert verdict.clearance == verdict.proven == np.inf
-    assert verdict.clearance_pair is None and np.isnan(verdict.clearance_at) and verdict.queries == 0
+    assert (
+        verdict.clearance_pair is None and np.isnan(verdict.clearance_at) and verdict.queries == 0
+    )
 
 
 @pytest.mark.parametrize(
     ("margin", "expected"),
-    [(0.0, "certified"), (0.05, "certified"), (0.0999999, "certified"), (0.1, "certified"), (0.1000001, "refuted")],
+    [
+        (0.0, "certified"),
+        (0.05, "certified"),
+        (0.0999999, "certified"),
+        (0.1, "certified"),
+        (0.1000001, "refuted"),
+    ],
 )
 def test_the_security_margin(margin: float, expected: str) -> None:
     """Past a wall at 0.1, at the end of the motion and in its middle."""
@@ -153,11 +184,18 @@ def test_the_security_margin(margin: float, expected: str) -> None:
 
 
 def test_a_margin_around_a_smooth_minimum() -> None:
-    """A tip that turns past a ball: least distance in the middle of an interval, between the resolutions."""
+    """A tip that turns past a ball.
+
+    Least distance in the middle of an interval, between the resolutions.
+    """
     ball = SphereObstacle(shape="sphere", center=(2.5, 0.0), radius=0.2)
     built = scene(link(2.0, (0.0, 0.0)).build(), (ball,))
     motion = Motion(np.array([[-1.0], [1.1]]))
-    for margin, expected in ((0.2999, "certified"), (0.3 - 1e-9, "certified"), (0.3 + 1e-9, "refuted")):
+    for margin, expected in (
+        (0.2999, "certified"),
+        (0.3 - 1e-9, "certified"),
+        (0.3 + 1e-9, "refuted"),
+    ):
         verdict = certify(built, motion, security_margin=margin)
         assert verdict.margin_status == expected
         assert verdict.clearance == pytest.approx(0.3, abs=1e-9)
@@ -171,7 +209,9 @@ def test_of_equal_clearances_the_first_is_named() -> None:
     verdict = certify(built, Motion(np.array([[-4.0], [3.0], [-4.0]])))
     assert verdict.clearance == pytest.approx(1.4, abs=1e-9)
     assert verdict.clearance_pair == ("arm_1_link_1", "obstacle_2")
-    assert 1.0 / 7.0 - 1e-6 <= verdict.clearance_at <= 2.0 / 7.0 + 1e-6  # a finger of length 1 passes
+    assert (
+        1.0 / 7.0 - 1e-6 <= verdict.clearance_at <= 2.0 / 7.0 + 1e-6
+    )  # a finger of length 1 passes
     assert verdict.queries == 1
 
 
@@ -197,13 +237,20 @@ def test_a_cubic_that_bulges_into_an_obstacle() -> None:
         verdict = certify(built, motion)
         assert verdict.status == status
         if status == "refuted":
-            assert verdict.refuted_at == pytest.approx(0.5 - 0.5 * np.sqrt(1.0 - touching / height), abs=1e-8)
+            assert verdict.refuted_at == pytest.approx(
+                0.5 - 0.5 * np.sqrt(1.0 - touching / height), abs=1e-8
+            )
         else:
-            assert verdict.clearance == pytest.approx(2.0 * np.sin(np.arcsin(0.25) + 1e-3) - 0.5, abs=1e-9)
+            assert verdict.clearance == pytest.approx(
+                2.0 * np.sin(np.arcsin(0.25) + 1e-3) - 0.5, abs=1e-9
+            )
 
 
 def test_an_arm_that_folds_onto_itself() -> None:
-    """The third link's tip comes down on the first link, while the first joint turns all three and changes nothing."""
+    """The third link's tip comes down on the first link.
+
+    While the first joint turns all three and changes nothing.
+    """
     robot = PlanarChain(link_lengths=(2.0, 1.0, 1.2), base_position=(0.0, 0.0))
     touching = 0.5 * np.pi + np.arcsin(1.0 / 1.2)
     built = scene(robot.build(), self_pairs=True)
@@ -218,7 +265,10 @@ def test_an_arm_that_folds_onto_itself() -> None:
 def test_one_scene_serves_many_threads() -> None:
     rng = np.random.default_rng(6)
     robot = PlanarChain(link_lengths=(1.2, 1.2), base_position=(0.0, 0.0), link_radius=0.05)
-    built = scene(robot.build(), (SphereObstacle(shape="sphere", center=(1.5, 1.8), radius=0.4), wall(2.6, 0.1)))
+    built = scene(
+        robot.build(),
+        (SphereObstacle(shape="sphere", center=(1.5, 1.8), radius=0.4), wall(2.6, 0.1)),
+    )
     motions = [Motion(np.cumsum(rng.normal(size=(9, 2)) * 0.2, axis=0)) for _ in range(40)]
     alone = [certify(built, motion) for motion in motions]
     with ThreadPoolExecutor(4) as pool:
@@ -229,9 +279,15 @@ def test_one_scene_serves_many_threads() -> None:
 
 def test_robots_in_another_order() -> None:
     rng = np.random.default_rng(3)
-    one, two = (PlanarChain(link_lengths=(4.0, 4.0), base_position=(0.0, y), link_radius=0.1) for y in (0.0, 6.0))
+    one, two = (
+        PlanarChain(link_lengths=(4.0, 4.0), base_position=(0.0, y), link_radius=0.1)
+        for y in (0.0, 6.0)
+    )
     ball = SphereObstacle(shape="sphere", center=(5.0, 3.0), radius=0.4)
-    here, there = scene(Arms(arms=(one, two)).build(), (ball,)), scene(Arms(arms=(two, one)).build(), (ball,))
+    here, there = (
+        scene(Arms(arms=(one, two)).build(), (ball,)),
+        scene(Arms(arms=(two, one)).build(), (ball,)),
+    )
     statuses = set()
     for _ in range(40):
         q = np.cumsum(rng.normal(size=(9, 4)) * 0.25, axis=0)
@@ -248,12 +304,21 @@ def test_a_mirrored_scene() -> None:
     rng = np.random.default_rng(4)
 
     def build(sign: float) -> Scene:
-        robot = PlanarChain(link_lengths=(2.0, 2.0, 1.0), base_position=(0.0, sign * 0.5), base_angle=sign * 20.0)
+        robot = PlanarChain(
+            link_lengths=(2.0, 2.0, 1.0), base_position=(0.0, sign * 0.5), base_angle=sign * 20.0
+        )
         return scene(
             robot.build(),
             (
-                CapsuleObstacle(shape="capsule", start=(1.0, sign * 2.0), end=(3.0, sign * 3.0), radius=0.3),
-                BoxObstacle(shape="box", center=(-2.0, sign * -1.0), size=(1.0, 0.5), rotation=(0.0, 0.0, sign * 30.0)),
+                CapsuleObstacle(
+                    shape="capsule", start=(1.0, sign * 2.0), end=(3.0, sign * 3.0), radius=0.3
+                ),
+                BoxObstacle(
+                    shape="box",
+                    center=(-2.0, sign * -1.0),
+                    size=(1.0, 0.5),
+                    rotation=(0.0, 0.0, sign * 30.0),
+                ),
             ),
         )
 
@@ -278,11 +343,16 @@ def test_a_motion_run_backwards_is_as_clear() -> None:
 
 
 def test_a_mesh_is_judged_by_coal_itself() -> None:
-    """An L of two faces: a finger passes where the hull would touch it, and touches where the mesh is."""
+    """An L of two faces: a finger passes where the hull would touch it.
+
+    And touches where the mesh is.
+    """
     model = pin.Model()
     model.addJoint(0, pin.JointModelPZ(), pin.SE3.Identity(), "z")
     geometry = pin.GeometryModel()
-    geometry.addGeometryObject(pin.GeometryObject("finger", 1, 0, pin.SE3.Identity(), coal.Sphere(0.05)))
+    geometry.addGeometryObject(
+        pin.GeometryObject("finger", 1, 0, pin.SE3.Identity(), coal.Sphere(0.05))
+    )
     place = pin.SE3(np.eye(3), np.array([0.3, -0.25, 0.0]))
     geometry.addGeometryObject(pin.GeometryObject("mesh", 0, 0, place, mesh(1.0)))
     geometry.addCollisionPair(pin.CollisionPair(0, 1))
@@ -306,7 +376,11 @@ def test_a_limit_leaves_it_undecided() -> None:
     ball = SphereObstacle(shape="sphere", center=(2.5, 0.0), radius=0.49)
     built, motion = scene(link(2.0, (0.0, 0.0)).build(), (ball,)), Motion(np.array([[-1.0], [1.1]]))
     verdict = certify(built, motion, limits=Limits(intervals=2))
-    assert (verdict.status, verdict.margin_status, verdict.intervals) == ("undecided", "undecided", 2)
+    assert (verdict.status, verdict.margin_status, verdict.intervals) == (
+        "undecided",
+        "undecided",
+        2,
+    )
     assert certify(built, motion, limits=Limits(queries=0)).status == "undecided"
     assert certify(built, motion).status == "certified"
 

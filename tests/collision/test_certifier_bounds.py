@@ -10,7 +10,14 @@ from scipy.interpolate import CubicSpline
 
 from collision.certifier_scenes import random_motion, random_scene
 from evoexp.collision.certifier import Limits, _Judgement
-from evoexp.collision.certifier_sweep import Task, least_separation, move_to, pair_distance, polish, work_space
+from evoexp.collision.certifier_sweep import (
+    Task,
+    least_separation,
+    move_to,
+    pair_distance,
+    polish,
+    work_space,
+)
 from evoexp.collision.convex_distance import CONVERGED
 from evoexp.collision.motion_bounds import approach_bounds
 from evoexp.collision.scene import geometry_scene
@@ -31,7 +38,9 @@ def write_bounds(task: Task, begin: float, end: float, bounds: np.ndarray) -> No
 
 @settings(max_examples=150, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 2**32 - 1), begin=st.floats(0.0, 0.99), width=st.floats(1e-3, 1.0))
-def test_distances_never_change_faster_than_the_bound(seed: int, begin: float, width: float) -> None:
+def test_distances_never_change_faster_than_the_bound(
+    seed: int, begin: float, width: float
+) -> None:
     judged = judgement(seed)
     end = min(begin + width, 1.0)
     bounds = np.empty((2, len(judged.scene.pairs)))
@@ -50,7 +59,11 @@ def test_bodies_stay_as_far_apart_as_their_velocities_and_accelerations_say(
 ) -> None:
     judged = judgement(seed)
     task, work, end = judged.task, work_space(judged.task), min(begin + width, 1.0)
-    bounds, u, half = np.empty((2, len(judged.scene.pairs))), 0.5 * (begin + end), 0.5 * (end - begin)
+    bounds, u, half = (
+        np.empty((2, len(judged.scene.pairs))),
+        0.5 * (begin + end),
+        0.5 * (end - begin),
+    )
     write_bounds(task, begin, end, bounds)
     move_to(task, work, 0, u)
     assert task.by_one.all()
@@ -72,7 +85,12 @@ def test_the_bound_is_reached() -> None:
     geometry.addGeometryObject(pin.GeometryObject("ball", 0, 0, ball, coal.Sphere(0.1)))
     geometry.addCollisionPair(pin.CollisionPair(0, 1))
     judged = _Judgement(
-        geometry_scene(model, geometry), Motion(np.array([[0.0], [0.5]])), 0.0, np.ones(1), 1e-3, Limits()
+        geometry_scene(model, geometry),
+        Motion(np.array([[0.0], [0.5]])),
+        0.0,
+        np.ones(1),
+        1e-3,
+        Limits(),
     )
     bounds = np.empty((2, 1))
     write_bounds(judged.task, 0.0, 1.0, bounds)
@@ -95,11 +113,15 @@ def test_bounds_of_distances_hold_however_early_they_stop(seed: int, u: float, s
             if task.exact[pair]:
                 assert high >= min(exact, 0.0) - 1e-6 and (high >= exact - 1e-6 or high <= 0.0)
             if need == np.inf and enough == -np.inf and task.exact[pair] and exact > 0.0:
-                assert low == pytest.approx(exact, abs=1e-6) and high == pytest.approx(exact, abs=1e-6)
+                assert low == pytest.approx(exact, abs=1e-6) and high == pytest.approx(
+                    exact, abs=1e-6
+                )
         low, high = pair_distance(task, work, pair, np.inf, -np.inf, 1e-3)
         assert low <= max(exact, 0.0) + 1e-6
         if task.exact[pair] and exact > 0.0:
-            cores = exact + task.bodies[6][task.pairs[pair]].sum()  # what is swept around them is taken off
+            cores = (
+                exact + task.bodies[6][task.pairs[pair]].sum()
+            )  # what is swept around them is taken off
             assert exact - 1e-6 <= high <= low + 1e-3 * cores + 1e-5
 
 
@@ -119,17 +141,24 @@ def slow_walk(judged: _Judgement, pair: int, t: float) -> float:
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 2**32 - 1), t=st.floats(0.0, 1.0))
 def test_local_minima_are_found(seed: int, t: float) -> None:
-    """As by halving steps, from the same instant; the two may end in different minima, if each is one."""
+    """As by halving steps, from the same instant.
+
+    The two may end in different minima, if each is one.
+    """
     judged = judgement(seed)
     pairs = np.flatnonzero(judged.task.exact)
     at, distances = np.full(len(pairs), t), np.empty(len(pairs))
     polish(judged.task, judged.work, pairs, at, distances)
-    for pair, end, distance in zip(pairs, at, np.maximum(distances, 0.0), strict=True):  # how deep is not known
+    for pair, end, distance in zip(
+        pairs, at, np.maximum(distances, 0.0), strict=True
+    ):  # how deep is not known
         assert 0.0 <= end <= judged.task.last
         assert distance == pytest.approx(max(judged.coal(int(pair), float(end)), 0.0), abs=1e-6)
         slow = max(slow_walk(judged, int(pair), t), 0.0)
         if abs(distance - slow) > 1e-6:
-            assert max(slow_walk(judged, int(pair), float(end)), 0.0) == pytest.approx(distance, abs=1e-6)
+            assert max(slow_walk(judged, int(pair), float(end)), 0.0) == pytest.approx(
+                distance, abs=1e-6
+            )
 
 
 @settings(max_examples=100, deadline=None, derandomize=True)

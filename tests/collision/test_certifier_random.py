@@ -1,4 +1,7 @@
-"""The certifier beside brute force: coal at 10 000 instants per segment of 200 random motions among random bodies."""
+"""The certifier beside brute force.
+
+Coal at 10 000 instants per segment of 200 random motions among random bodies.
+"""
 
 import numpy as np
 import pytest
@@ -25,8 +28,12 @@ def test_brute_force_never_contradicts(first: int) -> None:
             assert len(touching) == 0, seed
             assert verdict.proven - COAL_ERROR <= least, seed
             assert verdict.clearance <= least + COAL_ERROR, seed
-            assert verdict.proven <= verdict.clearance <= verdict.proven * 1.002 + 1e-5 * scene.size, seed
-            assert least <= verdict.clearance + 20.0 / SAMPLES, seed  # no body moves faster than 20 per segment
+            assert (
+                verdict.proven <= verdict.clearance <= verdict.proven * 1.002 + 1e-5 * scene.size
+            ), seed
+            assert least <= verdict.clearance + 20.0 / SAMPLES, (
+                seed
+            )  # no body moves faster than 20 per segment
         elif verdict.status == "refuted":
             assert len(touching) > 0 or least < 20.0 / SAMPLES, seed
             assert len(touching) == 0 or verdict.refuted_at <= touching[0] + 1e-9, seed

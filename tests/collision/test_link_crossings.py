@@ -1,4 +1,7 @@
-"""Crossing links against rational arithmetic, numpy, the paper's closed form, and themselves seen in a mirror."""
+"""Crossing links against rational arithmetic, numpy, the paper's closed form.
+
+And themselves seen in a mirror.
+"""
 
 from typing import Any
 
@@ -22,8 +25,13 @@ SCENE_A = Arm((0.0, 0.0), (0.25, 0.25)), Arm((0.3, 0.0), (0.25, 0.25))
 UNEQUAL = Arm((-0.2, 0.1), (0.4, 0.1)), Arm((0.3, -0.05), (0.15, 0.35))
 
 
-def populations(rng: np.random.Generator, arms: Any, num_1: int, num_2: int, size: int = 4) -> tuple[Any, Any]:
-    return tuple(arm.points(rng.uniform(0.0, np.pi, (size, 2, n))) for arm, n in zip(arms, (num_1, num_2), strict=True))
+def populations(
+    rng: np.random.Generator, arms: Any, num_1: int, num_2: int, size: int = 4
+) -> tuple[Any, Any]:
+    return tuple(
+        arm.points(rng.uniform(0.0, np.pi, (size, 2, n)))
+        for arm, n in zip(arms, (num_1, num_2), strict=True)
+    )
 
 
 def check_sums(found: Crossings) -> None:
@@ -63,7 +71,10 @@ def test_all_four_pairs_of_links_count() -> None:
 
 
 def random_points(kind: str, rng: np.random.Generator, size: int) -> tuple[Any, Any, Any, Any]:
-    """Bases and points (5, 4, size) of arms, many of which touch, are parallel, on one line, or of length 0."""
+    """Bases and points (5, 4, size) of arms, many of which touch, are parallel, on one line.
+
+    Or of length 0.
+    """
     if kind == "grid":
         points = rng.integers(-2, 3, (2, 5, 4, size)).astype(np.float64)
         return (0.0, 0.0), points[0], (1.0, 0.0), points[1]
@@ -72,7 +83,9 @@ def random_points(kind: str, rng: np.random.Generator, size: int) -> tuple[Any, 
         return (0.1, 0.1), points[0], (1.0 / 3.0 + 0.1, 0.1), points[1]
     if kind == "close":  # touching but for less than, and more than, single precision resolves
         points = rng.integers(-2, 3, (2, 5, 4, size)) / 3.0
-        points += rng.uniform(-1.0, 1.0, points.shape) * 10.0 ** rng.uniform(-9.0, -5.0, points.shape)
+        points += rng.uniform(-1.0, 1.0, points.shape) * 10.0 ** rng.uniform(
+            -9.0, -5.0, points.shape
+        )
         return (0.0, 0.0), points[0], (1.0 / 3.0, 0.0), points[1]
     if kind == "far":  # rounded coarsely, far away from the origin
         points = 1e6 + rng.integers(-2, 3, (2, 5, 4, size)) / 7.0
@@ -80,7 +93,11 @@ def random_points(kind: str, rng: np.random.Generator, size: int) -> tuple[Any, 
     if kind == "ulps":  # on one line but for the last places
         base = np.array([0.1, 0.3])
         t = rng.uniform(-1.0, 1.0, (2, 5, 2, 1, size))
-        points = (base + np.array([0.7, 0.2]) * np.moveaxis(t, 3, 4)).transpose(0, 1, 2, 4, 3).reshape(2, 5, 4, size)
+        points = (
+            (base + np.array([0.7, 0.2]) * np.moveaxis(t, 3, 4))
+            .transpose(0, 1, 2, 4, 3)
+            .reshape(2, 5, 4, size)
+        )
         points = points * (1.0 + rng.integers(-2, 3, points.shape) * 2.0**-52)
         return tuple(base), points[0], tuple(base + np.array([0.7, 0.2]) / 3.0), points[1]
     scale = {"tiny": 1e-120, "huge": 1e100, "mixed": 1.0}[kind]
@@ -90,7 +107,9 @@ def random_points(kind: str, rng: np.random.Generator, size: int) -> tuple[Any, 
     return (0.0, 0.0), points[0], (scale, 0.0), points[1]
 
 
-@pytest.mark.parametrize("kind", ["grid", "thirds", "close", "far", "ulps", "tiny", "huge", "mixed"])
+@pytest.mark.parametrize(
+    "kind", ["grid", "thirds", "close", "far", "ulps", "tiny", "huge", "mixed"]
+)
 def test_counts_are_exact_where_links_touch(kind: str) -> None:
     rng = np.random.default_rng(11)
     base_1, points_1, base_2, points_2 = random_points(kind, rng, 30)
@@ -104,16 +123,23 @@ def test_counts_are_exact_where_links_touch(kind: str) -> None:
 def test_counts_of_random_links_are_exact() -> None:
     points_1, points_2 = populations(np.random.default_rng(5), UNEQUAL, 40, 30, 3)
     found = count_crossings(UNEQUAL[0], points_1, UNEQUAL[1], points_2)
-    assert np.array_equal(found.counts, plain.exact_counts(UNEQUAL[0].base, points_1, UNEQUAL[1].base, points_2))
+    assert np.array_equal(
+        found.counts, plain.exact_counts(UNEQUAL[0].base, points_1, UNEQUAL[1].base, points_2)
+    )
 
 
 def test_right_angles_are_exact() -> None:
-    """Link angles of multiples of 30 degrees, bases a link apart: touching, parallel and collinear by the thousand."""
+    """Link angles of multiples of 30 degrees, bases a link apart.
+
+    Touching, parallel and collinear by the thousand.
+    """
     arms = Arm((0.0, 0.0), (0.25, 0.25)), Arm((0.25, 0.0), (0.25, 0.25))
     grid = np.array(np.meshgrid(*[np.arange(7)] * 2)).reshape(1, 2, -1) * (np.pi / 6.0)
     points = [arm.points(grid) for arm in arms]
     found = count_crossings(arms[0], points[0], arms[1], points[1])
-    assert np.array_equal(found.counts, plain.exact_counts(arms[0].base, points[0], arms[1].base, points[1]))
+    assert np.array_equal(
+        found.counts, plain.exact_counts(arms[0].base, points[0], arms[1].base, points[1])
+    )
 
 
 def test_a_link_between_two_others_by_the_last_place() -> None:
@@ -132,7 +158,9 @@ def test_a_link_between_two_others_by_the_last_place() -> None:
 
 
 coordinate = st.one_of(
-    st.integers(-3, 3).map(float), st.floats(-1.0, 1.0).map(lambda x: x if abs(x) > 1e-80 else 0.0), st.just(1e-9)
+    st.integers(-3, 3).map(float),
+    st.floats(-1.0, 1.0).map(lambda x: x if abs(x) > 1e-80 else 0.0),
+    st.just(1e-9),
 )
 point = st.tuples(coordinate, coordinate)
 
@@ -148,7 +176,9 @@ def test_predicates_are_rational_arithmetic(points: Any) -> None:
 
 @given(point, point, point, st.integers(0, 3), st.integers(-2, 2))
 @settings(max_examples=300)
-def test_orientation_of_points_almost_on_a_line(a: Any, b: Any, c: Any, what: int, places: int) -> None:
+def test_orientation_of_points_almost_on_a_line(
+    a: Any, b: Any, c: Any, what: int, places: int
+) -> None:
     t = (0.0, 0.5, 1.0 / 3.0, 1.7)[what]
     x, y = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])
     near = (x * (1.0 + places * 2.0**-52), y)
@@ -180,7 +210,9 @@ def test_upside_down_in_angles() -> None:
     q_1, q_2 = np.random.default_rng(9).uniform(0.0, np.pi, (2, 4, 2, 30))
     one, two = SCENE_A
     found = count_crossings(one, one.points(q_1), two, two.points(q_2))
-    assert np.array_equal(found.counts, count_crossings(one, one.points(-q_1), two, two.points(-q_2)).counts)
+    assert np.array_equal(
+        found.counts, count_crossings(one, one.points(-q_1), two, two.points(-q_2)).counts
+    )
 
 
 @given(st.integers(0, 2**32), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
@@ -191,7 +223,9 @@ def test_updates_are_full_counts(seed: int, rate_1: float, rate_2: float) -> Non
     points = [p.copy() for p in populations(rng, SCENE_A, num_1, num_2, 2)]
     found = count_crossings(SCENE_A[0], points[0], SCENE_A[1], points[1])
     changed = [rng.random(num_1) < rate_1, rng.random(num_2) < rate_2]
-    for old, new, which in zip(points, populations(rng, SCENE_A, num_1, num_2, 2), changed, strict=True):
+    for old, new, which in zip(
+        points, populations(rng, SCENE_A, num_1, num_2, 2), changed, strict=True
+    ):
         old[:, :, which] = new[:, :, which]
     update_crossings(found, SCENE_A[0], points[0], SCENE_A[1], points[1], *changed)
     full = count_crossings(SCENE_A[0], points[0], SCENE_A[1], points[1])
@@ -290,10 +324,17 @@ def test_substeps_divide_every_segment(steps: int, size: int) -> None:
     start, goal = np.array([2.0, 1.0]), np.array([0.5, -0.5])
     tested = path_configurations(genes, start, goal, steps)
     ends = np.concatenate(
-        [np.broadcast_to(start[:, None], (1, 2, 10)), genes, np.broadcast_to(goal[:, None], (1, 2, 10))]
+        [
+            np.broadcast_to(start[:, None], (1, 2, 10)),
+            genes,
+            np.broadcast_to(goal[:, None], (1, 2, 10)),
+        ]
     )
     t = np.arange(1, (size + 1) * steps) / steps
-    expected = [np.array([np.interp(t, np.arange(size + 2), ends[:, j, n]) for n in range(10)]) for j in (0, 1)]
+    expected = [
+        np.array([np.interp(t, np.arange(size + 2), ends[:, j, n]) for n in range(10)])
+        for j in (0, 1)
+    ]
     assert tested.shape == ((size + 1) * steps - 1, 2, 10)
     assert np.allclose(tested, np.array(expected).transpose(2, 0, 1), rtol=0.0, atol=1e-14)
     assert np.array_equal(tested[steps - 1 :: steps], genes)
@@ -307,7 +348,9 @@ def test_many_configurations_and_all_colliding() -> None:
 
 
 def test_empty_populations() -> None:
-    found = count_crossings(SCENE_A[0], np.empty((4, 4, 0)), SCENE_A[1], SCENE_A[1].points(np.zeros((4, 2, 3))))
+    found = count_crossings(
+        SCENE_A[0], np.empty((4, 4, 0)), SCENE_A[1], SCENE_A[1].points(np.zeros((4, 2, 3)))
+    )
     assert found.counts.shape == (0, 3)
     assert np.array_equal(found.sums_2, np.zeros(3))
     none = count_crossings(SCENE_A[0], np.empty((0, 4, 2)), SCENE_A[1], np.empty((0, 4, 3)))
@@ -317,9 +360,13 @@ def test_empty_populations() -> None:
 def test_what_does_not_fit_is_refused() -> None:
     one, two = SCENE_A
     points_1, points_2 = populations(np.random.default_rng(0), SCENE_A, 5, 6)
-    with pytest.raises(ValueError, match=r"q must have shape \(configurations, 2, individuals\), was \(3, 4\)"):
+    with pytest.raises(
+        ValueError, match=r"q must have shape \(configurations, 2, individuals\), was \(3, 4\)"
+    ):
         one.points(np.zeros((3, 4)))
-    with pytest.raises(ValueError, match=r"points_2 must have shape \(configurations, 4, individuals\)"):
+    with pytest.raises(
+        ValueError, match=r"points_2 must have shape \(configurations, 4, individuals\)"
+    ):
         count_crossings(one, points_1, two, points_2[:, :3])
     with pytest.raises(ValueError, match="as many configurations, had 4 and 3"):
         count_crossings(one, points_1, two, points_2[:3])
@@ -327,9 +374,13 @@ def test_what_does_not_fit_is_refused() -> None:
         count_crossings(one, np.zeros((32768, 4, 1)), two, np.zeros((32768, 4, 1)))
     found = count_crossings(one, points_1, two, points_2)
     everyone = np.ones(5, dtype=np.bool_), np.ones(6, dtype=np.bool_)
-    with pytest.raises(ValueError, match=r"crossings.counts must have shape \(4, 6\), was \(5, 6\)"):
+    with pytest.raises(
+        ValueError, match=r"crossings.counts must have shape \(4, 6\), was \(5, 6\)"
+    ):
         update_crossings(found, one, points_1[:, :, :4], two, points_2, *everyone)
-    with pytest.raises(ValueError, match=r"changed_1 must be bool of shape \(5,\), was bool of shape \(6,\)"):
+    with pytest.raises(
+        ValueError, match=r"changed_1 must be bool of shape \(5,\), was bool of shape \(6,\)"
+    ):
         update_crossings(found, one, points_1, two, points_2, everyone[1], everyone[1])
     with pytest.raises(ValueError, match="changed_2 must be bool"):
         update_crossings(found, one, points_1, two, points_2, everyone[0], np.arange(6))  # type: ignore[arg-type]

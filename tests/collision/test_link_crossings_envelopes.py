@@ -1,4 +1,7 @@
-"""Arms with envelopes: against numpy on all their lines and circles, and against the plain arms inside."""
+"""Arms with envelopes: against numpy on all their lines and circles.
+
+And against the plain arms inside.
+"""
 
 from typing import Any
 
@@ -17,7 +20,10 @@ UNEQUAL = Arm((-0.2, 0.1), (0.4, 0.1)), Arm((0.3, -0.05), (0.15, 0.35))
 
 
 def outlines(arms: Any, rng: np.random.Generator, num_1: int, num_2: int, size: int = 3) -> Any:
-    return [arm.outlines(rng.uniform(0.0, np.pi, (size, 2, n))) for arm, n in zip(arms, (num_1, num_2), strict=True)]
+    return [
+        arm.outlines(rng.uniform(0.0, np.pi, (size, 2, n)))
+        for arm, n in zip(arms, (num_1, num_2), strict=True)
+    ]
 
 
 def expected(arms: Any, drawn: Any) -> np.ndarray:
@@ -46,7 +52,8 @@ def test_boundaries_are_parallel_to_the_links() -> None:
 
 @pytest.mark.parametrize("arms", [SCENE_A, UNEQUAL])
 @pytest.mark.parametrize(
-    "sizes", [(0.02, 0.05, 0.02, 0.05), (0.03, 0.0, 0.0, 0.2), (0.0, 0.1, 0.05, 0.0), (0.2, 0.3, 0.1, 0.4)]
+    "sizes",
+    [(0.02, 0.05, 0.02, 0.05), (0.03, 0.0, 0.0, 0.2), (0.0, 0.1, 0.05, 0.0), (0.2, 0.3, 0.1, 0.4)],
 )
 def test_counts_are_numpy_s(arms: Any, sizes: Any) -> None:
     enveloped = EnvelopedArm(arms[0], *sizes[:2]), EnvelopedArm(arms[1], *sizes[2:])
@@ -63,14 +70,18 @@ def test_without_width_and_radius_they_are_the_plain_arms(right_angles: bool) ->
     rng = np.random.default_rng(5)
     arms = [Arm((0.0, 0.0), (0.25, 0.25)), Arm((0.25, 0.0), (0.25, 0.25))]
     angles = [
-        rng.integers(0, 13, (4, 2, 70)) * (np.pi / 12.0) if right_angles else rng.uniform(0.0, np.pi, (4, 2, 70))
+        rng.integers(0, 13, (4, 2, 70)) * (np.pi / 12.0)
+        if right_angles
+        else rng.uniform(0.0, np.pi, (4, 2, 70))
         for _ in arms
     ]
     points = [arm.points(q) for arm, q in zip(arms, angles, strict=True)]
     enveloped = [EnvelopedArm(arm, 0.0, 0.0) for arm in arms]
     drawn = [arm.outlines(q) for arm, q in zip(enveloped, angles, strict=True)]
     found = count_collisions(enveloped[0], drawn[0], enveloped[1], drawn[1])
-    assert np.array_equal(found.counts, count_crossings(arms[0], points[0], arms[1], points[1]).counts)
+    assert np.array_equal(
+        found.counts, count_crossings(arms[0], points[0], arms[1], points[1]).counts
+    )
 
 
 def test_single_precision_decides_nothing_that_is_close() -> None:
@@ -111,7 +122,9 @@ def test_touching_boundary_lines_are_exact() -> None:
 
 
 def exact_line_counts(arms: Any, drawn: Any) -> np.ndarray:
-    one, two = (arm.boundaries(outline)[:, :, 0] for arm, outline in zip(arms, drawn, strict=True))  # (4, 4, N)
+    one, two = (
+        arm.boundaries(outline)[:, :, 0] for arm, outline in zip(arms, drawn, strict=True)
+    )  # (4, 4, N)
     counts = np.zeros((one.shape[2], two.shape[2]), dtype=np.int64)
     for i, j in np.ndindex(counts.shape):
         counts[i, j] = any(
@@ -122,7 +135,13 @@ def exact_line_counts(arms: Any, drawn: Any) -> np.ndarray:
     return counts
 
 
-@given(st.floats(0.0, 0.2), st.floats(0.0, 0.4), st.floats(0.0, 0.2), st.floats(0.0, 0.4), st.integers(0, 1000))
+@given(
+    st.floats(0.0, 0.2),
+    st.floats(0.0, 0.4),
+    st.floats(0.0, 0.2),
+    st.floats(0.0, 0.4),
+    st.integers(0, 1000),
+)
 @settings(max_examples=40)
 def test_exchanged_arms_collide_as_often(
     half_1: float, radius_1: float, half_2: float, radius_2: float, seed: int
@@ -130,7 +149,9 @@ def test_exchanged_arms_collide_as_often(
     arms = EnvelopedArm(UNEQUAL[0], half_1, radius_1), EnvelopedArm(UNEQUAL[1], half_2, radius_2)
     drawn = outlines(arms, np.random.default_rng(seed), 20, 13)
     found = count_collisions(arms[0], drawn[0], arms[1], drawn[1])
-    assert np.array_equal(count_collisions(arms[1], drawn[1], arms[0], drawn[0]).counts.T, found.counts)
+    assert np.array_equal(
+        count_collisions(arms[1], drawn[1], arms[0], drawn[0]).counts.T, found.counts
+    )
 
 
 @given(st.integers(0, 1000), st.floats(0.0, 0.1))
@@ -155,12 +176,17 @@ def test_updates_are_full_counts(seed: int, rate_1: float, rate_2: float) -> Non
     for old, new, which in zip(drawn, outlines(arms, rng, num_1, num_2, 2), changed, strict=True):
         old[:, :, which] = new[:, :, which]
     update_collisions(found, arms[0], drawn[0], arms[1], drawn[1], *changed)
-    for mine, theirs in zip(found, count_collisions(arms[0], drawn[0], arms[1], drawn[1]), strict=True):
+    for mine, theirs in zip(
+        found, count_collisions(arms[0], drawn[0], arms[1], drawn[1]), strict=True
+    ):
         assert np.array_equal(mine, theirs)
 
 
 def test_links_without_length_leave_the_circles() -> None:
-    arms = EnvelopedArm(Arm((0.0, 0.0), (0.0, 0.0)), 0.0, 0.25), EnvelopedArm(Arm((0.5, 0.0), (0.0, 0.0)), 0.0, 0.25)
+    arms = (
+        EnvelopedArm(Arm((0.0, 0.0), (0.0, 0.0)), 0.0, 0.25),
+        EnvelopedArm(Arm((0.5, 0.0), (0.0, 0.0)), 0.0, 0.25),
+    )
     drawn = [arm.outlines(np.zeros((1, 2, 1))) for arm in arms]
     assert count_collisions(arms[0], drawn[0], arms[1], drawn[1]).counts[0, 0] == 0  # circles touch
     wider = arms[1]._replace(tcp_radius=0.2500001)
@@ -170,9 +196,13 @@ def test_links_without_length_leave_the_circles() -> None:
 def test_what_does_not_fit_is_refused() -> None:
     arms = EnvelopedArm(SCENE_A[0], 0.02, 0.05), EnvelopedArm(SCENE_A[1], 0.02, 0.05)
     drawn = outlines(arms, np.random.default_rng(0), 3, 4)
-    with pytest.raises(ValueError, match=r"outlines_1 must have shape \(configurations, 8, individuals\)"):
+    with pytest.raises(
+        ValueError, match=r"outlines_1 must have shape \(configurations, 8, individuals\)"
+    ):
         count_collisions(arms[0], drawn[0][:, :4], arms[1], drawn[1])
-    with pytest.raises(ValueError, match="one: half_width and tcp_radius must be at least 0, were -0.1 and 0.05"):
+    with pytest.raises(
+        ValueError, match="one: half_width and tcp_radius must be at least 0, were -0.1 and 0.05"
+    ):
         count_collisions(arms[0]._replace(half_width=-0.1), drawn[0], arms[1], drawn[1])
     with pytest.raises(ValueError, match="two must be finite"):
         count_collisions(arms[0], drawn[0], arms[1]._replace(tcp_radius=np.nan), drawn[1])
@@ -180,5 +210,7 @@ def test_what_does_not_fit_is_refused() -> None:
         count_collisions(arms[0], drawn[0], arms[1]._replace(tcp_radius=np.inf), drawn[1])
     with pytest.raises(ValueError, match="outlines must be finite"):
         count_collisions(arms[0], drawn[0] + np.nan, arms[1], drawn[1])
-    with pytest.raises(ValueError, match=r"outlines must have shape \(configurations, 8, individuals\)"):
+    with pytest.raises(
+        ValueError, match=r"outlines must have shape \(configurations, 8, individuals\)"
+    ):
         arms[0].boundaries(drawn[0][:, :4])

@@ -71,8 +71,12 @@ def test_counts_are_coal_s(names: Any) -> None:
     least = np.empty((4, 60))
     for k, n in np.ndindex(4, 60):
         rods = [rod([*ARM.base, *points[k, :2, n]]), rod(points[k, :, n])]
-        least[k, n] = min(distance(one, solid(table, o)) for one in rods for o in range(len(table.kind)))
-    assert not ((least > 0.0) & (least < 1e-7)).any()  # a rod has no inside: where it crosses, coal may say 0
+        least[k, n] = min(
+            distance(one, solid(table, o)) for one in rods for o in range(len(table.kind))
+        )
+    assert not (
+        (least > 0.0) & (least < 1e-7)
+    ).any()  # a rod has no inside: where it crosses, coal may say 0
     assert np.array_equal(found, (least <= 0.0).sum(axis=0))
     assert 0 < found.sum() < least.size
 
@@ -88,8 +92,12 @@ def test_envelopes_are_coal_s(names: Any) -> None:
     for k, n in np.ndindex(4, 60):
         ball = coal.Sphere(arm.tcp_radius), coal.Transform3s(np.array([*drawn[k, 2:4, n], 0.0]))
         parts = [ball, *(rod(line[:, k, n]) for line in lines)]
-        least[k, n] = min(distance(one, solid(table, o)) for one in parts for o in range(len(table.kind)))
-    assert not ((least > 0.0) & (least < 1e-7)).any()  # a rod has no inside: where it crosses, coal may say 0
+        least[k, n] = min(
+            distance(one, solid(table, o)) for one in parts for o in range(len(table.kind))
+        )
+    assert not (
+        (least > 0.0) & (least < 1e-7)
+    ).any()  # a rod has no inside: where it crosses, coal may say 0
     assert np.array_equal(found, (least <= 0.0).sum(axis=0))
     assert 0 < found.sum() < least.size
 
@@ -107,8 +115,16 @@ def test_without_width_and_radius_they_are_the_plain_arms() -> None:
     [
         (SphereObstacle(shape="sphere", center=(0.5, 0.25), radius=0.25), 0.0, -0.001),
         (BoxObstacle(shape="box", center=(0.5, 0.25), size=(0.5, 0.5)), 0.0, -0.001),
-        (CapsuleObstacle(shape="capsule", start=(0.25, 0.25), end=(0.75, 0.25), radius=0.25), 0.0, -0.001),
-        (CapsuleObstacle(shape="capsule", start=(0.5, 0.5), end=(0.5, -0.5), radius=0.001), -0.2, -0.502),
+        (
+            CapsuleObstacle(shape="capsule", start=(0.25, 0.25), end=(0.75, 0.25), radius=0.25),
+            0.0,
+            -0.001,
+        ),
+        (
+            CapsuleObstacle(shape="capsule", start=(0.5, 0.5), end=(0.5, -0.5), radius=0.001),
+            -0.2,
+            -0.502,
+        ),
         (HalfSpaceObstacle(shape="half_space", point=(0.0, 0.0), normal=(0.0, -1.0)), 0.0, -0.001),
     ],
 )
@@ -116,17 +132,24 @@ def test_touching_counts(obstacle: Any, touches: float, misses: float) -> None:
     obstacles = planar_obstacles(obstacle_table((obstacle,)))
     for height, expected in ((touches, 1), (misses, 0)):
         arm = Arm((0.0, height), (0.5, 0.5))
-        assert count_obstacle_collisions(arm, arm.points(np.zeros((1, 2, 1))), obstacles)[0] == expected
+        assert (
+            count_obstacle_collisions(arm, arm.points(np.zeros((1, 2, 1))), obstacles)[0]
+            == expected
+        )
 
 
 def test_a_link_inside_collides_and_nothing_collides_with_nothing() -> None:
     points = ARM.points(np.random.default_rng(1).uniform(0.0, np.pi, (4, 2, 9)))
     for name, obstacle in {
         "disc": SphereObstacle(shape="sphere", center=(0.0, 0.0), radius=3.0),
-        "box": BoxObstacle(shape="box", center=(0.0, 0.0), size=(5.0, 5.0), rotation=(0.0, 0.0, 20.0)),
+        "box": BoxObstacle(
+            shape="box", center=(0.0, 0.0), size=(5.0, 5.0), rotation=(0.0, 0.0, 20.0)
+        ),
         "capsule": CapsuleObstacle(shape="capsule", start=(0.0, -1.0), end=(0.0, 1.0), radius=3.0),
     }.items():
-        found = count_obstacle_collisions(ARM, points, planar_obstacles(obstacle_table((obstacle,))))
+        found = count_obstacle_collisions(
+            ARM, points, planar_obstacles(obstacle_table((obstacle,)))
+        )
         assert (found == 4).all(), name
     assert not count_obstacle_collisions(ARM, points, planar_obstacles(obstacle_table(()))).any()
 
@@ -149,5 +172,7 @@ def test_obstacles_out_of_the_plane_are_refused(obstacle: Any) -> None:
 
 
 def test_points_of_another_shape_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"points must have shape \(configurations, 4, individuals\), was \(4, 3\)"):
+    with pytest.raises(
+        ValueError, match=r"points must have shape \(configurations, 4, individuals\), was \(4, 3\)"
+    ):
         count_obstacle_collisions(ARM, np.zeros((4, 3)), planar_obstacles(obstacle_table(())))

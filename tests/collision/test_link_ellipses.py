@@ -29,7 +29,10 @@ TURNED = PlanarChain(link_lengths=(6.0, 7.0, 8.0), base_position=(1.0, -2.0), ba
 
 
 def bound(
-    swept: str = "chords", num_positions: int = 10, arm: PlanarChain = ARM, obstacles: tuple[object, ...] = BOX
+    swept: str = "chords",
+    num_positions: int = 10,
+    arm: PlanarChain = ARM,
+    obstacles: tuple[object, ...] = BOX,
 ) -> EllipseCollision:
     model = LinkEllipses(num_positions=num_positions, swept=swept, blind=False)  # type: ignore[arg-type]
     return model.bind(arm.build(), obstacle_table(obstacles))
@@ -43,7 +46,10 @@ def joints(arm: PlanarChain, q: FloatArray) -> FloatArray:
 
 
 def excess(ellipse: EllipseObstacle, p: FloatArray, q: FloatArray) -> FloatArray:
-    """Return the least distance of segments pq (n, 2) from an ellipse's centre, mapped to the unit circle, less 1."""
+    """Return the least distance of segments pq (n, 2) from an ellipse's centre.
+
+    Mapped to the unit circle, less 1.
+    """
     turn = np.deg2rad(ellipse.angle)
     into = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
     a, b = ((into @ (point - ellipse.center).T).T / ellipse.semi_axes for point in (p, q))
@@ -53,7 +59,12 @@ def excess(ellipse: EllipseObstacle, p: FloatArray, q: FloatArray) -> FloatArray
 
 
 def path_excess(
-    arm: PlanarChain, obstacles: tuple[EllipseObstacle, ...], start: FloatArray, end: FloatArray, num: int, chords: bool
+    arm: PlanarChain,
+    obstacles: tuple[EllipseObstacle, ...],
+    start: FloatArray,
+    end: FloatArray,
+    num: int,
+    chords: bool,
 ) -> float:
     """Return the least `excess` over all that is tested of one path, in plain numpy."""
     places = [joints(arm, start + j / num * (end - start)) for j in range(num + 1)]
@@ -77,7 +88,9 @@ def test_paths_agree_with_brute_force(
     collision = bound(swept, num_positions, arm, obstacles)
     found = collision.collide(starts, ends)
     for k in range(150):
-        value = path_excess(arm, obstacles, starts[:, k], ends[:, k], num_positions, swept == "chords")
+        value = path_excess(
+            arm, obstacles, starts[:, k], ends[:, k], num_positions, swept == "chords"
+        )
         if abs(value) > 1e-8:
             assert found[k] == (value < 0.0)
         contact = collision.contact(starts[:, k], ends[:, k])
@@ -95,7 +108,10 @@ def test_a_contact_is_where_it_is_said_to_be() -> None:
         if contact is None:
             continue
         seen.add(contact.swept)
-        now, before = (joints(TURNED, start + j / 10 * (end - start)) for j in (contact.position, contact.position - 1))
+        now, before = (
+            joints(TURNED, start + j / 10 * (end - start))
+            for j in (contact.position, contact.position - 1)
+        )
         other = before[contact.link] if contact.swept else now[contact.link - 1]
         value = excess(TILTED[contact.obstacle - 1], other[None], now[contact.link][None])
         assert value[0] <= 1e-9
@@ -111,7 +127,10 @@ def test_segments_agree_with_coal() -> None:
             shape="ellipse", center=tuple(rng.uniform(-9, 9, 2)), semi_axes=semi_axes, angle=angle
         )
         table = obstacle_table((ellipse,))
-        body, place = coal.Ellipsoid(*table.size[0]), coal.Transform3s(table.rotation[0].reshape(3, 3), table.center[0])
+        body, place = (
+            coal.Ellipsoid(*table.size[0]),
+            coal.Transform3s(table.rotation[0].reshape(3, 3), table.center[0]),
+        )
         for _ in range(50):
             p = np.array(ellipse.center) + rng.uniform(-6.0, 6.0, 2)
             q = np.array(ellipse.center) + rng.uniform(-6.0, 6.0, 2)
@@ -130,7 +149,9 @@ def test_segments_agree_with_coal() -> None:
     assert 200 < touching < 1800
 
 
-def distance_of_coal(body: coal.Ellipsoid, place: coal.Transform3s, p: FloatArray, q: FloatArray) -> float:
+def distance_of_coal(
+    body: coal.Ellipsoid, place: coal.Transform3s, p: FloatArray, q: FloatArray
+) -> float:
     """Return the signed distance of a segment, a capsule of radius 0, and an ellipsoid."""
     way = np.array([*(q - p), 0.0])
     z = way / np.linalg.norm(way)
@@ -139,7 +160,9 @@ def distance_of_coal(body: coal.Ellipsoid, place: coal.Transform3s, p: FloatArra
     middle = np.array([*(0.5 * (p + q)), 0.0])
     request, result = coal.DistanceRequest(), coal.DistanceResult()
     capsule = coal.Capsule(0.0, float(np.linalg.norm(way)))
-    return float(coal.distance(capsule, coal.Transform3s(rotation, middle), body, place, request, result))
+    return float(
+        coal.distance(capsule, coal.Transform3s(rotation, middle), body, place, request, result)
+    )
 
 
 @pytest.mark.parametrize(
@@ -154,8 +177,13 @@ def distance_of_coal(body: coal.Ellipsoid, place: coal.Transform3s, p: FloatArra
         ((10.0, 11.0), (15.0, 11.0), False),  # points at it
     ],
 )
-def test_contact_is_collision_and_a_link_has_ends(p: tuple[float, ...], q: tuple[float, ...], touches: bool) -> None:
-    length, direction = float(np.hypot(q[0] - p[0], q[1] - p[1])), np.arctan2(q[1] - p[1], q[0] - p[0])
+def test_contact_is_collision_and_a_link_has_ends(
+    p: tuple[float, ...], q: tuple[float, ...], touches: bool
+) -> None:
+    length, direction = (
+        float(np.hypot(q[0] - p[0], q[1] - p[1])),
+        np.arctan2(q[1] - p[1], q[0] - p[0]),
+    )
     chain = PlanarChain(link_lengths=(length,), base_position=(p[0], p[1]))
     collision = bound("none", 1, chain, BOX[:1])
     angle = np.array([[direction]])
@@ -163,7 +191,10 @@ def test_contact_is_collision_and_a_link_has_ends(p: tuple[float, ...], q: tuple
 
 
 def test_the_last_position_is_the_end_itself() -> None:
-    """Ends one rounding apart, at the edge of contact: 0 + 1 (q − 0) would do, s + (q − s) would not."""
+    """Ends one rounding apart, at the edge of contact.
+
+    0 + 1 (q − 0) would do, s + (q − s) would not.
+    """
     chain = PlanarChain(link_lengths=(10.0,), base_position=(0.0, 0.0))
     ellipse = EllipseObstacle(shape="ellipse", center=(9.0, 0.0), semi_axes=(0.5, 0.2))
     rng = np.random.default_rng(0)
@@ -178,7 +209,9 @@ def test_the_last_position_is_the_end_itself() -> None:
 
 
 def test_blind_arms_meet_nothing() -> None:
-    model = LinkEllipses(num_positions=10, swept="chords", blind=True).bind(ARM.build(), obstacle_table(BOX))
+    model = LinkEllipses(num_positions=10, swept="chords", blind=True).bind(
+        ARM.build(), obstacle_table(BOX)
+    )
     seeing = bound()
     q = np.random.default_rng(0).uniform(-2.0, 2.0, (2, 7, 64))
     assert not model.collide(q[0], q[1]).any()
@@ -197,7 +230,9 @@ def test_every_individual_is_judged_alone(count: int) -> None:
     rng = np.random.default_rng(count)
     starts, ends = rng.uniform(-1.0, 2.0, (2, 7, count))
     together = bound().collide(starts, ends)
-    alone = [bool(bound().collide(starts[:, k : k + 1], ends[:, k : k + 1])[0]) for k in range(count)]
+    alone = [
+        bool(bound().collide(starts[:, k : k + 1], ends[:, k : k + 1])[0]) for k in range(count)
+    ]
     assert together.tolist() == alone
 
 
@@ -215,14 +250,24 @@ def test_an_ellipse_counts_from_the_first_link_that_reaches_it() -> None:
 @pytest.mark.parametrize(
     ("robot", "obstacles", "message"),
     [
-        (ARM, (SphereObstacle(shape="sphere", center=(1.0, 2.0), radius=1.0),), "scenario.obstacles[0].shape: must be"),
-        (ARM, (EllipseObstacle(shape="ellipse", center=(1.0, 2.0, 3.0), semi_axes=(1.0, 2.0)),), "in the plane z = 0"),
+        (
+            ARM,
+            (SphereObstacle(shape="sphere", center=(1.0, 2.0), radius=1.0),),
+            "scenario.obstacles[0].shape: must be",
+        ),
+        (
+            ARM,
+            (EllipseObstacle(shape="ellipse", center=(1.0, 2.0, 3.0), semi_axes=(1.0, 2.0)),),
+            "in the plane z = 0",
+        ),
         (Arms(arms=(ARM, TURNED)), BOX, "robot: must be one planar arm"),
         (ARM.model_copy(update={"link_radius": 0.1}), BOX, "robot.link_radius: must be 0"),
         (ARM.model_copy(update={"tool_radius": 0.1}), BOX, "robot: must be one planar arm"),
     ],
 )
-def test_what_the_model_cannot_be_is_refused(robot: object, obstacles: tuple[object, ...], message: str) -> None:
+def test_what_the_model_cannot_be_is_refused(
+    robot: object, obstacles: tuple[object, ...], message: str
+) -> None:
     with pytest.raises(SettingError) as caught:
         LinkEllipses(num_positions=1, swept="none").bind(robot.build(), obstacle_table(obstacles))  # type: ignore[attr-defined]
     assert message in str(caught.value)

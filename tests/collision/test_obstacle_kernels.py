@@ -29,7 +29,9 @@ HALF_SPACES = (
 )
 
 
-def coal_distances(collision: SphereCollision, obstacles: tuple[object, ...], q_deg: np.ndarray) -> np.ndarray:
+def coal_distances(
+    collision: SphereCollision, obstacles: tuple[object, ...], q_deg: np.ndarray
+) -> np.ndarray:
     """All distances of spheres and obstacles, (spheres, obstacles)."""
     assembly, geometry = collision.assembly, collision.geometry
     data, placed = assembly.model.createData(), geometry.createData()
@@ -51,8 +53,12 @@ def coal_distances(collision: SphereCollision, obstacles: tuple[object, ...], q_
     return np.array(found).reshape(geometry.ngeoms, len(obstacles))
 
 
-@pytest.mark.parametrize("obstacles", [*((o,) for o in CYLINDERS + HALF_SPACES), CYLINDERS + HALF_SPACES])
-def test_spheres_among_cylinders_and_half_spaces_agree_with_coal(obstacles: tuple[object, ...]) -> None:
+@pytest.mark.parametrize(
+    "obstacles", [*((o,) for o in CYLINDERS + HALF_SPACES), CYLINDERS + HALF_SPACES]
+)
+def test_spheres_among_cylinders_and_half_spaces_agree_with_coal(
+    obstacles: tuple[object, ...],
+) -> None:
     assembly = ROBOT.build()
     collision = MODEL.bind(assembly, obstacles)
     q = np.random.default_rng(0).uniform(-180.0, 180.0, size=(assembly.model.nq, 130))
@@ -72,9 +78,13 @@ def test_a_limit_skips_only_what_is_not_asked(limit: float) -> None:
     rng = np.random.default_rng(1)
     for q in (
         rng.uniform(-180.0, 180.0, size=(assembly.model.nq, 200)),
-        rng.uniform(-180.0, 180.0, size=(assembly.model.nq, 1)) + rng.normal(size=(assembly.model.nq, 200)),
+        rng.uniform(-180.0, 180.0, size=(assembly.model.nq, 1))
+        + rng.normal(size=(assembly.model.nq, 200)),
     ):
-        exact, limited = collision.clearance(q).to_obstacles, collision.clearance(q, limit).to_obstacles
+        exact, limited = (
+            collision.clearance(q).to_obstacles,
+            collision.clearance(q, limit).to_obstacles,
+        )
         below = exact < limit
         assert np.array_equal(limited[below], exact[below])
         assert np.all(limited[~below] >= limit - 1e-15)
@@ -94,7 +104,13 @@ def test_a_limit_skips_only_what_is_not_asked(limit: float) -> None:
 )
 def test_signed_distance_of_a_point_from_a_cylinder(x: float, z: float, expected: float) -> None:
     robot = PlanarChain(link_lengths=(1.0,), base_position=(x, 0.0))
-    cylinder = CylinderObstacle(shape="cylinder", start=(0.5, 0.0, -1.0 - z), end=(0.5, 0.0, 1.0 - z), radius=0.5)
-    one = TouchingSpheres(spheres_per_link=1, sphere_radius=0.25, collision_substeps=1)  # at half the link
+    cylinder = CylinderObstacle(
+        shape="cylinder", start=(0.5, 0.0, -1.0 - z), end=(0.5, 0.0, 1.0 - z), radius=0.5
+    )
+    one = TouchingSpheres(
+        spheres_per_link=1, sphere_radius=0.25, collision_substeps=1
+    )  # at half the link
     collision = one.bind(robot.build(), (cylinder,))
-    assert collision.clearance(np.zeros((1, 1))).to_obstacles[0] == pytest.approx(expected - 0.25, abs=1e-15)
+    assert collision.clearance(np.zeros((1, 1))).to_obstacles[0] == pytest.approx(
+        expected - 0.25, abs=1e-15
+    )

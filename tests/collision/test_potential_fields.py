@@ -1,4 +1,7 @@
-"""Potential fields: the printed ones of the paper but for its slips, and what settings are refused."""
+"""Potential fields: the printed ones of the paper but for its slips.
+
+And what settings are refused.
+"""
 
 from typing import Any
 
@@ -24,10 +27,15 @@ def test_both_fields_are_the_printed_ones_but_for_known_slips() -> None:
     goal = own.inner(problem.fields.goal_field(problem.ends[1]))
     unsafeness, blocked = own.inner(problem.fields.unsafeness), np.isnan(goal)
     slips = []
-    for name, values, edge, given in zip("ab", (goal, unsafeness), "*" + "x", printed("chen_fig_1.txt"), strict=True):
+    for name, values, edge, given in zip(
+        "ab", (goal, unsafeness), "*" + "x", printed("chen_fig_1.txt"), strict=True
+    ):
         table = compare(name, rows_of(values, blocked, "10" if edge == "x" else edge), given)
         assert int((table["slip"] == "").sum()) >= 254
-        slips += [(r.field, r.row, r.column, r.slip) for r in table[table["slip"] != ""].itertuples(index=False)]
+        slips += [
+            (r.field, r.row, r.column, r.slip)
+            for r in table[table["slip"] != ""].itertuples(index=False)
+        ]
     assert slips == [
         ("a", 4, 13, SURPLUS), ("a", 5, 12, SURPLUS), ("a", 9, 13, WRONG),
         ("b", 6, 5, MISSING), ("b", 6, 16, SURPLUS), ("b", 12, 7, WRONG),
@@ -75,5 +83,7 @@ def test_potentials_are_ordered(changed: dict[str, Any], said: str) -> None:
 
 
 def test_a_neighbourhood_is_one_of_the_grid() -> None:
-    with pytest.raises(SettingError, match=r"collision\.neighbourhood: must be at most .* \(2\), was 3"):
+    with pytest.raises(
+        SettingError, match=r"collision\.neighbourhood: must be at most .* \(2\), was 3"
+    ):
         settings(neighbourhood=3).bind(np.zeros((4, 4), dtype=bool))

@@ -1,4 +1,7 @@
-"""Spheres and capsules: the kernels against Pinocchio, coal and a slow, plain reference on the same shapes."""
+"""Spheres and capsules: the kernels against Pinocchio, coal and a slow.
+
+Plain reference on the same shapes.
+"""
 
 from typing import Any
 
@@ -7,7 +10,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from evoexp.collision.primitives import PrimitiveCollision, Shapes, default_pairs, shapes_of_geometry
+from evoexp.collision.primitives import (
+    PrimitiveCollision,
+    Shapes,
+    default_pairs,
+    shapes_of_geometry,
+)
 from evoexp.robots.kinematics import UnsupportedJoint
 from evoexp.scenarios.obstacles import (
     BoxObstacle,
@@ -33,7 +41,11 @@ def random_tree(rng: np.random.Generator, size: int, chain: bool = False) -> Any
     for k in range(size):
         axis = rng.normal(size=3)
         axis /= np.linalg.norm(axis)
-        kinds: list[Any] = [pin.JointModelRevoluteUnaligned(axis), pin.JointModelRX(), pin.JointModelRZ()]
+        kinds: list[Any] = [
+            pin.JointModelRevoluteUnaligned(axis),
+            pin.JointModelRX(),
+            pin.JointModelRZ(),
+        ]
         if not chain:
             kinds += [pin.JointModelPrismaticUnaligned(axis), pin.JointModelPY()]
         parent = k if chain else int(rng.integers(0, k + 1))
@@ -47,7 +59,11 @@ def random_geometry(rng: np.random.Generator, model: Any, spheres: int, capsules
     geometry = pin.GeometryModel()
     for k in range(spheres + capsules):
         radius = float(rng.choice([0.0, 0.05, rng.uniform(0.01, 0.2)]))
-        shape = coal.Sphere(radius) if k < spheres else coal.Capsule(radius, float(rng.choice([0.0, 0.2, 0.7])))
+        shape = (
+            coal.Sphere(radius)
+            if k < spheres
+            else coal.Capsule(radius, float(rng.choice([0.0, 0.2, 0.7])))
+        )
         joint = int(rng.integers(0, model.njoints)) if k else 1
         place = pin.SE3(random_rotation(rng), rng.uniform(-0.3, 0.3, size=3))
         geometry.addGeometryObject(pin.GeometryObject(f"shape_{k}", joint, 0, place, shape))
@@ -63,16 +79,22 @@ def random_obstacles(rng: np.random.Generator) -> tuple[Any, ...]:
 
     return (
         SphereObstacle(shape="sphere", center=point(), radius=size()),
-        BoxObstacle(shape="box", center=point(), size=(size(), size(), size()), rotation=point(180.0)),
+        BoxObstacle(
+            shape="box", center=point(), size=(size(), size(), size()), rotation=point(180.0)
+        ),
         BoxObstacle(shape="box", center=point(), size=(1.0, size(), 0.02), rotation=point(180.0)),
         CapsuleObstacle(shape="capsule", start=point(), end=point(), radius=size()),
         CylinderObstacle(shape="cylinder", start=point(), end=point(), radius=size()),
-        CylinderObstacle(shape="cylinder", start=(0.5, 0.9, 0.1), end=(0.5, 0.9, 0.2), radius=size()),
+        CylinderObstacle(
+            shape="cylinder", start=(0.5, 0.9, 0.1), end=(0.5, 0.9, 0.2), radius=size()
+        ),
         HalfSpaceObstacle(shape="half_space", point=(0.0, 0.0, -0.8), normal=point()),
     )
 
 
-def placed(model: Any, geometry: Any, q: np.ndarray) -> list[tuple[int, np.ndarray, np.ndarray, float]]:
+def placed(
+    model: Any, geometry: Any, q: np.ndarray
+) -> list[tuple[int, np.ndarray, np.ndarray, float]]:
     """Joint, both ends of the axis and radius of every shape in the world, by Pinocchio."""
     data, places = model.createData(), geometry.createData()
     pin.updateGeometryPlacements(model, data, geometry, places, np.ascontiguousarray(q))
@@ -80,11 +102,20 @@ def placed(model: Any, geometry: Any, q: np.ndarray) -> list[tuple[int, np.ndarr
     for one, place in zip(geometry.geometryObjects, places.oMg, strict=True):
         half = one.geometry.halfLength if isinstance(one.geometry, coal.Capsule) else 0.0
         axis = half * place.rotation[:, 2]
-        found.append((one.parentJoint, place.translation - axis, place.translation + axis, one.geometry.radius))
+        found.append(
+            (
+                one.parentJoint,
+                place.translation - axis,
+                place.translation + axis,
+                one.geometry.radius,
+            )
+        )
     return found
 
 
-def plain_clearances(model: Any, geometry: Any, table: Any, pairs: Any, arms: Any, q: np.ndarray) -> list[float]:
+def plain_clearances(
+    model: Any, geometry: Any, table: Any, pairs: Any, arms: Any, q: np.ndarray
+) -> list[float]:
     """Least clearances to obstacles, between arms, to self; by the slow reference."""
     shapes = placed(model, geometry, q)
     least = [np.inf, np.inf, np.inf]
@@ -96,12 +127,14 @@ def plain_clearances(model: Any, geometry: Any, table: Any, pairs: Any, arms: An
         for other, one, two, thick in shapes[n + 1 :]:
             if frozenset((joint, other)) in chosen and joint != other:
                 row = 1 if arms[joint] != arms[other] and min(arms[joint], arms[other]) >= 0 else 2
-                least[row] = min(least[row], along(start, end, to_segment(one, two)) - radius - thick)
+                least[row] = min(
+                    least[row], along(start, end, to_segment(one, two)) - radius - thick
+                )
     return least
 
 
 def agree(found: Any, expected: list[float], deepest: float) -> None:
-    """Compare clearances; below `deepest` (a capsule's axis inside an obstacle) both need only be below it."""
+    """Compare clearances; below `deepest` (an axis inside an obstacle) both are only below it."""
     for row, (one, two) in enumerate(zip(found, expected, strict=True)):
         if row == 0 and two <= deepest:
             assert one <= deepest + 1e-12
@@ -122,10 +155,14 @@ def test_capsules_on_random_trees_agree_with_the_plain_reference(seed: int) -> N
     rng = np.random.default_rng(100 + seed)
     model = random_tree(rng, 7)
     geometry = random_geometry(rng, model, 4, 8)
-    check_against_plain(rng, model, geometry, -min(one.geometry.radius for one in geometry.geometryObjects))
+    check_against_plain(
+        rng, model, geometry, -min(one.geometry.radius for one in geometry.geometryObjects)
+    )
 
 
-def check_against_plain(rng: np.random.Generator, model: Any, geometry: Any, deepest: float) -> None:
+def check_against_plain(
+    rng: np.random.Generator, model: Any, geometry: Any, deepest: float
+) -> None:
     table = obstacle_table(random_obstacles(rng))
     joints = {one.parentJoint for one in geometry.geometryObjects}
     pairs, arms = default_pairs(model, joints), [-1, *rng.integers(0, 2, size=model.nq).tolist()]
@@ -138,7 +175,10 @@ def check_against_plain(rng: np.random.Generator, model: Any, geometry: Any, dee
 
 
 def coal_least(geometry: Any, placed_scene: Any, robot: int, row: str, exact: bool) -> float:
-    """Least distance by coal over the scene's pairs; `exact` leaves out capsules beside boxes and cylinders."""
+    """Least distance by coal over the scene's pairs.
+
+    `exact` leaves out capsules beside boxes and cylinders.
+    """
     least = np.inf
     for pair in geometry.collisionPairs:
         if (max(pair.first, pair.second) >= robot) is not (row == "obstacles"):
@@ -158,7 +198,10 @@ def coal_least(geometry: Any, placed_scene: Any, robot: int, row: str, exact: bo
 
 @pytest.mark.parametrize("shapes", ["spheres", "capsules"])
 def test_a_6r_arm_agrees_with_coal(shapes: str) -> None:
-    """All obstacles of all kinds: 1e-12 where coal has a formula and nothing overlaps, 1e-6 where it iterates."""
+    """All obstacles of all kinds.
+
+    1e-12 where coal has a formula and nothing overlaps, 1e-6 where it iterates.
+    """
     model = arms_6r.model()
     geometry = getattr(arms_6r, shapes)(model)
     ignored = [(1, arms_6r.FLOOR)]
@@ -183,19 +226,28 @@ def test_a_6r_arm_agrees_with_coal(shapes: str) -> None:
 
 
 def test_depths_agree_with_plain_numpy_in_a_crowd_of_large_obstacles() -> None:
-    """Centres deep inside boxes and cylinders, where a ball around a body is nearer than it is deep."""
+    """Centres deep inside boxes and cylinders.
+
+    Where a ball around a body is nearer than it is deep.
+    """
     model, rng = arms_6r.model(), np.random.default_rng(7)
     shapes = shapes_of_geometry(arms_6r.spheres(model))
     obstacles = (*arms_6r.OBSTACLES, *random_obstacles(rng)[:-1])
     large = (
-        BoxObstacle(shape="box", center=(0.9, 0.0, 0.9), size=(1.2, 1.5, 1.8), rotation=(10.0, 20.0, 30.0)),
-        CylinderObstacle(shape="cylinder", start=(-0.8, 0.0, -1.0), end=(-0.9, 0.2, 2.0), radius=0.6),
+        BoxObstacle(
+            shape="box", center=(0.9, 0.0, 0.9), size=(1.2, 1.5, 1.8), rotation=(10.0, 20.0, 30.0)
+        ),
+        CylinderObstacle(
+            shape="cylinder", start=(-0.8, 0.0, -1.0), end=(-0.9, 0.2, 2.0), radius=0.6
+        ),
         HalfSpaceObstacle(shape="half_space", point=(0.0, 0.0, 0.6), normal=(0.1, 0.2, 1.0)),
     )
     table = obstacle_table(obstacles + large)
     collision = PrimitiveCollision.build(model, shapes, table)
     q = arms_6r.random_configurations(1000)
-    local = np.array([collision.table.local(j, p) for j, p in zip(shapes.joint, shapes.start, strict=True)])
+    local = np.array(
+        [collision.table.local(j, p) for j, p in zip(shapes.joint, shapes.start, strict=True)]
+    )
     centers = primitives_numpy.sphere_centers(collision.table, shapes.joint - 1, local, q)
     every = np.ones((len(local), len(table.kind)), dtype=bool)
     expected = primitives_numpy.to_obstacles(centers, shapes.radius, table, every)
@@ -212,7 +264,9 @@ def test_verdicts_agree_with_coal(shapes: str, drawn: str) -> None:
     geometry = getattr(arms_6r, shapes)(model)
     ignored = [(1, arms_6r.FLOOR)]
     table = obstacle_table(arms_6r.OBSTACLES)
-    collision = PrimitiveCollision.from_geometry(model, geometry, table, arms_6r.SELF_PAIRS, ignored)
+    collision = PrimitiveCollision.from_geometry(
+        model, geometry, table, arms_6r.SELF_PAIRS, ignored
+    )
     scene = arms_6r.with_obstacles(geometry, arms_6r.OBSTACLES, arms_6r.SELF_PAIRS, ignored)
     pool = pin.BroadPhaseManagerPool_DynamicAABBTreeCollisionManager(model, scene, 1)
     q = getattr(arms_6r, drawn)(400)
@@ -221,7 +275,9 @@ def test_verdicts_agree_with_coal(shapes: str, drawn: str) -> None:
     assert np.array_equal(collision.collides(q), expected)
 
 
-def collision_of(seed: int, size: int = 6, arms: int = 2) -> tuple[PrimitiveCollision, np.random.Generator]:
+def collision_of(
+    seed: int, size: int = 6, arms: int = 2
+) -> tuple[PrimitiveCollision, np.random.Generator]:
     rng = np.random.default_rng(seed)
     model = random_tree(rng, size, chain=True)
     geometry = random_geometry(rng, model, 20, 6)
@@ -238,7 +294,9 @@ def test_a_batch_is_its_configurations_one_by_one(seed: int, count: int) -> None
     for limit in (np.inf, 0.1):
         together = np.array(collision.clearance(q, limit))
         backwards = np.array(collision.clearance(q[:, ::-1], limit))[:, ::-1]
-        alone = np.hstack([np.array(collision.clearance(q[:, k : k + 1], limit)) for k in range(0, count, 7)])
+        alone = np.hstack(
+            [np.array(collision.clearance(q[:, k : k + 1], limit)) for k in range(0, count, 7)]
+        )
         assert np.array_equal(together, backwards)
         assert np.array_equal(together[:, ::7], alone)
 
@@ -249,7 +307,9 @@ def test_a_limit_skips_only_what_is_not_asked(seed: int, limit: float) -> None:
     collision, rng = collision_of(seed, arms=1 + seed % 2)
     near = rng.uniform(-np.pi, np.pi, size=(6, 1)) + 0.1 * rng.normal(size=(6, 150))
     for q in (near, rng.uniform(-np.pi, np.pi, size=(6, 150))):
-        for exact, limited in zip(collision.clearance(q), collision.clearance(q, limit), strict=True):
+        for exact, limited in zip(
+            collision.clearance(q), collision.clearance(q, limit), strict=True
+        ):
             below = exact < limit
             assert np.array_equal(limited[below], exact[below])
             assert np.all(limited[~below] == limit)
@@ -276,7 +336,10 @@ def test_no_configurations_and_what_is_not_a_number() -> None:
 
 
 def test_pairs_arms_and_ignored_obstacles_are_the_callers() -> None:
-    model, floor = two_sticks(), HalfSpaceObstacle(shape="half_space", point=(0.0, 0.0), normal=(0.0, 0.0, 1.0))
+    model, floor = (
+        two_sticks(),
+        HalfSpaceObstacle(shape="half_space", point=(0.0, 0.0), normal=(0.0, 0.0, 1.0)),
+    )
     ends = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     shapes = Shapes(np.array([0, 1, 2]), np.zeros((3, 3)), ends, np.ones(3))
     q = np.zeros((2, 1))
@@ -310,7 +373,9 @@ def test_more_obstacles_and_pairs_than_a_word_has_bits() -> None:
     pairs = default_pairs(model, {one.parentJoint for one in geometry.geometryObjects})
     found = collision.clearance(q)
     for sample in range(2):
-        expected = plain_clearances(model, geometry, table, pairs, [0] * model.njoints, q[:, sample])
+        expected = plain_clearances(
+            model, geometry, table, pairs, [0] * model.njoints, q[:, sample]
+        )
         agree([row[sample] for row in found], expected, -np.inf)
 
 
@@ -333,7 +398,10 @@ def test_wrong_shapes_are_refused(changes: dict[str, np.ndarray], message: str) 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"pairs": [(1, 1)]}, r"pairs must hold two different joints of \[1, 2\] each, was \(1, 1\)"),
+        (
+            {"pairs": [(1, 1)]},
+            r"pairs must hold two different joints of \[1, 2\] each, was \(1, 1\)",
+        ),
         ({"pairs": [(0, 1)]}, "pairs must hold two different joints"),
         ({"ignored": [(1, 0)]}, "ignored must hold pairs"),
         ({"arms": (0, 0)}, "arms must have one number per joint of the model, 3, had 2"),
@@ -354,8 +422,12 @@ def test_wrong_arguments_and_geometries_are_refused() -> None:
     with pytest.raises(ValueError, match="limit must be a number, was nan"):
         collision.clearance(np.zeros((6, 1)), np.nan)
     geometry = pin.GeometryModel()
-    geometry.addGeometryObject(pin.GeometryObject("cube", 1, 0, pin.SE3.Identity(), coal.Box(1.0, 1.0, 1.0)))
-    with pytest.raises(ValueError, match=r"object 'cube' must be a coal.Sphere or a coal.Capsule, is a Box"):
+    geometry.addGeometryObject(
+        pin.GeometryObject("cube", 1, 0, pin.SE3.Identity(), coal.Box(1.0, 1.0, 1.0))
+    )
+    with pytest.raises(
+        ValueError, match=r"object 'cube' must be a coal.Sphere or a coal.Capsule, is a Box"
+    ):
         shapes_of_geometry(geometry)
     free = pin.Model()
     free.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "free")

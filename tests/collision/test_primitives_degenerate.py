@@ -1,4 +1,7 @@
-"""Capsules in special position: parallel, touching, crossing, of length or radius 0, inside obstacles."""
+"""Capsules in special position.
+
+Parallel, touching, crossing, of length or radius 0, inside obstacles.
+"""
 
 from typing import Any
 
@@ -29,7 +32,9 @@ RADII = st.sampled_from([0.0, 0.1, 0.5])
 OBSTACLES = (
     SphereObstacle(shape="sphere", center=(0.25, 0.0, 0.5), radius=0.25),
     BoxObstacle(shape="box", center=(0.0, 0.0, 0.0), size=(1.0, 0.5, 0.02)),
-    BoxObstacle(shape="box", center=(0.0, 0.5, 0.0), size=(0.5, 0.5, 0.5), rotation=(45.0, 0.0, 0.0)),
+    BoxObstacle(
+        shape="box", center=(0.0, 0.5, 0.0), size=(0.5, 0.5, 0.5), rotation=(45.0, 0.0, 0.0)
+    ),
     CapsuleObstacle(shape="capsule", start=(0.0, 0.0, -0.5), end=(0.0, 0.0, 0.5), radius=0.1),
     CylinderObstacle(shape="cylinder", start=(0.0, 0.0, -0.5), end=(0.0, 0.0, 0.5), radius=0.25),
     CylinderObstacle(shape="cylinder", start=(0.0, -0.5, 0.5), end=(0.5, -1.0, 0.5), radius=0.1),
@@ -43,7 +48,9 @@ def hinge() -> Any:
     return model
 
 
-def clearance(joints: list[int], starts: Any, ends: Any, radii: Any, obstacles: tuple[Any, ...] = ()) -> Any:
+def clearance(
+    joints: list[int], starts: Any, ends: Any, radii: Any, obstacles: tuple[Any, ...] = ()
+) -> Any:
     """Clearances of shapes on a hinge at rest, and on the world beside it."""
     shapes = Shapes(np.array(joints), np.array(starts), np.array(ends), np.array(radii))
     pairs = [(0, 1)] if len(joints) > 1 else []
@@ -83,19 +90,26 @@ def test_a_capsule_and_an_obstacle(a: Point, b: Point, radius: float, k: int) ->
     found = clearance([1], [a], [b], [radius], (OBSTACLES[k],)).to_obstacles[0]
     inside = expected <= -radius and isinstance(OBSTACLES[k], BoxObstacle | CylinderObstacle)
     if inside and a != b:
-        assert expected - 1e-12 <= found <= -radius + 1e-12  # the depth of a point inside, perhaps not the deepest
+        assert (
+            expected - 1e-12 <= found <= -radius + 1e-12
+        )  # the depth of a point inside, perhaps not the deepest
     else:
         assert found == pytest.approx(expected, abs=1e-12)
 
 
 def test_a_line_through_a_box_or_a_cylinder_collides() -> None:
     for obstacle in (OBSTACLES[1], OBSTACLES[4]):
-        for a, b in (((-3.0, 0.1, 0.002), (3.0, 0.12, 0.001)), ((0.1, 0.1, -3.0), (0.11, 0.1, 3.0))):
+        for a, b in (
+            ((-3.0, 0.1, 0.002), (3.0, 0.12, 0.001)),
+            ((0.1, 0.1, -3.0), (0.11, 0.1, 3.0)),
+        ):
             assert clearance([1], [a], [b], [0.0], (obstacle,)).to_obstacles[0] < 0.0
 
 
 def test_centres_inside_obstacles_give_depths() -> None:
-    for obstacle, expected in zip(OBSTACLES, (-0.25, -0.01, None, None, -0.25, None, -0.5), strict=True):
+    for obstacle, expected in zip(
+        OBSTACLES, (-0.25, -0.01, None, None, -0.25, None, -0.5), strict=True
+    ):
         point = (0.25, 0.0, 0.5) if isinstance(obstacle, SphereObstacle) else (0.0, 0.0, 0.0)
         if expected is not None:
             point = (0.0, 0.0, -1.0) if isinstance(obstacle, HalfSpaceObstacle) else point
@@ -107,9 +121,14 @@ def test_centres_inside_obstacles_give_depths() -> None:
 def test_very_short_capsules_are_points(length: float) -> None:
     a, b = (0.0, 0.0, 0.0), (length, 0.0, 0.0)
     c, d = (1.0, 0.0, 1.0), (1.0, length, 1.0)
-    assert clearance([0, 1], [a, c], [b, d], [0.1, 0.2]).to_self[0] == pytest.approx(np.sqrt(2.0) - 0.3, abs=1e-11)
+    assert clearance([0, 1], [a, c], [b, d], [0.1, 0.2]).to_self[0] == pytest.approx(
+        np.sqrt(2.0) - 0.3, abs=1e-11
+    )
     for k, obstacle in enumerate(OBSTACLES):
-        expected = float(to_obstacle(obstacle_table(OBSTACLES), k)(np.array(c).astype(np.longdouble))) - 0.1
+        expected = (
+            float(to_obstacle(obstacle_table(OBSTACLES), k)(np.array(c).astype(np.longdouble)))
+            - 0.1
+        )
         found = clearance([1], [c], [d], [0.1], (obstacle,)).to_obstacles[0]
         assert found == pytest.approx(expected, abs=1e-11)
 
@@ -117,6 +136,9 @@ def test_very_short_capsules_are_points(length: float) -> None:
 def test_touching_is_no_collision_and_less_is() -> None:
     for height, collides in ((1.0, False), (np.nextafter(1.0, 0.0), True)):
         found = clearance(
-            [0, 1], [(0.0, 0.0, 0.0), (0.0, 0.0, height)], [(0.0, 0.0, 0.0), (0.0, 0.0, height)], [0.5, 0.5]
+            [0, 1],
+            [(0.0, 0.0, 0.0), (0.0, 0.0, height)],
+            [(0.0, 0.0, 0.0), (0.0, 0.0, height)],
+            [0.5, 0.5],
         )
         assert bool(found.least[0] < 0.0) is collides

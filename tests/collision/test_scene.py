@@ -1,4 +1,7 @@
-"""Scenes: which pairs are watched, what bodies are called, and that coal's shapes are the obstacles'."""
+"""Scenes: which pairs are watched, what bodies are called.
+
+And that coal's shapes are the obstacles'.
+"""
 
 import coal
 import numpy as np
@@ -51,13 +54,17 @@ def test_a_platform_is_called_so_and_the_links_on_it_are_counted_as_ever() -> No
 
 def test_links_of_one_arm_are_watched_if_wanted() -> None:
     built = scene(ARM.build(), self_pairs=True)
-    assert [built.pair_names(k) for k in range(len(built.pairs))] == [("arm_1_link_1", "arm_1_link_3")]
+    assert [built.pair_names(k) for k in range(len(built.pairs))] == [
+        ("arm_1_link_1", "arm_1_link_3")
+    ]
     assert len(scene(ARM.build()).pairs) == 0
 
 
 OBSTACLES = [
     BALL,
-    BoxObstacle(shape="box", center=(1.0, 2.0, 3.0), size=(1.0, 0.6, 0.4), rotation=(20.0, -30.0, 70.0)),
+    BoxObstacle(
+        shape="box", center=(1.0, 2.0, 3.0), size=(1.0, 0.6, 0.4), rotation=(20.0, -30.0, 70.0)
+    ),
     CapsuleObstacle(shape="capsule", start=(-1.0, 1.0), end=(-2.0, -2.0, 1.0), radius=0.3),
     CylinderObstacle(shape="cylinder", start=(-1.0, 1.0), end=(-2.0, -2.0, 1.0), radius=0.3),
     HalfSpaceObstacle(shape="half_space", point=(1.0, -1.0, 0.5), normal=(1.0, 2.0, -0.5)),
@@ -71,10 +78,14 @@ def inside(obstacle: object, points: np.ndarray) -> np.ndarray:
         return ((points - np.array([*obstacle.center, 0.0])) ** 2).sum(axis=1) < obstacle.radius**2
     if isinstance(obstacle, BoxObstacle):
         turn = pin.rpy.rpyToMatrix(*np.deg2rad(obstacle.rotation))
-        return np.all(np.abs((points - obstacle.center) @ turn) < 0.5 * np.array(obstacle.size), axis=1)
+        return np.all(
+            np.abs((points - obstacle.center) @ turn) < 0.5 * np.array(obstacle.size), axis=1
+        )
     if isinstance(obstacle, EllipseObstacle):
         turn = pin.rpy.rpyToMatrix(0.0, 0.0, np.deg2rad(obstacle.angle))
-        return (((points - obstacle.center) @ turn / np.array([1.2, 0.7, 0.7])) ** 2).sum(axis=1) < 1.0
+        return (((points - obstacle.center) @ turn / np.array([1.2, 0.7, 0.7])) ** 2).sum(
+            axis=1
+        ) < 1.0
     if isinstance(obstacle, HalfSpaceObstacle):
         return (points - obstacle.point) @ np.array(obstacle.normal) < 0.0
     start, end = (np.array([*p, 0.0][:3]) for p in (obstacle.start, obstacle.end))
@@ -97,16 +108,24 @@ def test_coals_shape_is_the_obstacle(obstacle: object) -> None:
     for point, within in zip(points, expected, strict=True):
         result.clear()
         ball = coal.Sphere(1e-9)
-        distance = coal.distance(ball, coal.Transform3s(np.eye(3), point), shape, where, request, result)
+        distance = coal.distance(
+            ball, coal.Transform3s(np.eye(3), point), shape, where, request, result
+        )
         assert (distance < 0.0) == within or abs(distance) < 1e-5
 
 
 def test_a_scene_of_any_geometry() -> None:
     model, geometry = pin.Model(), pin.GeometryModel()
     joint = model.addJoint(0, pin.JointModelRY(), pin.SE3.Identity(), "turn")
-    for name, shape in (("egg", coal.Ellipsoid(0.3, 0.2, 0.1)), ("rock", hull(0.5)), ("ice", coal.Cone(0.2, 0.4))):
+    for name, shape in (
+        ("egg", coal.Ellipsoid(0.3, 0.2, 0.1)),
+        ("rock", hull(0.5)),
+        ("ice", coal.Cone(0.2, 0.4)),
+    ):
         placement = pin.SE3(np.eye(3), np.array([1.0, 0.0, 2.0]))
-        geometry.addGeometryObject(pin.GeometryObject(name, joint if name == "egg" else 0, 0, placement, shape))
+        geometry.addGeometryObject(
+            pin.GeometryObject(name, joint if name == "egg" else 0, 0, placement, shape)
+        )
     geometry.addCollisionPair(pin.CollisionPair(0, 2))
     built = geometry_scene(model, geometry)
     assert built.names == ("egg", "rock", "ice")
@@ -117,12 +136,19 @@ def test_a_scene_of_any_geometry() -> None:
 def test_shapes_that_cannot_be_bounded_are_refused() -> None:
     model, geometry = pin.Model(), pin.GeometryModel()
     joint = model.addJoint(0, pin.JointModelRY(), pin.SE3.Identity(), "turn")
-    plane = pin.GeometryObject("glass", 0, 0, pin.SE3.Identity(), coal.Plane(np.array([0.0, 0.0, 1.0]), 0.0))
+    plane = pin.GeometryObject(
+        "glass", 0, 0, pin.SE3.Identity(), coal.Plane(np.array([0.0, 0.0, 1.0]), 0.0)
+    )
     geometry.addGeometryObject(plane)
-    with pytest.raises(UnsupportedShape, match=r"'glass' must be a convex shape, a half-space or a mesh, was a Plane"):
+    with pytest.raises(
+        UnsupportedShape,
+        match=r"'glass' must be a convex shape, a half-space or a mesh, was a Plane",
+    ):
         geometry_scene(model, geometry)
     geometry = pin.GeometryModel()
     ground = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
     geometry.addGeometryObject(pin.GeometryObject("ground", joint, 0, pin.SE3.Identity(), ground))
-    with pytest.raises(UnsupportedShape, match=r"half-space 'ground' must stand still, moves with a joint"):
+    with pytest.raises(
+        UnsupportedShape, match=r"half-space 'ground' must stand still, moves with a joint"
+    ):
         geometry_scene(model, geometry)

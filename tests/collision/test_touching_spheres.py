@@ -1,4 +1,7 @@
-"""Touching spheres: the fast kernel against coal on the same shapes, and against the obvious loop."""
+"""Touching spheres: the fast kernel against coal on the same shapes.
+
+And against the obvious loop.
+"""
 
 import coal
 import numpy as np
@@ -16,7 +19,9 @@ MODEL = TouchingSpheres(spheres_per_link=5, sphere_radius=0.5, collision_substep
 OBSTACLES = (
     SphereObstacle(shape="sphere", center=(3.0, 4.0), radius=0.7),
     BoxObstacle(shape="box", center=(-3.0, 4.5, 0.2), size=(1.0, 2.0), rotation=(0.0, 0.0, 35.0)),
-    BoxObstacle(shape="box", center=(1.0, 9.0, 0.0), size=(1.0, 2.0, 0.4), rotation=(20.0, -30.0, 70.0)),
+    BoxObstacle(
+        shape="box", center=(1.0, 9.0, 0.0), size=(1.0, 2.0, 0.4), rotation=(20.0, -30.0, 70.0)
+    ),
     CapsuleObstacle(shape="capsule", start=(-6.0, 1.0), end=(-4.0, -2.0, 1.0), radius=0.3),
     CapsuleObstacle(shape="capsule", start=(5.0, 5.0, -1.0), end=(5.0, 5.0, 1.0), radius=0.3),
 )
@@ -36,24 +41,32 @@ TWO_PLANAR = Arms(
         PlanarChain(link_lengths=(4.0, 4.0), base_position=(0.0, 8.0), base_angle=20.0),
     )
 )
-THREE_PLANAR = Arms(arms=(*TWO_PLANAR.arms, PlanarChain(link_lengths=(3.0, 2.0, 2.0), base_position=(9.0, 4.0))))
+THREE_PLANAR = Arms(
+    arms=(*TWO_PLANAR.arms, PlanarChain(link_lengths=(3.0, 2.0, 2.0), base_position=(9.0, 4.0)))
+)
 TWO_SPATIAL = Arms(arms=(elbow((0.0, 0.0, 0.0)), elbow((0.0, 2.5, 0.0))))
 ONE_PLANAR = PlanarChain(link_lengths=(4.0, 4.0), base_position=(0.0, 4.0))
 
 
-def coal_clearance(collision: SphereCollision, obstacles: tuple[object, ...], q_deg: np.ndarray) -> tuple[float, float]:
-    """Least distances by coal, between spheres of different arms and between spheres and obstacles."""
+def coal_clearance(
+    collision: SphereCollision, obstacles: tuple[object, ...], q_deg: np.ndarray
+) -> tuple[float, float]:
+    """Least distances by coal: spheres of different arms, and spheres and obstacles."""
     assembly, geometry = collision.assembly, collision.geometry
     data, geometry_data = assembly.model.createData(), geometry.createData()
     pin.updateGeometryPlacements(assembly.model, data, geometry, geometry_data, np.deg2rad(q_deg))
-    arms = np.concatenate([[a] * (stop - first) for a, (first, stop) in enumerate(collision.arm_spheres)])
+    arms = np.concatenate(
+        [[a] * (stop - first) for a, (first, stop) in enumerate(collision.arm_spheres)]
+    )
     spheres = [
         (coal.CollisionObject(g.geometry, p.rotation, p.translation), arm)
         for g, p, arm in zip(geometry.geometryObjects, geometry_data.oMg, arms, strict=True)
     ]
     request, result = coal.DistanceRequest(), coal.DistanceResult()
     between = [_distance(a, b, request, result) for a, m in spheres for b, n in spheres if m < n]
-    outside = [_distance(a, coal_obstacle(o), request, result) for a, _ in spheres for o in obstacles]
+    outside = [
+        _distance(a, coal_obstacle(o), request, result) for a, _ in spheres for o in obstacles
+    ]
     return min(between, default=np.inf), min(outside, default=np.inf)
 
 
@@ -64,14 +77,18 @@ def _distance(a: object, b: object, request: object, result: object) -> float:
 
 def coal_obstacle(obstacle: object) -> coal.CollisionObject:
     if isinstance(obstacle, SphereObstacle):
-        return coal.CollisionObject(coal.Sphere(obstacle.radius), np.eye(3), np.array([*obstacle.center, 0.0][:3]))
+        return coal.CollisionObject(
+            coal.Sphere(obstacle.radius), np.eye(3), np.array([*obstacle.center, 0.0][:3])
+        )
     if isinstance(obstacle, BoxObstacle):
         shape = coal.Box(*[*obstacle.size, 1.0][:3])
         center = np.array([*obstacle.center, 0.0][:3])
         return coal.CollisionObject(shape, rotation_matrix(obstacle.rotation), center)
     start, end = (np.array([*point, 0.0][:3]) for point in (obstacle.start, obstacle.end))
     length = np.linalg.norm(end - start)
-    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), (end - start) / length).toRotationMatrix()
+    turn = pin.Quaternion.FromTwoVectors(
+        np.array([0.0, 0.0, 1.0]), (end - start) / length
+    ).toRotationMatrix()
     return coal.CollisionObject(coal.Capsule(obstacle.radius, length), turn, 0.5 * (start + end))
 
 
@@ -86,7 +103,8 @@ def test_clearance_agrees_with_coal(robot: Robot) -> None:
     for sample in range(q.shape[1]):
         between, outside = coal_clearance(collision, OBSTACLES, q[:, sample])
         assert clearance.between_arms[sample] == pytest.approx(between, abs=1e-12)
-        # coal gives penetration depths of box and sphere by iteration: compare magnitudes outside, signs inside
+        # coal gives penetration depths of box and sphere by iteration: compare magnitudes outside,
+        # signs inside
         if outside > 0.0:
             assert clearance.to_obstacles[sample] == pytest.approx(outside, abs=1e-6)
         else:
@@ -96,7 +114,9 @@ def test_clearance_agrees_with_coal(robot: Robot) -> None:
 def test_planar_and_spatial_kernels_agree() -> None:
     assembly = THREE_PLANAR.build()
     planar = MODEL.bind(assembly, OBSTACLES)
-    spatial = planar._replace(assembly=assembly._replace(table=assembly.table._replace(planar=False)))
+    spatial = planar._replace(
+        assembly=assembly._replace(table=assembly.table._replace(planar=False))
+    )
     q = np.random.default_rng(1).uniform(-720.0, 720.0, size=(assembly.model.nq, 333))
     for fast, general in zip(planar.clearance(q), spatial.clearance(q), strict=True):
         assert np.abs(fast - general).max() < 1e-12
@@ -116,7 +136,10 @@ def test_a_single_arm_meets_no_other_arm() -> None:
 
 
 def test_touching_is_no_collision_and_less_is() -> None:
-    """Strictly less than the sum of the radii collides: two parallel arms at distance 1 and just below."""
+    """Strictly less than the sum of the radii collides.
+
+    Two parallel arms at distance 1 and just below.
+    """
     for distance, collides in ((1.0, False), (np.nextafter(1.0, 0.0), True)):
         robot = Arms(
             arms=(
@@ -156,9 +179,13 @@ def test_a_limit_skips_only_what_is_not_asked(robot: Robot, limit: float) -> Non
     assembly = robot.build()
     collision = MODEL.bind(assembly, OBSTACLES)
     rng = np.random.default_rng(5)
-    near = rng.uniform(-180.0, 180.0, size=(assembly.model.nq, 1)) + rng.normal(size=(assembly.model.nq, 640))
+    near = rng.uniform(-180.0, 180.0, size=(assembly.model.nq, 1)) + rng.normal(
+        size=(assembly.model.nq, 640)
+    )
     for q in (near, rng.uniform(-180.0, 180.0, size=(assembly.model.nq, 640))):
-        for exact, limited in zip(collision.clearance(q), collision.clearance(q, limit), strict=True):
+        for exact, limited in zip(
+            collision.clearance(q), collision.clearance(q, limit), strict=True
+        ):
             below = exact < limit
             assert np.array_equal(limited[below], exact[below])
             assert np.all(limited[~below] >= limit - 1e-15)

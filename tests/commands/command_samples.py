@@ -6,7 +6,12 @@ from typing import NamedTuple
 
 from evoexp.cli import main
 
-SMALL = ("budget=smoke", "ga.population_size=8", "ga.num_generations=2", "planner.num_new_trajectories=1")
+SMALL = (
+    "budget=smoke",
+    "ga.population_size=8",
+    "ga.num_generations=2",
+    "planner.num_new_trajectories=1",
+)
 SERIAL = (*SMALL, "runner=serial")
 
 

@@ -48,7 +48,10 @@ def refused(evoexp: Evoexp, outputs: Path) -> Callable[..., str]:
 
 @pytest.fixture(scope="session")
 def stored_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return outputs with a small run of both conditions of `rana_planar`, two replicates each; not to be changed."""
+    """Return outputs with a small run of both conditions of `rana_planar`, two replicates each.
+
+    Not to be changed.
+    """
     root = tmp_path_factory.mktemp("stored") / "outputs"
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("EVOEXP_OUTPUTS", str(root))

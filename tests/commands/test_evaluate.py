@@ -59,7 +59,9 @@ def test_the_best_of_a_stored_run_is_worth_what_is_recorded(
     assert verdict == {name: getattr(log.summary, name) for name in Certificate._fields}
     assert said == log.summary.terms
     columns = read_summaries(runs[label]).columns
-    assert {f"term_{name}" for name in said} == {name for name in columns if name.startswith("term_")}
+    assert {f"term_{name}" for name in said} == {
+        name for name in columns if name.startswith("term_")
+    }
 
 
 def test_several_conditions_are_several_objects_and_columns(evoexp: Evoexp, motion: Path) -> None:
@@ -72,19 +74,26 @@ def test_several_conditions_are_several_objects_and_columns(evoexp: Evoexp, moti
         assert rows[0][name] == rows[1][name]
     table = evoexp("evaluate", str(motion), *PLANAR).out
     assert all(row["condition"][:12] in table and row["label"] in table for row in rows)
-    assert all(f"│ {name} " in table for name in rows[0].keys() - {"label", "condition", "length_unit"})
+    assert all(
+        f"│ {name} " in table for name in rows[0].keys() - {"label", "condition", "length_unit"}
+    )
 
 
 def test_overrides_and_only_narrow_it_down(evoexp: Evoexp, motion: Path) -> None:
     words = ("evaluate", *PLANAR, str(motion), "--json", "--only", "via-point GA")
-    plain, weighted = json.loads(evoexp(*words).out), json.loads(evoexp(*words, "objective.length_weight=1").out)
+    plain, weighted = (
+        json.loads(evoexp(*words).out),
+        json.loads(evoexp(*words, "objective.length_weight=1").out),
+    )
     assert (plain["label"], weighted["label"]) == ("via-point GA", "via-point GA")
     assert plain["condition"] != weighted["condition"]
     lengths = plain["length_arm_1_deg"] + plain["length_arm_2_deg"]
     assert plain["fitness"] - weighted["fitness"] == pytest.approx(0.5 * lengths)
 
 
-def test_tables_are_never_cut(evoexp: Evoexp, motion: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tables_are_never_cut(
+    evoexp: Evoexp, motion: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     words = ("evaluate", "-m", "experiment=rana_obstacles", "seed=0,1", str(motion))
     rows = json.loads(evoexp(*words, "--json").out)
     assert [row["label"] for row in rows] == ["seed=0", "seed=1"]
@@ -111,11 +120,17 @@ def test_a_condition_of_another_shape_is_left_out(
     for label, values in files.items():
         path = tmp_path / f"{label}.json"
         path.write_text(json.dumps(values))
-        assert json.loads(evoexp("evaluate", "experiment=mixed", str(path), "--json").out)["label"] == label
+        assert (
+            json.loads(evoexp("evaluate", "experiment=mixed", str(path), "--json").out)["label"]
+            == label
+        )
     (tmp_path / "none.json").write_text(json.dumps(two[:1]))
     said = evoexp("evaluate", "experiment=mixed", str(tmp_path / "none.json"))
     assert said.code == 2
-    assert "none.json: must be two: 2 × 21 × 2; three: 3 × 21 × 2 (start and goal included)" in said.err
+    assert (
+        "none.json: must be two: 2 × 21 × 2; three: 3 × 21 × 2 (start and goal included)"
+        in said.err
+    )
     assert said.err.endswith("was 1 × 21 × 2\n")
 
 
@@ -149,15 +164,31 @@ def spoiled(value: Any) -> list[Any]:
         ("motion.txt", lambda p: p.write_text("[]"), "a motion file ends in .json or .npy"),
         ("cut.json", lambda p: p.write_text("[[[0,"), "is no json of numbers: Expecting value"),
         ("empty.json", lambda p: p.write_text(""), "is no json of numbers: Expecting value"),
-        ("binary.json", lambda p: p.write_bytes(b"\xff\xfe\x00"), "is no json of numbers: 'utf-8' codec"),
-        ("deep.json", lambda p: p.write_text("[" * 100_000), "is no json of numbers: maximum recursion depth"),
+        (
+            "binary.json",
+            lambda p: p.write_bytes(b"\xff\xfe\x00"),
+            "is no json of numbers: 'utf-8' codec",
+        ),
+        (
+            "deep.json",
+            lambda p: p.write_text("[" * 100_000),
+            "is no json of numbers: maximum recursion depth",
+        ),
         (
             "nested.json",
             lambda p: p.write_text("[" * 900 + "]" * 900),
             "must hold nested lists of finite numbers, was [[",
         ),
-        ("nan.json", lambda p: p.write_text(json.dumps(spoiled(float("nan")))), "was nan at [1][3][0]"),
-        ("inf.json", lambda p: p.write_text(json.dumps(spoiled(float("inf")))), "was inf at [1][3][0]"),
+        (
+            "nan.json",
+            lambda p: p.write_text(json.dumps(spoiled(float("nan")))),
+            "was nan at [1][3][0]",
+        ),
+        (
+            "inf.json",
+            lambda p: p.write_text(json.dumps(spoiled(float("inf")))),
+            "was inf at [1][3][0]",
+        ),
         (
             "huge.json",
             lambda p: p.write_text(json.dumps(spoiled(10**400))),
@@ -171,11 +202,23 @@ def spoiled(value: Any) -> list[Any]:
             lambda p: p.write_text('{"motion": []}'),
             "must hold nested lists of finite numbers, was {'mot",
         ),
-        ("number.json", lambda p: p.write_text("3"), "must hold nested lists of finite numbers, was 3 at its top"),
+        (
+            "number.json",
+            lambda p: p.write_text("3"),
+            "must hold nested lists of finite numbers, was 3 at its top",
+        ),
         ("flat.json", lambda p: p.write_text("[1, 2, 3]"), "must be via-point GA: 2 × 21 × 2"),
         ("none.json", lambda p: p.write_text("[]"), "(start and goal included), was 0"),
-        ("ragged.json", lambda p: p.write_text(json.dumps([*NESTED[:1], [[0.0]]])), "was a ragged list of 2"),
-        ("shape.npy", lambda p: np.save(p, np.zeros((2, 20, 2))), "(start and goal included), was 2 × 20 × 2"),
+        (
+            "ragged.json",
+            lambda p: p.write_text(json.dumps([*NESTED[:1], [[0.0]]])),
+            "was a ragged list of 2",
+        ),
+        (
+            "shape.npy",
+            lambda p: np.save(p, np.zeros((2, 20, 2))),
+            "(start and goal included), was 2 × 20 × 2",
+        ),
         ("scalar.npy", lambda p: np.save(p, np.float64(3)), "was 3.0 at its top"),
         ("nan.npy", lambda p: np.save(p, np.full((2, 21, 2), np.nan)), "was nan at [0][0][0]"),
         ("complex.npy", lambda p: np.save(p, np.zeros((2, 21, 2), complex)), "was 0j at [0][0][0]"),
@@ -184,7 +227,11 @@ def spoiled(value: Any) -> list[Any]:
             lambda p: np.save(p, np.array([{}], dtype=object)),
             "is no npy of numbers: Object arrays cannot",
         ),
-        ("cut.npy", lambda p: (np.save(p, np.zeros((2, 21, 2))), p.write_bytes(p.read_bytes()[:-8])), "is no npy of"),
+        (
+            "cut.npy",
+            lambda p: (np.save(p, np.zeros((2, 21, 2))), p.write_bytes(p.read_bytes()[:-8])),
+            "is no npy of",
+        ),
         ("empty.npy", lambda p: p.write_bytes(b""), "is no npy of numbers: EOF"),
         ("pickle.npy", lambda p: p.write_bytes(b"\x80\x04N."), "is no npy of numbers: "),
         (
@@ -195,7 +242,11 @@ def spoiled(value: Any) -> list[Any]:
     ],
 )
 def test_motion_files_that_cannot_be_read(
-    refused: Callable[..., str], tmp_path: Path, name: str, write: Callable[[Path], object] | None, message: str
+    refused: Callable[..., str],
+    tmp_path: Path,
+    name: str,
+    write: Callable[[Path], object] | None,
+    message: str,
 ) -> None:
     path = tmp_path / name
     if write is not None:

@@ -1,4 +1,7 @@
-"""`evoexp list` and `evoexp show`: what is stored, what is shipped, what failed, what is damaged."""
+"""`evoexp list` and `evoexp show`.
+
+What is stored, what is shipped, what failed, what is damaged.
+"""
 
 import re
 from collections.abc import Callable
@@ -26,7 +29,11 @@ def width(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> in
 
 def cells(out: str) -> dict[str, list[str]]:
     """Return hash → the other cells of the first line of its row."""
-    rows = [[cell.strip() for cell in line.strip("│").split("│")] for line in out.splitlines() if line.startswith("│")]
+    rows = [
+        [cell.strip() for cell in line.strip("│").split("│")]
+        for line in out.splitlines()
+        if line.startswith("│")
+    ]
     return {row[0]: row[1:] for row in rows if re.fullmatch("[0-9a-f]{12}", row[0])}
 
 
@@ -60,7 +67,9 @@ def test_a_condition_that_experiments_share_is_named_as_it_was_run(
 ) -> None:
     monkeypatch.setenv("COLUMNS", "300")
     label, condition = expanded(name, "paper").conditions[0]
-    RunDirectory(outputs, condition.id).create(condition.to_json(), {"experiment": name, "label": label})
+    RunDirectory(outputs, condition.id).create(
+        condition.to_json(), {"experiment": name, "label": label}
+    )
     assert cells(evoexp("list").out)[condition.id[:12]][0] == f"{name}, {label}, paper"
 
 
@@ -68,7 +77,11 @@ def test_damaged_runs_are_listed_beside_the_others(
     evoexp: Evoexp, stored: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "300")
-    condition = compose.expand(["experiment=rana_planar", "budget=smoke", "seed=5"])[0].conditions[0].condition
+    condition = (
+        compose.expand(["experiment=rana_planar", "budget=smoke", "seed=5"])[0]
+        .conditions[0]
+        .condition
+    )
     first, second = find_runs(stored)
     without_manifest = RunDirectory(stored, condition.id)
     without_manifest.create(condition.to_json(), {})
@@ -84,7 +97,10 @@ def test_damaged_runs_are_listed_beside_the_others(
     assert list(rows) == sorted([first.hash12, second.hash12, without_manifest.hash12])
     assert rows[first.hash12][1:] == rows[second.hash12][1:] == ["–", "–", "–", "–"]
     assert rows[without_manifest.hash12] == ["(no manifest)", "0", "0", "0", "–"]
-    assert "config.json: damaged: its hash 44136fa355b3 is not the directory's name" in rows[first.hash12][0]
+    assert (
+        "config.json: damaged: its hash 44136fa355b3 is not the directory's name"
+        in rows[first.hash12][0]
+    )
     assert f"{log}: cut" in rows[second.hash12][0]
 
 
@@ -120,7 +136,9 @@ def test_digests_are_whole(evoexp: Evoexp, stored: Path, monkeypatch: pytest.Mon
     assert all(digest in out for digest in read_summaries(run)["digest"])
 
 
-def test_a_pipe_gets_wide_tables(evoexp: Evoexp, stored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_pipe_gets_wide_tables(
+    evoexp: Evoexp, stored: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.delenv("COLUMNS", raising=False)
     lines = [line for line in evoexp("list").out.splitlines() if "rana_planar, " in line]
     assert len(lines) == 2
@@ -129,19 +147,26 @@ def test_a_pipe_gets_wide_tables(evoexp: Evoexp, stored: Path, monkeypatch: pyte
 
 @pytest.fixture
 def one_shipped(monkeypatch: pytest.MonkeyPatch) -> Shipped:
-    condition = compose.expand(["experiment=rana_planar", "budget=smoke"])[0].conditions[1].condition
+    condition = (
+        compose.expand(["experiment=rana_planar", "budget=smoke"])[0].conditions[1].condition
+    )
     row = Shipped("rana_planar", "random search", "smoke", condition.id, "0" * 32)
     monkeypatch.setattr(shipped, "shipped", lambda: (row,))
     return row
 
 
-def test_a_shipped_condition_that_never_ran_here(evoexp: Evoexp, outputs: Path, one_shipped: Shipped) -> None:
+def test_a_shipped_condition_that_never_ran_here(
+    evoexp: Evoexp, outputs: Path, one_shipped: Shipped
+) -> None:
     said = evoexp("show", one_shipped.condition_id[:6])
     assert said.code == 0
     assert said.out.startswith(
         f"condition {one_shipped.condition_id}\nshipped as rana_planar, random search, budget smoke"
     )
-    assert "not run here; run it: evoexp run experiment=rana_planar budget=smoke --only 'random search'\n" in said.out
+    assert (
+        "not run here; run it: evoexp run experiment=rana_planar budget=smoke --only 'random "
+        "search'\n" in said.out
+    )
     assert "_target_: random_search" in said.out
     assert not outputs.exists()
 
@@ -154,7 +179,9 @@ def test_reproduce_compares_with_the_shipped_table(
     said = evoexp("reproduce", one_shipped.condition_id[:6], "--replicate", "1")
     assert said.code == 2
     assert said.err.startswith("evoexp: NOTHING TO COMPARE: replicate 1 of ")
-    condition = compose.expand(["experiment=rana_planar", "budget=smoke"])[0].conditions[1].condition
+    condition = (
+        compose.expand(["experiment=rana_planar", "budget=smoke"])[0].conditions[1].condition
+    )
     right = one_shipped._replace(digest=run_replicate(condition, 0).summary.digest)
     monkeypatch.setattr(shipped, "shipped", lambda: (right,))
     said = evoexp("reproduce", one_shipped.condition_id[:6], "--replicate", "0")
@@ -171,10 +198,18 @@ def test_an_ambiguous_shipped_hash_lists_the_candidates(
 
 
 def test_show_says_what_the_chromosomes_length_violates(evoexp: Evoexp, outputs: Path) -> None:
-    condition = compose.expand(["experiment=curkovic_methods"], only=["V"])[0].conditions[0].condition
+    condition = (
+        compose.expand(["experiment=curkovic_methods"], only=["V"])[0].conditions[0].condition
+    )
     said = evoexp("show", condition.id[:12])
     assert said.code == 0
     assert not outputs.exists()
     assert "robot 1: Eq. 2 allows steps of 5.73 and 11.46 deg (printed: 11.5 and 23)" in said.out
-    assert "robot 2: Eq. 3 asks for L = 42 here (120 deg), for L = 64 over 180 deg (printed: 32)" in said.out
-    assert "L = 8 (K = 4) takes steps of 24.00 deg at best, which violates it 4.19 times over" in said.out
+    assert (
+        "robot 2: Eq. 3 asks for L = 42 here (120 deg), for L = 64 over 180 deg (printed: 32)"
+        in said.out
+    )
+    assert (
+        "L = 8 (K = 4) takes steps of 24.00 deg at best, which violates it 4.19 times over"
+        in said.out
+    )

@@ -1,4 +1,7 @@
-"""Whatever cannot be done is said in one line that names the field, before anything is computed or written."""
+"""Whatever cannot be done is said in one line that names the field.
+
+Before anything is computed or written.
+"""
 
 import json
 import re
@@ -30,15 +33,25 @@ OPTIONS = f"(options: {EXPERIMENTS})"
         # unknown names
         (
             "ga.mutation_rat=1",
-            "ga.mutation_rat: unknown setting; did you mean 'mutation_rate'? (known here: crossover_rate",
+            "ga.mutation_rat: unknown setting; did you mean 'mutation_rate'? (known here: "
+            "crossover_rate",
         ),
         ("gaa.mutation_rate=1", "gaa: unknown setting; did you mean 'ga'?"),
         ("mutation_rate=1", "mutation_rate: unknown setting; did you mean 'ga.mutation_rate'?"),
         ("+ga.temperature=1", "ga.temperature: unknown setting"),
         ("++temperature=1", "temperature: unknown setting (known here:"),
-        ("+reference=x", "reference: no option 'x' (options: grid_frontier, placement_conventional, "),
-        ("robot.arms.0.length=1", "robot.arms.0.length: unknown setting; did you mean 'link_lengths'?"),
-        ("robot.arms.x.length=1", "configuration: must be composable, was \"Index 'x' (str) is not an int"),
+        (
+            "+reference=x",
+            "reference: no option 'x' (options: grid_frontier, placement_conventional, ",
+        ),
+        (
+            "robot.arms.0.length=1",
+            "robot.arms.0.length: unknown setting; did you mean 'link_lengths'?",
+        ),
+        (
+            "robot.arms.x.length=1",
+            "configuration: must be composable, was \"Index 'x' (str) is not an int",
+        ),
         (
             "scenario.obstacles.7.radius=3",
             "scenario.obstacles.7.radius: must be a setting that is there and takes this",
@@ -54,12 +67,19 @@ OPTIONS = f"(options: {EXPERIMENTS})"
         ("ga.num_elites=1.5", "ga.num_elites: must be a whole number, was 1.5"),
         ("ga.num_elites=null", "ga.num_elites: must be a whole number, was None"),
         ("planner.redistribution=1", "planner.redistribution: must be true or false, was 1"),
-        ("planner.spline_end=natur", "planner.spline_end: must be one of 'natural' or 'clamped', was 'natur'; did you"),
+        (
+            "planner.spline_end=natur",
+            "planner.spline_end: must be one of 'natural' or 'clamped', was 'natur'; did you",
+        ),
         (
             "scenario.obstacles=[{shape:cone}]",
-            "scenario.obstacles[0]: must be one of 'sphere', 'box', 'capsule', 'cylinder', 'half_space', 'ellipse'",
+            "scenario.obstacles[0]: must be one of 'sphere', 'box', 'capsule', 'cylinder', "
+            "'half_space', 'ellipse'",
         ),
-        ("robot.arms.0.link_lengths=[4,-1]", "robot.arms[0].link_lengths[1]: must be greater than 0"),
+        (
+            "robot.arms.0.link_lengths=[4,-1]",
+            "robot.arms[0].link_lengths[1]: must be greater than 0",
+        ),
         ("seed=1.5", "seed: must be a whole number, at least 0, was 1.5"),
         ("num_replicates=0", "num_replicates: must be a whole number, at least 1, was 0"),
         ("report.dpi=fine", "report.dpi: must be a whole number, was 'fine'"),
@@ -68,29 +88,51 @@ OPTIONS = f"(options: {EXPERIMENTS})"
         ("~ga.mutation_rate", "ga.mutation_rate: must be given, was None"),
         # pairs
         ("ga.num_elites=9", "ga.num_elites: must be at most population_size (8), was 9"),
-        ("ga.num_elites=8", "planner.num_new_trajectories: must be at most the offspring of a generation (0), was 1"),
+        (
+            "ga.num_elites=8",
+            "planner.num_new_trajectories: must be at most the offspring of a generation (0), "
+            "was 1",
+        ),
         (
             "scenario.q_start=[[90,0],[270,0]]",
             "scenario.q_start: must be free of collision (two arms overlap by 1 unit)",
         ),
         ("scenario.q_goal=[[0,0]]", "scenario.q_goal: must be one list per arm of the robot"),
-        ("robot=three_planar_2r", "scenario.q_start: must be one list per arm of the robot, with 2, 2, 2 joint angles"),
+        (
+            "robot=three_planar_2r",
+            "scenario.q_start: must be one list per arm of the robot, with 2, 2, 2 joint angles",
+        ),
         # what a configuration may not name
         ("ga._target_=os.system", "ga._target_: must be a registered component, was 'os.system'"),
         (
             "planner._target_=evoexp.planners.via_point_ga.ViaPointGa",
             "planner._target_: must be a registered component",
         ),
-        ("+ga.x={_target_:builtins.eval}", "ga.x._target_: must be a registered component, was 'builtins.eval'"),
-        ("hydra.run.dir=/tmp/x", "override: must be a setting of evoexp (nothing of Hydra's own), was 'hydra.run.dir"),
+        (
+            "+ga.x={_target_:builtins.eval}",
+            "ga.x._target_: must be a registered component, was 'builtins.eval'",
+        ),
+        (
+            "hydra.run.dir=/tmp/x",
+            "override: must be a setting of evoexp (nothing of Hydra's own), was 'hydra.run.dir",
+        ),
         ("+hydra.x=1", "nothing of Hydra's own"),
         ("~hydra", "nothing of Hydra's own"),
         ("hydra/launcher=basic", "nothing of Hydra's own"),
-        ("conditions={}", "conditions: must be left to the experiment's file (choose among them: --only LABEL)"),
+        (
+            "conditions={}",
+            "conditions: must be left to the experiment's file (choose among them: --only LABEL)",
+        ),
         ("budget.name=paper", "budget.name: must be left as it is: claims are judged by it"),
         # sweeps, malformed, twice
-        ("ga.num_elites=0,2", "ga.num_elites: must be one value (or add -m to sweep over several), was '0,2'"),
-        ("ga.num_elites=range(3)", "ga.num_elites: must be one value (or add -m to sweep over several)"),
+        (
+            "ga.num_elites=0,2",
+            "ga.num_elites: must be one value (or add -m to sweep over several), was '0,2'",
+        ),
+        (
+            "ga.num_elites=range(3)",
+            "ga.num_elites: must be one value (or add -m to sweep over several)",
+        ),
         ("ga.num_elites", "override: must be key=value, was 'ga.num_elites'"),
         ("ga.num_elites==1", "override: must be key=value"),
         ("=1", "override: must be key=value, was '=1'"),
@@ -100,12 +142,19 @@ OPTIONS = f"(options: {EXPERIMENTS})"
         ("ga@planner.ga=rana_planar", "override: must be key=value"),
         (
             "ga.population_size=9",
-            "ga.population_size: must be given once, was 'ga.population_size=8 ga.population_size=9'",
+            "ga.population_size: must be given once, was 'ga.population_size=8 "
+            "ga.population_size=9'",
         ),
         ("experiment=rana_planar", "experiment: must be given once"),
-        ("ga.mutation_rate=${nothing}", "ga.mutation_rate: must be resolvable, was \"Interpolation key 'nothing' not"),
+        (
+            "ga.mutation_rate=${nothing}",
+            "ga.mutation_rate: must be resolvable, was \"Interpolation key 'nothing' not",
+        ),
         ("~robot", "robot: must be given, was '~robot'"),
-        ("~control=random_search", "control: must be an option that is chosen, to be deleted, was '~control=random_"),
+        (
+            "~control=random_search",
+            "control: must be an option that is chosen, to be deleted, was '~control=random_",
+        ),
         ("~seed", "seed: must be given, was '~seed'"),
     ],
 )
@@ -127,36 +176,62 @@ def test_overrides(refused: Refused, override: str, message: str) -> None:
         ),
         (("run", "experiment=null"), f"experiment: must be chosen: {EXPERIMENTS}"),
         (("run", "robot=two_planar_2r"), "experiment: must be chosen: "),
-        (("run", "experiment=rana_planar,rana_obstacles"), "experiment: must be one value (or add -m"),
+        (
+            ("run", "experiment=rana_planar,rana_obstacles"),
+            "experiment: must be one value (or add -m",
+        ),
         (
             ("run", "-m", "experiment=rana_planar", 'scenario.length_unit=choice("foot\'",m)'),
-            "configuration: must be composable, was \"LexerNoViableAltException: scenario.length_unit=foot'",
+            'configuration: must be composable, was "LexerNoViableAltException: '
+            "scenario.length_unit=foot'",
         ),
         (("run", "experiment=rana_planar", "--only", "GA"), "--only: no option 'GA'"),
-        (("run", "experiment=rana_planar", "--only", " , "), "argument --only: must name a condition, was ' , '"),
-        (("run", "experiment=rana_planar", "--nolreport"), "no option '--nolreport'; did you mean '--no-report'?"),
+        (
+            ("run", "experiment=rana_planar", "--only", " , "),
+            "argument --only: must name a condition, was ' , '",
+        ),
+        (
+            ("run", "experiment=rana_planar", "--nolreport"),
+            "no option '--nolreport'; did you mean '--no-report'?",
+        ),
         (
             ("run", "--fast", "experiment=rana_planar"),
             "no option '--fast' (options: -h, --help, -m, --multirun, --only",
         ),
-        (("run", "--no-rep", "experiment=rana_planar"), "no option '--no-rep'; did you mean '--no-report'?"),
-        (("rum", "experiment=rana_planar"), "no command 'rum'; did you mean 'run'? (commands: run, report, reproduce,"),
+        (
+            ("run", "--no-rep", "experiment=rana_planar"),
+            "no option '--no-rep'; did you mean '--no-report'?",
+        ),
+        (
+            ("rum", "experiment=rana_planar"),
+            "no command 'rum'; did you mean 'run'? (commands: run, report, reproduce,",
+        ),
         (("--fast",), "no option '--fast'"),
         (("list", "runs"), "no option 'runs'"),
         (("show",), "the following arguments are required: HASH"),
-        (("report", "rana_planr"), f"experiment: no option 'rana_planr'; did you mean 'rana_planar'? {OPTIONS}"),
+        (
+            ("report", "rana_planr"),
+            f"experiment: no option 'rana_planr'; did you mean 'rana_planar'? {OPTIONS}",
+        ),
         (("report", "rana_planar"), "rana_planar: nothing stored in"),
-        (("evaluate", "experiment=rana_planar"), "motion file: one is needed (.json or .npy), got 0: none"),
+        (
+            ("evaluate", "experiment=rana_planar"),
+            "motion file: one is needed (.json or .npy), got 0: none",
+        ),
         (
             ("evaluate", "a.json", "b.json", "experiment=rana_planar"),
             "motion file: one is needed (.json or .npy), got 2: a",
         ),
         (("reproduce", "no/such.mcap"), "no/such.mcap: cannot be read: No such file or directory"),
         (("reproduce", "abc"), "NOTHING TO COMPARE: hash: no run 'abc' among the 0 in"),
-        (("reproduce", "xyz"), "NOTHING TO COMPARE: hash: must be 1 to 64 hexadecimal digits, was 'xyz'"),
+        (
+            ("reproduce", "xyz"),
+            "NOTHING TO COMPARE: hash: must be 1 to 64 hexadecimal digits, was 'xyz'",
+        ),
         (
             ("show", "xyz"),
-            "hash: must be 1 to 64 hexadecimal digits, was 'xyz'; no shipped condition either (stored: none",
+            "hash: must be 1 to 64 hexadecimal digits, was 'xyz'; no shipped condition either "
+            "(stored: none",
         ),
     ],
 )
@@ -237,7 +312,10 @@ def crafted(config: bytes, path: Path, source: Path) -> Path:
     ("target", "message"),
     [
         ("os.system", "planner.ga._target_: must be a registered component, was 'os.system'"),
-        ("subprocess:Popen", "planner.ga._target_: must be a registered component, was 'subprocess:Popen'"),
+        (
+            "subprocess:Popen",
+            "planner.ga._target_: must be a registered component, was 'subprocess:Popen'",
+        ),
         ("arms", "planner.ga.arms: must be given, was None"),
     ],
 )
@@ -248,12 +326,16 @@ def test_a_log_cannot_name_other_code(
     config = json.loads(read_log(source).config_json)
     inner = config["planner"].get("planner", config["planner"])
     inner["ga"]["_target_"] = target
-    said = refused("reproduce", str(crafted(json.dumps(config).encode(), tmp_path / "0000.mcap", source)))
+    said = refused(
+        "reproduce", str(crafted(json.dumps(config).encode(), tmp_path / "0000.mcap", source))
+    )
     assert message.split(": ", 1)[1] in said
     assert re.search(r"planner\.ga\.", said)
 
 
-def test_a_log_whose_configuration_is_another_one_is_refused(refused: Refused, stored: Path, tmp_path: Path) -> None:
+def test_a_log_whose_configuration_is_another_one_is_refused(
+    refused: Refused, stored: Path, tmp_path: Path
+) -> None:
     source = find_runs(stored)[0].log_path(0)
     config = read_log(source).config_json
     other = config.replace(b'"seed":0', b'"seed":1')
@@ -262,13 +344,17 @@ def test_a_log_whose_configuration_is_another_one_is_refused(refused: Refused, s
     assert read_log(source).condition_id[:12] in said
 
 
-def test_another_revision_says_how_to_run_anew(refused: Refused, stored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_revision_says_how_to_run_anew(
+    refused: Refused, stored: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     run = find_runs(stored)[0]
     monkeypatch.setattr(GeneticSettings, "revision", 2)
     said = refused("reproduce", run.hash12)
     assert said.startswith(f"run {run.hash12}: ")
     assert "ga was revision 1, installed is 2" in said
-    assert "Run it anew with what is installed: evoexp run experiment=rana_planar budget=smoke" in said
+    assert (
+        "Run it anew with what is installed: evoexp run experiment=rana_planar budget=smoke" in said
+    )
 
 
 # Files and directories

@@ -43,13 +43,17 @@ def test_a_run_without_report_loads_neither_pandas_nor_matplotlib(outputs: Path)
     code = f"import sys; from evoexp.cli import main; assert main({words!r}) == 0\n"
     code += "assert not {'pandas', 'matplotlib'} & set(sys.modules)"
     environment = os.environ | {"EVOEXP_OUTPUTS": str(outputs)}
-    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stderr
     assert len(find_runs(outputs)) == 2
 
 
 def test_a_run_ends_with_its_report(evoexp: Evoexp, outputs: Path) -> None:
-    said = evoexp("run", *PLANAR, "num_replicates=1", "report=paper", "report.formats=[png]", "report.dpi=20")
+    said = evoexp(
+        "run", *PLANAR, "num_replicates=1", "report=paper", "report.formats=[png]", "report.dpi=20"
+    )
     assert said.code == 0
     (line,) = [line for line in said.out.splitlines() if line.startswith("report: ")]
     page = Path(line.removeprefix("report: "))
@@ -59,11 +63,22 @@ def test_a_run_ends_with_its_report(evoexp: Evoexp, outputs: Path) -> None:
     assert "ga.population_size=8" in page.read_text()
 
 
-def test_several_experiments_share_a_batch_and_a_condition_runs_once(evoexp: Evoexp, outputs: Path) -> None:
-    words = ("-m", "experiment=rana_planar,rana_three_arms", *SERIAL, "num_replicates=1", "control=null", "--no-report")
+def test_several_experiments_share_a_batch_and_a_condition_runs_once(
+    evoexp: Evoexp, outputs: Path
+) -> None:
+    words = (
+        "-m",
+        "experiment=rana_planar,rana_three_arms",
+        *SERIAL,
+        "num_replicates=1",
+        "control=null",
+        "--no-report",
+    )
     said = evoexp("run", *words)
     assert said.code == 0
-    assert "replicates: 2 of 2 done" in said.out, "both labels of rana_planar are one condition without its control"
+    assert "replicates: 2 of 2 done" in said.out, (
+        "both labels of rana_planar are one condition without its control"
+    )
     assert len(find_runs(outputs)) == 2
     assert "rana_planar@smoke+" in said.out
     assert "rana_three_arms@smoke+" in said.out
@@ -72,7 +87,14 @@ def test_several_experiments_share_a_batch_and_a_condition_runs_once(evoexp: Evo
 def test_the_manifest_holds_a_command_that_runs_it_again(evoexp: Evoexp, outputs: Path) -> None:
     assert (
         evoexp(
-            "run", *PLANAR, "num_replicates=1", "-m", "seed=0,1", "--only", "random search · seed=1", "--no-report"
+            "run",
+            *PLANAR,
+            "num_replicates=1",
+            "-m",
+            "seed=0,1",
+            "--only",
+            "random search · seed=1",
+            "--no-report",
         ).code
         == 0
     )

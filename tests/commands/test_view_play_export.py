@@ -18,7 +18,9 @@ def runs(stored: Path) -> list[str]:
     return [run.hash12 for run in find_runs(stored)]
 
 
-def test_view_writes_a_page_of_the_best_replicate(evoexp: Evoexp, stored: Path, runs: list[str]) -> None:
+def test_view_writes_a_page_of_the_best_replicate(
+    evoexp: Evoexp, stored: Path, runs: list[str]
+) -> None:
     said = evoexp("view", runs[0])
     assert said.code == 0
     (path,) = (stored / "motions").glob("*.html")
@@ -34,7 +36,9 @@ def test_view_puts_two_runs_side_by_side(evoexp: Evoexp, tmp_path: Path, runs: l
     assert all(run in text for run in runs)
 
 
-def test_a_log_alone_is_enough(evoexp: Evoexp, stored: Path, runs: list[str], tmp_path: Path) -> None:
+def test_a_log_alone_is_enough(
+    evoexp: Evoexp, stored: Path, runs: list[str], tmp_path: Path
+) -> None:
     log = tmp_path / "log.mcap"
     log.write_bytes((stored / "runs" / runs[0] / "replicates" / "0001.mcap").read_bytes())
     from_run, from_log = tmp_path / "a.html", tmp_path / "b.html"
@@ -54,21 +58,31 @@ def test_view_of_a_motion_of_ones_own(evoexp: Evoexp, tmp_path: Path, outputs: P
 
 
 def test_what_cannot_be_shown_is_said(refused: Refused, runs: list[str], tmp_path: Path) -> None:
-    assert refused("view", runs[0], "--replicate", "9") == (f"run {runs[0]}: no finished replicate 9 (finished: 0, 1)")
+    assert refused("view", runs[0], "--replicate", "9") == (
+        f"run {runs[0]}: no finished replicate 9 (finished: 0, 1)"
+    )
     assert "hash: no run 'ffffffff' among the 2 in " in refused("view", "ffffffff")
     assert refused("view", *runs * 3) == "motions: at most 4 go together, got 6"
-    assert refused("view", "experiment=rana_planar") == ("motion file: one is needed (.json or .npy), got 0: none")
+    assert refused("view", "experiment=rana_planar") == (
+        "motion file: one is needed (.json or .npy), got 0: none"
+    )
     short = tmp_path / "short.json"
     short.write_text(json.dumps(STRAIGHT))
-    assert "must be via-point GA: 2 × 21 × 2" in refused("view", "experiment=rana_planar", str(short))
-    assert refused("view", runs[0], "--turn-speed", "0") == "--turn-speed: must be greater than 0, was 0.0"
+    assert "must be via-point GA: 2 × 21 × 2" in refused(
+        "view", "experiment=rana_planar", str(short)
+    )
+    assert (
+        refused("view", runs[0], "--turn-speed", "0")
+        == "--turn-speed: must be greater than 0, was 0.0"
+    )
     assert refused("play", *runs) == "motion: one at a time, got 2; choose with --only LABEL"
 
 
 def test_a_condition_that_was_not_run_here_says_how(refused: Refused) -> None:
     said = refused("view", "4da921ed6875")
     assert (
-        said == "condition 4da921ed6875: not run here; run it: evoexp run experiment=rana_planar --only 'via-point GA'"
+        said == "condition 4da921ed6875: not run here; run it: evoexp run experiment=rana_planar "
+        "--only 'via-point GA'"
     )
 
 

@@ -22,7 +22,9 @@ def random_strings(seed: int, bits: int, count: int) -> np.ndarray:
 
 def bits_of(strings: np.ndarray, bits: int) -> np.ndarray:
     """(genes × bits, individuals): every string as it is printed."""
-    return np.array([[int(bit) for gene in column for bit in f"{gene:0{bits}b}"] for column in strings.T]).T
+    return np.array(
+        [[int(bit) for gene in column for bit in f"{gene:0{bits}b}"] for column in strings.T]
+    ).T
 
 
 @given(BITS, st.booleans(), st.integers(0, 2**32))
@@ -39,7 +41,9 @@ def test_numbers_are_decoded_as_the_code_says(bits: int, gray: bool, seed: int) 
 
 
 @given(BITS, st.floats(0.0, 1.0), st.integers(0, 2**32))
-def test_crossing_exchanges_what_is_printed_behind_the_site(bits: int, rate: float, seed: int) -> None:
+def test_crossing_exchanges_what_is_printed_behind_the_site(
+    bits: int, rate: float, seed: int
+) -> None:
     strings, parents = random_strings(seed, bits, 6), rng(seed + 1).integers(0, 6, size=7)
     uniforms, out = rng(seed + 2).random(6), np.full((GENES, 9), -1)
     cross_strings(uniforms, strings, bits, parents, rate, out)
@@ -53,7 +57,9 @@ def test_crossing_exchanges_what_is_printed_behind_the_site(bits: int, rate: flo
 
 
 @given(BITS, st.floats(0.001, 1.0), st.integers(0, 2**32))
-def test_flips_are_where_a_walk_with_geometric_steps_ends(bits: int, rate: float, seed: int) -> None:
+def test_flips_are_where_a_walk_with_geometric_steps_ends(
+    bits: int, rate: float, seed: int
+) -> None:
     strings, draws = random_strings(seed, bits, 5), Draws(4096)
     draws.extend(rng(seed))
     uniforms, taken = draws.block
@@ -63,7 +69,9 @@ def test_flips_are_where_a_walk_with_geometric_steps_ends(bits: int, rate: float
     assert not flipped[GENES * bits * 4 :].any()
     places = np.flatnonzero(flipped)
     assert taken[0] == len(places) + 1, "a number per flipped bit, and the one that passes the end"
-    staying = np.diff(places, prepend=-1) - 1  # the number u says k stay: (1 − p)^(k + 1) < 1 − u ≤ (1 − p)^k
+    staying = (
+        np.diff(places, prepend=-1) - 1
+    )  # the number u says k stay: (1 − p)^(k + 1) < 1 − u ≤ (1 − p)^k
     left = 1.0 - uniforms[: len(places)]
     with np.errstate(divide="ignore"):
         assert np.all(left <= (1.0 - rate) ** staying * (1.0 + 1e-12))
@@ -75,7 +83,9 @@ def test_every_bit_is_flipped_as_often() -> None:
     draws.extend(rng(5))
     flip_strings(draws.block, strings, 8, 10_000, 0.1)
     shares = bits_of(strings, 8).mean(axis=1)
-    assert shares == pytest.approx(0.1, abs=4.5 * np.sqrt(0.09 / 10_000)), "16 shares, 4.5 standard errors"
+    assert shares == pytest.approx(0.1, abs=4.5 * np.sqrt(0.09 / 10_000)), (
+        "16 shares, 4.5 standard errors"
+    )
 
 
 @pytest.mark.parametrize(("rate", "share"), [(0.0, 0.0), (1.0, 1.0), (1e-300, 0.0)])

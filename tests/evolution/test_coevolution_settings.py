@@ -29,13 +29,18 @@ METHOD_V: dict[str, Any] = {
 
 
 def built(**changes: Any) -> CoevolutionSettings:
-    settings = build({"_target_": "coevolutionary"} | METHOD_V | changes, lambda name, field: CoevolutionSettings, "ga")
+    settings = build(
+        {"_target_": "coevolutionary"} | METHOD_V | changes,
+        lambda name, field: CoevolutionSettings,
+        "ga",
+    )
     assert isinstance(settings, CoevolutionSettings)
     return settings
 
 
 @pytest.mark.parametrize(
-    ("size", "depth", "teams"), [(100, 0.15, 15), (50, 0.15, 7), (150, 0.15, 22), (100, 0.29, 29), (100, 0.0, 0)]
+    ("size", "depth", "teams"),
+    [(100, 0.15, 15), (50, 0.15, 7), (150, 0.15, 22), (100, 0.29, 29), (100, 0.0, 0)],
 )
 def test_depth_of_the_hall_is_rounded_down(size: int, depth: float, teams: int) -> None:
     settings = built(population_size=size, hall_depth=depth, num_elites=2)
@@ -46,13 +51,21 @@ def test_depth_of_the_hall_is_rounded_down(size: int, depth: float, teams: int) 
 @given(st.integers(1, 1000), st.integers(0, 100))
 def test_a_depth_in_percent_is_exact(size: int, percent: int) -> None:
     if percent == 0 or percent * size >= 100:
-        assert built(population_size=size, hall_depth=percent / 100).num_hall_teams == math.floor(percent * size / 100)
+        assert built(population_size=size, hall_depth=percent / 100).num_hall_teams == math.floor(
+            percent * size / 100
+        )
 
 
 def test_everything_may_be_null_or_off() -> None:
     plain = built(hall_depth=0.0, mutation_decay=0.0, mutation_rate=0.1)
     assert plain.num_offspring == 100
-    full = built(hall_memory=3, restart_after=50, num_elites=85, selection="difference", mutation_direction="symmetric")
+    full = built(
+        hall_memory=3,
+        restart_after=50,
+        num_elites=85,
+        selection="difference",
+        mutation_direction="symmetric",
+    )
     assert full.num_offspring == 0
     assert built(hall_frozen=True).hall_frozen
 
@@ -61,11 +74,15 @@ def test_everything_may_be_null_or_off() -> None:
     ("changes", "message"),
     [
         ({"num_elites": 101}, "ga.num_elites: must be at most population_size (100), was 101"),
-        ({"num_elites": 86}, "ga.num_elites: must be at most population_size less the hall's teams (85), was 86"),
+        (
+            {"num_elites": 86},
+            "ga.num_elites: must be at most population_size less the hall's teams (85), was 86",
+        ),
         ({"mutation_rate": 0.5}, "ga.mutation_decay: must be at most mutation_rate (0.5), was 0.9"),
         (
             {"hall_depth": 0.009},
-            "ga.hall_depth: must be 0, or large enough for one pair (at least 1/population_size), was 0.009",
+            "ga.hall_depth: must be 0, or large enough for one pair (at least "
+            "1/population_size), was 0.009",
         ),
         (
             {"hall_depth": 0.0, "hall_memory": 3},
@@ -86,7 +103,8 @@ def test_everything_may_be_null_or_off() -> None:
         ({"restart_after": 0}, "ga.restart_after: must be at least 1, was 0"),
         (
             {"selection": "inverses"},
-            "ga.selection: must be one of 'inverse' or 'difference', was 'inverses'; did you mean 'inverse'?",
+            "ga.selection: must be one of 'inverse' or 'difference', was 'inverses'; did you "
+            "mean 'inverse'?",
         ),
         ({"hall_frozen": 1}, "ga.hall_frozen: must be true or false, was 1"),
     ],

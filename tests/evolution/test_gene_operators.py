@@ -6,7 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from evoexp.evolution.gene_crossover import ARITHMETIC, BLX_ALPHA, UNIFORM, cross_genes, num_gene_uniforms
+from evoexp.evolution.gene_crossover import (
+    ARITHMETIC,
+    BLX_ALPHA,
+    UNIFORM,
+    cross_genes,
+    num_gene_uniforms,
+)
 from evoexp.evolution.gene_mutation import (
     GAUSSIAN,
     GENE,
@@ -33,18 +39,24 @@ def genomes(count: int = COUNT, seed: int = 0) -> FloatArray:
     return low[:, None] + (high - low)[:, None] * np.random.default_rng(seed).random((3, count))
 
 
-def crossed(kind: int, rate: float, alpha: float = 0.5, seed: int = 1) -> tuple[FloatArray, FloatArray]:
+def crossed(
+    kind: int, rate: float, alpha: float = 0.5, seed: int = 1
+) -> tuple[FloatArray, FloatArray]:
     parents, out = genomes(), np.empty((3, COUNT))
     uniforms = np.random.default_rng(seed).random(num_gene_uniforms(3, COUNT // 2))
     cross_genes(kind, uniforms, parents, np.arange(COUNT), rate, alpha, LIMITS, out)
     return parents, out
 
 
-def mutated(kind: int, scope: int, rate: float, spread: float, seed: int = 1) -> tuple[FloatArray, FloatArray]:
+def mutated(
+    kind: int, scope: int, rate: float, spread: float, seed: int = 1
+) -> tuple[FloatArray, FloatArray]:
     rng, before = np.random.default_rng(seed), genomes()
     after = before.copy()
     uniforms = rng.random(num_mutation_uniforms(3, COUNT, scope))
-    mutate_genes(kind, scope, uniforms, rng.standard_normal((3, COUNT)), after, COUNT, rate, spread, LIMITS)
+    mutate_genes(
+        kind, scope, uniforms, rng.standard_normal((3, COUNT)), after, COUNT, rate, spread, LIMITS
+    )
     return before, after
 
 
@@ -58,8 +70,12 @@ def test_crossover_at_rate_0_copies(kind: int) -> None:
 def test_crossover_has_its_rate(kind: int) -> None:
     parents, out = crossed(kind, 0.3)
     changed = (parents != out).any(axis=0).reshape(-1, 2).any(axis=1)
-    rate = 0.3 * (0.875 if kind == UNIFORM else 1.0)  # three genes, none exchanged in one of eight pairs
-    assert changed.mean() == pytest.approx(rate, abs=4.0 * np.sqrt(0.3 * 0.7 / len(changed)))  # four standard errors
+    rate = 0.3 * (
+        0.875 if kind == UNIFORM else 1.0
+    )  # three genes, none exchanged in one of eight pairs
+    assert changed.mean() == pytest.approx(
+        rate, abs=4.0 * np.sqrt(0.3 * 0.7 / len(changed))
+    )  # four standard errors
 
 
 def test_uniform_crossover_exchanges_half_of_the_genes() -> None:
@@ -81,7 +97,9 @@ def test_arithmetic_children_lie_between_their_parents_at_one_share() -> None:
 
 
 @pytest.mark.parametrize("alpha", [0.0, 0.5, 3.0])
-def test_blx_children_lie_at_most_alpha_beyond_their_parents_and_within_limits(alpha: float) -> None:
+def test_blx_children_lie_at_most_alpha_beyond_their_parents_and_within_limits(
+    alpha: float,
+) -> None:
     parents, out = crossed(BLX_ALPHA, 1.0, alpha)
     x, y = parents[:, ::2], parents[:, 1::2]
     wide = alpha * np.abs(x - y) + 1e-12
@@ -103,7 +121,9 @@ def test_mutation_has_its_rate_and_keeps_the_limits(kind: int, scope: int) -> No
     before, after = mutated(kind, scope, 0.2, 0.7)
     changed = before != after
     counted = changed if scope == GENE else changed.any(axis=0)
-    assert counted.mean() == pytest.approx(0.2, abs=4.0 * np.sqrt(0.16 / counted.size))  # four standard errors
+    assert counted.mean() == pytest.approx(
+        0.2, abs=4.0 * np.sqrt(0.16 / counted.size)
+    )  # four standard errors
     if scope == INDIVIDUAL:
         assert changed.sum(axis=0).max() == 1
     assert (LIMITS[:, 0] <= after.T).all()
@@ -140,15 +160,22 @@ def test_a_tournament_prefers_the_better_and_takes_anyone_where_nobody_is_feasib
     choose_by_tournament(uniforms, costs, 2, parents)
     # Of 16 ordered draws the best wins 7, the next 5, 3, 1.
     expected = np.array([3, 1, 7, 5]) / 16.0
-    np.testing.assert_allclose(np.bincount(parents, minlength=4) / len(parents), expected, atol=0.012)
+    np.testing.assert_allclose(
+        np.bincount(parents, minlength=4) / len(parents), expected, atol=0.012
+    )
     choose_by_tournament(uniforms, np.full(4, np.inf), 2, parents)
     np.testing.assert_allclose(np.bincount(parents, minlength=4) / len(parents), 0.25, atol=0.012)
     choose_by_tournament(uniforms[:30_000], costs, 1, parents)
     np.testing.assert_allclose(np.bincount(parents, minlength=4) / len(parents), 0.25, atol=0.012)
 
 
-@given(st.lists(st.one_of(st.floats(0.0, 9.0), st.just(np.inf)), min_size=1, max_size=30), st.floats(1.0, 2.0))
-def test_rank_weights_sum_to_the_population_and_fall_with_cost(costs: list[float], pressure: float) -> None:
+@given(
+    st.lists(st.one_of(st.floats(0.0, 9.0), st.just(np.inf)), min_size=1, max_size=30),
+    st.floats(1.0, 2.0),
+)
+def test_rank_weights_sum_to_the_population_and_fall_with_cost(
+    costs: list[float], pressure: float
+) -> None:
     values, weights = np.array(costs), np.empty(len(costs))
     rank_weights(values, pressure, weights)
     assert weights.sum() == pytest.approx(len(costs) if len(costs) > 1 else 2.0 - pressure)
@@ -183,11 +210,13 @@ def test_bits() -> None:
 
 
 SHARED = {
-    "population_size": 10, "num_generations": 5, "num_elites": 1, "crossover_rate": 0.3, "mutation_rate": 0.2,
+    "population_size": 10, "num_generations": 5, "num_elites": 1, "crossover_rate": 0.3,
+    "mutation_rate": 0.2,
     "selection": "tournament", "tournament_size": 2, "rank_pressure": 1.5,
 }  # fmt: skip
 REAL = SHARED | {
-    "crossover": "one_point", "blend_alpha": 0.5, "mutation": "non_uniform", "mutation_scope": "gene",
+    "crossover": "one_point", "blend_alpha": 0.5, "mutation": "non_uniform",
+    "mutation_scope": "gene",
     "mutation_power": 2, "mutation_std": 0.1,
 }  # fmt: skip
 

@@ -47,8 +47,14 @@ def world(seed: int, num: int, size: int, free: float = 0.4, ties: bool = False)
     """Draw a generation; `ties` makes many costs and sums of costs equal."""
     rng = np.random.default_rng(seed)
     num_pairs = num * (num - 1) // 2
-    collisions = rng.integers(1, 5, size=(num_pairs, size, size)) * (rng.random((num_pairs, size, size)) > free)
-    own = rng.integers(1, 5, size=(num, size)).astype(float) if ties else rng.uniform(1.0, 5.0, size=(num, size))
+    collisions = rng.integers(1, 5, size=(num_pairs, size, size)) * (
+        rng.random((num_pairs, size, size)) > free
+    )
+    own = (
+        rng.integers(1, 5, size=(num, size)).astype(float)
+        if ties
+        else rng.uniform(1.0, 5.0, size=(num, size))
+    )
     return World(collisions, own, rng.random((num, size)) < 0.4)
 
 
@@ -61,14 +67,17 @@ def teams_by_definition(w: World) -> list[tuple[int, ...]]:
             for s in range(num):
                 if s != p:
                     ranked = [
-                        (sum(w.hits(q, m, s, j) for q, m in members.items()), w.own[s, j], j) for j in range(size)
+                        (sum(w.hits(q, m, s, j) for q, m in members.items()), w.own[s, j], j)
+                        for j in range(size)
                     ]
                     members[s] = min(ranked)[2]
             teams.append(tuple(members[q] for q in range(num)))
     return teams
 
 
-def hall_by_definition(w: World, hall: Hall, depth: int, memory: int | None, frozen: bool) -> list[tuple[int, ...]]:
+def hall_by_definition(
+    w: World, hall: Hall, depth: int, memory: int | None, frozen: bool
+) -> list[tuple[int, ...]]:
     old = [tuple(map(int, team)) for team in hall.teams]
     ranked = []
     for k, team in enumerate(old):
@@ -78,14 +87,20 @@ def hall_by_definition(w: World, hall: Hall, depth: int, memory: int | None, fro
     ranked += [((0, *w.key(team), len(old) + k), team) for k, team in enumerate(new)]
     chosen: list[tuple[int, ...]] = []
     for _, team in sorted(ranked):
-        if len(chosen) < depth and not any(a == b for other in chosen for a, b in zip(team, other, strict=True)):
+        if len(chosen) < depth and not any(
+            a == b for other in chosen for a, b in zip(team, other, strict=True)
+        ):
             chosen.append(team)
     return chosen
 
 
 def best_by_definition(w: World) -> tuple[tuple[int, ...], float]:
     num, size = w.own.shape
-    free = [(w.key(team)[1], team) for team in itertools.product(range(size), repeat=num) if w.key(team)[0] == 0]
+    free = [
+        (w.key(team)[1], team)
+        for team in itertools.product(range(size), repeat=num)
+        if w.key(team)[0] == 0
+    ]
     cost, team = min(free, default=(np.inf, (-1,) * num))
     return (team, cost) if cost < np.inf else ((-1,) * num, np.inf)
 
@@ -107,7 +122,9 @@ def test_teams_are_formed_as_defined(seed: int, num: int, size: int, ties: bool)
     formed = form_teams(*w)
     expected = teams_by_definition(w)
     assert [tuple(team) for team in formed.teams] == expected
-    assert list(zip(formed.collisions, formed.costs, strict=True)) == [w.key(team) for team in expected]
+    assert list(zip(formed.collisions, formed.costs, strict=True)) == [
+        w.key(team) for team in expected
+    ]
 
 
 @cases
@@ -145,7 +162,9 @@ def test_without_a_free_team_there_is_none() -> None:
         assert none.individuals.tolist() == [-1] * num
         assert none.cost == np.inf
         assert not none.found
-        assert not best_team(np.zeros((num * (num - 1) // 2, 4, 4), dtype=int), np.full((num, 4), np.inf)).found
+        assert not best_team(
+            np.zeros((num * (num - 1) // 2, 4, 4), dtype=int), np.full((num, 4), np.inf)
+        ).found
     own = np.array([[np.inf, 2.0], [1.0, np.inf]])
     assert best_team(np.zeros((1, 2, 2), dtype=int), own).individuals.tolist() == [1, 0]
 
@@ -168,7 +187,9 @@ def test_hall_is_chosen_as_defined(
     chosen = update_hall(*w, hall, depth, memory, frozen)
     expected = hall_by_definition(w, hall, depth, memory, frozen)
     assert [tuple(team) for team in chosen.teams] == expected
-    assert list(zip(chosen.collisions, chosen.costs, strict=True)) == [w.key(team) for team in expected]
+    assert list(zip(chosen.collisions, chosen.costs, strict=True)) == [
+        w.key(team) for team in expected
+    ]
     ages = {tuple(team): age + 1 for team, age in zip(hall.teams, hall.ages, strict=True)}
     assert chosen.ages.tolist() == [ages.get(team, 0) for team in expected]
 
@@ -191,11 +212,16 @@ def test_teams_give_way_to_better_ones_only(seed: int, num: int) -> None:
             rivals = np.array([shares_a_member(team, other) for other in chosen.teams])
             better = [w.key(tuple(other)) < w.key(tuple(team)) for other in chosen.teams[entered]]
             full = chosen.num_teams == 4 and all(better)
-            assert full or any(w.key(tuple(other)) < w.key(tuple(team)) for other in chosen.teams[rivals & entered])
+            assert full or any(
+                w.key(tuple(other)) < w.key(tuple(team)) for other in chosen.teams[rivals & entered]
+            )
 
 
 class Evolution:
-    """Populations whose members are drawn from a pool of known pairs, so that the hall can be copied unchanged."""
+    """Populations whose members are drawn from a pool of known pairs.
+
+    So that the hall can be copied unchanged.
+    """
 
     def __init__(self, seed: int, num: int, size: int, depth: int) -> None:
         self.rng = np.random.default_rng(seed)
@@ -205,7 +231,10 @@ class Evolution:
         self.hall = Hall.empty(num)
 
     def step(self, memory: int | None = None, frozen: bool = False) -> list[tuple[int, ...]]:
-        """Make a generation that ends with the hall; return who is in the next hall, by their numbers in the pool."""
+        """Make a generation that ends with the hall.
+
+        Return who is in the next hall, by their numbers in the pool.
+        """
         rows = np.arange(self.num)
         kept = self.members[rows, self.hall.teams]  # (teams, P)
         self.members = self.rng.integers(0, 60, size=(self.num, self.size))
@@ -214,9 +243,13 @@ class Evolution:
         own = self.pool.own[rows[:, None], self.members]
         pairs = itertools.combinations(range(self.num), 2)
         tables = zip(self.pool.collisions, pairs, strict=True)
-        collisions = np.stack([table[np.ix_(self.members[r], self.members[s])] for table, (r, s) in tables])
+        collisions = np.stack(
+            [table[np.ix_(self.members[r], self.members[s])] for table, (r, s) in tables]
+        )
         front = self.rng.random(own.shape) < 0.3
-        self.hall = update_hall(collisions, own, front, self.hall.moved(first), self.depth, memory, frozen)
+        self.hall = update_hall(
+            collisions, own, front, self.hall.moved(first), self.depth, memory, frozen
+        )
         return [tuple(map(int, team)) for team in self.members[rows, self.hall.teams]]
 
 
@@ -265,15 +298,21 @@ def test_memory_lets_the_best_go_in_time() -> None:
 def test_memory_counts_generations_and_needs_somebody_new() -> None:
     own = np.array([[1.0, 2.0], [1.0, 2.0]])
     collisions = np.array([[[0, 1], [1, 0]]])
-    front = np.array([[False, True], [False, False]])  # forms (1, 1) of key (0, 4); in the hall is (0, 0) of (0, 2)
-    hall = Hall.empty(2)._replace(teams=np.zeros((1, 2), dtype=np.int64), ages=np.zeros(1, dtype=np.int64))
+    front = np.array(
+        [[False, True], [False, False]]
+    )  # forms (1, 1) of key (0, 4); in the hall is (0, 0) of (0, 2)
+    hall = Hall.empty(2)._replace(
+        teams=np.zeros((1, 2), dtype=np.int64), ages=np.zeros(1, dtype=np.int64)
+    )
     firsts = []
     for _ in range(4):
         hall = update_hall(collisions, own, front, hall, 1, memory=2)
         firsts.append(hall.teams[0].tolist())
     assert firsts == [[0, 0], [0, 0], [1, 1], [1, 1]]
     old = hall._replace(teams=np.zeros((1, 2), dtype=np.int64), ages=np.array([9]))
-    again = np.array([[True, False], [True, False]])  # forms the very team that must give way: nobody new
+    again = np.array(
+        [[True, False], [True, False]]
+    )  # forms the very team that must give way: nobody new
     for nobody in (again, np.zeros((2, 2), dtype=bool)):
         stayed = update_hall(collisions, own, nobody, old, 1, memory=2)
         assert stayed.teams.tolist() == [[0, 0]]
@@ -285,7 +324,10 @@ def test_equal_keys_keep_the_old_then_the_first_formed() -> None:
     everybody = np.ones((2, 4), dtype=bool)
     old = Hall.empty(2)._replace(teams=np.array([[3, 2]]), ages=np.array([7]))
     chosen = update_hall(collisions, own, everybody, old, 3)
-    assert chosen.teams.tolist() == [[3, 2], [0, 0]]  # all new pairs have member 0 of one population
+    assert chosen.teams.tolist() == [
+        [3, 2],
+        [0, 0],
+    ]  # all new pairs have member 0 of one population
     assert chosen.ages.tolist() == [8, 0]
 
 
@@ -301,7 +343,11 @@ def test_kernels_ignore_padding_and_take_any_number_type(num: int, dtype: type) 
     cost = find_best_team(collisions, own, 13, team)
     best = best_team(w.collisions, w.own)
     assert (cost, team.tolist()) == (best.cost, best.individuals.tolist())
-    teams, hits, costs = np.empty((num * 13, num), dtype=np.int64), np.empty(num * 13, dtype=np.int64), np.empty(39)
+    teams, hits, costs = (
+        np.empty((num * 13, num), dtype=np.int64),
+        np.empty(num * 13, dtype=np.int64),
+        np.empty(39),
+    )
     count = gather_teams(collisions, own, front, 13, teams, hits, costs)
     assert np.array_equal(teams[:count], form_teams(*w).teams)
     teams, ages = np.zeros((6, num), dtype=np.int64), np.zeros(6, dtype=np.int64)

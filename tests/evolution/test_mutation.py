@@ -5,22 +5,33 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoexp.evolution.mutation import allele_mutation, decayed_rate, mutate_allele, num_allele_uniforms
+from evoexp.evolution.mutation import (
+    allele_mutation,
+    decayed_rate,
+    mutate_allele,
+    num_allele_uniforms,
+)
 
 LIMIT, STEP = np.pi, np.pi / 5.0
 LAST = np.nextafter(1.0, 0.0)  # the largest uniform number there can be
 
 
-def mutated(seed: int, genomes: np.ndarray, rate: float, symmetric: bool, limit: float = LIMIT) -> np.ndarray:
+def mutated(
+    seed: int, genomes: np.ndarray, rate: float, symmetric: bool, limit: float = LIMIT
+) -> np.ndarray:
     out = genomes.copy()
-    allele_mutation(np.random.default_rng(seed), out, genomes.shape[1], rate, STEP, limit, symmetric)
+    allele_mutation(
+        np.random.default_rng(seed), out, genomes.shape[1], rate, STEP, limit, symmetric
+    )
     return out
 
 
 def mutated_literally(seed: int, genomes: np.ndarray, rate: float, symmetric: bool) -> np.ndarray:
     """The same individual by individual, as one reads it in the paper."""
     out = genomes.copy()
-    for k, (decide, which, amount) in enumerate(np.random.default_rng(seed).random((genomes.shape[1], 3))):
+    for k, (decide, which, amount) in enumerate(
+        np.random.default_rng(seed).random((genomes.shape[1], 3))
+    ):
         gene = int(which * len(genomes))
         r = STEP * (2.0 * amount - 1.0) if symmetric else STEP * (1.0 - amount)
         if decide < rate and 0.0 <= genomes[gene, k] + r < LIMIT:
@@ -91,14 +102,18 @@ def test_genes_stay_in_bounds_and_one_allele_moves_by_a_step_at_most(
     assert symmetric or np.all(moved >= 0.0)
 
 
-@pytest.mark.parametrize(("symmetric", "mean", "std"), [(False, 0.5, 0.2887), (True, 0.0, 0.5774)])  # of a step
+@pytest.mark.parametrize(
+    ("symmetric", "mean", "std"), [(False, 0.5, 0.2887), (True, 0.0, 0.5774)]
+)  # of a step
 def test_statistics_of_alleles(symmetric: bool, mean: float, std: float) -> None:
     count, rate = 40_000, 0.3
     genomes = np.full((8, count), 100.0)
     moved = mutated(3, genomes, rate, symmetric, limit=200.0) - genomes
     genes, individuals = np.nonzero(moved)
     amounts = moved[genes, individuals] / STEP
-    assert len(amounts) / count == pytest.approx(rate, abs=4.0 * (rate * (1.0 - rate) / count) ** 0.5)
+    assert len(amounts) / count == pytest.approx(
+        rate, abs=4.0 * (rate * (1.0 - rate) / count) ** 0.5
+    )
     shares = np.bincount(genes, minlength=8) / len(genes)
     assert shares == pytest.approx(np.full(8, 0.125), abs=4.0 * (0.125 * 0.875 / len(genes)) ** 0.5)
     assert amounts.mean() == pytest.approx(mean, abs=4.0 * std / len(amounts) ** 0.5)
@@ -117,7 +132,9 @@ def test_draws_are_fixed_whatever_the_rate_and_padding_is_left_alone() -> None:
 
 
 def test_more_individuals_than_there_are_is_an_error() -> None:
-    with pytest.raises(ValueError, match=r"genomes are \(genes, at least 5 individuals\), were \(4, 3\)"):
+    with pytest.raises(
+        ValueError, match=r"genomes are \(genes, at least 5 individuals\), were \(4, 3\)"
+    ):
         allele_mutation(np.random.default_rng(0), np.ones((4, 3)), 5, 1.0, STEP, LIMIT, False)
 
 

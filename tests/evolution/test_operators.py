@@ -18,13 +18,17 @@ def population(seed: int, individuals: int = 12, points: int = 9) -> np.ndarray:
     return np.random.default_rng(seed).uniform(0.0, 50.0, size=(5, points, individuals))
 
 
-def crossed(seed: int, parents: np.ndarray, rate: float, distance: float, strings: np.ndarray) -> np.ndarray:
+def crossed(
+    seed: int, parents: np.ndarray, rate: float, distance: float, strings: np.ndarray
+) -> np.ndarray:
     out = np.full((*strings.shape[:2], len(parents) + 4), np.nan)
     site_crossover(np.random.default_rng(seed), strings, parents, ARMS, rate, distance, out)
     return out[:, :, : len(parents)]
 
 
-def crossed_literally(seed: int, parents: np.ndarray, rate: float, distance: float, strings: np.ndarray) -> np.ndarray:
+def crossed_literally(
+    seed: int, parents: np.ndarray, rate: float, distance: float, strings: np.ndarray
+) -> np.ndarray:
     """The same pair by pair, arm by arm, as one reads it in the paper."""
     rng = np.random.default_rng(seed)
     children = strings[:, :, parents].copy()
@@ -32,7 +36,9 @@ def crossed_literally(seed: int, parents: np.ndarray, rate: float, distance: flo
         decide, *draws = rng.random(1 + len(ARMS))
         sites = [1 + int(draw * (strings.shape[1] - 2)) for draw in draws]
         a, b = strings[:, :, parents[2 * pair]], strings[:, :, parents[2 * pair + 1]]
-        gaps = [np.linalg.norm(a[f:s, i] - b[f:s, i]) for (f, s), i in zip(ARMS, sites, strict=True)]
+        gaps = [
+            np.linalg.norm(a[f:s, i] - b[f:s, i]) for (f, s), i in zip(ARMS, sites, strict=True)
+        ]
         if decide < rate and all(gap < distance for gap in gaps):
             for (f, s), i in zip(ARMS, sites, strict=True):
                 children[f:s, i:, 2 * pair] = b[f:s, i:]
@@ -63,7 +69,9 @@ def test_crossover_keeps_the_ends_and_all_material() -> None:
     assert np.array_equal(children[:, 0], strings[:, 0, parents])
     assert np.array_equal(children[:, -1], strings[:, -1, parents])
     for pair in (slice(0, 2), slice(2, 4)):
-        assert np.array_equal(np.sort(children[:, :, pair], axis=2), np.sort(strings[:, :, parents[pair]], axis=2))
+        assert np.array_equal(
+            np.sort(children[:, :, pair], axis=2), np.sort(strings[:, :, parents[pair]], axis=2)
+        )
 
 
 def test_strings_without_inner_points_are_copied() -> None:
@@ -97,7 +105,8 @@ def test_roulette_agrees_with_searchsorted() -> None:
     weights = np.random.default_rng(1).uniform(0.0, 3.0, size=37)
     pointers = np.random.default_rng(2).random(500) * np.cumsum(weights)[-1]
     assert np.array_equal(
-        roulette(np.random.default_rng(2), weights, 500), np.searchsorted(np.cumsum(weights), pointers, side="right")
+        roulette(np.random.default_rng(2), weights, 500),
+        np.searchsorted(np.cumsum(weights), pointers, side="right"),
     )
 
 
@@ -128,5 +137,13 @@ def test_evaluations_of_the_paper() -> None:
 
 
 def test_more_elites_than_individuals_are_refused() -> None:
-    with pytest.raises(SettingError, match=r"num_elites: must be at most population_size \(5\), was 6"):
-        GeneticSettings(population_size=5, num_generations=1, num_elites=6, crossover_rate=0.9, mutation_rate=1.0)
+    with pytest.raises(
+        SettingError, match=r"num_elites: must be at most population_size \(5\), was 6"
+    ):
+        GeneticSettings(
+            population_size=5,
+            num_generations=1,
+            num_elites=6,
+            crossover_rate=0.9,
+            mutation_rate=1.0,
+        )

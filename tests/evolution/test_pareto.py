@@ -15,7 +15,11 @@ def dominates(a: np.ndarray, b: np.ndarray) -> bool:
 def front_by_definition(criteria: np.ndarray) -> np.ndarray:
     columns = criteria.T
     return np.array(
-        [not np.isnan(own).any() and not any(dominates(other, own) for other in columns) for own in columns], dtype=bool
+        [
+            not np.isnan(own).any() and not any(dominates(other, own) for other in columns)
+            for own in columns
+        ],
+        dtype=bool,
     )
 
 
@@ -31,7 +35,9 @@ values = st.sampled_from([0.0, -0.0, 1.0, 2.0, 3.0, np.inf, -np.inf, np.nan])
 
 @given(
     st.integers(1, 6).flatmap(
-        lambda rows: st.lists(st.lists(values, min_size=rows, max_size=rows), min_size=1, max_size=30)
+        lambda rows: st.lists(
+            st.lists(values, min_size=rows, max_size=rows), min_size=1, max_size=30
+        )
     )
 )
 def test_ties_infinities_and_nan(individuals: list[list[float]]) -> None:

@@ -37,7 +37,9 @@ def test_difference_weights() -> None:
 
 @pytest.mark.parametrize("weigh", [inverse, difference])
 @given(costs=costs_with_inf)
-def test_lower_costs_never_weigh_less_and_the_wheel_turns(weigh: object, costs: list[float]) -> None:
+def test_lower_costs_never_weigh_less_and_the_wheel_turns(
+    weigh: object, costs: list[float]
+) -> None:
     weights = weigh(costs)  # type: ignore[operator]
     order = np.argsort(costs, kind="stable")
     assert np.all(np.diff(weights[order]) <= 0.0)
@@ -50,5 +52,12 @@ def test_lower_costs_never_weigh_less_and_the_wheel_turns(weigh: object, costs: 
 
 
 def test_inverse_weights_draw_as_the_paper_wants() -> None:
-    shares = np.bincount(roulette(np.random.default_rng(0), inverse([1.0, 2.0, 4.0]), 80_000), minlength=3) / 80_000
-    assert shares == pytest.approx(np.array([4.0, 2.0, 1.0]) / 7.0, abs=0.007)  # four standard errors
+    shares = (
+        np.bincount(
+            roulette(np.random.default_rng(0), inverse([1.0, 2.0, 4.0]), 80_000), minlength=3
+        )
+        / 80_000
+    )
+    assert shares == pytest.approx(
+        np.array([4.0, 2.0, 1.0]) / 7.0, abs=0.007
+    )  # four standard errors

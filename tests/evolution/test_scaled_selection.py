@@ -1,4 +1,7 @@
-"""Linear scaling and stochastic remainder sampling: what the paper's formula says, and counts that are unbiased."""
+"""Linear scaling and stochastic remainder sampling.
+
+What the paper's formula says, and counts that are unbiased.
+"""
 
 import numpy as np
 import pytest
@@ -23,7 +26,9 @@ def test_scaling_is_equation_5_whatever_the_constant(seed: int, num: int, count:
     costs = np.random.default_rng(seed).uniform(10.0, 90.0, num)
     for constant in (costs.max(), 250.0):
         scaled = scaled_as_printed(constant - costs)
-        np.testing.assert_allclose(scale_linearly(costs, count), count * scaled / scaled.sum(), rtol=1e-7, atol=1e-9)
+        np.testing.assert_allclose(
+            scale_linearly(costs, count), count * scaled / scaled.sum(), rtol=1e-7, atol=1e-9
+        )
 
 
 def test_mean_is_kept_and_the_best_expects_twice_the_mean_where_nothing_is_negative() -> None:
@@ -38,7 +43,9 @@ def test_what_would_be_negative_is_0_and_the_rest_is_divided_by_the_mean() -> No
 
 
 @given(COSTS, st.floats(-1e3, 1e3), st.integers(0, 40))
-def test_scaling_does_not_change_with_a_shift_and_adds_up(costs: np.ndarray, shift: float, count: int) -> None:
+def test_scaling_does_not_change_with_a_shift_and_adds_up(
+    costs: np.ndarray, shift: float, count: int
+) -> None:
     costs = np.round(costs, 3)
     expected = scale_linearly(costs, count)
     assert expected.sum() == pytest.approx(count)
@@ -88,9 +95,15 @@ def test_counts_are_unbiased() -> None:
 
 
 def test_order_of_parents_is_random() -> None:
-    """Each of three parents stands first in a third of 6000 draws: six standard errors are 0.037."""
+    """Each of three parents stands first in a third of 6000 draws.
+
+    Six standard errors are 0.037.
+    """
     rng, num = np.random.default_rng(4), 6000
-    first = np.bincount([stochastic_remainder(rng, np.ones(3))[0] for _ in range(num)], minlength=3) / num
+    first = (
+        np.bincount([stochastic_remainder(rng, np.ones(3))[0] for _ in range(num)], minlength=3)
+        / num
+    )
     np.testing.assert_allclose(first, 1 / 3, atol=0.037)
 
 

@@ -5,7 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoexp.evolution.crossover import cross_single_point, num_single_point_uniforms, single_point_crossover
+from evoexp.evolution.crossover import (
+    cross_single_point,
+    num_single_point_uniforms,
+    single_point_crossover,
+)
 
 
 def population(num_genes: int = 8, individuals: int = 12) -> np.ndarray:
@@ -20,9 +24,13 @@ def crossed(seed: int, genomes: np.ndarray, parents: np.ndarray, rate: float) ->
     return out[:, : len(parents)]
 
 
-def crossed_literally(seed: int, genomes: np.ndarray, parents: np.ndarray, rate: float) -> np.ndarray:
+def crossed_literally(
+    seed: int, genomes: np.ndarray, parents: np.ndarray, rate: float
+) -> np.ndarray:
     children = genomes[:, parents].copy()
-    for pair, (decide, where) in enumerate(np.random.default_rng(seed).random((len(parents) // 2, 2))):
+    for pair, (decide, where) in enumerate(
+        np.random.default_rng(seed).random((len(parents) // 2, 2))
+    ):
         site = 1 + int(where * (len(genomes) - 1))
         if decide < rate:
             a, b = children[:, 2 * pair].copy(), children[:, 2 * pair + 1].copy()
@@ -30,10 +38,19 @@ def crossed_literally(seed: int, genomes: np.ndarray, parents: np.ndarray, rate:
     return children
 
 
-@given(st.integers(0, 2**32 - 1), st.lists(st.integers(0, 11), max_size=13), st.floats(0.0, 1.0), st.integers(1, 9))
-def test_crossover_is_what_one_reads(seed: int, chosen: list[int], rate: float, num_genes: int) -> None:
+@given(
+    st.integers(0, 2**32 - 1),
+    st.lists(st.integers(0, 11), max_size=13),
+    st.floats(0.0, 1.0),
+    st.integers(1, 9),
+)
+def test_crossover_is_what_one_reads(
+    seed: int, chosen: list[int], rate: float, num_genes: int
+) -> None:
     genomes, parents = population(num_genes), np.array(chosen, dtype=np.int64)
-    assert np.array_equal(crossed(seed, genomes, parents, rate), crossed_literally(seed, genomes, parents, rate))
+    assert np.array_equal(
+        crossed(seed, genomes, parents, rate), crossed_literally(seed, genomes, parents, rate)
+    )
 
 
 def test_rate_zero_returns_the_parents() -> None:
@@ -67,7 +84,9 @@ def test_sites_and_rate_are_drawn_evenly() -> None:
     counts = np.bincount(own, minlength=9)
     assert counts[0] == 0
     assert 1.0 - counts[8] / num_pairs == pytest.approx(rate, abs=0.0105)  # four standard errors
-    assert counts[1:8] / counts[1:8].sum() == pytest.approx(np.full(7, 1.0 / 7.0), abs=0.0097)  # four standard errors
+    assert counts[1:8] / counts[1:8].sum() == pytest.approx(
+        np.full(7, 1.0 / 7.0), abs=0.0097
+    )  # four standard errors
 
 
 def test_the_last_site_is_the_last_gene_even_for_the_largest_draw() -> None:
@@ -86,4 +105,6 @@ def test_draws_are_fixed_whatever_the_rate() -> None:
 
 def test_offspring_that_do_not_fit_are_an_error() -> None:
     with pytest.raises(ValueError, match=r"3 offspring of \(8, 12\) do not fit \(8, 2\)"):
-        single_point_crossover(np.random.default_rng(0), population(), np.arange(3), 0.5, np.empty((8, 2)))
+        single_point_crossover(
+            np.random.default_rng(0), population(), np.arange(3), 0.5, np.empty((8, 2))
+        )

@@ -27,6 +27,11 @@ def test_evaluations_of_all_cycles() -> None:
 
 
 def test_more_parents_than_offspring_are_for_plus_selection_only() -> None:
-    with pytest.raises(SettingError, match=r"num_parents: must be at most num_offspring \(100\) with comma selection"):
+    with pytest.raises(
+        SettingError,
+        match=r"num_parents: must be at most num_offspring \(100\) with comma selection",
+    ):
         StrategySettings(**SETTINGS | {"num_parents": 103})
-    assert StrategySettings(**SETTINGS | {"num_parents": 103, "selection": "plus"}).num_parents == 103
+    assert (
+        StrategySettings(**SETTINGS | {"num_parents": 103, "selection": "plus"}).num_parents == 103
+    )

@@ -20,7 +20,10 @@ PLAIN = {
 
 
 def model(
-    force: tuple[float, float] = (0.0, -5.0), avoided: object = (), limits: np.ndarray = ANYTHING, **weights: object
+    force: tuple[float, float] = (0.0, -5.0),
+    avoided: object = (),
+    limits: np.ndarray = ANYTHING,
+    **weights: object,
 ) -> Model:
     objective = PlacementCriteria(**(PLAIN | weights))  # type: ignore[arg-type]
     table = np.array(avoided, dtype=np.float64).reshape(-1, 5)
@@ -30,7 +33,9 @@ def model(
 @settings(max_examples=60, deadline=None)
 @given(st.floats(-180, 180), st.floats(-180, 180), st.floats(-5, 5), st.floats(-5, 5))
 def test_both_branches_agree_with_pinocchio(one: float, two: float, fx: float, fy: float) -> None:
-    found = model((fx, fy), [[1.0, 2, 0.5, 5.2, 1.0]], torque_max_weight=0.5, manipulability_weight=2.0)
+    found = model(
+        (fx, fy), [[1.0, 2, 0.5, 5.2, 1.0]], torque_max_weight=0.5, manipulability_weight=2.0
+    )
     branch, *both = found.posture(one, two)
     assert (branch >= 0) == np.isfinite(both[0][8])
     for numbers in both if branch >= 0 else ():
@@ -44,7 +49,10 @@ def test_both_branches_agree_with_pinocchio(one: float, two: float, fx: float, f
         assert numbers[1] == pytest.approx(min(float(torques @ torques), 250.0), abs=1e-9)
         assert numbers[2] == pytest.approx(np.abs(torques).max(), abs=1e-9)
         angles = np.cumsum(q[1:3])
-        middle = q[0] + np.cos(angles[0]) + 0.5 * np.cos(angles[1]), np.sin(angles[0]) + 0.5 * np.sin(angles[1])
+        middle = (
+            q[0] + np.cos(angles[0]) + 0.5 * np.cos(angles[1]),
+            np.sin(angles[0]) + 0.5 * np.sin(angles[1]),
+        )
         gap = np.square(np.subtract(middle, (5.2, 1.0))).sum()
         assert numbers[3] == pytest.approx(min(1.0 / max(gap, 1e-9), 250.0), rel=1e-6)
         total = numbers[1] + 0.5 * numbers[2] + 2.0 * numbers[4] + numbers[3]
@@ -78,12 +86,22 @@ def test_singular_and_infeasible_postures_are_capped_and_never_nan() -> None:
 
 
 @pytest.mark.parametrize("count", [1, 7, 50, 400])
-@pytest.mark.parametrize("avoided", [[], [[1.0, 2, 0.5, 5.2, 1.0]], [[2.0, 0, 0.3, 4.0, 0.1], [1.5, 3, 0.9, 5.1, 1.3]]])
+@pytest.mark.parametrize(
+    "avoided", [[], [[1.0, 2, 0.5, 5.2, 1.0]], [[2.0, 0, 0.3, 4.0, 0.1], [1.5, 3, 0.9, 5.1, 1.3]]]
+)
 def test_a_population_is_measured_as_its_postures_are(count: int, avoided: object) -> None:
-    narrow = np.array([[-100.0, 150.0], [-170.0, 90.0], [-120.0, 179.0], [-5.0, 7.0], [-4.0, 6.0], [-3.0, 2.0]])
-    weights = {"torque_max_weight": 0.5, "manipulability_weight": 2.0, "torque_weights": (1.0, 2.0, 3.0)}
+    narrow = np.array(
+        [[-100.0, 150.0], [-170.0, 90.0], [-120.0, 179.0], [-5.0, 7.0], [-4.0, 6.0], [-3.0, 2.0]]
+    )
+    weights = {
+        "torque_max_weight": 0.5,
+        "manipulability_weight": 2.0,
+        "torque_weights": (1.0, 2.0, 3.0),
+    }
     rng = np.random.default_rng(count)
-    angles = np.round(rng.uniform(-180.0, 180.0, (2, count)), 0 if count == 400 else 9)  # round ones: singular ones
+    angles = np.round(
+        rng.uniform(-180.0, 180.0, (2, count)), 0 if count == 400 else 9
+    )  # round ones: singular ones
     for limits in (ANYTHING, narrow):
         found = model((1.0, -5.0), avoided, limits, **(weights | {"greatest": 40.0}))
         out = found.measure(angles)
@@ -119,7 +137,10 @@ def test_limits_make_a_branch_infeasible(row: int) -> None:
     ("changes", "field"),
     [
         ({"torque_norm_weight": 0.0}, "torque_norm_weight: must be above 0, or another weight"),
-        ({"torque_max_weight": 1.0, "torque_weights": (0.0, 0.0, 0.0)}, "torque_weights: must be above 0"),
+        (
+            {"torque_max_weight": 1.0, "torque_weights": (0.0, 0.0, 0.0)},
+            "torque_weights: must be above 0",
+        ),
     ],
 )
 def test_zero_weights_are_refused(changes: dict[str, object], field: str) -> None:
@@ -129,5 +150,8 @@ def test_zero_weights_are_refused(changes: dict[str, object], field: str) -> Non
 
 def test_an_obstacle_that_is_not_there_is_refused() -> None:
     avoidances = (Avoidance(weight=1.0, link=0, place=0.5, obstacle=1),)
-    with pytest.raises(SettingError, match=r"objective.avoidances\[0\].obstacle: must be an obstacle of the scenario"):
+    with pytest.raises(
+        SettingError,
+        match=r"objective.avoidances\[0\].obstacle: must be an obstacle of the scenario",
+    ):
         PlacementCriteria(**(PLAIN | {"avoidances": avoidances})).avoided(np.zeros((1, 2)))  # type: ignore[arg-type]

@@ -87,15 +87,21 @@ def test_distances_from_surfaces_against_coal(name: str) -> None:
         expected = coal.distance(coal.Sphere(1e-9), point, shape, body, request, result)
         if expected >= 0.0:
             assert rows[DISTANCE, n] == pytest.approx(expected, abs=1e-5)
-        else:  # coal finds the way out by iterations, near round bodies a longer one than the shortest
+        # coal finds the way out by iterations, near round bodies a longer one than the shortest
+        else:
             inside += 1
             assert expected - 1e-5 <= rows[DISTANCE, n] <= 0.0
-            assert rows[DISTANCE, n] == pytest.approx(depth(name, place.inv().apply(position - aim[9:12])), abs=1e-12)
+            assert rows[DISTANCE, n] == pytest.approx(
+                depth(name, place.inv().apply(position - aim[9:12])), abs=1e-12
+            )
     assert inside > 3
 
 
 def depth(name: str, point: np.ndarray) -> float:
-    """Return minus how far a point inside of a body, in its own frame, is from getting out of it."""
+    """Return minus how far a point inside of a body, in its own frame.
+
+    Is from getting out of it.
+    """
     x, y, z = np.abs(point)
     away = np.hypot(x, y)
     return float(
@@ -110,7 +116,10 @@ def depth(name: str, point: np.ndarray) -> float:
 
 def test_axial_and_heading_against_their_definitions() -> None:
     pose, rotations, positions = drawn(2)
-    place, middle = Rotation.from_euler("xyz", [10, 70, -20], degrees=True), np.array([0.1, -0.2, 0.3])
+    place, middle = (
+        Rotation.from_euler("xyz", [10, 70, -20], degrees=True),
+        np.array([0.1, -0.2, 0.3]),
+    )
     aim = aim_at(place, middle)
     aim[18], aim[19], aim[23] = 0.4, 0.2, 2.0
     rows = rated(pose, aim)
@@ -149,9 +158,14 @@ def test_weights_of_chosen_terms() -> None:
 
 def test_terms_that_a_phase_cannot_have() -> None:
     cost = PostureCost(goal_distance=LENGTH)
-    with pytest.raises(SettingError, match=r"terms\[0\]: must be a cost term .*, was 'goal_distanc'; did you mean"):
+    with pytest.raises(
+        SettingError, match=r"terms\[0\]: must be a cost term .*, was 'goal_distanc'; did you mean"
+    ):
         cost.weights(("goal_distanc",), "terms")
-    with pytest.raises(SettingError, match=r"terms\[1\]: must be a term that the objective gives a weight \(goal_dist"):
+    with pytest.raises(
+        SettingError,
+        match=r"terms\[1\]: must be a term that the objective gives a weight \(goal_dist",
+    ):
         cost.weights(("goal_distance", "upright"), "terms")
 
 
@@ -162,8 +176,14 @@ UP = LimitedAngle(weight=0.3, limit=10.0)
     ("terms", "message"),
     [
         ({"goal_distance": None}, "goal_distance: must be given: every goal is a place"),
-        ({"upright": UP, "keep_parallel": UP}, "keep_parallel: must be left out with upright, which holds another"),
-        ({"free_space": FreeSpace(weight=1.0, reach=0.1)}, "free_space: must be given with collision"),
+        (
+            {"upright": UP, "keep_parallel": UP},
+            "keep_parallel: must be left out with upright, which holds another",
+        ),
+        (
+            {"free_space": FreeSpace(weight=1.0, reach=0.1)},
+            "free_space: must be given with collision",
+        ),
     ],
 )
 def test_terms_that_contradict_each_other(terms: dict[str, object], message: str) -> None:

@@ -13,7 +13,11 @@ from evoexp.robots.planar_ends import LANES
 def test_a_whole_table_is_measured_as_a_list_of_individuals_is(count: int) -> None:
     rng = np.random.default_rng(count)
     lengths = rng.uniform(0.5, 3.0, 6)
-    arm, target, box = (lengths, 0.5, -0.25, 0.3), np.array([3.0, 4.0]), np.array([-2.0, 6.0, -3.0, 5.0])
+    arm, target, box = (
+        (lengths, 0.5, -0.25, 0.3),
+        np.array([3.0, 4.0]),
+        np.array([-2.0, 6.0, -3.0, 5.0]),
+    )
     start, ends = rng.uniform(-3.0, 3.0, 6), rng.uniform(-3.0, 3.0, (6, count + 3))
     weights = (1.0, 0.7)
     whole, listed = np.full((2, 3, count + 3), -1.0)
@@ -24,7 +28,10 @@ def test_a_whole_table_is_measured_as_a_list_of_individuals_is(count: int) -> No
     assert (whole[:, count:] == -1.0).all()
     for k in range(count):
         directions = 0.3 + np.cumsum(ends[:, k])
-        x, y = 0.5 + float(lengths @ np.cos(directions)), -0.25 + float(lengths @ np.sin(directions))
+        x, y = (
+            0.5 + float(lengths @ np.cos(directions)),
+            -0.25 + float(lengths @ np.sin(directions)),
+        )
         cost, error, way = whole[:, k]
         assert error == pytest.approx(math.dist((x, y), target), abs=1e-12)
         assert way == pytest.approx(math.dist(start, ends[:, k]), abs=1e-12)

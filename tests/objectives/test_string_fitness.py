@@ -5,7 +5,9 @@ import pytest
 
 from evoexp.objectives.string_fitness import StringFitness, count_collisions, weigh
 
-PAPER = StringFitness(length_weight=0.5, unevenness_weight=0.005, collision_weight=100.0, fitness_offset=500.0)
+PAPER = StringFitness(
+    length_weight=0.5, unevenness_weight=0.005, collision_weight=100.0, fitness_offset=500.0
+)
 
 
 def test_cost_is_the_bracket_of_equation_7() -> None:

@@ -37,7 +37,9 @@ def walked(start, goal, num, uniforms, step, max_turn):
         if joints == 1:
             path.append(path[-1] + length * np.sign(d))
             continue
-        angles = [math.atan2(d[1], d[0])] + [math.atan2(d[k], math.hypot(*d[:k])) for k in range(2, joints)]
+        angles = [math.atan2(d[1], d[0])] + [
+            math.atan2(d[k], math.hypot(*d[:k])) for k in range(2, joints)
+        ]
         angles = [a + (2 * uniforms.pop(0) - 1) * max_turn for a in angles]
         move, rest = np.zeros(joints), length
         for k in range(joints - 1, 0, -1):

@@ -1,4 +1,7 @@
-"""Random walks over grids against walks written plainly, which take the same numbers in the same order."""
+"""Random walks over grids against walks written plainly.
+
+Which take the same numbers in the same order.
+"""
 
 import numpy as np
 from hypothesis import given, settings
@@ -16,7 +19,10 @@ def test_a_single_walk_is_that_of_a_single_walker(
 ) -> None:
     world = World(shape, share, seed, potentials)
     uniforms, taken = np.random.default_rng(seed).random(20_000), np.array([7])
-    path, place = np.zeros(world.grid.num_nodes + 1, dtype=np.int32), np.zeros(world.grid.num_nodes, dtype=np.int32)
+    path, place = (
+        np.zeros(world.grid.num_nodes + 1, dtype=np.int32),
+        np.zeros(world.grid.num_nodes, dtype=np.int32),
+    )
     walk((uniforms, taken), world.moves, world.ends, erase, path, place)
     trail = world.trail(iter(uniforms[7:].tolist()))
     assert taken[0] == 7 + len(trail) - 1
@@ -25,7 +31,10 @@ def test_a_single_walk_is_that_of_a_single_walker(
 
 def test_numbers_that_do_not_suffice_are_said() -> None:
     world = World((9, 9), 0.0, 0, (1.0, 3.0))
-    path, place = np.zeros(world.grid.num_nodes + 1, dtype=np.int32), np.zeros(world.grid.num_nodes, dtype=np.int32)
+    path, place = (
+        np.zeros(world.grid.num_nodes + 1, dtype=np.int32),
+        np.zeros(world.grid.num_nodes, dtype=np.int32),
+    )
     for taken in (np.array([0]), np.array([5])):
         draws = np.full(5, 0.5), taken
         walk(draws, world.moves, world.ends, True, path, place)
@@ -47,12 +56,16 @@ def test_walks_one_by_one_are_those_of_a_walker_wherever_blocks_end(
         complete = walk_each(draws, world.moves, world.ends, erase, complete, paths, place)
         begin += int(draws[1][0])
     numbers = iter(uniforms.tolist())
-    assert [nodes_of(path) for path in paths] == [as_path(world.trail(numbers), erase, nodes) for _ in paths]
+    assert [nodes_of(path) for path in paths] == [
+        as_path(world.trail(numbers), erase, nodes) for _ in paths
+    ]
     assert next(numbers) == uniforms[begin]
 
 
 @given(st.lists(st.integers(0, 9), min_size=1, max_size=40), st.booleans())
-def test_loops_are_erased_in_the_order_in_which_they_close(nodes: list[int], in_place: bool) -> None:
+def test_loops_are_erased_in_the_order_in_which_they_close(
+    nodes: list[int], in_place: bool
+) -> None:
     trail = np.array([len(nodes), *nodes], dtype=np.int32)
     path = trail if in_place else np.zeros(len(nodes) + 1, dtype=np.int32)
     erase_loops(trail, len(nodes), path, np.full(10, 99, dtype=np.int32))

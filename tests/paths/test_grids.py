@@ -1,4 +1,7 @@
-"""Grids: the moves they permit, against the rule spelled out; fronts, against a search written plainly."""
+"""Grids: the moves they permit, against the rule spelled out.
+
+Fronts, against a search written plainly.
+"""
 
 import itertools
 from collections import deque
@@ -42,14 +45,18 @@ def test_moves_are_those_of_the_rule(shape: tuple[int, ...], share: float, seed:
         targets = {
             other
             for move in itertools.product((-1, 0, 1), repeat=len(shape))
-            if any(move) and free(blocked, other := tuple(a + b for a, b in zip(node, move, strict=True)))
+            if any(move)
+            and free(blocked, other := tuple(a + b for a, b in zip(node, move, strict=True)))
             if free(blocked, node) and joined_laterally(blocked, node, other)
         }
         index = own.index_of(node)
         found = [int(k) for k in own.neighbours[index] if k >= 0]
         assert {tuple(own.coordinates[k].tolist()) for k in found} == targets
         for k in found:
-            assert own.kinds[abs(k - index)] == np.abs(own.coordinates[k] - own.coordinates[index]).sum()
+            assert (
+                own.kinds[abs(k - index)]
+                == np.abs(own.coordinates[k] - own.coordinates[index]).sum()
+            )
 
 
 def test_a_diagonal_move_is_forbidden_between_two_blocked_nodes_only() -> None:
@@ -67,7 +74,9 @@ def test_there_are_2m_lateral_moves_first() -> None:
 
 
 @given(SHAPES, st.floats(0.0, 0.6), st.integers(1, 2), st.integers(0, 2**32))
-def test_a_front_counts_steps(shape: tuple[int, ...], share: float, neighbourhood: int, seed: int) -> None:
+def test_a_front_counts_steps(
+    shape: tuple[int, ...], share: float, neighbourhood: int, seed: int
+) -> None:
     blocked = maps(shape, share, seed)
     own, source = grid(blocked), (0,) * len(shape)
     blocked[source] = False

@@ -16,7 +16,9 @@ def test_are_at_the_fractions_of_each_segment(num, substeps):
     for j in range(4):
         for lane in range(16):
             expected = np.interp(at, np.arange(num + 1), via_points[j, :, lane])
-            assert np.allclose(out[j, :, lane], expected, rtol=0.0, atol=1e-12)  # 20 roundings at 600
+            assert np.allclose(
+                out[j, :, lane], expected, rtol=0.0, atol=1e-12
+            )  # 20 roundings at 600
     assert np.array_equal(out[:, substeps - 1 :: substeps], via_points[:, 1:])
 
 

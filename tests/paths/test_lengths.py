@@ -27,7 +27,9 @@ def test_are_the_sums_of_the_paper(num):
             mean = sum(d) / num
             # 40 additions of numbers below 350: rounding stays below 40 · 350 · 20 · 1e-16
             assert lengths[arm, lane] == pytest.approx(sum(d), rel=1e-13)
-            assert unevenness[arm, lane] == pytest.approx(sum(abs(x - mean) for x in d), rel=1e-12, abs=1e-10)
+            assert unevenness[arm, lane] == pytest.approx(
+                sum(abs(x - mean) for x in d), rel=1e-12, abs=1e-10
+            )
 
 
 def test_a_path_without_length_and_an_even_one():

@@ -8,7 +8,9 @@ from hypothesis import strategies as st
 from evoexp.paths.motion import Motion, clamped_cubic, joint_ranges, top_speeds
 
 CONFIGURATIONS = st.integers(2, 8).flatmap(
-    lambda n: st.lists(st.lists(st.floats(-3.0, 3.0), min_size=2, max_size=2), min_size=n, max_size=n)
+    lambda n: st.lists(
+        st.lists(st.floats(-3.0, 3.0), min_size=2, max_size=2), min_size=n, max_size=n
+    )
 )
 
 

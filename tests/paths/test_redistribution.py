@@ -1,4 +1,7 @@
-"""Redistribution against scipy's splines with dense arc length, its properties, and its degenerate cases."""
+"""Redistribution against scipy's splines with dense arc length, its properties.
+
+And its degenerate cases.
+"""
 
 from itertools import pairwise
 
@@ -20,11 +23,16 @@ def strings(seed, nq, num, lanes, scale=100.0):
 
 
 def walks(seed, num, lanes):
-    """Return strings as the algorithm meets them: steps of 10 ± noise in a slowly turning direction, two joints."""
+    """Return strings as the algorithm meets them.
+
+    Steps of 10 ± noise in a slowly turning direction, two joints.
+    """
     rng = np.random.default_rng(seed)
     angle = np.cumsum(rng.uniform(-1.0, 1.0, (num, lanes)), axis=0)
     steps = rng.uniform(5.0, 15.0, (num, lanes)) * np.array([np.cos(angle), np.sin(angle)])
-    return np.ascontiguousarray(np.concatenate([np.zeros((2, 1, lanes)), np.cumsum(steps, axis=1)], axis=1))
+    return np.ascontiguousarray(
+        np.concatenate([np.zeros((2, 1, lanes)), np.cumsum(steps, axis=1)], axis=1)
+    )
 
 
 def arms(*slices):
@@ -34,7 +42,12 @@ def arms(*slices):
 def run(via_points, arm_slices, num_lanes, end="natural", samples=8):
     joints = int(np.max(arm_slices[:, 1] - arm_slices[:, 0]))
     out = via_points.copy()
-    redistribute(out, arm_slices, num_lanes, prepare_redistribution(via_points.shape[1] - 1, joints, end, samples))
+    redistribute(
+        out,
+        arm_slices,
+        num_lanes,
+        prepare_redistribution(via_points.shape[1] - 1, joints, end, samples),
+    )
     return out
 
 
@@ -49,8 +62,9 @@ def errors(given, moved, arm_slices, num_lanes, end):
     return np.array(result)
 
 
-# Root mean square and largest error, twice the worst measured over N and end condition. The points are random, so that
-# every path turns sharply everywhere; with one joint it stops dead wherever it turns, and the rule is of second order.
+# Root mean square and largest error, twice the worst measured over N and end condition. The points
+# are random, so that every path turns sharply everywhere; with one joint it stops dead wherever it
+# turns, and the rule is of second order.
 BOUNDS = {
     ("several", 8): (7e-3, 4e-2), ("several", 16): (1.2e-3, 7e-3), ("several", 128): (8e-6, 1e-4),
     ("one", 8): (3.5e-2, 1.1e-1), ("one", 16): (9e-3, 3e-2), ("one", 128): (1.4e-4, 5e-4),
@@ -63,7 +77,9 @@ BOUNDS = {
 def test_points_are_those_of_scipys_spline_at_equal_arc_length(num, joints, samples, end):
     given = strings(num, 12, num, 16)
     moved = run(given, arms((0, 2), (2, 5), (5, 6), (6, 12)), 16, end, samples)
-    found = errors(given, moved, [(0, 2), (2, 5), (6, 12)] if joints == "several" else [(5, 6)], 16, end)
+    found = errors(
+        given, moved, [(0, 2), (2, 5), (6, 12)] if joints == "several" else [(5, 6)], 16, end
+    )
     mean, largest = BOUNDS[joints, samples]
     assert np.sqrt(np.mean(found**2)) < mean
     assert found.max() < largest
@@ -80,7 +96,10 @@ def test_smooth_paths_are_more_accurate(end):
 @pytest.mark.parametrize("end", ENDS)
 def test_accuracy_converges_with_the_samples(end):
     given = walks(2, 20, 32)
-    found = [errors(given, run(given, arms((0, 2)), 32, end, s), arms((0, 2)), 32, end) for s in (8, 16, 32, 64)]
+    found = [
+        errors(given, run(given, arms((0, 2)), 32, end, s), arms((0, 2)), 32, end)
+        for s in (8, 16, 32, 64)
+    ]
     rms = [np.sqrt(np.mean(e**2)) for e in found]
     assert all(finer < coarser / 2 for coarser, finer in pairwise(rms))
 
@@ -90,13 +109,17 @@ def test_spacing_is_even_for_smooth_paths():
     circle = np.stack([np.cos(3.0 * t), np.sin(3.0 * t)])[:, :, None]
     moved = run(np.ascontiguousarray(np.repeat(circle, 8, axis=2)), arms((0, 2)), 8)
     chords = np.linalg.norm(np.diff(moved[:, :, 0], axis=1), axis=0)
-    assert np.ptp(chords) / chords.mean() < 2e-3  # the spline itself is off the circle near its natural ends
+    assert (
+        np.ptp(chords) / chords.mean() < 2e-3
+    )  # the spline itself is off the circle near its natural ends
 
 
 @settings(max_examples=40, deadline=None)
 @given(
-    num=st.integers(1, 45), joints=st.lists(st.integers(1, 6), min_size=1, max_size=3), seed=st.integers(0, 2**32 - 1),
-    scale=st.sampled_from([1e-9, 1e-3, 1.0, 1e6]), end=st.sampled_from(ENDS), samples=st.sampled_from([8, 16, 32]),
+    num=st.integers(1, 45), joints=st.lists(st.integers(1, 6), min_size=1, max_size=3),
+    seed=st.integers(0, 2**32 - 1),
+    scale=st.sampled_from([1e-9, 1e-3, 1.0, 1e6]), end=st.sampled_from(ENDS),
+    samples=st.sampled_from([8, 16, 32]),
 )  # fmt: skip
 def test_ends_keep_their_bits_and_points_stay_finite(num, joints, seed, scale, end, samples):
     stops = np.cumsum(joints)
@@ -115,7 +138,9 @@ def test_an_equally_spaced_straight_line_stays(num, joints, seed):
     given = start + (goal - start) * np.linspace(0.0, 1.0, num + 1)[:, None]
     moved = run(given, arms((0, joints)), 8)
     length = np.linalg.norm(goal - start, axis=0).max()
-    assert np.max(np.abs(moved - given)) < 1e-11 * length + 1e-12  # rounding: some 1e3 operations at 300
+    assert (
+        np.max(np.abs(moved - given)) < 1e-11 * length + 1e-12
+    )  # rounding: some 1e3 operations at 300
 
 
 @settings(max_examples=25, deadline=None)
@@ -125,7 +150,9 @@ def test_a_lane_does_not_depend_on_its_place_or_company(seed, lanes):
     arm_slices = arms((0, 2), (2, 5))
     moved = run(given, arm_slices, lanes)
     order = np.random.default_rng(seed).permutation(lanes)
-    assert np.array_equal(run(np.ascontiguousarray(given[:, :, order]), arm_slices, lanes), moved[:, :, order])
+    assert np.array_equal(
+        run(np.ascontiguousarray(given[:, :, order]), arm_slices, lanes), moved[:, :, order]
+    )
     alone = np.zeros((5, 13, 8))
     alone[:, :, 3] = given[:, :, lanes - 1]
     assert np.array_equal(run(alone, arm_slices, 8)[:, :, 3], moved[:, :, lanes - 1])
@@ -137,7 +164,10 @@ def test_garbage_in_the_padding_changes_nothing(num_lanes, garbage):
     given = strings(7, 5, 20, 56)
     dirty = given.copy()
     dirty[:, ::2, num_lanes:] = garbage
-    moved, clean = run(dirty, arms((0, 2), (2, 5)), num_lanes), run(given, arms((0, 2), (2, 5)), num_lanes)
+    moved, clean = (
+        run(dirty, arms((0, 2), (2, 5)), num_lanes),
+        run(given, arms((0, 2), (2, 5)), num_lanes),
+    )
     assert np.array_equal(moved[:, :, :num_lanes], clean[:, :, :num_lanes])
     assert np.all(np.isfinite(moved)) or not np.isfinite(garbage)
     rest = -(-num_lanes // 8) * 8
@@ -222,7 +252,8 @@ def test_read_only_via_points_are_refused():
     ("arguments", "message"),
     [
         ((0, 2), "num_via_points"), ((10, 0), "max_joints"), ((10, 2, "periodic"), "end_condition"),
-        ((10, 2, "natural", 4), "samples_per_segment"), ((10, 2, "natural", 12), "samples_per_segment"),
+        ((10, 2, "natural", 4), "samples_per_segment"), ((10, 2, "natural", 12),
+        "samples_per_segment"),
         ((10, 2, "natural", 2048), "samples_per_segment"),
     ],
 )  # fmt: skip

@@ -51,11 +51,14 @@ def test_repeated_sweeps_straighten_a_path():
     for _ in range(5000):
         relax(given, 0.5, 24)
     line = np.linspace(ends[:, 0], ends[:, 1], 21, axis=1)
-    assert np.allclose(given, line, rtol=0.0, atol=1e-9)  # the slowest mode shrinks by 0.8 % per sweep
+    assert np.allclose(
+        given, line, rtol=0.0, atol=1e-9
+    )  # the slowest mode shrinks by 0.8 % per sweep
     assert np.array_equal(given[:, [0, -1]], ends)
 
 
-@pytest.mark.parametrize(("delta", "num_lanes", "message"), [(-0.1, 24, "delta"), (1.1, 24, "delta"),
+@pytest.mark.parametrize(("delta", "num_lanes", "message"), [(-0.1, 24, "delta"), (1.1, 24,
+"delta"),
     (float("nan"), 24, "delta"), (0.5, 0, "num_lanes"), (0.5, 25, "num_lanes")])  # fmt: skip
 def test_what_does_not_fit_is_refused_untouched(delta, num_lanes, message):
     given = strings(4)

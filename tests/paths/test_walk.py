@@ -14,7 +14,10 @@ TURN = math.radians(120)
 
 
 def fresh(seed, joints, num, strings, step=2.5, max_turn=TURN, start=None, goal=None):
-    """Return (via_points, uniforms, start, goal, arm_slices) of walks in the lanes 3, 4, … of a population of NaN."""
+    """Return (via_points, uniforms, start, goal, arm_slices) of walks in the lanes 3, 4.
+
+    … of a population of NaN.
+    """
     stops = np.cumsum(joints)
     arm_slices = np.stack([stops - joints, stops], axis=1)
     rng = np.random.default_rng(seed)
@@ -36,7 +39,10 @@ def test_is_the_walk_with_true_angles(seed, joints, num, max_turn):
     for s in range(4):
         rest = list(uniforms[s])
         for first, stop in arm_slices:
-            used, rest = rest[: (num - 1) * (stop - first - 1)], rest[(num - 1) * (stop - first - 1) :]
+            used, rest = (
+                rest[: (num - 1) * (stop - first - 1)],
+                rest[(num - 1) * (stop - first - 1) :],
+            )
             truth = walked(start[first:stop], goal[first:stop], num, used, 2.3, max_turn)
             # 25 steps of 60; an error grows by step / distance where a walk passes the goal closely
             assert np.allclose(via_points[first:stop, :, s + 3].T, truth, rtol=0.0, atol=1e-9)
@@ -85,9 +91,13 @@ def test_a_walk_to_where_it_begins_stays_there(joints):
     assert np.all(via_points[:, :, 3:7] == 0.3)
 
 
-@pytest.mark.parametrize(("start", "goal"), [([0, 0, 0], [0, 0, 90]), ([0, 0, 90], [0, 0, 0]), ([0, 0, 0], [0, 50, 0])])
+@pytest.mark.parametrize(
+    ("start", "goal"), [([0, 0, 0], [0, 0, 90]), ([0, 0, 90], [0, 0, 0]), ([0, 0, 0], [0, 50, 0])]
+)
 def test_a_goal_along_one_axis_gives_no_nan(start, goal):
-    via_points, _, _, _, _ = fresh(6, [3], 20, 30, max_turn=math.pi / 2, start=np.float64(start), goal=np.float64(goal))
+    via_points, _, _, _, _ = fresh(
+        6, [3], 20, 30, max_turn=math.pi / 2, start=np.float64(start), goal=np.float64(goal)
+    )
     assert np.all(np.isfinite(via_points[:, :, 3:33]))
 
 

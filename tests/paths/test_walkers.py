@@ -18,7 +18,10 @@ def table(world: World, count: int) -> np.ndarray:
 
 
 def plain_trails(world: World, words: np.ndarray, count: int) -> tuple[list[list[int]], int]:
-    """Every walker takes half a word in turn; whoever arrives begins the next walk, and goes on if there is none."""
+    """Every walker takes half a word in turn.
+
+    Whoever arrives begins the next walk, and goes on if there is none.
+    """
     halves = iter(half / 2**32 for word in words.tolist() for half in (word % 2**32, word // 2**32))
     trails: list[list[int]] = [[world.ends[0]] for _ in range(max(count, LANES))]
     own, begun, taken = list(range(LANES)), LANES, 0
@@ -36,7 +39,14 @@ def plain_trails(world: World, words: np.ndarray, count: int) -> tuple[list[list
 
 
 @settings(max_examples=60, deadline=None)
-@given(SHAPES, st.floats(0.0, 0.5), st.sampled_from([1.0, 2.0]), st.booleans(), st.integers(1, 3 * LANES), SEEDS)
+@given(
+    SHAPES,
+    st.floats(0.0, 0.5),
+    st.sampled_from([1.0, 2.0]),
+    st.booleans(),
+    st.integers(1, 3 * LANES),
+    SEEDS,
+)
 def test_many_walks_are_those_of_walkers_that_take_turns(
     shape: tuple[int, ...], share: float, step: float, erase: bool, count: int, seed: int
 ) -> None:
@@ -46,7 +56,9 @@ def test_many_walks_are_those_of_walkers_that_take_turns(
     taken = walkers.go(words)
     trails, expected = plain_trails(world, words, count)
     assert (walkers.complete, taken) == (count, expected)
-    assert [nodes_of(path) for path in paths] == [as_path(trail, erase, world.grid.num_nodes) for trail in trails]
+    assert [nodes_of(path) for path in paths] == [
+        as_path(trail, erase, world.grid.num_nodes) for trail in trails
+    ]
 
 
 @settings(max_examples=40, deadline=None)

@@ -15,7 +15,9 @@ POTENTIALS = st.sampled_from([(1.0, 3.0), (1.0, 2.0), (0.5, 1.75), (1.0, 500.0)]
 class World:
     """A grid whose last node can be reached from its first one."""
 
-    def __init__(self, shape: tuple[int, ...], share: float, seed: int, potentials: tuple[float, float]) -> None:
+    def __init__(
+        self, shape: tuple[int, ...], share: float, seed: int, potentials: tuple[float, float]
+    ) -> None:
         height = np.random.default_rng(seed).random(shape)
         first, last = (0,) * len(shape), tuple(size - 1 for size in shape)
         height[first] = height[last] = 1.0
@@ -27,11 +29,16 @@ class World:
                 break
             share *= 0.8
         one, two = potentials
-        self.potentials = np.array([0.0, *(one + (two - one) * k for k in range(self.grid.num_nodes))])
+        self.potentials = np.array(
+            [0.0, *(one + (two - one) * k for k in range(self.grid.num_nodes))]
+        )
         self.moves = self.grid.neighbours, self.potentials, self.steps
 
     def weights(self, node: int) -> dict[int, float]:
-        """Where moves lead to, in their order, and what they weigh (Chen & Zalzala 1995, section 2.3)."""
+        """Where moves lead to, in their order, and what they weigh.
+
+        Chen & Zalzala 1995, section 2.3.
+        """
         others = [int(other) for other in self.grid.neighbours[node] if other >= 0]
         potential = {other: float(self.potentials[self.steps[other]]) for other in others}
         return {other: max(potential.values()) - potential[other] + 1.0 for other in others}

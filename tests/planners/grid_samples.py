@@ -12,7 +12,11 @@ from evoexp.planners.grid_path_ga import GridPathGa, Problem
 from evoexp.robots.floor_platform import FloorPlatform
 from evoexp.scenarios.grid_motion import GridMotion
 
-FIELDS = {"neighbourhood": 1, "goal_potentials": (1.0, 3.0), "obstacle_potentials": (10.0, 9.0, 7.0, 5.0, 3.0, 1.0)}
+FIELDS = {
+    "neighbourhood": 1,
+    "goal_potentials": (1.0, 3.0),
+    "obstacle_potentials": (10.0, 9.0, 7.0, 5.0, 3.0, 1.0),
+}
 GA: dict[str, Any] = {"population_size": 12, "num_generations": 8, "num_elites": 1}
 GA |= {"crossover_rate": 0.9, "mutation_rate": 0.4, "scaling_multiple": 2.0}
 
@@ -21,7 +25,9 @@ def planner(weights: tuple[float, float] = (0.2, 1.0), **changed: Any) -> GridPa
     cost = PathCost(distance_weight=weights[0], unsafeness_weight=weights[1])
     ga = ScaledGenetic(**(GA | {k: v for k, v in changed.items() if k in GA}))
     own = {"revisits": False, "crossover_reach": 2, "collision": PotentialFields(**FIELDS)}
-    return GridPathGa(ga=ga, objective=cost, **(own | {k: v for k, v in changed.items() if k not in GA}))
+    return GridPathGa(
+        ga=ga, objective=cost, **(own | {k: v for k, v in changed.items() if k not in GA})
+    )
 
 
 def scenario(blocked: np.ndarray, **changed: Any) -> GridMotion:

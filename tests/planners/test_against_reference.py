@@ -1,8 +1,11 @@
-"""The compiled planner against the same algorithm in plain numpy and scipy, from the same uniform numbers.
+"""The compiled planner against the same algorithm in plain numpy and scipy.
 
-As long as both take the same discrete decisions (who is drawn, which sites, who collides), a generation differs by no
-more than the arithmetic. A decision flips only if a number comes closer to its threshold than that, which with the
-seeds below never happens; were one to flip, the strings would differ by degrees and the test would fail.
+From the same uniform numbers.
+
+As long as both take the same discrete decisions (who is drawn, which sites, who collides), a
+generation differs by no more than the arithmetic. A decision flips only if a number comes closer to
+its threshold than that, which with the seeds below never happens; were one to flip, the strings
+would differ by degrees and the test would fail.
 """
 
 from typing import Any
@@ -16,9 +19,9 @@ from references import rana_numpy
 
 ROUNDING = 1e-9  # [deg] measured: 7e-13
 
-# The reference measures arc length by chords, a rule of second order, the planner by one of fourth order; so the
-# difference is the reference's error. Measured: 1.3e-3 for 128 per segment, 2.3e-5 for 1024, where the points are 10
-# apart: a factor of 57, for steps 8 times finer.
+# The reference measures arc length by chords, a rule of second order, the planner by one of fourth
+# order; so the difference is the reference's error. Measured: 1.3e-3 for 128 per segment, 2.3e-5
+# for 1024, where the points are 10 apart: a factor of 57, for steps 8 times finer.
 ARC_LENGTH = {128: 3e-3, 1024: 6e-5}  # [deg]
 
 
@@ -27,11 +30,16 @@ def condition(*overrides: str, experiment: str = "rana_planar") -> Condition:
 
 
 def largest_differences(given: Condition, seed: int, **changes: Any) -> tuple[float, float]:
-    """Largest difference of strings [deg] and of costs over all generations; collisions must be the same."""
+    """Largest difference of strings [deg] and of costs over all generations.
+
+    Collisions must be the same.
+    """
     planner, problem = given.prepare()
     size = planner.ga.population_size
     ours = planner.evolve(problem, np.random.default_rng(seed))
-    theirs = rana_numpy.evolve(rana_numpy.from_condition(given, **changes), np.random.default_rng(seed))
+    theirs = rana_numpy.evolve(
+        rana_numpy.from_condition(given, **changes), np.random.default_rng(seed)
+    )
     strings, costs, hits = 0.0, 0.0, 0
     for generation, expected in zip(ours, theirs, strict=True):
         arms = [generation.population[a:b, :, :size] for a, b in problem.arm_slices]
@@ -61,7 +69,9 @@ def test_generations_agree_to_the_accuracy_of_the_arc_length(chords: int, seed: 
         ("rana_three_arms", []),
     ],
 )
-def test_variants_agree_to_the_accuracy_of_the_arc_length(experiment: str, overrides: list[str]) -> None:
+def test_variants_agree_to_the_accuracy_of_the_arc_length(
+    experiment: str, overrides: list[str]
+) -> None:
     finer = ["planner.samples_per_segment=128", "ga.num_generations=4"]
     given = condition(*finer, *overrides, experiment=experiment)
     strings, costs = largest_differences(given, 2, chords_per_segment=128)
@@ -74,16 +84,26 @@ def test_variants_agree_to_the_accuracy_of_the_arc_length(experiment: str, overr
         ("rana_planar", []),
         ("rana_three_arms", []),
         ("rana_planar", ["collision.collision_substeps=4"]),
-        ("rana_planar", ["ga.crossover_rate=0.5", "ga.mutation_rate=0.5", "planner.num_new_trajectories=12"]),
-        ("rana_planar", ["ga.population_size=31", "ga.num_elites=0", "planner.crossover_distance=15"]),
+        (
+            "rana_planar",
+            ["ga.crossover_rate=0.5", "ga.mutation_rate=0.5", "planner.num_new_trajectories=12"],
+        ),
+        (
+            "rana_planar",
+            ["ga.population_size=31", "ga.num_elites=0", "planner.crossover_distance=15"],
+        ),
         ("rana_planar", ["objective.fitness_offset=0", "planner.relaxation_step=0"]),
         ("rana_planar", ["planner.num_via_points=7", "planner.walk_step=1", "planner.max_turn=30"]),
         ("rana_planar", ["collision.spheres_per_link=8", "collision.sphere_radius=0.6"]),
     ],
     ids=str,
 )
-def test_without_redistribution_generations_agree_to_rounding(experiment: str, overrides: list[str]) -> None:
-    given = condition("planner.redistribution=false", "ga.num_generations=40", *overrides, experiment=experiment)
+def test_without_redistribution_generations_agree_to_rounding(
+    experiment: str, overrides: list[str]
+) -> None:
+    given = condition(
+        "planner.redistribution=false", "ga.num_generations=40", *overrides, experiment=experiment
+    )
     for seed in (0, 1):
         strings, costs = largest_differences(given, seed)
         assert max(strings, costs) < ROUNDING
@@ -95,10 +115,11 @@ def test_a_wrong_term_would_be_noticed() -> None:
 
 
 def test_runs_end_equally_well() -> None:
-    """With its coarse arc length (8 samples) the planner goes other ways than the reference (16 chords), as far.
+    """With 8 samples of arc length the planner goes other ways than the reference, as far.
 
-    After some tens of generations roundings have become decisions, and runs are two samples of one distribution: the
-    means of eight differ by less than three standard errors, a bound that chance exceeds in less than a percent.
+    After some tens of generations roundings have become decisions, and runs are two samples of one
+    distribution: the means of eight differ by less than three standard errors, a bound that chance
+    exceeds in less than a percent.
     """
     given = condition("ga.num_generations=60")
     planner, problem = given.prepare()
@@ -110,4 +131,6 @@ def test_runs_end_equally_well() -> None:
         theirs[seed] = end.costs.min()
     error = np.sqrt((ours.var(ddof=1) + theirs.var(ddof=1)) / 8)
     assert abs(ours.mean() - theirs.mean()) < 3.0 * error
-    assert 0.2 < ours.std(ddof=1) / theirs.std(ddof=1) < 5.0  # F test: 4.995 and its reciprocal are the 5 % bounds
+    assert (
+        0.2 < ours.std(ddof=1) / theirs.std(ddof=1) < 5.0
+    )  # F test: 4.995 and its reciprocal are the 5 % bounds

@@ -48,7 +48,10 @@ def test_costs_are_the_papers_sums() -> None:
     found = planner.evaluated(problem, genes)
     bases = ((0.0, 0.0), (0.3, 0.0))
     paths = [
-        [np.vstack([problem.start[r], genes[r, :, i].reshape(4, 2), problem.goal[r]]) for i in range(7)]
+        [
+            np.vstack([problem.start[r], genes[r, :, i].reshape(4, 2), problem.goal[r]])
+            for i in range(7)
+        ]
         for r in range(2)
     ]
     for i, j in itertools.product(range(7), range(7)):
@@ -71,7 +74,9 @@ def test_costs_are_the_papers_sums() -> None:
         assert found.costs[r, i] == pytest.approx(sum(expected), abs=1e-12)
 
 
-@pytest.mark.parametrize("settings", [SMALL, NO_HALL, (*SMALL, "ga.hall_frozen=true"), (*SMALL, "ga.hall_memory=3")])
+@pytest.mark.parametrize(
+    "settings", [SMALL, NO_HALL, (*SMALL, "ga.hall_frozen=true"), (*SMALL, "ga.hall_memory=3")]
+)
 def test_a_run_keeps_its_promises(settings: tuple[str, ...]) -> None:
     planner, problem = prepared(*settings)
     last, runs = np.inf, []
@@ -100,7 +105,9 @@ def test_the_best_team_is_what_it_says() -> None:
     assert paths[:, -1] == pytest.approx(np.array([[30.0, 0.0], [30.0, 120.0]]))
     motion = planner.motion(problem, last.best)
     assert motion.q.shape == (6, 4)
-    assert np.rad2deg(motion.q[:, 0] + motion.q[:, 1]) == pytest.approx(paths[0, :, 1])  # relative to the link before
+    assert np.rad2deg(motion.q[:, 0] + motion.q[:, 1]) == pytest.approx(
+        paths[0, :, 1]
+    )  # relative to the link before
 
 
 def test_what_stands_where_the_hall_does_is_soon_free_of_collision() -> None:
@@ -118,7 +125,9 @@ def test_what_stands_where_the_hall_does_is_soon_free_of_collision() -> None:
 def test_with_a_hall_the_best_team_of_a_generation_never_gets_worse() -> None:
     for settings, worsens in ((SMALL, False), (NO_HALL, True)):
         planner, problem = prepared(*settings)
-        best = np.array([g.best_cost_in_generation for g in planner.evolve(problem, np.random.default_rng(7))])
+        best = np.array(
+            [g.best_cost_in_generation for g in planner.evolve(problem, np.random.default_rng(7))]
+        )
         found = best[np.isfinite(best)]
         assert len(found) > 10
         assert bool((np.diff(found) > 1e-12).any()) is worsens
@@ -130,7 +139,9 @@ def test_random_search_draws_teams_of_its_own() -> None:
     judged = planner.cost(problem, population)
     found: Evaluated = judged.evaluated
     for i in range(9):
-        free = [found.own[0, i] + found.own[1, j] for j in range(9) if found.collisions[0, i, j] == 0]
+        free = [
+            found.own[0, i] + found.own[1, j] for j in range(9) if found.collisions[0, i, j] == 0
+        ]
         assert judged.cost[i] == pytest.approx(min(free, default=np.inf))
     k = int(np.argmin(judged.cost))
     terms = planner.evaluate(problem, planner.solution(problem, population, k))
@@ -138,16 +149,28 @@ def test_random_search_draws_teams_of_its_own() -> None:
 
 
 def test_restarts_draw_fresh_populations() -> None:
-    """A single pair, which collides at first: without restarts it changes one allele at most, with them all of them."""
-    lonely = ("ga=curkovic_1", "ga.population_size=1", "ga.num_generations=6", "ga.mutation_rate=1.0")
+    """A single pair, which collides at first.
+
+    Without restarts it changes one allele at most, with them all of them.
+    """
+    lonely = (
+        "ga=curkovic_1",
+        "ga.population_size=1",
+        "ga.num_generations=6",
+        "ga.mutation_rate=1.0",
+    )
     seed = next(
         seed
         for seed in range(50)
-        if not next(iter(prepared(*lonely)[0].evolve(prepared(*lonely)[1], np.random.default_rng(seed)))).solved
+        if not next(
+            iter(prepared(*lonely)[0].evolve(prepared(*lonely)[1], np.random.default_rng(seed)))
+        ).solved
     )
     for restart, changed in (("null", 1), ("1", 8)):
         planner, problem = prepared(*lonely, f"ga.restart_after={restart}")
-        first, second, *_ = (g.population.copy() for g in planner.evolve(problem, np.random.default_rng(seed)))
+        first, second, *_ = (
+            g.population.copy() for g in planner.evolve(problem, np.random.default_rng(seed))
+        )
         assert (first != second).sum(axis=1).max() <= changed
         assert (first != second).sum() > (changed - 1) * 2 - 1
 
@@ -161,13 +184,17 @@ def test_restarts_draw_fresh_populations() -> None:
         ),
         (
             ("scenario.q_start=[{angles:[60.0,0.0]},{angles:[120.0,180.0]}]",),
-            "q_start: must be free of collision (robots 1 and 2 touch: arm_1_link_2 and arm_2_link_2)",
+            "q_start: must be free of collision (robots 1 and 2 touch: arm_1_link_2 and "
+            "arm_2_link_2)",
         ),
         (
             ("scenario.q_goal=[{tip:[0.9,0.0],elbow:left},{angles:[30.0,120.0]}]",),
             "q_goal[0].tip: must be 0 to 0.5 away",
         ),
-        (("scenario.q_goal=[{tip:[0.4,0.0]},{angles:[30.0,120.0]}]",), "elbow: must be given with tip"),
+        (
+            ("scenario.q_goal=[{tip:[0.4,0.0]},{angles:[30.0,120.0]}]",),
+            "elbow: must be given with tip",
+        ),
         (("scenario.stationary=[0]",), "q_goal[0]: must be the same as its start"),
         (("ga.hall_depth=0.001",), "hall_depth: must be 0, or large enough"),
         (("planner.chromosome_length=7",), "chromosome_length: must be even and at least 2"),
@@ -209,7 +236,9 @@ def test_a_robot_that_stands_still_keeps_its_posture() -> None:
 def test_no_team_is_cheaper_than_the_lower_bound() -> None:
     from evoexp.report.results import ConditionResults
 
-    condition = compose.expand(["experiment=curkovic_methods"], only=["V"])[0].conditions[0].condition
+    condition = (
+        compose.expand(["experiment=curkovic_methods"], only=["V"])[0].conditions[0].condition
+    )
     nothing: Any = None
     bound = lower_bound(ConditionResults("V", condition, 1, nothing, {}, None, {}))
     planner, problem = prepared(*SMALL)
@@ -240,7 +269,9 @@ def test_a_spline_is_executed_between_the_same_configurations() -> None:
         speed = np.abs(np.gradient(own, times, axis=0)).max()
         assert terms[f"fastest_turn_robot_{r + 1}_deg"] == pytest.approx(speed, abs=0.05)
         steps = np.abs(np.diff(solution.reshape(2, 6, 2)[r], axis=0)).max()
-        assert planner.evaluate(problem, solution)[f"fastest_turn_robot_{r + 1}_deg"] == pytest.approx(steps)
+        assert planner.evaluate(problem, solution)[
+            f"fastest_turn_robot_{r + 1}_deg"
+        ] == pytest.approx(steps)
 
 
 def test_the_first_generations_of_method_v_are_those_of_the_pareto_experiment() -> None:
@@ -249,7 +280,9 @@ def test_the_first_generations_of_method_v_are_those_of_the_pareto_experiment() 
     front, problem = condition.prepare()
     method, _ = prepared()
     pairs = zip(
-        front.evolve(problem, np.random.default_rng(9)), method.evolve(problem, np.random.default_rng(9)), strict=False
+        front.evolve(problem, np.random.default_rng(9)),
+        method.evolve(problem, np.random.default_rng(9)),
+        strict=False,
     )
     for one, other in pairs:
         assert np.array_equal(one.population, other.population)
@@ -261,7 +294,10 @@ def test_the_first_generations_of_method_v_are_those_of_the_pareto_experiment() 
 
 
 def test_thick_links_and_tools_are_judged_by_their_bodies() -> None:
-    """What the envelopes' lines let pass between configurations, or a circle hides, the exact verdict sees."""
+    """What the envelopes' lines let pass between configurations, or a circle hides.
+
+    The exact verdict sees.
+    """
     planner, problem = prepared("collision.tcp_radius=0.04", experiment="curkovic_safety")
     names = set(problem.scene.names)
     assert names == {f"arm_{r}_link_{k}" for r in (1, 2) for k in (1, 2, 3)}

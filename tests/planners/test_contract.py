@@ -13,7 +13,10 @@ from evoexp.store.log import Finished
 from evoexp.store.log_reader import read_log, read_summary
 from shipped_conditions import kinds_of_conditions
 
-SHIPPED = [pytest.param(condition, id=name) for name, condition in sorted(kinds_of_conditions("smoke").items())]
+SHIPPED = [
+    pytest.param(condition, id=name)
+    for name, condition in sorted(kinds_of_conditions("smoke").items())
+]
 
 
 @pytest.fixture(params=SHIPPED)
@@ -28,7 +31,11 @@ def finished(condition: Condition, replicate: int) -> Finished:
 
 
 def test_same_seed_same_bits_other_replicate_other_bits(condition: Condition) -> None:
-    first, again, other = finished(condition, 0), run_replicate(condition, 0), finished(condition, 1)
+    first, again, other = (
+        finished(condition, 0),
+        run_replicate(condition, 0),
+        finished(condition, 1),
+    )
     assert first.summary.digest == again.summary.digest
     assert first.summary.digest != other.summary.digest
 
@@ -37,10 +44,18 @@ def test_records_are_consistent(condition: Condition) -> None:
     log = read_log(finished(condition, 0).content)
     rows = log.generations
     assert [row.index for row in rows] == list(range(len(rows)))
-    assert all(b.best_cost <= a.best_cost for a, b in zip(rows, rows[1:], strict=False)), "best so far is monotone"
+    assert all(b.best_cost <= a.best_cost for a, b in zip(rows, rows[1:], strict=False)), (
+        "best so far is monotone"
+    )
     assert all(row.best_cost <= row.best_cost_in_generation for row in rows)
-    if not {"team_cost", "sub_path", "phase"} & rows[0].terms.keys():  # else the best is a team, or a whole plan
-        assert all(row.best_cost_in_generation <= row.mean_cost for row in rows if np.isfinite(row.mean_cost))
+    if (
+        not {"team_cost", "sub_path", "phase"} & rows[0].terms.keys()
+    ):  # else the best is a team, or a whole plan
+        assert all(
+            row.best_cost_in_generation <= row.mean_cost
+            for row in rows
+            if np.isfinite(row.mean_cost)
+        )
     assert all(b.evaluations > a.evaluations for a, b in zip(rows, rows[1:], strict=False))
     assert log.summary.best_cost == rows[-1].best_cost == log.solutions[-1].cost
     assert log.summary.evaluations == rows[-1].evaluations
@@ -49,9 +64,13 @@ def test_records_are_consistent(condition: Condition) -> None:
 
 def test_the_summary_is_the_row_that_its_log_gives(condition: Condition) -> None:
     content, summary = finished(condition, 0)
-    given, read = (pa.Table.from_pylist([flatten(each)]) for each in (summary, read_summary(content)))
+    given, read = (
+        pa.Table.from_pylist([flatten(each)]) for each in (summary, read_summary(content))
+    )
     assert set(given.schema) == set(read.schema)
-    assert repr(sorted(given.to_pylist()[0].items())) == repr(sorted(read.to_pylist()[0].items()))  # NaN equals NaN
+    assert repr(sorted(given.to_pylist()[0].items())) == repr(
+        sorted(read.to_pylist()[0].items())
+    )  # NaN equals NaN
 
 
 def test_the_best_solution_is_worth_what_was_recorded(condition: Condition) -> None:
@@ -63,16 +82,22 @@ def test_the_best_solution_is_worth_what_was_recorded(condition: Condition) -> N
         search = {"attempts", "sub_path", "phase", "cycles", "idle_cycles"}
         assert recorded.keys() - terms.keys() <= search, "what only the search knows"
     common = recorded.keys() & terms.keys()  # equal but for the rounding of a solution's units
-    assert {name: recorded[name] for name in common} == pytest.approx({name: terms[name] for name in common}, abs=1e-9)
+    assert {name: recorded[name] for name in common} == pytest.approx(
+        {name: terms[name] for name in common}, abs=1e-9
+    )
     assert log.summary.terms == recorded | terms
 
 
-def test_costs_and_populations_are_views_that_hold_until_the_next_generation(condition: Condition) -> None:
+def test_costs_and_populations_are_views_that_hold_until_the_next_generation(
+    condition: Condition,
+) -> None:
     planner, problem = condition.prepare()
     best = np.inf
     for generation in planner.evolve(problem, condition.rng(0)):
         assert np.all(np.isfinite(generation.population))
-        if generation.costs.ndim == 1:  # else the best is a team of several populations, or a plan of several searches
+        if (
+            generation.costs.ndim == 1
+        ):  # else the best is a team of several populations, or a plan of several searches
             assert generation.costs.min() == generation.best_cost_in_generation
         best = min(best, generation.best_cost_in_generation)
         assert generation.best_cost == best

@@ -60,7 +60,10 @@ def test_exchange_without_loops_is_exchange_and_then_erasing_loops(
     own = planner()
     problem = solvable(shape, share, seed, own)
     paths = own.sample(problem, rng(seed), 12)
-    place, sites = np.zeros(problem.fields.grid.num_nodes, dtype=np.int32), np.zeros((2, 400), dtype=np.int32)
+    place, sites = (
+        np.zeros(problem.fields.grid.num_nodes, dtype=np.int32),
+        np.zeros((2, 400), dtype=np.int32),
+    )
     child = np.zeros(problem.fields.grid.num_nodes + 1, dtype=np.int32)
     for one, two in zip(paths[:-1], paths[1:], strict=True):
         count = grid_kernels.coincident_sites(one, two, place, sites)
@@ -75,7 +78,9 @@ def test_exchange_without_loops_is_exchange_and_then_erasing_loops(
 def test_paths_without_a_common_node_are_crossed_where_they_are_near() -> None:
     own = planner()
     blocked = np.zeros((9, 4), dtype=bool)
-    blocked[2:7, 1:3] = True  # a block of two rows between the lower and the upper way: rows 0 and 3, three apart
+    blocked[2:7, 1:3] = (
+        True  # a block of two rows between the lower and the upper way: rows 0 and 3, three apart
+    )
     problem = own.prepare(robot(), scenario(blocked))
     index = problem.fields.grid.index_of
     lower = [(0, 0), *((x, 0) for x in range(1, 8)), (8, 1), (8, 2), (8, 3)]
@@ -115,7 +120,10 @@ def test_elites_stay() -> None:
 
 
 def test_blocks_of_uniform_numbers_grow_where_walks_are_long() -> None:
-    """A labyrinth, whose walks take more numbers than a block has; small populations draw short blocks."""
+    """A labyrinth, whose walks take more numbers than a block has.
+
+    Small populations draw short blocks.
+    """
     blocked = np.zeros((21, 21), dtype=bool)
     for x in range(1, 21, 2):
         blocked[x, :20] = True
@@ -126,7 +134,9 @@ def test_blocks_of_uniform_numbers_grow_where_walks_are_long() -> None:
         assert all(faults(problem, path, revisits=False) == [] for path in generation.population)
 
 
-@pytest.mark.parametrize(("block", "stretch"), [(1, 8), (300, 8), (2000, 8), (16384, 1), (16384, 3), (400, 5)])
+@pytest.mark.parametrize(
+    ("block", "stretch"), [(1, 8), (300, 8), (2000, 8), (16384, 1), (16384, 3), (400, 5)]
+)
 def test_generations_do_not_depend_on_how_numbers_and_they_are_made_in_blocks(
     block: int, stretch: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -135,7 +145,11 @@ def test_generations_do_not_depend_on_how_numbers_and_they_are_made_in_blocks(
 
     def run() -> list[tuple[list[list[int]], list[float], list[float]]]:
         return [
-            ([nodes_of(path) for path in g.population], g.costs.tolist(), [g.best_cost, g.mean_cost, g.std_cost])
+            (
+                [nodes_of(path) for path in g.population],
+                g.costs.tolist(),
+                [g.best_cost, g.mean_cost, g.std_cost],
+            )
             for g in own.evolve(problem, rng(6))
         ]
 
@@ -204,7 +218,8 @@ def test_evaluate_says_what_is_wrong_with_a_path() -> None:
         ([[0.0, 0.0]], "path: must be two nodes at least"),
         (
             [[0, 0], [0, 4]],
-            r"path\[1\]: must be a node of the grid, whole numbers \(0\.\.3 × 0\.\.3\), was \[0\.0, 4\.0\]",
+            r"path\[1\]: must be a node of the grid, whole numbers \(0\.\.3 × 0\.\.3\)"
+            r", was \[0\.0, 4\.0\]",
         ),
         ([[0, 0], [0.5, 1]], r"path\[1\]: must be a node"),
         ([[-1, 0], [0, 0]], r"path\[0\]: must be a node"),
@@ -221,7 +236,8 @@ def test_a_goal_behind_obstacles_is_said_before_any_search() -> None:
     blocked = np.zeros((5, 5), dtype=bool)
     blocked[3, 3:] = blocked[4, 3] = True
     with pytest.raises(
-        SettingError, match=r"scenario\.goal: must be a node that can be reached from the start \[0, 0\]"
+        SettingError,
+        match=r"scenario\.goal: must be a node that can be reached from the start \[0, 0\]",
     ):
         planner().prepare(robot(), scenario(blocked))
     blocked[3, 3] = False  # leaves the gap between two corners, which may not be passed
@@ -232,7 +248,8 @@ def test_a_goal_behind_obstacles_is_said_before_any_search() -> None:
 def test_start_and_goal_are_safe_enough() -> None:
     capped = PotentialFields(**FIELDS, max_unsafeness=7.0)
     with pytest.raises(
-        SettingError, match=r"scenario\.start: must be a node of an unsafeness of at most .* \(7\), was 9"
+        SettingError,
+        match=r"scenario\.start: must be a node of an unsafeness of at most .* \(7\), was 9",
     ):
         planner(collision=capped).prepare(robot(), scenario(np.zeros((5, 5), dtype=bool)))
 
@@ -248,12 +265,16 @@ def test_the_cap_is_kept_by_all_paths() -> None:
 
 
 def test_something_must_cost() -> None:
-    with pytest.raises(SettingError, match="distance_weight: must be above 0, or unsafeness_weight is"):
+    with pytest.raises(
+        SettingError, match="distance_weight: must be above 0, or unsafeness_weight is"
+    ):
         PathCost(distance_weight=0.0, unsafeness_weight=0.0)
 
 
 def test_robot_and_grid_have_the_same_dimensions() -> None:
-    with pytest.raises(SettingError, match=r"robot\.dimensions: must be as many as the grid has \(2\), was 3"):
+    with pytest.raises(
+        SettingError, match=r"robot\.dimensions: must be as many as the grid has \(2\), was 3"
+    ):
         planner().prepare(robot(3), scenario(np.zeros((4, 4), dtype=bool)))
 
 
@@ -262,7 +283,9 @@ def test_random_search_draws_the_same_first_paths() -> None:
     problem = solvable((9, 9), 0.3, 4, own)
     control = RandomSearch(planner=own)
     first, drawn = next(own.evolve(problem, rng(7))), next(control.evolve(problem, rng(7)))
-    assert [nodes_of(path) for path in first.population] == [nodes_of(path) for path in drawn.population]
+    assert [nodes_of(path) for path in first.population] == [
+        nodes_of(path) for path in drawn.population
+    ]
     assert np.array_equal(first.costs, drawn.costs)
 
 

@@ -14,7 +14,9 @@ BASE = ("experiment=chen_placement",)
 
 
 def prepared(*words: str) -> tuple[object, Problem]:
-    return compose.expand([*BASE, *words], only=["A torque norm"])[0].conditions[0].condition.prepare()
+    return (
+        compose.expand([*BASE, *words], only=["A torque norm"])[0].conditions[0].condition.prepare()
+    )
 
 
 @pytest.mark.parametrize("coding", ["binary", "gray"])
@@ -45,7 +47,11 @@ def test_generations_do_not_depend_on_how_numbers_and_they_are_made_in_blocks(
     def run() -> list[tuple[list[list[int]], list[float], list[float]]]:
         generations = planner.evolve(problem, np.random.Generator(np.random.PCG64(3)))  # type: ignore[attr-defined]
         return [
-            (g.population.tolist(), g.costs.tolist(), [g.best_cost, g.mean_cost, g.std_cost, g.num_feasible])
+            (
+                g.population.tolist(),
+                g.costs.tolist(),
+                [g.best_cost, g.mean_cost, g.std_cost, g.num_feasible],
+            )
             for g in generations
         ]
 
@@ -60,7 +66,9 @@ def test_records_are_those_of_the_costs() -> None:
     before = np.empty(0)
     for g in planner.evolve(problem, np.random.Generator(np.random.PCG64(3))):  # type: ignore[attr-defined]
         assert g.best_cost_in_generation == g.costs.min()
-        assert (g.mean_cost, g.std_cost) == pytest.approx((g.costs.mean(), g.costs.std()), rel=1e-12)
+        assert (g.mean_cost, g.std_cost) == pytest.approx(
+            (g.costs.mean(), g.costs.std()), rel=1e-12
+        )
         if g.index:  # the elites stand behind the offspring, best first
             assert g.costs[-2:].tolist() == np.sort(before)[:2].tolist()
         before = g.costs.copy()
@@ -109,13 +117,31 @@ def test_an_infeasible_posture_is_told_as_such() -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["scenario.target=[5,2.6]"], "scenario.target: must be within the arm's reach: Y_e between −2.5 and 2.5"),
+        (
+            ["scenario.target=[5,2.6]"],
+            "scenario.target: must be within the arm's reach: Y_e between −2.5 and 2.5",
+        ),
         (["objective=chen_torque"], "objective: no option 'chen_torque'"),
-        (["objective.torqe_norm_weight=1"], "objective.torqe_norm_weight: unknown setting; did you mean 'torque_norm_"),
-        (["objective.torque_norm_weight=0"], "objective.torque_norm_weight: must be above 0, or another weight"),
-        (["objective.torque_norm_weight=-1"], "objective.torque_norm_weight: must be at least 0.0, was -1"),
-        (["objective=chen_obstacle_link"], "objective.avoidances[0].obstacle: must be an obstacle of the scenario"),
-        (["planner.angle_range=[90,-90]"], "planner.angle_range: must be [least, greatest] with least < greatest"),
+        (
+            ["objective.torqe_norm_weight=1"],
+            "objective.torqe_norm_weight: unknown setting; did you mean 'torque_norm_",
+        ),
+        (
+            ["objective.torque_norm_weight=0"],
+            "objective.torque_norm_weight: must be above 0, or another weight",
+        ),
+        (
+            ["objective.torque_norm_weight=-1"],
+            "objective.torque_norm_weight: must be at least 0.0, was -1",
+        ),
+        (
+            ["objective=chen_obstacle_link"],
+            "objective.avoidances[0].obstacle: must be an obstacle of the scenario",
+        ),
+        (
+            ["planner.angle_range=[90,-90]"],
+            "planner.angle_range: must be [least, greatest] with least < greatest",
+        ),
         (
             ["planner.coding=grey"],
             "planner.coding: must be one of 'binary' or 'gray', was 'grey'; did you mean 'gray'?",
@@ -123,11 +149,26 @@ def test_an_infeasible_posture_is_told_as_such() -> None:
         (["planner.bits_per_gene=0"], "planner.bits_per_gene: must be at least 1, was 0"),
         (["ga.scaling_multiple=1"], "ga.scaling_multiple: must be greater than 1.0"),
         (["ga=lavoie"], "planner.ga: must be a ScaledGenetic"),
-        (["+robot.joint_limits=[[0,0],[0,1],[0,1]]"], "robot.joint_limits[0]: must be [least, greatest]"),
-        (["robot.platform_size=[0.2,0.6]"], "robot.platform_size: must be [length, height] with length > height"),
-        (["robot=planar_7r"], "robot: must be what placement_ga takes, a MobileArm, was 'planar_chain'"),
-        (["reference=placement_optimum", "reference.num_angles=7"], "planner.num_angles: must be at least 8, was 7"),
-        (["reference=placement_optimum", "control=random_search"], "reference: must be left out beside a control"),
+        (
+            ["+robot.joint_limits=[[0,0],[0,1],[0,1]]"],
+            "robot.joint_limits[0]: must be [least, greatest]",
+        ),
+        (
+            ["robot.platform_size=[0.2,0.6]"],
+            "robot.platform_size: must be [length, height] with length > height",
+        ),
+        (
+            ["robot=planar_7r"],
+            "robot: must be what placement_ga takes, a MobileArm, was 'planar_chain'",
+        ),
+        (
+            ["reference=placement_optimum", "reference.num_angles=7"],
+            "planner.num_angles: must be at least 8, was 7",
+        ),
+        (
+            ["reference=placement_optimum", "control=random_search"],
+            "reference: must be left out beside a control",
+        ),
         (["reference=optimum"], "reference: no option 'optimum'"),
     ],
 )

@@ -22,7 +22,9 @@ FREE = ("corsepius_ball", "collision=corsepius_capsules")
 @pytest.mark.parametrize("name", ["corsepius_ball", "corsepius_bottle", "corsepius_shelf"])
 def test_the_search_is_the_obvious_one(name: str, replicate: int) -> None:
     planner, problem = prepared(name)
-    expected, evaluations, reason = posture_es_python.path(problem, planner.ga, condition(name).rng(replicate))
+    expected, evaluations, reason = posture_es_python.path(
+        problem, planner.ga, condition(name).rng(replicate)
+    )
     found = log(name, replicate=replicate)
     assert np.array_equal(postures(found), np.array(expected))
     assert found.summary.evaluations == evaluations
@@ -31,7 +33,9 @@ def test_the_search_is_the_obvious_one(name: str, replicate: int) -> None:
 
 @pytest.mark.parametrize("replicate", range(10))
 @pytest.mark.parametrize("size", [10, 100])
-def test_a_path_has_one_posture_per_cycle_and_no_step_beyond_the_scope(size: int, replicate: int) -> None:
+def test_a_path_has_one_posture_per_cycle_and_no_step_beyond_the_scope(
+    size: int, replicate: int
+) -> None:
     found = log("corsepius_ball", f"ga.num_offspring={size}", replicate=replicate)
     assert found.summary.stop_reason == "goal"
     cycles = len(found.generations) - 1
@@ -53,25 +57,36 @@ def _greatest_steps(mutant: str) -> list[float]:
     planner, problem = prepared("corsepius_ball")
     found = []
     for replicate in range(10):
-        path, _, _ = posture_es_python.path(problem, planner.ga, condition("corsepius_ball").rng(replicate), mutant)
+        path, _, _ = posture_es_python.path(
+            problem, planner.ga, condition("corsepius_ball").rng(replicate), mutant
+        )
         found.append(float((np.abs(np.diff(np.array(path), axis=0)) / problem.scope).max()))
     return found
 
 
 def test_half_the_scope_would_be_noticed() -> None:
-    """Some fifty uniform steps per path: that none passes .9 of the scope has a probability of .9^50 per path."""
+    """Some fifty uniform steps per path.
+
+    That none passes .9 of the scope has a probability of .9^50 per path.
+    """
     assert min(_greatest_steps("")) > 0.9
     assert max(_greatest_steps("half_scope")) <= 0.5 + 1e-12
 
 
 def test_a_path_of_each_generations_best_would_be_noticed() -> None:
-    """Best individuals of successive generations need not be parent and child: steps beyond the scope are the rule."""
+    """Best individuals of successive generations need not be parent and child.
+
+    Steps beyond the scope are the rule.
+    """
     assert max(_greatest_steps("")) <= 1.0 + 1e-9
     assert np.median(_greatest_steps("best_of_generation")) > 1.0 + 1e-9
 
 
 def test_no_selection_would_be_noticed() -> None:
-    """Without selection the search is a random walk: the ball, some 12 scopes away, is not met within 50 cycles."""
+    """Without selection the search is a random walk.
+
+    The ball, some 12 scopes away, is not met within 50 cycles.
+    """
     planner, problem = prepared("corsepius_ball", "ga.num_generations=50")
     reasons = []
     for replicate in range(5):
@@ -102,13 +117,20 @@ def test_a_sub_goal_solves_the_wall() -> None:
 
 @pytest.mark.parametrize(
     "override",
-    ["ga.selection=plus", "ga.mutation=gaussian", "ga.parent_choice=gaussian", "ga.crossover_rate=0.5"],
+    [
+        "ga.selection=plus",
+        "ga.mutation=gaussian",
+        "ga.parent_choice=gaussian",
+        "ga.crossover_rate=0.5",
+    ],
 )
 def test_options_search_as_well(override: str) -> None:
     found = log("corsepius_ball", override)
     assert found.summary.solved
     assert found.summary.evaluations == 1 + 100 * (len(found.generations) - 1)
-    if override != "ga.selection=plus":  # which differs only where offspring are worse than their parents
+    if (
+        override != "ga.selection=plus"
+    ):  # which differs only where offspring are worse than their parents
         assert not np.array_equal(postures(found)[-1], postures(log("corsepius_ball"))[-1])
 
 
@@ -121,7 +143,9 @@ def test_parents_that_may_stay_never_get_worse() -> None:
 
 
 def test_immigrants_descend_from_the_nearest_member_and_their_steps_are_reported() -> None:
-    found = log("corsepius_wall", "ga.num_immigrants=200", "planner.scope=0.02", "ga.num_generations=20")
+    found = log(
+        "corsepius_wall", "ga.num_immigrants=200", "planner.scope=0.02", "ga.num_generations=20"
+    )
     path, terms = postures(found), found.summary.terms
     steps = (np.abs(np.diff(path, axis=0)) / 0.02).max(axis=1)
     assert terms["oversized_steps"] == np.count_nonzero(steps > 1.0 + 1e-9) > 0
@@ -140,14 +164,22 @@ def test_a_scope_per_joint_is_kept_joint_by_joint() -> None:
 def test_nobody_on_a_path_collides() -> None:
     planner, problem = prepared("corsepius_shelf")
     for replicate in range(5):
-        terms = planner.evaluate(problem, log("corsepius_shelf", replicate=replicate).solutions[-1].values)
+        terms = planner.evaluate(
+            problem, log("corsepius_shelf", replicate=replicate).solutions[-1].values
+        )
         assert terms["infeasible_postures"] == 0.0
 
 
 def test_edges_that_are_tested_are_free() -> None:
-    """The paper's own search touches the shelf between postures in a third of its runs; with tested edges, never."""
+    """The paper's own search touches the shelf between postures in a third of its runs.
+
+    With tested edges, never.
+    """
     plain = [log("corsepius_shelf", replicate=k).summary.certified for k in range(12)]
-    tested = [log("corsepius_shelf", "planner.edge_check=4", replicate=k).summary.certified for k in range(12)]
+    tested = [
+        log("corsepius_shelf", "planner.edge_check=4", replicate=k).summary.certified
+        for k in range(12)
+    ]
     assert plain.count(False) >= 2
     assert tested.count(False) == 0
     found = log("corsepius_shelf", "planner.edge_check=4").summary
@@ -187,12 +219,19 @@ def test_what_is_held_moves_with_the_tool_and_stays_where_it_is_left(carried: in
 
 
 def test_the_tilt_stays_within_its_limit_also_between_postures(carried: int) -> None:
-    """Between two postures of at most L a tilt passes L by the square of what the joints turn, at most: (6 × .1)²/8."""
+    """Between two postures of at most L a tilt passes L by the square of what the joints turn.
+
+    At most: (6 × .1)²/8.
+    """
     planner, problem = prepared("corsepius_pick_and_place")
     solution = log("corsepius_pick_and_place", replicate=carried).solutions[-1].values
     terms = planner.evaluate(problem, solution)
     assert 0.0 < terms["greatest_upright_deg"] <= 10.0
-    assert terms["greatest_upright_deg"] <= terms["greatest_upright_between_deg"] <= 10.0 + 0.045 / DEGREE
+    assert (
+        terms["greatest_upright_deg"]
+        <= terms["greatest_upright_between_deg"]
+        <= 10.0 + 0.045 / DEGREE
+    )
     for span in spans(problem, solution.reshape(-1, 6))[2:5]:
         rows = judge(span.stage, dense(solution.reshape(-1, 6)[span.first : span.last + 1])).rows
         assert rows[UPRIGHT].max() <= 10.0 * DEGREE + 0.045
@@ -200,7 +239,9 @@ def test_the_tilt_stays_within_its_limit_also_between_postures(carried: int) -> 
 
 def test_every_phase_is_certified_with_its_own_bodies(carried: int) -> None:
     planner, problem = prepared("corsepius_pick_and_place")
-    motion = planner.motion(problem, log("corsepius_pick_and_place", replicate=carried).solutions[-1].values)
+    motion = planner.motion(
+        problem, log("corsepius_pick_and_place", replicate=carried).solutions[-1].values
+    )
     parts = problem.parts(motion)
     assert [part.first for part in parts[1:]] == [part.last for part in parts[:-1]]
     each = [judged_part(part, motion, 0.0) for part in parts]
@@ -208,10 +249,17 @@ def test_every_phase_is_certified_with_its_own_bodies(carried: int) -> None:
     assert together == combined(each)
     assert together.certified is all(one.certified for one in each)
     assert together.clearance == min(one.clearance for one in each)
-    names = [set(map(frozenset, (part.scene.pair_names(k) for k in range(len(part.scene.pairs))))) for part in parts]
+    names = [
+        set(map(frozenset, (part.scene.pair_names(k) for k in range(len(part.scene.pairs)))))
+        for part in parts
+    ]
     assert frozenset(("bottle", "table")) not in names[2] | names[4]
-    assert frozenset(("bottle", "table")) in names[3], "while it is carried, the bottle must not touch the table"
-    assert frozenset(("hand", "bottle")) in names[0] and frozenset(("hand", "bottle")) not in names[1]
+    assert frozenset(("bottle", "table")) in names[3], (
+        "while it is carried, the bottle must not touch the table"
+    )
+    assert (
+        frozenset(("hand", "bottle")) in names[0] and frozenset(("hand", "bottle")) not in names[1]
+    )
     assert frozenset(("column", "bottle")) in names[3]
 
 
@@ -230,7 +278,9 @@ def test_fast_collisions_of_all_phases_miss_nothing_that_coal_sees(carried: int)
                 assert found.rows[7, n] == 1.0
 
 
-def test_evaluate_lists_every_term_of_every_posture(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_evaluate_lists_every_term_of_every_posture(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     planner, problem = prepared("corsepius_bottle")
     path = postures(log("corsepius_bottle"))
     names, rows = planner.listing(problem, path.ravel())
@@ -238,15 +288,22 @@ def test_evaluate_lists_every_term_of_every_posture(tmp_path: Path, capsys: pyte
     assert names[:4] == ["posture", "phase", "goal_distance", "axial_approach_rad"]
     last = dict(zip(names, rows[-1], strict=True))
     terms = planner.evaluate(problem, path.ravel())
-    assert all(last[name] == terms[name] for name in ("goal_distance", "axial_approach_rad", "heading_rad", "cost"))
+    assert all(
+        last[name] == terms[name]
+        for name in ("goal_distance", "axial_approach_rad", "heading_rad", "cost")
+    )
     file = tmp_path / "path.json"
     file.write_text(json.dumps(path.tolist()))
     parser = argparse.ArgumentParser()
     evaluate.add_arguments(parser)
-    assert evaluate.main(parser.parse_args([str(file), "experiment=corsepius_bottle", "--json"])) == 0
+    assert (
+        evaluate.main(parser.parse_args([str(file), "experiment=corsepius_bottle", "--json"])) == 0
+    )
     printed = json.loads(capsys.readouterr().out)
     assert len(printed["rows"]) == len(path)
-    assert printed["rows"][-1]["step_scopes"] == pytest.approx(np.abs(path[-1] - path[-2]).max() / 0.1)
+    assert printed["rows"][-1]["step_scopes"] == pytest.approx(
+        np.abs(path[-1] - path[-2]).max() / 0.1
+    )
     assert printed["goal_distance"] == pytest.approx(terms["goal_distance"])
 
 

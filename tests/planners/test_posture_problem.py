@@ -23,7 +23,10 @@ def phases(text: str) -> str:
     ("overrides", "message"),
     [
         (["planner.scope=0"], "planner.scope: must be greater than 0.0, was 0"),
-        (["planner.scope=[0.1,0.1]"], "planner.scope: must be one number, or one per joint (6), was [0.1, 0.1]"),
+        (
+            ["planner.scope=[0.1,0.1]"],
+            "planner.scope: must be one number, or one per joint (6), was [0.1, 0.1]",
+        ),
         (["planner.scope=[0.1,0.1,0.1,0.1,0.1,0]"], "planner.scope"),
         (["scenario.q_start=[0,0]"], "scenario.q_start: must be one value per joint (6), was 2"),
         (
@@ -36,7 +39,8 @@ def phases(text: str) -> str:
         ),
         (
             [phases("[{name: a, goal: {kind: point, point: [2, 0, 0.6]}}]")],
-            "scenario.phases[0].goal.point: must be within reach, 0.8936 m from (0, 0, 0.6) (check_reach=false",
+            "scenario.phases[0].goal.point: must be within reach, 0.8936 m from (0, 0, 0.6) "
+            "(check_reach=false",
         ),
         (
             ["scenario.obstacles.0.center=[3,0,0]"],
@@ -45,11 +49,13 @@ def phases(text: str) -> str:
         (["scenario.subgoals=[[0,0,3]]"], "scenario.subgoals[0]: must be within reach"),
         (
             [phases("[{name: a, goal: {kind: surface, object: bal}}]")],
-            "scenario.phases[0].goal.object: must be the name of an obstacle (ball), was 'bal'; did you mean 'ball'?",
+            "scenario.phases[0].goal.object: must be the name of an obstacle (ball), was 'bal'; "
+            "did you mean 'ball'?",
         ),
         (
             [phases("[{name: a, goal: {kind: pose, point: [0.4,0.2,0.7], rotation: [0,0,0]}}]")],
-            "scenario.phases[0].goal: must be a point, since no goal_angle rates its orientation, was 'pose'",
+            "scenario.phases[0].goal: must be a point, since no goal_angle rates its "
+            "orientation, was 'pose'",
         ),
         (
             [phases("[{name: a, goal: {kind: place}}]")],
@@ -61,11 +67,13 @@ def phases(text: str) -> str:
         ),
         (
             ["objective=corsepius_grasp"],
-            "scenario.phases[0].goal.object: must be a cylinder or capsule, since axial_approach rates its axis",
+            "scenario.phases[0].goal.object: must be a cylinder or capsule, since axial_approach "
+            "rates its axis",
         ),
         (
             ["objective=corsepius_grasp", phases(POINT)],
-            "scenario.phases[0].goal: must be the surface of an object, since axial_approach rates the way to it",
+            "scenario.phases[0].goal: must be the surface of an object, since axial_approach "
+            "rates the way to it",
         ),
         (
             [phases("[{name: a, goal: {kind: point, point: [0.4,0.2,0.7]}, terms: [upright]}]")],
@@ -76,8 +84,14 @@ def phases(text: str) -> str:
             "scenario.phases[0].terms[0]: must be a cost term",
         ),
         (
-            [phases("[{name: a, goal: {kind: point, point: [0.4,0.2,0.7]}, contacts: [[hand, bal]]}]")],
-            "scenario.phases[0].contacts[0]: must be names of bodies or obstacles (column, shoulder",
+            [
+                phases(
+                    "[{name: a, goal: {kind: point, point: [0.4,0.2,0.7]}, contacts: [[hand, "
+                    "bal]]}]"
+                )
+            ],
+            "scenario.phases[0].contacts[0]: must be names of bodies or obstacles (column, "
+            "shoulder",
         ),
         (
             [phases("[{name: a, goal: {kind: point, point: [0.4,0.2,0.7]}, then: detach}]")],
@@ -88,14 +102,35 @@ def phases(text: str) -> str:
             "scenario.phases[0].object: must be given with then: attach, and only then, was None",
         ),
         (["+scenario.up=[0,0,0]"], "scenario.up: must be a direction, not (0, 0, 0)"),
-        (["+objective.goal_anglee.weight=1"], "objective.goal_anglee: unknown setting; did you mean 'goal_angle'?"),
-        (["objective.goal_distance.weight=0"], "objective.goal_distance.weight: must be greater than 0.0, was 0"),
-        (["+objective.goal_distance.unit=rad"], "objective.goal_distance.unit: must be one of 'length', was 'rad'"),
-        (["~objective.goal_distance"], "objective.goal_distance: must be given: every goal is a place, was None"),
-        (["ga.num_parents=101"], "ga.num_parents: must be at most num_offspring (100) with comma selection, was 101"),
-        (["robot.joints.0.limits=[10,-10]"], "robot.joints[0].limits: must be [least, greatest] with least < greatest"),
+        (
+            ["+objective.goal_anglee.weight=1"],
+            "objective.goal_anglee: unknown setting; did you mean 'goal_angle'?",
+        ),
+        (
+            ["objective.goal_distance.weight=0"],
+            "objective.goal_distance.weight: must be greater than 0.0, was 0",
+        ),
+        (
+            ["+objective.goal_distance.unit=rad"],
+            "objective.goal_distance.unit: must be one of 'length', was 'rad'",
+        ),
+        (
+            ["~objective.goal_distance"],
+            "objective.goal_distance: must be given: every goal is a place, was None",
+        ),
+        (
+            ["ga.num_parents=101"],
+            "ga.num_parents: must be at most num_offspring (100) with comma selection, was 101",
+        ),
+        (
+            ["robot.joints.0.limits=[10,-10]"],
+            "robot.joints[0].limits: must be [least, greatest] with least < greatest",
+        ),
         (["robot=two_planar_2r"], "robot: must be one arm, was '2 arms'"),
-        (["scenario=lavoie_7dof"], "scenario: must be what posture_es takes, a PostureTask, was 'pick_and_place'"),
+        (
+            ["scenario=lavoie_7dof"],
+            "scenario: must be what posture_es takes, a PostureTask, was 'pick_and_place'",
+        ),
         (["collision=rana_planar"], "collision"),
     ],
 )
@@ -108,7 +143,10 @@ def test_refusals(overrides: list[str], message: str) -> None:
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("hand", "scenario.obstacles[1].name: must be a name that no body of the robot has, was 'hand'"),
+        (
+            "hand",
+            "scenario.obstacles[1].name: must be a name that no body of the robot has, was 'hand'",
+        ),
         ("ground", "obstacles[1].name: must be a name that no other obstacle has, was 'ground'"),
     ],
 )
@@ -123,13 +161,18 @@ def test_one_thing_is_held_at_a_time() -> None:
         "[{name: a, goal: {kind: surface, object: bottle}, then: attach, object: bottle},"
         "{name: b, goal: {kind: surface, object: table}, then: attach, object: table}]"
     )
-    with pytest.raises(EvoexpError, match=re.escape("scenario.phases[1].then: must be detach before anything else is")):
+    with pytest.raises(
+        EvoexpError,
+        match=re.escape("scenario.phases[1].then: must be detach before anything else is"),
+    ):
         compose.expand([PICK, phases(text)])
 
 
 def test_goals_out_of_reach_are_searched_on_request() -> None:
     far = phases("[{name: a, goal: {kind: point, point: [2, 0, 0.6]}}]")
-    planner, problem = prepared("corsepius_ball", far, "scenario.check_reach=false", "ga.num_generations=30")
+    planner, problem = prepared(
+        "corsepius_ball", far, "scenario.check_reach=false", "ga.num_generations=30"
+    )
     last = list(planner.evolve(problem, condition("corsepius_ball").rng(0)))[-1]
     assert not last.solved
     assert last.terms["goal_distance"] > 1.0

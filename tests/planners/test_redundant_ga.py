@@ -1,4 +1,7 @@
-"""The planner of Lavoie & Boudreau: worked values, promises of every run, degenerate cases, messages."""
+"""The planner of Lavoie & Boudreau.
+
+Worked values, promises of every run, degenerate cases, messages.
+"""
 
 import math
 
@@ -67,7 +70,9 @@ def test_a_collision_costs_inf_and_says_where() -> None:
     assert 1.0 <= terms["contact_position_sp1"] <= 10.0
     assert 1.0 <= terms["contact_link_sp1"] <= 7.0
     assert 1.0 <= terms["contact_obstacle_sp1"] <= 5.0
-    assert terms["position_error_sp1"] == pytest.approx(math.dist(tip(through), (15.0, 5.0)), abs=1e-12)
+    assert terms["position_error_sp1"] == pytest.approx(
+        math.dist(tip(through), (15.0, 5.0)), abs=1e-12
+    )
 
 
 @pytest.mark.parametrize("replicate", range(3))
@@ -139,7 +144,9 @@ def test_a_whole_run_keeps_its_promises(replicate: int) -> None:
 )
 def test_all_settings_run_and_the_best_never_gets_worse(overrides: tuple[str, ...]) -> None:
     given = {text.split("=")[0] for text in overrides}
-    planner, problem = prepared(*(text for text in SMALL if text.split("=")[0] not in given), *overrides)
+    planner, problem = prepared(
+        *(text for text in SMALL if text.split("=")[0] not in given), *overrides
+    )
     best = np.inf
     for generation in planner.evolve(problem, np.random.default_rng(3)):
         assert np.isfinite(generation.population).all()
@@ -147,14 +154,21 @@ def test_all_settings_run_and_the_best_never_gets_worse(overrides: tuple[str, ..
         assert generation.best_cost <= best
         best = generation.best_cost
         terms = planner.evaluate(problem, generation.best)
-        assert all(terms[name] == value for name, value in generation.terms.items() if name in terms)
+        assert all(
+            terms[name] == value for name, value in generation.terms.items() if name in terms
+        )
 
 
 @pytest.mark.parametrize(
     "overrides", [(), ("ga.mutation_rate=0.01", "ga.crossover_rate=0.1"), ("ga.population_size=7",)]
 )
-def test_what_a_generation_knows_of_itself_is_what_judging_it_again_gives(overrides: tuple[str, ...]) -> None:
-    """Children that are their own parents, or end outside the box, are not tested; the bits are the same."""
+def test_what_a_generation_knows_of_itself_is_what_judging_it_again_gives(
+    overrides: tuple[str, ...],
+) -> None:
+    """Children that are their own parents, or end outside the box, are not tested.
+
+    The bits are the same.
+    """
     planner, problem = prepared("ga.num_generations=30", "planner.stop_cost_sp1=0.1", *overrides)
     judged = 0
     for generation in planner.evolve(problem, np.random.default_rng(5)):
@@ -167,7 +181,10 @@ def test_what_a_generation_knows_of_itself_is_what_judging_it_again_gives(overri
 
 
 def test_a_population_without_one_feasible_member_is_searched_on() -> None:
-    """A box far away: nobody ever ends inside, so every plan costs inf, and all attempts are made."""
+    """A box far away: nobody ever ends inside, so every plan costs inf.
+
+    And all attempts are made.
+    """
     planner, problem = prepared(*SMALL, "scenario.box_x=[60.0,61.0]", "planner.stop_cost_sp1=60")
     *_, last = planner.evolve(problem, np.random.default_rng(0))
     assert last.terms["attempts"] == 3.0
@@ -228,16 +245,31 @@ def test_the_arm_of_ten_joints_stands_before_the_moved_box() -> None:
 @pytest.mark.parametrize(
     ("overrides", "message"),
     [
-        (("scenario=lavoie_10dof_literal", "robot=planar_10r"), "scenario.q_start: must be free of collision (link "),
-        (("scenario.q_start=[1.8,1.0]",), "scenario.q_start: must be one angle per joint (7), was 2"),
-        (("scenario.q_start=[2.2,1,-1,-1,0,0,0]",), "scenario.q_start[0]: must be within the joint's limits, 0 to 2.1"),
+        (
+            ("scenario=lavoie_10dof_literal", "robot=planar_10r"),
+            "scenario.q_start: must be free of collision (link ",
+        ),
+        (
+            ("scenario.q_start=[1.8,1.0]",),
+            "scenario.q_start: must be one angle per joint (7), was 2",
+        ),
+        (
+            ("scenario.q_start=[2.2,1,-1,-1,0,0,0]",),
+            "scenario.q_start[0]: must be within the joint's limits, 0 to 2.1",
+        ),
         (("scenario.box_x=[5,5]",), "box_x: must be [least, greatest]"),
         (("robot.joint_limits=null",), "robot.joint_limits: must be given"),
         (("robot.joint_limits=[[0,1]]",), "joint_limits: must be one pair per link (7), was 1"),
         (("robot=two_planar_2r",), "robot: must be one planar arm in the plane z = 0"),
         (("ga=rana_planar",), "ga: must be a SelectiveSettings"),
-        (("scenario=rana_planar",), "scenario: must be what redundant_ga takes, a PickAndPlace, was 'arm_motion'"),
-        (("planner.success=maybe",), "planner.success: must be one of 'threshold' or 'finite', was 'maybe'"),
+        (
+            ("scenario=rana_planar",),
+            "scenario: must be what redundant_ga takes, a PickAndPlace, was 'arm_motion'",
+        ),
+        (
+            ("planner.success=maybe",),
+            "planner.success: must be one of 'threshold' or 'finite', was 'maybe'",
+        ),
         (("collision.num_positions=0",), "collision.num_positions: must be at least 1, was 0"),
     ],
 )

@@ -19,7 +19,10 @@ def test_partnered_individuals(robots: int) -> None:
         expected = 0
         for i in range(6):
             free = [
-                any(collisions[pairs.index((0, r)), i, j] == 0 and blocked[r, j] == 0 for j in range(6))
+                any(
+                    collisions[pairs.index((0, r)), i, j] == 0 and blocked[r, j] == 0
+                    for j in range(6)
+                )
                 for r in range(1, robots)
             ]
             expected += blocked[0, i] == 0 and all(free)

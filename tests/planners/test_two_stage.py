@@ -33,13 +33,17 @@ def end_effector(robot: FloorManipulator, q: np.ndarray) -> np.ndarray:
     return np.asarray(data.oMi[model.njoints - 1].act(np.array([robot.link_lengths[-1], 0.0, 0.0])))
 
 
-def test_the_motion_ends_where_the_task_is(condition: Condition, found: tuple[Any, Any, np.ndarray]) -> None:
+def test_the_motion_ends_where_the_task_is(
+    condition: Condition, found: tuple[Any, Any, np.ndarray]
+) -> None:
     planner, problem, solution = found
     motion = planner.motion(problem, solution)
     scenario: Any = condition.scenario
     (x, y), (reach, above) = scenario.task_origin, scenario.docking.target
     robot: Any = condition.robot
-    assert end_effector(robot, motion.q[-1]) == pytest.approx([x + reach, y, robot.body_height + above], abs=1e-9)
+    assert end_effector(robot, motion.q[-1]) == pytest.approx(
+        [x + reach, y, robot.body_height + above], abs=1e-9
+    )
     assert motion.q[0, :2].tolist() == list(scenario.grid.start)
     assert np.abs(motion.q[-2, :2] - scenario.grid.goal).max() < 0.5
     assert np.array_equal(motion.q[-2, :2], motion.q[-1, :2])
@@ -64,13 +68,17 @@ def test_the_whole_motion_is_certified(found: tuple[Any, Any, np.ndarray]) -> No
     assert certificate(problem, planner.motion(problem, through)).certified is False
 
 
-def test_another_docking_place_has_another_goal(condition: Condition, found: tuple[Any, Any, np.ndarray]) -> None:
+def test_another_docking_place_has_another_goal(
+    condition: Condition, found: tuple[Any, Any, np.ndarray]
+) -> None:
     planner, problem, solution = found
     scenario = condition.scenario.model_copy(update={"task_origin": (23.2, 26.0)})
     moved = problem._replace(scenario=scenario)
     last = list(planner._drive(moved, condition.rng(0), last_of(planner, problem, condition)))[-1]
     assert last.best[-2:].tolist() == [28.0, 26.0]
-    blocked = problem._replace(scenario=condition.scenario.model_copy(update={"task_origin": (18.0, 23.0)}))
+    blocked = problem._replace(
+        scenario=condition.scenario.model_copy(update={"task_origin": (18.0, 23.0)})
+    )
     with pytest.raises(SettingError, match=r"scenario\.goal: must be a free node"):
         planner.evaluate(blocked, solution)
 
@@ -84,9 +92,14 @@ def test_the_first_stage_has_no_plan_yet(condition: Condition) -> None:
     rows = list(planner.evolve(problem, condition.rng(2)))
     stages = [row.terms["sub_path"] for row in rows]
     assert stages == sorted(stages)
-    assert all((row.best_cost == np.inf) == (stage == 1.0) for row, stage in zip(rows, stages, strict=True))
+    assert all(
+        (row.best_cost == np.inf) == (stage == 1.0) for row, stage in zip(rows, stages, strict=True)
+    )
     assert [row.index for row in rows] == list(range(len(rows)))
-    assert rows[-1].evaluations == planner.placement.ga.num_evaluations + planner.path.ga.num_evaluations
+    assert (
+        rows[-1].evaluations
+        == planner.placement.ga.num_evaluations + planner.path.ga.num_evaluations
+    )
 
 
 def test_the_manipulator_agrees_with_the_arm_of_the_placement_search() -> None:
@@ -98,7 +111,9 @@ def test_the_manipulator_agrees_with_the_arm_of_the_placement_search() -> None:
         x, y, *angles = rng.uniform(-3.0, 3.0, 5)
         pin.forwardKinematics(arm, data, np.array([x, *angles]))
         flat = data.oMi[arm.njoints - 1].act(np.array([0.5, 0.0, 0.0]))
-        assert end_effector(robot, np.array([x, y, *angles])) == pytest.approx([flat[0], y, 0.4 + flat[1]], abs=1e-12)
+        assert end_effector(robot, np.array([x, y, *angles])) == pytest.approx(
+            [flat[0], y, 0.4 + flat[1]], abs=1e-12
+        )
 
 
 def test_a_mission_is_over_a_floor(condition: Condition) -> None:

@@ -16,7 +16,9 @@ from evoexp.scenarios.arm_motion import ArmMotion
 
 
 def condition(*overrides: str, experiment: str = "rana_planar") -> Condition:
-    short = () if any("num_generations" in text for text in overrides) else ("ga.num_generations=5",)
+    short = (
+        () if any("num_generations" in text for text in overrides) else ("ga.num_generations=5",)
+    )
     expanded = compose.expand([f"experiment={experiment}", *short, *overrides])
     return expanded[0].conditions[0].condition
 
@@ -27,14 +29,22 @@ def prepared(*overrides: str, experiment: str = "rana_planar") -> tuple[ViaPoint
 
 def straight(problem: Problem, num: int) -> np.ndarray:
     """The straight line from start to goal as strings (nq, N + 1)."""
-    return problem.start[:, None] + (problem.goal - problem.start)[:, None] * np.linspace(0.0, 1.0, num + 1)
+    return problem.start[:, None] + (problem.goal - problem.start)[:, None] * np.linspace(
+        0.0, 1.0, num + 1
+    )
 
 
 def terms_by_hand(strings: np.ndarray, arms: np.ndarray) -> dict[str, float]:
-    """Eqs. 2–6 for two arms of two links of 4 from (0, 0) and (0, 8), with circles of radius 0.5; in plain Python."""
+    """Eqs. 2–6 for two arms of two links of 4 from (0, 0) and (0, 8), with circles of radius 0.5.
+
+    In plain Python.
+    """
     terms: dict[str, float] = {}
     for a, (first, stop) in enumerate(arms):
-        steps = [math.dist(p, q) for p, q in zip(strings[first:stop].T, strings[first:stop].T[1:], strict=False)]
+        steps = [
+            math.dist(p, q)
+            for p, q in zip(strings[first:stop].T, strings[first:stop].T[1:], strict=False)
+        ]
         mean = math.fsum(steps) / len(steps)
         terms[f"length_arm_{a + 1}_deg"] = math.fsum(steps)
         terms[f"unevenness_arm_{a + 1}_deg"] = math.fsum(abs(step - mean) for step in steps)
@@ -47,7 +57,11 @@ def terms_by_hand(strings: np.ndarray, arms: np.ndarray) -> dict[str, float]:
             tip = (elbow[0] + 4 * math.cos(b), elbow[1] + 4 * math.sin(b))
             ends = [(base, elbow), (elbow, tip)]
             circles.append(
-                [tuple(p + k / 4 * (r - p) for p, r in zip(s, e, strict=True)) for s, e in ends for k in range(5)]
+                [
+                    tuple(p + k / 4 * (r - p) for p, r in zip(s, e, strict=True))
+                    for s, e in ends
+                    for k in range(5)
+                ]
             )
         collisions += min(math.dist(c, d) for c in circles[0] for d in circles[1]) < 1.0
     return terms | {"collisions": float(collisions)}
@@ -64,7 +78,9 @@ def test_terms_agree_with_plain_python() -> None:
         assert judged.named_terms(k) == pytest.approx(expected, rel=1e-9)
         lengths = expected["length_arm_1_deg"] + expected["length_arm_2_deg"]
         uneven = expected["unevenness_arm_1_deg"] + expected["unevenness_arm_2_deg"]
-        assert judged.cost[k] == pytest.approx(0.5 * lengths + 0.005 * uneven + 100 * expected["collisions"], rel=1e-9)
+        assert judged.cost[k] == pytest.approx(
+            0.5 * lengths + 0.005 * uneven + 100 * expected["collisions"], rel=1e-9
+        )
         hits += int(expected["collisions"])
     assert hits > 0, "the sample meets collisions"
 
@@ -106,8 +122,13 @@ def six_axes(base: tuple[float, float, float]) -> SerialChain:
 
 
 def test_two_arms_of_six_joints_are_planned_by_the_same_planner() -> None:
-    """With the wrists held straight they are the paper's arms; the straight line collides, the plan does not."""
-    planner, _ = prepared("ga.num_generations=60", "objective.collision_weight=100.0", experiment="rana_puma")
+    """With the wrists held straight they are the paper's arms.
+
+    The straight line collides, the plan does not.
+    """
+    planner, _ = prepared(
+        "ga.num_generations=60", "objective.collision_weight=100.0", experiment="rana_puma"
+    )
     robot = Arms(arms=(six_axes((0.0, 0.0, 0.0)), six_axes((0.0, 2.5, 0.0))))
     scenario = ArmMotion(
         q_start=((15.0, -15.0, -30.0, 0.0, 0.0, 0.0), (-150.0, -15.0, 30.0, 0.0, 0.0, 0.0)),
@@ -117,7 +138,9 @@ def test_two_arms_of_six_joints_are_planned_by_the_same_planner() -> None:
     )
     problem = planner.prepare(robot, scenario)
     share = np.linspace(0.0, 1.0, 41)[:, None]
-    straight = np.concatenate([((1 - share) * problem.start[a:b] + share * problem.goal[a:b]).ravel() for a, b in SIX])
+    straight = np.concatenate(
+        [((1 - share) * problem.start[a:b] + share * problem.goal[a:b]).ravel() for a, b in SIX]
+    )
     assert planner.evaluate(problem, straight)["collisions"] > 0.0
     first, *_, last = planner.evolve(problem, np.random.default_rng(0))
     assert last.best.shape == (2 * 41 * 6,)
@@ -134,21 +157,32 @@ def test_puma_like_arms_move_by_eq_10_and_their_straight_line_collides() -> None
     spheres = problem.collision
     data = problem.assembly.model.createData()
     pin.updateGeometryPlacements(
-        problem.assembly.model, data, spheres.geometry, placed := spheres.geometry.createData(), np.deg2rad(q[:, 0])
+        problem.assembly.model,
+        data,
+        spheres.geometry,
+        placed := spheres.geometry.createData(),
+        np.deg2rad(q[:, 0]),
     )
     found = np.array([place.translation for place in placed.oMg])
     assert [stop - first for first, stop in spheres.arm_spheres] == [9, 9]  # none on the columns
     for arm, (first, stop) in enumerate(spheres.arm_spheres):
         one, two, three = np.deg2rad(q[3 * arm : 3 * arm + 3, 0])
         shoulder = np.array([0.0, 2.5 * arm, 1.0])
-        elbow = shoulder + np.array([np.cos(one) * np.cos(two), np.sin(one) * np.cos(two), np.sin(two)])
+        elbow = shoulder + np.array(
+            [np.cos(one) * np.cos(two), np.sin(one) * np.cos(two), np.sin(two)]
+        )
         reach = two + three
-        tip = elbow + np.array([np.cos(one) * np.cos(reach), np.sin(one) * np.cos(reach), np.sin(reach)])
+        tip = elbow + np.array(
+            [np.cos(one) * np.cos(reach), np.sin(one) * np.cos(reach), np.sin(reach)]
+        )
         expected = [shoulder + f * (elbow - shoulder) for f in np.linspace(0.0, 1.0, 5)]
         expected += [elbow + f * (tip - elbow) for f in np.linspace(0.25, 1.0, 4)]
         assert found[first:stop] == pytest.approx(np.array(expected), abs=1e-12)
     share = np.linspace(0.0, 1.0, 41)[:, None]
-    straight = [((1 - share) * problem.start[a:b] + share * problem.goal[a:b]).ravel() for a, b in ((0, 3), (3, 6))]
+    straight = [
+        ((1 - share) * problem.start[a:b] + share * problem.goal[a:b]).ravel()
+        for a, b in ((0, 3), (3, 6))
+    ]
     assert planner.evaluate(problem, np.concatenate(straight))["collisions"] == 3.0
 
 
@@ -199,7 +233,11 @@ def test_more_evaluations_than_the_papers_are_not_made() -> None:
         ("planner.num_via_points=1",),
         ("planner.num_via_points=2",),
         ("objective.fitness_offset=0",),
-        ("objective.length_weight=0", "objective.unevenness_weight=0", "objective.collision_weight=0"),
+        (
+            "objective.length_weight=0",
+            "objective.unevenness_weight=0",
+            "objective.collision_weight=0",
+        ),
         ("planner.redistribution=false", "planner.relaxation_step=0"),
         ("planner.relaxation_step=1", "planner.max_turn=0"),
         ("planner.spline_end=clamped", "planner.max_turn=180"),
@@ -220,11 +258,23 @@ def test_degenerate_settings_run(overrides: tuple[str, ...]) -> None:
 @pytest.mark.parametrize(
     ("overrides", "message"),
     [
-        (("scenario.q_start=[[90,0],[270,0]]",), "scenario.q_start: must be free of collision (two arms overlap"),
+        (
+            ("scenario.q_start=[[90,0],[270,0]]",),
+            "scenario.q_start: must be free of collision (two arms overlap",
+        ),
         (("scenario.q_goal=[[90,0],[270,0]]",), "scenario.q_goal: must be free of collision"),
-        (("scenario.q_start=[[45,225]]",), "scenario.q_start: must be one list per arm of the robot"),
-        (("scenario.q_start=[[45,225],[1,2,3]]",), "scenario.q_start: must be one list per arm of the robot"),
-        (("planner.num_new_trajectories=49",), "planner.num_new_trajectories: must be at most the offspring"),
+        (
+            ("scenario.q_start=[[45,225]]",),
+            "scenario.q_start: must be one list per arm of the robot",
+        ),
+        (
+            ("scenario.q_start=[[45,225],[1,2,3]]",),
+            "scenario.q_start: must be one list per arm of the robot",
+        ),
+        (
+            ("planner.num_new_trajectories=49",),
+            "planner.num_new_trajectories: must be at most the offspring",
+        ),
     ],
 )
 def test_problems_that_cannot_be_are_refused(overrides: tuple[str, ...], message: str) -> None:

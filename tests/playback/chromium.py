@@ -1,4 +1,7 @@
-"""A headless Chromium, driven over the pipe of its DevTools protocol: no driver, no further packages."""
+"""A headless Chromium, driven over the pipe of its DevTools protocol.
+
+No driver, no further packages.
+"""
 
 import base64
 import json
@@ -11,7 +14,12 @@ from pathlib import Path
 from typing import Any
 
 CHROMIUM = next(
-    (path for name in ("chromium", "chromium-browser", "google-chrome") if (path := shutil.which(name))), None
+    (
+        path
+        for name in ("chromium", "chromium-browser", "google-chrome")
+        if (path := shutil.which(name))
+    ),
+    None,
 )
 FLAGS = (
     "--headless=new",
@@ -35,8 +43,16 @@ class Browser:
     def __init__(self, profile: Path) -> None:
         """Start it with an empty profile."""
         (read_here, write_there), (read_there, write_here) = os.pipe(), os.pipe()
-        command = f'exec "$@" 3<&{read_there} 4>&{write_there}'  # the protocol's pipes have these numbers
-        words = [str(CHROMIUM), *FLAGS, "--remote-debugging-pipe", f"--user-data-dir={profile}", "about:blank"]
+        command = (
+            f'exec "$@" 3<&{read_there} 4>&{write_there}'  # the protocol's pipes have these numbers
+        )
+        words = [
+            str(CHROMIUM),
+            *FLAGS,
+            "--remote-debugging-pipe",
+            f"--user-data-dir={profile}",
+            "about:blank",
+        ]
         self._process = subprocess.Popen(
             ["bash", "-c", command, "bash", *words],
             pass_fds=(read_there, write_there),
@@ -50,7 +66,9 @@ class Browser:
         self.requests: list[str] = []
         self.complaints: list[str] = []
         target = self._call("Target.createTarget", url="about:blank")["targetId"]
-        self._session = self._call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        self._session = self._call("Target.attachToTarget", targetId=target, flatten=True)[
+            "sessionId"
+        ]
         for domain in ("Page", "Runtime", "Network", "Log"):
             self._call(f"{domain}.enable")
 
@@ -68,7 +86,9 @@ class Browser:
 
     def run(self, script: str) -> Any:
         """Return the value of an expression in the page."""
-        answer = self._call("Runtime.evaluate", expression=script, returnByValue=True, userGesture=True)
+        answer = self._call(
+            "Runtime.evaluate", expression=script, returnByValue=True, userGesture=True
+        )
         assert "exceptionDetails" not in answer, answer
         return answer["result"].get("value")
 

@@ -54,7 +54,10 @@ def refuted() -> Recording:
     own = condition("two arms")
     _, problem = own.prepare()
     share = np.abs(np.sin(np.linspace(0.0, 2.0 * np.pi, 21)))[:, None]
-    parts = [problem.start[a:b] + share * (problem.goal - problem.start)[a:b] for a, b in problem.arm_slices]
+    parts = [
+        problem.start[a:b] + share * (problem.goal - problem.start)[a:b]
+        for a, b in problem.arm_slices
+    ]
     return record(own, np.concatenate([part.ravel() for part in parts]), Heading("refuted"))
 
 

@@ -13,7 +13,9 @@ LARGEST = 2_000_000  # [B]
 
 
 def motions(content: bytes) -> list[dict[str, object]]:
-    found = re.search(rb'<script type="application/json" id="motions">(.*?)</script>', content, re.DOTALL)
+    found = re.search(
+        rb'<script type="application/json" id="motions">(.*?)</script>', content, re.DOTALL
+    )
     assert found
     return json.loads(found[1])  # type: ignore[no-any-return]
 
@@ -28,7 +30,9 @@ def test_a_page_holds_its_motion_and_refers_to_nothing(name: str) -> None:
     content = page([shown])
     assert content == page([shown])
     assert len(content) < LARGEST
-    assert not re.search(rb"https?://|//cdn|@import|url\(|<script[^>]+src=|fetch\(|XMLHttpRequest", content)
+    assert not re.search(
+        rb"https?://|//cdn|@import|url\(|<script[^>]+src=|fetch\(|XMLHttpRequest", content
+    )
     assert b"{{" not in content
     (motion,) = motions(content)
     assert np.array_equal(unpacked(motion["poses"]), shown.poses.world.astype("<f4").ravel())

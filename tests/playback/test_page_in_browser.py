@@ -12,7 +12,9 @@ from evoexp.playback.page import page
 
 pytestmark = [
     pytest.mark.browser,
-    pytest.mark.skipif(CHROMIUM is None, reason="needs chromium on PATH (Debian: apt-get install chromium)"),
+    pytest.mark.skipif(
+        CHROMIUM is None, reason="needs chromium on PATH (Debian: apt-get install chromium)"
+    ),
 ]
 
 
@@ -53,7 +55,9 @@ def test_a_page_shows_its_motion(browser: Browser, tmp_path: Path, name: str) ->
     pictures = []
     for share in (0.0, 0.3, 1.0):
         pictures.append(browser.run(f"motionPage.jump({share}), motionPage.picture(0)"))
-    assert all(picture.startswith("data:image/png") and len(picture) > 3000 for picture in pictures), "blank"
+    assert all(
+        picture.startswith("data:image/png") and len(picture) > 3000 for picture in pictures
+    ), "blank"
     if name != "placement":  # a posture
         assert pictures[0] != pictures[1]
     assert browser.complaints == []
@@ -74,14 +78,20 @@ def test_it_plays_and_stops(browser: Browser, tmp_path: Path) -> None:
     assert browser.screenshot() != first
     assert browser.run("motionPage.state.playing") is False
     assert browser.run("motionPage.state.share") == share
-    browser.run("s = document.getElementById('time'); s.value = 0.5; s.dispatchEvent(new Event('input'))")
+    browser.run(
+        "s = document.getElementById('time'); s.value = 0.5; s.dispatchEvent(new Event('input'))"
+    )
     assert browser.run("motionPage.state.share") == 0.5
     assert browser.run("document.querySelectorAll('.motion').length") == 2
-    assert browser.run("document.querySelectorAll('#track b').length") == len(refuted().clearance.contacts)
+    assert browser.run("document.querySelectorAll('#track b').length") == len(
+        refuted().clearance.contacts
+    )
     assert browser.complaints == []
 
 
-def test_it_plays_by_itself_and_the_bodies_that_touch_are_red(browser: Browser, tmp_path: Path) -> None:
+def test_it_plays_by_itself_and_the_bodies_that_touch_are_red(
+    browser: Browser, tmp_path: Path
+) -> None:
     opened(browser, tmp_path / "page.html", page([refuted()]), fragment="")
     assert browser.run("motionPage.state.playing || motionPage.state.share > 0")
     contact = refuted().clearance.contacts[0]

@@ -1,4 +1,7 @@
-"""The playable log: read back by other people's readers, and held against its schemas and Pinocchio."""
+"""The playable log: read back by other people's readers.
+
+And held against its schemas and Pinocchio.
+"""
 
 import io
 import json
@@ -34,7 +37,9 @@ def decoded(content: bytes) -> dict[str, list[tuple[int, object]]]:
             if schema.id not in kinds:
                 kinds[schema.id] = _message_class(schema.data, schema.name)
             value = kinds[schema.id].FromString(message.data)  # type: ignore[attr-defined]
-            assert value.SerializeToString(deterministic=True) == message.data, "nothing that the schema does not know"
+            assert value.SerializeToString(deterministic=True) == message.data, (
+                "nothing that the schema does not know"
+            )
             assert schema.name == PUBLISHED[channel.topic]
         else:
             assert schema.encoding == "jsonschema" and channel.message_encoding == "json"
@@ -42,14 +47,18 @@ def decoded(content: bytes) -> dict[str, list[tuple[int, object]]]:
             properties = json.loads(schema.data)["properties"]
             assert set(value) <= set(properties)
             kinds_of = {"number": (int, float), "string": str, "array": list}
-            assert all(isinstance(item, kinds_of[properties[key]["type"]]) for key, item in value.items())
+            assert all(
+                isinstance(item, kinds_of[properties[key]["type"]]) for key, item in value.items()
+            )
         found.setdefault(channel.topic, []).append((message.log_time, value))
     return found
 
 
 def _message_class(data: bytes, name: str) -> object:
     pool = descriptor_pool.DescriptorPool()
-    for file in descriptor_pb2.FileDescriptorSet.FromString(data).file:  # each behind what it depends on
+    for file in descriptor_pb2.FileDescriptorSet.FromString(
+        data
+    ).file:  # each behind what it depends on
         pool.Add(file)
     return message_factory.GetMessageClass(pool.FindMessageTypeByName(name))
 
@@ -83,7 +92,9 @@ def test_composed_transforms_are_those_of_pinocchio(name: str) -> None:
         where = {"world": np.eye(4)}
         _, message = topics["/tf"][k]
         transforms = message.transforms  # type: ignore[attr-defined]
-        assert len(transforms) == len({row.child_frame_id for row in transforms}) == len(shown.frames)
+        assert (
+            len(transforms) == len({row.child_frame_id for row in transforms}) == len(shown.frames)
+        )
         for row in transforms:
             t, r = row.translation, row.rotation
             where[row.child_frame_id] = where[row.parent_frame_id] @ matrix(
@@ -97,21 +108,37 @@ def test_composed_transforms_are_those_of_pinocchio(name: str) -> None:
 def test_every_body_is_drawn_once_in_the_frame_that_moves_it_and_of_its_size(name: str) -> None:
     shown, topics = recording(name), decoded(playable_log(recording(name)))
     frames = [*(frame.name for frame in shown.frames), "world"]
-    drawn = [e for topic in ("/scene/robot", "/scene/obstacles") for _, u in topics.get(topic, []) for e in u.entities]  # type: ignore[attr-defined]
+    drawn = [
+        e
+        for topic in ("/scene/robot", "/scene/obstacles")
+        for _, u in topics.get(topic, [])
+        for e in u.entities
+    ]  # type: ignore[attr-defined]
     assert sorted(entity.id for entity in drawn) == sorted(shape.name for shape in shown.shapes)
     entities = {entity.id: entity for entity in drawn}
     for shape in shown.shapes:
         entity, kind = entities[shape.name], shape.outline.kind
         assert entity.frame_id == frames[shape.frame]
-        counts = [len(getattr(entity, field)) for field in ("cubes", "spheres", "cylinders", "lines", "triangles")]
+        counts = [
+            len(getattr(entity, field))
+            for field in ("cubes", "spheres", "cylinders", "lines", "triangles")
+        ]
         if shape.outline.is_line:
             assert counts == [0, 0, 0, 1, 0]
             a, b = (np.array([p.x, p.y, p.z]) for p in entity.lines[0].points)
             assert np.linalg.norm(b - a) == pytest.approx(shape.outline.size[1], abs=1e-12)
             assert 0.5 * (a + b) == pytest.approx(shape.pose[:3], abs=1e-12)
             continue
-        expected = {"box": [1, 0, 0, 0, 0], "half_space": [1, 0, 0, 0, 0], "sphere": [0, 1, 0, 0, 0]}
-        expected |= {"ellipsoid": [0, 1, 0, 0, 0], "cylinder": [0, 0, 1, 0, 0], "capsule": [0, 2, 1, 0, 0]}
+        expected = {
+            "box": [1, 0, 0, 0, 0],
+            "half_space": [1, 0, 0, 0, 0],
+            "sphere": [0, 1, 0, 0, 0],
+        }
+        expected |= {
+            "ellipsoid": [0, 1, 0, 0, 0],
+            "cylinder": [0, 0, 1, 0, 0],
+            "capsule": [0, 2, 1, 0, 0],
+        }
         assert counts == expected[kind], shape.name
         if kind == "half_space":
             continue

@@ -30,7 +30,9 @@ def test_composed_transforms_are_those_of_pinocchio(name: str) -> None:
         pin.forwardKinematics(model, data, shown.motion.at(float(shown.times[k])))
         composed: list[np.ndarray] = []
         for frame, local in zip(shown.frames, shown.poses.local[k], strict=True):
-            composed.append((composed[frame.parent] if frame.parent >= 0 else np.eye(4)) @ matrix(local))
+            composed.append(
+                (composed[frame.parent] if frame.parent >= 0 else np.eye(4)) @ matrix(local)
+            )
         for joint in range(1, model.njoints):
             truth = data.oMi[joint].homogeneous
             assert np.abs(composed[joint - 1] - truth).max() < 1e-9
@@ -61,7 +63,12 @@ def test_every_coal_shape_is_drawn_once_and_of_the_same_size(name: str) -> None:
 def test_shapes_that_no_scenario_has_are_drawn_too() -> None:
     points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     faces = coal.StdVec_Triangle()
-    for a, b, c in ((0, 1, 2), (0, 1, 3), (0, 3, 2), (1, 2, 3)):  # the first one the wrong way round
+    for a, b, c in (
+        (0, 1, 2),
+        (0, 1, 3),
+        (0, 3, 2),
+        (1, 2, 3),
+    ):  # the first one the wrong way round
         faces.append(coal.Triangle(a, b, c))
     vertices = coal.StdVec_Vec3s()
     vertices.extend(points)
@@ -88,7 +95,9 @@ def test_shapes_that_no_scenario_has_are_drawn_too() -> None:
     assert np.allclose(place.rotation[:, 2], [1.0, 0.0, 0.0])
 
 
-def test_a_certified_motion_has_no_contact_and_its_curve_stays_above_the_verdict(shown: Recording) -> None:
+def test_a_certified_motion_has_no_contact_and_its_curve_stays_above_the_verdict(
+    shown: Recording,
+) -> None:
     verdict, least = shown.verdict, shown.clearance.least
     assert len(least) == len(shown.times) == len(shown.q) == len(shown.clearance.pairs)
     if verdict.certified:
@@ -135,10 +144,14 @@ def test_bodies_that_touch_all_the_time_are_one_contact() -> None:
     model, geometry = pin.Model(), pin.GeometryModel()
     model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "slide")
     for joint in (1, 0):
-        geometry.addGeometryObject(pin.GeometryObject(f"ball_{joint}", joint, 0, pin.SE3.Identity(), coal.Sphere(1.0)))
+        geometry.addGeometryObject(
+            pin.GeometryObject(f"ball_{joint}", joint, 0, pin.SE3.Identity(), coal.Sphere(1.0))
+        )
     geometry.addCollisionPair(pin.CollisionPair(0, 1))
     motion = Motion(np.array([[0.0], [1.0], [0.5]]))
-    found = clearance([Part(geometry_scene(model, geometry), 0, 2)], motion, np.linspace(0.0, 2.0, 9))
+    found = clearance(
+        [Part(geometry_scene(model, geometry), 0, 2)], motion, np.linspace(0.0, 2.0, 9)
+    )
     assert [(contact.begin, contact.end) for contact in found.contacts] == [(0.0, 2.0)]
     assert not found.least.any()
 
@@ -165,7 +178,10 @@ def test_a_carried_object_goes_with_the_tool_while_it_is_held_and_stands_otherwi
     hand = next(shape for shape in shown.shapes if shape.name == "hand").frame
     for part in held:
         inside = (shown.times >= part.first) & (shown.times < part.last)
-        relative = [np.linalg.inv(matrix(row[hand])) @ matrix(row[bottle.frame]) for row in shown.poses.world[inside]]
+        relative = [
+            np.linalg.inv(matrix(row[hand])) @ matrix(row[bottle.frame])
+            for row in shown.poses.world[inside]
+        ]
         assert np.ptp(relative, axis=0).max() < 1e-9
     for part in free:
         inside = (shown.times >= part.first) & (shown.times < part.last)

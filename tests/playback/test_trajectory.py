@@ -17,7 +17,9 @@ LIMITS = SpeedLimits()
 PATH = np.array([[0.0, 0.0], [1.0, -0.5], [1.0, -0.5], [1.01, -0.5], [0.0, 2.0]])
 
 
-def executed(times: np.ndarray, positions: np.ndarray, velocities: np.ndarray | None, at: np.ndarray) -> np.ndarray:
+def executed(
+    times: np.ndarray, positions: np.ndarray, velocities: np.ndarray | None, at: np.ndarray
+) -> np.ndarray:
     """Return what a controller makes of the points."""
     if velocities is None:
         return np.stack([np.interp(at, times, column) for column in positions.T], axis=1)
@@ -43,7 +45,9 @@ def test_both_formats_say_the_same() -> None:
     assert data["interpolation"] == "cubic"
     assert rows[0][:2] == ["time_s", f"{shown.joints[0].name}_rad"]
     for point, row in zip(data["points"], rows[1:], strict=True):
-        assert [point["time_from_start"], *point["positions"], *point["velocities"]] == [float(cell) for cell in row]
+        assert [point["time_from_start"], *point["positions"], *point["velocities"]] == [
+            float(cell) for cell in row
+        ]
 
 
 def test_sliding_joints_have_the_unit_of_the_scene() -> None:
@@ -51,7 +55,9 @@ def test_sliding_joints_have_the_unit_of_the_scene() -> None:
     assert trajectory(shown, "uniform", LIMITS, 0.5).units == ("unit", "unit")
 
 
-def check_limits(times: np.ndarray, positions: np.ndarray, velocities: np.ndarray, slack: float) -> None:
+def check_limits(
+    times: np.ndarray, positions: np.ndarray, velocities: np.ndarray, slack: float
+) -> None:
     curve = CubicHermiteSpline(times, positions, velocities)
     at = np.linspace(0.0, times[-1], 20001)
     assert np.abs(curve(at, 1)).max() <= 0.5 * (1.0 + slack)
@@ -70,7 +76,11 @@ def test_optimal_lines_keep_the_limits_stay_on_the_lines_and_could_not_be_faster
         along = np.clip((at - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
         offsets.append(np.linalg.norm(at - a - along[:, None] * (b - a), axis=1))
     assert np.min(offsets, axis=0).max() < 1e-9
-    longest = [1.0, 0.01, 2.5]  # [rad] of the joint that takes longest: to full speed in 0.5 s over 0.125 rad
+    longest = [
+        1.0,
+        0.01,
+        2.5,
+    ]  # [rad] of the joint that takes longest: to full speed in 0.5 s over 0.125 rad
     truth = [2.0 * np.sqrt(way) if way < 0.25 else way / 0.5 + 0.5 for way in longest]
     assert times[-1] == pytest.approx(sum(truth), rel=1e-9)
 

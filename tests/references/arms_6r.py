@@ -1,4 +1,7 @@
-"""A 6R arm of a PUMA's proportions, as capsules and as spheres, among ten turned obstacles of all kinds."""
+"""A 6R arm of a PUMA's proportions, as capsules and as spheres.
+
+Among ten turned obstacles of all kinds.
+"""
 
 from typing import Any
 
@@ -17,15 +20,33 @@ from evoexp.scenarios.obstacles import (
 )
 
 FLOOR = 0  # index of the obstacle that the first link stands on: those two are no pair
-SELF_PAIRS = ((1, 3), (1, 4), (1, 5), (1, 6), (2, 4), (2, 5), (2, 6))  # joints; the links around the wrist always touch
+SELF_PAIRS = (
+    (1, 3),
+    (1, 4),
+    (1, 5),
+    (1, 6),
+    (2, 4),
+    (2, 5),
+    (2, 6),
+)  # joints; the links around the wrist always touch
 
 OBSTACLES = (
     HalfSpaceObstacle(shape="half_space", point=(0.0, 0.0, 0.0), normal=(0.02, -0.03, 1.0)),
-    BoxObstacle(shape="box", center=(0.75, 0.1, 0.25), size=(0.5, 0.9, 0.06), rotation=(3.0, -4.0, 20.0)),
-    BoxObstacle(shape="box", center=(-0.45, 0.75, 0.55), size=(0.25, 0.3, 0.5), rotation=(15.0, 10.0, -30.0)),
-    BoxObstacle(shape="box", center=(0.35, -0.85, 0.9), size=(0.3, 0.12, 0.4), rotation=(40.0, 25.0, 60.0)),
-    CylinderObstacle(shape="cylinder", start=(-0.75, -0.35, 0.0), end=(-0.7, -0.3, 1.1), radius=0.08),
-    CylinderObstacle(shape="cylinder", start=(0.7, -0.45, 0.5), end=(0.9, -0.35, 0.75), radius=0.12),
+    BoxObstacle(
+        shape="box", center=(0.75, 0.1, 0.25), size=(0.5, 0.9, 0.06), rotation=(3.0, -4.0, 20.0)
+    ),
+    BoxObstacle(
+        shape="box", center=(-0.45, 0.75, 0.55), size=(0.25, 0.3, 0.5), rotation=(15.0, 10.0, -30.0)
+    ),
+    BoxObstacle(
+        shape="box", center=(0.35, -0.85, 0.9), size=(0.3, 0.12, 0.4), rotation=(40.0, 25.0, 60.0)
+    ),
+    CylinderObstacle(
+        shape="cylinder", start=(-0.75, -0.35, 0.0), end=(-0.7, -0.3, 1.1), radius=0.08
+    ),
+    CylinderObstacle(
+        shape="cylinder", start=(0.7, -0.45, 0.5), end=(0.9, -0.35, 0.75), radius=0.12
+    ),
     SphereObstacle(shape="sphere", center=(0.6, 0.65, 0.95), radius=0.15),
     SphereObstacle(shape="sphere", center=(-0.6, 0.05, 1.25), radius=0.12),
     CapsuleObstacle(shape="capsule", start=(-0.3, 0.9, 1.2), end=(0.4, 0.85, 1.35), radius=0.05),
@@ -49,7 +70,10 @@ CAPSULES = (
 
 
 def model() -> Any:
-    """Return the arm's `pin.Model`: z upwards, shoulder at 0.65 m, upper arm and forearm 0.43 m, a spherical wrist."""
+    """Return the arm's `pin.Model`.
+
+    Z upwards, shoulder at 0.65 m, upper arm and forearm 0.43 m, a spherical wrist.
+    """
     arm = pin.Model()
     joint = 0
     for axis, place in (
@@ -124,7 +148,9 @@ def point(coordinates: tuple[float, ...]) -> FloatArray:
     return np.array([*coordinates, 0.0][:3])
 
 
-def with_obstacles(geometry: Any, obstacles: tuple[Any, ...], joint_pairs: Any, ignored: Any = ()) -> Any:
+def with_obstacles(
+    geometry: Any, obstacles: tuple[Any, ...], joint_pairs: Any, ignored: Any = ()
+) -> Any:
     """Return a robot's geometry with the obstacles behind it, and the pairs that are to be checked.
 
     Args:
@@ -155,6 +181,9 @@ def random_configurations(count: int) -> FloatArray:
 
 
 def population(count: int) -> FloatArray:
-    """Return configurations of a converged population, (6, count) [rad]: within some 6° of one that is free."""
+    """Return configurations of a converged population, (6, count) [rad].
+
+    Within some 6° of one that is free.
+    """
     center = np.array([0.3, 0.4, 0.9, 0.2, 0.5, 0.0])
     return np.asarray(center[:, None] + 0.1 * np.random.default_rng(0).normal(size=(6, count)))

@@ -1,4 +1,7 @@
-"""Crossing links the obvious ways: in rational numbers pair by pair, and in numpy for whole populations."""
+"""Crossing links the obvious ways.
+
+In rational numbers pair by pair, and in numpy for whole populations.
+"""
 
 from fractions import Fraction
 from typing import Any
@@ -17,7 +20,10 @@ def side(a: Point, b: Point, c: Point) -> int:
 
 
 def segments_touch(a: Any, b: Any, c: Any, d: Any) -> bool:
-    """Whether two segments have a common point; ends are pairs of floats, taken as the rational numbers they are."""
+    """Whether two segments have a common point.
+
+    Ends are pairs of floats, taken as the rational numbers they are.
+    """
     a, b, c, d = (tuple(map(Fraction, point)) for point in (a, b, c, d))
     if side(a, b, c) * side(a, b, d) < 0 and side(c, d, a) * side(c, d, b) < 0:
         return True
@@ -25,17 +31,26 @@ def segments_touch(a: Any, b: Any, c: Any, d: Any) -> bool:
 
 
 def on_segment(a: Point, b: Point, c: Point) -> bool:
-    within = min(a[0], b[0]) <= c[0] <= max(a[0], b[0]) and min(a[1], b[1]) <= c[1] <= max(a[1], b[1])
+    within = min(a[0], b[0]) <= c[0] <= max(a[0], b[0]) and min(a[1], b[1]) <= c[1] <= max(
+        a[1], b[1]
+    )
     return side(a, b, c) == 0 and within
 
 
-def exact_counts(base_1: Any, points_1: FloatArray, base_2: Any, points_2: FloatArray) -> np.ndarray:
-    """Return the number of colliding configurations of each pair, (N1, N2); points are (K, 4, N)."""
+def exact_counts(
+    base_1: Any, points_1: FloatArray, base_2: Any, points_2: FloatArray
+) -> np.ndarray:
+    """Return the number of colliding configurations of each pair, (N1, N2).
+
+    Points are (K, 4, N).
+    """
     counts = np.zeros((points_1.shape[2], points_2.shape[2]), dtype=np.int64)
     for i, j in np.ndindex(counts.shape):
         for one, two in zip(points_1[:, :, i].tolist(), points_2[:, :, j].tolist(), strict=True):
             a, b = [base_1, one[:2], one[2:]], [base_2, two[:2], two[2:]]
-            counts[i, j] += any(segments_touch(*a[m : m + 2], *b[n : n + 2]) for m in (0, 1) for n in (0, 1))
+            counts[i, j] += any(
+                segments_touch(*a[m : m + 2], *b[n : n + 2]) for m in (0, 1) for n in (0, 1)
+            )
     return counts
 
 
@@ -44,17 +59,28 @@ def cross(u: FloatArray, v: FloatArray) -> FloatArray:
 
 
 def crossing(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> np.ndarray:
-    """Whether segments cross, by the signs of rounded line functions; ends are (2, …) and broadcast."""
+    """Whether segments cross, by the signs of rounded line functions.
+
+    Ends are (2, …) and broadcast.
+    """
     first = cross(b - a, c - a) * cross(b - a, d - a) <= 0.0
     return np.asarray(first & (cross(d - c, a - c) * cross(d - c, b - c) <= 0.0))
 
 
-def counts_of_populations(base_1: Any, points_1: FloatArray, base_2: Any, points_2: FloatArray) -> np.ndarray:
-    """Return the number of colliding configurations of each pair, (N1, N2), a configuration at a time."""
+def counts_of_populations(
+    base_1: Any, points_1: FloatArray, base_2: Any, points_2: FloatArray
+) -> np.ndarray:
+    """Return the number of colliding configurations of each pair, (N1, N2).
+
+    A configuration at a time.
+    """
     counts = np.zeros((points_1.shape[2], points_2.shape[2]), dtype=np.int64)
     start_1, start_2 = (np.array(base)[:, None, None] for base in (base_1, base_2))
     for one, two in zip(points_1, points_2, strict=True):
-        a, b = (start_1, one[:2, :, None], one[2:, :, None]), (start_2, two[:2, None], two[2:, None])
+        a, b = (
+            (start_1, one[:2, :, None], one[2:, :, None]),
+            (start_2, two[:2, None], two[2:, None]),
+        )
         met = [crossing(a[m], a[m + 1], b[n], b[n + 1]) for m in (0, 1) for n in (0, 1)]
         counts += met[0] | met[1] | met[2] | met[3]
     return counts
@@ -70,7 +96,12 @@ def squared_distance(a: FloatArray, b: FloatArray, p: FloatArray) -> FloatArray:
 
 
 def envelope_counts(
-    lines_1: FloatArray, tips_1: FloatArray, radius_1: float, lines_2: FloatArray, tips_2: FloatArray, radius_2: float
+    lines_1: FloatArray,
+    tips_1: FloatArray,
+    radius_1: float,
+    lines_2: FloatArray,
+    tips_2: FloatArray,
+    radius_2: float,
 ) -> np.ndarray:
     """Return the number of colliding configurations of each pair of enveloped arms, (N1, N2).
 

@@ -1,9 +1,11 @@
-"""The criteria of a mobile arm's posture over the links' directions, by numpy, with derivatives by complex steps.
+"""The criteria of a mobile arm's posture over the links' directions, by numpy.
+
+With derivatives by complex steps.
 
 The slow and obvious versions of what `references.placement_*` compiles.
 
-All functions take x (3, …) = (φ1, φ2, φ3) [rad], complex numbers, too: a complex step gives derivatives without any
-cancellation.
+All functions take x (3, …) = (φ1, φ2, φ3) [rad], complex numbers, too: a complex step gives
+derivatives without any cancellation.
 """
 
 from typing import Any
@@ -70,7 +72,9 @@ def margins(model: Directions, x: Any) -> Any:
     rows = []
     for values, limits in ((angles, model.joint_limits), (torques(model, x), model.torque_limits)):
         for value, (least, greatest) in zip(values, limits, strict=True):
-            rows += [value - least] * bool(np.isfinite(least)) + [greatest - value] * bool(np.isfinite(greatest))
+            rows += [value - least] * bool(np.isfinite(least)) + [greatest - value] * bool(
+                np.isfinite(greatest)
+            )
     return np.stack(rows) if rows else np.zeros((0, *np.shape(x)[1:]))
 
 
@@ -98,7 +102,9 @@ def slide(model: Directions, x: np.ndarray, steps: np.ndarray) -> tuple[np.ndarr
 
     h, least, end = 1e-6, float(cost(model, x)), x
     for step in steps:
-        slope = np.array([cost(model, x + h * unit) - cost(model, x - h * unit) for unit in np.eye(3)]) / (2 * h)
+        slope = np.array(
+            [cost(model, x + h * unit) - cost(model, x - h * unit) for unit in np.eye(3)]
+        ) / (2 * h)
         slope = slope - (slope @ normal(x)) / (normal(x) @ normal(x)) * normal(x)
         x = x - step * slope / np.linalg.norm(slope)
         for _ in range(3):

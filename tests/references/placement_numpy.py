@@ -1,4 +1,7 @@
-"""Postures of the mobile arm, slowly and by another way: over the directions of links 2 and 3, from Pinocchio."""
+"""Postures of the mobile arm, slowly and by another way.
+
+Over the directions of links 2 and 3, from Pinocchio.
+"""
 
 import numpy as np
 import pinocchio as pin
@@ -12,8 +15,13 @@ def robot(**changes: object) -> MobileArm:
     return MobileArm(**({"link_lengths": LENGTHS, "platform_size": (0.6, 0.2)} | changes))  # type: ignore[arg-type]
 
 
-def pinocchio_posture(q: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the end-effector (2,), the arm's Jacobian (2, 3) and its torques (3,) at q = (X_p, θ1, θ2, θ3) [rad]."""
+def pinocchio_posture(
+    q: np.ndarray, force: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the end-effector (2,), the arm's Jacobian (2, 3) and its torques (3,) at q = (X_p.
+
+    Θ1, θ2, θ3) [rad].
+    """
     model = robot().build().model
     tip = pin.SE3(np.eye(3), np.array([LENGTHS[2], 0.0, 0.0]))
     frame = model.addFrame(pin.Frame("tip", model.njoints - 1, 0, tip, pin.FrameType.OP_FRAME))
@@ -26,7 +34,10 @@ def pinocchio_posture(q: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.
 
 
 def dense_least(cost: object, height: float, num: int) -> float:
-    """Return the least cost over a grid of φ2, φ3 with φ1 from the height, both of its values; `cost` takes (3, n)."""
+    """Return the least cost over a grid of φ2, φ3 with φ1 from the height, both of its values.
+
+    `cost` takes (3, n).
+    """
     grid = np.linspace(-np.pi, np.pi, num, endpoint=False)
     two, three = (values.ravel() for values in np.meshgrid(grid, grid))
     sine = (height - LENGTHS[1] * np.sin(two) - LENGTHS[2] * np.sin(three)) / LENGTHS[0]

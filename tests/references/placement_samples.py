@@ -1,4 +1,7 @@
-"""The shipped references to postures, composed once for all tests: composing takes longer than they do."""
+"""The shipped references to postures, composed once for all tests.
+
+Composing takes longer than they do.
+"""
 
 import functools
 from typing import Any
@@ -27,7 +30,10 @@ def problem(case: str) -> Any:
 
 @functools.cache
 def found(case: str, kind: str) -> tuple[Truth, Any, Any]:
-    """Return the truth of a reference, the reference and its problem; kind: optimum, conventional or landscape."""
+    """Return the truth of a reference, the reference and its problem.
+
+    Kind: optimum, conventional or landscape.
+    """
     experiment = "chen_landscapes" if kind == "landscape" else "chen_placement"
     planner, prepared = conditions(experiment)[f"{LABELS[case]}, {kind}"].prepare()
     return planner.truth(prepared), planner, prepared

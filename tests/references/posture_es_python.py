@@ -1,4 +1,7 @@
-"""The evolution strategy on postures, slow and obvious: individuals are lists, everybody remembers the whole line."""
+"""The evolution strategy on postures, slow and obvious.
+
+Individuals are lists, everybody remembers the whole line.
+"""
 
 from typing import Any
 
@@ -8,7 +11,9 @@ from evoexp.planners.posture_kernels import COST
 from evoexp.planners.posture_stages import Problem, begin, judge
 
 
-def path(problem: Problem, ga: Any, rng: np.random.Generator, mutant: str = "") -> tuple[Any, int, str]:
+def path(
+    problem: Problem, ga: Any, rng: np.random.Generator, mutant: str = ""
+) -> tuple[Any, int, str]:
     """Search the first phase; return postures, evaluations, and why it ended.
 
     Args:
@@ -30,11 +35,18 @@ def path(problem: Problem, ga: Any, rng: np.random.Generator, mutant: str = "") 
         children = []
         for n in range(count):
             line = parents[n % len(parents)]
-            child = np.clip(line[-1] + scope * (2.0 * uniforms[n] - 1.0), problem.limits[:, 0], problem.limits[:, 1])
+            child = np.clip(
+                line[-1] + scope * (2.0 * uniforms[n] - 1.0),
+                problem.limits[:, 0],
+                problem.limits[:, 1],
+            )
             children.append([*line, child])
         judged = judge(stage, np.array([line[-1] for line in children]).T)
         evaluations += count
-        cost = [float(c) if ok else np.inf for c, ok in zip(judged.rows[COST], judged.feasible, strict=True)]
+        cost = [
+            float(c) if ok else np.inf
+            for c, ok in zip(judged.rows[COST], judged.feasible, strict=True)
+        ]
         ranked = sorted((n for n in range(count) if cost[n] < np.inf), key=lambda n: (cost[n], n))
         generations.append(children[ranked[0]][-1])
         met = [n for n in ranked if judged.met[n]]

@@ -1,7 +1,9 @@
-"""Distances of capsules and obstacles, slowly and plainly, in 80-bit numbers: the truth where coal iterates.
+"""Distances of capsules and obstacles, slowly and plainly, in 80-bit numbers.
 
-The distance of a point moving along a segment to a convex body is a convex function of its place, so a search by
-thirds finds the least one.
+The truth where coal iterates.
+
+The distance of a point moving along a segment to a convex body is a convex function of its place,
+so a search by thirds finds the least one.
 """
 
 from collections.abc import Callable

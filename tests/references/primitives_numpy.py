@@ -1,4 +1,7 @@
-"""The plain way for whole populations: numpy on all sphere centres, all obstacles, all pairs; configurations last."""
+"""The plain way for whole populations: numpy on all sphere centres, all obstacles, all pairs.
+
+Configurations last.
+"""
 
 from typing import Any
 
@@ -9,7 +12,9 @@ from evoexp.robots.kinematics import KinematicTable
 from evoexp.scenarios.obstacles import BOX, CAPSULE, CYLINDER, SPHERE, ObstacleTable
 
 
-def sphere_centers(table: KinematicTable, joint: np.ndarray, local: FloatArray, q: FloatArray) -> FloatArray:
+def sphere_centers(
+    table: KinematicTable, joint: np.ndarray, local: FloatArray, q: FloatArray
+) -> FloatArray:
     """Return the centres of spheres in the world, (spheres, 3, configurations).
 
     Args:
@@ -28,12 +33,16 @@ def sphere_centers(table: KinematicTable, joint: np.ndarray, local: FloatArray, 
         first = before < 0
         rotations.append(own if first else np.einsum("ijn,jkn->ikn", rotations[before], own))
         rest = np.tile(shift[:, None], q.shape[1])
-        origins.append(rest if first else origins[before] + np.tensordot(shift, rotations[before], (0, 1)))
+        origins.append(
+            rest if first else origins[before] + np.tensordot(shift, rotations[before], (0, 1))
+        )
     turns, places = np.array(rotations)[joint], np.array(origins)[joint]
     return np.asarray(np.einsum("sijn,sj->sin", turns, local) + places)
 
 
-def to_obstacles(centers: FloatArray, radius: FloatArray, table: ObstacleTable, checked: np.ndarray) -> FloatArray:
+def to_obstacles(
+    centers: FloatArray, radius: FloatArray, table: ObstacleTable, checked: np.ndarray
+) -> FloatArray:
     """Return the least clearance to obstacles, (configurations,); checked: (spheres, obstacles)."""
     least = np.full(centers.shape[2], np.inf)
     for k in range(len(table.kind)):
@@ -55,7 +64,9 @@ def to_obstacles(centers: FloatArray, radius: FloatArray, table: ObstacleTable, 
     return least
 
 
-def to_self(centers: FloatArray, radius: FloatArray, one: np.ndarray, two: np.ndarray) -> FloatArray:
+def to_self(
+    centers: FloatArray, radius: FloatArray, one: np.ndarray, two: np.ndarray
+) -> FloatArray:
     """Return the least clearance of pairs of spheres, (configurations,); one, two: (pairs,)."""
     away = centers[one] - centers[two]
     distance = np.sqrt(np.einsum("pin,pin->pn", away, away)) - (radius[one] + radius[two])[:, None]

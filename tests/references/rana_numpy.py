@@ -1,11 +1,15 @@
-"""The planner of Rana & Zalzala 1995 for planar arms of two links, in numpy and scipy over whole populations.
+"""The planner of Rana & Zalzala 1995 for planar arms of two links.
 
-Written from the paper, without any kernel of evoexp: what a careful author would write without a compiler. It takes its
-uniform numbers in the order in which `via_point_ga` takes them, so that both can be compared generation by generation:
-walks of the initial population (individual by individual, arm by arm, step by step); then per generation the roulette,
-per pair of parents the decision and a site per arm, the distinct slots, the decision per slot, and the new walks.
+In numpy and scipy over whole populations.
 
-A population is an array (individuals, arms, N + 1, 2) [deg], joint angles relative to the link before.
+Written from the paper, without any kernel of evoexp: what a careful author would write without a
+compiler. It takes its uniform numbers in the order in which `via_point_ga` takes them, so that both
+can be compared generation by generation: walks of the initial population (individual by individual,
+arm by arm, step by step); then per generation the roulette, per pair of parents the decision and a
+site per arm, the distinct slots, the decision per slot, and the new walks.
+
+A population is an array (individuals, arms, N + 1, 2) [deg], joint angles relative to the link
+before.
 """
 
 import itertools
@@ -63,7 +67,10 @@ class Rana:
 
 
 class Judged(NamedTuple):
-    """Cost (individuals,) and the terms of Eq. 7: lengths and unevenness (individuals, arms), collisions."""
+    """Cost (individuals,) and the terms of Eq.
+
+    7: lengths and unevenness (individuals, arms), collisions.
+    """
 
     cost: Array
     lengths: Array
@@ -72,7 +79,10 @@ class Judged(NamedTuple):
 
 
 class Population(NamedTuple):
-    """One generation: strings (individuals, arms, N + 1, 2), costs and collisions (individuals,)."""
+    """One generation: strings (individuals, arms, N + 1, 2), costs and collisions.
+
+    Individuals,.
+    """
 
     strings: Array
     costs: Array
@@ -83,10 +93,13 @@ def from_condition(condition: Any, **changes: Any) -> Rana:
     """Return the same scene and settings as a condition of `via_point_ga` has, with changes.
 
     Raises:
-        ValueError: If the scene is none of planar arms of two links, standing straight and free of obstacles.
+        ValueError: If the scene is none of planar arms of two links, standing straight and free of
+            obstacles.
     """
     robot, scenario, planner = condition.robot, condition.scenario, condition.planner
-    if scenario.obstacles or any(len(arm.link_lengths) != 2 or arm.base_angle for arm in robot.arms):
+    if scenario.obstacles or any(
+        len(arm.link_lengths) != 2 or arm.base_angle for arm in robot.arms
+    ):
         raise ValueError("the reference is for planar arms of two links without obstacles")
     settings: dict[str, Any] = {}
     for part in (planner, planner.ga, planner.objective, planner.collision):
@@ -139,21 +152,32 @@ def walks(rana: Rana, rng: np.random.Generator, count: int) -> Array:
     for i in range(1, num):
         ahead = rana.goal - path[:, :, i - 1]
         angle = np.arctan2(ahead[..., 1], ahead[..., 0]) + turns[:, :, i - 1]
-        path[:, :, i] = path[:, :, i - 1] + length[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        path[:, :, i] = path[:, :, i - 1] + length[:, None] * np.stack(
+            [np.cos(angle), np.sin(angle)], axis=-1
+        )
     return path
 
 
 def smooth(rana: Rana, strings: Array) -> Array:
     """Redistribute along splines at equal arc length, then relax once (Eqs. 8, 9)."""
     paths = strings.reshape(-1, rana.num_via_points + 1, 2)
-    paths = redistributed(paths, rana.chords_per_segment, rana.spline_end) if rana.redistribution else paths.copy()
+    paths = (
+        redistributed(paths, rana.chords_per_segment, rana.spline_end)
+        if rana.redistribution
+        else paths.copy()
+    )
     for i in range(1, rana.num_via_points):
-        paths[:, i] += rana.relaxation_step * ((paths[:, i - 1] + paths[:, i + 1]) / 2.0 - paths[:, i])
+        paths[:, i] += rana.relaxation_step * (
+            (paths[:, i - 1] + paths[:, i + 1]) / 2.0 - paths[:, i]
+        )
     return paths.reshape(strings.shape)
 
 
 def redistributed(paths: Array, chords: int, spline_end: str) -> Array:
-    """Return points of paths (paths, N + 1, joints) at equal length along the splines, measured by chords."""
+    """Return points of paths (paths, N + 1, joints) at equal length along the splines.
+
+    Measured by chords.
+    """
     num = paths.shape[1] - 1
     rows = np.arange(len(paths))[:, None]
     spline: Any = CubicSpline(np.arange(num + 1), paths, axis=1, bc_type=spline_end)
@@ -161,7 +185,9 @@ def redistributed(paths: Array, chords: int, spline_end: str) -> Array:
     length = np.zeros((len(paths), num * chords + 1))
     np.cumsum(np.sqrt((steps * steps).sum(axis=2)), axis=1, out=length[:, 1:])
     target = length[:, -1:] * (np.arange(1, num) / num)
-    k = np.array([np.searchsorted(of, at, side="right") - 1 for of, at in zip(length, target, strict=True)])
+    k = np.array(
+        [np.searchsorted(of, at, side="right") - 1 for of, at in zip(length, target, strict=True)]
+    )
     k = np.clip(k, 0, num * chords - 1)
     begin, end = length[rows, k], length[rows, k + 1]
     u = (k + (target - begin) / np.where(end > begin, end - begin, 1.0)) / chords
@@ -169,7 +195,9 @@ def redistributed(paths: Array, chords: int, spline_end: str) -> Array:
     t = (u - segment)[:, :, None]
     c3, c2, c1, c0 = spline.c[:, segment, rows]  # each (paths, N − 1, joints)
     result = paths.copy()
-    result[:, 1:num] = np.where(length[:, -1, None, None] > 0.0, ((c3 * t + c2) * t + c1) * t + c0, paths[:, 1:num])
+    result[:, 1:num] = np.where(
+        length[:, -1, None, None] > 0.0, ((c3 * t + c2) * t + c1) * t + c0, paths[:, 1:num]
+    )
     return result
 
 
@@ -178,7 +206,12 @@ def judge(rana: Rana, strings: Array) -> Judged:
     steps = np.sqrt((np.diff(strings, axis=2) ** 2).sum(axis=3))  # (individuals, arms, N)
     lengths = steps.sum(axis=2)
     unevenness = np.abs(steps - lengths[:, :, None] / steps.shape[2]).sum(axis=2)
-    collisions = colliding(rana, between(strings, rana.collision_substeps)).any(axis=2).sum(axis=1).astype(float)
+    collisions = (
+        colliding(rana, between(strings, rana.collision_substeps))
+        .any(axis=2)
+        .sum(axis=1)
+        .astype(float)
+    )
     cost = (
         rana.length_weight * lengths.sum(axis=1)
         + rana.unevenness_weight * unevenness.sum(axis=1)
@@ -205,12 +238,18 @@ def colliding(rana: Rana, q: Array) -> NDArray[np.bool_]:
 
 
 def _centers(rana: Rana, arm: int, q: Array) -> tuple[Array, Array]:
-    """Return x and y of the circles of one arm, joint to joint, the shared one once: (…, circles)."""
+    """Return x and y of the circles of one arm, joint to joint, the shared one once.
+
+    (…, circles).
+    """
     first, second = np.deg2rad(q[..., 0]), np.deg2rad(q[..., 0] + q[..., 1])
     lengths, fractions = rana.link_lengths[arm], np.linspace(0.0, 1.0, rana.spheres_per_link)
     coordinates = []
     for base, one, two in zip(
-        rana.bases[arm], (np.cos(first), np.sin(first)), (np.cos(second), np.sin(second)), strict=True
+        rana.bases[arm],
+        (np.cos(first), np.sin(first)),
+        (np.cos(second), np.sin(second)),
+        strict=True,
     ):
         upper = base + lengths[0] * one[..., None] * fractions
         lower = upper[..., -1:] + lengths[1] * two[..., None] * fractions[1:]
@@ -236,7 +275,9 @@ def crossover(rana: Rana, rng: np.random.Generator, parents: Array) -> Array:
     children = parents.copy()
     if num < 2:
         return children
-    sites = 1 + np.minimum((uniforms[:, 1:] * (num - 1)).astype(int), num - 2)  # (pairs, arms), 1 … N − 1
+    sites = 1 + np.minimum(
+        (uniforms[:, 1:] * (num - 1)).astype(int), num - 2
+    )  # (pairs, arms), 1 … N − 1
     pair, arm = np.arange(len(first))[:, None], np.arange(arms)
     gap = np.linalg.norm(first[pair, arm, sites] - second[pair, arm, sites], axis=2)
     crossed = (uniforms[:, 0] < rana.crossover_rate) & (gap < rana.crossover_distance).all(axis=1)

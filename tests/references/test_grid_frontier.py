@@ -1,4 +1,7 @@
-"""The truth about grid paths: against all paths of small grids, and against what walks cannot be below."""
+"""The truth about grid paths.
+
+Against all paths of small grids, and against what walks cannot be below.
+"""
 
 from itertools import pairwise
 from typing import Any
@@ -8,7 +11,14 @@ import pytest
 from scipy.sparse import csgraph, csr_array
 
 from evoexp.errors import SettingError
-from evoexp.references.grid_frontier import GridFrontier, arrivals_of, best_walk, frontier, network_of, walk_costs
+from evoexp.references.grid_frontier import (
+    GridFrontier,
+    arrivals_of,
+    best_walk,
+    frontier,
+    network_of,
+    walk_costs,
+)
 from planners.grid_samples import planner, robot, scenario, solvable
 from shipped_conditions import expanded
 
@@ -45,7 +55,9 @@ def test_the_shortest_path_is_the_shortest_of_all(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("weights", [(0.3, 1.0), (1.0, 0.3)])
-def test_no_path_is_below_the_bound_and_the_best_known_is_a_path(weights: tuple[float, float], seed: int) -> None:
+def test_no_path_is_below_the_bound_and_the_best_known_is_a_path(
+    weights: tuple[float, float], seed: int
+) -> None:
     own = planner(weights)
     problem = solvable((4, 4), 0.4, seed, own)
     truth = GridFrontier(planner=own, **SETTINGS).truth(problem)
@@ -60,7 +72,9 @@ def costs_of_all_walks(problem: Any, epsilon: float, lam: float, most: int) -> l
     """Return the cost of the best walk of 2 … most nodes, over all walks."""
     own, unsafeness = problem.fields.grid, problem.fields.unsafeness
     start, goal = problem.ends
-    level: dict[int, set[tuple[int, int, float]]] = {start: {(0, 0, float(unsafeness[start]))}}  # lateral, diagonal, ΣS
+    level: dict[int, set[tuple[int, int, float]]] = {
+        start: {(0, 0, float(unsafeness[start]))}
+    }  # lateral, diagonal, ΣS
     costs = []
     for count in range(2, most + 1):
         following: dict[int, set[tuple[int, int, float]]] = {}
@@ -69,7 +83,8 @@ def costs_of_all_walks(problem: Any, epsilon: float, lam: float, most: int) -> l
                 if other >= 0:
                     step = (1, 0) if own.changes[move] == 1 else (0, 1)
                     following.setdefault(int(other), set()).update(
-                        (a + step[0], b + step[1], s + float(unsafeness[other])) for a, b, s in states
+                        (a + step[0], b + step[1], s + float(unsafeness[other]))
+                        for a, b, s in states
                     )
         level = following
         ends = [epsilon * (a + b * np.sqrt(2)) + lam * s / count for a, b, s in level.get(goal, ())]
@@ -89,13 +104,16 @@ def test_the_best_walk_is_the_best_of_all_walks(weights: tuple[float, float]) ->
     for count, found in walks:
         assert found == pytest.approx(expected[int(count) - 2], rel=1e-12)
     assert cost(own, problem, walk) == pytest.approx(min(expected), rel=1e-12)
-    assert GridFrontier(planner=own, **(SETTINGS | {"max_nodes": 24})).truth(problem).cost == pytest.approx(
-        min(expected)
-    )
+    assert GridFrontier(planner=own, **(SETTINGS | {"max_nodes": 24})).truth(
+        problem
+    ).cost == pytest.approx(min(expected))
 
 
 def slow_walk_costs(network: Any, epsilon: float, mu: float, most: int) -> list[float]:
-    """Return the least ε D + μ ΣS of walks of 0 … most nodes, one number of nodes after the other."""
+    """Return the least ε D + μ ΣS of walks of 0 … most nodes.
+
+    One number of nodes after the other.
+    """
     present = {network.ends[0]: mu * network.unsafeness[network.ends[0]]}
     costs = [np.inf, np.inf]
     for _ in range(2, most + 1):
@@ -121,7 +139,9 @@ def test_walks_for_many_weights_are_those_for_each(size: tuple[int, ...], num_we
 
 def test_walks_too_short_to_arrive_are_refused() -> None:
     problem = solvable((6, 6), 0.2, 1, planner())
-    with pytest.raises(SettingError, match=r"reference\.max_nodes: must be as many as a path from .*, was 3"):
+    with pytest.raises(
+        SettingError, match=r"reference\.max_nodes: must be as many as a path from .*, was 3"
+    ):
         best_walk(network_of(problem), 0.3, 1.0, 1e3, 3)
 
 
@@ -135,16 +155,23 @@ def test_the_shortest_weighted_path_is_that_of_a_graph_made_anew(mu: float) -> N
         csr_array((costs, (network.tails, network.heads)), shape=(len(network.unsafeness),) * 2),
         indices=network.ends[0],
     )[network.ends[1]]
-    edges = dict(zip(zip(network.tails.tolist(), network.heads.tolist(), strict=True), costs, strict=True))
+    edges = dict(
+        zip(zip(network.tails.tolist(), network.heads.tolist(), strict=True), costs, strict=True)
+    )
     for nodes in (path, found[-1][1]):
-        assert sum(edges[pair] for pair in pairwise(nodes.tolist())) == pytest.approx(least, rel=1e-12)
+        assert sum(edges[pair] for pair in pairwise(nodes.tolist())) == pytest.approx(
+            least, rel=1e-12
+        )
 
 
 def test_the_frontier_goes_from_the_shortest_to_the_safest() -> None:
     own = planner()
     problem = solvable((16, 16), 0.25, 3, own)
     found = frontier(network_of(problem), np.geomspace(1e-4, 10.0, 50))
-    terms = [own.evaluate(problem, problem.fields.grid.coordinates[path].astype(float).ravel()) for _, path in found]
+    terms = [
+        own.evaluate(problem, problem.fields.grid.coordinates[path].astype(float).ravel())
+        for _, path in found
+    ]
     lengths = [term["distance"] for term in terms]
     sums = [term["unsafeness"] * term["num_nodes"] for term in terms]
     assert lengths == sorted(lengths)
@@ -153,7 +180,11 @@ def test_the_frontier_goes_from_the_shortest_to_the_safest() -> None:
 
 def test_lingering_pays_in_the_papers_own_workspace() -> None:
     experiment = expanded("chen_lingering", "paper")
-    found = {label: condition.prepare() for label, condition in experiment.conditions if condition.is_reference}
+    found = {
+        label: condition.prepare()
+        for label, condition in experiment.conditions
+        if condition.is_reference
+    }
     truths = {label: planner.truth(problem) for label, (planner, problem) in found.items()}
     free, simple = truths["(b), revisits, exact"], truths["(b), loops erased, exact"]
     assert free.terms["bound_is_reached"]

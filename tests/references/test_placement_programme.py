@@ -1,4 +1,7 @@
-"""What references compile of postures: against numpy and complex steps, and against the planner's own kernels."""
+"""What references compile of postures.
+
+Against numpy and complex steps, and against the planner's own kernels.
+"""
 
 import functools
 from typing import Any
@@ -16,7 +19,14 @@ from references import placement_complex as slow
 from references.placement_samples import LABELS, problem
 
 AROUND = np.array([[-180.0, 180.0], [-180.0, 180.0]])
-POINTS = np.array([[2.0, 0, 0.5, 5.2, 1.0], [1.0, 1, 0.3, 4.0, 0.1], [3.0, 2, 0.5, 5.2, 1.0], [0.7, 3, 0.9, 5.0, 2.0]])
+POINTS = np.array(
+    [
+        [2.0, 0, 0.5, 5.2, 1.0],
+        [1.0, 1, 0.3, 4.0, 0.1],
+        [3.0, 2, 0.5, 5.2, 1.0],
+        [0.7, 3, 0.9, 5.0, 2.0],
+    ]
+)
 
 
 def directions(case: str, **changes: Any) -> Directions:
@@ -25,12 +35,16 @@ def directions(case: str, **changes: Any) -> Directions:
 
 def limited(case: str) -> Directions:
     joints = np.array([[-2.5, 3.0], [-np.inf, 2.5], [-2.0, np.inf]])
-    return directions(case, avoided=POINTS, joint_limits=joints, torque_limits=np.array([[-6.0, 8.0]] * 3))
+    return directions(
+        case, avoided=POINTS, joint_limits=joints, torque_limits=np.array([[-6.0, 8.0]] * 3)
+    )
 
 
 @pytest.mark.parametrize("with_limits", [False, True])
 @pytest.mark.parametrize("case", LABELS)
-def test_the_programme_and_its_derivatives_are_those_of_complex_steps(case: str, with_limits: bool) -> None:
+def test_the_programme_and_its_derivatives_are_those_of_complex_steps(
+    case: str, with_limits: bool
+) -> None:
     model = limited(case) if with_limits else directions(case)
     programme, rng = Programme(model), np.random.default_rng(2)
     function = functools.partial(slow.programme, model)
@@ -77,7 +91,12 @@ def test_many_costs_at_once_are_the_planners(case: str) -> None:
     pairs = rng.uniform(-180.0, 180.0, (2, 300))
     costs, theta_3 = own.model.measure_branches(pairs)
     kept = costs < 250.0
-    x = np.array([model.directions(pairs[:, k], theta_3[b, k]) for b, k in zip(*np.nonzero(kept), strict=True)]).T
+    x = np.array(
+        [
+            model.directions(pairs[:, k], theta_3[b, k])
+            for b, k in zip(*np.nonzero(kept), strict=True)
+        ]
+    ).T
     assert x.shape[1] > 60
     np.testing.assert_allclose(many_costs(model, x), costs[kept], rtol=1e-9)
     assert np.abs(slow.height(model, x)).max() < 1e-12
@@ -101,7 +120,9 @@ def test_the_subgradient_method_is_the_slow_one(case: str) -> None:
     slide(x, steps, *model[:5], ends, costs)
     for k, start in enumerate(starts):
         end, least = slow.slide(model, start, steps)
-        assert costs[k] == pytest.approx(least, rel=1e-5)  # differences of 1e-6 rad: ten digits of the slope
+        assert costs[k] == pytest.approx(
+            least, rel=1e-5
+        )  # differences of 1e-6 rad: ten digits of the slope
         np.testing.assert_allclose(ends[:, k], end, atol=1e-5)
         np.testing.assert_array_equal(ends[:, k], ends[:, k + len(starts)])
 
@@ -109,20 +130,28 @@ def test_the_subgradient_method_is_the_slow_one(case: str) -> None:
 @pytest.mark.parametrize("case", LABELS)
 def test_the_dense_search_has_the_planners_costs(case: str) -> None:
     own = problem(case)
-    one, two = np.meshgrid(np.arange(-180.0, 180.0, 4.0), np.arange(-180.0, 180.0, 4.0), indexing="ij")
+    one, two = np.meshgrid(
+        np.arange(-180.0, 180.0, 4.0), np.arange(-180.0, 180.0, 4.0), indexing="ij"
+    )
     expected, theta_3 = own.model.measure_branches(np.stack([one.ravel(), two.ravel()]))
     costs, sines = search(directions(case), np.radians(np.stack([one[:, 0], two[0]])))
     expected = np.where(np.isnan(theta_3), np.inf, expected).reshape(costs.shape)
     np.testing.assert_array_equal(np.isinf(costs), np.isinf(expected))
     np.testing.assert_array_equal(np.abs(sines) <= 1.0, np.isfinite(costs[0]))
-    np.testing.assert_allclose(np.minimum(costs, np.where(np.isinf(costs), np.inf, 250.0)), expected, rtol=1e-8)
+    np.testing.assert_allclose(
+        np.minimum(costs, np.where(np.isinf(costs), np.inf, 250.0)), expected, rtol=1e-8
+    )
 
 
 def test_the_dense_search_keeps_to_limits() -> None:
     own, limits = problem("torque_norm"), np.array([[-170.0, 95.0], [-60.0, 151.0], [-101.0, 77.0]])
     torques = np.array([[-8.1, 6.2], [-np.inf, 5.6], [-1.3, np.inf]])
-    model = Model(own.model.task, own.model.weights, own.model.avoided, np.concatenate([limits, torques]))
-    one, two = np.meshgrid(np.arange(-180.0, 180.0, 2.0), np.arange(-180.0, 180.0, 2.0), indexing="ij")
+    model = Model(
+        own.model.task, own.model.weights, own.model.avoided, np.concatenate([limits, torques])
+    )
+    one, two = np.meshgrid(
+        np.arange(-180.0, 180.0, 2.0), np.arange(-180.0, 180.0, 2.0), indexing="ij"
+    )
     expected, _ = model.measure_branches(np.stack([one.ravel(), two.ravel()]))
     costs, _ = search(directions_of(model, AROUND), np.radians(np.stack([one[:, 0], two[0]])))
     feasible = expected.reshape(costs.shape) < 250.0
@@ -165,6 +194,8 @@ def test_a_polished_minimum_meets_its_conditions_and_others_are_refused() -> Non
 def test_rows_of_what_is_measured() -> None:
     model = directions("torque_norm")
     values, slopes = np.empty(MARGINS), np.empty((MARGINS, 3))
-    measure(np.array([0.1, 0.2, 0.3]), model.numbers(), model.avoided, model.bounds(), values, slopes)
+    measure(
+        np.array([0.1, 0.2, 0.3]), model.numbers(), model.avoided, model.bounds(), values, slopes
+    )
     assert values[OBJECTIVE] == pytest.approx(slow.smooth(model, np.array([0.1, 0.2, 0.3])))
     assert values[HEIGHT] == pytest.approx(slow.height(model, np.array([0.1, 0.2, 0.3])))

@@ -1,4 +1,7 @@
-"""Exact optima against another parametrisation, conventional methods and landscapes against the planner's kernels."""
+"""Exact optima against another parametrisation.
+
+Conventional methods and landscapes against the planner's kernels.
+"""
 
 import functools
 
@@ -25,7 +28,9 @@ def test_the_optimum_is_that_of_another_parametrisation(case: str) -> None:
     assert truth.cost == pytest.approx(CASES[case], abs=1e-9)
     model = directions_of(problem.model, problem.angle_limits)
     cost = functools.partial(slow.cost, model)
-    least = dense_least(cost, 1.4, 1200)  # every 0.3°: the cost near a smooth minimum changes by 1e-4 or so
+    least = dense_least(
+        cost, 1.4, 1200
+    )  # every 0.3°: the cost near a smooth minimum changes by 1e-4 or so
     assert truth.cost <= least * (1.0 + 1e-12)
     assert least == pytest.approx(truth.cost, rel=1e-2)
     minima = truth.arrays["minima"]
@@ -37,7 +42,9 @@ def test_the_optimum_is_that_of_another_parametrisation(case: str) -> None:
 def test_no_posture_of_a_fine_grid_is_below_the_optimum(case: str) -> None:
     truth, _, problem = found(case, "optimum")
     one, two = truth.best
-    grid = np.stack(np.meshgrid(one + np.linspace(-1, 1, 201), two + np.linspace(-1, 1, 201))).reshape(2, -1)
+    grid = np.stack(
+        np.meshgrid(one + np.linspace(-1, 1, 201), two + np.linspace(-1, 1, 201))
+    ).reshape(2, -1)
     assert problem.model.measure(grid)[0].min() >= truth.cost - 1e-12
 
 
@@ -48,16 +55,21 @@ def test_the_minimax_optimum_has_equal_torques() -> None:
 
 
 @pytest.mark.parametrize(
-    ("limit", "k"), [([[-180, 60], [-180, 180], [-180, 180]], 0), ([[-180, 180], [60, 90], [-180, 180]], 1)]
+    ("limit", "k"),
+    [([[-180, 60], [-180, 180], [-180, 180]], 0), ([[-180, 180], [60, 90], [-180, 180]], 1)],
 )
 def test_optima_within_joint_limits_lie_on_them(limit: list[list[int]], k: int) -> None:
     own = conditions("chen_placement")["A torque norm, optimum"]
-    robot = own.robot.model_copy(update={"joint_limits": tuple((float(low), float(high)) for low, high in limit)})
+    robot = own.robot.model_copy(
+        update={"joint_limits": tuple((float(low), float(high)) for low, high in limit)}
+    )
     problem = own.planner.prepare(robot, own.scenario)
     truth = own.planner.truth(problem)
     assert truth.solved
     assert truth.cost > CASES["torque_norm"] + 1e-3
-    fine = np.stack(np.meshgrid(np.linspace(-180, 180, 1801), np.linspace(-180, 180, 1801))).reshape(2, -1)
+    fine = np.stack(
+        np.meshgrid(np.linspace(-180, 180, 1801), np.linspace(-180, 180, 1801))
+    ).reshape(2, -1)
     least = problem.model.measure(fine)[0].min()
     assert truth.cost <= least * (1 + 1e-9)
     assert truth.cost == pytest.approx(least, rel=0.05)

@@ -15,7 +15,12 @@ from evoexp.report.results import gather
 from evoexp.store.log_reader import array_names, read_array, read_log
 from evoexp.store.run_directory import RunDirectory
 
-EXPERIMENT = ("experiment=rana_obstacles", "ga.population_size=8", "ga.num_generations=2", "runner=serial")
+EXPERIMENT = (
+    "experiment=rana_obstacles",
+    "ga.population_size=8",
+    "ga.num_generations=2",
+    "runner=serial",
+)
 WORDS = (*EXPERIMENT, "planner.num_new_trajectories=1", "+reference._target_=counted")
 
 
@@ -29,7 +34,9 @@ def registered(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 @pytest.fixture
-def said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
+def said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., str]:
     """Return what runs a command and gives its exit code and what it printed."""
     monkeypatch.setenv("EVOEXP_OUTPUTS", str(tmp_path / "outputs"))
     monkeypatch.setenv("COLUMNS", "200")
@@ -54,14 +61,22 @@ def test_the_group_is_no_part_of_other_identities() -> None:
     without = compose.expand(["experiment=rana_obstacles"])[0].conditions[0].condition
     assert not without.is_reference
     assert without.num_replicates(7) == 7
-    assert compose.expand(["experiment=rana_obstacles", "reference=null"])[0].conditions[0].condition.id == without.id
+    assert (
+        compose.expand(["experiment=rana_obstacles", "reference=null"])[0]
+        .conditions[0]
+        .condition.id
+        == without.id
+    )
 
 
 @pytest.mark.parametrize(
     ("words", "message"),
     [
         (["control=random_search"], "reference: must be left out beside a control, was 'counted'"),
-        (["+reference.planner=1"], "reference.planner: must be left out: it is the chosen planner, was 1"),
+        (
+            ["+reference.planner=1"],
+            "reference.planner: must be left out: it is the chosen planner, was 1",
+        ),
         (["+reference.rows=x"], "planner.rows: must be a whole number, was 'x'"),
     ],
 )
@@ -91,7 +106,9 @@ def test_the_log_carries_the_arrays_and_reads_them_one_by_one() -> None:
     assert run_replicate(found, 0).summary.digest == log.summary.digest
 
 
-def test_run_list_show_reproduce_report(said: Callable[..., str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_run_list_show_reproduce_report(
+    said: Callable[..., str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     for budget in ("paper", "smoke"):
         printed = said("run", *WORDS, "num_replicates=4", f"budget={budget}")
         assert "1 of 1" in printed
@@ -106,7 +123,9 @@ def test_run_list_show_reproduce_report(said: Callable[..., str], monkeypatch: p
     assert "DIVERGES by" in said("reproduce", found.id[:12], code=1)
 
 
-def test_the_report_reads_references_beside_the_planners(said: Callable[..., str], tmp_path: Path) -> None:
+def test_the_report_reads_references_beside_the_planners(
+    said: Callable[..., str], tmp_path: Path
+) -> None:
     said("run", *WORDS[:-1], "num_replicates=2")
     said("run", *WORDS, "num_replicates=2")
     conditions = [

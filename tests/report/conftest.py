@@ -22,7 +22,14 @@ def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def results(stored: Path) -> Results:
     """Return what is stored of the two planar arms and of random search beside them."""
     experiment = expand("rana_planar")
-    return gather(stored, experiment.conditions, experiment.num_replicates, experiment.name, experiment.budget, "")
+    return gather(
+        stored,
+        experiment.conditions,
+        experiment.num_replicates,
+        experiment.name,
+        experiment.budget,
+        "",
+    )
 
 
 @pytest.fixture

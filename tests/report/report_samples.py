@@ -34,14 +34,19 @@ def store(outputs: Path, experiment: Experiment) -> None:
     """Run and store every replicate of an experiment."""
     for label, condition in experiment.conditions:
         run = RunDirectory(outputs, condition.id)
-        run.create(condition.to_json(), manifest(condition.id) | {"label": label}, condition.files())
+        run.create(
+            condition.to_json(), manifest(condition.id) | {"label": label}, condition.files()
+        )
         for replicate in range(condition.num_replicates(experiment.num_replicates)):
             run.write_log(replicate, run_replicate(condition, replicate).content)
 
 
 @functools.cache
 def smoke_experiment(name: str, *overrides: str) -> Experiment:
-    """Return an experiment with two replicates of ten generations; composing it is most of the work."""
+    """Return an experiment with two replicates of ten generations.
+
+    Composing it is most of the work.
+    """
     return expansions.expand([f"experiment={name}", "budget=smoke", *overrides])[0]
 
 
@@ -50,7 +55,9 @@ def smoke_results(outputs: Path, name: str, *overrides: str) -> Results:
     """Return what two replicates of every condition gave."""
     experiment = smoke_experiment(name, *overrides)
     store(outputs, experiment)
-    return gather(outputs, experiment.conditions, experiment.num_replicates, name, experiment.budget, "")
+    return gather(
+        outputs, experiment.conditions, experiment.num_replicates, name, experiment.budget, ""
+    )
 
 
 def page_settings(name: str, figures: str | None = None) -> ReportSettings:

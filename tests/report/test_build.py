@@ -54,9 +54,14 @@ def draw(
     formats: tuple[str, ...] = ("svg", "png"),
 ) -> Path:
     experiment = expand(name, *overrides)
-    request = build.Request(experiment.report_name, experiment.name, experiment.budget, experiment.conditions)
+    request = build.Request(
+        experiment.report_name, experiment.name, experiment.budget, experiment.conditions
+    )
     return build.report(
-        request, ReportSettings(**REPORT | {"formats": formats, "figures": page}), outputs, experiment.num_replicates
+        request,
+        ReportSettings(**REPORT | {"formats": formats, "figures": page}),
+        outputs,
+        experiment.num_replicates,
     )  # type: ignore[arg-type]
 
 
@@ -71,7 +76,9 @@ def page(stored: Path) -> Path:
 
 def test_a_report_is_seven_figures_with_data_and_sidecars(page: Path) -> None:
     kinds = ("csv", "json", "png", "svg")
-    assert sorted(contents(page)) == sorted([f"{stem}.{kind}" for stem in FIGURES for kind in kinds] + ["index.md"])
+    assert sorted(contents(page)) == sorted(
+        [f"{stem}.{kind}" for stem in FIGURES for kind in kinds] + ["index.md"]
+    )
 
 
 def test_sidecars_tell_what_a_figure_was_drawn_from(page: Path, results: Results) -> None:
@@ -85,14 +92,21 @@ def test_sidecars_tell_what_a_figure_was_drawn_from(page: Path, results: Results
         shown = results.conditions if stem == "fig_5_fitness" else results.conditions[:1]
         assert [c["run"] for c in sidecar["conditions"]] == [c.condition.id for c in shown]
         assert [c["label"] for c in sidecar["conditions"]] == [c.label for c in shown]
-        assert all((c["planned"], c["done"], c["failed"]) == (2, 2, 0) for c in sidecar["conditions"])
+        assert all(
+            (c["planned"], c["done"], c["failed"]) == (2, 2, 0) for c in sidecar["conditions"]
+        )
 
 
 def test_a_report_is_the_same_in_another_process(page: Path, stored: Path, tmp_path: Path) -> None:
     first = contents(page)
     for path in page.parent.iterdir():
         path.unlink()
-    other = os.environ | {"PYTHONHASHSEED": "12345", "MPLCONFIGDIR": str(tmp_path), "TZ": "Asia/Tokyo", "LANG": "C"}
+    other = os.environ | {
+        "PYTHONHASHSEED": "12345",
+        "MPLCONFIGDIR": str(tmp_path),
+        "TZ": "Asia/Tokyo",
+        "LANG": "C",
+    }
     command = [sys.executable, "-c", SCRIPT, str(stored), str(Path(__file__).parent)]
     subprocess.run(command, check=True, env=other, cwd=tmp_path)
     again = contents(page)
@@ -110,7 +124,10 @@ def test_the_index_says_it_all(page: Path, results: Results) -> None:
     text = page.read_text()
     for condition in results.conditions:
         assert f"| {condition.label} | `{condition.hash12}` | 2 | 2 | 0 |" in text
-    assert "| solved | certified | refuted | undecided | solved, yet refuted | margin certified |" in text
+    assert (
+        "| solved | certified | refuted | undecided | solved, yet refuted | margin certified |"
+        in text
+    )
     assert "| `ga.crossover_rate` | 0.9 | – | paper: Tab. 1, cross_over_probability |" in text
     assert "| `ga.population_size` | 12 | – | override |" in text
     assert text.count("not judged (budget smoke)") == 5
@@ -122,7 +139,9 @@ def test_the_index_says_it_all(page: Path, results: Results) -> None:
     assert "nan" not in text.lower().replace("dominan", "")
 
 
-def test_the_command_in_the_index_makes_this_report(page: Path, stored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_command_in_the_index_makes_this_report(
+    page: Path, stored: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from evoexp import cli
 
     hashes = re.search(r"Made by `evoexp report ([^`]+)`", page.read_text())
@@ -141,14 +160,19 @@ def test_partial_results_are_drawn_and_said(tmp_path: Path) -> None:
         search.log_path(replicate).unlink()
     page = draw(tmp_path, "rana", "rana_planar", "ga.num_generations=1", formats=("svg",))
     text = page.read_text()
-    assert "**Partial results.** via-point GA: 1 of 2 replicates done, 1 failed; random search: 0 of 2" in text
+    assert (
+        "**Partial results.** via-point GA: 1 of 2 replicates done, 1 failed; random search: 0 of 2"
+        in text
+    )
     assert "| via-point GA | 1 | ValueError: no luck \\| at all |" in text
     assert "no random search beside it" in text
     assert (page.parent / "fig_7_distances.svg").is_file()
     sidecar = json.loads((page.parent / "fig_5_fitness.json").read_text())
     assert [(c["done"], c["failed"]) for c in sidecar["conditions"]] == [(1, 1)]
     ga.log_path(0).unlink()
-    text = draw(tmp_path, "rana", "rana_planar", "ga.num_generations=1", formats=("svg",)).read_text()
+    text = draw(
+        tmp_path, "rana", "rana_planar", "ga.num_generations=1", formats=("svg",)
+    ).read_text()
     assert "0 of 2 replicates done, 1 failed" in text
     assert sorted(contents(page)) == ["index.md"]  # the figures of before are gone
 
@@ -158,7 +182,9 @@ def test_arms_in_space_have_the_papers_other_figures(tmp_path: Path) -> None:
     page = draw(tmp_path, "rana", "rana_puma", "ga.num_generations=2", formats=("svg",))
     assert sorted(path.stem for path in page.parent.glob("*.svg")) == sorted(SPATIAL)
     text = page.read_text()
-    assert [text.index(f"### Fig. {number}:") for number in ("8", "9", "11", "12a", "12b", "13")] == sorted(
+    assert [
+        text.index(f"### Fig. {number}:") for number in ("8", "9", "11", "12a", "12b", "13")
+    ] == sorted(
         text.index(f"### Fig. {number}:") for number in ("8", "9", "11", "12a", "12b", "13")
     )
     assert "C5 = 3 of 40 instants" in text
@@ -201,7 +227,12 @@ def test_ablations_are_compared_with_the_first_condition(tmp_path: Path) -> None
 
 
 def test_methods_of_co_evolution_are_drawn_and_paired(tmp_path: Path) -> None:
-    words = ("ga.population_size=8", "ga.hall_depth=0.25", "ga.num_generations=3", "num_replicates=3")
+    words = (
+        "ga.population_size=8",
+        "ga.hall_depth=0.25",
+        "ga.num_generations=3",
+        "num_replicates=3",
+    )
     methods = [f"experiment=curkovic_methods budget=smoke {' '.join(words)}"]
     experiment = compose.expand(methods[0].split(), only=["V", "VI"])[0]
     plain = compose.expand([w for w in methods[0].split() if "hall" not in w], only=["I", "II"])[0]
@@ -229,14 +260,20 @@ def test_methods_of_co_evolution_are_drawn_and_paired(tmp_path: Path) -> None:
 
 def test_nothing_stored_names_the_command(tmp_path: Path) -> None:
     experiment = compose.expand(["experiment=rana_planar", "budget=smoke"])[0]
-    request = build.Request(experiment.report_name, experiment.name, experiment.budget, experiment.conditions)
-    with pytest.raises(NothingStored, match=r"try: evoexp run experiment=rana_planar budget=smoke$"):
+    request = build.Request(
+        experiment.report_name, experiment.name, experiment.budget, experiment.conditions
+    )
+    with pytest.raises(
+        NothingStored, match=r"try: evoexp run experiment=rana_planar budget=smoke$"
+    ):
         build.report(request, experiment.report, tmp_path, 2)
     assert not (tmp_path / "reports").exists()
 
 
 def test_three_arms_have_figures_too(stored: Path) -> None:
-    page = draw(stored, "planar_arms", "rana_three_arms", "scenario=rana_three_arms", formats=("svg",))
+    page = draw(
+        stored, "planar_arms", "rana_three_arms", "scenario=rana_three_arms", formats=("svg",)
+    )
     assert {"snapshots.svg", "paths.svg", "distances.svg", "convergence.svg"} <= set(contents(page))
     snapshots = pd.read_csv(page.parent / "snapshots.csv")
     assert set(snapshots["arm"]) == {0, 1, 2}
@@ -246,12 +283,16 @@ def test_three_arms_have_figures_too(stored: Path) -> None:
 
 def test_an_experiment_without_a_page_has_results_convergence_and_parameters(stored: Path) -> None:
     page = draw(stored, None, "rana_three_arms", "scenario=rana_three_arms")
-    assert sorted(contents(page)) == [f"convergence.{kind}" for kind in ("csv", "json", "png", "svg")] + ["index.md"]
+    assert sorted(contents(page)) == [
+        f"convergence.{kind}" for kind in ("csv", "json", "png", "svg")
+    ] + ["index.md"]
     assert "## Claims" not in page.read_text()
 
 
 def test_an_unknown_page_is_named(stored: Path) -> None:
-    with pytest.raises(UnknownOption, match=r"report\.figures: no option 'ranna'; did you mean 'rana'"):
+    with pytest.raises(
+        UnknownOption, match=r"report\.figures: no option 'ranna'; did you mean 'rana'"
+    ):
         draw(stored, "ranna")
 
 
@@ -262,7 +303,9 @@ def test_claims_are_judged_only_on_the_papers_own_settings(results: Results) -> 
     assert rana.not_judged(judged, condition) == ""
     assert rana.not_judged(results, condition) == "budget smoke"
     assert rana.not_judged(judged, condition._replace(planned=3)) == "3 of 20 replicates planned"
-    assert rana.not_judged(judged, results.conditions[0]._replace(planned=20)).startswith("overridden: ga.")
+    assert rana.not_judged(judged, results.conditions[0]._replace(planned=20)).startswith(
+        "overridden: ga."
+    )
 
 
 def test_redistribution_is_applied_to_solved_strings_only(results: Results) -> None:
@@ -279,8 +322,15 @@ def test_drawing_leaves_matplotlib_as_it_was(page: Path) -> None:
     assert pyplot is None or pyplot.get_fignums() == []
 
 
-def test_swept_conditions_are_told_apart_and_compared_with_their_own_control(tmp_path: Path) -> None:
-    words = ["experiment=rana_planar", "budget=smoke", "ga.num_generations=1", "ga.population_size=8,10"]
+def test_swept_conditions_are_told_apart_and_compared_with_their_own_control(
+    tmp_path: Path,
+) -> None:
+    words = [
+        "experiment=rana_planar",
+        "budget=smoke",
+        "ga.num_generations=1",
+        "ga.population_size=8,10",
+    ]
     experiment = compose.expand(words, multirun=True)[0]
     store(tmp_path, experiment)
     request = build.Request("swept", experiment.name, experiment.budget, experiment.conditions)
@@ -288,8 +338,15 @@ def test_swept_conditions_are_told_apart_and_compared_with_their_own_control(tmp
     page = build.report(request, settings, tmp_path, 2)
     text = page.read_text()
     assert sorted(re.findall(r"^## (.* against .*)$", text, re.MULTILINE)) == [
-        f"via-point GA · population_size={size} against random search · population_size={size}" for size in (10, 8)
+        f"via-point GA · population_size={size} against random search · population_size={size}"
+        for size in (10, 8)
     ]
-    assert "### Fig. 4: snapshots of the motion in operational space (via-point GA · population_size=8)" in text
+    assert (
+        "### Fig. 4: snapshots of the motion in operational space (via-point GA · "
+        "population_size=8)" in text
+    )
     assert (page.parent / "fig_7_distances_2_via_point_ga_population_size_10.svg").is_file()
-    assert "| `ga.population_size` (via-point GA · population_size=8, random search · population_size=8) | 8 |" in text
+    assert (
+        "| `ga.population_size` (via-point GA · population_size=8, random search · "
+        "population_size=8) | 8 |" in text
+    )

@@ -32,7 +32,11 @@ def test_a_path_that_goes_there_and_back_passes_nothing(seed: int) -> None:
 
 def test_routes_are_named_by_frequency() -> None:
     found = routes({1: BELOW, 2: ABOVE, 3: BETWEEN, 4: ABOVE + 0.0}, CENTRES)
-    assert [(route.name, route.members) for route in found] == [("A", (2, 4)), ("B", (1,)), ("C", (3,))]
+    assert [(route.name, route.members) for route in found] == [
+        ("A", (2, 4)),
+        ("B", (1,)),
+        ("C", (3,)),
+    ]
 
 
 @pytest.mark.parametrize(
@@ -57,7 +61,9 @@ def outputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("chen_grid")
 
 
-def test_the_page_of_fig_2_has_its_figures_and_judges_nothing_below_its_budget(outputs: Path) -> None:
+def test_the_page_of_fig_2_has_its_figures_and_judges_nothing_below_its_budget(
+    outputs: Path,
+) -> None:
     directory = smoke_report(outputs, "chen_path")
     assert figure_stems(directory) == {"fig_2_costs", "fig_2_paths", "routes", "gaps"}
     text = (directory / "index.md").read_text()

@@ -31,7 +31,9 @@ LOW, HIGH = np.arange(12.0), np.arange(12.0) + 20.0
         ("", 0, 0, 0, INCONCLUSIVE),
     ],
 )
-def test_a_claim_about_every_run(reason: str, holds: int, done: int, planned: int, verdict: str) -> None:
+def test_a_claim_about_every_run(
+    reason: str, holds: int, done: int, planned: int, verdict: str
+) -> None:
     assert judge_all(reason, holds, done, planned) == verdict
 
 
@@ -56,7 +58,9 @@ def test_a_comparison_knows_which_way_is_better() -> None:
 
 
 def test_two_infinite_costs_do_not_differ() -> None:
-    found = compare("cost", np.array([1.0, np.inf, np.inf]), np.array([2.0, np.inf, 3.0]), True, 0.95, 50)
+    found = compare(
+        "cost", np.array([1.0, np.inf, np.inf]), np.array([2.0, np.inf, 3.0]), True, 0.95, 50
+    )
     assert found.median_difference == 0.0
     assert found.test.num_pairs == 2
 
@@ -99,7 +103,9 @@ def test_a_claim_about_being_better_than_each(comparisons: list[Comparison], ver
         ([], True, INCONCLUSIVE),
     ],
 )
-def test_a_claim_about_the_best_setting(comparisons: list[Comparison], best_median: bool, verdict: str) -> None:
+def test_a_claim_about_the_best_setting(
+    comparisons: list[Comparison], best_median: bool, verdict: str
+) -> None:
     assert judge_best("", comparisons, best_median, 0.05) == verdict
     assert judge_best("fewer replicates", comparisons, best_median, 0.05) == NOT_JUDGED
 

@@ -7,7 +7,15 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from report_samples import REPORT, figure_stems, page_settings, smoke_experiment, smoke_report, smoke_results, store
+from report_samples import (
+    REPORT,
+    figure_stems,
+    page_settings,
+    smoke_experiment,
+    smoke_report,
+    smoke_results,
+    store,
+)
 
 from evoexp import expansions
 from evoexp.numerics import DEGREE
@@ -39,7 +47,10 @@ def outputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @functools.cache
 def solved(outputs: Path, name: str) -> Results:
-    """Return results of three runs at the paper's budget, whose cycles the smoke budget would cut."""
+    """Return results of three runs at the paper's budget.
+
+    Whose cycles the smoke budget would cut.
+    """
     experiment = expansions.expand([f"experiment={name}", f"num_replicates={FEW}"])[0]
     store(outputs, experiment)
     return gather(outputs, experiment.conditions, FEW, name, experiment.budget, "")
@@ -49,9 +60,17 @@ def drawn(table: pd.DataFrame, draw) -> bool:  # type: ignore[no-untyped-def]
     return len(style.drawn(lambda: draw(table), ("svg",), 60)["svg"]) > 1000
 
 
-def test_the_page_of_a_task_has_its_figures_and_judges_nothing_below_its_budget(outputs: Path) -> None:
+def test_the_page_of_a_task_has_its_figures_and_judges_nothing_below_its_budget(
+    outputs: Path,
+) -> None:
     directory = smoke_report(outputs, "corsepius_ball")
-    assert figure_stems(directory) == {"fig_2_scope", "fig_3_4_models", "history", "stop_reasons", "paths"}
+    assert figure_stems(directory) == {
+        "fig_2_scope",
+        "fig_3_4_models",
+        "history",
+        "stop_reasons",
+        "paths",
+    }
     text = (directory / "index.md").read_text()
     assert "**not judged (budget smoke)**" in text
     assert "**not judged (another machine, another model)**" in text
@@ -76,7 +95,9 @@ def test_a_manoeuvre_is_told_phase_by_phase(outputs: Path) -> None:
         ("corsepius_options", {"shares", "values", "effects"}),
     ],
 )
-def test_studies_have_figures_and_a_row_per_condition(outputs: Path, name: str, expected: set[str]) -> None:
+def test_studies_have_figures_and_a_row_per_condition(
+    outputs: Path, name: str, expected: set[str]
+) -> None:
     results = smoke_results(outputs, name)
     found = page_of(results, page_settings(name))
     assert {drawing.stem for drawing in found.drawings} <= expected
@@ -141,7 +162,9 @@ def test_lengths_and_detours_of_paths(outputs: Path) -> None:
 def test_models_show_bodies_and_covers_that_hold_them(outputs: Path) -> None:
     condition = smoke_results(outputs, "corsepius_ball").conditions[0]
     table = posture_models.models_table([("MANUS", condition)])
-    bodies, covers = (table[table["element"] == kind] for kind in (posture_models.BODY, posture_models.COVER))
+    bodies, covers = (
+        table[table["element"] == kind] for kind in (posture_models.BODY, posture_models.COVER)
+    )
     problem = condition.prepared.problem
     assert list(bodies["name"]) == list(problem.bodies.names)
     assert len(covers) == problem.bodies.num_shapes
@@ -183,7 +206,9 @@ def test_what_is_held_moves_in_the_manoeuvre(outputs: Path) -> None:
     held = table[table["element"] == posture_motions.HELD]
     assert sorted(held["panel"].unique()) == [2, 3, 4]
     carried = held[held["panel"] == 3].sort_values("instant")[["x", "y", "z"]].to_numpy()
-    assert np.linalg.norm(carried[-1] - (0.52, -0.22, 0.745)) < 0.0101  # the goal of carrying, within its tolerance
+    assert (
+        np.linalg.norm(carried[-1] - (0.52, -0.22, 0.745)) < 0.0101
+    )  # the goal of carrying, within its tolerance
     standing = table[(table["element"] == posture_motions.OBSTACLE) & (table["name"] == "bottle")]
     assert sorted(standing["panel"].unique()) == [0, 1, 5]
     assert drawn(table, posture_motions.draw_motions)
@@ -205,7 +230,10 @@ def test_the_trap_shows_both_kinds_of_runs(outputs: Path) -> None:
 
 def test_expected_effort_counts_failures(outputs: Path) -> None:
     found = measures.tasks(smoke_results(outputs, "corsepius_population"), "num_offspring")[:1]
-    shares, effort = {"goal met": lambda c: Proportion(1, 2)}, {"spent [-]": lambda c: np.array([3.0, 5.0])}
+    shares, effort = (
+        {"goal met": lambda c: Proportion(1, 2)},
+        {"spent [-]": lambda c: np.array([3.0, 5.0])},
+    )
     table = population_effort.effort_table(found, shares, effort, 0.95, 50)
     assert set(table.loc[table["quantity"] == "goal met", "expected"]) == {0.5}
     own = table[table["quantity"] == "spent [-]"]
@@ -218,7 +246,9 @@ def test_the_slope_of_the_floor_is_that_of_the_medians(outputs: Path) -> None:
     task = measures.tasks(smoke_results(outputs, "corsepius_scope"), "scope", "")[0]
     assert task.values == (0.0125, 0.025, 0.05, 0.1, 0.2, 0.4)
     table = residual_floor.floor_table(task)
-    medians = table[table["quantity"] == residual_floor.RESIDUAL]["median"].to_numpy(dtype=np.float64)
+    medians = table[table["quantity"] == residual_floor.RESIDUAL]["median"].to_numpy(
+        dtype=np.float64
+    )
     expected = np.polyfit(np.log(task.values), np.log(medians), 1)[0]
     assert residual_floor.slope(task) == pytest.approx(expected)
 

@@ -1,4 +1,7 @@
-"""The rules by which claims of Corsépius 2001 are judged, on made-up runs of the shipped conditions."""
+"""The rules by which claims of Corsépius 2001 are judged.
+
+On made-up runs of the shipped conditions.
+"""
 
 import functools
 from collections.abc import Callable
@@ -20,7 +23,9 @@ from shipped_conditions import expanded
 SETTINGS = ReportSettings(**REPORT, figures="corsepius")  # type: ignore[arg-type]
 NO_LOGS = StoredLogs(None, (), None)  # type: ignore[arg-type]
 RUNS = 40
-Effort = Callable[[str, float], tuple[float, int]]  # task, size → cycles of every run, runs that meet the goal
+Effort = Callable[
+    [str, float], tuple[float, int]
+]  # task, size → cycles of every run, runs that meet the goal
 
 
 @functools.cache
@@ -66,24 +71,47 @@ def verdict(claims: dict[str, Claim], text: str) -> str:
 def test_equal_evaluations_per_cycle_make_larger_populations_slower() -> None:
     """Where cycles do not depend on the size, evaluations go with it."""
     claims = study(lambda task, size: (20.0, RUNS))
-    assert verdict(claims, "Larger populations do not plan faster, on any task: evaluations") == REPRODUCED
-    assert verdict(claims, "Larger populations do not plan faster, on any task: cycles") == INCONCLUSIVE
-    assert verdict(claims, "Smaller populations increase planning times over-proportionally: cycles") == CONTRADICTED
+    assert (
+        verdict(claims, "Larger populations do not plan faster, on any task: evaluations")
+        == REPRODUCED
+    )
+    assert (
+        verdict(claims, "Larger populations do not plan faster, on any task: cycles")
+        == INCONCLUSIVE
+    )
+    assert (
+        verdict(claims, "Smaller populations increase planning times over-proportionally: cycles")
+        == CONTRADICTED
+    )
     assert verdict(claims, "Smaller populations reduce convergence") == INCONCLUSIVE
     assert verdict(claims, "100 individuals are reasonable: cycles") == REPRODUCED
-    assert verdict(claims, "100 individuals are reasonable: evaluations") == CONTRADICTED  # ten take a tenth
+    assert (
+        verdict(claims, "100 individuals are reasonable: evaluations") == CONTRADICTED
+    )  # ten take a tenth
 
 
 def test_one_task_that_large_populations_plan_faster_contradicts() -> None:
     claims = study(lambda task, size: (20.0 if task != "pose" else 4e5 / size**2, RUNS))
-    assert verdict(claims, "Larger populations do not plan faster, on any task: evaluations") == CONTRADICTED
-    assert verdict(claims, "Larger populations do not necessarily plan faster: evaluations") == REPRODUCED
-    text = next(c.evidence for n, c in claims.items() if n.startswith("Larger populations do not plan faster, on any"))
+    assert (
+        verdict(claims, "Larger populations do not plan faster, on any task: evaluations")
+        == CONTRADICTED
+    )
+    assert (
+        verdict(claims, "Larger populations do not necessarily plan faster: evaluations")
+        == REPRODUCED
+    )
+    text = next(
+        c.evidence
+        for n, c in claims.items()
+        if n.startswith("Larger populations do not plan faster, on any")
+    )
     assert "pose × 0.25 (200)" in text
 
 
 def test_steep_costs_of_small_populations_are_over_proportional() -> None:
-    claims = study(lambda task, size: (20.0 * max(1.0, (100.0 / size) ** 2), RUNS if size >= 100 else 5))
+    claims = study(
+        lambda task, size: (20.0 * max(1.0, (100.0 / size) ** 2), RUNS if size >= 100 else 5)
+    )
     for metric in verdicts.METRICS:
         text = f"Smaller populations increase planning times over-proportionally: {metric}"
         assert verdict(claims, text) == REPRODUCED
@@ -100,7 +128,10 @@ def test_failures_count_in_the_expected_effort() -> None:
 def test_what_100_never_solves_and_more_do_contradicts_it() -> None:
     claims = study(lambda task, size: (20.0, RUNS if task != "narrow gate" or size > 100 else 0))
     assert verdict(claims, "100 individuals are reasonable: cycles") == CONTRADICTED
-    assert verdict(claims, "Larger populations do not plan faster, on any task: cycles") == CONTRADICTED
+    assert (
+        verdict(claims, "Larger populations do not plan faster, on any task: cycles")
+        == CONTRADICTED
+    )
 
 
 def test_nothing_solved_says_nothing() -> None:
@@ -126,7 +157,9 @@ def task_rows(having: dict[str, int], free: int = RUNS) -> Callable[[str], dict[
     return rows
 
 
-def judged(name: str, rows: Callable[[str], dict[str, object]], monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:
+def judged(
+    name: str, rows: Callable[[str], dict[str, object]], monkeypatch: pytest.MonkeyPatch
+) -> dict[str, str]:
     monkeypatch.setattr(corsepius_verdicts, "not_judged", lambda results: "")
     return {c.text: c.verdict for c in corsepius_verdicts.of_tasks(made_up(name, rows), SETTINGS)}
 
@@ -135,7 +168,10 @@ def test_a_wall_that_a_subgoal_opens_is_a_local_minimum(monkeypatch: pytest.Monk
     text = "wall: the search gets stuck in a local minimum"
     assert judged("corsepius_wall", task_rows({"wall": 0}), monkeypatch)[text] == REPRODUCED
     assert judged("corsepius_wall", task_rows({}), monkeypatch)[text] == INCONCLUSIVE
-    assert judged("corsepius_wall", task_rows({"with a sub-goal": 0}), monkeypatch)[text] == CONTRADICTED
+    assert (
+        judged("corsepius_wall", task_rows({"with a sub-goal": 0}), monkeypatch)[text]
+        == CONTRADICTED
+    )
 
 
 def test_one_tilted_or_touching_path_contradicts(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -151,7 +187,10 @@ def test_one_certified_path_is_enough_for_redundant_arms(monkeypatch: pytest.Mon
     labels = [label for label, _ in conditions_of("corsepius_gate_narrow").conditions]
     nobody = dict.fromkeys(labels, 0)
     assert judged("corsepius_gate_narrow", task_rows(nobody), monkeypatch)[text] == CONTRADICTED
-    assert judged("corsepius_gate_narrow", task_rows(nobody | {labels[0]: 1}), monkeypatch)[text] == REPRODUCED
+    assert (
+        judged("corsepius_gate_narrow", task_rows(nobody | {labels[0]: 1}), monkeypatch)[text]
+        == REPRODUCED
+    )
     assert text not in judged("corsepius_pick_and_place", task_rows({}), monkeypatch)
 
 

@@ -46,7 +46,9 @@ def test_fronts_are_what_no_other_individual_dominates(outputs: Path) -> None:
     assert len(table) == 2 * 100
     for _, rows in table.groupby("population"):
         values = rows[list(pareto_fronts.CRITERIA)].to_numpy()
-        dominated = [any((other <= own).all() and (other < own).any() for other in values) for own in values]
+        dominated = [
+            any((other <= own).all() and (other < own).any() for other in values) for own in values
+        ]
         assert list(~np.array(dominated)) == list(rows["non_dominated"])
     results = smoke_results(outputs, "curkovic_pareto")
     fronts = read_fronts(results, results.conditions[0], 1)
@@ -59,7 +61,9 @@ def test_fronts_are_what_no_other_individual_dominates(outputs: Path) -> None:
 def test_motions_of_two_robots_are_figures_7_to_9(outputs: Path) -> None:
     directory = smoke_report(outputs, "curkovic_motion")
     names = {
-        f"fig_{k}_{what}_{c}" for k, what in ((8, "motion"), (9, "joints")) for c in ("1_straight", "2_cubic_spline")
+        f"fig_{k}_{what}_{c}"
+        for k, what in ((8, "motion"), (9, "joints"))
+        for c in ("1_straight", "2_cubic_spline")
     }
     assert figure_stems(directory) == names | {"fig_7_intersection", "distances", "convergence"}
     text = (directory / "index.md").read_text()
@@ -98,7 +102,9 @@ def test_a_trail_begins_at_the_start_and_ends_at_the_goal(outputs: Path) -> None
     problem = condition.prepared.problem
     for robot, rows in path.groupby("robot"):
         for row, q in ((rows.iloc[0], problem.start[robot]), (rows.iloc[-1], problem.goal[robot])):
-            tip = np.array(problem.collision.arms[robot].base) + 0.25 * np.array([np.cos(q).sum(), np.sin(q).sum()])
+            tip = np.array(problem.collision.arms[robot].base) + 0.25 * np.array(
+                [np.cos(q).sum(), np.sin(q).sum()]
+            )
             assert (row["x_end"], row["y_end"]) == pytest.approx(tuple(tip), abs=1e-9)
     assert (table["element"] == "contact").sum() == condition.verdicts.refuted
     postures = table[table["element"] == "posture"]
@@ -106,19 +112,26 @@ def test_a_trail_begins_at_the_start_and_ends_at_the_goal(outputs: Path) -> None
 
 
 @pytest.mark.parametrize(
-    ("name", "robots", "stem"), [("curkovic_stationary", 2, "fig_10_motion"), ("curkovic_three", 3, "motion")]
+    ("name", "robots", "stem"),
+    [("curkovic_stationary", 2, "fig_10_motion"), ("curkovic_three", 3, "motion")],
 )
-def test_other_scenes_are_drawn_and_claimed(outputs: Path, name: str, robots: int, stem: str) -> None:
+def test_other_scenes_are_drawn_and_claimed(
+    outputs: Path, name: str, robots: int, stem: str
+) -> None:
     found = page(outputs, name)
     assert "fig_7_intersection" not in {drawing.stem for drawing in found.drawings}
-    assert sum("by the exact verdict on the whole motion" in claim.text for claim in found.claims) == 2
+    assert (
+        sum("by the exact verdict on the whole motion" in claim.text for claim in found.claims) == 2
+    )
     table = drawing(found, f"{stem}_2_5_substeps")
     assert set(table.loc[table["element"] == "path", "robot"]) == set(range(robots))
     assert (table["element"] == "obstacle").any() == (robots == 2)
     assert set(drawing(found, "joints_1_configurations_only")["robot"]) == set(range(robots))
     distances = drawing(found, "distances")
     assert sorted(distances["replicate"].unique()) == [-1, 0, 1]
-    for (position, replicate), rows in distances[distances["replicate"] >= 0].groupby(["position", "replicate"]):
+    for (position, replicate), rows in distances[distances["replicate"] >= 0].groupby(
+        ["position", "replicate"]
+    ):
         exact = smoke_results(outputs, name).conditions[position].column("clearance")[replicate]
         assert rows["distance"].min() >= exact - 1e-6  # sampled
 
@@ -129,7 +142,13 @@ def test_three_radii_are_figure_11(outputs: Path) -> None:
     assert sorted(table["tcp_radius"].unique()) == [0.01, 0.025, 0.04]
     assert sorted(table["collision_substeps"].unique()) == [1, 5]
     assert table.groupby(["condition", "robot"])["at_configuration"].sum().eq(6).all()
-    assert sum(claim.text.startswith("A larger radius forces the robots further apart") for claim in found.claims) == 2
+    assert (
+        sum(
+            claim.text.startswith("A larger radius forces the robots further apart")
+            for claim in found.claims
+        )
+        == 2
+    )
     sticking = "radius 0.01 m; radius 0.01 m, configurations only"
     assert [finding for what, finding in found.checks if "sticks out" in what] == [sticking]
     trail = drawing(found, "motion_3_radius_0_04_m")
@@ -145,7 +164,9 @@ def test_a_hall_is_judged_against_what_replaces_it(outputs: Path) -> None:
     assert len(found.claims) == 6
     assert {claim.source for claim in found.claims} == {"section 3", "our question"}
     assert sum("frozen hall" in claim.evidence for claim in found.claims) == 2
-    assert [heading for heading, _ in found.comparisons if "best cost" in heading] == ["best cost: hall against …"]
+    assert [heading for heading, _ in found.comparisons if "best cost" in heading] == [
+        "best cost: hall against …"
+    ]
     assert {claim.verdict for claim in found.claims} == {"not judged (budget smoke)"}
 
 
@@ -153,28 +174,42 @@ def test_the_depth_of_the_hall_is_judged_once_per_measure(outputs: Path) -> None
     found = page(outputs, "curkovic_hall_depth")
     assert len(found.claims) == 2
     assert all(len(rows) == 7 for _, rows in found.comparisons)
-    assert all(claim.text.startswith("A hall of at most 15 % of the population is the best") for claim in found.claims)
+    assert all(
+        claim.text.startswith("A hall of at most 15 % of the population is the best")
+        for claim in found.claims
+    )
 
 
 def test_mutation_rates_are_compared_within_a_reading(outputs: Path) -> None:
     results = smoke_results(outputs, "curkovic_mutation")
     one, two = curkovic_families.families(results)
-    assert [other.label for _, other in one.pairs] == [f"constant {rate}" for rate in ("0.1", "0.3", "0.6", "1")]
+    assert [other.label for _, other in one.pairs] == [
+        f"constant {rate}" for rate in ("0.1", "0.3", "0.6", "1")
+    ]
     assert {first.label for first, _ in two.pairs} == {"Eq. 10, symmetric"}
     assert all(other.label.endswith("symmetric") for _, other in two.pairs)
     tested = curkovic_families.tested(results, page_settings("curkovic_mutation"), 12.0)
     judged = curkovic_verdicts.of_sweep(results, page_settings("curkovic_mutation"), tested)
-    assert [claim.text.rsplit("; ", 1)[1] for claim in judged] == ["Eq. 9 as printed", "Eq. 9 read as symmetric"] * 2
+    assert [claim.text.rsplit("; ", 1)[1] for claim in judged] == [
+        "Eq. 9 as printed",
+        "Eq. 9 read as symmetric",
+    ] * 2
 
 
-def test_verdicts_follow_the_rows_of_a_sweep(outputs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_verdicts_follow_the_rows_of_a_sweep(
+    outputs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     results = smoke_results(outputs, "curkovic_mutation")
     monkeypatch.setattr(verdicts, "not_judged", lambda results: "")
     low, high = np.arange(12.0), np.arange(12.0) + 20.0
     settings, found = page_settings("curkovic_mutation"), []
     for first, second in ((low, high), (high, low), (low, low)):
-        rows = tuple(claims.compare(f"constant {k}", first, second, True, 0.95, 50) for k in range(3))
-        tested = [one._replace(rows=rows) for one in curkovic_families.tested(results, settings, 12.0)[:1]]
+        rows = tuple(
+            claims.compare(f"constant {k}", first, second, True, 0.95, 50) for k in range(3)
+        )
+        tested = [
+            one._replace(rows=rows) for one in curkovic_families.tested(results, settings, 12.0)[:1]
+        ]
         (judged,) = curkovic_verdicts.of_sweep(results, settings, tested)
         found.append(judged.verdict)
         assert "constant 2 (A12" in judged.evidence
@@ -187,7 +222,9 @@ def test_what_is_tested_between_configurations_is_paired_with_its_twin(outputs: 
     assert [(a.label, b.label) for a, b in twins.pairs] == [("configurations only", "5 substeps")]
     found = page(outputs, "curkovic_stationary", "curkovic_sweep")
     assert found.claims == ()
-    assert any(heading.startswith("solved motion collides between") for heading, _ in found.comparisons)
+    assert any(
+        heading.startswith("solved motion collides between") for heading, _ in found.comparisons
+    )
     both = results._replace(conditions=results.conditions[::-1])  # whatever comes first
     assert curkovic_families.families(both)[0].pairs[0][1].label == "5 substeps"
 
@@ -195,7 +232,11 @@ def test_what_is_tested_between_configurations_is_paired_with_its_twin(outputs: 
 def test_curves_show_three_defects(outputs: Path) -> None:
     found = page(outputs, "curkovic_motion", "curkovic_sweep")
     table = drawing(found, "defects")
-    assert list(table["defect"].unique()) == ["collide in between", "leave [0, π]", "too fast (Eq. 2)"]
+    assert list(table["defect"].unique()) == [
+        "collide in between",
+        "leave [0, π]",
+        "too fast (Eq. 2)",
+    ]
     assert (table["lower"] <= table["share"]).all()
     assert (table["share"] <= table["upper"]).all()
     assert (table["failing"] <= table["solved"]).all()
@@ -213,7 +254,10 @@ def test_effort_to_a_threshold_counts_runs_that_never_get_there(outputs: Path) -
     np.testing.assert_array_equal(curkovic_measures.generations_to(condition, threshold), expected)
     evaluations = curkovic_measures.evaluations_to(condition, threshold)
     np.testing.assert_array_equal(evaluations, 200.0 * (expected + 1.0))
-    spent = np.where(np.isfinite(evaluations), evaluations, 2200.0).sum() / np.isfinite(evaluations).sum()
+    spent = (
+        np.where(np.isfinite(evaluations), evaluations, 2200.0).sum()
+        / np.isfinite(evaluations).sum()
+    )
     assert curkovic_measures.expected_evaluations(condition, threshold) == spent
     assert curkovic_measures.expected_evaluations(condition, 0.0) == np.inf
     assert curkovic_measures.lower_bound(condition) <= costs.to_numpy().min()
@@ -237,11 +281,20 @@ def test_claims_are_judged_only_on_the_papers_own_settings(outputs: Path) -> Non
 def test_rates_are_counted_among_solved_motions(outputs: Path) -> None:
     condition = smoke_results(outputs, "curkovic_motion").conditions[1]
     refuted, leaves, fast = curkovic_measures.rates(condition)
-    assert (refuted.failing, refuted.solved) == (condition.verdicts.solved_refuted, condition.solved)
+    assert (refuted.failing, refuted.solved) == (
+        condition.verdicts.solved_refuted,
+        condition.solved,
+    )
     far = [
         link_motions.sampled(link_motions.executed(condition.prepared, solution), 500).links
         for solution in condition.solutions.values()
     ]
     assert leaves.failing == sum(bool((q < -1e-6).any() or (q > 180.0 + 1e-6).any()) for q in far)
-    assert fast.failing == sum(times > 1.0 for times in curkovic_measures.times_over_limit(condition))
-    assert refuted.interval(0.95).low <= refuted.failing / refuted.solved <= refuted.interval(0.95).high
+    assert fast.failing == sum(
+        times > 1.0 for times in curkovic_measures.times_over_limit(condition)
+    )
+    assert (
+        refuted.interval(0.95).low
+        <= refuted.failing / refuted.solved
+        <= refuted.interval(0.95).high
+    )

@@ -11,7 +11,11 @@ from evoexp.report.results import Results
 
 def texts(figure: Figure) -> list[str]:
     """Return every word that a figure shows, its legends included."""
-    found = [text.get_text() for axes in figure.axes for text in (axes.xaxis.label, axes.yaxis.label, *axes.texts)]
+    found = [
+        text.get_text()
+        for axes in figure.axes
+        for text in (axes.xaxis.label, axes.yaxis.label, *axes.texts)
+    ]
     found += [axes.get_title(loc=place) for axes in figure.axes for place in ("left", "center")]
     return found + [text.get_text() for legend in figure.legends for text in legend.get_texts()]
 
@@ -72,8 +76,12 @@ def test_convergence_of_infinite_costs_and_of_one_generation() -> None:
 def test_fitness_is_the_papers(results: Results) -> None:
     costs, fitness = convergence.cost_table(results), convergence.fitness_table(results)
     np.testing.assert_allclose(fitness["median"], 500.0 - costs["median"])
-    np.testing.assert_allclose(fitness["upper"] - fitness["lower"], costs["upper"] - costs["lower"], atol=1e-9)
-    best = fitness[(fitness["condition"] == "via-point GA") & (fitness["quantity"] == "best so far")]
+    np.testing.assert_allclose(
+        fitness["upper"] - fitness["lower"], costs["upper"] - costs["lower"], atol=1e-9
+    )
+    best = fitness[
+        (fitness["condition"] == "via-point GA") & (fitness["quantity"] == "best so far")
+    ]
     assert list(best["generation"]) == [0, 1, 2, 3, 4]
     assert best["median"].is_monotonic_increasing
 
@@ -82,11 +90,15 @@ def test_arms_stand_at_start_and_goal_of_table_2(results: Results) -> None:
     table = planar_models.arms_table(results.conditions[0])
     first = table[(table["posture"] == "start") & (table["joint"] == 0)]
     assert list(first["angle_deg"]) == [45.0, 225.0]
-    assert list(first["reference_deg"]) == [0.0, -360.0] or list(first["reference_deg"] % 360.0) == [0.0, 0.0]
+    assert list(first["reference_deg"]) == [0.0, -360.0] or list(
+        first["reference_deg"] % 360.0
+    ) == [0.0, 0.0]
     np.testing.assert_allclose(first[["x", "y"]], [[0.0, 0.0], [0.0, 8.0]])
     length = np.hypot(table["x_end"] - table["x"], table["y_end"] - table["y"])
     np.testing.assert_allclose(length, 4.0)
-    assert {"θ₁ = 45°", "θ₂ = 225°", "α₁ = 225°", "x [unit]"} <= set(texts(planar_models.draw_arms(table)))
+    assert {"θ₁ = 45°", "θ₂ = 225°", "α₁ = 225°", "x [unit]"} <= set(
+        texts(planar_models.draw_arms(table))
+    )
 
 
 def test_via_points_are_those_of_the_solution(results: Results) -> None:
@@ -105,8 +117,12 @@ def test_circles_show_the_least_distance(results: Results) -> None:
     assert (table["element"] == "circle").sum() == 18
     row = table[table["element"] == "centres"].iloc[0]
     q = motions.configurations(condition.prepared, condition.solutions[condition.best_replicate])
-    assert row["distance"] == pytest.approx(motions.centre_distances(condition.prepared.problem, q).min(), abs=1e-9)
-    assert np.hypot(row["x_end"] - row["x"], row["y_end"] - row["y"]) == pytest.approx(row["distance"])
+    assert row["distance"] == pytest.approx(
+        motions.centre_distances(condition.prepared.problem, q).min(), abs=1e-9
+    )
+    assert np.hypot(row["x_end"] - row["x"], row["y_end"] - row["y"]) == pytest.approx(
+        row["distance"]
+    )
     bodies = table[table["element"] == "bodies"].iloc[0]
     assert bodies["distance"] <= row["distance"] + 1e-9
     words = texts(planar_models.draw_circles(table))
@@ -120,7 +136,9 @@ def test_snapshots_cut_the_motion_into_stages(results: Results) -> None:
     whole = table[table["stage"] == 5]
     assert len(whole) == 21 * 4
     start = whole[(whole["instant"] == 0) & (whole["arm"] == 0) & (whole["link"] == 1)].iloc[0]
-    assert (start["x_end"], start["y_end"]) == pytest.approx((4.0 * np.sqrt(0.5), 4.0 * np.sqrt(0.5) - 4.0))
+    assert (start["x_end"], start["y_end"]) == pytest.approx(
+        (4.0 * np.sqrt(0.5), 4.0 * np.sqrt(0.5) - 4.0)
+    )
     figure = planar_motion.draw_snapshots(table)
     assert {"instants 0–4", "all instants 0–20", "arm 1", "arm 2", "y [unit]"} <= set(texts(figure))
 
@@ -138,19 +156,31 @@ def test_distances_are_best_and_envelope(results: Results) -> None:
     sampled = planar_motion.sampled_distances(condition, 4)
     assert len(sampled) == 3 * 81
     table = planar_motion.distances_table(condition, sampled)
-    sets = {key: rows.set_index("instant")["distance"] for key, rows in table.groupby(["measure", "series"])}
+    sets = {
+        key: rows.set_index("instant")["distance"]
+        for key, rows in table.groupby(["measure", "series"])
+    }
     for measure in (planar_motion.CENTRES, planar_motion.LINKS):
-        best, low, high = (sets[measure, s] for s in (planar_motion.BEST, planar_motion.LOWEST, planar_motion.HIGHEST))
+        best, low, high = (
+            sets[measure, s]
+            for s in (planar_motion.BEST, planar_motion.LOWEST, planar_motion.HIGHEST)
+        )
         assert (low <= best).all()
         assert (best <= high).all()
         at = sets[measure, planar_motion.AT_VIA_POINTS]
         assert list(at.index) == list(range(21))
         np.testing.assert_array_equal(at, best[at.index])
-    centres, links = (sets[m, planar_motion.STRAIGHT] for m in (planar_motion.CENTRES, planar_motion.LINKS))
+    centres, links = (
+        sets[m, planar_motion.STRAIGHT] for m in (planar_motion.CENTRES, planar_motion.LINKS)
+    )
     assert (links <= centres + 1e-9).all()  # circles sit on the links
     assert links.min() == 0.0
     words = texts(planar_motion.draw_distances(table))
-    assert {"below the safety distance of 1 unit", "least distance [unit]", planar_motion.AT_VIA_POINTS} <= set(words)
+    assert {
+        "below the safety distance of 1 unit",
+        "least distance [unit]",
+        planar_motion.AT_VIA_POINTS,
+    } <= set(words)
 
 
 def test_a_figure_has_the_same_bytes_each_time_whatever_the_users_style() -> None:

@@ -5,7 +5,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from report_samples import REPORT, figure_stems, page_settings, smoke_experiment, smoke_report, smoke_results
+from report_samples import (
+    REPORT,
+    figure_stems,
+    page_settings,
+    smoke_experiment,
+    smoke_report,
+    smoke_results,
+)
 
 from evoexp.collision.certificate import certificate
 from evoexp.numerics import DEGREE
@@ -25,8 +32,13 @@ def outputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def blind(outputs: Path) -> ConditionResults:
-    """Return runs of arms that ignore obstacles and are content with any solution: most of them touch."""
-    return smoke_results(outputs, "lavoie_7dof", "collision.blind=true", "planner.success=finite").conditions[0]
+    """Return runs of arms that ignore obstacles and are content with any solution.
+
+    Most of them touch.
+    """
+    return smoke_results(
+        outputs, "lavoie_7dof", "collision.blind=true", "planner.success=finite"
+    ).conditions[0]
 
 
 def test_the_page_has_the_papers_figures_and_judges_nothing_below_its_budget(outputs: Path) -> None:
@@ -35,7 +47,10 @@ def test_the_page_has_the_papers_figures_and_judges_nothing_below_its_budget(out
     text = (directory / "index.md").read_text()
     assert text.count("**not judged (budget smoke)**") == 10
     assert text.count("**not judged**") == 2  # those that need a sweep
-    assert "(-15, -5) instead of (-5, -15) is refused: scenario.q_start: must be free of collision (link" in text
+    assert (
+        "(-15, -5) instead of (-5, -15) is refused: scenario.q_start: must be free of collision "
+        "(link" in text
+    )
     assert "tests of a link against an ellipse per second of search" in text
     assert "convergence" not in figure_stems(directory)
 
@@ -68,7 +83,9 @@ def test_no_generation_is_read(outputs: Path, monkeypatch: pytest.MonkeyPatch) -
         ("lavoie_controls", {"shares", "values", "effects"}),
     ],
 )
-def test_sweeps_have_figures_and_a_row_of_shares_per_condition(outputs: Path, name: str, expected: set[str]) -> None:
+def test_sweeps_have_figures_and_a_row_of_shares_per_condition(
+    outputs: Path, name: str, expected: set[str]
+) -> None:
     directory = smoke_report(outputs, name)
     assert figure_stems(directory) == expected
     text = (directory / "index.md").read_text()
@@ -104,12 +121,19 @@ def test_arms_stand_as_the_paper_prints(outputs: Path) -> None:
     np.testing.assert_allclose(lengths[7:], [6, 6, 6, 6, 6, 6, 2, 2, 2, 2], atol=1e-9)
     assert (links["sub_path"] == 0).all()
     ellipses = table[table["element"] == reaching.ELLIPSE]
-    np.testing.assert_allclose(ellipses.iloc[5:, 7:9] - ellipses.iloc[:5, 7:9].to_numpy(), [[-5.0, -15.0]] * 5)
+    np.testing.assert_allclose(
+        ellipses.iloc[5:, 7:9] - ellipses.iloc[:5, 7:9].to_numpy(), [[-5.0, -15.0]] * 5
+    )
     assert list(ellipses["angle_deg"]) == [0.0, 90.0, 0.0, 90.0, 90.0] * 2
     box = table[table["element"] == reaching.BOX].iloc[0]
     assert tuple(box[["x", "x_end", "y", "y_end"]]) == (16.0, 23.0, 2.0, 11.0)
     targets = table[table["element"] == reaching.TARGET]
-    assert [tuple(row) for row in targets[["x", "y"]].to_numpy()] == [(15, 5), (18, 8.5), (10, -10), (13, -6.5)]
+    assert [tuple(row) for row in targets[["x", "y"]].to_numpy()] == [
+        (15, 5),
+        (18, 8.5),
+        (10, -10),
+        (13, -6.5),
+    ]
     assert len(style.drawn(lambda: reaching.draw_reaching(table), ("svg",), 60)["svg"]) > 1000
 
 
@@ -124,8 +148,12 @@ def test_solutions_show_tested_positions_and_contacts(outputs: Path) -> None:
     tips = links[links["link"] == 6].set_index("instant")
     q = condition.solutions[replicate].reshape(3, 7)
     for instant, posture in ((1.0, q[1]), (2.0, q[2])):
-        *_, (_, _, _, end) = motions.joint_positions(condition.prepared.problem.assembly, posture[:, None] / DEGREE)
-        np.testing.assert_allclose(tips.loc[instant, ["x_end", "y_end"]].to_numpy(float), end[0, :2], atol=1e-9)
+        *_, (_, _, _, end) = motions.joint_positions(
+            condition.prepared.problem.assembly, posture[:, None] / DEGREE
+        )
+        np.testing.assert_allclose(
+            tips.loc[instant, ["x_end", "y_end"]].to_numpy(float), end[0, :2], atol=1e-9
+        )
     contact = table[table["element"] == reaching.CONTACT]
     assert list(contact["instant"]) == pytest.approx([instant for instant, _ in found])
     touching = table[table["element"] == reaching.TOUCHING]
@@ -154,7 +182,9 @@ def test_either_sub_path_is_judged_by_itself(outputs: Path) -> None:
     np.testing.assert_array_equal(lavoie_measures.refuted_paths(condition), expected)
     found = lavoie_measures.refuted(condition)
     solved = lavoie_measures.solved(condition)
-    assert found.anywhere == Proportion(int(np.array(expected)[solved].any(axis=1).sum()), int(solved.sum()))
+    assert found.anywhere == Proportion(
+        int(np.array(expected)[solved].any(axis=1).sum()), int(solved.sum())
+    )
     assert found.sp2.having == np.array(expected)[solved, 1].sum()
 
 
@@ -162,7 +192,9 @@ def test_the_distribution_counts_smaller_errors_only(outputs: Path) -> None:
     results = smoke_results(outputs, "lavoie_7dof")
     errors = np.array([0.5, 0.25, np.inf, 0.25])
     printed = [(1.0, Proportion(935, 1000))]
-    table = error_distribution.distribution_table(results, lambda _: errors, lambda _: printed, 0.95)
+    table = error_distribution.distribution_table(
+        results, lambda _: errors, lambda _: printed, 0.95
+    )
     steps = table[table["series"] == error_distribution.FOUND]
     assert list(steps["error"]) == [0.0, 0.25, 0.5]
     assert list(steps["having"]) == [0, 2, 3]  # the run without a solution is in no step
@@ -188,7 +220,10 @@ def test_attempts_add_up_to_all_runs(outputs: Path) -> None:
 
 
 def test_shares_mark_what_is_printed_and_survive_nothing() -> None:
-    rows = [("error below 1", 0, "a", Proportion(3, 4)), ("error below 1", 1, "b", Proportion(0, 0))]
+    rows = [
+        ("error below 1", 0, "a", Proportion(3, 4)),
+        ("error below 1", 1, "b", Proportion(0, 0)),
+    ]
     table = shares.shares_table(rows, {"error below 1": 0.935}, 0.95)
     assert list(table["printed"]) == [0.935, 0.935]
     figure = shares.draw_shares(table)

@@ -1,4 +1,7 @@
-"""The rules by which claims of Lavoie & Boudreau 2001 are judged, on made-up runs of the shipped conditions."""
+"""The rules by which claims of Lavoie & Boudreau 2001 are judged.
+
+On made-up runs of the shipped conditions.
+"""
 
 import functools
 
@@ -27,7 +30,10 @@ def conditions_of(*words: str) -> Experiment:
 
 
 def made_up(errors: dict[str, np.ndarray], *words: str) -> Results:
-    """Return results in which the runs of every condition, by label, have these errors; NaN: no solution."""
+    """Return results in which the runs of every condition, by label, have these errors.
+
+    NaN: no solution.
+    """
     experiment, found = conditions_of(*words), []
     for label, condition in experiment.conditions:
         values = errors[label]
@@ -59,7 +65,9 @@ def below_one(count: int, runs: int = 1000) -> np.ndarray:
         (Proportion(0, 0), Proportion(935, 1000), INCONCLUSIVE),
     ],
 )
-def test_a_printed_percentage_is_a_sample_too(one: Proportion, two: Proportion, verdict: str) -> None:
+def test_a_printed_percentage_is_a_sample_too(
+    one: Proportion, two: Proportion, verdict: str
+) -> None:
     assert lavoie_verdicts.judge_equal("", one, two, 0.95) == verdict
     assert lavoie_verdicts.judge_equal("budget smoke", one, two, 0.95) == NOT_JUDGED
 
@@ -81,11 +89,16 @@ def test_one_proportion_is_greater(one: Proportion, two: Proportion, verdict: st
 
 def test_printed_percentages_say_the_numbers_and_the_rule() -> None:
     results = made_up({"7-DOF": below_one(964), "10-DOF": below_one(991)}, "lavoie")
-    (seven, _), (ten, _) = (lavoie_verdicts.percentages("", c, SETTINGS) for c in results.conditions)
+    (seven, _), (ten, _) = (
+        lavoie_verdicts.percentages("", c, SETTINGS) for c in results.conditions
+    )
     assert (seven.verdict, ten.verdict) == (CONTRADICTED, REPRODUCED)
     assert seven.text == "7-DOF: a position error below 1 in 93.5 % of runs"
     assert "964 of 1000 = 96.4 % [95.1, 97.4]; the printed one lies outside" in seven.evidence
-    assert "its own thousand runs give [91.8, 94.9]; ours − printed +2.9 [+1.0, +4.9] points" in seven.evidence
+    assert (
+        "its own thousand runs give [91.8, 94.9]; ours − printed +2.9 [+1.0, +4.9] points"
+        in seven.evidence
+    )
     assert "0 within the 95 % interval of the difference by Newcombe" in seven.evidence
     assert "lies within, its own thousand runs give" in ten.evidence
 
@@ -119,7 +132,10 @@ def test_motions_in_contact_contradict() -> None:
     found = lavoie_verdicts.free_of_collision(results, seven, Proportion(115, 1000), SETTINGS)
     assert found.verdict == CONTRADICTED
     assert "885 of 1000 certified; refuted 115 of 1000 = 11.5 % [9.7, 13.6]" in found.evidence
-    assert lavoie_verdicts.free_of_collision(results, ten, Proportion(0, 1000), SETTINGS).verdict == REPRODUCED
+    assert (
+        lavoie_verdicts.free_of_collision(results, ten, Proportion(0, 1000), SETTINGS).verdict
+        == REPRODUCED
+    )
 
 
 def test_what_is_overridden_or_too_few_is_not_judged() -> None:
@@ -139,7 +155,9 @@ def sweep(results: Results, in_contact: dict[str, int] | None = None) -> list[Cl
     """Return the claims of a sweep; some accepted runs of each condition, by label, in contact."""
     counts = in_contact or {}
     refuted = {
-        c.label: Refuted(Proportion(counts.get(c.label, 0), c.solved), *[Proportion(0, c.solved)] * 2)
+        c.label: Refuted(
+            Proportion(counts.get(c.label, 0), c.solved), *[Proportion(0, c.solved)] * 2
+        )
         for c in results.conditions
     }
     return list(lavoie_sweep_verdicts.of_sweep(results, SETTINGS, refuted))
@@ -147,7 +165,9 @@ def sweep(results: Results, in_contact: dict[str, int] | None = None) -> list[Cl
 
 def test_smaller_stopping_values_are_judged_step_by_step() -> None:
     labels = {
-        (stop, most): f"stop below {stop}, at most {most}" for stop in ("2.0", "1.5", "1.0") for most in (100, 300)
+        (stop, most): f"stop below {stop}, at most {most}"
+        for stop in ("2.0", "1.5", "1.0")
+        for most in (100, 300)
     }
     spread = np.linspace(0.0, 0.1, 100)
     errors = {label: float(stop) / 4.0 + spread for (stop, _), label in labels.items()}
@@ -166,7 +186,12 @@ def test_smaller_stopping_values_are_judged_step_by_step() -> None:
 
 def test_codings_are_compared_arm_by_arm() -> None:
     values = np.linspace(0.1, 0.5, 200)
-    errors = {"real": values, "binary": values + 0.2, "10-DOF, real": values + 0.2, "10-DOF, binary": values}
+    errors = {
+        "real": values,
+        "binary": values + 0.2,
+        "10-DOF, real": values + 0.2,
+        "10-DOF, binary": values,
+    }
     found = {claim.text: claim.verdict for claim in sweep(made_up(errors, "lavoie_coding"))}
     start = "Real coding performs better than binary coding, judged by"
     assert found == {
@@ -180,7 +205,9 @@ def test_codings_are_compared_arm_by_arm() -> None:
 def test_controls_stand_beside_their_own_arm() -> None:
     labels = [label for label, _ in conditions_of("lavoie_controls").conditions]
     errors = {label: np.full(200, np.nan if "random" in label else 0.3) for label in labels}
-    found = sweep(made_up(errors, "lavoie_controls"), {"7-DOF, blind": 186, "10-DOF, blind": 3, "7-DOF": 20})
+    found = sweep(
+        made_up(errors, "lavoie_controls"), {"7-DOF, blind": 186, "10-DOF, blind": 3, "7-DOF": 20}
+    )
     assert [(claim.text.split(": ")[1], claim.verdict) for claim in found] == [
         ("7-DOF, blind against 7-DOF", REPRODUCED),
         ("10-DOF, blind against 10-DOF", INCONCLUSIVE),
@@ -195,11 +222,18 @@ def test_positions_and_chords_are_judged_with_adjusted_p_values() -> None:
     contacts = {"7-DOF, M = 10, none": 72, "7-DOF, M = 10, chords": 20, "7-DOF, M = 50, chords": 9}
     found = {claim.text: claim for claim in sweep(results, contacts)}
     fewer = "Fewer accepted motions touch an obstacle"
-    assert found[f"{fewer}: 7-DOF, M = 10, chords against 7-DOF, M = 10, none"].verdict == REPRODUCED
+    assert (
+        found[f"{fewer}: 7-DOF, M = 10, chords against 7-DOF, M = 10, none"].verdict == REPRODUCED
+    )
     middle = found[f"{fewer}: 7-DOF, M = 50, chords against 7-DOF, M = 10, chords"]
     assert middle.verdict == INCONCLUSIVE  # 0.053 alone
-    assert found[f"{fewer}: 7-DOF, M = 100, chords against 7-DOF, M = 10, chords"].verdict == REPRODUCED
-    assert found["M = 50 removes contacts altogether: 7-DOF, M = 50, chords"].verdict == CONTRADICTED
+    assert (
+        found[f"{fewer}: 7-DOF, M = 100, chords against 7-DOF, M = 10, chords"].verdict
+        == REPRODUCED
+    )
+    assert (
+        found["M = 50 removes contacts altogether: 7-DOF, M = 50, chords"].verdict == CONTRADICTED
+    )
     assert found["M = 50 removes contacts altogether: 10-DOF, M = 50, chords"].verdict == REPRODUCED
     assert len(found) == 10
 
@@ -212,11 +246,15 @@ def test_printed_percentages_are_judged_by_either_reading_of_a_success() -> None
         "10-DOF, any finite cost": below_one(982),
     }
     found = sweep(made_up(errors, "lavoie_success"))
-    below_1 = {claim.text.split(":")[0]: claim.verdict for claim in found if "below 1 " in claim.text}
+    below_1 = {
+        claim.text.split(":")[0]: claim.verdict for claim in found if "below 1 " in claim.text
+    }
     assert below_1 == {label: CONTRADICTED if "value" in label else REPRODUCED for label in errors}
     assert len(found) == 8
 
 
 def test_operators_judge_nothing() -> None:
     labels = [label for label, _ in conditions_of("lavoie_operators").conditions]
-    assert sweep(made_up({label: below_one(195, 200) for label in labels}, "lavoie_operators")) == []
+    assert (
+        sweep(made_up({label: below_one(195, 200) for label in labels}, "lavoie_operators")) == []
+    )

@@ -1,4 +1,7 @@
-"""Executed motions, their bodies and the defects that reports count, against independent ways to get them."""
+"""Executed motions, their bodies and the defects that reports count.
+
+Against independent ways to get them.
+"""
 
 import numpy as np
 import pytest
@@ -30,7 +33,9 @@ def solution(one: Prepared) -> FloatArray:
 def test_an_executed_motion_passes_its_configurations(one: Prepared, solution: FloatArray) -> None:
     found = link_motions.sampled(link_motions.executed(one, solution), 10)
     assert found.links.shape == found.speeds.shape == (51, 2, 2)
-    np.testing.assert_allclose(found.links[::10].transpose(1, 0, 2), solution.reshape(2, 6, 2), atol=1e-9)
+    np.testing.assert_allclose(
+        found.links[::10].transpose(1, 0, 2), solution.reshape(2, 6, 2), atol=1e-9
+    )
     motion = one.planner.motion(one.problem, solution)
     np.testing.assert_allclose(found.q[:, 13], np.degrees(motion.at(1.3)), atol=1e-9)
 
@@ -39,7 +44,9 @@ def test_speeds_are_differences_of_angles(one: Prepared, solution: FloatArray) -
     found = link_motions.sampled(link_motions.executed(one, solution), 2000)
     between = np.diff(found.links, axis=0) * 2000
     off = np.abs(between - found.speeds[:-1]).max()
-    assert off < 0.002 * np.abs(found.speeds).max()  # a step of 1/2000 against accelerations of some speeds per instant
+    assert (
+        off < 0.002 * np.abs(found.speeds).max()
+    )  # a step of 1/2000 against accelerations of some speeds per instant
     limits = link_motions.speed_limits(one)
     expected = (np.abs(found.speeds).max(axis=0) / limits).max()
     assert link_motions.times_over_limit(one, solution) == pytest.approx(expected, rel=1e-4)
@@ -54,8 +61,12 @@ def test_limits_are_those_of_equation_2() -> None:
 
 
 def test_a_control_has_the_limits_of_the_planner_beside_it() -> None:
-    control = expand("curkovic_methods_b", "control=random_search").conditions[0].condition.prepare()
-    np.testing.assert_array_equal(link_motions.speed_limits(control), link_motions.speed_limits(prepared("linear")))
+    control = (
+        expand("curkovic_methods_b", "control=random_search").conditions[0].condition.prepare()
+    )
+    np.testing.assert_array_equal(
+        link_motions.speed_limits(control), link_motions.speed_limits(prepared("linear"))
+    )
 
 
 def test_distances_of_bodies_are_those_of_links(one: Prepared, solution: FloatArray) -> None:

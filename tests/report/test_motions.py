@@ -46,7 +46,9 @@ def segment_distance(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray)
         return np.asarray(np.linalg.norm(p - s - share * (e - s), axis=0))
 
     ends = np.min([point(a, c, d), point(b, c, d), point(c, a, b), point(d, a, b)], axis=0)
-    crossing = (cross(b - a, c - a) * cross(b - a, d - a) < 0) & (cross(d - c, a - c) * cross(d - c, b - c) < 0)
+    crossing = (cross(b - a, c - a) * cross(b - a, d - a) < 0) & (
+        cross(d - c, a - c) * cross(d - c, b - c) < 0
+    )
     return np.where(crossing, 0.0, ends)
 
 
@@ -62,15 +64,23 @@ def test_joints_are_where_trigonometry_puts_them(prepared: Prepared, q: FloatArr
 
 def test_link_distances_are_those_of_segments(prepared: Prepared, q: FloatArray) -> None:
     one, other = by_hand(q[:2], (0.0, 0.0)), by_hand(q[2:], (0.0, 8.0))
-    pairs = [segment_distance(one[i], one[i + 1], other[j], other[j + 1]) for i in range(2) for j in range(2)]
+    pairs = [
+        segment_distance(one[i], one[i + 1], other[j], other[j + 1])
+        for i in range(2)
+        for j in range(2)
+    ]
     expected = np.min(pairs, axis=0)
     assert (expected == 0.0).any()
     links = motions.LinkDistance(prepared.problem.assembly)
     np.testing.assert_allclose(links(q), expected, atol=1e-9)
     nearest = links.nearest(q[:, 0])
     assert nearest.distance == pytest.approx(expected[0], abs=1e-9)
-    assert np.linalg.norm(nearest.points[0] - nearest.points[1]) == pytest.approx(expected[0], abs=1e-9)
-    assert len(prepared.problem.assembly.geometry.collisionPairs) == 0  # the robot's own geometry stays as it is
+    assert np.linalg.norm(nearest.points[0] - nearest.points[1]) == pytest.approx(
+        expected[0], abs=1e-9
+    )
+    assert (
+        len(prepared.problem.assembly.geometry.collisionPairs) == 0
+    )  # the robot's own geometry stays as it is
 
 
 def test_centre_distances_are_those_of_the_centres(prepared: Prepared, q: FloatArray) -> None:
@@ -113,9 +123,13 @@ def test_outlines_lie_on_the_surfaces_of_obstacles() -> None:
     table = obstacle_table(
         (
             SphereObstacle(shape="sphere", center=(5.2, 4.0), radius=0.4),
-            BoxObstacle(shape="box", center=(-5.5, 4.0), size=(0.8, 0.8), rotation=(0.0, 0.0, 30.0)),
+            BoxObstacle(
+                shape="box", center=(-5.5, 4.0), size=(0.8, 0.8), rotation=(0.0, 0.0, 30.0)
+            ),
             CapsuleObstacle(shape="capsule", start=(-1.0, -5.0), end=(1.0, -5.0), radius=0.2),
-            CylinderObstacle(shape="cylinder", start=(2.0, 3.0, -1.0), end=(2.0, 3.0, 1.0), radius=0.3),
+            CylinderObstacle(
+                shape="cylinder", start=(2.0, 3.0, -1.0), end=(2.0, 3.0, 1.0), radius=0.3
+            ),
             CylinderObstacle(shape="cylinder", start=(2.0, 3.0), end=(4.0, 3.0), radius=0.3),
             HalfSpaceObstacle(shape="half_space", point=(0.0, -2.0), normal=(0.0, 1.0)),
             EllipseObstacle(shape="ellipse", center=(1.0, 2.0), semi_axes=(3.0, 0.5), angle=60.0),
@@ -132,7 +146,10 @@ def test_outlines_lie_on_the_surfaces_of_obstacles() -> None:
     assert (edges > 1.0).sum() == 2  # two long sides, walked once each
     np.testing.assert_allclose(np.linalg.norm(tin - [2.0, 3.0], axis=1), 0.3)
     assert (lying.min(axis=0).tolist(), lying.max(axis=0).tolist()) == ([2.0, 2.7], [4.0, 3.3])
-    assert (wall.min(axis=0).round(9).tolist(), wall.max(axis=0).round(9).tolist()) == ([-8.0, -2.8], [8.0, -2.0])
+    assert (wall.min(axis=0).round(9).tolist(), wall.max(axis=0).round(9).tolist()) == (
+        [-8.0, -2.8],
+        [8.0, -2.0],
+    )
     turn = np.deg2rad(60.0)
     along = (egg - [1.0, 2.0]) @ [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]
     np.testing.assert_allclose(np.linalg.norm(along / [3.0, 0.5], axis=1), 1.0)

@@ -10,7 +10,9 @@ from evoexp.report.parameters import Parameter, option, overridden
 from evoexp.report.results import ConditionResults, Results
 
 
-def of(*overrides: str, name: str = "rana_planar", budget: str = "paper", label: int = 0) -> dict[str, Parameter]:
+def of(
+    *overrides: str, name: str = "rana_planar", budget: str = "paper", label: int = 0
+) -> dict[str, Parameter]:
     """Return the parameters of a condition that nobody ran, by name."""
     experiment = expansions.expand([f"experiment={name}", f"budget={budget}", *overrides])[0]
     text, condition = experiment.conditions[label]
@@ -22,12 +24,22 @@ def of(*overrides: str, name: str = "rana_planar", budget: str = "paper", label:
 
 def test_units_and_sources_come_from_the_comments() -> None:
     rows = of()
-    assert rows["ga.population_size"] == ("ga.population_size", "50", "", "paper: Tab. 1, population")
+    assert rows["ga.population_size"] == (
+        "ga.population_size",
+        "50",
+        "",
+        "paper: Tab. 1, population",
+    )
     assert rows["scenario.q_goal[0]"].unit == "deg"
     assert rows["scenario.q_goal[0]"].value == "[135.0, 135.0]"
     assert rows["objective.length_weight"][1:] == ("0.5", "1/deg", "paper: Tab. 1, k1")
     assert rows["planner.num_via_points"].source.startswith("assumed: ")
-    assert rows["planner"] == ("planner", "via_point_ga, revision 1", "", "conf/planner/rana_planar.yaml")
+    assert rows["planner"] == (
+        "planner",
+        "via_point_ga, revision 1",
+        "",
+        "conf/planner/rana_planar.yaml",
+    )
     assert rows["seed"].source.startswith("assumed")
     assert rows["num_replicates"].value == "20"
 
@@ -48,13 +60,22 @@ def test_overrides_and_budgets_are_told_apart() -> None:
     assert rows["num_replicates"].source == "budget smoke"
     assert rows["ga.crossover_rate"].source == "paper: Tab. 1, cross_over_probability"
     assert rows["seed"].source == "override"
-    assert sorted(overridden(rows.values())) == ["ga.num_generations", "ga.population_size", "num_replicates"]
+    assert sorted(overridden(rows.values())) == [
+        "ga.num_generations",
+        "ga.population_size",
+        "num_replicates",
+    ]
 
 
 def test_another_option_than_the_experiments_own_is_recognised() -> None:
     rows = of("scenario=rana_obstacles")
     assert rows["scenario"].source == "conf/scenario/rana_obstacles.yaml"
-    assert rows["scenario.obstacles[1].size"] == ("scenario.obstacles[1].size", "[0.8, 0.8]", "unit", "assumed")
+    assert rows["scenario.obstacles[1].size"] == (
+        "scenario.obstacles[1].size",
+        "[0.8, 0.8]",
+        "unit",
+        "assumed",
+    )
     assert rows["scenario.q_start[0]"].source.startswith("paper: Tab. 2")
 
 
@@ -77,7 +98,10 @@ def test_an_option_file_is_read_with_its_comments(tmp_path: Path) -> None:
     (tmp_path / "base.yaml").write_text(
         "_target_: x\nrate: 1e-3  # [1/s] paper: Tab. 1\nsize: 3  # [m] assumed: seen\n"
     )
-    text = 'defaults:\n  - base\n  - _self_\nsize: 4  # [m] paper: p. 2\nname: "a # b"  # a note\nlist:\n  - [1, 2]\n'
+    text = (
+        'defaults:\n  - base\n  - _self_\nsize: 4  # [m] paper: p. 2\nname: "a # b"  # a '
+        "note\nlist:\n  - [1, 2]\n"
+    )
     (tmp_path / "own.yaml").write_text(text)
     entries = option(tmp_path / "own.yaml")
     assert entries["size"] == (4, "m", "paper: p. 2")

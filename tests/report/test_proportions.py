@@ -23,7 +23,9 @@ def test_a_proportion_knows_share_and_interval() -> None:
         (Proportion(10, 10), Proportion(0, 10), 0.6075, 1.0),
     ],
 )
-def test_differences_are_newcombes(one: Proportion, two: Proportion, low: float, high: float) -> None:
+def test_differences_are_newcombes(
+    one: Proportion, two: Proportion, low: float, high: float
+) -> None:
     found = newcombe(one, two, 0.95)
     assert found == pytest.approx((low, high), abs=5e-5)
     mirrored = newcombe(two, one, 0.95)
@@ -39,7 +41,10 @@ def test_fishers_test_is_scipys() -> None:
     rng = np.random.default_rng(4)
     for _ in range(60):
         n, m = (int(size) for size in rng.integers(1, 60, 2))
-        one, two = Proportion(int(rng.integers(0, n + 1)), n), Proportion(int(rng.integers(0, m + 1)), m)
+        one, two = (
+            Proportion(int(rng.integers(0, n + 1)), n),
+            Proportion(int(rng.integers(0, m + 1)), m),
+        )
         table = [[p.having, p.total - p.having] for p in (one, two)]
         assert fisher_exact(one, two) == pytest.approx(scipy_fisher_exact(table)[1], rel=1e-9)
     assert fisher_exact(Proportion(0, 0), Proportion(1, 2)) == 1.0

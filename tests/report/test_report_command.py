@@ -37,7 +37,9 @@ def test_the_experiment_may_be_an_override_as_for_run(capsys: pytest.CaptureFixt
     assert "| via-point GA |" not in text
 
 
-def test_runs_by_prefixes_of_their_hashes(outputs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_runs_by_prefixes_of_their_hashes(
+    outputs: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     ids = [c.condition.id for c in expand("rana_planar").conditions]
     assert report(ids[0][:6], ids[1][:8].upper()) == 0
     index = page(capsys)
@@ -72,7 +74,10 @@ def test_what_cannot_be_reported_is_one_line(
 def test_overrides_and_hashes_exclude_each_other(capsys: pytest.CaptureFixture[str]) -> None:
     prefix = expand("rana_planar").conditions[0].condition.id[:8]
     assert report(prefix, "budget=smoke") == 2
-    assert "overrides: must be left out where runs are given by their hashes" in capsys.readouterr().err
+    assert (
+        "overrides: must be left out where runs are given by their hashes"
+        in capsys.readouterr().err
+    )
 
 
 def test_loading_the_command_loads_no_matplotlib() -> None:

@@ -14,11 +14,20 @@ from evoexp.store.run_directory import RunDirectory
 
 
 def gathered(outputs: Path, count: int | None, *overrides: str) -> Results:
-    return gather(outputs, expand("rana_planar", *overrides).conditions, count, "rana_planar", "smoke", "evoexp run it")
+    return gather(
+        outputs,
+        expand("rana_planar", *overrides).conditions,
+        count,
+        "rana_planar",
+        "smoke",
+        "evoexp run it",
+    )
 
 
 def test_nothing_stored_is_one_line_with_the_command(tmp_path: Path) -> None:
-    with pytest.raises(NothingStored, match=r"^rana_planar: nothing stored in .*; try: evoexp run it$"):
+    with pytest.raises(
+        NothingStored, match=r"^rana_planar: nothing stored in .*; try: evoexp run it$"
+    ):
         gathered(tmp_path, 2)
     assert not list(tmp_path.iterdir())
 
@@ -67,7 +76,9 @@ def test_a_condition_is_read_back_from_its_run(stored: Path, results: Results) -
     assert Condition.from_json(RunDirectory(stored, ga.condition.id).config_json()) == ga.condition
 
 
-def test_logs_are_opened_when_a_page_asks_for_what_they_hold(stored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_logs_are_opened_when_a_page_asks_for_what_they_hold(
+    stored: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     gathered(stored, 2)  # summary.parquet is there
 
     def never(*_: object) -> None:

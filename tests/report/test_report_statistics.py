@@ -41,11 +41,15 @@ def test_quantiles_of_infinite_and_missing_values() -> None:
     assert spread(np.array([np.nan])).num_values == 0
 
 
-@pytest.mark.parametrize(("successes", "trials"), [(0, 20), (1, 7), (13, 20), (20, 20), (998, 1000)])
+@pytest.mark.parametrize(
+    ("successes", "trials"), [(0, 20), (1, 7), (13, 20), (20, 20), (998, 1000)]
+)
 @pytest.mark.parametrize("confidence", [0.9, 0.95, 0.99])
 def test_wilson_is_that_of_scipy(successes: int, trials: int, confidence: float) -> None:
     expected = scipy.stats.binomtest(successes, trials).proportion_ci(confidence, method="wilson")
-    assert wilson(successes, trials, confidence) == pytest.approx((expected.low, expected.high), abs=1e-9)
+    assert wilson(successes, trials, confidence) == pytest.approx(
+        (expected.low, expected.high), abs=1e-9
+    )
 
 
 def test_wilson_without_trials_knows_nothing() -> None:
@@ -59,7 +63,10 @@ def test_signed_rank_without_ties_is_the_exact_test_of_scipy(size: int) -> None:
     expected = scipy.stats.wilcoxon(x, y, method="exact")
     found = signed_rank(x, y)
     assert found.num_pairs == size
-    assert min(found.positive_ranks, size * (size + 1) / 2 - found.positive_ranks) == expected.statistic
+    assert (
+        min(found.positive_ranks, size * (size + 1) / 2 - found.positive_ranks)
+        == expected.statistic
+    )
     assert found.p_value == pytest.approx(expected.pvalue, rel=1e-12)
 
 
@@ -67,7 +74,9 @@ def test_signed_rank_with_ties_counts_all_assignments_of_signs() -> None:
     difference = np.array([1.0, -1.0, 2.0, 2.0, 2.0, -3.0, 5.0, 0.0])
     ranks = scipy.stats.rankdata(np.abs(difference[:7]))
     observed = ranks[difference[:7] > 0].sum()
-    sums = np.array([ranks[np.array(signs)].sum() for signs in itertools.product([False, True], repeat=7)])
+    sums = np.array(
+        [ranks[np.array(signs)].sum() for signs in itertools.product([False, True], repeat=7)]
+    )
     expected = min(1.0, 2.0 * min(np.mean(sums <= observed), np.mean(sums >= observed)))
     found = signed_rank(difference, np.zeros(8))
     assert (found.num_pairs, found.positive_ranks) == (7, observed)
@@ -96,10 +105,14 @@ def test_holm_by_hand() -> None:
 
 
 def test_a12_by_hand_and_by_the_u_statistic_of_scipy() -> None:
-    assert vargha_delaney(np.array([1.0, 2.0, 3.0]), np.array([2.0, 2.0])) == pytest.approx((2 * 0.5 + 2) / 6)
+    assert vargha_delaney(np.array([1.0, 2.0, 3.0]), np.array([2.0, 2.0])) == pytest.approx(
+        (2 * 0.5 + 2) / 6
+    )
     rng = np.random.default_rng(1)
     x, y = np.round(rng.normal(size=17), 1), np.round(rng.normal(0.5, size=23), 1)
-    assert vargha_delaney(x, y) == pytest.approx(scipy.stats.mannwhitneyu(x, y).statistic / (17 * 23))
+    assert vargha_delaney(x, y) == pytest.approx(
+        scipy.stats.mannwhitneyu(x, y).statistic / (17 * 23)
+    )
     assert math.isnan(vargha_delaney(x, np.empty(0)))
 
 
@@ -115,7 +128,9 @@ def test_effect_has_the_bootstrap_interval_of_its_pairs() -> None:
     picks = (own.integers(0, 30, 30) for _ in range(2000))
     estimates = [vargha_delaney(x[pick], y[pick]) for pick in picks]
     expected = Interval(*np.quantile(estimates, [0.025, 0.975]))
-    assert first.interval == pytest.approx(expected, abs=0.03)  # two bootstraps of 400 and 2000 resamples
+    assert first.interval == pytest.approx(
+        expected, abs=0.03
+    )  # two bootstraps of 400 and 2000 resamples
 
 
 def test_effect_of_separated_and_of_no_values() -> None:

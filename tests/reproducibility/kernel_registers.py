@@ -1,4 +1,4 @@
-"""A process of its own: compiles real kernels afresh and prints which vector registers their assembly names.
+"""A process of its own: compiles kernels afresh and prints the vector registers they use.
 
 EVOEXP_CACHE must be a new directory: numba has no assembly of functions that come from its cache.
 """
@@ -18,7 +18,11 @@ def main() -> None:
     values = [value for module in (lengths, relaxation) for value in vars(module).values()]
     kernels = [value for value in values if getattr(value, "nopython_signatures", None)]
     assembly = "\n".join(text for kernel in kernels for text in kernel.inspect_asm().values())
-    print(json.dumps({name: len(re.findall(rf"%{name}\d", assembly)) for name in ("xmm", "ymm", "zmm")}))
+    print(
+        json.dumps(
+            {name: len(re.findall(rf"%{name}\d", assembly)) for name in ("xmm", "ymm", "zmm")}
+        )
+    )
 
 
 if __name__ == "__main__":

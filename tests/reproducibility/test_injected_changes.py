@@ -1,4 +1,7 @@
-"""`reproduce` names the very generation at which a run was changed, were it by the last bit of one number."""
+"""`reproduce` names the very generation at which a run was changed.
+
+Were it by the last bit of one number.
+"""
 
 import os
 import subprocess
@@ -48,7 +51,9 @@ def record_changed(condition: Condition, directory: Path, change: Change) -> Pat
     kind: Any = type(condition.planner)
     evolve = kind.evolve
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(kind, "evolve", lambda planner, problem, rng: change(evolve(planner, problem, rng), rng))
+        patch.setattr(
+            kind, "evolve", lambda planner, problem, rng: change(evolve(planner, problem, rng), rng)
+        )
         return record(condition, directory)
 
 
@@ -58,7 +63,10 @@ def compare_changed(condition: Condition, directory: Path, change: Change) -> Co
 
 
 def nudged_at(generation: int) -> Change:
-    """Raise one cost of one generation by one ulp, in the planner's own memory: what follows builds on it."""
+    """Raise one cost of one generation by one ulp, in the planner's own memory.
+
+    What follows builds on it.
+    """
 
     def change(generations: Iterator[Generation], rng: np.random.Generator) -> Iterator[Generation]:
         for row in generations:
@@ -85,7 +93,9 @@ def test_one_ulp_in_one_cost(condition: Condition, tmp_path: Path, generation: i
 
 
 @pytest.mark.parametrize("generation", [0, 4, LAST])
-def test_one_ulp_in_the_best_solution(condition: Condition, tmp_path: Path, generation: int) -> None:
+def test_one_ulp_in_the_best_solution(
+    condition: Condition, tmp_path: Path, generation: int
+) -> None:
     def change(generations: Iterator[Generation], rng: np.random.Generator) -> Iterator[Generation]:
         for row in generations:
             best = row.best.copy()
@@ -93,18 +103,26 @@ def test_one_ulp_in_the_best_solution(condition: Condition, tmp_path: Path, gene
                 one_ulp_more(best, 5)
             yield row._replace(best=best)
 
-    assert compare_changed(condition, tmp_path, change).verdict == f"DIVERGES at generation {generation}"
+    assert (
+        compare_changed(condition, tmp_path, change).verdict
+        == f"DIVERGES at generation {generation}"
+    )
 
 
 @pytest.mark.parametrize("generation", [0, 4, LAST])
-def test_one_number_drawn_from_the_generator(condition: Condition, tmp_path: Path, generation: int) -> None:
+def test_one_number_drawn_from_the_generator(
+    condition: Condition, tmp_path: Path, generation: int
+) -> None:
     def change(generations: Iterator[Generation], rng: np.random.Generator) -> Iterator[Generation]:
         for row in generations:
             if row.index == generation:
                 rng.random()
             yield row
 
-    assert compare_changed(condition, tmp_path, change).verdict == f"DIVERGES at generation {generation}"
+    assert (
+        compare_changed(condition, tmp_path, change).verdict
+        == f"DIVERGES at generation {generation}"
+    )
 
 
 def test_one_ulp_in_the_last_population(condition: Condition, tmp_path: Path) -> None:
@@ -134,14 +152,18 @@ def test_a_longer_run(condition: Condition, tmp_path: Path) -> None:
             yield row
         yield row._replace(index=LAST + 1)
 
-    assert compare_changed(condition, tmp_path, change).verdict == f"DIVERGES at generation {LAST + 1}"
+    assert (
+        compare_changed(condition, tmp_path, change).verdict == f"DIVERGES at generation {LAST + 1}"
+    )
 
 
 def test_the_command_says_it_in_another_process(tmp_path: Path) -> None:
     path = record_changed(LABELLED[0].condition, tmp_path, nudged_at(3))
     command = [sys.executable, "-m", "evoexp", "reproduce", str(path)]
     environment = os.environ | {"COLUMNS": "120", "EVOEXP_OUTPUTS": str(tmp_path / "none")}
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment, cwd=tmp_path)
+    done = subprocess.run(
+        command, capture_output=True, text=True, check=False, env=environment, cwd=tmp_path
+    )
     assert (done.returncode, done.stderr) == (1, "")
     assert "DIVERGES at generation 3" in done.stdout
     assert "0 of 1 MATCH" in done.stdout

@@ -1,4 +1,7 @@
-"""The same digests whatever the number of workers, the order, the hash seed, the threads, and the processor."""
+"""The same digests whatever the number of workers, the order, the hash seed, the threads.
+
+And the processor.
+"""
 
 import json
 import os
@@ -15,8 +18,14 @@ import pytest
 from evoexp import compose
 
 HERE = Path(__file__).parent
-SMOKE = ("experiment=rana_planar,rana_obstacles", "budget=smoke")  # GA, random search, GA among obstacles
-THREADS = [f"{name}_NUM_THREADS" for name in ("OMP", "OPENBLAS", "MKL", "BLIS", "VECLIB", "NUMEXPR", "NUMBA")]
+SMOKE = (
+    "experiment=rana_planar,rana_obstacles",
+    "budget=smoke",
+)  # GA, random search, GA among obstacles
+THREADS = [
+    f"{name}_NUM_THREADS"
+    for name in ("OMP", "OPENBLAS", "MKL", "BLIS", "VECLIB", "NUMEXPR", "NUMBA")
+]
 NUMPY_PATHS = ("X86_V4", "AVX512_ICL")  # numpy's code for AVX-512
 GENERIC = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
 VARIED = {"PYTHONHASHSEED", "NPY_DISABLE_CPU_FEATURES", *GENERIC, *THREADS}
@@ -28,7 +37,9 @@ def execute(script: str, *arguments: str, **environment: str) -> Any:
     """Run a script of this directory in a process of its own; return what it prints."""
     inherited = {name: value for name, value in os.environ.items() if name not in VARIED}
     command = [sys.executable, str(HERE / script), *arguments]
-    done = subprocess.run(command, env=inherited | environment, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        command, env=inherited | environment, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
@@ -36,14 +47,20 @@ def execute(script: str, *arguments: str, **environment: str) -> Any:
 @pytest.fixture(scope="module")
 def conditions() -> list[str]:
     experiments = compose.expand(SMOKE, multirun=True)
-    return [labelled.condition.to_json().decode() for experiment in experiments for labelled in experiment.conditions]
+    return [
+        labelled.condition.to_json().decode()
+        for experiment in experiments
+        for labelled in experiment.conditions
+    ]
 
 
 @pytest.fixture(scope="module")
 def run(conditions: list[str], tmp_path_factory: pytest.TempPathFactory) -> Run:
     file = tmp_path_factory.mktemp("digests") / "conditions"
     file.write_text("\n".join(conditions))
-    return lambda *arguments, **environment: execute("smoke_digests.py", str(file), *arguments, **environment)
+    return lambda *arguments, **environment: execute(
+        "smoke_digests.py", str(file), *arguments, **environment
+    )
 
 
 @pytest.fixture(scope="module")
@@ -53,11 +70,16 @@ def plain(run: Run) -> Any:
 
 
 def generic_cache() -> str:
-    """Return a cache directory of the generic target's own, kept, so that it is compiled once per state of the sources.
+    """Return a cache directory of the generic target's own, kept.
 
-    Not the native one: numba's index of a function can mix up what two processes write to it at the same moment.
+    So that it is compiled once per state of the sources.
+
+    Not the native one: numba's index of a function can mix up what two processes write to it at the
+    same moment.
     """
-    return str(Path(os.environ.get("EVOEXP_CACHE") or platformdirs.user_cache_dir("evoexp")) / "generic")
+    return str(
+        Path(os.environ.get("EVOEXP_CACHE") or platformdirs.user_cache_dir("evoexp")) / "generic"
+    )
 
 
 def test_the_digests_tell_replicates_and_conditions_apart(plain: Any) -> None:
@@ -102,7 +124,9 @@ def test_numpy_without_its_widest_code_paths(run: Run, plain: Any) -> None:
     assert other["digests"] == plain["digests"]
 
 
-@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="ymm and zmm are registers of x86")
+@pytest.mark.skipif(
+    platform.machine() not in ("x86_64", "AMD64"), reason="ymm and zmm are registers of x86"
+)
 def test_only_the_processor_itself_has_registers_wider_than_two_numbers(tmp_path: Path) -> None:
     generic = execute("kernel_registers.py", EVOEXP_CACHE=str(tmp_path / "generic"), **GENERIC)
     assert generic["xmm"] > 0, "this is the assembly of real kernels"

@@ -36,24 +36,38 @@ def test_arms_are_slices_of_one_configuration() -> None:
 
 
 def test_geometry_holds_the_links_as_capsules_of_the_given_radius() -> None:
-    assembly = PlanarChain(link_lengths=(2.0, 1.0), base_position=(0.0, 0.0), link_radius=0.1).build()
+    assembly = PlanarChain(
+        link_lengths=(2.0, 1.0), base_position=(0.0, 0.0), link_radius=0.1
+    ).build()
     shapes = [geometry.geometry for geometry in assembly.geometry.geometryObjects]
     assert all(isinstance(shape, coal.Capsule) for shape in shapes)
     assert [2.0 * shape.halfLength for shape in shapes] == [2.0, 1.0]
     assert [shape.radius for shape in shapes] == [0.1, 0.1]
     data, geometry_data = assembly.model.createData(), assembly.geometry.createData()
-    pin.updateGeometryPlacements(assembly.model, data, assembly.geometry, geometry_data, np.array([0.3, 0.4]))
+    pin.updateGeometryPlacements(
+        assembly.model, data, assembly.geometry, geometry_data, np.array([0.3, 0.4])
+    )
     for link, placement, shape in zip(assembly.links, geometry_data.oMg, shapes, strict=True):
         world = data.oMi[link.joint]
-        assert placement.act(np.array([0.0, 0.0, shape.halfLength])) == pytest.approx(world.act(link.end))
-        assert placement.act(np.array([0.0, 0.0, -shape.halfLength])) == pytest.approx(world.act(link.start))
+        assert placement.act(np.array([0.0, 0.0, shape.halfLength])) == pytest.approx(
+            world.act(link.end)
+        )
+        assert placement.act(np.array([0.0, 0.0, -shape.halfLength])) == pytest.approx(
+            world.act(link.start)
+        )
 
 
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"link_lengths": [], "base_position": [0, 0]}, "robot.link_lengths: must be a list of at least 1"),
-        ({"link_lengths": [1, 0], "base_position": [0, 0]}, r"robot.link_lengths\[1\]: must be greater than 0"),
+        (
+            {"link_lengths": [], "base_position": [0, 0]},
+            "robot.link_lengths: must be a list of at least 1",
+        ),
+        (
+            {"link_lengths": [1, 0], "base_position": [0, 0]},
+            r"robot.link_lengths\[1\]: must be greater than 0",
+        ),
         ({"link_lengths": [1], "base_position": [0]}, r"robot.base_position"),
         ({"link_lengths": [1]}, "robot.base_position: must be given"),
     ],
@@ -64,7 +78,9 @@ def test_impossible_chains_are_refused(settings: dict[str, object], message: str
 
 
 def test_a_tool_is_a_ball_that_moves_with_the_tip() -> None:
-    assembly = PlanarChain(link_lengths=(2.0, 1.0), base_position=(0.0, 0.0), tool_radius=0.3).build()
+    assembly = PlanarChain(
+        link_lengths=(2.0, 1.0), base_position=(0.0, 0.0), tool_radius=0.3
+    ).build()
     *links, tool = assembly.links
     assert [link.is_tool for link in links] == [False, False]
     assert tool.is_tool
@@ -77,6 +93,10 @@ def test_a_tool_is_a_ball_that_moves_with_the_tip() -> None:
 
 
 def test_circles_of_one_size_cannot_show_a_tool() -> None:
-    assembly = PlanarChain(link_lengths=(2.0, 1.0), base_position=(0.0, 0.0), tool_radius=0.3).build()
+    assembly = PlanarChain(
+        link_lengths=(2.0, 1.0), base_position=(0.0, 0.0), tool_radius=0.3
+    ).build()
     with pytest.raises(SettingError, match="robot: must be without tools"):
-        TouchingSpheres(spheres_per_link=5, sphere_radius=0.1, collision_substeps=1).bind(assembly, ())
+        TouchingSpheres(spheres_per_link=5, sphere_radius=0.1, collision_substeps=1).bind(
+            assembly, ()
+        )

@@ -22,7 +22,9 @@ def denavit_hartenberg(row: tuple[float, float, float, float], q: float) -> np.n
     """The matrix as textbooks print it."""
     a, alpha, d, theta = row[0], np.deg2rad(row[1]), row[2], np.deg2rad(row[3]) + q
     s, c, sa, ca = np.sin(theta), np.cos(theta), np.sin(alpha), np.cos(alpha)
-    return np.array([[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0, sa, ca, d], [0, 0, 0, 1.0]])
+    return np.array(
+        [[c, -s * ca, s * sa, a * c], [s, c * ca, -c * sa, a * s], [0, sa, ca, d], [0, 0, 0, 1.0]]
+    )
 
 
 @pytest.mark.parametrize("experiment", ["corsepius_ball", "corsepius_shelf", "corsepius_gate_wide"])
@@ -50,15 +52,28 @@ def test_the_manus_has_its_proportions() -> None:
     assembly = robot("corsepius_ball").build()
     tool = assembly.tools[0]
     local = local_pose(assembly.table, tool.joint, tool.rotation, tool.position)
-    stretched = frame_pose(assembly.table, tool.joint - 1, local, np.deg2rad([0.0, 0.0, 90.0, 0.0, 0.0, 0.0]))
+    stretched = frame_pose(
+        assembly.table, tool.joint - 1, local, np.deg2rad([0.0, 0.0, 90.0, 0.0, 0.0, 0.0])
+    )
     assert stretched[9:] == pytest.approx([0.40 + 0.32 + 0.16, 0.105, 0.60])
-    assert stretched[[2, 5, 8]] == pytest.approx([1.0, 0.0, 0.0], abs=1e-12)  # z: the grasping direction
+    assert stretched[[2, 5, 8]] == pytest.approx(
+        [1.0, 0.0, 0.0], abs=1e-12
+    )  # z: the grasping direction
 
 
 def test_bodies_move_with_their_joints() -> None:
     assembly = robot("corsepius_ball").build()
     names = [item.name for item in assembly.geometry.geometryObjects]
-    assert names == ["column", "shoulder", "upper_arm", "forearm", "wrist", "hand", "finger_left", "finger_right"]
+    assert names == [
+        "column",
+        "shoulder",
+        "upper_arm",
+        "forearm",
+        "wrist",
+        "hand",
+        "finger_left",
+        "finger_right",
+    ]
     data, placements = assembly.model.createData(), assembly.geometry.createData()
     pin.updateGeometryPlacements(assembly.model, data, assembly.geometry, placements, np.zeros(6))
     upper_arm = placements.oMg[2].translation
@@ -79,7 +94,9 @@ def test_base_and_tool_are_chosen_freely() -> None:
     tool = assembly.tools[0]
     local = local_pose(assembly.table, tool.joint, tool.rotation, tool.position)
     pose = frame_pose(assembly.table, 0, local, np.zeros(1))
-    assert pose[9:] == pytest.approx([0.5, 0.0, 0.0], abs=1e-12)  # x of the base points down, its z along the world's x
+    assert pose[9:] == pytest.approx(
+        [0.5, 0.0, 0.0], abs=1e-12
+    )  # x of the base points down, its z along the world's x
     assert pose[[2, 5, 8]] == pytest.approx([0.0, -1.0, 0.0], abs=1e-12)
 
 
@@ -106,7 +123,10 @@ def test_poses_compose_and_invert() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"bodies": (SPHERE, SPHERE)}, r"bodies\[1\].name: must be a name that no other body has, was 'ball'"),
+        (
+            {"bodies": (SPHERE, SPHERE)},
+            r"bodies\[1\].name: must be a name that no other body has, was 'ball'",
+        ),
         ({"bodies": ({**SPHERE, "joint": 2},)}, r"bodies\[0\].joint: must be at most 1, was 2"),
     ],
 )
@@ -119,13 +139,24 @@ def test_bodies_that_do_not_fit(change: dict[str, object], message: str) -> None
 
 def test_limits_in_the_wrong_order_are_refused() -> None:
     joint = DhJoint(dh=(1.0, 0.0, 0.0, 0.0), limits=(90.0, -90.0))
-    with pytest.raises(SettingError, match=r"joints\[0\].limits: must be \[least, greatest\] with least < greatest"):
+    with pytest.raises(
+        SettingError, match=r"joints\[0\].limits: must be \[least, greatest\] with least < greatest"
+    ):
         DhChain(joints=(joint,), bodies=(SPHERE,), base_position=(0.0, 0.0, 0.0))  # type: ignore[arg-type]
 
 
 def test_a_rod_without_length_is_refused() -> None:
     joint = DhJoint(dh=(1.0, 0.0, 0.0, 0.0), limits=(-90.0, 90.0))
-    rod = {"name": "rod", "joint": 1, "shape": "capsule", "start": (0.0,) * 3, "end": (0.0,) * 3, "radius": 0.1}
+    rod = {
+        "name": "rod",
+        "joint": 1,
+        "shape": "capsule",
+        "start": (0.0,) * 3,
+        "end": (0.0,) * 3,
+        "radius": 0.1,
+    }
     chain = DhChain(joints=(joint,), bodies=(rod,), base_position=(0.0, 0.0, 0.0))
-    with pytest.raises(SettingError, match=r"robot.bodies\[0\].end: must be another point than start"):
+    with pytest.raises(
+        SettingError, match=r"robot.bodies\[0\].end: must be another point than start"
+    ):
         chain.build()

@@ -24,7 +24,9 @@ def random_tree(seed: int, num_joints: int = 14) -> pin.Model:
             pin.JointModelPrismaticUnaligned(*axis),
         ]
         joint = joints[rng.integers(len(joints))]
-        placement = pin.SE3.Random() if rng.random() < 0.7 else pin.SE3(np.eye(3), rng.normal(size=3))
+        placement = (
+            pin.SE3.Random() if rng.random() < 0.7 else pin.SE3(np.eye(3), rng.normal(size=3))
+        )
         model.addJoint(int(rng.integers(0, k + 1)), joint, placement, f"joint_{k}")
     return model
 
@@ -70,7 +72,9 @@ def test_blocks_do_not_matter() -> None:
         assert np.array_equal(alone[1][..., 0], together[1][..., sample])
 
 
-@pytest.mark.parametrize("joint", [pin.JointModelFreeFlyer(), pin.JointModelSpherical(), pin.JointModelRUBZ()])
+@pytest.mark.parametrize(
+    "joint", [pin.JointModelFreeFlyer(), pin.JointModelSpherical(), pin.JointModelRUBZ()]
+)
 def test_joints_with_several_coordinates_are_refused(joint: object) -> None:
     model = pin.Model()
     model.addJoint(0, joint, pin.SE3.Identity(), "wrist")

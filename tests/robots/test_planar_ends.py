@@ -6,7 +6,14 @@ import pytest
 
 from evoexp.errors import SettingError
 from evoexp.robots.planar_chain import PlanarChain
-from evoexp.robots.planar_ends import LANES, begin_turning, block_ends, load_lanes, planar_arm, turned_ends
+from evoexp.robots.planar_ends import (
+    LANES,
+    begin_turning,
+    block_ends,
+    load_lanes,
+    planar_arm,
+    turned_ends,
+)
 
 ARM = PlanarChain(link_lengths=(3.0, 2.0, 1.0), base_position=(0.5, -1.0), base_angle=30.0)
 NUM_POSITIONS = 40
@@ -34,7 +41,9 @@ def test_link_ends_agree_with_pinocchio(paths: np.ndarray) -> None:
     for position in (0, 1, 13, NUM_POSITIONS):
         block_ends(starts, ends, arm, position, NUM_POSITIONS, *np.empty((3, LANES)), x, y)
         for lane in range(LANES):
-            q = paths[0, :, lane] + position / NUM_POSITIONS * (paths[1, :, lane] - paths[0, :, lane])
+            q = paths[0, :, lane] + position / NUM_POSITIONS * (
+                paths[1, :, lane] - paths[0, :, lane]
+            )
             found = np.column_stack([x.reshape(4, LANES)[:, lane], y.reshape(4, LANES)[:, lane]])
             np.testing.assert_allclose(found, pinocchio_ends(q), atol=1e-13)
 
@@ -52,7 +61,11 @@ def test_the_last_position_is_the_end_to_the_last_bit(paths: np.ndarray) -> None
 def test_turned_on_directions_agree_with_computed_ones(paths: np.ndarray) -> None:
     """32 turns, after which the kernels begin anew, at 2e-16 each."""
     starts, ends = (np.ascontiguousarray(q).ravel() for q in paths)
-    arm, scratch, turn = tuple(planar_arm(ARM.build())), np.empty((3, LANES)), np.empty((4, 3 * LANES))
+    arm, scratch, turn = (
+        tuple(planar_arm(ARM.build())),
+        np.empty((3, LANES)),
+        np.empty((4, 3 * LANES)),
+    )
     x, y, u, v = np.empty((4, 4 * LANES))
     begin_turning(starts, ends, arm, 5, NUM_POSITIONS, scratch[0], scratch[1], turn)
     for position in range(6, 38):
@@ -79,6 +92,8 @@ def test_joint_limits_reach_the_model() -> None:
 
 def test_limits_that_cannot_be_are_refused() -> None:
     with pytest.raises(SettingError, match=r"joint_limits: must be one pair per link \(3\), was 1"):
-        PlanarChain(link_lengths=(1.0, 1.0, 1.0), base_position=(0.0, 0.0), joint_limits=((0.0, 1.0),))
+        PlanarChain(
+            link_lengths=(1.0, 1.0, 1.0), base_position=(0.0, 0.0), joint_limits=((0.0, 1.0),)
+        )
     with pytest.raises(SettingError, match=r"joint_limits\[0\]: must be \[least, greatest\]"):
         PlanarChain(link_lengths=(1.0,), base_position=(0.0, 0.0), joint_limits=((1.0, 1.0),))

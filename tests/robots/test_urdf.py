@@ -1,4 +1,7 @@
-"""Robots out of a URDF: against Pinocchio's own reading, through two planners, and what is refused."""
+"""Robots out of a URDF: against Pinocchio's own reading, through two planners.
+
+And what is refused.
+"""
 
 import json
 import shutil
@@ -21,24 +24,30 @@ from evoexp.store.log_reader import read_log
 DATA = Path(__file__).parent / "data" / "ur5_like"
 URDF = DATA / "ur5_like.urdf"
 REACH = (
-    "robot=urdf", "scenario=urdf_reach", "planner=posture_es", "ga=corsepius", "objective=corsepius_reach",
+    "robot=urdf", "scenario=urdf_reach", "planner=posture_es", "ga=corsepius",
+    "objective=corsepius_reach",
     "collision=corsepius_spheres",
 )  # fmt: skip
 TWO = (
-    "robot=two_urdf", "scenario=urdf_two_arms", "planner=rana_puma", "ga=rana_puma", "objective=rana_puma",
+    "robot=two_urdf", "scenario=urdf_two_arms", "planner=rana_puma", "ga=rana_puma",
+    "objective=rana_puma",
     "collision=urdf_two_arms",
 )  # fmt: skip
 
 
 def condition(*overrides: str, base: tuple[str, ...] = REACH, path: Path = URDF) -> Condition:
-    found: Condition = compose.expand([*base, f"robot.path={path}", *overrides])[0].conditions[0].condition
+    found: Condition = (
+        compose.expand([*base, f"robot.path={path}", *overrides])[0].conditions[0].condition
+    )
     return found
 
 
 def test_tool_and_bodies_are_where_pinocchio_has_them() -> None:
     assembly = condition().robot.build()  # type: ignore[attr-defined]
     own = pin.buildModelFromUrdf(str(URDF))
-    geometry = pin.buildGeomFromUrdf(own, str(URDF), pin.GeometryType.COLLISION, package_dirs=[str(DATA.parent)])
+    geometry = pin.buildGeomFromUrdf(
+        own, str(URDF), pin.GeometryType.COLLISION, package_dirs=[str(DATA.parent)]
+    )
     data, placed = own.createData(), geometry.createData()
     again, moved = assembly.model.createData(), assembly.geometry.createData()
     tool = assembly.tools[0]
@@ -63,7 +72,9 @@ def test_identity_is_the_content_wherever_it_lies(tmp_path: Path) -> None:
     moved = tmp_path / "ur5_like" / "renamed.urdf"
     (tmp_path / "ur5_like" / "ur5_like.urdf").rename(moved)
     assert condition(path=moved).id == condition().id
-    (tmp_path / "ur5_like" / "hand.obj").write_text((DATA / "hand.obj").read_text().replace("0.04", "0.05"))
+    (tmp_path / "ur5_like" / "hand.obj").write_text(
+        (DATA / "hand.obj").read_text().replace("0.04", "0.05")
+    )
     assert condition(path=moved).id != condition().id
     assert str(tmp_path) not in condition(path=moved).to_json().decode()
 
@@ -101,8 +112,13 @@ def test_two_of_them_through_strings_of_via_points() -> None:
 
 
 def test_base_and_tool_frames_are_chosen_by_name() -> None:
-    moved = condition("robot.base_position=[1,0,0]", "robot.base_rotation=[0,0,90]", "robot.tool_frame=wrist_3_link")
-    assembly, plain = moved.robot.build(), condition("robot.tool_frame=wrist_3_link").robot.build()  # type: ignore[attr-defined]
+    moved = condition(
+        "robot.base_position=[1,0,0]",
+        "robot.base_rotation=[0,0,90]",
+        "robot.tool_frame=wrist_3_link",
+    )
+    assembly = moved.robot.build()  # type: ignore[attr-defined]
+    plain = condition("robot.tool_frame=wrist_3_link").robot.build()  # type: ignore[attr-defined]
     poses = []
     for one in (assembly, plain):
         tool = one.tools[0]
@@ -122,23 +138,33 @@ def written(tmp_path: Path, change: Any) -> Path:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda text: text[:300], "robot.path: must be XML with the root <robot>, was 'unclosed token: line 7"),
+        (
+            lambda text: text[:300],
+            "robot.path: must be XML with the root <robot>, was 'unclosed token: line 7",
+        ),
         (lambda text: "<sdf></sdf>", "robot.path: must be XML with the root <robot>, was '<sdf>'"),
         (
             lambda text: text.replace("hand.obj", "hnad.obj"),
-            "robot.path: must be a URDF whose meshes are there, was \"a missing mesh 'package://ur5_like/hnad.obj'\"",
+            'robot.path: must be a URDF whose meshes are there, was "a missing mesh '
+            "'package://ur5_like/hnad.obj'\"",
         ),
         (
-            lambda text: text.replace('"elbow_joint" type="revolute"', '"elbow_joint" type="continuous"'),
-            "robot.path: must be a URDF whose joints are revolute, prismatic or fixed; a continuous joint can be given",
+            lambda text: text.replace(
+                '"elbow_joint" type="revolute"', '"elbow_joint" type="continuous"'
+            ),
+            "robot.path: must be a URDF whose joints are revolute, prismatic or fixed; a "
+            "continuous joint can be given",
         ),
         (
-            lambda text: text.replace('"elbow_joint" type="revolute"', '"elbow_joint" type="floating"'),
+            lambda text: text.replace(
+                '"elbow_joint" type="revolute"', '"elbow_joint" type="floating"'
+            ),
             "was \"joint 'elbow_joint' of type floating\"",
         ),
         (
             lambda text: text.replace('<limit lower="-2.8" upper="2.8"', "<limit "),
-            "robot.joint_limits: must be given for every joint: postures are drawn between them, and margins rated",
+            "robot.joint_limits: must be given for every joint: postures are drawn between them, "
+            "and margins rated",
         ),
         (
             lambda text: text.replace('<child link="tool0"/>', '<child link="nothing"/>'),
@@ -156,15 +182,28 @@ def test_refusals(tmp_path: Path, change: Any, message: str) -> None:
 @pytest.mark.parametrize(
     ("overrides", "message"),
     [
-        (("robot.path=nowhere.urdf",), "robot.path: must be a file that can be read (no such file or directory)"),
+        (
+            ("robot.path=nowhere.urdf",),
+            "robot.path: must be a file that can be read (no such file or directory)",
+        ),
         (("robot.tool_frame=tool1",), "was 'tool1'; did you mean 'tool0'?"),
-        (("robot.tool_frame=base_link",), "robot.tool_frame: must be a frame that moves, was 'base_link'"),
-        (("robot.base_frame=tool0",), "robot.base_frame: must be a frame that does not move, was 'tool0'"),
+        (
+            ("robot.tool_frame=base_link",),
+            "robot.tool_frame: must be a frame that moves, was 'base_link'",
+        ),
+        (
+            ("robot.base_frame=tool0",),
+            "robot.base_frame: must be a frame that does not move, was 'tool0'",
+        ),
         (("robot.srdf=no.srdf",), "robot.srdf: must be a file that can be read"),
     ],
 )
 def test_frames_and_files_that_are_not_there(overrides: tuple[str, ...], message: str) -> None:
-    given = [*REACH, *(() if overrides[0].startswith("robot.path") else (f"robot.path={URDF}",)), *overrides]
+    given = [
+        *REACH,
+        *(() if overrides[0].startswith("robot.path") else (f"robot.path={URDF}",)),
+        *overrides,
+    ]
     with pytest.raises(EvoexpError) as found:
         compose.expand(given)[0].conditions[0].condition.prepare()
     assert message in str(found.value)

@@ -43,13 +43,22 @@ def test_a_map_in_space_has_one_block_per_z() -> None:
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        (b"....\n....\n", r"scenario\.map: must be a map of 4 × 3 nodes, as scenario\.size says, was '4 × 2'"),
-        (b"....\n..x.\n....", r"must be a map of \* or # \(blocked\) and \+ or \. \(free\), was 'x in row 2'"),
+        (
+            b"....\n....\n",
+            r"scenario\.map: must be a map of 4 × 3 nodes, as scenario\.size says, was '4 × 2'",
+        ),
+        (
+            b"....\n..x.\n....",
+            r"must be a map of \* or # \(blocked\) and \+ or \. \(free\), was 'x in row 2'",
+        ),
         (b"....\n..\n....", "equally long"),
         (b"", "equally long, was 'empty'"),
         (b"\xff\xfe", "a text or a PNG"),
         (b"\x89PNG\r\n\x1a\nnothing", "a PNG that can be read"),
-        (png([[255, 128, 0, 255]] * 3), r"black \(blocked\) and white \(free\) pixels, was 'grey 128'"),
+        (
+            png([[255, 128, 0, 255]] * 3),
+            r"black \(blocked\) and white \(free\) pixels, was 'grey 128'",
+        ),
     ],
 )
 def test_what_is_no_map_is_refused(content: bytes, said: str) -> None:
@@ -59,7 +68,10 @@ def test_what_is_no_map_is_refused(content: bytes, said: str) -> None:
 
 def test_blocks_and_map_add_up() -> None:
     scenario = GridMotion(**BASE, obstacles=((1, 1, 2, 1),), map=File(sha256=keep(TEXT)))
-    assert {tuple(node) for node in np.argwhere(scenario.blocked()).tolist()} == SEEN | {(1, 1), (2, 1)}
+    assert {tuple(node) for node in np.argwhere(scenario.blocked()).tolist()} == SEEN | {
+        (1, 1),
+        (2, 1),
+    }
     assert scenario.bodies()[0].size == (1.0, 0.02, 0.5)
     assert scenario.bodies()[0].center == (1.5, 1.0, 0.25)
 
@@ -67,11 +79,17 @@ def test_blocks_and_map_add_up() -> None:
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({"start": (4, 0)}, r"start: must be a node inside the grid \(0\.\.3 × 0\.\.2\), was \[4, 0\]"),
+        (
+            {"start": (4, 0)},
+            r"start: must be a node inside the grid \(0\.\.3 × 0\.\.2\), was \[4, 0\]",
+        ),
         ({"goal": (0, 0)}, "goal: must be another node than start"),
         ({"goal": (1, 1, 1)}, "goal: must be a node inside"),
         ({"obstacles": ((0, 0, 1),)}, "obstacles"),
-        ({"obstacles": ((2, 1, 1, 1),)}, r"obstacles\[0\]: must be from a lower to an upper corner"),
+        (
+            {"obstacles": ((2, 1, 1, 1),)},
+            r"obstacles\[0\]: must be from a lower to an upper corner",
+        ),
         ({"obstacles": ((0, 0, 4, 0),)}, r"obstacles\[0\]"),
     ],
 )
@@ -82,7 +100,9 @@ def test_what_does_not_fit_the_grid_is_refused(changed: dict[str, Any], said: st
 
 def test_start_and_goal_are_free() -> None:
     for name, corners in (("start", (0, 0, 1, 1)), ("goal", (3, 2, 3, 2))):
-        with pytest.raises(SettingError, match=rf"scenario\.{name}: must be a free node; an obstacle is there"):
+        with pytest.raises(
+            SettingError, match=rf"scenario\.{name}: must be a free node; an obstacle is there"
+        ):
             GridMotion(**BASE, obstacles=(corners,)).blocked()
 
 
@@ -92,7 +112,9 @@ def test_a_file_nobody_gave_is_missed() -> None:
 
 
 @given(st.sampled_from([(5, 6), (3, 3, 4)]), st.floats(0.0, 1.0), st.integers(0, 2**32))
-def test_blocks_cover_a_set_and_nothing_else(shape: tuple[int, ...], share: float, seed: int) -> None:
+def test_blocks_cover_a_set_and_nothing_else(
+    shape: tuple[int, ...], share: float, seed: int
+) -> None:
     nodes = np.random.default_rng(seed).random(shape) < share
     covered = np.zeros(shape, dtype=bool)
     for low, high in blocks(nodes):

@@ -24,7 +24,10 @@ def generations(num: int, seed: int = 0, reverse_terms: bool = False) -> list[Ge
             best_cost, best = 100.0 - index + rng.random(), rng.random(12)
         costs = rng.random(20)
         costs[::4] = math.inf
-        terms = {"length": rng.random() if index >= 3 else math.inf, "clearance": -math.inf if index < 2 else -0.0}
+        terms = {
+            "length": rng.random() if index >= 3 else math.inf,
+            "clearance": -math.inf if index < 2 else -0.0,
+        }
         terms["torque"] = math.nan if index == 1 else 1e-300
         found.append(
             Generation(
@@ -79,7 +82,10 @@ def summary(replicate: int = 7, **changes: Any) -> ReplicateSummary:
 
 
 def write(
-    written: Iterable[Generation], replicate: int = 7, fronts: Iterable[FrontRow] = (), **changes: Any
+    written: Iterable[Generation],
+    replicate: int = 7,
+    fronts: Iterable[FrontRow] = (),
+    **changes: Any,
 ) -> Finished:
     """Write a log of these generations."""
     rng = np.random.default_rng(5)

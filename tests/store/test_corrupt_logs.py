@@ -46,7 +46,11 @@ def test_cut_anywhere(reader: Reader, content: bytes) -> None:
 def test_altered_anywhere(reader: Reader, content: bytes) -> None:
     rng = np.random.default_rng(1)
     damaged = bytearray(content)
-    positions = range(len(content)) if reader is read_summary else rng.integers(len(content), size=1500).tolist()
+    positions = (
+        range(len(content))
+        if reader is read_summary
+        else rng.integers(len(content), size=1500).tolist()
+    )
     for position in positions:
         flip = int(rng.integers(1, 256))
         damaged[position] ^= flip
@@ -67,7 +71,9 @@ def foreign(checksums: bool) -> bytes:
     buffer = BytesIO()
     writer = Writer(buffer, enable_data_crcs=checksums)
     writer.start()
-    channel = writer.register_channel("/generation", "json", writer.register_schema("other", "jsonschema", b"{}"))
+    channel = writer.register_channel(
+        "/generation", "json", writer.register_schema("other", "jsonschema", b"{}")
+    )
     writer.add_message(channel, 0, b"{}", 0)
     writer.finish()
     return buffer.getvalue()
@@ -89,12 +95,16 @@ def test_the_file_is_named(tmp_path: Path, content: bytes) -> None:
 
 @pytest.mark.parametrize("reader", READERS)
 @pytest.mark.parametrize(("other", "age"), [(1, "an older"), (3, "a newer")])
-def test_other_schema_version(reader: Reader, monkeypatch: pytest.MonkeyPatch, other: int, age: str) -> None:
+def test_other_schema_version(
+    reader: Reader, monkeypatch: pytest.MonkeyPatch, other: int, age: str
+) -> None:
     monkeypatch.setattr(log_module, "SCHEMA_VERSION", other)
     foreign = write(generations(3)).content
     reader(foreign)
     monkeypatch.undo()
-    assert f"written by {age} evoexp: schema version {other}, this one reads 2" in refusal(reader, foreign)
+    assert f"written by {age} evoexp: schema version {other}, this one reads 2" in refusal(
+        reader, foreign
+    )
 
 
 def test_killed_before_finish() -> None:

@@ -20,7 +20,11 @@ def test_chain_is_the_documented_hash() -> None:
     assert chain.update(array_bytes(costs), array_bytes(best), chain.state()) == first.hex()
     rng.random()
     second = xxhash.xxh3_128(first + costs.tobytes() + best.tobytes() + state_bytes(bits)).digest()
-    assert chain.update(array_bytes(costs), array_bytes(best), chain.state()) == second.hex() != first.hex()
+    assert (
+        chain.update(array_bytes(costs), array_bytes(best), chain.state())
+        == second.hex()
+        != first.hex()
+    )
     assert chain.finish(population) == xxhash.xxh3_128_hexdigest(second + population.tobytes())
 
 
@@ -32,7 +36,9 @@ def test_state_bytes_follow_the_generator() -> None:
     for draw in (rng.random, lambda: rng.integers(5, dtype=np.uint32), lambda: bits.advance(2**80)):
         draw()
         state: Any = bits.state
-        words = state["state"]["state"].to_bytes(16, "little") + state["state"]["inc"].to_bytes(16, "little")
+        words = state["state"]["state"].to_bytes(16, "little") + state["state"]["inc"].to_bytes(
+            16, "little"
+        )
         expected = words + struct.pack("<II", state["has_uint32"], state["uinteger"])
         assert fast() == state_bytes(bits) == expected
         halves.append(state["has_uint32"])
@@ -42,7 +48,9 @@ def test_state_bytes_follow_the_generator() -> None:
 def test_the_fast_reading_of_the_state_is_in_use() -> None:
     from evoexp.store.digests import _layout_is_known
 
-    assert _layout_is_known(), "numpy changed the layout of PCG64: results stay right, each generation costs 2 µs more"
+    assert _layout_is_known(), (
+        "numpy changed the layout of PCG64: results stay right, each generation costs 2 µs more"
+    )
 
 
 def test_other_generators_are_refused() -> None:
@@ -51,10 +59,14 @@ def test_other_generators_are_refused() -> None:
 
 
 def test_every_nan_is_one_and_zeros_keep_their_sign() -> None:
-    payloads = np.array([0x7FF8000000000000, 0xFFF8000000000001, 0x7FF0000000000123], dtype=np.uint64)
+    payloads = np.array(
+        [0x7FF8000000000000, 0xFFF8000000000001, 0x7FF0000000000123], dtype=np.uint64
+    )
     arrays = [np.array([1.0, np.inf, payload]) for payload in payloads.view(np.float64)]
     assert np.isnan([array[2] for array in arrays]).all()
-    assert {array_bytes(array) for array in arrays} == {struct.pack("<ddQ", 1.0, np.inf, 0x7FF8000000000000)}
+    assert {array_bytes(array) for array in arrays} == {
+        struct.pack("<ddQ", 1.0, np.inf, 0x7FF8000000000000)
+    }
     assert array_bytes(np.array([-0.0])) != array_bytes(np.array([0.0]))
 
 

@@ -28,7 +28,9 @@ def same(one: object, other: object) -> bool:
     if isinstance(one, tuple) and isinstance(other, tuple):
         return len(one) == len(other) and all(map(same, one, other))
     if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
-        return one.shape == other.shape and same(tuple(one.ravel().tolist()), tuple(other.ravel().tolist()))
+        return one.shape == other.shape and same(
+            tuple(one.ravel().tolist()), tuple(other.ravel().tolist())
+        )
     return type(one) is type(other) and one == other
 
 
@@ -38,7 +40,11 @@ def test_round_trip(tmp_path: Path) -> None:
     path = tmp_path / "0007.mcap"
     path.write_bytes(finished.content)
     contents = read_log(path)
-    assert (contents.condition_id, contents.config_json, contents.replicate) == (CONDITION, CONFIG, 7)
+    assert (contents.condition_id, contents.config_json, contents.replicate) == (
+        CONDITION,
+        CONFIG,
+        7,
+    )
     assert (contents.attachments, contents.environment) == ({"map.txt": b"\x00\xff"}, ENVIRONMENT)
     assert same(contents.summary, finished.summary)
     assert len(contents.generations) == len(given)
@@ -61,19 +67,27 @@ def test_a_solution_is_written_for_the_first_and_each_strictly_better_one() -> N
     given = generations(30)
     solutions = read_log(write(given).content).solutions
     costs = [generation.best_cost for generation in given]
-    improved = [index for index, cost in enumerate(costs) if index == 0 or cost < min(costs[:index])]
+    improved = [
+        index for index, cost in enumerate(costs) if index == 0 or cost < min(costs[:index])
+    ]
     assert [row.generation for row in solutions] == improved
     assert all(same(row.values, given[row.generation].best) for row in solutions)
     assert [row.cost for row in solutions] == [costs[index] for index in improved]
 
 
 @pytest.mark.parametrize("changes", [{"best": np.full(12, math.nan)}, {"best_cost": 1e6}])
-def test_the_last_solution_is_written_even_where_it_is_no_better(changes: dict[str, object]) -> None:
+def test_the_last_solution_is_written_even_where_it_is_no_better(
+    changes: dict[str, object],
+) -> None:
     given = generations(10)
     given[-1] = given[-1]._replace(**changes)  # type: ignore[arg-type]
     finished = write(given)
     last = read_solution(finished.content)
-    assert last.generation == 9 and last.cost == given[-1].best_cost and same(last.values, given[-1].best)
+    assert (
+        last.generation == 9
+        and last.cost == given[-1].best_cost
+        and same(last.values, given[-1].best)
+    )
     assert same(last, read_log(finished.content).solutions[-1])
 
 
@@ -134,7 +148,9 @@ def test_other_readers_of_mcap_find_their_way() -> None:
     assert index is not None and len(index.chunk_indexes) > 1
     assert max(chunk.uncompressed_size for chunk in index.chunk_indexes) <= 64 * 1024
     assert {chunk.compression for chunk in index.chunk_indexes} == {"zstd"}
-    names = {index.schemas[channel.schema_id].name: channel.topic for channel in index.channels.values()}
+    names = {
+        index.schemas[channel.schema_id].name: channel.topic for channel in index.channels.values()
+    }
     assert names == {
         "evoexp.Generation": "/generation",
         "evoexp.Solution": "/solution",
@@ -147,15 +163,22 @@ def test_other_readers_of_mcap_find_their_way() -> None:
         assert set(row) == set(orjson.loads(schema.data)["properties"])
     ticks = [message.log_time for _, _, message in reader.iter_messages(topics="/generation")]
     assert ticks == [index * 10**9 for index in range(400)]
-    assert [m.sequence for _, _, m in reader.iter_messages(topics="/generation")] == list(range(400))
+    assert [m.sequence for _, _, m in reader.iter_messages(topics="/generation")] == list(
+        range(400)
+    )
 
 
 def test_nonfinite_is_there_only_when_needed() -> None:
     reader = make_reader(BytesIO(write(generations(10)).content))
-    rows = [orjson.loads(message.data) for _, _, message in reader.iter_messages(topics="/generation")]
+    rows = [
+        orjson.loads(message.data) for _, _, message in reader.iter_messages(topics="/generation")
+    ]
     assert [index for index, row in enumerate(rows) if "nonfinite" in row] == [0, 1, 2]
     assert rows[1]["nonfinite"]["term_torque"] == "nan" and rows[1]["term_torque"] is None
-    assert rows[1]["nonfinite"]["best_cost"] == "inf" and rows[1]["nonfinite"]["term_clearance"] == "-inf"
+    assert (
+        rows[1]["nonfinite"]["best_cost"] == "inf"
+        and rows[1]["nonfinite"]["term_clearance"] == "-inf"
+    )
 
 
 def test_misuse_is_refused() -> None:
@@ -171,7 +194,10 @@ def test_misuse_is_refused() -> None:
 
 
 def test_log_imports_no_tables() -> None:
-    code = "import sys, evoexp.store.log, evoexp.store.log_reader, evoexp.store.run_directory, evoexp.store.manifest\n"
+    code = (
+        "import sys, evoexp.store.log, evoexp.store.log_reader, evoexp.store.run_directory, "
+        "evoexp.store.manifest\n"
+    )
     code += "assert not {'pandas', 'pyarrow', 'numba', 'scipy', 'pinocchio'} & set(sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

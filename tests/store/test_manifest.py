@@ -34,8 +34,12 @@ def test_git_state_never_raises(monkeypatch: pytest.MonkeyPatch) -> None:
     assert git_state.__wrapped__() in (None, {"commit": None, "dirty": None})
 
 
-def test_an_installed_package_has_no_git_state(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(module, "__file__", str(tmp_path / "lib" / "evoexp" / "store" / "manifest.py"))
+def test_an_installed_package_has_no_git_state(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(
+        module, "__file__", str(tmp_path / "lib" / "evoexp" / "store" / "manifest.py")
+    )
     assert git_state.__wrapped__() is None
 
 
@@ -64,7 +68,12 @@ def test_differences() -> None:
         "cpu": {"features": ["avx", "avx2"]},
         "git": None,
     }
-    now = {"condition": "b", "versions": {"numpy": "2.4.6"}, "cpu": {"features": ["avx", "fma"]}, "extra": {"x": 1}}
+    now = {
+        "condition": "b",
+        "versions": {"numpy": "2.4.6"},
+        "cpu": {"features": ["avx", "fma"]},
+        "extra": {"x": 1},
+    }
     found = differences(was, now)
     assert found == [
         Difference("cpu.features", ["avx2"], ["fma"]),

@@ -17,7 +17,14 @@ from evoexp.errors import AmbiguousHash, Busy, EvoexpError, UnknownHash
 from evoexp.store.files import NUM_THREADS
 from evoexp.store.log import Finished
 from evoexp.store.log_reader import read_log
-from evoexp.store.run_directory import RunDirectory, StoreError, find_runs, lock_all, outputs_root, resolve
+from evoexp.store.run_directory import (
+    RunDirectory,
+    StoreError,
+    find_runs,
+    lock_all,
+    outputs_root,
+    resolve,
+)
 
 HOLD = """
     import sys, time
@@ -104,7 +111,10 @@ def test_a_failed_write_leaves_nothing(run: RunDirectory, monkeypatch: pytest.Mo
 def test_nothing_gets_its_name_before_its_bytes_are_on_the_disk(
     run: RunDirectory, monkeypatch: pytest.MonkeyPatch, count: int
 ) -> None:
-    """What a machine that loses its power keeps is what was synced: every file before the first name, names after."""
+    """What a machine that loses its power keeps is what was synced.
+
+    Every file before the first name, names after.
+    """
     events: list[tuple[str, str]] = []
     fsync, replace = os.fsync, os.replace
 
@@ -124,7 +134,9 @@ def test_nothing_gets_its_name_before_its_bytes_are_on_the_disk(
     assert [kind for kind, _ in events] == ["sync"] * count + ["rename"] * count + ["sync"]
     assert sorted(path for _, path in events[:count]) == sorted(renamed), "each file itself"
     assert events[-1] == ("sync", str(run.replicates)), "then their names"
-    assert [run.log_path(k).read_bytes() for k in range(count)] == [bytes([k]) * 1000 for k in range(count)]
+    assert [run.log_path(k).read_bytes() for k in range(count)] == [
+        bytes([k]) * 1000 for k in range(count)
+    ]
 
 
 def test_killed_while_writing_leaves_whole_files(
@@ -162,7 +174,9 @@ def test_the_lock_dies_with_its_process(run: RunDirectory, tmp_path: Path) -> No
 
 
 def test_lock_all_releases_what_it_took(tmp_path: Path) -> None:
-    runs = sorted((create(tmp_path, bytes([65 + k])) for k in range(4)), key=lambda run: run.condition_id)
+    runs = sorted(
+        (create(tmp_path, bytes([65 + k])) for k in range(4)), key=lambda run: run.condition_id
+    )
     process = start(HOLD, str(tmp_path), runs[2].condition_id)
     try:
         with pytest.raises(Busy, match=runs[2].hash12), lock_all(reversed(runs)):
@@ -197,7 +211,12 @@ def test_damage_is_named(run: RunDirectory, tmp_path: Path) -> None:
         run.manifest()
     (run.path / "config.json").write_bytes(CONFIG[:-1])
     damaged = r"config\.json: damaged"
-    for action in (run.check, run.config_json, lambda: run.create(CONFIG, {}), lambda: find_runs(tmp_path)):
+    for action in (
+        run.check,
+        run.config_json,
+        lambda: run.create(CONFIG, {}),
+        lambda: find_runs(tmp_path),
+    ):
         with pytest.raises(StoreError, match=damaged):
             action()
     with pytest.raises(StoreError, match=damaged):
@@ -215,14 +234,19 @@ def test_prefixes(tmp_path: Path) -> None:
     assert [run.condition_id for run in stored] == sorted(run.condition_id for run in runs)
     for run in runs:
         for length in (12, 13, 64):
-            assert resolve(tmp_path, run.condition_id[:length].upper()).condition_id == run.condition_id
+            assert (
+                resolve(tmp_path, run.condition_id[:length].upper()).condition_id
+                == run.condition_id
+            )
     digits = [run.condition_id[0] for run in runs]
     shared = next(digit for digit in digits if digits.count(digit) > 1)
     alone = next(digit for digit in digits if digits.count(digit) == 1)
     assert resolve(tmp_path, alone).condition_id[0] == alone
     with pytest.raises(AmbiguousHash) as caught:
         resolve(tmp_path, shared)
-    assert caught.value.candidates == sorted(run.hash12 for run in runs if run.condition_id[0] == shared)
+    assert caught.value.candidates == sorted(
+        run.hash12 for run in runs if run.condition_id[0] == shared
+    )
 
 
 def test_unknown_prefixes_say_what_there_is(tmp_path: Path) -> None:

@@ -57,18 +57,35 @@ def test_done_and_failed_rows(run: RunDirectory, add: Add) -> None:
     ]
     first, second, failed = table.to_pylist()
     assert (first["replicate"], first["status"], first["best_cost"]) == (0, "done", math.inf)
-    assert (first["term_length"], first["term_torque"], first["first_feasible_generation"]) == (-math.inf, None, None)
-    assert math.isnan(second["best_cost"]) and math.isnan(second["term_torque"]) and second["solved"] is True
+    assert (first["term_length"], first["term_torque"], first["first_feasible_generation"]) == (
+        -math.inf,
+        None,
+        None,
+    )
+    assert (
+        math.isnan(second["best_cost"])
+        and math.isnan(second["term_torque"])
+        and second["solved"] is True
+    )
     given = {name for name, value in failed.items() if value is not None}
     assert given == {"condition", "replicate", "status", "stop_reason"}
-    assert (failed["replicate"], failed["status"], failed["stop_reason"]) == (2, "failed", "ValueError: no")
+    assert (failed["replicate"], failed["status"], failed["stop_reason"]) == (
+        2,
+        "failed",
+        "ValueError: no",
+    )
     kinds = {field.name: str(field.type) for field in table.schema}
     assert kinds["best_cost"] == kinds["term_torque"] == "double" and kinds["solved"] == "bool"
-    assert kinds["evaluations"] == kinds["first_feasible_generation"] == "int64" and kinds["digest"] == "string"
+    assert (
+        kinds["evaluations"] == kinds["first_feasible_generation"] == "int64"
+        and kinds["digest"] == "string"
+    )
     assert pq.ParquetFile(run.summary_path).metadata.row_group(0).column(0).compression == "ZSTD"
 
 
-def test_more_replicates_read_only_themselves(run: RunDirectory, add: Add, reads: list[str]) -> None:
+def test_more_replicates_read_only_themselves(
+    run: RunDirectory, add: Add, reads: list[str]
+) -> None:
     for replicate in (0, 1, 2):
         add(replicate)
     run.write_failure(4, "x", "")
@@ -86,10 +103,15 @@ def test_more_replicates_read_only_themselves(run: RunDirectory, add: Add, reads
     assert [row["status"] for row in incremental.to_pylist()] == ["done"] * 5
 
 
-def test_what_was_just_written_is_not_read_again(run: RunDirectory, add: Add, reads: list[str]) -> None:
+def test_what_was_just_written_is_not_read_again(
+    run: RunDirectory, add: Add, reads: list[str]
+) -> None:
     add(0)
     write_summary(run)
-    written = {1: add(1, best_cost=math.nan, terms={"new": -math.inf}).summary, 2: add(2, solved=True).summary}
+    written = {
+        1: add(1, best_cost=math.nan, terms={"new": -math.inf}).summary,
+        2: add(2, solved=True).summary,
+    }
     table = write_summary(run, written)
     assert reads == ["0000.mcap"]
     run.summary_path.unlink()
@@ -123,7 +145,9 @@ def test_a_term_that_no_row_has_any_more_is_dropped(run: RunDirectory, add: Add)
     assert "term_old" not in write_summary(run).column_names
 
 
-def test_a_table_with_other_columns_is_rebuilt(run: RunDirectory, add: Add, reads: list[str]) -> None:
+def test_a_table_with_other_columns_is_rebuilt(
+    run: RunDirectory, add: Add, reads: list[str]
+) -> None:
     add(0)
     expected = write_summary(run)
     pq.write_table(expected.drop_columns("solved"), run.summary_path)
@@ -152,7 +176,9 @@ def test_any_flipped_byte_of_the_table_changes_no_row(run: RunDirectory, add: Ad
         pd.testing.assert_frame_equal(read_summaries(run), expected)
 
 
-def test_read_summaries_rebuilds_what_is_stale_or_missing(run: RunDirectory, add: Add, reads: list[str]) -> None:
+def test_read_summaries_rebuilds_what_is_stale_or_missing(
+    run: RunDirectory, add: Add, reads: list[str]
+) -> None:
     add(0)
     assert list(read_summaries(run)["replicate"]) == [0]
     assert run.summary_path.exists()
@@ -163,7 +189,9 @@ def test_read_summaries_rebuilds_what_is_stale_or_missing(run: RunDirectory, add
     assert reads == ["0000.mcap", "0001.mcap"]
 
 
-def test_read_summaries_writes_nothing_where_another_writes(run: RunDirectory, add: Add, tmp_path: Path) -> None:
+def test_read_summaries_writes_nothing_where_another_writes(
+    run: RunDirectory, add: Add, tmp_path: Path
+) -> None:
     add(0)
     with RunDirectory(tmp_path, CONDITION).lock():
         assert len(read_summaries(run)) == 1
@@ -209,13 +237,24 @@ def test_read_generations(run: RunDirectory, add: Add, tmp_path: Path) -> None:
     run.write_log(2, write(given, 2).content)
     frame = read_generations([run])
     assert frame.columns[:3].tolist() == ["condition", "replicate", "index"]
-    assert frame.columns[-4:].tolist() == ["term_clearance", "term_length", "term_other", "term_torque"]
+    assert frame.columns[-4:].tolist() == [
+        "term_clearance",
+        "term_length",
+        "term_other",
+        "term_torque",
+    ]
     assert frame["replicate"].tolist() == [0] * 6 + [1] * 6 + [2] * 4
     assert frame["condition"].astype(str).unique().tolist() == [CONDITION]
     expected: list[Any] = [g.best_cost for k in (0, 1) for g in generations(6, seed=k)]
     assert frame["best_cost"].tolist()[:12] == expected
-    assert frame["term_other"].tolist()[12:] == [0.0, 1.0, 2.0, 3.0] and frame["term_other"][:12].isna().all()
-    assert frame["solved"].tolist()[:6] == [False] * 3 + [True] * 3 and frame.dtypes["solved"] == np.bool_
+    assert (
+        frame["term_other"].tolist()[12:] == [0.0, 1.0, 2.0, 3.0]
+        and frame["term_other"][:12].isna().all()
+    )
+    assert (
+        frame["solved"].tolist()[:6] == [False] * 3 + [True] * 3
+        and frame.dtypes["solved"] == np.bool_
+    )
     assert frame.dtypes["evaluations"] == np.int64 and frame.dtypes["mean_cost"] == np.float64
 
 
@@ -226,13 +265,18 @@ def test_only_the_replicates_asked_for_are_read(
         add(replicate)
     names: list[str] = []
     read = tables.generation_columns
-    monkeypatch.setattr(tables, "generation_columns", lambda path: names.append(path.name) or read(path))  # type: ignore[func-returns-value]
+    monkeypatch.setattr(
+        tables, "generation_columns", lambda path: names.append(path.name) or read(path)
+    )  # type: ignore[func-returns-value]
     assert read_generations(run, [3, 1, 9])["replicate"].unique().tolist() == [1, 3]
     assert names == ["0001.mcap", "0003.mcap"]
 
 
 def test_reading_generations_takes_the_memory_of_their_table(run: RunDirectory) -> None:
-    """Logs are looked at one by one, and no column is there twice: thousands need no more than their numbers."""
+    """Logs are looked at one by one, and no column is there twice.
+
+    Thousands need no more than their numbers.
+    """
     content = write(generations(60)).content
     for replicate in range(200):
         run.log_path(replicate).write_bytes(content)
@@ -243,4 +287,6 @@ def test_reading_generations_takes_the_memory_of_their_table(run: RunDirectory) 
     tracemalloc.stop()
     table = int(frame.memory_usage(index=False).sum())
     assert len(frame) == 200 * 60 and table > 1_000_000
-    assert peak < 1.5 * table + 500_000, "besides the table one column, one log, and an object per array"
+    assert peak < 1.5 * table + 500_000, (
+        "besides the table one column, one log, and an object per array"
+    )

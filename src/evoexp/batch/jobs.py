@@ -1,4 +1,7 @@
-"""Replicates as tasks: a description goes out, what became of it comes back. All that a worker process loads."""
+"""Replicates as tasks: a description goes out, what became of it comes back.
+
+All that a worker process loads.
+"""
 
 import contextlib
 import functools
@@ -67,7 +70,8 @@ def run_jobs(jobs: Sequence[Job]) -> list[Outcome]:
     """Run some replicates, here, one after the other; a failure is an outcome.
 
     Returns:
-        Their outcomes; of fewer than were asked for if they take longer than `LONGEST_TASK_S`, of one at least.
+        Their outcomes; of fewer than were asked for if they take longer than `LONGEST_TASK_S`, of
+        one at least.
     """
     outcomes: list[Outcome] = []
     begun = time.perf_counter()
@@ -78,17 +82,26 @@ def run_jobs(jobs: Sequence[Job]) -> list[Outcome]:
         try:
             keep_all(job.files)
             condition = _condition(job.condition_json)
-            (content, summary), reason, trace = run_replicate(condition, job.replicate, job.condition_json), "", ""
+            (content, summary), reason, trace = (
+                run_replicate(condition, job.replicate, job.condition_json),
+                "",
+                "",
+            )
         except Exception as error:
             content, summary, trace = b"", None, traceback.format_exc()
             reason = f"{type(error).__name__}: {error}".splitlines()[0]
         seconds = time.perf_counter() - start
-        outcomes.append(Outcome(job.condition_id, job.replicate, reason, trace, content, seconds, summary))
+        outcomes.append(
+            Outcome(job.condition_id, job.replicate, reason, trace, content, seconds, summary)
+        )
     return outcomes
 
 
 def load(config_jsons: Sequence[bytes], files: Sequence[bytes] = ()) -> None:
-    """Load what some conditions need, code and compiled kernels; what is wrong with one is said by its jobs."""
+    """Load what some conditions need, code and compiled kernels.
+
+    What is wrong with one is said by its jobs.
+    """
     keep_all(files)
     for config_json in config_jsons:
         with contextlib.suppress(Exception):
@@ -97,5 +110,8 @@ def load(config_jsons: Sequence[bytes], files: Sequence[bytes] = ()) -> None:
 
 @functools.lru_cache(maxsize=64)
 def _condition(config_json: bytes) -> Condition:
-    """Return the condition of a canonical form; checking it takes as long as a short run, hence once per process."""
+    """Return the condition of a canonical form.
+
+    Checking it takes as long as a short run, hence once per process.
+    """
     return Condition.from_json(config_json)

@@ -1,6 +1,7 @@
 """Runs stored replicates again and compares: MATCH, or the first generation that differs.
 
-References are compared by their numbers, to `TOLERANCE`: libraries compute them that are not reproducible bit by bit.
+References are compared by their numbers, to `TOLERANCE`: libraries compute them that are not
+reproducible bit by bit.
 """
 
 import math
@@ -19,7 +20,9 @@ from evoexp.store.log import ARRAY
 from evoexp.store.log_reader import LogContents, decode_array, read_log
 from evoexp.store.manifest import differences, environment
 
-TOLERANCE = 1e-9  # [-] by which numbers of a reference may differ: of their size, or absolutely where they are below 1
+# [-] by which numbers of a reference may differ: of their size, or absolutely where they are below
+# 1
+TOLERANCE = 1e-9
 _COST = "cost "  # what stands in the place of a reference's digest begins with it
 
 
@@ -33,8 +36,8 @@ class Comparison(NamedTuple):
         digest_matches: Whether the ends of both chains agree (they include the last population).
         num_generations: Generations compared, the initial one included.
         environment: Differences between then and now, one line each.
-        farthest: Of a reference, instead of the chains: the number that differs most, and by how much; None: no
-            reference.
+        farthest: Of a reference, instead of the chains: the number that differs most, and by how
+            much; None: no reference.
     """
 
     condition_id: str
@@ -58,7 +61,9 @@ class Comparison(NamedTuple):
         if self.farthest is not None:
             name, difference = self.farthest
             if self.matches:
-                return f"MATCH to {TOLERANCE:g}" + (f" (at most {difference:.1e}, {name})" if difference else "")
+                return f"MATCH to {TOLERANCE:g}" + (
+                    f" (at most {difference:.1e}, {name})" if difference else ""
+                )
             return f"DIVERGES by {difference:.1e} in {name}"
         if self.matches:
             return "MATCH"
@@ -79,7 +84,8 @@ def reproduce_log(path: Path) -> Comparison:
     condition = Condition.from_json(stored.config_json)
     if condition.id != stored.condition_id:
         raise CorruptLog(
-            f"{path}: its configuration has hash {condition.id[:12]}, it claims {stored.condition_id[:12]}"
+            f"{path}: its configuration has hash {condition.id[:12]}, it claims "
+            f"{stored.condition_id[:12]}"
         )
     again = read_log(run_replicate(condition, stored.replicate).content)
     found = compare(stored, again)
@@ -99,7 +105,10 @@ def compare(stored: LogContents, again: LogContents) -> Comparison:
 
 
 def first_divergence(stored: list[GenerationRow], again: list[GenerationRow]) -> int | None:
-    """Return the index of the first generation that differs or is missing on one side; None if there is none."""
+    """Return the index of the first generation that differs or is missing on one side.
+
+    None if there is none.
+    """
     for before, now in zip(stored, again, strict=False):
         if before.chain != now.chain:
             return before.index
@@ -110,7 +119,10 @@ def first_divergence(stored: list[GenerationRow], again: list[GenerationRow]) ->
 
 
 def farthest(stored: LogContents, again: LogContents) -> tuple[str, float]:
-    """Return which number of a reference differs most from that of its re-execution, and by how much [-]."""
+    """Return which number of a reference differs most from that of its re-execution.
+
+    And by how much [-].
+    """
     before, now = dict(_numbers(stored)), dict(_numbers(again))
     if unmatched := sorted(before.keys() ^ now.keys()):
         return unmatched[0], math.inf
@@ -119,9 +131,12 @@ def farthest(stored: LogContents, again: LogContents) -> tuple[str, float]:
 
 
 def difference(one: Any, two: Any) -> float:
-    """Return by how much two numbers or arrays differ at most, in units of their size, or of 1 below it.
+    """Return by how much two numbers or arrays differ at most, in units of their size.
 
-    Two infinities of one sign, and two NaN, do not differ; those of one array only differ by inf, as do other shapes.
+    Or of 1 below it.
+
+    Two infinities of one sign, and two NaN, do not differ; those of one array only differ by inf,
+    as do other shapes.
     """
     a, b = np.asarray(one, dtype=np.float64), np.asarray(two, dtype=np.float64)
     if a.shape != b.shape:
@@ -136,25 +151,40 @@ def difference(one: Any, two: Any) -> float:
 
 
 def fingerprint(condition: Condition, summary: ReplicateSummary) -> str:
-    """Return what the shipped table keeps of a first replicate: its digest, of a reference its cost."""
+    """Return what the shipped table keeps of a first replicate.
+
+    Its digest, of a reference its cost.
+    """
     return f"{_COST}{summary.best_cost!r}" if condition.is_reference else summary.digest
 
 
 def same_fingerprint(one: str, two: str) -> bool:
-    """Return whether two fingerprints agree: digests to the bit, costs of references to `TOLERANCE`."""
+    """Return whether two fingerprints agree.
+
+    Digests to the bit, costs of references to `TOLERANCE`.
+    """
     if one.startswith(_COST) and two.startswith(_COST):
-        return difference(float(one.removeprefix(_COST)), float(two.removeprefix(_COST))) <= TOLERANCE
+        return (
+            difference(float(one.removeprefix(_COST)), float(two.removeprefix(_COST))) <= TOLERANCE
+        )
     return one == two
 
 
 def _numbers(log: LogContents) -> Iterator[tuple[str, Any]]:
     """Yield every number that a reference's log holds: cost, terms, solution, arrays.
 
-    Neither times nor counts of evaluations: rounding decides how many steps a library takes to the same end.
+    Neither times nor counts of evaluations: rounding decides how many steps a library takes to the
+    same end.
     """
     summary, last = log.summary, log.generations[-1]
     yield from (("cost", summary.best_cost), ("solved", summary.solved))
     yield from (("clearance", summary.clearance), ("feasible", last.num_feasible))
-    yield from ((f"term {name}", value) for name, value in summary.terms.items() if not name.endswith("evaluations"))
+    yield from (
+        (f"term {name}", value)
+        for name, value in summary.terms.items()
+        if not name.endswith("evaluations")
+    )
     yield "solution", log.solutions[-1].values
-    yield from ((name, decode_array(data)) for name, data in log.attachments.items() if name.endswith(ARRAY))
+    yield from (
+        (name, decode_array(data)) for name, data in log.attachments.items() if name.endswith(ARRAY)
+    )

@@ -1,7 +1,9 @@
-"""Runs the missing replicates of conditions: fans them out, writes what comes back, resumes what was cut off.
+"""Runs the missing replicates of conditions.
 
-Descriptions go out and bytes come back; only the calling process writes. A finished log is the only mark of completion,
-so an interrupted batch is resumed by asking for it again.
+Fans them out, writes what comes back, resumes what was cut off.
+
+Descriptions go out and bytes come back; only the calling process writes. A finished log is the only
+mark of completion, so an interrupted batch is resumed by asking for it again.
 """
 
 import contextlib
@@ -29,7 +31,8 @@ from evoexp.store.manifest import manifest
 from evoexp.store.run_directory import RunDirectory, create_all, lock_all
 from evoexp.store.summaries import write_summary
 
-TASK_S = 0.2  # [s] replicates are bundled into tasks of about this length; a task costs the parent some 2 ms
+# [s] replicates are bundled into tasks of about this length; a task costs the parent some 2 ms
+TASK_S = 0.2
 MAX_BUNDLE = 64  # replicates per task at most, so that results keep streaming
 _NUMBER = re.compile(r"-?\d+(\.\d+)?([eE][-+]?\d+)?")
 
@@ -51,7 +54,8 @@ class Batch:
         """Plan; nothing is written yet.
 
         Args:
-            conditions: (condition, number of replicates, notes for the manifest of a new run); one may occur twice.
+            conditions: (condition, number of replicates, notes for the manifest of a new run); one
+                may occur twice.
             settings: How to fan out.
             outputs: Root of all outputs.
         """
@@ -59,7 +63,11 @@ class Batch:
         self._wanted: dict[str, tuple[Condition, int, dict[str, Any]]] = {}
         for condition, count, notes in conditions:
             known = self._wanted.get(condition.id)
-            self._wanted[condition.id] = (condition, max(count, known[1] if known else 0), known[2] if known else notes)
+            self._wanted[condition.id] = (
+                condition,
+                max(count, known[1] if known else 0),
+                known[2] if known else notes,
+            )
         self.runs = {key: RunDirectory(outputs, key) for key in self._wanted}
         self.jobs = self._missing()
         self._finished: dict[str, dict[int, ReplicateSummary]] = {}  # by this batch, per condition
@@ -75,7 +83,9 @@ class Batch:
             condition.prepare()
 
     def run(self) -> Generator[Outcome, None, None]:
-        """Run what is missing; yield every outcome once it is stored. Closing the iterator keeps what is finished.
+        """Run what is missing; yield every outcome once it is stored.
+
+        Closing the iterator keeps what is finished.
 
         Raises:
             Busy: If another process writes one of the runs.
@@ -87,7 +97,10 @@ class Batch:
             files = list(dict.fromkeys(content for job in self.jobs for content in job.files))
             with loading(num_workers, load, config_jsons, files):
                 wanted = ((run, *self._wanted[key]) for key, run in self.runs.items())
-                create_all((run, own.to_json(), manifest(own.id) | notes, own.files()) for run, own, _, notes in wanted)
+                create_all(
+                    (run, own.to_json(), manifest(own.id) | notes, own.files())
+                    for run, own, _, notes in wanted
+                )
                 _compile(config_jsons)
             try:
                 for outcomes in fan_out(self.jobs, num_workers):
@@ -98,11 +111,15 @@ class Batch:
 
     def _missing(self) -> list[Job]:
         jobs = []
-        first = sorted(self._wanted.items(), key=lambda item: not item[1][0].is_reference)  # the longest replicates
+        first = sorted(
+            self._wanted.items(), key=lambda item: not item[1][0].is_reference
+        )  # the longest replicates
         for key, (condition, count, _) in first:
             config_json, done = condition.to_json(), self.runs[key].completed()
             files = tuple(condition.files().values())
-            jobs += [Job(key, config_json, index, files) for index in range(count) if index not in done]
+            jobs += [
+                Job(key, config_json, index, files) for index in range(count) if index not in done
+            ]
         return jobs
 
     def _store(self, outcomes: Sequence[Outcome]) -> list[Outcome]:
@@ -113,7 +130,9 @@ class Batch:
                 run.write_failure(outcome.replicate, outcome.reason, outcome.traceback)
             else:
                 by_run.setdefault(outcome.condition_id, {})[outcome.replicate] = outcome.content
-                self._finished.setdefault(outcome.condition_id, {})[outcome.replicate] = outcome.summary
+                self._finished.setdefault(outcome.condition_id, {})[outcome.replicate] = (
+                    outcome.summary
+                )
         for key, contents in by_run.items():
             self.runs[key].write_logs(contents)
             if len(self._finished[key]) == self._wanted[key][1]:  # now, while the workers go on
@@ -130,8 +149,8 @@ class Batch:
 def fan_out(jobs: Sequence[Job], num_workers: int) -> Iterator[list[Outcome]]:
     """Run jobs in worker processes; yield outcomes as they come.
 
-    A worker that dies takes the pool with it, and everything in flight: each of those jobs then runs alone, so that
-    only the one that kills its worker fails; the others go on in a new pool.
+    A worker that dies takes the pool with it, and everything in flight: each of those jobs then
+    runs alone, so that only the one that kills its worker fails; the others go on in a new pool.
     """
     waiting = deque(jobs)
     while waiting:
@@ -141,7 +160,9 @@ def fan_out(jobs: Sequence[Job], num_workers: int) -> Iterator[list[Outcome]]:
         in_flight: dict[tuple[str, int], Job] = {}
         bundles = _Bundles(waiting, in_flight, num_workers)
         try:
-            for outcomes in in_workers(num_workers, (joblib.delayed(run_jobs)(bundle) for bundle in bundles)):
+            for outcomes in in_workers(
+                num_workers, (joblib.delayed(run_jobs)(bundle) for bundle in bundles)
+            ):
                 bundles.took(outcomes)
                 yield outcomes
         except TerminatedWorkerError:
@@ -152,11 +173,13 @@ def fan_out(jobs: Sequence[Job], num_workers: int) -> Iterator[list[Outcome]]:
 class _Bundles:
     """Takes waiting jobs into tasks of about `TASK_S`, by the times seen of late.
 
-    Before any is seen, tasks are long, and end when they take too long: replicates that need the same library stand
-    together, and are best run where it is loaded.
+    Before any is seen, tasks are long, and end when they take too long: replicates that need the
+    same library stand together, and are best run where it is loaded.
     """
 
-    def __init__(self, waiting: deque[Job], in_flight: dict[tuple[str, int], Job], num_workers: int) -> None:
+    def __init__(
+        self, waiting: deque[Job], in_flight: dict[tuple[str, int], Job], num_workers: int
+    ) -> None:
         self._waiting, self._in_flight, self._num_workers = waiting, in_flight, num_workers
         self._bundles: dict[tuple[str, int], list[Job]] = {}  # those in flight, by their first jobs
         self._seconds, self._count = 0.0, 0.0
@@ -173,7 +196,9 @@ class _Bundles:
             yield bundle
 
     def took(self, outcomes: Sequence[Outcome]) -> None:
-        """Note what came back; what came before counts half from now on, so that slow first jobs are soon forgotten.
+        """Note what came back; what came before counts half from now on.
+
+        So that slow first jobs are soon forgotten.
 
         What a task did not begin is to wait again.
         """
@@ -189,7 +214,10 @@ class _Bundles:
 
 
 def _run_alone(job: Job) -> Outcome:
-    """Run one job in a process of its own; where that dies, once more (who had brought the pool down is not known)."""
+    """Run one job in a process of its own.
+
+    Where that dies, once more (who had brought the pool down is not known).
+    """
     trace = ""
     for _ in range(2):
         try:
@@ -201,20 +229,29 @@ def _run_alone(job: Job) -> Outcome:
 
 
 def _compile(config_jsons: Iterable[bytes]) -> None:
-    """Compile every kernel that some conditions need, once and here, unless they are in the cache."""
+    """Compile every kernel that some conditions need, once and here.
+
+    Unless they are in the cache.
+    """
     for text in config_jsons:
         kind = _NUMBER.sub("0", text.decode())  # another number needs no other kernel
         if is_compiled(kind):
             continue
-        with contextlib.suppress(Exception):  # a planner that fails does so again in its replicate, and is noted there
+        with contextlib.suppress(
+            Exception
+        ):  # a planner that fails does so again in its replicate, and is noted there
             condition = Condition.from_json(text)
             planner, problem = condition.prepare()
-            if condition.is_reference:  # long, and what it compiles is mostly that of the planner beside it
+            if (
+                condition.is_reference
+            ):  # long, and what it compiles is mostly that of the planner beside it
                 planner = planner.planner
             for generation in itertools.islice(planner.evolve(problem, condition.rng(0)), 2):
                 planner.evaluate(problem, generation.best)
                 motion = planner.motion(problem, generation.best)
                 certificate(problem, motion)
-                if motion is not None:  # and one that touches nothing, whose closest approach is sought
+                if (
+                    motion is not None
+                ):  # and one that touches nothing, whose closest approach is sought
                     certificate(problem, Motion(np.repeat(motion.q[:1], 2, axis=0)))
             note_compiled(kind)

@@ -1,4 +1,7 @@
-"""Worker processes: silent when Ctrl-C reaches all processes of a terminal, and gone when their parent is."""
+"""Worker processes: silent when Ctrl-C reaches all processes of a terminal.
+
+And gone when their parent is.
+"""
 
 import gc
 import multiprocessing
@@ -29,15 +32,20 @@ _SERVED = "forkserver"  # the name of this way to start processes
 _NUM_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(2**26), "MALLOC_TRIM_THRESHOLD_": str(2**28)}
 _ENVIRONMENT = dict.fromkeys(_NUM_THREADS, "1") | _MEMORY
-"""Of workers: their libraries compute in one thread, as the replicates keep all cores busy, and (where the C library is
-glibc) memory that one generation gives back serves the next, instead of being fetched page by page from the system."""
+"""Of workers: their libraries compute in one thread, as the replicates keep all cores busy.
+
+And (where the C library is glibc) memory that one generation gives back serves the next, instead of
+being fetched page by page from the system.
+"""
 
 
 def start_server() -> None:
-    """Let a process of its own load what every worker needs, from now on; workers are then forked from it at once.
+    """Let a process of its own load what every worker needs, from now on.
 
-    For processes that are evoexp's own: it changes how all of joblib's workers start. Without it, or where processes
-    cannot be forked, each worker loads everything by itself, later.
+    Workers are then forked from it at once.
+
+    For processes that are evoexp's own: it changes how all of joblib's workers start. Without it,
+    or where processes cannot be forked, each worker loads everything by itself, later.
     """
     if num_cores() == 1 or _SERVED not in multiprocessing.get_all_start_methods():
         return
@@ -53,7 +61,9 @@ def num_cores() -> int:
 
 
 def in_workers(num_workers: int, tasks: Iterable[Any], ordered: bool = False) -> Iterator[Any]:
-    """Run delayed calls in worker processes, from now on; yield what they return, as it comes or in order.
+    """Run delayed calls in worker processes, from now on.
+
+    Yield what they return, as it comes or in order.
 
     Raises:
         TerminatedWorkerError: If a worker dies.
@@ -75,14 +85,18 @@ def in_workers(num_workers: int, tasks: Iterable[Any], ordered: bool = False) ->
 
 @contextmanager
 def loading(num_workers: int, load: Callable[..., None], *arguments: Any) -> Iterator[None]:
-    """Have worker processes load what they will need, while the body does something else; wait for them at its end.
+    """Have worker processes load what they will need, while the body does something else.
+
+    Wait for them at its end.
 
     A worker that dies meanwhile is no error: whoever gives work to workers starts new ones.
     """
     if num_workers == 1:
         yield
         return
-    loaded = in_workers(num_workers, (joblib.delayed(_load)(load, *arguments) for _ in range(num_workers)))
+    loaded = in_workers(
+        num_workers, (joblib.delayed(_load)(load, *arguments) for _ in range(num_workers))
+    )
     try:
         yield
     finally:
@@ -91,7 +105,10 @@ def loading(num_workers: int, load: Callable[..., None], *arguments: Any) -> Ite
 
 
 def _load(load: Callable[..., None], *arguments: Any) -> None:
-    """Load, and keep what is there now from being searched for garbage: every worker searches once per second."""
+    """Load, and keep what is there now from being searched for garbage.
+
+    Every worker searches once per second.
+    """
     load(*arguments)
     gc.freeze()
 
@@ -103,7 +120,9 @@ def leave_with_parent(parent: int, served: bool) -> None:
 
 def _watch(parent: int, served: bool) -> None:
     origin = multiprocessing.parent_process()
-    if served and origin is not None:  # our process's parent is the server, which lives as long as we do
+    if (
+        served and origin is not None
+    ):  # our process's parent is the server, which lives as long as we do
         origin.join()
     else:
         while os.getppid() == parent:
@@ -113,7 +132,10 @@ def _watch(parent: int, served: bool) -> None:
 
 @contextmanager
 def _children_ignore_interrupts() -> Iterator[None]:
-    """Start processes that ignore Ctrl-C from their first instruction on: a process inherits what is ignored."""
+    """Start processes that ignore Ctrl-C from their first instruction on.
+
+    A process inherits what is ignored.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -1,7 +1,7 @@
 """Bodies covered by spheres or capsules: what the fast kernels test in place of coal's shapes.
 
-A cover contains its body, so whatever coal sees touching, the cover sees, too. What it adds is its inflation: how far
-the cover reaches beyond the body at most, bounded from above for every body.
+A cover contains its body, so whatever coal sees touching, the cover sees, too. What it adds is its
+inflation: how far the cover reaches beyond the body at most, bounded from above for every body.
 """
 
 from itertools import product
@@ -13,7 +13,8 @@ import numpy as np
 from evoexp.collision.body_table import UnsupportedShape
 from evoexp.records import FloatArray
 
-MOST_SPHERES = 150  # of one body that is neither ball nor capsule; where they do not suffice, the inflation grows
+# of one body that is neither ball nor capsule; where they do not suffice, the inflation grows
+MOST_SPHERES = 150
 WIDER = 1.0 + 1e-9  # covers are made larger by more than rounding
 
 
@@ -36,13 +37,15 @@ class Cover(NamedTuple):
 def sphere_cover(item: Any, inflation: float) -> Cover:
     """Return spheres that cover a geometry object.
 
-    Balls and capsules are covered by equal spheres on their axis; everything else by spheres around the cells of a
-    lattice, with as few cells as keep within the inflation; where that takes more than `MOST_SPHERES`, by those that
-    reach the least beyond it.
+    Balls and capsules are covered by equal spheres on their axis; everything else by spheres around
+    the cells of a lattice, with as few cells as keep within the inflation; where that takes more
+    than `MOST_SPHERES`, by those that reach the least beyond it.
 
     Args:
-        item: A `pin.GeometryObject` with a convex coal shape or a mesh; of a mesh the convex hull is covered.
-        inflation: How far spheres may reach beyond the body [length unit]; `Cover.inflation` says how far they do.
+        item: A `pin.GeometryObject` with a convex coal shape or a mesh; of a mesh the convex hull
+            is covered.
+        inflation: How far spheres may reach beyond the body [length unit]; `Cover.inflation` says
+            how far they do.
 
     Raises:
         UnsupportedShape: If the shape has no inside that could be covered.
@@ -119,7 +122,10 @@ def capsule_cover(item: Any) -> Cover:
 
 
 class _Solid(NamedTuple):
-    """A convex body in its own frame: the box around it, and bounds (points, 3) → (points,) of signed distances."""
+    """A convex body in its own frame.
+
+    The box around it, and bounds (points, 3) → (points,) of signed distances.
+    """
 
     low: FloatArray
     high: FloatArray
@@ -134,20 +140,31 @@ def _solid(item: Any) -> _Solid:
         return _exact(half, lambda points: _box_distance(points, half))
     if isinstance(shape, coal.Cylinder):
         half = np.array([shape.radius, shape.radius, shape.halfLength])
-        return _exact(half, lambda points: _cylinder_distance(points, shape.radius, shape.halfLength))
+        return _exact(
+            half, lambda points: _cylinder_distance(points, shape.radius, shape.halfLength)
+        )
     if isinstance(shape, coal.Ellipsoid):
         half = np.array(shape.radii)
-        return _Solid(-half, half, lambda points: _box_distance(points, half), lambda p: _ellipsoid_bound(p, half))
+        return _Solid(
+            -half,
+            half,
+            lambda points: _box_distance(points, half),
+            lambda p: _ellipsoid_bound(p, half),
+        )
     if isinstance(shape, coal.Cone):
         half = np.array([shape.radius, shape.radius, shape.halfLength])
-        around = _exact(half, lambda points: _cylinder_distance(points, shape.radius, shape.halfLength))
+        around = _exact(
+            half, lambda points: _cylinder_distance(points, shape.radius, shape.halfLength)
+        )
         return around._replace(far=lambda points: np.maximum(_coal_distance(points, shape), 0.0))
     if isinstance(shape, coal.ConvexBase):
         corners = np.array([shape.point(i) for i in range(shape.num_points)])
     elif isinstance(shape, coal.BVHModelBase):
         corners = np.array([shape.vertex(i) for i in range(shape.num_vertices)])
     else:
-        raise UnsupportedShape(f"robot: body '{item.name}' must be a solid, was a {type(shape).__name__}")
+        raise UnsupportedShape(
+            f"robot: body '{item.name}' must be a solid, was a {type(shape).__name__}"
+        )
     from scipy.spatial import ConvexHull  # only meshes need it, and it takes long to load
 
     planes = ConvexHull(corners).equations  # outward normals, unit length
@@ -169,7 +186,10 @@ def _exact(half: FloatArray, distance: Any) -> _Solid:
 
 
 def _lattices(edges: FloatArray) -> list[tuple[int, ...]]:
-    """Return numbers of cells along the three edges, of cells about as long as wide, from coarse to fine."""
+    """Return numbers of cells along the three edges, of cells about as long as wide.
+
+    From coarse to fine.
+    """
     found: set[tuple[int, ...]] = set()
     size, most = float(edges.max()), 0
     while most <= MOST_SPHERES:
@@ -203,7 +223,10 @@ def _cylinder_distance(points: FloatArray, radius: float, half: float) -> FloatA
 
 
 def _ellipsoid_bound(points: FloatArray, half: FloatArray) -> FloatArray:
-    """Return upper bounds of signed distances: outside by the way to the middle, inside by the thinnest axis."""
+    """Return upper bounds of signed distances.
+
+    Outside by the way to the middle, inside by the thinnest axis.
+    """
     scale = np.sqrt(((points / half) ** 2).sum(axis=1))
     away = np.sqrt((points**2).sum(axis=1))
     outside = away * (1.0 - 1.0 / np.maximum(scale, 1.0))
@@ -212,14 +235,25 @@ def _ellipsoid_bound(points: FloatArray, half: FloatArray) -> FloatArray:
 
 def _coal_distance(points: FloatArray, shape: Any) -> FloatArray:
     """Return the distances of points from a body as coal has them."""
-    here, ball, request, result = coal.Transform3s(), coal.Sphere(1e-9), coal.DistanceRequest(), coal.DistanceResult()
+    here, ball, request, result = (
+        coal.Transform3s(),
+        coal.Sphere(1e-9),
+        coal.DistanceRequest(),
+        coal.DistanceResult(),
+    )
     found = np.empty(len(points))
     for k, point in enumerate(points):
         result.clear()
-        found[k] = coal.distance(ball, coal.Transform3s(np.eye(3), point), shape, here, request, result)
+        found[k] = coal.distance(
+            ball, coal.Transform3s(np.eye(3), point), shape, here, request, result
+        )
     return found
 
 
-def _placed(item: Any, start: FloatArray, end: FloatArray, radius: FloatArray, inflation: float) -> Cover:
+def _placed(
+    item: Any, start: FloatArray, end: FloatArray, radius: FloatArray, inflation: float
+) -> Cover:
     rotation, translation = np.array(item.placement.rotation), np.array(item.placement.translation)
-    return Cover(start @ rotation.T + translation, end @ rotation.T + translation, radius, inflation)
+    return Cover(
+        start @ rotation.T + translation, end @ rotation.T + translation, radius, inflation
+    )

@@ -1,7 +1,8 @@
 """A robot's bodies as the fast kernels test them, and which pairs of bodies are worth testing.
 
-Two models: sphere sets, generated from the bodies' coal geometry (Corsépius 2001, section 5), and one capsule per body.
-Both cover the bodies, so a posture that is free by the model is free on coal's geometry.
+Two models: sphere sets, generated from the bodies' coal geometry (Corsépius 2001, section 5), and
+one capsule per body. Both cover the bodies, so a posture that is free by the model is free on
+coal's geometry.
 """
 
 from typing import Any, ClassVar, NamedTuple
@@ -45,7 +46,9 @@ class CollisionModel(Component):
             SettingError: If covers touch in every posture although their bodies do not.
         """
         covers = [self.cover(item) for item in assembly.geometry.geometryObjects]
-        shapes = cover_shapes(covers, [item.parentJoint for item in assembly.geometry.geometryObjects])
+        shapes = cover_shapes(
+            covers, [item.parentJoint for item in assembly.geometry.geometryObjects]
+        )
         return BodyModel(assembly, tuple(covers), shapes, *_derived_pairs(assembly, shapes))
 
 
@@ -79,7 +82,9 @@ class BodyCapsules(CollisionModel):
     def cover(self, item: Any) -> Cover:
         """Return the capsule around a geometry object."""
         found = capsule_cover(item)
-        return found._replace(radius=found.radius + self.padding, inflation=found.inflation + self.padding)
+        return found._replace(
+            radius=found.radius + self.padding, inflation=found.inflation + self.padding
+        )
 
 
 class BodyModel(NamedTuple):
@@ -119,7 +124,10 @@ class BodyModel(NamedTuple):
         return len(self.shapes.joint)
 
     def collision(
-        self, obstacles: ObstacleTable, ignored: tuple[Pair, ...] = (), carried: "Carried | None" = None
+        self,
+        obstacles: ObstacleTable,
+        ignored: tuple[Pair, ...] = (),
+        carried: "Carried | None" = None,
     ) -> PrimitiveCollision:
         """Return the collision model among obstacles.
 
@@ -193,8 +201,17 @@ def _derived_pairs(assembly: Assembly, shapes: Shapes) -> tuple[tuple[Pair, ...]
             never.append(pair)
         elif _alone(assembly, shapes, pair).collides(q).all():
             names = " and ".join(items[body].name for body in pair)
-            raise SettingError("collision", f"closer to the bodies: the covers of {names} touch in every posture", None)
-    return tuple(pair for pair in rest if pair not in never), tuple(adjacent), tuple(always), tuple(never)
+            raise SettingError(
+                "collision",
+                f"closer to the bodies: the covers of {names} touch in every posture",
+                None,
+            )
+    return (
+        tuple(pair for pair in rest if pair not in never),
+        tuple(adjacent),
+        tuple(always),
+        tuple(never),
+    )
 
 
 def _limits(assembly: Assembly) -> FloatArray:
@@ -212,26 +229,37 @@ def _coal_touches(assembly: Assembly, pairs: list[Pair], q: FloatArray) -> np.nd
     request, result = coal.CollisionRequest(), coal.CollisionResult()
     out = np.zeros((len(pairs), q.shape[1]), dtype=np.bool_)
     for n in range(q.shape[1]):
-        pin.updateGeometryPlacements(model, data, geometry, placements, np.ascontiguousarray(q[:, n]))
+        pin.updateGeometryPlacements(
+            model, data, geometry, placements, np.ascontiguousarray(q[:, n])
+        )
         places = [coal.Transform3s(place.rotation, place.translation) for place in placements.oMg]
         for k, (a, b) in enumerate(pairs):
             result.clear()
-            out[k, n] = coal.collide(shapes[a], places[a], shapes[b], places[b], request, result) > 0
+            out[k, n] = (
+                coal.collide(shapes[a], places[a], shapes[b], places[b], request, result) > 0
+            )
     return out
 
 
 def _alone(assembly: Assembly, shapes: Shapes, pair: Pair) -> PrimitiveCollision:
     """Return the model of two bodies alone."""
     kept = np.isin(shapes.labels, pair)
-    own = Shapes(*(column[kept] for column in (shapes.joint, shapes.start, shapes.end, shapes.radius, shapes.labels)))
+    own = Shapes(
+        *(
+            column[kept]
+            for column in (shapes.joint, shapes.start, shapes.end, shapes.radius, shapes.labels)
+        )
+    )
     return PrimitiveCollision.build(assembly.model, own, NO_OBSTACLES, (pair,))
 
 
 def _never_touch(assembly: Assembly, shapes: Shapes, pair: Pair) -> bool:
-    """Whether two bodies are proven apart: a grid over the joints between them, and how far a step can move them.
+    """Whether two bodies are proven apart.
 
-    The distances are those of the covers, or where these are too close, coal's on a coarser grid. Proven for two joints
-    at most; what more joints move is tested always.
+    A grid over the joints between them, and how far a step can move them.
+
+    The distances are those of the covers, or where these are too close, coal's on a coarser grid.
+    Proven for two joints at most; what more joints move is tested always.
     """
     items, table = list(assembly.geometry.geometryObjects), assembly.table
     bodies = body_table(table, [items[body] for body in pair])
@@ -249,8 +277,13 @@ def _never_touch(assembly: Assembly, shapes: Shapes, pair: Pair) -> bool:
     return bool(_coal_distances(assembly, pair, q).min() > slack)
 
 
-def _grid(assembly: Assembly, moving: np.ndarray, way: FloatArray, size: int) -> tuple[FloatArray, float]:
-    """Return configurations (nq, n) on a grid, and how much a distance can differ half a step away."""
+def _grid(
+    assembly: Assembly, moving: np.ndarray, way: FloatArray, size: int
+) -> tuple[FloatArray, float]:
+    """Return configurations (nq, n) on a grid.
+
+    And how much a distance can differ half a step away.
+    """
     low, high = _limits(assembly)
     columns = assembly.table.index_q[moving]
     step = (high[columns] - low[columns]) / size

@@ -1,7 +1,8 @@
 """Bodies as arrays: what the certifier's kernels know of coal's shapes.
 
-Every shape is a core, swept by a ball: a sphere is a point and a radius, a capsule a segment and a radius. The core is
-given by its support function (the farthest point in a direction), see `convex_distance`.
+Every shape is a core, swept by a ball: a sphere is a point and a radius, a capsule a segment and a
+radius. The core is given by its support function (the farthest point in a direction), see
+`convex_distance`.
 """
 
 from itertools import product
@@ -15,13 +16,22 @@ from evoexp.records import FloatArray
 from evoexp.robots.kinematics import KinematicTable
 
 SEGMENT, BOX, CYLINDER, CONE, ELLIPSOID, HULL, HALF_SPACE = range(7)
-"""Cores: a segment along z, of length 0 for a point, …; a half-space holds all points with z ≤ 0."""
+"""Cores: a segment along z, of length 0 for a point, ….
+
+A half-space holds all points with z ≤ 0.
+"""
 
 FLAT_TOLERANCE = 1e-10
-"""[-] of the scene's size: where coal's distances are closed forms, or end after finitely many steps (err ≤ 1e-13)."""
+"""[-] of the scene's size: where coal's distances are closed forms.
+
+Or end after finitely many steps (err ≤ 1e-13).
+"""
 
 ROUND_TOLERANCE = 1e-6
-"""[-] of the scene's size: where coal approaches a curved surface by steps (errors up to 4e-8 were seen)."""
+"""[-] of the scene's size: where coal approaches a curved surface by steps.
+
+Errors up to 4e-8 were seen.
+"""
 
 
 class UnsupportedShape(EvoexpError):
@@ -34,16 +44,20 @@ class BodyTable(NamedTuple):
     Attributes:
         joint: (bodies,) index into the kinematic table, −1 for the world.
         kind: (bodies,) the core.
-        exact: (bodies,) false where the arrays describe a larger body than coal's: the convex hull of a mesh.
+        exact: (bodies,) false where the arrays describe a larger body than coal's: the convex hull
+            of a mesh.
         rotation: (bodies, 9) from the core's frame to the joint's frame in the table, row by row.
         translation: (bodies, 3).
-        size: (bodies, 3) half a segment's length | half the edges | radius, half the height | semi-axes.
+        size: (bodies, 3) half a segment's length | half the edges | radius, half the height |
+            semi-axes.
         radius: (bodies,) of the ball that sweeps the core.
         corners: (bodies, 2) first and one-past-last corner of a hull.
         corner_points: (corners, 3) in the frames of their hulls.
-        from_origin: (bodies,) greatest distance of a body's points from its joint's origin; inf for half-spaces.
+        from_origin: (bodies,) greatest distance of a body's points from its joint's origin; inf for
+            half-spaces.
         from_axis: (bodies,) the same from its joint's axis.
-        ball: (bodies,) radius of a ball around the core's origin that holds the body; inf for half-spaces.
+        ball: (bodies,) radius of a ball around the core's origin that holds the body; inf for
+            half-spaces.
     """
 
     joint: np.ndarray
@@ -60,11 +74,18 @@ class BodyTable(NamedTuple):
     ball: FloatArray
 
     def tolerance(self, one: int, two: int) -> float:
-        """Return the distance, relative to the scene's size, that counts as contact of two bodies."""
-        flat = all(self.exact[k] and self.kind[k] in (SEGMENT, BOX, HULL, HALF_SPACE) for k in (one, two))
+        """Return the distance, relative to the scene's size.
+
+        That counts as contact of two bodies.
+        """
+        flat = all(
+            self.exact[k] and self.kind[k] in (SEGMENT, BOX, HULL, HALF_SPACE) for k in (one, two)
+        )
         closed = any(self._is_ball(k) or self.kind[k] == HALF_SPACE for k in (one, two))
         plain = all(self.kind[k] in (SEGMENT, BOX, CYLINDER, HALF_SPACE) for k in (one, two))
-        half_space = HALF_SPACE in (self.kind[one], self.kind[two]) and self.exact[one] and self.exact[two]
+        half_space = (
+            HALF_SPACE in (self.kind[one], self.kind[two]) and self.exact[one] and self.exact[two]
+        )
         return FLAT_TOLERANCE if flat or half_space or (closed and plain) else ROUND_TOLERANCE
 
     def _is_ball(self, body: int) -> bool:
@@ -107,7 +128,9 @@ def body_table(table: KinematicTable, items: list[Any]) -> BodyTable:
             alignment = table.alignment[item.parentJoint - 1].T
             rotation, translation = alignment @ rotation, alignment @ translation
             if core.kind == HALF_SPACE:
-                raise UnsupportedShape(f"scene: half-space '{item.name}' must stand still, moves with a joint")
+                raise UnsupportedShape(
+                    f"scene: half-space '{item.name}' must stand still, moves with a joint"
+                )
         begin = sum(map(len, corners))
         corners.append(core.corners)
         bodies.kind[k], bodies.size[k], bodies.radius[k], bodies.exact[k] = (
@@ -146,7 +169,9 @@ def _core(item: Any) -> tuple[_Core, FloatArray, FloatArray]:
     elif isinstance(shape, coal.Ellipsoid):
         core = _Core(ELLIPSOID, tuple(shape.radii), swept)
     elif isinstance(shape, coal.ConvexBase):
-        core = _Core(HULL, radius=swept, corners=np.array([shape.point(i) for i in range(shape.num_points)]))
+        core = _Core(
+            HULL, radius=swept, corners=np.array([shape.point(i) for i in range(shape.num_points)])
+        )
     elif isinstance(shape, coal.TriangleP):
         core = _Core(HULL, radius=swept, corners=np.array([shape.a, shape.b, shape.c]))
     elif isinstance(shape, coal.BVHModelBase):
@@ -154,13 +179,14 @@ def _core(item: Any) -> tuple[_Core, FloatArray, FloatArray]:
         core = _Core(HULL, corners=corners, exact=False)
     else:
         raise UnsupportedShape(
-            f"scene: '{item.name}' must be a convex shape, a half-space or a mesh, was a {type(shape).__name__}"
+            f"scene: '{item.name}' must be a convex shape, a half-space or a mesh, was a "
+            f"{type(shape).__name__}"
         )
     return core, rotation, translation
 
 
 def _reach(core: _Core, rotation: FloatArray, translation: FloatArray) -> tuple[float, float]:
-    """Return the greatest distances of a body's points from the origin and the z axis of its joint's frame.
+    """Return the greatest distances of a body's points from its joint's origin and z axis.
 
     From the corners of the core or of a box around it, or from a ball around it, whichever is less.
     """
@@ -169,7 +195,9 @@ def _reach(core: _Core, rotation: FloatArray, translation: FloatArray) -> tuple[
     if core.kind == HULL:
         corners = core.corners
     else:
-        half = {SEGMENT: (0.0, 0.0, a), CYLINDER: (a, a, b), CONE: (a, a, b)}.get(core.kind, core.size)
+        half = {SEGMENT: (0.0, 0.0, a), CYLINDER: (a, a, b), CONE: (a, a, b)}.get(
+            core.kind, core.size
+        )
         corners = np.array(list(product(*((-e, e) for e in half))))
         if core.kind == ELLIPSOID:
             ball = max(a, b, c)

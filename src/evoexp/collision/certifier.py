@@ -1,8 +1,9 @@
 """The exact certifier: judges a motion continuously, on exact bodies.
 
-A compiled sweep (`certifier_sweep`) bounds the distances of all pairs over the whole motion. It leaves the instants
-that matter, the first contact or the least clearances, and intervals that its own shapes cannot settle; coal settles
-both, and every distance in a verdict is coal's, at Pinocchio's placements.
+A compiled sweep (`certifier_sweep`) bounds the distances of all pairs over the whole motion. It
+leaves the instants that matter, the first contact or the least clearances, and intervals that its
+own shapes cannot settle; coal settles both, and every distance in a verdict is coal's, at
+Pinocchio's placements.
 """
 
 from collections.abc import Callable
@@ -18,7 +19,15 @@ from evoexp.collision.certifier_coal import (
     search_interval,
     walk_down,
 )
-from evoexp.collision.certifier_sweep import Goal, Sweep, Task, approach_weights, polish, sweep_motion, work_space
+from evoexp.collision.certifier_sweep import (
+    Goal,
+    Sweep,
+    Task,
+    approach_weights,
+    polish,
+    sweep_motion,
+    work_space,
+)
 from evoexp.collision.motion_bounds import approach_bounds, moved_by_one
 from evoexp.collision.scene import Scene
 from evoexp.paths.motion import Motion
@@ -35,12 +44,16 @@ MAX_POLISHED = 8  # pairs whose local minimum is sought, those with the least di
 
 
 class Verdict(NamedTuple):
-    """What the certifier says of a motion. t is in instants: 2.5 is half way from instant 2 to instant 3.
+    """What the certifier says of a motion.
+
+    T is in instants: 2.5 is half way from instant 2 to instant 3.
 
     Attributes:
-        status: "certified": no two bodies touch, ever; "refuted": two do; "undecided": a limit was used up.
+        status: "certified": no two bodies touch, ever; "refuted": two do; "undecided": a limit was
+            used up.
         margin_status: The same of "the clearance is never less than the security margin".
-        clearance: Least distance over the motion [length unit]; 0 where bodies touch, inf without pairs.
+        clearance: Least distance over the motion [length unit]; 0 where bodies touch, inf without
+            pairs.
         clearance_at: Its t; NaN without pairs.
         clearance_pair: Names of its two bodies; None without pairs.
         refuted_at: t of the first contact; NaN if there is none.
@@ -95,7 +108,8 @@ def certify(
         scene: The bodies; read only.
         motion: Its q in the units of the model: radians, lengths.
         security_margin: Clearance that is asked for [length unit].
-        contact_tolerance: A distance at or below it is contact [length unit]; None: `Scene.tolerances`.
+        contact_tolerance: A distance at or below it is contact [length unit]; None:
+            `Scene.tolerances`.
         resolution: The clearance is proven up to this part of it [-].
         limits: When to give up.
         clock: Returns seconds, for `duration_s`.
@@ -105,7 +119,11 @@ def certify(
     """
     begin = clock() if clock is not None else np.nan
     _check(scene, motion, security_margin, contact_tolerance, resolution)
-    tolerances = scene.tolerances if contact_tolerance is None else np.full(len(scene.pairs), contact_tolerance)
+    tolerances = (
+        scene.tolerances
+        if contact_tolerance is None
+        else np.full(len(scene.pairs), contact_tolerance)
+    )
     verdict = _Judgement(scene, motion, security_margin, tolerances, resolution, limits).verdict()
     return verdict._replace(duration_s=(clock() if clock is not None else np.nan) - begin)
 
@@ -122,9 +140,21 @@ class _Judgement:
     """One motion being judged."""
 
     def __init__(
-        self, scene: Scene, motion: Motion, margin: float, tolerances: FloatArray, resolution: float, limits: Limits
+        self,
+        scene: Scene,
+        motion: Motion,
+        margin: float,
+        tolerances: FloatArray,
+        resolution: float,
+        limits: Limits,
     ) -> None:
-        self.scene, self.motion, self.margin, self.resolution, self.limits = scene, motion, margin, resolution, limits
+        self.scene, self.motion, self.margin, self.resolution, self.limits = (
+            scene,
+            motion,
+            margin,
+            resolution,
+            limits,
+        )
         self.tolerances = tolerances
         self.coal = CoalDistance(scene, motion, limits.queries)
         self.floor = 1e-6 * scene.size
@@ -174,10 +204,15 @@ class _Judgement:
     def _free(self, status: Status, margin_status: Status, proven: float) -> Verdict:
         pair = self.scene.pair_names(self.best.pair) if self.best.pair >= 0 else None
         where = float(self.best.distance), float(self.best.t), pair, np.nan, None
-        return Verdict(status, margin_status, *where, float(proven), self.coal.queries, self.intervals, np.nan)
+        return Verdict(
+            status, margin_status, *where, float(proven), self.coal.queries, self.intervals, np.nan
+        )
 
     def _too_close(self) -> bool:
-        return self.best.pair >= 0 and self.best.distance < self.margin - self.tolerances[self.best.pair]
+        return (
+            self.best.pair >= 0
+            and self.best.distance < self.margin - self.tolerances[self.best.pair]
+        )
 
     def _judge_margin(self, status: Status, proven: float) -> Status:
         """Compare with the margin; look closer where the clearance is not proven far enough."""
@@ -194,22 +229,36 @@ class _Judgement:
             return "refuted"
         return "certified" if bound > -np.inf else "undecided"
 
-    def _search(self, resolution: float, goal: FloatArray, level: FloatArray) -> tuple[_Candidate | None, float]:
-        """Return the first distance at or below its level as coal sees it, and what is proven (−inf: a limit)."""
+    def _search(
+        self, resolution: float, goal: FloatArray, level: FloatArray
+    ) -> tuple[_Candidate | None, float]:
+        """Return the first distance at or below its level as coal sees it, and what is proven.
+
+        −inf: a limit.
+        """
         refine = resolution < np.inf
         rounding = ROUNDING * self.scene.size
-        wanted = Goal(goal, level, self.tolerances, np.inf, resolution, self.floor, rounding, True, refine, 0)
+        wanted = Goal(
+            goal, level, self.tolerances, np.inf, resolution, self.floor, rounding, True, refine, 0
+        )
         self._look_at_meshes(wanted)
         while True:
             known, left = self.best.distance, self.limits.intervals - self.intervals
             instants = not (self.looked and refine)
-            found = sweep_motion(self.task, wanted._replace(known=known, max_nodes=left, instants=instants), self.work)
+            found = sweep_motion(
+                self.task,
+                wanted._replace(known=known, max_nodes=left, instants=instants),
+                self.work,
+            )
             self.looked = True
             self.intervals += found.nodes
             contact = None
             if found.first < np.inf:
                 t = first_contact(
-                    self.coal, found.first_pair, min(found.first, self.task.last), level[found.first_pair]
+                    self.coal,
+                    found.first_pair,
+                    min(found.first, self.task.last),
+                    level[found.first_pair],
                 )
                 if t is None:  # coal does not see it: let coal judge this pair alone
                     self.task.exact[found.first_pair] = self.looked = False
@@ -220,7 +269,10 @@ class _Judgement:
             return earlier, proven if found.done else -np.inf
 
     def _look_at_meshes(self, goal: Goal) -> None:
-        """Ask coal for pairs whose shapes the sweep does not know exactly, where their hulls are closest."""
+        """Ask coal for pairs whose shapes the sweep does not know exactly.
+
+        Where their hulls are closest.
+        """
         if self.task.exact.all() or self.best.pair >= 0:
             return
         found = sweep_motion(self.task, goal, self.work)
@@ -230,7 +282,12 @@ class _Judgement:
             self._note(_Candidate(self.coal(pair, t), t, int(pair)))
 
     def _search_leaves(
-        self, found: Sweep, contact: _Candidate | None, resolution: float, goal: FloatArray, level: FloatArray
+        self,
+        found: Sweep,
+        contact: _Candidate | None,
+        resolution: float,
+        goal: FloatArray,
+        level: FloatArray,
     ) -> tuple[_Candidate | None, float]:
         """Have coal settle the leaves, from left to right up to the first contact."""
         proven = found.proven
@@ -238,9 +295,20 @@ class _Judgement:
             if contact is not None and begin >= contact.t:
                 break
             p, segment = int(pair), min(int(begin), len(self.task.coefficients) - 1)
-            speeds, scratch = np.empty((2, len(self.scene.pairs))), np.empty(len(self.task.table[0]))
+            speeds, scratch = (
+                np.empty((2, len(self.scene.pairs))),
+                np.empty(len(self.task.table[0])),
+            )
             piece = self.task.coefficients[segment]
-            approach_bounds(self.task.table, piece, begin - segment, end - segment, self.task.weights, speeds, scratch)
+            approach_bounds(
+                self.task.table,
+                piece,
+                begin - segment,
+                end - segment,
+                self.task.weights,
+                speeds,
+                scratch,
+            )
             known = min(self.best.distance, found.least)
             goals = LeafGoals(goal[p], level[p], self.tolerances[p], known, resolution, self.floor)
             end = min(end, float(self.motion.num_segments))
@@ -265,7 +333,9 @@ class _Judgement:
 
     def _polish_from(self, pairs: np.ndarray, begins: FloatArray) -> None:
         """Ask coal for the least of some pairs' local minima; of equal ones, the first."""
-        t = np.minimum(begins, self.task.last)  # a motion of one instant is swept as a segment without movement
+        t = np.minimum(
+            begins, self.task.last
+        )  # a motion of one instant is swept as a segment without movement
         seen = (pairs == self.best.pair) & (np.abs(t - self.best.t) < SAME)
         pairs, t = pairs[~seen], t[~seen]
         if len(pairs) > 0:
@@ -282,15 +352,25 @@ class _Judgement:
 
 
 def _check(
-    scene: Scene, motion: Motion, security_margin: float, contact_tolerance: float | None, resolution: float
+    scene: Scene,
+    motion: Motion,
+    security_margin: float,
+    contact_tolerance: float | None,
+    resolution: float,
 ) -> None:
     """Raise ValueError for what cannot be judged."""
     nq = scene.model.nq
     if motion.q.ndim != 2 or motion.q.shape[0] == 0 or motion.q.shape[1] != nq:
         raise ValueError(f"motion: q must have shape (instants, {nq}), was {motion.q.shape}")
-    if motion.coefficients is not None and motion.coefficients.shape != (motion.num_segments, 4, nq):
+    if motion.coefficients is not None and motion.coefficients.shape != (
+        motion.num_segments,
+        4,
+        nq,
+    ):
         must = (motion.num_segments, 4, nq)
-        raise ValueError(f"motion: coefficients must have shape {must}, was {motion.coefficients.shape}")
+        raise ValueError(
+            f"motion: coefficients must have shape {must}, was {motion.coefficients.shape}"
+        )
     if not np.isfinite(motion.polynomials).all() or not np.isfinite(motion.q).all():
         raise ValueError("motion: q must be finite, was not")
     if not 0.0 <= security_margin < np.inf:

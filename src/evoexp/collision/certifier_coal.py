@@ -1,4 +1,7 @@
-"""The last word of the certifier: distances of coal at Pinocchio's placements, and what is settled by them alone."""
+"""The last word of the certifier.
+
+Distances of coal at Pinocchio's placements, and what is settled by them alone.
+"""
 
 import threading
 from typing import Any, NamedTuple
@@ -12,7 +15,10 @@ from evoexp.errors import EvoexpError
 from evoexp.paths.motion import Motion
 
 GJK_TOLERANCE = 1e-9
-"""[-] relative: the tightest that coal keeps with all shapes; at 1e-12 some distances of ellipsoids were 1e-2 wrong."""
+"""[-] relative: the tightest that coal keeps with all shapes.
+
+At 1e-12 some distances of ellipsoids were 1e-2 wrong.
+"""
 
 GJK_ITERATIONS = 1000
 
@@ -26,7 +32,10 @@ class QueryLimit(EvoexpError):
 
 
 class _Scratch(threading.local):
-    """A thread's last `pin.Data`, which takes as long to make as two distances, and whose placements it holds."""
+    """A thread's last `pin.Data`, which takes as long to make as two distances.
+
+    And whose placements it holds.
+    """
 
     model: Any = None
     data: Any = None
@@ -46,7 +55,10 @@ class CoalDistance:
         self._model, self._data, self._token = scene.model, _scratch.data, object()
         self._shapes = scene.shapes
         self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
-        self._request.gjk_tolerance, self._request.gjk_max_iterations = GJK_TOLERANCE, GJK_ITERATIONS
+        self._request.gjk_tolerance, self._request.gjk_max_iterations = (
+            GJK_TOLERANCE,
+            GJK_ITERATIONS,
+        )
         self._t = np.nan
 
     def __call__(self, pair: int, t: float) -> float:
@@ -72,7 +84,9 @@ class CoalDistance:
 
 
 def first_contact(distance: CoalDistance, pair: int, t: float, level: float) -> float | None:
-    """Return the instant near t from which on a pair's distance is at or below a level, to `TIME_RESOLUTION`.
+    """Return the instant near t from which on a pair's distance is at or below a level.
+
+    To `TIME_RESOLUTION`.
 
     Args:
         distance: Coal's.
@@ -136,9 +150,15 @@ class Leaf(NamedTuple):
 
 
 def search_interval(
-    distance: CoalDistance, pair: int, interval: tuple[float, float], speed: float, goals: "LeafGoals"
+    distance: CoalDistance,
+    pair: int,
+    interval: tuple[float, float],
+    speed: float,
+    goals: "LeafGoals",
 ) -> Leaf:
-    """Search an interval from left to right, where the least distance is possible (Piyavskii 1972, Shubert 1972).
+    """Search an interval from left to right, where the least distance is possible.
+
+    Piyavskii 1972, Shubert 1972.
 
     Args:
         distance: Coal's.
@@ -157,7 +177,9 @@ def search_interval(
             return Leaf(least, at, a, proven)
         width, way = b - a, speed * (b - a)
         low = 0.5 * (d_a + d_b - way) - goals.slack
-        if low >= goals.target(min(least, goals.known)) or (way <= 0.25 * goals.slack and d_b > goals.level):
+        if low >= goals.target(min(least, goals.known)) or (
+            way <= 0.25 * goals.slack and d_b > goals.level
+        ):
             proven = min(proven, low)
         elif width < TIME_RESOLUTION:
             return Leaf(least, at, b, proven)

@@ -1,9 +1,10 @@
 """The compiled part of the certifier: branch and bound over a whole motion and all pairs of bodies.
 
-An interval of the motion is judged from its middle: if a pair is d apart there and cannot approach faster than L, it
-stays d − L·(half the interval) apart. Or better, across the plane that separates the pair there: the gap if all points
-kept their velocities, less what accelerations can change. Pairs of which that is not enough go on to both halves, the
-left one first, so that what happens first is found first. Depth first, with the pairs that are left on each level.
+An interval of the motion is judged from its middle: if a pair is d apart there and cannot approach
+faster than L, it stays d − L·(half the interval) apart. Or better, across the plane that separates
+the pair there: the gap if all points kept their velocities, less what accelerations can change.
+Pairs of which that is not enough go on to both halves, the left one first, so that what happens
+first is found first. Depth first, with the pairs that are left on each level.
 """
 
 from typing import Any, NamedTuple
@@ -54,7 +55,8 @@ class Task(NamedTuple):
         table: The kinematic table's first six fields.
         bodies: `BodyTable` as a plain tuple.
         pairs: (pairs, 2) indices of bodies.
-        exact: (pairs,) whether upper bounds of distances are believed; else what cannot be excluded becomes a leaf.
+        exact: (pairs,) whether upper bounds of distances are believed; else what cannot be excluded
+            becomes a leaf.
         coefficients: (segments, 4, nq) of the motion.
         straight: Whether all segments are straight lines.
         last: The last instant: the number of segments, or 0 for a motion of one instant.
@@ -84,8 +86,8 @@ class Sweep(NamedTuple):
         nodes: Intervals that were judged.
         done: False if `max_nodes` were used up.
         leaves: (leaves, 3) pair, begin, end [instants] of intervals left open.
-        pair_least: (pairs,) like `least`, pair by pair; where upper bounds are not believed, the least lower bound
-            at an instant.
+        pair_least: (pairs,) like `least`, pair by pair; where upper bounds are not believed, the
+            least lower bound at an instant.
         pair_least_at: (pairs,) the t of it.
     """
 
@@ -131,38 +133,82 @@ class Goal(NamedTuple):
 def sweep_motion(task: Task, goal: Goal, work: tuple[np.ndarray, ...]) -> Sweep:
     """Judge a motion."""
     num_pairs = len(task.pairs)
-    leaves, state = np.empty((MAX_LEAVES + num_pairs, 3)), np.array([goal.known, np.inf, -1.0, np.inf, 0.0, 0.0])
+    leaves, state = (
+        np.empty((MAX_LEAVES + num_pairs, 3)),
+        np.array([goal.known, np.inf, -1.0, np.inf, 0.0, 0.0]),
+    )
     least, at = np.full(num_pairs, np.inf), np.zeros(num_pairs)
-    done = _sweep(task, goal, work, (leaves, state, least, at), _stack(num_pairs, len(task.table[0])))
+    done = _sweep(
+        task, goal, work, (leaves, state, least, at), _stack(num_pairs, len(task.table[0]))
+    )
     count = int(state[LEAVES])
     first_pair = int(state[FIRST_PAIR])
     return Sweep(
-        state[LEAST], state[FIRST], first_pair, state[PROVEN], int(state[NODES]), done, leaves[:count], least, at
+        state[LEAST],
+        state[FIRST],
+        first_pair,
+        state[PROVEN],
+        int(state[NODES]),
+        done,
+        leaves[:count],
+        least,
+        at,
     )
 
 
 def _stack(num_pairs: int, num_joints: int) -> tuple[np.ndarray, ...]:
-    """Scratch of a sweep: speeds and accelerations, of joints, too; the pairs left on each level; where it stands."""
-    lists, counts = np.empty((DEPTH + 2, num_pairs), dtype=np.int64), np.empty(DEPTH + 2, dtype=np.int64)
+    """Scratch of a sweep: speeds and accelerations, of joints, too; the pairs left on each level.
+
+    Where it stands.
+    """
+    lists, counts = (
+        np.empty((DEPTH + 2, num_pairs), dtype=np.int64),
+        np.empty(DEPTH + 2, dtype=np.int64),
+    )
     lists[0], counts[0] = np.arange(num_pairs), num_pairs
-    begins, ends, depths = np.empty(DEPTH + 2), np.empty(DEPTH + 2), np.empty(DEPTH + 2, dtype=np.int64)
+    begins, ends, depths = (
+        np.empty(DEPTH + 2),
+        np.empty(DEPTH + 2),
+        np.empty(DEPTH + 2, dtype=np.int64),
+    )
     return np.empty((2, num_pairs)), np.empty(num_joints), lists, counts, depths, begins, ends
 
 
 @kernel
 def approach_weights(table, bodies, pairs, strokes):  # type: ignore[no-untyped-def]
-    """(pairs, joints): how much a joint's speed can change a pair's distance, widened against rounding."""
+    """(pairs, joints): how much a joint's speed can change a pair's distance.
+
+    Widened against rounding.
+    """
     reach = reaches(table, bodies[0], bodies[9], bodies[10], strokes)
     return pair_reaches(pairs, reach) * WIDER
 
 
 def work_space(task: Task) -> tuple[np.ndarray, ...]:
-    """Scratch: q, joints' frames, bodies' frames and when they were placed, what `distance_bounds` needs, twists."""
+    """Scratch: q, joints' frames, bodies' frames and when they were placed.
+
+    What `distance_bounds` needs, twists.
+    """
     num_joints, num_bodies = len(task.table[0]), len(task.bodies[0])
     world = np.hstack([task.bodies[3], task.bodies[4]])  # right for bodies that stand still
-    stamps = np.zeros(num_bodies + 2, dtype=np.int64)  # the last but one: of the twists; the last: of q
-    q, frames, twists = np.zeros(num_joints), np.zeros((num_joints, FRAME)), np.zeros((num_joints, 6))
-    return q, frames, world, stamps, np.ones((len(task.pairs), 3)), np.zeros((4, 3)), np.zeros((3, 3)), twists
+    stamps = np.zeros(
+        num_bodies + 2, dtype=np.int64
+    )  # the last but one: of the twists; the last: of q
+    q, frames, twists = (
+        np.zeros(num_joints),
+        np.zeros((num_joints, FRAME)),
+        np.zeros((num_joints, 6)),
+    )
+    return (
+        q,
+        frames,
+        world,
+        stamps,
+        np.ones((len(task.pairs), 3)),
+        np.zeros((4, 3)),
+        np.zeros((3, 3)),
+        twists,
+    )
 
 
 @inlined
@@ -185,7 +231,9 @@ def pair_distance(task, work, pair, need, enough, converged):  # type: ignore[no
             stamps[body] = stamps[-1]
             _place_body(frames[joint], task.bodies[3][body], task.bodies[4][body], world[body])
     one, two = task.pairs[pair, 0], task.pairs[pair, 1]
-    return distance_bounds(task.bodies, world, one, two, need, enough, converged, normals[pair], simplex, scratch)
+    return distance_bounds(
+        task.bodies, world, one, two, need, enough, converged, normals[pair], simplex, scratch
+    )
 
 
 @inlined
@@ -208,11 +256,17 @@ def _sweep(task, goal, work, found, stack):  # type: ignore[no-untyped-def]
         _judge_instants(task, goal, work, found)
     for segment in range(num_segments):
         if task.straight:
-            approach_bounds(task.table, task.coefficients[segment], 0.0, 1.0, task.weights, bounds, above)
+            approach_bounds(
+                task.table, task.coefficients[segment], 0.0, 1.0, task.weights, bounds, above
+            )
         begins[0], ends[0], depths[0], waiting = 0.0, 1.0, 0, 1
         while waiting > 0:
             waiting -= 1
-            a, b, depth = begins[waiting], min(ends[waiting], state[FIRST] - segment), depths[waiting]
+            a, b, depth = (
+                begins[waiting],
+                min(ends[waiting], state[FIRST] - segment),
+                depths[waiting],
+            )
             if state[FIRST] < np.inf and not goal.refine:
                 return True
             if a >= b:
@@ -220,9 +274,21 @@ def _sweep(task, goal, work, found, stack):  # type: ignore[no-untyped-def]
             if state[NODES] >= goal.max_nodes or state[LEAVES] + num_pairs > len(leaves):
                 return False
             if not task.straight:
-                approach_bounds(task.table, task.coefficients[segment], a, b, task.weights, bounds, above)
+                approach_bounds(
+                    task.table, task.coefficients[segment], a, b, task.weights, bounds, above
+                )
             counts[depth + 1] = _judge_interval(
-                task, goal, work, found, segment, a, b, depth, bounds, lists[depth, : counts[depth]], lists[depth + 1]
+                task,
+                goal,
+                work,
+                found,
+                segment,
+                a,
+                b,
+                depth,
+                bounds,
+                lists[depth, : counts[depth]],
+                lists[depth + 1],
             )
             if counts[depth + 1] > 0:
                 u = 0.5 * (a + b)
@@ -234,7 +300,10 @@ def _sweep(task, goal, work, found, stack):  # type: ignore[no-untyped-def]
 
 @inlined
 def _closely(goal):  # type: ignore[no-untyped-def]
-    """How closely distances are bounded: a thousandth of what shall be told apart; around a level, exactly."""
+    """How closely distances are bounded: a thousandth of what shall be told apart.
+
+    Around a level, exactly.
+    """
     return max(CONVERGED, 0.001 * goal.resolution) if goal.resolution < 1.0 else CONVERGED
 
 
@@ -261,7 +330,10 @@ def _judge_instants(task, goal, work, found):  # type: ignore[no-untyped-def]
 
 @inlined
 def _judge_interval(task, goal, work, found, segment, a, b, depth, bounds, given, left):  # type: ignore[no-untyped-def]
-    """Judge the given pairs on [a, b] from its middle; write those for its halves to `left`, return their number."""
+    """Judge the given pairs on [a, b] from its middle.
+
+    Write those for its halves to `left`, return their number.
+    """
     leaves, state, least, at = found
     state[NODES] += 1.0
     u, half, count = 0.5 * (a + b), 0.5 * (b - a), 0
@@ -278,10 +350,14 @@ def _judge_interval(task, goal, work, found, segment, a, b, depth, bounds, given
         if task.exact[pair] and high <= goal.level[pair] and segment + u < state[FIRST]:
             state[FIRST], state[FIRST_PAIR] = segment + u, pair
         slack = goal.slack[pair]
-        near = way <= 0.25 * slack and low > goal.level[pair] - 0.5 * slack and high > goal.level[pair]
+        near = (
+            way <= 0.25 * slack and low > goal.level[pair] - 0.5 * slack and high > goal.level[pair]
+        )
         bound = low - way
         change = 0.5 * half * half * bounds[1, pair] + goal.rounding
-        if bound < wanted <= low - change and task.by_one[pair]:  # the least gap is not above the gap now
+        if (
+            bound < wanted <= low - change and task.by_one[pair]
+        ):  # the least gap is not above the gap now
             bound = max(bound, least_separation(task, work, pair, segment, u, half) - change)
         if bound >= wanted or near:
             state[PROVEN] = min(state[PROVEN], bound)
@@ -298,22 +374,28 @@ def _judge_interval(task, goal, work, found, segment, a, b, depth, bounds, given
 
 @inlined
 def least_separation(task, work, pair, segment, u, half):  # type: ignore[no-untyped-def]
-    """Least gap across a pair's last normal within `half` before and after u, if velocities did not change."""
+    """Least gap across a pair's last normal within `half` before and after u.
+
+    If velocities did not change.
+    """
     _, frames, world, stamps, normals, _, scratch, twists = work
     if stamps[-2] != stamps[-1]:
         stamps[-2] = stamps[-1]
         joint_twists(task.table, task.coefficients[segment], u, frames, twists)
     one, two, normal = task.pairs[pair, 0], task.pairs[pair, 1], normals[pair]
     before = separation_later(task.bodies, world, twists, one, two, normal, -half, scratch)
-    return min(before, separation_later(task.bodies, world, twists, one, two, normal, half, scratch))
+    return min(
+        before, separation_later(task.bodies, world, twists, one, two, normal, half, scratch)
+    )
 
 
 @kernel
 def polish(task, work, pairs, t, distances):  # type: ignore[no-untyped-def]
     """Walk from given instants to local minima of pairs' distances.
 
-    At a step to both sides that finds nothing less, the vertex of the parabola through the three is tried, and the
-    step shrinks: a smooth minimum takes some 25 distances, one at an instant, where the motion bends, no more.
+    At a step to both sides that finds nothing less, the vertex of the parabola through the three is
+    tried, and the step shrinks: a smooth minimum takes some 25 distances, one at an instant, where
+    the motion bends, no more.
 
     Args:
         task: The motion.

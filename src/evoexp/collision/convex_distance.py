@@ -1,8 +1,9 @@
 """Bounds of the distance of two convex bodies: closed forms where there are some, GJK elsewhere.
 
-Gilbert, Johnson & Keerthi 1988. Every direction v gives a lower bound, the gap between the two planes across v that
-support the bodies; every point found in the difference of the bodies gives an upper bound. Both hold whenever the
-iteration stops, so it stops as soon as they decide what is asked. Nothing here is the last word: coal is.
+Gilbert, Johnson & Keerthi 1988. Every direction v gives a lower bound, the gap between the two
+planes across v that support the bodies; every point found in the difference of the bodies gives an
+upper bound. Both hold whenever the iteration stops, so it stops as soon as they decide what is
+asked. Nothing here is the last word: coal is.
 
 A body's frame in the world is a row of twelve numbers, as in `motion_bounds`.
 """
@@ -15,14 +16,19 @@ from evoexp.numerics import inlined
 
 MAX_ITERATIONS = 100
 
-LOOSE = 0.05  # [-] of what is left above `enough`: gap at which GJK ends where `need` is out of reach
+LOOSE = (
+    0.05  # [-] of what is left above `enough`: gap at which GJK ends where `need` is out of reach
+)
 
-CONVERGED = 1e-13  # [-] of the distance: gap between the bounds at which GJK ends where the distance itself is wanted
+# [-] of the distance: gap between the bounds at which GJK ends where the distance itself is wanted
+CONVERGED = 1e-13
 
 
 @inlined
 def distance_bounds(bodies, world, one, two, need, enough, converged, normal, simplex, scratch):  # type: ignore[no-untyped-def]
-    """A lower and an upper bound of the distance of two bodies; equal up to rounding unless stopped early.
+    """A lower and an upper bound of the distance of two bodies.
+
+    Equal up to rounding unless stopped early.
 
     Args:
         bodies: `BodyTable` as a tuple.
@@ -30,11 +36,11 @@ def distance_bounds(bodies, world, one, two, need, enough, converged, normal, si
         one: Index of a body.
         two: Index of the other.
         need: Stops when the lower bound is not below it.
-        enough: Stops when the upper bound is below it; where `need` is out of reach, when it is known how far: `LOOSE`.
-            −inf: never.
+        enough: Stops when the upper bound is below it; where `need` is out of reach, when it is
+            known how far: `LOOSE`. −inf: never.
         converged: And when the two are apart by this part of the distance of the cores [-].
-        normal: (3,) a direction to begin with, from the second to the first; the last one, across which the lower
-            bound was found, is written back.
+        normal: (3,) a direction to begin with, from the second to the first; the last one, across
+            which the lower bound was found, is written back.
         simplex: (4, 3) scratch.
         scratch: (3, 3) scratch.
     """
@@ -51,13 +57,21 @@ def distance_bounds(bodies, world, one, two, need, enough, converged, normal, si
         normal[0], normal[1], normal[2] = sign * x, sign * y, sign * z
         return distance, distance
     if kind[one] == SEGMENT and kind[two] == SEGMENT:
-        distance = segment_distance(world[one], size[one, 0], world[two], size[two, 0], normal) - radii
+        distance = (
+            segment_distance(world[one], size[one, 0], world[two], size[two, 0], normal) - radii
+        )
         return distance, distance
-    x, y, z = world[one, 9] - world[two, 9], world[one, 10] - world[two, 10], world[one, 11] - world[two, 11]
+    x, y, z = (
+        world[one, 9] - world[two, 9],
+        world[one, 10] - world[two, 10],
+        world[one, 11] - world[two, 11],
+    )
     apart = np.sqrt(x * x + y * y + z * z) - bodies[11][one] - bodies[11][two]
     if apart >= need:
         return apart, np.inf
-    low, high = _gjk(bodies, world, one, two, need + radii, enough + radii, converged, normal, simplex, scratch)
+    low, high = _gjk(
+        bodies, world, one, two, need + radii, enough + radii, converged, normal, simplex, scratch
+    )
     return low - radii, high - radii
 
 
@@ -145,7 +159,10 @@ def _support(bodies, world, body, direction, sign, out):  # type: ignore[no-unty
 
 @inlined
 def segment_distance(one, half_one, two, half_two, across):  # type: ignore[no-untyped-def]
-    """Distance of two segments of given half lengths along the z axes of their frames, centred; writes its vector."""
+    """Distance of two segments of given half lengths along the z axes of their frames, centred.
+
+    Writes its vector.
+    """
     rx, ry, rz = one[9] - two[9], one[10] - two[10], one[11] - two[11]
     ux, uy, uz = one[2], one[5], one[8]
     vx, vy, vz = two[2], two[5], two[8]
@@ -158,16 +175,22 @@ def segment_distance(one, half_one, two, half_two, across):  # type: ignore[no-u
         s = min(max((b * e - d) / square, -half_one), half_one)
         t = min(max(e + b * s, -half_two), half_two)
         s = min(max(b * t - d, -half_one), half_one)
-        best = _nearer(rx + s * ux - t * vx, ry + s * uy - t * vy, rz + s * uz - t * vz, best, across)
+        best = _nearer(
+            rx + s * ux - t * vx, ry + s * uy - t * vy, rz + s * uz - t * vz, best, across
+        )
         if square > 1e-6 and abs(s) < half_one and abs(t) < half_two:
             return np.sqrt(best)
     for sign in (-1.0, 1.0):
         s = sign * half_one
         t = min(max(e + b * s, -half_two), half_two)
-        best = _nearer(rx + s * ux - t * vx, ry + s * uy - t * vy, rz + s * uz - t * vz, best, across)
+        best = _nearer(
+            rx + s * ux - t * vx, ry + s * uy - t * vy, rz + s * uz - t * vz, best, across
+        )
         t = sign * half_two
         s = min(max(b * t - d, -half_one), half_one)
-        best = _nearer(rx + s * ux - t * vx, ry + s * uy - t * vy, rz + s * uz - t * vz, best, across)
+        best = _nearer(
+            rx + s * ux - t * vx, ry + s * uy - t * vy, rz + s * uz - t * vz, best, across
+        )
     return np.sqrt(best)
 
 
@@ -182,10 +205,13 @@ def _nearer(x, y, z, best, across):  # type: ignore[no-untyped-def]
 
 @inlined
 def separation_later(bodies, world, twists, one, two, normal, later, scratch):  # type: ignore[no-untyped-def]
-    """The gap of two bodies across a normal, `later` ahead, if all their points kept their velocities.
+    """The gap of two bodies across a normal, `later` ahead.
 
-    A point x then stands at x + later (v + ω × x), at a height n·x + later (n·v + (n × ω)·x) that is linear in x: the
-    least and greatest are supports in a turned direction. In `later` the gap is concave.
+    If all their points kept their velocities.
+
+    A point x then stands at x + later (v + ω × x), at a height n·x + later (n·v + (n × ω)·x) that
+    is linear in x: the least and greatest are supports in a turned direction. In `later` the gap is
+    concave.
 
     Args:
         bodies: `BodyTable` as a tuple.

@@ -1,14 +1,17 @@
-"""Straight links of planar arms among ellipses: which individuals of a population collide on their way.
+"""Straight links of planar arms among ellipses.
 
-An ellipse is mapped to the unit circle by an upper triangular matrix; there a segment meets it where its distance to
-the origin is at most 1. With P, Q its ends in that frame and s = P·Q, the nearest point lies between them where
-P·P − s and Q·Q − s are positive, and then at the squared distance (P × Q)² / (P·P + Q·Q − 2 s): no division is needed.
-What is within a relative 1e-9 of touching counts as touching, so that rounding never lets a contact pass.
+Which individuals of a population collide on their way.
 
-Only whether an individual collides is asked for, so any order of tests gives the same answer. First some positions are
-tested one after the other, the ones that find most collisions first, and whoever collides is not tested again; whoever
-is left goes through all positions, and the chords of its link ends are tested on the way. Individuals are innermost, in
-blocks that `load_lanes` gathers.
+An ellipse is mapped to the unit circle by an upper triangular matrix; there a segment meets it
+where its distance to the origin is at most 1. With P, Q its ends in that frame and s = P·Q, the
+nearest point lies between them where P·P − s and Q·Q − s are positive, and then at the squared
+distance (P × Q)² / (P·P + Q·Q − 2 s): no division is needed. What is within a relative 1e-9 of
+touching counts as touching, so that rounding never lets a contact pass.
+
+Only whether an individual collides is asked for, so any order of tests gives the same answer. First
+some positions are tested one after the other, the ones that find most collisions first, and whoever
+collides is not tested again; whoever is left goes through all positions, and the chords of its link
+ends are tested on the way. Individuals are innermost, in blocks that `load_lanes` gathers.
 """
 
 import numpy as np
@@ -18,7 +21,9 @@ from evoexp.robots.kinematics import U
 from evoexp.robots.planar_ends import LANES, begin_turning, block_ends, load_lanes, turned_ends
 
 AFRESH = 32  # positions after which sines are computed anew, between them turned on
-CONTACT = 1.0 + 1e-9  # [-] squared distance to the centre of the unit circle that still counts as contact
+CONTACT = (
+    1.0 + 1e-9
+)  # [-] squared distance to the centre of the unit circle that still counts as contact
 BEYOND = CONTACT  # [-] distance from an axis at which nothing counts as contact any more
 
 
@@ -32,25 +37,43 @@ def paths_collide(starts, ends, lanes, count, arm, ellipses, path, hit):  # type
         lanes: (≥ count) indices of the individuals to test.
         count: How many.
         arm: See `planar_ends.block_ends`.
-        ellipses: (E, 5) maps (x, y) → (a x + b y + c, d y + e) to the unit circle; (E,) the first link (1, 2, …) that
-            reaches each ellipse.
-        path: M; the positions (1 … M) that are tested first; whether all positions follow, with chords swept.
+        ellipses: (E, 5) maps (x, y) → (a x + b y + c, d y + e) to the unit circle; (E,) the first
+            link (1, 2, …) that reaches each ellipse.
+        path: M; the positions (1 … M) that are tested first; whether all positions follow, with
+            chords swept.
         hit: (individuals,) written for those tested: whether each collides.
     """
     rows, num, num_ellipses = len(starts) * LANES, len(starts), len(ellipses[0])
     alive = np.empty(count + LANES, dtype=np.int64)
     block = np.empty(rows), np.empty(rows), np.empty(LANES)
-    at = np.empty(LANES), np.empty(LANES), np.empty(LANES), np.empty(rows + LANES), np.empty(rows + LANES)
-    mapped = np.empty((2, num_ellipses * (rows + LANES))), np.empty((2, num_ellipses * (rows + LANES)))
-    codes = np.empty((num_ellipses, num + 1), dtype=np.int64), np.empty((num_ellipses, num + 1), dtype=np.int64)
+    at = (
+        np.empty(LANES),
+        np.empty(LANES),
+        np.empty(LANES),
+        np.empty(rows + LANES),
+        np.empty(rows + LANES),
+    )
+    mapped = (
+        np.empty((2, num_ellipses * (rows + LANES))),
+        np.empty((2, num_ellipses * (rows + LANES))),
+    )
+    codes = (
+        np.empty((num_ellipses, num + 1), dtype=np.int64),
+        np.empty((num_ellipses, num + 1), dtype=np.int64),
+    )
     memory = alive, block, at, np.empty((4, rows)), mapped, codes
     _test_paths(starts, ends, lanes, count, arm, ellipses, path, hit, memory)
 
 
 @kernel
 def _test_paths(starts, ends, lanes, count, arm, ellipses, path, hit, memory):  # type: ignore[no-untyped-def]
-    """Do what `paths_collide` says, given its memory; so that no references are counted in the innermost loops."""
-    starts, ends, lanes, arm, ellipses, hit, memory = borrowed((starts, ends, lanes, arm, ellipses, hit, memory))
+    """Do what `paths_collide` says, given its memory.
+
+    So that no references are counted in the innermost loops.
+    """
+    starts, ends, lanes, arm, ellipses, hit, memory = borrowed(
+        (starts, ends, lanes, arm, ellipses, hit, memory)
+    )
     num_positions, first_positions, chords = path
     alive = memory[0]
     alive[:count] = lanes[:count]
@@ -58,7 +81,9 @@ def _test_paths(starts, ends, lanes, count, arm, ellipses, path, hit, memory):  
         hit[lanes[k]] = False
     left = count if len(ellipses[0]) > 0 else 0
     for position in first_positions:
-        left = _drop_colliding(starts, ends, left, arm, ellipses, position, num_positions, hit, memory)
+        left = _drop_colliding(
+            starts, ends, left, arm, ellipses, position, num_positions, hit, memory
+        )
     if chords:
         _sweep(starts, ends, left, arm, ellipses, num_positions, hit, memory)
 
@@ -67,8 +92,13 @@ def _test_paths(starts, ends, lanes, count, arm, ellipses, path, hit, memory):  
 def _drop_colliding(  # type: ignore[no-untyped-def]
     starts, ends, count, arm, ellipses, position, num_positions, hit, memory
 ):
-    """Test one position; mark who collides, keep the others in front of `alive` and return how many they are."""
-    alive, (begin, end, least), (angle, at_x, at_y, x, y), _, (mapped, _), (codes, _) = borrowed(memory)
+    """Test one position; mark who collides.
+
+    Keep the others in front of `alive` and return how many they are.
+    """
+    alive, (begin, end, least), (angle, at_x, at_y, x, y), _, (mapped, _), (codes, _) = borrowed(
+        memory
+    )
     num, kept = len(starts), 0
     for first in range(0, count, LANES):
         load_lanes(starts, alive, first, count, begin)
@@ -117,10 +147,12 @@ def _sweep(starts, ends, count, arm, ellipses, num_positions, hit, memory):  # t
 
 @kernel
 def _map(ellipse, reached, num, x, y, place, mapped, codes):  # type: ignore[no-untyped-def]
-    """Write link ends in an ellipse's frame, and the sides of the unit circle that all of a block's lie beyond.
+    """Write link ends in an ellipse's frame.
 
-    Where two ends share a side, nothing between them meets the circle (outcodes, Newman & Sproull 1979); as the arms of
-    a block are alike, most tests need not be done.
+    And the sides of the unit circle that all of a block's lie beyond.
+
+    Where two ends share a side, nothing between them meets the circle (outcodes, Newman & Sproull
+    1979); as the arms of a block are alike, most tests need not be done.
     """
     a, b, c, d, e = ellipse[0], ellipse[1], ellipse[2], ellipse[3], ellipse[4]
     u, v = mapped[0], mapped[1]
@@ -161,7 +193,13 @@ def _test(u, v, row, p, q, to, least):  # type: ignore[no-untyped-def]
     """Lower `least` to 0 or less where a segment from (u, v) to (p, q) touches the unit circle."""
     for n in range(LANES):
         lane = U(n)
-        x_0, y_0, x_1, y_1, lowest = u[row + lane], v[row + lane], p[to + lane], q[to + lane], least[lane]
+        x_0, y_0, x_1, y_1, lowest = (
+            u[row + lane],
+            v[row + lane],
+            p[to + lane],
+            q[to + lane],
+            least[lane],
+        )
         r, s = x_0 * x_0 + y_0 * y_0, x_1 * x_1 + y_1 * y_1
         inner, nearer = between(x_0, y_0, r, x_1, y_1, s), (r if r < s else s) - CONTACT
         value = inner if inner < nearer else nearer
@@ -170,7 +208,10 @@ def _test(u, v, row, p, q, to, least):  # type: ignore[no-untyped-def]
 
 @kernel
 def between(u, v, r, p, q, s):  # type: ignore[no-untyped-def]
-    """Return ≤ 0 if a segment touches the unit circle between its ends (u, v), (p, q) at squared distances r, s."""
+    """Return ≤ 0 if a segment touches the unit circle between its ends (u, v), (p.
+
+    Q) at squared distances r, s.
+    """
     turned, along = u * q - v * p, u * p + v * q
     one, two = r - along, s - along
     value = turned * turned - CONTACT * (one + two)
@@ -180,7 +221,9 @@ def between(u, v, r, p, q, s):  # type: ignore[no-untyped-def]
 
 @kernel
 def first_contact(start, end, arm, ellipses, num_positions, chords):  # type: ignore[no-untyped-def]
-    """Find the first contact of one path, in the order of positions, ellipses and links, a chord before its position.
+    """Find the first contact of one path, in the order of positions, ellipses and links.
+
+    A chord before its position.
 
     Args:
         start: (N,) joint angles at the start [rad].
@@ -191,8 +234,8 @@ def first_contact(start, end, arm, ellipses, num_positions, chords):  # type: ig
         chords: Whether chords are swept.
 
     Returns:
-        Position; place of the ellipse; link, or link end, from 1; whether it is a chord that touches. All −1 and false
-        if nothing does.
+        Position; place of the ellipse; link, or link end, from 1; whether it is a chord that
+        touches. All −1 and false if nothing does.
     """
     num = len(start)
     begin, stop = np.repeat(start, LANES), np.repeat(end, LANES)

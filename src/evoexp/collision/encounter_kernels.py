@@ -1,7 +1,7 @@
 """Kernels of encounters: the shapes of a body against obstacles, or against those of another body.
 
-An encounter is gathered from the frames of its configuration; what is measured is in `primitive_distances` and
-`segment_distances`.
+An encounter is gathered from the frames of its configuration; what is measured is in
+`primitive_distances` and `segment_distances`.
 """
 
 import numpy as np
@@ -111,7 +111,15 @@ def body_meets_body(width, one, two, units, shapes, lane_of, frames, place, work
     first, stop = whole[two, 1], whole[two, 2]
     begin, end = (runs[first, 0], runs[stop - 1, 1]) if first < stop else (0, 0)
     for j in range(begin, end):
-        move(width, spheres[j, 0], spheres[j, 1], spheres[j, 2], 1.0, CENTERS + U(j - begin) * U(3) * W, work)
+        move(
+            width,
+            spheres[j, 0],
+            spheres[j, 1],
+            spheres[j, 2],
+            1.0,
+            CENTERS + U(j - begin) * U(3) * W,
+            work,
+        )
     for run in range(whole[one, 1], whole[one, 2]):
         spheres_to_spheres(width, runs, spheres, run, first, stop, work)
     for i in range(whole[one, 3], whole[one, 4]):
@@ -122,9 +130,13 @@ def body_meets_body(width, one, two, units, shapes, lane_of, frames, place, work
         _move_segment(width, capsules[j], work)
         for run in range(whole[one, 1], whole[one, 2]):
             for i in range(runs[run, 0], runs[run, 1]):
-                segments_to_point(width, spheres[i], capsules[j, 7], capsules[j, 6] + spheres[i, 3], work)
+                segments_to_point(
+                    width, spheres[i], capsules[j, 7], capsules[j, 6] + spheres[i, 3], work
+                )
         for i in range(whole[one, 3], whole[one, 4]):
-            segment_to_segments(width, capsules[i], capsules[j, 7], capsules[i, 6] + capsules[j, 6], work)
+            segment_to_segments(
+                width, capsules[i], capsules[j, 7], capsules[i, 6] + capsules[j, 6], work
+            )
 
 
 @kernel
@@ -153,7 +165,9 @@ def _relative(width, work):  # type: ignore[no-untyped-def]
             for n in range(width):
                 k = U(n)
                 y, z = x + U(3) * W + k, x + U(6) * W + k
-                work[o + k] = work[a + k] * work[x + k] + work[b + k] * work[y] + work[c + k] * work[z]
+                work[o + k] = (
+                    work[a + k] * work[x + k] + work[b + k] * work[y] + work[c + k] * work[z]
+                )
         o = MOTION + U(9 + row) * W
         for n in range(width):
             k = U(n)

@@ -1,4 +1,7 @@
-"""The collision model of Curkovic et al. 2013 on a robot: links as lines, or as envelopes, among static obstacles."""
+"""The collision model of Curkovic et al.
+
+2013 on a robot: links as lines, or as envelopes, among static obstacles.
+"""
 
 from typing import Any, ClassVar, NamedTuple
 
@@ -23,8 +26,10 @@ class LinkCrossings(Component):
     """Robots of two links in the plane, which collide where lines of them meet (Eqs. 4, 5, 11, 12).
 
     Attributes:
-        collision_substeps: Configurations tested per segment of a path; 1: the encoded ones only, as in the paper.
-        half_width: Of the envelope: distance of a link's two boundary lines from it [length unit]; 0: the link itself.
+        collision_substeps: Configurations tested per segment of a path; 1: the encoded ones only,
+            as in the paper.
+        half_width: Of the envelope: distance of a link's two boundary lines from it [length unit];
+            0: the link itself.
         tcp_radius: Of a circle around the tool centre point [length unit]; 0: none.
     """
 
@@ -38,13 +43,16 @@ class LinkCrossings(Component):
         """Return the model of some robots among obstacles.
 
         Raises:
-            SettingError: If a robot is no planar arm of two links, or an obstacle no figure of the plane.
+            SettingError: If a robot is no planar arm of two links, or an obstacle no figure of the
+                plane.
         """
         arms = tuple(_arm(assembly, first) for first, _ in _pairs_of_joints(assembly))
         try:
             flat = planar_obstacles(obstacle_table(obstacles))
         except ValueError as error:
-            raise SettingError("scenario.obstacles", f"figures of the plane ({error})", len(obstacles)) from None
+            raise SettingError(
+                "scenario.obstacles", f"figures of the plane ({error})", len(obstacles)
+            ) from None
         return LinkCollision(arms, flat, self.collision_substeps, self.half_width, self.tcp_radius)
 
 
@@ -75,7 +83,8 @@ class LinkCollision(NamedTuple):
 
         Args:
             robot: Whose population.
-            path: (K + 2, 2, N) link angles [rad], start and goal included, which are the same for all.
+            path: (K + 2, 2, N) link angles [rad], start and goal included, which are the same for
+                all.
             points: (K + 2, 4, N) of the robot's `Arm.points` at these angles.
         """
         if self.substeps > 1:
@@ -90,7 +99,8 @@ class LinkCollision(NamedTuple):
     def contact(self, posture: FloatArray) -> str:
         """Return what touches what at link angles (robots, 2) [rad]; empty if nothing does."""
         lines = [
-            self.of_configurations(r, np.ascontiguousarray(angles.reshape(1, 2, 1))) for r, angles in enumerate(posture)
+            self.of_configurations(r, np.ascontiguousarray(angles.reshape(1, 2, 1)))
+            for r, angles in enumerate(posture)
         ]
         for r, own in enumerate(lines):
             if self.with_obstacles(r, own)[0]:
@@ -101,17 +111,19 @@ class LinkCollision(NamedTuple):
         return ""
 
     def between(self, one: int, first: FloatArray, two: int, second: FloatArray) -> Crossings:
-        """Count colliding configurations for every pair of individuals of two robots' populations."""
+        """Count colliding configurations for every pair of individuals of two populations."""
         if self.enveloped:
             return count_collisions(self._enveloped(one), first, self._enveloped(two), second)
         return count_crossings(self.arms[one], first, self.arms[two], second)
 
     def with_obstacles(self, robot: int, lines: FloatArray) -> np.ndarray:
-        """Count colliding configurations with obstacles for every individual of a robot's population, (N,)."""
+        """Count configurations in an obstacle for every individual of a population, (N,)."""
         if not len(self.obstacles.kind):
             return np.zeros(lines.shape[2], dtype=np.int64)
         if self.enveloped:
-            return count_enveloped_obstacle_collisions(self._enveloped(robot), lines, self.obstacles)
+            return count_enveloped_obstacle_collisions(
+                self._enveloped(robot), lines, self.obstacles
+            )
         return count_obstacle_collisions(self.arms[robot], lines, self.obstacles)
 
     def _enveloped(self, robot: int) -> EnvelopedArm:
@@ -119,7 +131,10 @@ class LinkCollision(NamedTuple):
 
 
 def _pairs_of_joints(assembly: Assembly) -> list[tuple[int, int]]:
-    """Return first and one-past-last joint of every robot, which must have two and turn in the plane."""
+    """Return first and one-past-last joint of every robot.
+
+    Which must have two and turn in the plane.
+    """
     slices = [(int(first), int(stop)) for first, stop in assembly.arm_slices]
     flat = assembly.table.planar and all(stop - first == 2 for first, stop in slices)
     links = [link for link in assembly.links if not link.is_tool]
@@ -127,13 +142,17 @@ def _pairs_of_joints(assembly: Assembly) -> list[tuple[int, int]]:
     turned = [bool(assembly.table.turned[k]) for k in range(len(assembly.table.parent))]
     if not straight or any(turned):
         must = "planar arms of two links with base_angle 0"
-        raise SettingError("robot", must, ", ".join(f"{stop - first} joints" for first, stop in slices))
+        raise SettingError(
+            "robot", must, ", ".join(f"{stop - first} joints" for first, stop in slices)
+        )
     return slices
 
 
 def _arm(assembly: Assembly, first: int) -> Arm:
     base = assembly.table.translation[first]
     lengths = [
-        float(link.end[0]) for link in assembly.links if link.joint - 1 in (first, first + 1) and not link.is_tool
+        float(link.end[0])
+        for link in assembly.links
+        if link.joint - 1 in (first, first + 1) and not link.is_tool
     ]
     return Arm((float(base[0]), float(base[1])), (lengths[0], lengths[1]))

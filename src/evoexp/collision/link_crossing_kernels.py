@@ -1,22 +1,26 @@
-"""Kernels of crossing links: two populations of two-link arms, every individual of one against every one of the other.
+"""Kernels of crossing links: two populations of two-link arms.
 
-Arm 1 has its base A, elbow B = A + u1, tip C = B + u2; arm 2 D, E = D + v1, F = E + v2. Two links cross where the ends
-of each lie on different sides of the other's line. All sixteen line functions follow from the four cross products
-u × v (in angles: the sines of Curkovic et al. 2013, Eq. 12) and from what each individual has on its own; the latter
-is prepared once per individual. So a configuration of a pair takes 20 additions and multiplications for its line
-functions and 15 more for the sign products of its four link pairs.
+Every individual of one against every one of the other.
 
-Those run in single precision, eight or more lanes at a time. A pair of links is apart where one of its two products is
-above `tau`, a bound on all rounding (proved at `_threshold`), and crosses where both are below −tau; what is neither,
-two pairs of ten thousand random ones, is decided anew by the exact predicates. So counts are exact, whatever the
-vector width.
+Arm 1 has its base A, elbow B = A + u1, tip C = B + u2; arm 2 D, E = D + v1, F = E + v2. Two links
+cross where the ends of each lie on different sides of the other's line. All sixteen line functions
+follow from the four cross products u × v (in angles: the sines of Curkovic et al. 2013, Eq. 12) and
+from what each individual has on its own; the latter is prepared once per individual. So a
+configuration of a pair takes 20 additions and multiplications for its line functions and 15 more
+for the sign products of its four link pairs.
 
-What limits the speed: by count the multipliers, which do 16 multiplications, 7 minima or maxima and 2 comparisons of
-the 40 operations. Measured with vectors of eight (AVX2), 100 × 100 pairs in 4 configurations: 42 µs from points to
-counts and sums, 28 µs of them this loop (5.4 ns per vector), the rest tables, lengths, sums, checks; fresh or gathered
-populations alike, for nothing is skipped.
+Those run in single precision, eight or more lanes at a time. A pair of links is apart where one of
+its two products is above `tau`, a bound on all rounding (proved at `_threshold`), and crosses where
+both are below −tau; what is neither, two pairs of ten thousand random ones, is decided anew by the
+exact predicates. So counts are exact, whatever the vector width.
 
-`q` and points are (configurations, rows, individuals), any number of individuals; tables are padded to blocks.
+What limits the speed: by count the multipliers, which do 16 multiplications, 7 minima or maxima and
+2 comparisons of the 40 operations. Measured with vectors of eight (AVX2), 100 × 100 pairs in 4
+configurations: 42 µs from points to counts and sums, 28 µs of them this loop (5.4 ns per vector),
+the rest tables, lengths, sums, checks; fresh or gathered populations alike, for nothing is skipped.
+
+`q` and points are (configurations, rows, individuals), any number of individuals; tables are padded
+to blocks.
 """
 
 import math
@@ -28,10 +32,16 @@ from evoexp.numerics import kernel, sincos
 from evoexp.robots.kinematics import U
 
 LANES = 104
-"""Individuals per block of a table; of the last block only as many as there are, in eights, are computed."""
+"""Individuals per block of a table.
+
+Of the last block only as many as there are, in eights, are computed.
+"""
 
 ROWS = 6
-"""Rows of a table, in single precision: u1 (x, y), u2 (x, y), and both links' line functions at the other's base."""
+"""Rows of a table, in single precision.
+
+U1 (x, y), u2 (x, y), and both links' line functions at the other's base.
+"""
 
 MOST_CONFIGURATIONS = 32767  # both counters of a pair share an int32, and counts are int16
 
@@ -51,7 +61,12 @@ def link_points(q, base_x, base_y, first_length, second_length, out):  # type: i
     for link in range(2 * q.shape[0]):
         directions(angles, U(link * num), num, place, U(2 * link * num), U((2 * link + 1) * num))
     for k in range(q.shape[0]):
-        x, y, z, w = U(4 * k * num), U((4 * k + 1) * num), U((4 * k + 2) * num), U((4 * k + 3) * num)
+        x, y, z, w = (
+            U(4 * k * num),
+            U((4 * k + 1) * num),
+            U((4 * k + 2) * num),
+            U((4 * k + 3) * num),
+        )
         for n in range(num):
             place[x + U(n)] = base_x + first_length * place[x + U(n)]
             place[y + U(n)] = base_y + first_length * place[y + U(n)]
@@ -71,7 +86,10 @@ def directions(angles, a, num, out, x, y):  # type: ignore[no-untyped-def]
 
 @kernel
 def substeps(genes, start, goal, steps, out):  # type: ignore[no-untyped-def]
-    """Configurations tested on the way start → genes → goal: genes (K, 2, N); out ((K + 1) · steps − 1, 2, N)."""
+    """Configurations tested on the way start → genes → goal: genes (K, 2, N).
+
+    Out ((K + 1) · steps − 1, 2, N).
+    """
     last = genes.shape[0]
     for k in range(last + 1):
         for step in range(1, steps + 1):
@@ -105,12 +123,15 @@ def longest_link(base_x, base_y, points):  # type: ignore[no-untyped-def]
 
 @kernel
 def _threshold(longest, distance):  # type: ignore[no-untyped-def]
-    """Return the scale 2^-e of tables, and tau: above all errors of a product of two line functions.
+    """Return the scale 2^-e of tables, and tau.
 
-    With links ≤ l, bases d apart and u = 2^-24, every line function is at most V = l (d + 3 l). Its error is below
-    5 u V: the vectors are rounded (2 u), their products and differences (2 u, four times), sums of at most three terms
-    follow. So the product of two errs by less than (10 + 1) u V² + 25 u² V²; taken are 16. The double precision of what
-    is prepared and the sums of rounded vectors add less than 2^-45 V².
+    Above all errors of a product of two line functions.
+
+    With links ≤ l, bases d apart and u = 2^-24, every line function is at most V = l (d + 3 l). Its
+    error is below 5 u V: the vectors are rounded (2 u), their products and differences (2 u, four
+    times), sums of at most three terms follow. So the product of two errs by less than (10 + 1) u
+    V² + 25 u² V²; taken are 16. The double precision of what is prepared and the sums of rounded
+    vectors add less than 2^-45 V².
     """
     exponent = max(math.frexp(max(longest, distance))[1], -_HIGHEST)
     scale = math.ldexp(1.0, -exponent)
@@ -120,7 +141,10 @@ def _threshold(longest, distance):  # type: ignore[no-untyped-def]
 
 @kernel
 def _fill_table(points, base_x, base_y, other_x, other_y, members, scale, out):  # type: ignore[no-untyped-def]
-    """Table of some individuals of a population; lanes without an individual are apart from everything."""
+    """Table of some individuals of a population.
+
+    Lanes without an individual are apart from everything.
+    """
     num_configurations = points.shape[0]
     dx, dy = (other_x - base_x) * scale, (other_y - base_y) * scale
     for block in range((len(members) + LANES - 1) // LANES):
@@ -137,7 +161,9 @@ def _fill_table(points, base_x, base_y, other_x, other_y, members, scale, out): 
                 out[at + U(2 * LANES)] = np.float32(w)
                 out[at + U(3 * LANES)] = np.float32(z)
                 out[at + U(4 * LANES)] = np.float32(u * dy - v * dx)
-                out[at + U(5 * LANES)] = np.float32(w * ((other_y - y) * scale) - z * ((other_x - x) * scale))
+                out[at + U(5 * LANES)] = np.float32(
+                    w * ((other_y - y) * scale) - z * ((other_x - x) * scale)
+                )
             for lane in range(count, (count + 7) // 8 * 8):
                 for row in range(ROWS):
                     out[o + U(row * LANES + lane)] = np.float32(row >= 4)
@@ -145,7 +171,10 @@ def _fill_table(points, base_x, base_y, other_x, other_y, members, scale, out): 
 
 @kernel
 def _add_crossings(one, own, two, other, num_configurations, lanes, tau, seen):  # type: ignore[no-untyped-def]
-    """An individual (at own) against a block (at other): seen (LANES,) certain crossings + 65536 · possible ones."""
+    """An individual (at own) against a block (at other).
+
+    Seen (LANES,) certain crossings + 65536 · possible ones.
+    """
     low = -tau
     for n in range(lanes):
         seen[U(n)] = _NONE
@@ -195,7 +224,10 @@ def colliding(base_1, points_1, i, base_2, points_2, j, k):  # type: ignore[no-u
 def _count_rows(  # type: ignore[no-untyped-def]
     base_1, points_1, one, rows, base_2, points_2, two, columns, tau, counts
 ):
-    """Fill counts[rows, columns]; `one` is the table of all of population 1, `two` of the columns alone."""
+    """Fill counts[rows, columns].
+
+    `one` is the table of all of population 1, `two` of the columns alone.
+    """
     num_configurations, dense = points_1.shape[0], len(columns) == points_2.shape[2]
     seen = np.empty(LANES, dtype=np.int32)
     for row in range(len(rows)):
@@ -219,7 +251,16 @@ def _count_rows(  # type: ignore[no-untyped-def]
                     counts[U(i), U(columns[first + n])] = certain
                     undecided += certain != possible
             if undecided > 0:
-                _decide(base_1, points_1, i, base_2, points_2, columns[first : first + count], seen, counts)
+                _decide(
+                    base_1,
+                    points_1,
+                    i,
+                    base_2,
+                    points_2,
+                    columns[first : first + count],
+                    seen,
+                    counts,
+                )
 
 
 @kernel
@@ -268,7 +309,9 @@ def crossings(  # type: ignore[no-untyped-def]
     Returns:
         False, with nothing written, if a coordinate is not finite.
     """
-    squared = max(longest_link(base_1[0], base_1[1], points_1), longest_link(base_2[0], base_2[1], points_2))
+    squared = max(
+        longest_link(base_1[0], base_1[1], points_1), longest_link(base_2[0], base_2[1], points_2)
+    )
     dx, dy = base_2[0] - base_1[0], base_2[1] - base_1[1]
     apart = dx * dx + dy * dy
     if not squared + apart < _LARGEST:

@@ -1,4 +1,7 @@
-"""The collision model of Lavoie & Boudreau 2001: a planar arm's links as lines among ellipses, along a whole path."""
+"""The collision model of Lavoie & Boudreau 2001.
+
+A planar arm's links as lines among ellipses, along a whole path.
+"""
 
 from typing import ClassVar, Literal, NamedTuple
 
@@ -19,7 +22,8 @@ class LinkEllipses(Component):
     """Positions and chords along a straight joint-space path, tested exactly; contact is collision.
 
     Attributes:
-        num_positions: M of Eq. 3: equally spaced positions that are tested, the end included, the start not.
+        num_positions: M of Eq. 3: equally spaced positions that are tested, the end included, the
+            start not.
         swept: Whether the chord of every link end from one position to the next must be free, too.
         blind: Whether obstacles are ignored (a control: its solutions must collide).
     """
@@ -34,19 +38,26 @@ class LinkEllipses(Component):
         """Return the model of an arm among obstacles.
 
         Raises:
-            SettingError: If the robot is no single planar arm of thin links, or an obstacle no ellipse in its plane.
+            SettingError: If the robot is no single planar arm of thin links, or an obstacle no
+                ellipse in its plane.
         """
         arm = planar_arm(assembly)
         if thick := [link.radius for link in assembly.links if link.radius > 0.0]:
-            raise SettingError("robot.link_radius", "0: this collision model knows links as lines", thick[0])
+            raise SettingError(
+                "robot.link_radius", "0: this collision model knows links as lines", thick[0]
+            )
         for k, (kind, center) in enumerate(zip(obstacles.kind, obstacles.center, strict=True)):
             if kind != ELLIPSE or center[2] != 0.0:
-                raise SettingError(f"scenario.obstacles[{k}].shape", "an ellipse in the plane z = 0", int(kind))
+                raise SettingError(
+                    f"scenario.obstacles[{k}].shape", "an ellipse in the plane z = 0", int(kind)
+                )
         seen = 0 if self.blind else len(obstacles.kind)
         rows = list(zip(*obstacles[1:], strict=True))[:seen]
         maps = np.array([_to_unit_circle(*row) for row in rows]).reshape(-1, 5)
         reached = np.array([_first_link(arm, *row) for row in rows], dtype=np.int64)
-        return EllipseCollision(arm, (maps, reached), self.num_positions, self.swept == "chords", obstacles)
+        return EllipseCollision(
+            arm, (maps, reached), self.num_positions, self.swept == "chords", obstacles
+        )
 
 
 class Contact(NamedTuple):
@@ -84,7 +95,10 @@ class EllipseCollision(NamedTuple):
 
     @property
     def path(self) -> tuple[int, np.ndarray, bool]:
-        """M; the positions tested first, the end, then halves, quarters, …; whether all follow, with chords swept."""
+        """M; the positions tested first, the end, then halves, quarters, ….
+
+        Whether all follow, with chords swept.
+        """
         first = _spread(self.num_positions)
         return self.num_positions, first[:NUM_FIRST] if self.chords else first, self.chords
 
@@ -105,7 +119,10 @@ class EllipseCollision(NamedTuple):
         """
         num = len(self.arm[0])
         if starts.shape != ends.shape or starts.ndim != 2 or len(starts) != num:
-            raise ValueError(f"starts and ends must be ({num}, individuals), were {starts.shape} and {ends.shape}")
+            raise ValueError(
+                f"starts and ends must be ({num}, individuals), were {starts.shape} and "
+                f"{ends.shape}"
+            )
         lanes = np.arange(starts.shape[1])
         hit = np.zeros(len(lanes), dtype=np.bool_)
         starts, ends = (np.ascontiguousarray(q, dtype=np.float64) for q in (starts, ends))
@@ -113,7 +130,10 @@ class EllipseCollision(NamedTuple):
         return hit
 
     def contact(self, start: FloatArray, end: FloatArray) -> Contact | None:
-        """Return the first contact of one path between postures (N,) [rad]; None if there is none."""
+        """Return the first contact of one path between postures (N,) [rad].
+
+        None if there is none.
+        """
         start, end = (np.ascontiguousarray(q, dtype=np.float64) for q in (start, end))
         position, obstacle, link, swept = first_contact(
             start, end, self.arm, self.ellipses, self.num_positions, self.chords
@@ -121,10 +141,15 @@ class EllipseCollision(NamedTuple):
         return None if position < 0 else Contact(position, obstacle + 1, link, bool(swept))
 
 
-def _to_unit_circle(center: FloatArray, rotation: FloatArray, size: FloatArray) -> tuple[float, ...]:
-    """Return a, b, c, d, e of (x, y) → (a x + b y + c, d y + e), which maps an ellipse to the unit circle.
+def _to_unit_circle(
+    center: FloatArray, rotation: FloatArray, size: FloatArray
+) -> tuple[float, ...]:
+    """Return a, b, c, d, e of (x, y) → (a x + b y + c, d y + e).
 
-    The Cholesky factor of R diag(1/a², 1/b²) Rᵀ; d follows from its determinant, without cancellation.
+    Which maps an ellipse to the unit circle.
+
+    The Cholesky factor of R diag(1/a², 1/b²) Rᵀ; d follows from its determinant, without
+    cancellation.
     """
     (cosine, sine), one, two = (rotation[0], rotation[3]), 1.0 / size[0], 1.0 / size[1]
     a = float(np.sqrt(cosine * one * cosine * one + sine * two * sine * two))
@@ -133,11 +158,17 @@ def _to_unit_circle(center: FloatArray, rotation: FloatArray, size: FloatArray) 
 
 
 def _first_link(arm: PlanarArm, center: FloatArray, rotation: FloatArray, size: FloatArray) -> int:
-    """Return the first link (1, 2, …) whose end can reach an ellipse's bounding box; N + 2 if none does."""
+    """Return the first link (1, 2, …) whose end can reach an ellipse's bounding box.
+
+    N + 2 if none does.
+    """
     lengths, base_x, base_y = arm[:3]
     c, s = rotation[0], rotation[3]
     half = np.array(
-        [np.sqrt((c * size[0]) ** 2 + (s * size[1]) ** 2), np.sqrt((s * size[0]) ** 2 + (c * size[1]) ** 2)]
+        [
+            np.sqrt((c * size[0]) ** 2 + (s * size[1]) ** 2),
+            np.sqrt((s * size[0]) ** 2 + (c * size[1]) ** 2),
+        ]
     )
     off = np.maximum(np.abs(center[:2] - (base_x, base_y)) - half, 0.0)
     nearest = float(np.sqrt(np.sum(off * off))) * (1.0 - 1e-9)
@@ -146,7 +177,10 @@ def _first_link(arm: PlanarArm, center: FloatArray, rotation: FloatArray, size: 
 
 
 def _spread(num_positions: int) -> np.ndarray:
-    """Return 1 … M so that every next one is far from those before: M, the middle, the quarters, …."""
+    """Return 1 … M so that every next one is far from those before.
+
+    M, the middle, the quarters, ….
+    """
     order, parts = [num_positions], 2
     while len(order) < num_positions:
         for k in range(1, parts, 2):

@@ -1,10 +1,13 @@
-"""Kernels of arms with envelopes: two boundary lines per link, at ± half its width, and a circle around the tip.
+"""Kernels of arms with envelopes.
 
-As in `link_crossing_kernels`, all follows from what each individual has on its own and from four cross and four dot
-products of the arms' directions; here the directions are unit vectors, so that line functions are distances [length
-unit of the scene]. A pair's configuration takes some 260 operations in single precision for its sixteen pairs of
-boundary lines, eight of a circle and a line, and one of two circles; what they leave open is decided in double
-precision, the lines exactly. Measured with vectors of eight (AVX2), 100 × 100 pairs in 4 configurations: 220 µs, nearly
+Two boundary lines per link, at ± half its width, and a circle around the tip.
+
+As in `link_crossing_kernels`, all follows from what each individual has on its own and from four
+cross and four dot products of the arms' directions; here the directions are unit vectors, so that
+line functions are distances [length unit of the scene]. A pair's configuration takes some 260
+operations in single precision for its sixteen pairs of boundary lines, eight of a circle and a
+line, and one of two circles; what they leave open is decided in double precision, the lines
+exactly. Measured with vectors of eight (AVX2), 100 × 100 pairs in 4 configurations: 220 µs, nearly
 all of them this loop, which no longer fits the registers.
 
 Outlines are (K, 8, N): elbow x, y, tip x, y, direction of the first link x, y, of the second x, y.
@@ -22,7 +25,10 @@ from evoexp.robots.kinematics import U
 LANES = 104
 
 ROWS = 8
-"""Rows of a table: direction of link 1 (x, y), of link 2 (x, y), both links' (across, along) of the other's base."""
+"""Rows of a table: direction of link 1 (x, y), of link 2 (x, y), both links' (across.
+
+Along) of the other's base.
+"""
 
 _ONE, _MANY, _NONE = np.int32(1), np.int32(65536), np.int32(0)
 _ZERO = np.float32(0.0)
@@ -36,8 +42,18 @@ def outlines(q, base_x, base_y, lengths, out):  # type: ignore[no-untyped-def]
     num, (first, second) = q.shape[2], lengths
     angles, place = q.reshape(-1), out.reshape(-1)
     for k in range(q.shape[0]):
-        x, y, z, w = U(8 * k * num), U((8 * k + 1) * num), U((8 * k + 2) * num), U((8 * k + 3) * num)
-        c, s, d, t = U((8 * k + 4) * num), U((8 * k + 5) * num), U((8 * k + 6) * num), U((8 * k + 7) * num)
+        x, y, z, w = (
+            U(8 * k * num),
+            U((8 * k + 1) * num),
+            U((8 * k + 2) * num),
+            U((8 * k + 3) * num),
+        )
+        c, s, d, t = (
+            U((8 * k + 4) * num),
+            U((8 * k + 5) * num),
+            U((8 * k + 6) * num),
+            U((8 * k + 7) * num),
+        )
         directions(angles, U(2 * k * num), num, place, c, s)
         directions(angles, U((2 * k + 1) * num), num, place, d, t)
         for n in range(num):
@@ -97,9 +113,10 @@ def _squared_distance(ax, ay, bx, by, x, y):  # type: ignore[no-untyped-def]
 def _threshold(arm_1, arm_2):  # type: ignore[no-untyped-def]
     """Return the scale of tables, and tau: above all errors of the quantities compared.
 
-    With links ≤ l, bases d apart, half widths and radii ≤ h: every distance is below V = d + 3 l + 4 h and
-    errs by less than 10 u V, u = 2^-24: the unit vectors' products (4 u), their multiples (2 u), and sums of up to
-    six terms. So the product of two errs by less than 21 u V², a sum of two squares by less than 32 u V² (40 taken).
+    With links ≤ l, bases d apart, half widths and radii ≤ h: every distance is below V = d + 3 l +
+    4 h and errs by less than 10 u V, u = 2^-24: the unit vectors' products (4 u), their multiples
+    (2 u), and sums of up to six terms. So the product of two errs by less than 21 u V², a sum of
+    two squares by less than 32 u V² (40 taken).
     """
     (ax, ay), lengths_1, half_1, radius_1 = arm_1
     (dx, dy), lengths_2, half_2, radius_2 = arm_2
@@ -112,7 +129,10 @@ def _threshold(arm_1, arm_2):  # type: ignore[no-untyped-def]
 
 @kernel
 def _fill_table(outline, lengths, dx, dy, members, scale, out):  # type: ignore[no-untyped-def]
-    """Table of some individuals; (dx, dy) leads to the other's base; lanes without an individual are apart."""
+    """Table of some individuals; (dx, dy) leads to the other's base.
+
+    Lanes without an individual are apart.
+    """
     num_configurations = outline.shape[0]
     first = lengths[0] * scale
     dx, dy = dx * scale, dy * scale
@@ -142,7 +162,7 @@ def _apart(p, q, least):  # type: ignore[no-untyped-def]
 
 @kernel
 def _lines(across, turned, sine, cosine, sizes, least):  # type: ignore[no-untyped-def]
-    """Lower `least` to the greater sign product of each of the four pairs of boundary lines of two links.
+    """Lower `least` to the greater sign product of each pair of two links' boundary lines.
 
     Args:
         across: Distance of the beginning of the second link from the first's line.
@@ -168,7 +188,7 @@ def _lines(across, turned, sine, cosine, sizes, least):  # type: ignore[no-untyp
 
 @kernel
 def _circle(across, along, length, half_width, squared_radius, least):  # type: ignore[no-untyped-def]
-    """Lower `least` to squared distance − squared radius of a circle and the nearer boundary line of a link."""
+    """Lower `least` to distance² − radius² of a circle and a link's nearer boundary line."""
     off, beyond = abs(across) - half_width, along - length
     out = beyond if beyond > -along else -along
     out = out if out > _ZERO else _ZERO
@@ -182,13 +202,33 @@ def _add_collisions(one, s, two, o, lanes, sizes, tau, seen):  # type: ignore[no
     low = -tau
     l1, l2, half, squared, m1, m2, wide, other_squared, both_squared = sizes
     ax, ay, bx, by = one[s], one[s + U(LANES)], one[s + U(2 * LANES)], one[s + U(3 * LANES)]
-    p1, g1, p2, g2 = one[s + U(4 * LANES)], one[s + U(5 * LANES)], one[s + U(6 * LANES)], one[s + U(7 * LANES)]
+    p1, g1, p2, g2 = (
+        one[s + U(4 * LANES)],
+        one[s + U(5 * LANES)],
+        one[s + U(6 * LANES)],
+        one[s + U(7 * LANES)],
+    )
     for n in range(lanes):
         j = o + U(n)
         vx, vy, wx, wy = two[j], two[j + U(LANES)], two[j + U(2 * LANES)], two[j + U(3 * LANES)]
-        r1, e1, r2, e2 = two[j + U(4 * LANES)], two[j + U(5 * LANES)], two[j + U(6 * LANES)], two[j + U(7 * LANES)]
-        c11, c12, c21, c22 = ax * vy - ay * vx, ax * wy - ay * wx, bx * vy - by * vx, bx * wy - by * wx
-        d11, d12, d21, d22 = ax * vx + ay * vy, ax * wx + ay * wy, bx * vx + by * vy, bx * wx + by * wy
+        r1, e1, r2, e2 = (
+            two[j + U(4 * LANES)],
+            two[j + U(5 * LANES)],
+            two[j + U(6 * LANES)],
+            two[j + U(7 * LANES)],
+        )
+        c11, c12, c21, c22 = (
+            ax * vy - ay * vx,
+            ax * wy - ay * wx,
+            bx * vy - by * vx,
+            bx * wy - by * wx,
+        )
+        d11, d12, d21, d22 = (
+            ax * vx + ay * vy,
+            ax * wx + ay * wy,
+            bx * vx + by * vy,
+            bx * wx + by * wy,
+        )
         p12, p22 = p1 + m1 * c11, p2 + m1 * c21  # the other's elbow from the lines of links 1 and 2
         r12, r22 = r1 - l1 * c11, r2 - l1 * c12  # the own elbow from the other's lines
         q1, q2 = p12 + m2 * c12, p22 + m2 * c22  # tips
@@ -212,7 +252,10 @@ def _add_collisions(one, s, two, o, lanes, sizes, tau, seen):  # type: ignore[no
 def _count_rows(  # type: ignore[no-untyped-def]
     arm_1, outline_1, one, rows, arm_2, outline_2, two, columns, sizes, tau, counts
 ):
-    """Fill counts[rows, columns]; `one` is the table of all of population 1, `two` of the columns alone."""
+    """Fill counts[rows, columns].
+
+    `one` is the table of all of population 1, `two` of the columns alone.
+    """
     num_configurations = outline_1.shape[0]
     seen = np.empty(LANES, dtype=np.int32)
     for row in range(len(rows)):
@@ -226,7 +269,9 @@ def _count_rows(  # type: ignore[no-untyped-def]
                 seen[U(n)] = _NONE
             for k in range(num_configurations):
                 other = (block * num_configurations + k) * ROWS * LANES
-                _add_collisions(one, U(own + k * ROWS * LANES), two, U(other), lanes, sizes, tau, seen)
+                _add_collisions(
+                    one, U(own + k * ROWS * LANES), two, U(other), lanes, sizes, tau, seen
+                )
             for n in range(count):
                 j, total = columns[first + n], seen[U(n)] & 0xFFFF
                 if seen[U(n)] >> 16 != total:
@@ -264,10 +309,14 @@ def collisions(  # type: ignore[no-untyped-def]
     if len(rows) > 0:
         everyone = np.arange(num_2)
         _fill_table(outline_2, arm_2[1], -dx, -dy, everyone, scale, two)
-        _count_rows(arm_1, outline_1, one, rows, arm_2, outline_2, two, everyone, sizes, tau, counts)
+        _count_rows(
+            arm_1, outline_1, one, rows, arm_2, outline_2, two, everyone, sizes, tau, counts
+        )
     if len(columns) > 0 and len(other_rows) > 0:
         _fill_table(outline_2, arm_2[1], -dx, -dy, columns, scale, two)
-        _count_rows(arm_1, outline_1, one, other_rows, arm_2, outline_2, two, columns, sizes, tau, counts)
+        _count_rows(
+            arm_1, outline_1, one, other_rows, arm_2, outline_2, two, columns, sizes, tau, counts
+        )
     sum_counts(counts, sums_1, sums_2)
 
 
@@ -275,10 +324,15 @@ def collisions(  # type: ignore[no-untyped-def]
 def _sizes(arm_1, arm_2, scale):  # type: ignore[no-untyped-def]
     _, (l1, l2), half_1, radius_1 = arm_1
     _, (m1, m2), half_2, radius_2 = arm_2
-    squared_1, squared_2 = (radius_1 * scale) * (radius_1 * scale), (radius_2 * scale) * (radius_2 * scale)
+    squared_1, squared_2 = (
+        (radius_1 * scale) * (radius_1 * scale),
+        (radius_2 * scale) * (radius_2 * scale),
+    )
     both = ((radius_1 + radius_2) * scale) * ((radius_1 + radius_2) * scale)
     return (
-        np.float32(l1 * scale), np.float32(l2 * scale), np.float32(half_1 * scale), np.float32(squared_1),
-        np.float32(m1 * scale), np.float32(m2 * scale), np.float32(half_2 * scale), np.float32(squared_2),
+        np.float32(l1 * scale), np.float32(l2 * scale), np.float32(half_1 * scale),
+        np.float32(squared_1),
+        np.float32(m1 * scale), np.float32(m2 * scale), np.float32(half_2 * scale),
+        np.float32(squared_2),
         np.float32(both),
     )  # fmt: skip

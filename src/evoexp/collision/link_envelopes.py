@@ -1,10 +1,13 @@
-"""Collisions of planar arms of two links with envelopes around them: whole populations against each other.
+"""Collisions of planar arms of two links with envelopes around them.
 
-Curkovic, Jerbic & Stipancic 2013, section 4: each link is a set of two boundary lines, parallel to it, and a circle of
-variable radius lies around the tool centre point (Fig. 11). Two arms collide in a configuration if a boundary line of
-one has a point in common with a boundary line of the other, or a circle of one is nearer to a boundary line of the
-other than its radius, or to its circle than both radii. Boundary lines have no ends across: an arm may lie between
-another's two lines unnoticed, as in the paper. Without width and radius this is `link_crossings`.
+Whole populations against each other.
+
+Curkovic, Jerbic & Stipancic 2013, section 4: each link is a set of two boundary lines, parallel to
+it, and a circle of variable radius lies around the tool centre point (Fig. 11). Two arms collide in
+a configuration if a boundary line of one has a point in common with a boundary line of the other,
+or a circle of one is nearer to a boundary line of the other than its radius, or to its circle than
+both radii. Boundary lines have no ends across: an arm may lie between another's two lines
+unnoticed, as in the paper. Without width and radius this is `link_crossings`.
 
 The lines are decided exactly, as given by `EnvelopedArm.boundaries`; distances in double precision.
 """
@@ -42,7 +45,9 @@ class EnvelopedArm(NamedTuple):
     tcp_radius: float
 
     def outlines(self, q: FloatArray) -> FloatArray:
-        """Return elbow x, y, tip x, y [length unit of the scene], and the links' unit directions x, y, x, y.
+        """Return elbow x, y, tip x, y [length unit of the scene].
+
+        And the links' unit directions x, y, x, y.
 
         Args:
             q: (K, 2, N) angles of the links from +x [rad].
@@ -60,7 +65,9 @@ class EnvelopedArm(NamedTuple):
         return out
 
     def boundaries(self, outlines: FloatArray) -> FloatArray:
-        """Return the boundary lines: right and left of the first link, right and left of the second.
+        """Return the boundary lines: right and left of the first link.
+
+        Right and left of the second.
 
         Args:
             outlines: (K, 8, N).
@@ -70,7 +77,11 @@ class EnvelopedArm(NamedTuple):
         """
         outlines = checked("outlines", outlines, 8)
         base = np.zeros(outlines[:, 0].shape)
-        ends = [base + self.arm.base[0], base + self.arm.base[1], *(outlines[:, row] for row in range(4))]
+        ends = [
+            base + self.arm.base[0],
+            base + self.arm.base[1],
+            *(outlines[:, row] for row in range(4)),
+        ]
         lines = []
         for link in (0, 1):
             c, s = outlines[:, 4 + 2 * link], outlines[:, 5 + 2 * link]
@@ -81,7 +92,9 @@ class EnvelopedArm(NamedTuple):
         return np.array(lines)
 
 
-def count_collisions(one: EnvelopedArm, outlines_1: FloatArray, two: EnvelopedArm, outlines_2: FloatArray) -> Crossings:
+def count_collisions(
+    one: EnvelopedArm, outlines_1: FloatArray, two: EnvelopedArm, outlines_2: FloatArray
+) -> Crossings:
     """Count the configurations in which arms collide, for every pair of individuals.
 
     Args:
@@ -91,8 +104,8 @@ def count_collisions(one: EnvelopedArm, outlines_1: FloatArray, two: EnvelopedAr
         outlines_2: (K, 8, N2), the same configurations.
 
     Raises:
-        ValueError: If the shapes do not fit, there are more than 32767 configurations, something is not finite, or a
-            half width or radius is negative.
+        ValueError: If the shapes do not fit, there are more than 32767 configurations, something is
+            not finite, or a half width or radius is negative.
     """
     outlines_1, outlines_2 = checked_pair("outlines", outlines_1, outlines_2, 8)
     found = no_crossings(outlines_1.shape[2], outlines_2.shape[2])
@@ -109,7 +122,9 @@ def update_collisions(
     changed_1: NDArray[np.bool_],
     changed_2: NDArray[np.bool_],
 ) -> None:
-    """Count anew, in place, the pairs of which at least one individual changed; see `update_crossings`.
+    """Count anew, in place, the pairs of which at least one individual changed.
+
+    See `update_crossings`.
 
     Args:
         crossings: Of the outlines before, altered.
@@ -124,7 +139,9 @@ def update_collisions(
         ValueError: As `count_collisions`; nothing is altered then.
     """
     outlines_1, outlines_2 = checked_pair("outlines", outlines_1, outlines_2, 8)
-    members = changed_members(crossings, outlines_1.shape[2], outlines_2.shape[2], changed_1, changed_2)
+    members = changed_members(
+        crossings, outlines_1.shape[2], outlines_2.shape[2], changed_1, changed_2
+    )
     _update(crossings, one, outlines_1, two, outlines_2, *members)
 
 
@@ -143,8 +160,13 @@ def _update(
         if not np.isfinite([*base, *lengths, half_width, radius]).all():
             raise ValueError(f"{name} must be finite, was {enveloped}")
         if half_width < 0.0 or radius < 0.0:
-            raise ValueError(f"{name}: half_width and tcp_radius must be at least 0, were {half_width} and {radius}")
-        arms.append((tuple(map(float, base)), tuple(map(float, lengths)), float(half_width), float(radius)))
+            raise ValueError(
+                f"{name}: half_width and tcp_radius must be at least 0, were {half_width} and "
+                f"{radius}"
+            )
+        arms.append(
+            (tuple(map(float, base)), tuple(map(float, lengths)), float(half_width), float(radius))
+        )
     if not (np.isfinite(outlines_1).all() and np.isfinite(outlines_2).all()):
         raise ValueError("outlines must be finite")
     kernels.collisions(arms[0], outlines_1, rows, others, arms[1], outlines_2, columns, *found)

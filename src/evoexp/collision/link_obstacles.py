@@ -1,7 +1,10 @@
-"""Collisions of planar arms of two links with static obstacles of the plane: discs, rectangles, capsules, half-planes.
+"""Collisions of planar arms of two links with static obstacles of the plane.
 
-A link, or a boundary line of an envelope, collides where it has a point in common with the solid; a circle around the
-tip where it is nearer than its radius. Decided in double precision: right away from touching.
+Discs, rectangles, capsules, half-planes.
+
+A link, or a boundary line of an envelope, collides where it has a point in common with the solid; a
+circle around the tip where it is nearer than its radius. Decided in double precision: right away
+from touching.
 """
 
 from typing import NamedTuple
@@ -23,8 +26,10 @@ class PlanarObstacles(NamedTuple):
     Attributes:
         kind: (obstacles,) SPHERE, BOX, CAPSULE or HALF_SPACE.
         center: (obstacles, 2); of a half-plane a point of its boundary.
-        direction: (obstacles, 2) unit vector: x axis of a box, axis of a capsule, outward normal of a half-plane.
-        size: (obstacles, 2): radius, 0 | half the edges | radius, half the length of the axis | unused.
+        direction: (obstacles, 2) unit vector: x axis of a box, axis of a capsule, outward normal of
+            a half-plane.
+        size: (obstacles, 2): radius, 0 | half the edges | radius, half the length of the axis |
+            unused.
     """
 
     kind: IntArray
@@ -37,11 +42,14 @@ def planar_obstacles(table: ObstacleTable) -> PlanarObstacles:
     """Return the obstacles' sections by the plane.
 
     Raises:
-        ValueError: If an obstacle is none of the kinds above, or not drawn in the plane: a ball, a capsule's axis or a
-            half-space's normal that leaves it, a box that is turned about another axis than z, or does not reach it.
+        ValueError: If an obstacle is none of the kinds above, or not drawn in the plane: a ball, a
+            capsule's axis or a half-space's normal that leaves it, a box that is turned about
+            another axis than z, or does not reach it.
     """
     num = len(table.kind)
-    out = PlanarObstacles(table.kind.copy(), table.center[:, :2].copy(), np.zeros((num, 2)), np.zeros((num, 2)))
+    out = PlanarObstacles(
+        table.kind.copy(), table.center[:, :2].copy(), np.zeros((num, 2)), np.zeros((num, 2))
+    )
     for k in range(num):
         kind, z, size, turn = table.kind[k], table.center[k, 2], table.size[k], table.rotation[k]
         if kind == BOX:
@@ -55,7 +63,8 @@ def planar_obstacles(table: ObstacleTable) -> PlanarObstacles:
             out.size[k, 0] = size[0]
         if not flat:
             raise ValueError(
-                f"obstacles[{k}] must be a sphere, box (turned about z), capsule or half-space of the plane z = 0"
+                f"obstacles[{k}] must be a sphere, box (turned about z), capsule or half-space of "
+                "the plane z = 0"
             )
     return out
 
@@ -82,7 +91,9 @@ def count_obstacle_collisions(arm: Arm, points: FloatArray, obstacles: PlanarObs
 def count_enveloped_obstacle_collisions(
     arm: EnvelopedArm, outlines: FloatArray, obstacles: PlanarObstacles
 ) -> IntArray:
-    """Count the configurations in which a boundary line or the circle meets an obstacle, per individual, (N,).
+    """Count the configurations in which a boundary line or the circle meets an obstacle.
+
+    Per individual, (N,).
 
     Args:
         arm: The arm and its envelope.
@@ -113,12 +124,24 @@ def _hits(lines: FloatArray, obstacles: PlanarObstacles) -> NDArray[np.bool_]:
 def _segments(lines, kind, center, direction, size, hit):  # type: ignore[no-untyped-def]
     """Add the obstacles that each segment meets: lines (4, n), hit (n,)."""
     for o in range(len(kind)):
-        x, y, c, s, a, b = center[o, 0], center[o, 1], direction[o, 0], direction[o, 1], size[o, 0], size[o, 1]
+        x, y, c, s, a, b = (
+            center[o, 0],
+            center[o, 1],
+            direction[o, 0],
+            direction[o, 1],
+            size[o, 0],
+            size[o, 1],
+        )
         what = kind[o]
         for m in range(lines.shape[1]):
             n = U(m)
             # in the obstacle's frame
-            dx, dy, ex, ey = lines[U(0), n] - x, lines[U(1), n] - y, lines[U(2), n] - x, lines[U(3), n] - y
+            dx, dy, ex, ey = (
+                lines[U(0), n] - x,
+                lines[U(1), n] - y,
+                lines[U(2), n] - x,
+                lines[U(3), n] - y,
+            )
             px, py, qx, qy = c * dx + s * dy, c * dy - s * dx, c * ex + s * ey, c * ey - s * ex
             if what == SPHERE:
                 met = _squared_distance(dx, dy, ex, ey, 0.0, 0.0) <= a * a
@@ -135,7 +158,14 @@ def _segments(lines, kind, center, direction, size, hit):  # type: ignore[no-unt
 def _circles(tips, radius, kind, center, direction, size, hit):  # type: ignore[no-untyped-def]
     """Add the obstacles that are nearer to each point than a radius: tips (2, n), hit (n,)."""
     for o in range(len(kind)):
-        x, y, c, s, a, b = center[o, 0], center[o, 1], direction[o, 0], direction[o, 1], size[o, 0], size[o, 1]
+        x, y, c, s, a, b = (
+            center[o, 0],
+            center[o, 1],
+            direction[o, 0],
+            direction[o, 1],
+            size[o, 0],
+            size[o, 1],
+        )
         for m in range(tips.shape[1]):
             n = U(m)
             dx, dy = tips[U(0), n] - x, tips[U(1), n] - y
@@ -156,7 +186,10 @@ def _circles(tips, radius, kind, center, direction, size, hit):  # type: ignore[
 
 @kernel
 def _meets_box(px, py, qx, qy, a, b):  # type: ignore[no-untyped-def]
-    """Whether a segment and the box ± a, ± b meet: no axis, and not the segment's normal, keeps them apart."""
+    """Whether a segment and the box ± a, ± b meet.
+
+    No axis, and not the segment's normal, keeps them apart.
+    """
     mx, my, ex, ey = 0.5 * (px + qx), 0.5 * (py + qy), 0.5 * (qx - px), 0.5 * (qy - py)
     beside = abs(mx * ey - my * ex) <= a * abs(ey) + b * abs(ex)
     return (abs(mx) <= a + abs(ex)) & (abs(my) <= b + abs(ey)) & beside
@@ -170,7 +203,9 @@ def _meets_capsule(px, py, qx, qy, radius, half):  # type: ignore[no-untyped-def
     crossing = (py * qy < 0.0) & (left * right < 0.0)
     u, v = max(abs(px) - half, 0.0), max(abs(qx) - half, 0.0)
     ends = min(u * u + py * py, v * v + qy * qy)
-    tips = min(_squared_distance(px, py, qx, qy, -half, 0.0), _squared_distance(px, py, qx, qy, half, 0.0))
+    tips = min(
+        _squared_distance(px, py, qx, qy, -half, 0.0), _squared_distance(px, py, qx, qy, half, 0.0)
+    )
     return crossing | (min(ends, tips) <= radius * radius)
 
 

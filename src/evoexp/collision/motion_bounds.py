@@ -1,9 +1,9 @@
 """How fast bodies can move: bounds that hold for every configuration of a motion.
 
-A point p on joints j moves at most at Σ |q̇_j| × (distance of p from axis j), a prismatic joint adding |q̇_j| itself.
-`reaches` bounds these distances for all points of a body, whatever the configuration; a pair of bodies can approach at
-most at the sum over the joints that carry one of the two and not the other: what carries both moves neither against the
-other.
+A point p on joints j moves at most at Σ |q̇_j| × (distance of p from axis j), a prismatic joint
+adding |q̇_j| itself. `reaches` bounds these distances for all points of a body, whatever the
+configuration; a pair of bodies can approach at most at the sum over the joints that carry one of
+the two and not the other: what carries both moves neither against the other.
 """
 
 import numpy as np
@@ -13,7 +13,8 @@ from evoexp.numerics import inlined, kernel, sincos
 FRAME = 12
 """Numbers of a frame: nine of its rotation, row by row, three of its origin."""
 
-PARALLEL = 1e-12  # [-] an axis is parallel to its parent's if the cosine between them differs from ±1 by less
+# [-] an axis is parallel to its parent's if the cosine between them differs from ±1 by less
+PARALLEL = 1e-12
 
 
 @inlined
@@ -53,7 +54,9 @@ def joint_frames(table, q, frames):  # type: ignore[no-untyped-def]
 
 @inlined
 def joint_twists(table, coefficients, u, frames, twists):  # type: ignore[no-untyped-def]
-    """Write how joints' frames move (joints, 6) per u: turning ω, and the velocity of what is at the world's origin.
+    """Write how joints' frames move (joints, 6) per u.
+
+    Turning ω, and the velocity of what is at the world's origin.
 
     A point x moves at that velocity + ω × x.
     """
@@ -96,7 +99,9 @@ def moved_by_one(table, joint, pairs):  # type: ignore[no-untyped-def]
 
 @kernel
 def reaches(table, joint, from_origin, from_axis, strokes):  # type: ignore[no-untyped-def]
-    """How far any point of each body can be from each joint's axis; 1 for prismatic joints, 0 for those not above it.
+    """How far any point of each body can be from each joint's axis.
+
+    1 for prismatic joints, 0 for those not above it.
 
     Args:
         table: The kinematic table's first six fields.
@@ -117,7 +122,9 @@ def reaches(table, joint, from_origin, from_axis, strokes):  # type: ignore[no-u
             x, y, z = translation[k, 0], translation[k, 1], translation[k, 2]
             slide = strokes[index_q[k]] if prismatic[k] else 0.0
             beside = np.sqrt(x * x + y * y)
-            parallel = abs(abs(rotation[k, 8]) - 1.0) < PARALLEL  # then the joint moves nothing away from its own axis
+            parallel = (
+                abs(abs(rotation[k, 8]) - 1.0) < PARALLEL
+            )  # then the joint moves nothing away from its own axis
             turn = beside + (turn if parallel else ball + slide)
             ball = np.sqrt(x * x + y * y + z * z) + ball + slide
             k = parent[k]
@@ -126,7 +133,7 @@ def reaches(table, joint, from_origin, from_axis, strokes):  # type: ignore[no-u
 
 @kernel
 def pair_reaches(pairs, reach):  # type: ignore[no-untyped-def]
-    """(pairs, joints): by how much each joint's speed can change the distance of a pair of bodies."""
+    """(pairs, joints): how much each joint's speed can change the distance of a pair."""
     out = np.zeros((len(pairs), reach.shape[1]))
     for pair in range(len(pairs)):
         one, two = pairs[pair, 0], pairs[pair, 1]
@@ -138,17 +145,21 @@ def pair_reaches(pairs, reach):  # type: ignore[no-untyped-def]
 
 @inlined
 def approach_bounds(table, coefficients, begin, end, by_joint, out, above):  # type: ignore[no-untyped-def]
-    """Write bounds (2, pairs) of |d distance / du| and of points' |accelerations| on [begin, end] of a segment.
+    """Write bounds (2, pairs) of |d distance / du| and of points' |accelerations| on [begin.
 
-    Joint j adds to the acceleration of what it carries, at a distance r from its axis, at most
-    r (|q̈_j| + q̇_j² + 2 |q̇_j| Σ |q̇_i|) over the turning joints i that carry it: centripetal and Coriolis.
+    End] of a segment.
+
+    Joint j adds to the acceleration of what it carries, at a distance r from its axis, at most r
+    (|q̈_j| + q̇_j² + 2 |q̇_j| Σ |q̇_i|) over the turning joints i that carry it: centripetal and
+    Coriolis.
 
     Args:
         table: The kinematic table.
         coefficients: (4, nq) of the segment.
         begin: Of the interval.
         end: Of the interval.
-        by_joint: (pairs, joints) from `pair_reaches`; accelerations hold for pairs that are `moved_by_one` only.
+        by_joint: (pairs, joints) from `pair_reaches`; accelerations hold for pairs that are
+            `moved_by_one` only.
         out: (2, pairs), written.
         above: (joints,) scratch: the sum of |q̇| of the turning joints up to each.
     """

@@ -1,4 +1,7 @@
-"""Kernels of static obstacles: signed distances of points of a robot to their surfaces, a block at a time."""
+"""Kernels of static obstacles.
+
+Signed distances of points of a robot to their surfaces, a block at a time.
+"""
 
 import numpy as np
 
@@ -25,7 +28,7 @@ def meet(one, i, two, j, within):  # type: ignore[no-untyped-def]
 
 @kernel
 def _below(rotation, origin, points, i, within):  # type: ignore[no-untyped-def]
-    """Whether the point at offset i is lower than `within` above a frame's plane z = 0 in any lane."""
+    """Whether the point at offset i is lower than `within` above a frame's z = 0 in any lane."""
     x, y, z = rotation[2], rotation[5], rotation[8]
     level = x * origin[0] + y * origin[1] + z * origin[2]
     level += within + (abs(within) + abs(level)) * (MARGIN - 1.0)
@@ -38,19 +41,30 @@ def _below(rotation, origin, points, i, within):  # type: ignore[no-untyped-def]
 
 @kernel
 def to_obstacles(obstacles, bounds, limit, centers, middles, scratch, place, out):  # type: ignore[no-untyped-def]
-    """Lower `out` (BLOCK,), the limit, to the signed distance of any centre to any obstacle's surface."""
+    """Lower `out` (BLOCK,), the limit.
+
+    To the signed distance of any centre to any obstacle's surface.
+    """
     _, _, reach, spheres, _ = borrowed(bounds)
     kind, center, rotation, size = borrowed(obstacles)
     centers, middles, scratch, place, out = borrowed((centers, middles, scratch, place, out))
     for o in range(len(kind)):
         for row in range(3):
             place[row * BLOCK : (row + 1) * BLOCK] = center[o, row]
-        extent = size[o, 0] + size[o, 1] if kind[o] == CAPSULE else _length(size[o, 0], size[o, 1], size[o, 2])
+        extent = (
+            size[o, 0] + size[o, 1]
+            if kind[o] == CAPSULE
+            else _length(size[o, 0], size[o, 1], size[o, 2])
+        )
         for link in range(len(reach)):
             if kind[o] == HALF_SPACE:
-                near = _below(rotation[o], center[o], middles, U(link) * U(ROWS), limit + reach[link])
+                near = _below(
+                    rotation[o], center[o], middles, U(link) * U(ROWS), limit + reach[link]
+                )
             else:
-                near = meet(middles, U(link) * U(ROWS), place, U(0), (limit + reach[link] + extent) * MARGIN)
+                near = meet(
+                    middles, U(link) * U(ROWS), place, U(0), (limit + reach[link] + extent) * MARGIN
+                )
             if near:
                 for i in range(spheres[link, 0], spheres[link, 1]):
                     _into_frame(center[o], rotation[o], centers, U(i) * U(ROWS), scratch)
@@ -86,7 +100,11 @@ def _into_frame(center, rotation, centers, i, out):  # type: ignore[no-untyped-d
         a, b, c, e = rotation[row], rotation[3 + row], rotation[6 + row], U(row * BLOCK)
         for n in range(BLOCK):
             lane = i + U(n)
-            x, y, z = centers[lane] - cx, centers[lane + U(BLOCK)] - cy, centers[lane + U(2 * BLOCK)] - cz
+            x, y, z = (
+                centers[lane] - cx,
+                centers[lane + U(BLOCK)] - cy,
+                centers[lane + U(2 * BLOCK)] - cz,
+            )
             out[e + U(n)] = a * x + b * y + c * z
 
 

@@ -1,7 +1,8 @@
 """Numerical potential fields over a grid by wave fronts: toward the goal, and away from obstacles.
 
-Chen & Zalzala 1995, section 2.1, after Barraquand & Latombe 1991. The potential of the obstacles is what the paper
-calls the unsafeness of a node; it is the model of collision that its paths are planned with.
+Chen & Zalzala 1995, section 2.1, after Barraquand & Latombe 1991. The potential of the obstacles is
+what the paper calls the unsafeness of a node; it is the model of collision that its paths are
+planned with.
 """
 
 from itertools import pairwise
@@ -37,11 +38,17 @@ class Fields(NamedTuple):
         return self.grid.moves_within(self.neighbourhood)
 
     def steps_to(self, node: int) -> np.ndarray:
-        """Return how many steps every node (nodes,) is away from one; `grids.UNREACHED` where it cannot be reached."""
+        """Return how many steps every node (nodes,) is away from one.
+
+        `grids.UNREACHED` where it cannot be reached.
+        """
         return front(self.grid, np.array([node]), self.neighbourhood)
 
     def goal_field(self, node: int) -> FloatArray:
-        """Return the potential of every node (nodes,) toward a goal; NaN where the goal cannot be reached from."""
+        """Return the potential of every node (nodes,) toward a goal.
+
+        NaN where the goal cannot be reached from.
+        """
         steps = self.steps_to(node)
         return np.where(steps == UNREACHED, np.nan, self.potentials[steps])
 
@@ -51,9 +58,10 @@ class PotentialFields(Component):
 
     Attributes:
         neighbourhood: p: a step of a front changes at most so many coordinates.
-        goal_potentials: d_1, d_2, … after 1, 2, … steps from the goal, where it is 0; goes on with the last difference.
-        obstacle_potentials: o_0, o_1, … after 0, 1, … steps from obstacles and from the ring of nodes around the grid;
-            the last one is held.
+        goal_potentials: d_1, d_2, … after 1, 2, … steps from the goal, where it is 0; goes on with
+            the last difference.
+        obstacle_potentials: o_0, o_1, … after 0, 1, … steps from obstacles and from the ring of
+            nodes around the grid; the last one is held.
         max_unsafeness: S_* of Eq. 3: no path may pass a node of a greater one; None: any.
     """
 
@@ -67,9 +75,13 @@ class PotentialFields(Component):
     @model_validator(mode="after")
     def _potentials_are_ordered(self) -> Self:
         if any(b <= a for a, b in pairwise(self.goal_potentials)):
-            raise SettingError("goal_potentials", "ascending: d1 < d2 < …", list(self.goal_potentials))
+            raise SettingError(
+                "goal_potentials", "ascending: d1 < d2 < …", list(self.goal_potentials)
+            )
         if any(b > a for a, b in pairwise(self.obstacle_potentials)):
-            raise SettingError("obstacle_potentials", "descending: o0 ≥ o1 ≥ …", list(self.obstacle_potentials))
+            raise SettingError(
+                "obstacle_potentials", "descending: o0 ≥ o1 ≥ …", list(self.obstacle_potentials)
+            )
         return self
 
     def bind(self, blocked: np.ndarray) -> Fields:
@@ -85,14 +97,18 @@ class PotentialFields(Component):
             must = f"at most the grid's number of dimensions ({blocked.ndim})"
             raise SettingError("collision.neighbourhood", must, self.neighbourhood)
         unsafeness = self._unsafeness(blocked)
-        closed = blocked if self.max_unsafeness is None else blocked | (unsafeness > self.max_unsafeness)
+        closed = (
+            blocked if self.max_unsafeness is None else blocked | (unsafeness > self.max_unsafeness)
+        )
         own = grid(closed)
         around = np.pad(unsafeness, 1, constant_values=self.obstacle_potentials[0])
         return Fields(own, around.ravel(), self._goal_potentials(own.num_nodes), self.neighbourhood)
 
     def _unsafeness(self, blocked: np.ndarray) -> FloatArray:
         """Return the unsafeness of every node, in the shape of the grid."""
-        sources = np.pad(blocked, 1, constant_values=True)  # "obstacles (including the natural boundaries)"
+        sources = np.pad(
+            blocked, 1, constant_values=True
+        )  # "obstacles (including the natural boundaries)"
         everywhere = grid(np.zeros(sources.shape, dtype=bool))
         starts = np.flatnonzero(np.pad(sources, 1))
         steps = everywhere.inner(front(everywhere, starts, self.neighbourhood))

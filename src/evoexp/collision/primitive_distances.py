@@ -1,11 +1,15 @@
-"""Distances of spheres in encounters: a configuration of the batch in which a body is near an obstacle or another body.
+"""Distances of spheres in encounters.
 
-Everything here is seen from the obstacle's frame or from the other body's frame: then the shapes of one side are
-constants, and of the other side one rigid motion per encounter is all that has to be gathered. A batch of encounters
-lives in one flat array, `work`: its rows are `WIDTH` values apart, encounters innermost. (One array, because LLVM gives
-up vector code when it would have to check several arrays for overlaps.)
+A configuration of the batch in which a body is near an obstacle or another body.
 
-A sphere, a capsule and a box are one shape: a box (with edges of length 0 where needed), thickened by a radius.
+Everything here is seen from the obstacle's frame or from the other body's frame: then the shapes of
+one side are constants, and of the other side one rigid motion per encounter is all that has to be
+gathered. A batch of encounters lives in one flat array, `work`: its rows are `WIDTH` values apart,
+encounters innermost. (One array, because LLVM gives up vector code when it would have to check
+several arrays for overlaps.)
+
+A sphere, a capsule and a box are one shape: a box (with edges of length 0 where needed), thickened
+by a radius.
 """
 
 import numpy as np
@@ -22,7 +26,10 @@ BASE, FRAME, MOTION = U(0), U(12) * W, U(24) * W
 """Rigid motions, 12 rows each: nine of the rotation, row by row, three of the translation."""
 
 CORE = U(36) * W
-"""Of the obstacles: half the edges and the thickness of a box; radius and half the length of a cylinder."""
+"""Of the obstacles: half the edges and the thickness of a box.
+
+Radius and half the length of a cylinder.
+"""
 
 VALUE, OUTSIDE, INSIDE = U(40) * W, U(41) * W, U(42) * W
 """The least clearance so far, and sums on the way to it."""
@@ -57,21 +64,37 @@ def spheres_to_boxes(width, runs, spheres, first, stop, work):  # type: ignore[n
             for n in range(width):
                 m, c = MOTION + U(n), CORE + U(n)
                 x = work[m] * lx + work[m + W] * ly + work[m + U(2) * W] * lz + work[m + U(9) * W]
-                y = work[m + U(3) * W] * lx + work[m + U(4) * W] * ly + work[m + U(5) * W] * lz + work[m + U(10) * W]
-                z = work[m + U(6) * W] * lx + work[m + U(7) * W] * ly + work[m + U(8) * W] * lz + work[m + U(11) * W]
+                y = (
+                    work[m + U(3) * W] * lx
+                    + work[m + U(4) * W] * ly
+                    + work[m + U(5) * W] * lz
+                    + work[m + U(10) * W]
+                )
+                z = (
+                    work[m + U(6) * W] * lx
+                    + work[m + U(7) * W] * ly
+                    + work[m + U(8) * W] * lz
+                    + work[m + U(11) * W]
+                )
                 u, v, w = abs(x) - work[c], abs(y) - work[c + W], abs(z) - work[c + U(2) * W]
                 inside = u if u > v else v
                 inside = w if w > inside else inside
                 u = u if u > 0.0 else 0.0
                 v = v if v > 0.0 else 0.0
                 w = w if w > 0.0 else 0.0
-                outside, best, deepest = u * u + v * v + w * w, work[OUTSIDE + U(n)], work[INSIDE + U(n)]
+                outside, best, deepest = (
+                    u * u + v * v + w * w,
+                    work[OUTSIDE + U(n)],
+                    work[INSIDE + U(n)],
+                )
                 work[OUTSIDE + U(n)] = outside if outside < best else best
                 work[INSIDE + U(n)] = inside if inside < deepest else deepest
         radius = spheres[runs[run, 0], 3]
         for n in range(width):
             k = U(n)
-            found = np.sqrt(work[OUTSIDE + k]) + work[INSIDE + k] - (work[CORE + U(3) * W + k] + radius)
+            found = (
+                np.sqrt(work[OUTSIDE + k]) + work[INSIDE + k] - (work[CORE + U(3) * W + k] + radius)
+            )
             best = work[VALUE + k]
             work[VALUE + k] = found if found < best else best
 
@@ -84,8 +107,18 @@ def spheres_to_cylinders(width, runs, spheres, first, stop, work):  # type: igno
         for n in range(width):
             m, c = MOTION + U(n), CORE + U(n)
             x = work[m] * lx + work[m + W] * ly + work[m + U(2) * W] * lz + work[m + U(9) * W]
-            y = work[m + U(3) * W] * lx + work[m + U(4) * W] * ly + work[m + U(5) * W] * lz + work[m + U(10) * W]
-            z = work[m + U(6) * W] * lx + work[m + U(7) * W] * ly + work[m + U(8) * W] * lz + work[m + U(11) * W]
+            y = (
+                work[m + U(3) * W] * lx
+                + work[m + U(4) * W] * ly
+                + work[m + U(5) * W] * lz
+                + work[m + U(10) * W]
+            )
+            z = (
+                work[m + U(6) * W] * lx
+                + work[m + U(7) * W] * ly
+                + work[m + U(8) * W] * lz
+                + work[m + U(11) * W]
+            )
             u, w = np.sqrt(x * x + y * y) - work[c], abs(z) - work[c + W]
             inside = u if u > w else w
             inside = inside if inside < 0.0 else 0.0
@@ -102,14 +135,19 @@ def spheres_to_half_spaces(width, runs, spheres, first, stop, work):  # type: ig
         lx, ly, lz, radius = spheres[i, 0], spheres[i, 1], spheres[i, 2], spheres[i, 3]
         for n in range(width):
             m = MOTION + U(n)
-            z = work[m + U(6) * W] * lx + work[m + U(7) * W] * ly + work[m + U(8) * W] * lz + work[m + U(11) * W]
+            z = (
+                work[m + U(6) * W] * lx
+                + work[m + U(7) * W] * ly
+                + work[m + U(8) * W] * lz
+                + work[m + U(11) * W]
+            )
             found, best = z - radius, work[VALUE + U(n)]
             work[VALUE + U(n)] = found if found < best else best
 
 
 @kernel
 def move(width, x, y, z, w, target, work):  # type: ignore[no-untyped-def]
-    """Write a constant point (w = 1) or direction (w = 0) as seen behind MOTION to three rows at `target`."""
+    """Write a constant point (w = 1) or direction (w = 0) as MOTION sees it to rows at `target`."""
     for row in range(3):
         a, t, o = MOTION + U(3 * row) * W, MOTION + U(9 + row) * W, target + U(row) * W
         for n in range(width):
@@ -120,7 +158,9 @@ def move(width, x, y, z, w, target, work):  # type: ignore[no-untyped-def]
 
 @kernel
 def spheres_to_spheres(width, runs, spheres, one, other, other_stop, work):  # type: ignore[no-untyped-def]
-    """Lower VALUE to the distances of one run of constant spheres from the spheres at CENTERS, less both radii.
+    """Lower VALUE to the distances of one run of constant spheres from the spheres at CENTERS.
+
+    Less both radii.
 
     Args:
         width: Encounters.
@@ -145,7 +185,12 @@ def spheres_to_spheres(width, runs, spheres, one, other, other_stop, work):  # t
                 lx, ly, lz = spheres[i, 0], spheres[i, 1], spheres[i, 2]
                 for n in range(width):
                     k = o + U(n)
-                    x, y, z, best = work[k] - lx, work[k + W] - ly, work[k + U(2) * W] - lz, work[OUTSIDE + U(n)]
+                    x, y, z, best = (
+                        work[k] - lx,
+                        work[k + W] - ly,
+                        work[k + U(2) * W] - lz,
+                        work[OUTSIDE + U(n)],
+                    )
                     found = x * x + y * y + z * z
                     work[OUTSIDE + U(n)] = found if found < best else best
                 i += 1
@@ -157,7 +202,10 @@ def spheres_to_spheres(width, runs, spheres, one, other, other_stop, work):  # t
 
 @kernel
 def _three_squares(width, spheres, i, o, work):  # type: ignore[no-untyped-def]
-    """Lower OUTSIDE to the squared distances of one moved centre from three fixed ones, held in registers."""
+    """Lower OUTSIDE to the squared distances of one moved centre from three fixed ones.
+
+    Held in registers.
+    """
     ax, ay, az = spheres[i, 0], spheres[i, 1], spheres[i, 2]
     bx, by, bz = spheres[i + 1, 0], spheres[i + 1, 1], spheres[i + 1, 2]
     cx, cy, cz = spheres[i + 2, 0], spheres[i + 2, 1], spheres[i + 2, 2]

@@ -1,16 +1,20 @@
-"""Kernels of bodies made of spheres and capsules: least clearances of whole batches of configurations.
+"""Kernels of bodies made of spheres and capsules.
 
-Per block of `LANES` configurations: forward kinematics; the centres of balls around bodies and parts of bodies; balls
-against obstacles (first the ball around an obstacle, then the box around it) and against each other. What a ball cannot
-rule out is an encounter, one bit of a word per configuration; encounters are listed per body and class of obstacle, or
-per pair of parts, gathered into dense rows, and measured exactly, as vectors again (`encounter_kernels`). Bounds are
-widened by `MARGIN`, so the result does not depend on what was skipped, nor on the batch.
+Least clearances of whole batches of configurations.
 
-What limits it, for a 6R arm of 59 spheres and ten obstacles, is the number of encounters: random configurations have
-0.7 with obstacles and 4 between parts of the arm (fewer where only collisions are asked for), each some 40 ns of
-gathering and arithmetic, in lists of some ten per batch of 128 that vectors do not fill; they take two thirds of the
-time. In a population, whose configurations are alike, encounters are rare: then forward kinematics and the centres of
-balls take a third, the balls a quarter, and the call itself, which unpacks the tables' arrays, another third. A single
+Per block of `LANES` configurations: forward kinematics; the centres of balls around bodies and
+parts of bodies; balls against obstacles (first the ball around an obstacle, then the box around it)
+and against each other. What a ball cannot rule out is an encounter, one bit of a word per
+configuration; encounters are listed per body and class of obstacle, or per pair of parts, gathered
+into dense rows, and measured exactly, as vectors again (`encounter_kernels`). Bounds are widened by
+`MARGIN`, so the result does not depend on what was skipped, nor on the batch.
+
+What limits it, for a 6R arm of 59 spheres and ten obstacles, is the number of encounters: random
+configurations have 0.7 with obstacles and 4 between parts of the arm (fewer where only collisions
+are asked for), each some 40 ns of gathering and arithmetic, in lists of some ten per batch of 128
+that vectors do not fill; they take two thirds of the time. In a population, whose configurations
+are alike, encounters are rare: then forward kinematics and the centres of balls take a third, the
+balls a quarter, and the call itself, which unpacks the tables' arrays, another third. A single
 configuration costs as much as a block of 64, and the call.
 """
 
@@ -35,7 +39,10 @@ WORD = 64
 """Encounters of one configuration that one word of bits can hold."""
 
 GROUP = 8
-"""Pairs that are marked together where only collisions are asked for: what one group finds spares the next."""
+"""Pairs that are marked together where only collisions are asked for.
+
+What one group finds spares the next.
+"""
 
 CLASSES = 3
 
@@ -70,7 +77,8 @@ def primitive_clearances(table, units, shapes, obstacles, pairs, limit, decide, 
         obstacles: See `primitives.PackedObstacles`.
         pairs: (pairs, 3) two units, and the row of the result that they count for.
         limit: Above it nothing is asked.
-        decide: Whether the first clearance below 0 ends the judgement of a configuration: all rows are −inf then.
+        decide: Whether the first clearance below 0 ends the judgement of a configuration: all rows
+            are −inf then.
         q: (nq, configurations) [rad].
         out: (3, configurations), written: rows OBSTACLES, BETWEEN, SELF.
     """
@@ -86,7 +94,10 @@ def primitive_clearances(table, units, shapes, obstacles, pairs, limit, decide, 
     for lane in range(LANES):
         place[lane] = U(lane // BLOCK) * size + U(lane % BLOCK)
     middles, best = np.empty(num_units * 3 * LANES), np.empty(3 * LANES)
-    bits, lists = np.empty(LANES, dtype=np.uint64), np.empty(_room(units[0], pairs), dtype=np.uint64)
+    bits, lists = (
+        np.empty(LANES, dtype=np.uint64),
+        np.empty(_room(units[0], pairs), dtype=np.uint64),
+    )
     work = np.empty((FIXED_ROWS + 3 * shapes[3]) * WIDTH)
     for first in range(0, q.shape[1], LANES):
         count = min(LANES, q.shape[1] - first)
@@ -95,14 +106,20 @@ def primitive_clearances(table, units, shapes, obstacles, pairs, limit, decide, 
             begin = first + block * BLOCK
             own = frames[U(block) * size : U(block + 1) * size]
             load_block(q, begin, min(BLOCK, q.shape[1] - begin), 1.0, block_q)
-            block_frames(parent, index_q, prismatic, turned, rotation, translation, block_q, own, scratch)
+            block_frames(
+                parent, index_q, prismatic, turned, rotation, translation, block_q, own, scratch
+            )
             _middles(units, own, U(block * BLOCK), middles)
         _begin(num_units, limit, count, middles, best)
         if not decide:
             _bound_obstacles(lanes, units, obstacles, middles, work, best)
             _bound_pairs(lanes, units, pairs, middles, best)
-        _judge_obstacles(lanes, decide, units, shapes, obstacles, frames, place, middles, bits, lists, work, best)
-        _judge_pairs(lanes, decide, units, shapes, pairs, frames, place, middles, bits, lists, work, best)
+        _judge_obstacles(
+            lanes, decide, units, shapes, obstacles, frames, place, middles, bits, lists, work, best
+        )
+        _judge_pairs(
+            lanes, decide, units, shapes, pairs, frames, place, middles, bits, lists, work, best
+        )
         for row in range(3):
             for lane in range(count):
                 out[row, first + lane] = best[row * LANES + lane]
@@ -128,13 +145,20 @@ def _middles(units, frames, first, middles):  # type: ignore[no-untyped-def]
             a, o, m = j + U(3 * row * BLOCK), j + U((9 + row) * BLOCK), own + U(row * LANES)
             for n in range(BLOCK):
                 k = U(n)
-                turned = frames[a + k] * x + frames[a + U(BLOCK) + k] * y + frames[a + U(2 * BLOCK) + k] * z
+                turned = (
+                    frames[a + k] * x
+                    + frames[a + U(BLOCK) + k] * y
+                    + frames[a + U(2 * BLOCK) + k] * z
+                )
                 middles[m + k] = frames[o + k] + turned
 
 
 @kernel
 def _begin(num_units, limit, count, middles, best):  # type: ignore[no-untyped-def]
-    """What is best before anything is measured: the limit; NaN where q is; −inf, so that all is skipped, in padding."""
+    """What is best before anything is measured: the limit; NaN where q is.
+
+    −inf, so that all is skipped, in padding.
+    """
     best[:] = 0.0
     for b in range(3 * num_units):
         for lane in range(LANES):
@@ -148,9 +172,12 @@ def _begin(num_units, limit, count, middles, best):  # type: ignore[no-untyped-d
 
 @kernel
 def _bound_obstacles(lanes, units, obstacles, middles, least, best):  # type: ignore[no-untyped-def]
-    """Lower `best` to a little more than a bound of the least clearance: some sphere is as near to its ball's centre.
+    """Lower `best` to a little more than a bound of the least clearance.
 
-    An obstacle's centre belongs to it. Whoever asks for all distances is spared most encounters by this.
+    Some sphere is as near to its ball's centre.
+
+    An obstacle's centre belongs to it. Whoever asks for all distances is spared most encounters by
+    this.
     """
     whole, ball = units
     data, listed = obstacles
@@ -165,14 +192,25 @@ def _bound_obstacles(lanes, units, obstacles, middles, least, best):  # type: ig
                 level = nx * data[o, 0] + ny * data[o, 1] + nz * data[o, 2]
                 for n in range(lanes):
                     k, lane = m + U(n), U(n)
-                    height = nx * middles[k] + ny * middles[k + U(LANES)] + nz * middles[k + U(2 * LANES)] - level
-                    bound = height + slack + (abs(height) + abs(level) + ball[b, 3]) * (MARGIN - 1.0)
+                    height = (
+                        nx * middles[k]
+                        + ny * middles[k + U(LANES)]
+                        + nz * middles[k + U(2 * LANES)]
+                        - level
+                    )
+                    bound = (
+                        height + slack + (abs(height) + abs(level) + ball[b, 3]) * (MARGIN - 1.0)
+                    )
                     best[lane] = bound if bound < best[lane] else best[lane]
             else:
                 cx, cy, cz = data[o, 0], data[o, 1], data[o, 2]
                 for n in range(lanes):
                     k, lane = m + U(n), U(n)
-                    x, y, z = middles[k] - cx, middles[k + U(LANES)] - cy, middles[k + U(2 * LANES)] - cz
+                    x, y, z = (
+                        middles[k] - cx,
+                        middles[k + U(LANES)] - cy,
+                        middles[k + U(2 * LANES)] - cz,
+                    )
                     square = x * x + y * y + z * z
                     least[lane] = square if square < least[lane] else least[lane]
         for n in range(lanes):
@@ -205,7 +243,9 @@ def _judge_obstacles(  # type: ignore[no-untyped-def]
     listed, whole = obstacles[1], units[0]
     capacity = len(lists) // (2 * CLASSES)
     filled = np.empty(CLASSES, dtype=np.int64)
-    for b in range(len(whole) - 1, -1, -1):  # from the tip, which is nearest to most things, to the base
+    for b in range(
+        len(whole) - 1, -1, -1
+    ):  # from the tip, which is nearest to most things, to the base
         for first in range(whole[b, 5], whole[b, 6], WORD):
             stop = min(first + WORD, whole[b, 6])
             if not _mark_obstacles(lanes, b, units, obstacles, first, stop, middles, best, bits):
@@ -224,7 +264,9 @@ def _judge_obstacles(  # type: ignore[no-untyped-def]
                 for at in range(2 * c * capacity, filled[c], WIDTH):
                     width = min(WIDTH, filled[c] - at)
                     near = lists[at : at + width], lists[at + capacity : at + capacity + width]
-                    body_meets_obstacles(width, c, b, units, shapes, obstacles, near, frames, place, work, best)
+                    body_meets_obstacles(
+                        width, c, b, units, shapes, obstacles, near, frames, place, work, best
+                    )
         if decide:
             _drop_collided(best)
 
@@ -253,7 +295,9 @@ def _judge_pairs(  # type: ignore[no-untyped-def]
             for at in range(begin, end, WIDTH):
                 width = min(WIDTH, end - at)
                 near = lists[at : at + width]
-                body_meets_body(width, pairs[p, 0], pairs[p, 1], units, shapes, near, frames, place, work)
+                body_meets_body(
+                    width, pairs[p, 0], pairs[p, 1], units, shapes, near, frames, place, work
+                )
                 base = U(pairs[p, 2] * LANES)
                 for n in range(width):
                     k = base + near[U(n)]
@@ -275,7 +319,7 @@ def _drop_collided(best):  # type: ignore[no-untyped-def]
 
 @kernel
 def _mark_obstacles(lanes, b, units, obstacles, first, stop, middles, best, bits):  # type: ignore[no-untyped-def]
-    """Mark the configurations in which the ball around a body may be nearer to obstacles than the best so far.
+    """Mark the configurations in which a body's ball may be nearer to obstacles than the best.
 
     The obstacle's ball comes first; where it is met anywhere, the box around the obstacle decides.
     """
@@ -301,7 +345,9 @@ def _mark_half_space(lanes, obstacle, reach, m, middles, best, bit, bits):  # ty
     margin = reach * MARGIN + abs(level) * (MARGIN - 1.0)
     for n in range(lanes):
         k, lane = m + U(n), U(n)
-        height = nx * middles[k] + ny * middles[k + U(LANES)] + nz * middles[k + U(2 * LANES)] - level
+        height = (
+            nx * middles[k] + ny * middles[k + U(LANES)] + nz * middles[k + U(2 * LANES)] - level
+        )
         bits[lane] |= bit if height < best[lane] + margin else U(0)
 
 
@@ -345,11 +391,15 @@ def _mark_box(lanes, obstacle, reach, m, middles, best, bit, bits):  # type: ign
 
 @kernel
 def _mark_pairs(lanes, units, pairs, first, stop, middles, best, bits):  # type: ignore[no-untyped-def]
-    """Mark the configurations in which two units may be nearer to each other than the best so far."""
+    """Mark the configurations in which two units may be nearer than the best so far."""
     ball = units[1]
     bits[:] = U(0)
     for p in range(first, stop):
-        a, b, r = U(pairs[p, 0]) * U(3 * LANES), U(pairs[p, 1]) * U(3 * LANES), U(pairs[p, 2]) * U(LANES)
+        a, b, r = (
+            U(pairs[p, 0]) * U(3 * LANES),
+            U(pairs[p, 1]) * U(3 * LANES),
+            U(pairs[p, 2]) * U(LANES),
+        )
         margin, bit = (ball[pairs[p, 0], 3] + ball[pairs[p, 1], 3]) * MARGIN, U(1) << U(p - first)
         for n in range(lanes):
             i, j, lane = a + U(n), b + U(n), U(n)

@@ -1,7 +1,9 @@
-"""What the kernels of spheres and capsules read: shapes, bodies and their parts, obstacles, as arrays.
+"""What the kernels of spheres and capsules read.
 
-A body is all shapes that move with one joint. Bodies of many shapes are cut into parts for the checks between bodies:
-the balls around parts are smaller, and rule out more.
+Shapes, bodies and their parts, obstacles, as arrays.
+
+A body is all shapes that move with one joint. Bodies of many shapes are cut into parts for the
+checks between bodies: the balls around parts are smaller, and rule out more.
 """
 
 from collections.abc import Iterable
@@ -33,8 +35,8 @@ class Shapes(NamedTuple):
         start: (shapes, 3) one end, or the centre, in the joint's frame [length unit].
         end: (shapes, 3) the other end.
         radius: (shapes,) at least 0.
-        body: (shapes,) number of the body that each belongs to; None: all shapes of one joint are one body, whose
-            number is the joint's.
+        body: (shapes,) number of the body that each belongs to; None: all shapes of one joint are
+            one body, whose number is the joint's.
     """
 
     joint: np.ndarray
@@ -54,18 +56,32 @@ class Shapes(NamedTuple):
         Raises:
             ValueError: If arrays do not fit each other or the model, or a radius is negative.
         """
-        joint, radius = np.asarray(self.joint, dtype=np.int64), np.asarray(self.radius, dtype=np.float64)
-        start, end = np.asarray(self.start, dtype=np.float64), np.asarray(self.end, dtype=np.float64)
+        joint, radius = (
+            np.asarray(self.joint, dtype=np.int64),
+            np.asarray(self.radius, dtype=np.float64),
+        )
+        start, end = (
+            np.asarray(self.start, dtype=np.float64),
+            np.asarray(self.end, dtype=np.float64),
+        )
         if joint.ndim != 1 or len(joint) == 0:
-            raise ValueError(f"shapes.joint must have shape (shapes,) with one shape at least, was {joint.shape}")
+            raise ValueError(
+                f"shapes.joint must have shape (shapes,) with one shape at least, was {joint.shape}"
+            )
         for name, points in (("start", start), ("end", end)):
             if points.shape != (len(joint), 3) or not np.isfinite(points).all():
-                raise ValueError(f"shapes.{name} must be finite, of shape ({len(joint)}, 3), was {points.shape}")
+                raise ValueError(
+                    f"shapes.{name} must be finite, of shape ({len(joint)}, 3), was {points.shape}"
+                )
         if radius.shape != joint.shape or not np.all((radius >= 0.0) & np.isfinite(radius)):
-            raise ValueError(f"shapes.radius must be finite, at least 0, of shape {joint.shape}, was {radius.tolist()}")
+            raise ValueError(
+                f"shapes.radius must be finite, at least 0, of shape {joint.shape}, was "
+                f"{radius.tolist()}"
+            )
         if joint.min() < 0 or joint.max() >= model.njoints:
             raise ValueError(
-                f"shapes.joint must be joints of the model, 0 to {model.njoints - 1}, was {joint.tolist()}"
+                f"shapes.joint must be joints of the model, 0 to {model.njoints - 1}, was "
+                f"{joint.tolist()}"
             )
         if self.body is not None and len(self.body) != len(joint):
             raise ValueError(f"shapes.body must have shape {joint.shape}, was {self.body.shape}")
@@ -77,10 +93,11 @@ class Units(NamedTuple):
     """Bodies and then parts of bodies, each with a ball around it.
 
     Attributes:
-        whole: (units, 7) frame (a joint of the kinematic table, one past its end: the world); first and one-past-last
-            run of spheres; capsule; entry in the list of obstacles that a body is checked against.
-        ball: (units, 5) centre in the frame, radius, and the least distance of any shape's end from this centre, less
-            its own radius.
+        whole: (units, 7) frame (a joint of the kinematic table, one past its end: the world); first
+            and one-past-last run of spheres; capsule; entry in the list of obstacles that a body is
+            checked against.
+        ball: (units, 5) centre in the frame, radius, and the least distance of any shape's end from
+            this centre, less its own radius.
     """
 
     whole: np.ndarray
@@ -107,8 +124,9 @@ class PackedObstacles(NamedTuple):
     """Obstacles, and the lists of those that each body is checked against.
 
     Attributes:
-        data: (obstacles, 21) centre; rotation, row by row; half the edges and thickness of a box, or radius and half
-            the length of a cylinder; radius of a ball around; half the edges and thickness of a box around.
+        data: (obstacles, 21) centre; rotation, row by row; half the edges and thickness of a box,
+            or radius and half the length of a cylinder; radius of a ball around; half the edges and
+            thickness of a box around.
         listed: (entries, 2) obstacle, and its class: BOXES, CYLINDERS or HALF_SPACES; body by body.
     """
 
@@ -150,8 +168,26 @@ def pack_shapes(
                 runs.append((len(spheres), len(spheres) + len(same)))
                 spheres.extend(same)
             rods.extend(cut[~ball[cut]])
-            rows.append((frame, begin[0], len(runs), begin[1], len(rods), _ball(start, axis, shapes.radius, cut)))
-        bodies.append((frame, first[0], len(runs), first[1], len(rods), _ball(start, axis, shapes.radius, own)))
+            rows.append(
+                (
+                    frame,
+                    begin[0],
+                    len(runs),
+                    begin[1],
+                    len(rods),
+                    _ball(start, axis, shapes.radius, cut),
+                )
+            )
+        bodies.append(
+            (
+                frame,
+                first[0],
+                len(runs),
+                first[1],
+                len(rods),
+                _ball(start, axis, shapes.radius, own),
+            )
+        )
         only = len(rows) == 1
         parts.append([k] if only else [len(joints) + len(cuts) + n for n in range(len(rows))])
         cuts.extend([] if only else rows)
@@ -163,7 +199,11 @@ def pack_shapes(
     centers = np.column_stack([start[at], shapes.radius[at]])
     capsules = np.column_stack([start[of], axis[of], shapes.radius[of], 1.0 / square[of]])
     packed = PackedShapes(bounds, centers, capsules, 0)
-    return units, packed._replace(most=max(num_spheres(units, packed, k) for k in range(len(units.ball)))), parts
+    return (
+        units,
+        packed._replace(most=max(num_spheres(units, packed, k) for k in range(len(units.ball)))),
+        parts,
+    )
 
 
 def num_spheres(units: Units, shapes: PackedShapes, unit: int) -> int:
@@ -173,7 +213,10 @@ def num_spheres(units: Units, shapes: PackedShapes, unit: int) -> int:
 
 
 def _cut(own: np.ndarray, middle: FloatArray, ball: np.ndarray) -> list[np.ndarray]:
-    """Halve a set of shapes, by number, across its longest extent, until every piece is small enough for a part."""
+    """Halve a set of shapes, by number, across its longest extent.
+
+    Until every piece is small enough for a part.
+    """
     if len(own) == 1 or np.where(ball[own], 1, CAPSULE_WEIGHT).sum() <= PART:
         return [own]
     axis = np.ptp(middle[own], axis=0).argmax()
@@ -183,15 +226,24 @@ def _cut(own: np.ndarray, middle: FloatArray, ball: np.ndarray) -> list[np.ndarr
 
 
 def _ball(start: FloatArray, axis: FloatArray, radius: FloatArray, own: np.ndarray) -> FloatArray:
-    """Return (5,) centre and radius of a ball around some capsules, and the slack that `Units` tells of."""
-    ends, radii = np.concatenate([start[own], start[own] + axis[own]]), np.concatenate([radius[own], radius[own]])
+    """Return (5,) centre and radius of a ball around some capsules.
+
+    And the slack that `Units` tells of.
+    """
+    ends, radii = (
+        np.concatenate([start[own], start[own] + axis[own]]),
+        np.concatenate([radius[own], radius[own]]),
+    )
     center = 0.5 * ((ends - radii[:, None]).min(axis=0) + (ends + radii[:, None]).max(axis=0))
     away = np.sqrt(((ends - center) ** 2).sum(axis=1))
     return np.array([*center, (away + radii).max(), (away - radii).min()])
 
 
 def pack_obstacles(
-    obstacles: ObstacleTable, numbers: np.ndarray, joints: np.ndarray, ignored: tuple[tuple[int, int], ...]
+    obstacles: ObstacleTable,
+    numbers: np.ndarray,
+    joints: np.ndarray,
+    ignored: tuple[tuple[int, int], ...],
 ) -> tuple[PackedObstacles, np.ndarray]:
     """Return the obstacles, and where each body's list of them begins and ends, (bodies, 2).
 
@@ -204,7 +256,10 @@ def pack_obstacles(
     kind, size = obstacles.without_ellipses().kind, obstacles.size
     for number, k in ignored:
         if number not in numbers or not 0 <= k < len(kind):
-            must = f"pairs (joint, obstacle), of joints {numbers.tolist()} and obstacles 0 to {len(kind) - 1}"
+            must = (
+                f"pairs (joint, obstacle), of joints {numbers.tolist()} and obstacles 0 to "
+                f"{len(kind) - 1}"
+            )
             raise ValueError(f"ignored must hold {must}, was {(number, k)}")
     core = np.zeros((len(kind), 4))
     core[kind == SPHERE, 3] = size[kind == SPHERE, 0]
@@ -221,6 +276,8 @@ def pack_obstacles(
         [k for k in range(len(kind)) if joint > 0 and (int(number), k) not in skipped]
         for number, joint in zip(numbers, joints, strict=True)
     ]
-    listed = np.array([(k, classes[k]) for one in lists for k in one], dtype=np.int64).reshape(-1, 2)
+    listed = np.array([(k, classes[k]) for one in lists for k in one], dtype=np.int64).reshape(
+        -1, 2
+    )
     ends = np.cumsum([0, *map(len, lists)])
     return PackedObstacles(data, listed), np.column_stack([ends[:-1], ends[1:]])

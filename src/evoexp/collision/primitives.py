@@ -1,7 +1,8 @@
 """Robots as spheres and capsules, among obstacles of all kinds: the kernels in three dimensions.
 
-Any Pinocchio model whose joints have one coordinate, any number of arms; the kernels are in `primitive_kernels`. A body
-is all shapes that move with one joint, or what is told apart of them. Angles are radians here, as in Pinocchio.
+Any Pinocchio model whose joints have one coordinate, any number of arms; the kernels are in
+`primitive_kernels`. A body is all shapes that move with one joint, or what is told apart of them.
+Angles are radians here, as in Pinocchio.
 """
 
 from collections.abc import Iterable, Sequence
@@ -27,10 +28,13 @@ from evoexp.scenarios.obstacles import ObstacleTable
 
 
 class Clearances(NamedTuple):
-    """Least clearances of a batch: negative where shapes overlap, +inf where there is nothing to meet.
+    """Least clearances of a batch.
+
+    Negative where shapes overlap, +inf where there is nothing to meet.
 
     Attributes:
-        to_obstacles: (configurations,) least distance of the robot's shapes to obstacles [length unit].
+        to_obstacles: (configurations,) least distance of the robot's shapes to obstacles [length
+            unit].
         between_arms: (configurations,) least distance of shapes of two arms.
         to_self: (configurations,) least distance of shapes of one arm.
     """
@@ -56,7 +60,10 @@ def shapes_of_geometry(geometry: Any) -> Shapes:
         half = one.geometry.halfLength if isinstance(one.geometry, coal.Capsule) else 0.0
         if not isinstance(one.geometry, coal.Sphere | coal.Capsule):
             kind = type(one.geometry).__name__
-            raise ValueError(f"geometry: object '{one.name}' must be a coal.Sphere or a coal.Capsule, is a {kind}")
+            raise ValueError(
+                f"geometry: object '{one.name}' must be a coal.Sphere or a coal.Capsule, is a "
+                f"{kind}"
+            )
         center, along = one.placement.translation, half * one.placement.rotation[:, 2]
         joint.append(int(one.parentJoint))
         start.append(center - along)
@@ -73,7 +80,10 @@ def default_pairs(model: Any, joints: Iterable[int]) -> tuple[tuple[int, int], .
 
 
 def arms_of_joints(model: Any) -> tuple[int, ...]:
-    """Return which arm each joint belongs to, the world included as −1: the trees that start at the world, counted."""
+    """Return which arm each joint belongs to, the world included as −1.
+
+    The trees that start at the world, counted.
+    """
     arms, count = [-1], 0
     for joint in range(1, model.njoints):
         root = model.parents[joint] == 0
@@ -117,13 +127,15 @@ class PrimitiveCollision(NamedTuple):
 
         Args:
             model: `pin.Model` whose joints have one coordinate each.
-            shapes: Its spheres and capsules; those of the world (a pedestal) are checked against bodies only.
+            shapes: Its spheres and capsules; those of the world (a pedestal) are checked against
+                bodies only.
             obstacles: The obstacle table.
-            pairs: Bodies that are checked against each other, by their numbers (the joints', unless shapes have
-                others); `default_pairs` if not given.
-            ignored: Pairs (body, obstacle) that are not checked: the floor that the first link stands on.
-            arms: Which arm each joint of the model belongs to, the world included; `arms_of_joints` if not given.
-                Negative numbers belong to every arm.
+            pairs: Bodies that are checked against each other, by their numbers (the joints', unless
+                shapes have others); `default_pairs` if not given.
+            ignored: Pairs (body, obstacle) that are not checked: the floor that the first link
+                stands on.
+            arms: Which arm each joint of the model belongs to, the world included; `arms_of_joints`
+                if not given. Negative numbers belong to every arm.
 
         Raises:
             UnsupportedJoint: If a joint has not exactly one coordinate.
@@ -133,11 +145,19 @@ class PrimitiveCollision(NamedTuple):
         numbers, first = np.unique(shapes.labels, return_index=True)
         joints = shapes.joint[first]
         units, packed, parts = pack_shapes(table, shapes, numbers, joints)
-        chosen = default_pairs(model, joints) if pairs is None else tuple((int(a), int(b)) for a, b in pairs)
+        chosen = (
+            default_pairs(model, joints)
+            if pairs is None
+            else tuple((int(a), int(b)) for a, b in pairs)
+        )
         arm = arms_of_joints(model) if arms is None else tuple(arms)
         if len(arm) != model.njoints:
-            raise ValueError(f"arms must have one number per joint of the model, {model.njoints}, had {len(arm)}")
-        around, units.whole[: len(joints), 5:] = pack_obstacles(obstacles, numbers, joints, tuple(ignored))
+            raise ValueError(
+                f"arms must have one number per joint of the model, {model.njoints}, had {len(arm)}"
+            )
+        around, units.whole[: len(joints), 5:] = pack_obstacles(
+            obstacles, numbers, joints, tuple(ignored)
+        )
         rows = _pair_table(numbers, chosen, [arm[joint] for joint in joints], parts, units, packed)
         tables = (table[:6], tuple(units), tuple(packed), tuple(around), rows)
         return cls(table, joints, units, packed, around, rows, tables)
@@ -152,20 +172,26 @@ class PrimitiveCollision(NamedTuple):
         ignored: Pairs = (),
         arms: Sequence[int] | None = None,
     ) -> "PrimitiveCollision":
-        """Return the same for a `pin.GeometryModel` that holds coal spheres and capsules; see `build`."""
+        """Return the same for a `pin.GeometryModel` that holds coal spheres and capsules.
+
+        See `build`.
+        """
         return cls.build(model, shapes_of_geometry(geometry), obstacles, pairs, ignored, arms)
 
     def clearance(self, q: FloatArray, limit: float = np.inf) -> Clearances:
         """Return the clearances of a batch of configurations.
 
-        They are exact, but for a capsule whose axis enters a box or a cylinder: there some value ≤ −radius stands.
+        They are exact, but for a capsule whose axis enters a box or a cylinder: there some value ≤
+        −radius stands.
 
         Args:
             q: (nq, configurations) [rad], lengths for prismatic joints. NaN where q holds NaN.
-            limit: Above it nothing is asked: a clearance is exact where it is less, elsewhere it is the limit.
+            limit: Above it nothing is asked: a clearance is exact where it is less, elsewhere it is
+                the limit.
 
         Raises:
-            ValueError: If q has another number of rows than the model has coordinates, or the limit is NaN.
+            ValueError: If q has another number of rows than the model has coordinates, or the limit
+                is NaN.
         """
         if np.isnan(limit):
             raise ValueError("limit must be a number, was nan")
@@ -174,7 +200,9 @@ class PrimitiveCollision(NamedTuple):
         return Clearances(*out[1])
 
     def collides(self, q: FloatArray) -> np.ndarray:
-        """Return which configurations collide, (configurations,): the sign of `clearance`, for less; true for NaN.
+        """Return which configurations collide, (configurations,).
+
+        The sign of `clearance`, for less; true for NaN.
 
         Raises:
             ValueError: If q has another number of rows than the model has coordinates.
@@ -199,16 +227,25 @@ def _pair_table(
     units: Units,
     shapes: PackedShapes,
 ) -> np.ndarray:
-    """Return all pairs of parts of the bodies that are paired; the part with more spheres stays in its frame."""
+    """Return all pairs of parts of the bodies that are paired.
+
+    The part with more spheres stays in its frame.
+    """
     body = {int(number): k for k, number in enumerate(numbers)}
     rows: list[tuple[int, int, int]] = []
     for one, two in pairs:
         if one not in body or two not in body or one == two:
-            raise ValueError(f"pairs must hold two different joints of {numbers.tolist()} each, was {(one, two)}")
+            raise ValueError(
+                f"pairs must hold two different joints of {numbers.tolist()} each, was {(one, two)}"
+            )
         arm, other = arms[body[one]], arms[body[two]]
         between = arm != other and arm >= 0 and other >= 0
         for a in parts[body[one]]:
             for b in parts[body[two]]:
-                more, fewer = (a, b) if num_spheres(units, shapes, a) >= num_spheres(units, shapes, b) else (b, a)
+                more, fewer = (
+                    (a, b)
+                    if num_spheres(units, shapes, a) >= num_spheres(units, shapes, b)
+                    else (b, a)
+                )
                 rows.append((more, fewer, BETWEEN if between else SELF))
     return np.array(rows, dtype=np.int64).reshape(-1, 3)

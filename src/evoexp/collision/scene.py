@@ -1,7 +1,10 @@
-"""A scene: a robot's exact bodies and what stands around it, as coal shapes, with the pairs that must not touch.
+"""A scene: a robot's exact bodies and what stands around it, as coal shapes.
 
-`Scene` holds coal's shapes, which have the last word, and the same bodies as plain arrays, from which the kernels of
-the certifier bound their distances. It is read-only: one scene serves many motions and threads.
+With the pairs that must not touch.
+
+`Scene` holds coal's shapes, which have the last word, and the same bodies as plain arrays, from
+which the kernels of the certifier bound their distances. It is read-only: one scene serves many
+motions and threads.
 """
 
 from typing import Any, NamedTuple
@@ -14,7 +17,15 @@ from evoexp.collision.body_table import BodyTable, body_table
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.kinematics import KinematicTable, kinematic_table
-from evoexp.scenarios.obstacles import BOX, CAPSULE, CYLINDER, ELLIPSE, SPHERE, ObstacleTable, obstacle_table
+from evoexp.scenarios.obstacles import (
+    BOX,
+    CAPSULE,
+    CYLINDER,
+    ELLIPSE,
+    SPHERE,
+    ObstacleTable,
+    obstacle_table,
+)
 
 
 class Scene(NamedTuple):
@@ -28,8 +39,10 @@ class Scene(NamedTuple):
         shapes: (bodies) coal's shape, index of its Pinocchio joint, placement in it.
         pairs: (pairs, 2) indices of bodies.
         bodies: The bodies as arrays.
-        size: Greatest distance of a body's points from the world's origin at the neutral configuration [length unit].
-        tolerances: (pairs,) at or below which a distance counts as contact [length unit]: above coal's own error.
+        size: Greatest distance of a body's points from the world's origin at the neutral
+            configuration [length unit].
+        tolerances: (pairs,) at or below which a distance counts as contact [length unit]: above
+            coal's own error.
     """
 
     model: Any
@@ -48,20 +61,26 @@ class Scene(NamedTuple):
         return self.names[one], self.names[two]
 
     def nearest_pair(self, q: FloatArray) -> tuple[str, str]:
-        """Return the names of the two bodies that are closest, or deepest in each other, at q (nq,) [rad]."""
+        """Return the names of the two bodies that are closest, or deepest in each other.
+
+        At q (nq,) [rad].
+        """
         data, placements = self.model.createData(), self.geometry.createData()
         pin.computeDistances(self.model, data, self.geometry, placements, q)
         distances = [result.min_distance for result in placements.distanceResults]
         return self.pair_names(int(np.argmin(distances)))
 
 
-def scene(assembly: Assembly, obstacles: ObstacleTable | tuple[Any, ...] = (), self_pairs: bool = False) -> Scene:
+def scene(
+    assembly: Assembly, obstacles: ObstacleTable | tuple[Any, ...] = (), self_pairs: bool = False
+) -> Scene:
     """Return a robot among obstacles: links of different arms, and every link with every obstacle.
 
     Args:
         assembly: The robot; links without names of their own are named `arm_1_link_1` and so on.
         obstacles: Settings of obstacles, or their table; named `obstacle_1` and so on.
-        self_pairs: Whether links of one arm are watched, too, unless one joint carries both or they meet at a joint.
+        self_pairs: Whether links of one arm are watched, too, unless one joint carries both or they
+            meet at a joint.
     """
     table = obstacles if isinstance(obstacles, ObstacleTable) else obstacle_table(obstacles)
     geometry = pin.GeometryModel()
@@ -69,10 +88,14 @@ def scene(assembly: Assembly, obstacles: ObstacleTable | tuple[Any, ...] = (), s
     bodies = list(assembly.geometry.geometryObjects)
     arms = assembly.body_arms
     for k, (arm, item) in enumerate(zip(arms, bodies, strict=True)):
-        own = item.name != f"link_{k}"  # bodies that have names of their own keep them, and are not counted
+        own = (
+            item.name != f"link_{k}"
+        )  # bodies that have names of their own keep them, and are not counted
         counts[arm] += not own
         name = item.name if own else f"arm_{arm + 1}_link_{counts[arm]}"
-        geometry.addGeometryObject(pin.GeometryObject(name, item.parentJoint, 0, item.placement, item.geometry))
+        geometry.addGeometryObject(
+            pin.GeometryObject(name, item.parentJoint, 0, item.placement, item.geometry)
+        )
     for k, (shape, placement) in enumerate(obstacle_shapes(table)):
         geometry.addGeometryObject(pin.GeometryObject(f"obstacle_{k + 1}", 0, 0, placement, shape))
     parents = assembly.model.parents
@@ -88,7 +111,9 @@ def scene(assembly: Assembly, obstacles: ObstacleTable | tuple[Any, ...] = (), s
 
 
 def geometry_scene(model: Any, geometry: Any, table: KinematicTable | None = None) -> Scene:
-    """Return a scene of any convex coal shapes or meshes on a model, with the collision pairs of the geometry model.
+    """Return a scene of any convex coal shapes or meshes on a model.
+
+    With the collision pairs of the geometry model.
 
     Args:
         model: A `pin.Model` whose joints have one coordinate each.
@@ -102,12 +127,16 @@ def geometry_scene(model: Any, geometry: Any, table: KinematicTable | None = Non
     table = kinematic_table(model) if table is None else table
     items = list(geometry.geometryObjects)
     bodies = body_table(table, items)
-    pairs = np.array([(pair.first, pair.second) for pair in geometry.collisionPairs], dtype=np.int64).reshape(-1, 2)
+    pairs = np.array(
+        [(pair.first, pair.second) for pair in geometry.collisionPairs], dtype=np.int64
+    ).reshape(-1, 2)
     size = _size(model, bodies)
     tolerances = np.array([bodies.tolerance(one, two) for one, two in pairs]) * size
     names = tuple(item.name for item in items)
     shapes = tuple((item.geometry, int(item.parentJoint), item.placement) for item in items)
-    return Scene(model, geometry, table, names, shapes, pairs, bodies, size, tolerances.reshape(len(pairs)))
+    return Scene(
+        model, geometry, table, names, shapes, pairs, bodies, size, tolerances.reshape(len(pairs))
+    )
 
 
 def obstacle_shapes(table: ObstacleTable) -> list[tuple[Any, Any]]:
@@ -131,7 +160,10 @@ def obstacle_shapes(table: ObstacleTable) -> list[tuple[Any, Any]]:
 
 
 def _size(model: Any, bodies: BodyTable) -> float:
-    """Return how far bodies reach from the world's origin at the neutral configuration; 1 if there is nothing."""
+    """Return how far bodies reach from the world's origin at the neutral configuration.
+
+    1 if there is nothing.
+    """
     data = model.createData()
     pin.forwardKinematics(model, data, pin.neutral(model))
     far = [0.0]

@@ -1,9 +1,10 @@
 """Distances of capsules' axes, in encounters; see `primitive_distances`.
 
-The distance of a point that moves along a segment to a convex body is a convex function of its place on the segment: it
-is least where its slope changes sign. For boxes the slope (of half the squared distance) is piecewise linear with kinks
-where a coordinate reaches a face, so the place is found by evaluating it at six kinks and one linear interpolation. For
-cylinders it is bracketed in the same way and found by Newton steps that fall back to bisection.
+The distance of a point that moves along a segment to a convex body is a convex function of its
+place on the segment: it is least where its slope changes sign. For boxes the slope (of half the
+squared distance) is piecewise linear with kinks where a coordinate reaches a face, so the place is
+found by evaluating it at six kinks and one linear interpolation. For cylinders it is bracketed in
+the same way and found by Newton steps that fall back to bisection.
 """
 
 import numpy as np
@@ -38,7 +39,9 @@ def _inverse(value):  # type: ignore[no-untyped-def]
 @kernel
 def _slope(t, px, py, pz, ux, uy, uz, a, b, c):  # type: ignore[no-untyped-def]
     """Of half the squared distance of the point p + t u from a box."""
-    return ux * _beyond(px + t * ux, a) + uy * _beyond(py + t * uy, b) + uz * _beyond(pz + t * uz, c)
+    return (
+        ux * _beyond(px + t * ux, a) + uy * _beyond(py + t * uy, b) + uz * _beyond(pz + t * uz, c)
+    )
 
 
 @kernel
@@ -66,9 +69,12 @@ def _crossing(p, u, inverse, half):  # type: ignore[no-untyped-def]
 
 @kernel
 def segment_to_boxes(width, radius, work):  # type: ignore[no-untyped-def]
-    """Lower VALUE to the signed distances of the segments at STARTS, AXES to thickened boxes, less a radius.
+    """Lower VALUE to the signed distances of the segments at STARTS, AXES to thickened boxes.
 
-    Where a segment enters a box, it is the signed distance of the middle of the part inside: not above 0.
+    Less a radius.
+
+    Where a segment enters a box, it is the signed distance of the middle of the part inside: not
+    above 0.
     """
     for n in range(width):
         s, e, k = STARTS + U(n), AXES + U(n), CORE + U(n)
@@ -79,7 +85,10 @@ def segment_to_boxes(width, radius, work):  # type: ignore[no-untyped-def]
         y1, y2, y_in, y_out = _crossing(py, uy, _inverse(uy), b)
         z1, z2, z_in, z_out = _crossing(pz, uz, _inverse(uz), c)
         low, high = 0.0, 1.0
-        at_low, at_high = _slope(0.0, px, py, pz, ux, uy, uz, a, b, c), _slope(1.0, px, py, pz, ux, uy, uz, a, b, c)
+        at_low, at_high = (
+            _slope(0.0, px, py, pz, ux, uy, uz, a, b, c),
+            _slope(1.0, px, py, pz, ux, uy, uz, a, b, c),
+        )
         slope = _slope(x1, px, py, pz, ux, uy, uz, a, b, c)
         low, at_low, high, at_high = _narrowed(x1, slope, low, at_low, high, at_high)
         slope = _slope(x2, px, py, pz, ux, uy, uz, a, b, c)
@@ -116,13 +125,18 @@ def _cylinder_slope(t, px, py, pz, ux, uy, uz, radius, half):  # type: ignore[no
     share = radius / rho
     slope = ((1.0 - share) * along if out else 0.0) + e * uz
     bend = along / rho
-    curvature = ((1.0 - share) * flat + share * bend * bend if out else 0.0) + (uz * uz if e != 0.0 else 0.0)
+    curvature = ((1.0 - share) * flat + share * bend * bend if out else 0.0) + (
+        uz * uz if e != 0.0 else 0.0
+    )
     return slope, curvature
 
 
 @kernel
 def segment_to_cylinders(width, radius, work):  # type: ignore[no-untyped-def]
-    """The same for cylinders; core: radius, half the length. No vector code: the searches differ in length."""
+    """The same for cylinders; core: radius, half the length.
+
+    No vector code: the searches differ in length.
+    """
     for n in range(width):
         s, e, k = STARTS + U(n), AXES + U(n), CORE + U(n)
         px, py, pz = work[s], work[s + W], work[s + U(2) * W]
@@ -131,12 +145,17 @@ def segment_to_cylinders(width, radius, work):  # type: ignore[no-untyped-def]
         x, y, z = px + t * ux, py + t * uy, pz + t * uz
         u, w = np.sqrt(x * x + y * y) - work[k], abs(z) - work[k + W]
         p, r = max(u, 0.0), max(w, 0.0)
-        work[VALUE + U(n)] = min(work[VALUE + U(n)], np.sqrt(p * p + r * r) + min(max(u, w), 0.0) - radius)
+        work[VALUE + U(n)] = min(
+            work[VALUE + U(n)], np.sqrt(p * p + r * r) + min(max(u, w), 0.0) - radius
+        )
 
 
 @kernel
 def _beside_cylinder(px, py, pz, ux, uy, uz, radius, half):  # type: ignore[no-untyped-def]
-    """The place t in [0, 1] where p + t u is nearest to a cylinder; inside, the middle of the part inside."""
+    """The place t in [0, 1] where p + t u is nearest to a cylinder.
+
+    Inside, the middle of the part inside.
+    """
     flat = ux * ux + uy * uy
     still = max(abs(ux), abs(uy)) < TINY
     flat = 1.0 if still else flat
@@ -180,7 +199,11 @@ def _zero_of_slope(px, py, pz, ux, uy, uz, radius, half, low, high):  # type: ig
 def segment_to_half_spaces(width, radius, work):  # type: ignore[no-untyped-def]
     """The same for half-spaces: the lower end counts; exact on both sides of the boundary."""
     for n in range(width):
-        z, w, best = work[STARTS + U(2) * W + U(n)], work[AXES + U(2) * W + U(n)], work[VALUE + U(n)]
+        z, w, best = (
+            work[STARTS + U(2) * W + U(n)],
+            work[AXES + U(2) * W + U(n)],
+            work[VALUE + U(n)],
+        )
         found = (z if w > 0.0 else z + w) - radius
         work[VALUE + U(n)] = found if found < best else best
 
@@ -211,7 +234,10 @@ def segment_to_points(width, capsule, p, both, work):  # type: ignore[no-untyped
 
 @kernel
 def segments_to_point(width, point, inverse, both, work):  # type: ignore[no-untyped-def]
-    """Lower VALUE to the distance of one constant point from the segments at STARTS, AXES, less `both`."""
+    """Lower VALUE to the distance of one constant point from the segments at STARTS, AXES.
+
+    Less `both`.
+    """
     cx, cy, cz = point[0], point[1], point[2]
     for n in range(width):
         s, e = STARTS + U(n), AXES + U(n)
@@ -227,11 +253,14 @@ def segments_to_point(width, point, inverse, both, work):  # type: ignore[no-unt
 
 @kernel
 def segment_to_segments(width, capsule, other, both, work):  # type: ignore[no-untyped-def]
-    """Lower VALUE to the distance of one constant segment from the segments at STARTS, AXES, less `both`.
+    """Lower VALUE to the distance of one constant segment from the segments at STARTS, AXES.
 
-    The common perpendicular's foot, clamped to the first segment, is projected to the second, clamped, and back: the
-    least of a convex function of two places. It comes from cross products, whose errors stay harmless when the segments
-    are nearly parallel; for parallel ones any foot serves.
+    Less `both`.
+
+    The common perpendicular's foot, clamped to the first segment, is projected to the second,
+    clamped, and back: the least of a convex function of two places. It comes from cross products,
+    whose errors stay harmless when the segments are nearly parallel; for parallel ones any foot
+    serves.
 
     Args:
         width: Encounters.

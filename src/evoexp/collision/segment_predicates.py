@@ -1,9 +1,12 @@
-"""Exact decisions about segments in the plane, whatever their rounding: parallel, collinear, touching, of length zero.
+"""Exact decisions about segments in the plane, whatever their rounding.
 
-`orientation` first takes the plain determinant where its sign is beyond doubt, and else sums without error (Shewchuk
-1997, "Adaptive precision floating-point arithmetic and fast robust geometric predicates": two-sum, two-product,
-expansions), from `+ − ×` alone. The answer is that of rational arithmetic on the given coordinates while these lie
-below 1e150 and, where not zero, within 280 decades of the greatest.
+Parallel, collinear, touching, of length zero.
+
+`orientation` first takes the plain determinant where its sign is beyond doubt, and else sums
+without error (Shewchuk 1997, "Adaptive precision floating-point arithmetic and fast robust
+geometric predicates": two-sum, two-product, expansions), from `+ − ×` alone. The answer is that of
+rational arithmetic on the given coordinates while these lie below 1e150 and, where not zero, within
+280 decades of the greatest.
 """
 
 import math
@@ -21,7 +24,9 @@ _MOST = 1000
 
 @kernel
 def orientation(ax, ay, bx, by, cx, cy):  # type: ignore[no-untyped-def]
-    """Return a number > 0, = 0 or < 0 as c lies to the left of, on, or to the right of the line from a to b.
+    """Return a number > 0, = 0 or < 0 as c lies to the left of, on.
+
+    Or to the right of the line from a to b.
 
     Zero, too, if two of the points coincide.
     """
@@ -49,7 +54,9 @@ def touching(ax, ay, bx, by, cx, cy, dx, dy):  # type: ignore[no-untyped-def]
     a, b = orientation(cx, cy, dx, dy, ax, ay), orientation(cx, cy, dx, dy, bx, by)
     if (a > 0.0 and b > 0.0) or (a < 0.0 and b < 0.0):
         return False
-    if ((c > 0.0 and d < 0.0) or (c < 0.0 and d > 0.0)) and ((a > 0.0 and b < 0.0) or (a < 0.0 and b > 0.0)):
+    if ((c > 0.0 and d < 0.0) or (c < 0.0 and d > 0.0)) and (
+        (a > 0.0 and b < 0.0) or (a < 0.0 and b > 0.0)
+    ):
         return True
     return (
         (c == 0.0 and _between(ax, ay, bx, by, cx, cy))
@@ -117,4 +124,6 @@ def _product(a, b):  # type: ignore[no-untyped-def]
     c = _SPLITTER * b
     b_high = c - (c - b)
     b_low = b - b_high
-    return product, a_low * b_low - (((product - a_high * b_high) - a_low * b_high) - a_high * b_low)
+    return product, a_low * b_low - (
+        ((product - a_high * b_high) - a_low * b_high) - a_high * b_low
+    )

@@ -7,7 +7,9 @@ from evoexp.numerics import inlined
 
 @inlined
 def closest_of_simplex(p, count, out):  # type: ignore[no-untyped-def]
-    """Write the point closest to the origin to `out` and keep the corners that carry it; return their number.
+    """Write the point closest to the origin to `out` and keep the corners that carry it.
+
+    Return their number.
 
     Args:
         p: (4, 3) corners.

@@ -1,24 +1,37 @@
 """Kernels of touching spheres: least distances of whole batches of configurations.
 
-One kernel runs a block of configurations through forward kinematics, sphere centres, all pairs of spheres of different
-arms and all obstacles; the configuration is innermost. What limits it is the arithmetic of the pairs: per pair six
-operations in the plane and nine in space, on values that stay in the first-level cache; square roots are taken once per
-pair of arms, of the least squared distance. Who only asks for collisions (`limit` 0) is spared the pairs of links that
-are far apart in a whole block.
+One kernel runs a block of configurations through forward kinematics, sphere centres, all pairs of
+spheres of different arms and all obstacles; the configuration is innermost. What limits it is the
+arithmetic of the pairs: per pair six operations in the plane and nine in space, on values that stay
+in the first-level cache; square roots are taken once per pair of arms, of the least squared
+distance. Who only asks for collisions (`limit` 0) is spared the pairs of links that are far apart
+in a whole block.
 
-`space` is None for what moves in a plane, else true: by its type numba compiles one of the two branches only.
+`space` is None for what moves in a plane, else true: by its type numba compiles one of the two
+branches only.
 """
 
 import numpy as np
 
 from evoexp.collision.obstacle_kernels import MARGIN, ROWS, meet, to_obstacles
 from evoexp.numerics import DEGREE, borrowed, kernel
-from evoexp.robots.kinematics import BLOCK, PLANAR_ROWS, SPATIAL_ROWS, U, block_frames, block_planar_frames, load_block
+from evoexp.robots.kinematics import (
+    BLOCK,
+    PLANAR_ROWS,
+    SPATIAL_ROWS,
+    U,
+    block_frames,
+    block_planar_frames,
+    load_block,
+)
 
 
 @kernel
 def clearances(tables, limit, q, out):  # type: ignore[no-untyped-def]
-    """The kernel of `SphereCollision.clearance`, for other kernels; writes (2, configurations), q in degrees."""
+    """The kernel of `SphereCollision.clearance`, for other kernels.
+
+    Writes (2, configurations), q in degrees.
+    """
     num_spheres, num_bounds, num_joints = len(tables[2][0]), len(tables[3][0]), len(tables[0][0])
     block_q, frames = np.zeros(q.shape[0] * BLOCK), np.empty(num_joints * SPATIAL_ROWS * BLOCK)
     points = np.empty(num_spheres * ROWS), np.empty(num_bounds * ROWS)
@@ -29,7 +42,10 @@ def clearances(tables, limit, q, out):  # type: ignore[no-untyped-def]
 
 @kernel
 def _clearances(tables, limit, q, out, memory):  # type: ignore[no-untyped-def]
-    """Do what `clearances` says, given its memory; so that no references are counted in the innermost loops."""
+    """Do what `clearances` says, given its memory.
+
+    So that no references are counted in the innermost loops.
+    """
     tables, q, out, memory = borrowed((tables, q, out, memory))
     table, space, spheres, bounds, obstacles = tables
     joint, local, radius = spheres
@@ -43,10 +59,14 @@ def _clearances(tables, limit, q, out, memory):  # type: ignore[no-untyped-def]
         _frames(space, table, block_q, frames, scratch)
         _centers(space, joint, local, frames, centers)
         _centers(space, bound_joint, bound_local, frames, middles)
-        _between_arms(space, bounds, max(limit + 2.0 * radius, 0.0), centers, middles, scratch, between)
+        _between_arms(
+            space, bounds, max(limit + 2.0 * radius, 0.0), centers, middles, scratch, between
+        )
         outside[:] = limit + radius
         if len(obstacles[0]) > 0:
-            to_obstacles(obstacles, bounds, limit + radius, centers, middles, scratch, place, outside)
+            to_obstacles(
+                obstacles, bounds, limit + radius, centers, middles, scratch, place, outside
+            )
         for lane in range(count):
             out[0, first + lane] = between[lane] - 2.0 * radius
             out[1, first + lane] = outside[lane] - radius
@@ -140,7 +160,10 @@ def _pairs(space, centers, i, first, stop, least):  # type: ignore[no-untyped-de
 
 @kernel
 def _planar_pairs(centers, i, first, stop, least):  # type: ignore[no-untyped-def]
-    """Lower `least` to the squared distances of one sphere from a range of spheres; four in registers at a time."""
+    """Lower `least` to the squared distances of one sphere from a range of spheres.
+
+    Four in registers at a time.
+    """
     j = first
     while j + U(4) <= stop:
         for n in range(BLOCK):
@@ -156,7 +179,10 @@ def _planar_pairs(centers, i, first, stop, least):  # type: ignore[no-untyped-de
     while j < stop:
         for n in range(BLOCK):
             lane, k = U(n), j * U(ROWS) + U(n)
-            dx, dy = centers[i + lane] - centers[k], centers[i + U(BLOCK) + lane] - centers[k + U(BLOCK)]
+            dx, dy = (
+                centers[i + lane] - centers[k],
+                centers[i + U(BLOCK) + lane] - centers[k + U(BLOCK)],
+            )
             squared, best = dx * dx + dy * dy, least[lane]
             least[lane] = squared if squared < best else best
         j += U(1)
@@ -168,10 +194,18 @@ def _spatial_pairs(centers, i, first, stop, least):  # type: ignore[no-untyped-d
     while j + U(4) <= stop:
         for n in range(BLOCK):
             lane, best = U(n), least[U(n)]
-            x, y, z = centers[i + lane], centers[i + U(BLOCK) + lane], centers[i + U(2 * BLOCK) + lane]
+            x, y, z = (
+                centers[i + lane],
+                centers[i + U(BLOCK) + lane],
+                centers[i + U(2 * BLOCK) + lane],
+            )
             for t in range(4):
                 k = j * U(ROWS) + U(t * ROWS) + lane
-                dx, dy, dz = x - centers[k], y - centers[k + U(BLOCK)], z - centers[k + U(2 * BLOCK)]
+                dx, dy, dz = (
+                    x - centers[k],
+                    y - centers[k + U(BLOCK)],
+                    z - centers[k + U(2 * BLOCK)],
+                )
                 squared = dx * dx + dy * dy + dz * dz
                 best = squared if squared < best else best
             least[lane] = best
@@ -179,7 +213,10 @@ def _spatial_pairs(centers, i, first, stop, least):  # type: ignore[no-untyped-d
     while j < stop:
         for n in range(BLOCK):
             lane, k = U(n), j * U(ROWS) + U(n)
-            dx, dy = centers[i + lane] - centers[k], centers[i + U(BLOCK) + lane] - centers[k + U(BLOCK)]
+            dx, dy = (
+                centers[i + lane] - centers[k],
+                centers[i + U(BLOCK) + lane] - centers[k + U(BLOCK)],
+            )
             dz = centers[i + U(2 * BLOCK) + lane] - centers[k + U(2 * BLOCK)]
             squared, best = dx * dx + dy * dy + dz * dz, least[lane]
             least[lane] = squared if squared < best else best

@@ -10,17 +10,25 @@ def add_experiment_arguments(parser: argparse.ArgumentParser) -> None:
         "overrides",
         nargs="*",
         metavar="KEY=VALUE",
-        help="experiment=NAME, budget=paper|quick|smoke, num_replicates=N, and any setting: ga.population_size=20",
+        help="experiment=NAME, budget=paper|quick|smoke, num_replicates=N, and any setting: "
+        "ga.population_size=20",
     )
     parser.add_argument(
-        "-m", "--multirun", action="store_true", help="sweep over values with commas: ga.num_elites=0,2"
+        "-m",
+        "--multirun",
+        action="store_true",
+        help="sweep over values with commas: ga.num_elites=0,2",
     )
-    parser.add_argument("--only", type=_labels, default=(), metavar="LABEL,...", help="only these conditions")
+    parser.add_argument(
+        "--only", type=_labels, default=(), metavar="LABEL,...", help="only these conditions"
+    )
 
 
 def _labels(text: str) -> tuple[str, ...]:
     """Split labels at their commas, but for those inside brackets: `q=[0,1]` is one label."""
-    labels = tuple(label.strip() for label in re.split(r",(?![^\[\](){}]*[\])}])", text) if label.strip())
+    labels = tuple(
+        label.strip() for label in re.split(r",(?![^\[\](){}]*[\])}])", text) if label.strip()
+    )
     if not labels:
         raise argparse.ArgumentTypeError(f"must name a condition, was '{text}'")
     return labels

@@ -10,7 +10,10 @@ PIPED_WIDTH = 160  # columns of a table in a pipe, where nobody has to read it o
 
 
 class _Console(Console):
-    """Goes on in silence where the reader of a pipe has left: the work and its exit code are the same."""
+    """Goes on in silence where the reader of a pipe has left.
+
+    The work and its exit code are the same.
+    """
 
     def on_broken_pipe(self) -> None:
         self.quiet = True

@@ -16,7 +16,11 @@ from evoexp.commands.console import add_columns, new_table, plain_console
 from evoexp.errors import MotionFileError
 from evoexp.records import FloatArray
 
-HEAD = ("label", "condition", "length_unit")  # what a row says of its condition; everything else is a term
+HEAD = (
+    "label",
+    "condition",
+    "length_unit",
+)  # what a row says of its condition; everything else is a term
 LARGEST = float(np.finfo(np.float64).max)
 MAX_DEPTH = 16  # nested lists; no planner's shape comes near
 
@@ -28,10 +32,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         if action.dest == "overrides":
             action.metavar, action.nargs = "MOTION | KEY=VALUE", "+"
             action.help = (
-                "a motion file (.json: nested lists, .npy: an array) in the planner's documented shape, start and goal "
-                "included, and an experiment with overrides as for run"
+                "a motion file (.json: nested lists, .npy: an array) in the planner's documented "
+                "shape, start and goal included, and an experiment with overrides as for run"
             )
-    parser.add_argument("--json", action="store_true", help="print flat JSON: one object, or a list of them")
+    parser.add_argument(
+        "--json", action="store_true", help="print flat JSON: one object, or a list of them"
+    )
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -41,7 +47,9 @@ def main(arguments: argparse.Namespace) -> int:
     rows: list[dict[str, Any]] = []
     misfits = []
     listings: list[tuple[str, list[str], list[list[Any]]]] = []
-    for experiment in expansions.expand(overrides, multirun=arguments.multirun, only=arguments.only):
+    for experiment in expansions.expand(
+        overrides, multirun=arguments.multirun, only=arguments.only
+    ):
         for label, condition in experiment.conditions:
             planner, problem = condition.prepare()
             shape = planner.shape(problem)
@@ -56,13 +64,21 @@ def main(arguments: argparse.Namespace) -> int:
                 listings.append((label, *planner.listing(problem, solution)))
     if not rows:
         given = " and ".join(map(str, _shape_of(values)))
-        included = "" if all("numbers" in text for text in misfits) else " (start and goal included)"
-        raise MotionFileError(f"{path}: must be {'; '.join(dict.fromkeys(misfits))}{included}, was {given}")
+        included = (
+            "" if all("numbers" in text for text in misfits) else " (start and goal included)"
+        )
+        raise MotionFileError(
+            f"{path}: must be {'; '.join(dict.fromkeys(misfits))}{included}, was {given}"
+        )
     if arguments.json:
         for row, (_, names, cells) in zip(rows, listings, strict=False):
             row["rows"] = [dict(zip(names, values, strict=True)) for values in cells]
         plain = [{name: _finite(value) for name, value in row.items()} for row in rows]
-        print(json.dumps(plain if len(rows) > 1 else plain[0], indent=2, allow_nan=False, default=_plain))
+        print(
+            json.dumps(
+                plain if len(rows) > 1 else plain[0], indent=2, allow_nan=False, default=_plain
+            )
+        )
     else:
         console = plain_console()
         for label, names, cells in listings:
@@ -76,7 +92,8 @@ def read_motion(path: Path) -> Any:
     """Read a motion as nested lists, or as an array from `.npy`.
 
     Raises:
-        MotionFileError: If the file is missing, of another kind, or holds anything but finite numbers.
+        MotionFileError: If the file is missing, of another kind, or holds anything but finite
+            numbers.
     """
     try:
         if path.suffix == ".npy":
@@ -125,7 +142,8 @@ def motion_file(words: list[str]) -> tuple[list[str], Path]:
     files = [word for word in words if "=" not in word]
     if len(files) != 1:
         raise MotionFileError(
-            f"motion file: one is needed (.json or .npy), got {len(files)}: {' '.join(files) or 'none'}"
+            f"motion file: one is needed (.json or .npy), got {len(files)}: "
+            f"{' '.join(files) or 'none'}"
         )
     return [word for word in words if "=" in word], Path(files[0])
 
@@ -133,7 +151,14 @@ def motion_file(words: list[str]) -> tuple[list[str], Path]:
 def _not_finite(values: Any, place: str) -> str:
     """Return the first thing that is no finite number, and where; nothing if there is none."""
     if isinstance(values, list) and place.count("[") <= MAX_DEPTH:
-        return next((wrong for k, value in enumerate(values) if (wrong := _not_finite(value, f"{place}[{k}]"))), "")
+        return next(
+            (
+                wrong
+                for k, value in enumerate(values)
+                if (wrong := _not_finite(value, f"{place}[{k}]"))
+            ),
+            "",
+        )
     if place and type(values) in (int, float) and abs(values) < math.inf and abs(values) <= LARGEST:
         return ""
     return f"was {str(values)[:40]} at {place or 'its top'}"
@@ -151,7 +176,11 @@ def shape_text(shape: Any) -> str:
     if not any(shape):
         return f"{len(shape)} numbers"
     parts = [" × ".join(map(str, part)) for part in shape]
-    return f"{len(parts)} × {parts[0]}" if len(set(parts)) == 1 else f"{len(parts)} lists: {', '.join(parts)}"
+    return (
+        f"{len(parts)} × {parts[0]}"
+        if len(set(parts)) == 1
+        else f"{len(parts)} lists: {', '.join(parts)}"
+    )
 
 
 def _shape_of(values: Any) -> list[str]:
@@ -180,7 +209,10 @@ def _listing(label: str, names: list[str], rows: list[list[Any]]) -> Table:
 
 
 def _tables(rows: list[dict[str, Any]], width: int) -> list[Table]:
-    """Return a table with one column per condition; several where the terminal is too narrow for one."""
+    """Return a table with one column per condition.
+
+    Several where the terminal is too narrow for one.
+    """
     names = list(dict.fromkeys(name for row in rows for name in row if name not in HEAD))
     longest_word = max(len(word) for row in rows for word in row["label"].split())
     column = min(max(12, longest_word), 40) + 3

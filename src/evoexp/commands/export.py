@@ -11,14 +11,23 @@ from evoexp.playback.trajectory import as_csv, as_json, trajectory
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     add_motion_arguments(parser, ".json")
-    parser.add_argument("--format", choices=("csv", "json"), default="json", help="json: as ROS's JointTrajectory")
+    parser.add_argument(
+        "--format", choices=("csv", "json"), default="json", help="json: as ROS's JointTrajectory"
+    )
     parser.add_argument(
         "--timing",
         choices=("uniform", "optimal"),
         default="uniform",
-        help="equal times from instant to instant, or as fast along the path as speeds and accelerations permit",
+        help="equal times from instant to instant, or as fast along the path as speeds and "
+        "accelerations permit",
     )
-    parser.add_argument("--ramp", type=float, default=0.5, metavar="S", help="time from rest to full speed (optimal)")
+    parser.add_argument(
+        "--ramp",
+        type=float,
+        default=0.5,
+        metavar="S",
+        help="time from rest to full speed (optimal)",
+    )
 
 
 def main(arguments: argparse.Namespace) -> int:

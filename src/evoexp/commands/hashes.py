@@ -9,7 +9,10 @@ MAX_LISTED = 8  # candidates in an error; `evoexp list` shows all
 
 
 def stored_names(outputs: Path) -> list[str]:
-    """Return the names of all run directories that were created to the end, damaged ones included."""
+    """Return the names of all run directories that were created to the end.
+
+    Damaged ones included.
+    """
     pattern = "[0-9a-f]" * HASH_LENGTH
     return sorted(path.parent.name for path in (outputs / "runs").glob(f"{pattern}/config.json"))
 

@@ -72,9 +72,16 @@ def _named(run: RunDirectory) -> str:
     except EvoexpError:
         notes = {}
     rows = [row for row in shipped.shipped() if row.condition_id == run.condition_id]
-    asked = [row for row in rows if (row.experiment, row.label) == (notes.get("experiment"), notes.get("label"))]
+    asked = [
+        row
+        for row in rows
+        if (row.experiment, row.label) == (notes.get("experiment"), notes.get("label"))
+    ]
     if found := asked or rows:
         return f"{found[0].experiment}, {found[0].label}, {found[0].budget}"
     if not notes:
         return "(no manifest)"
-    return f"{notes.get('experiment', '?')}, {notes.get('label', '?')}, {notes.get('budget', '?')} (changed)"
+    return (
+        f"{notes.get('experiment', '?')}, {notes.get('label', '?')}, {notes.get('budget', '?')} "
+        "(changed)"
+    )

@@ -8,7 +8,14 @@ from pathlib import Path
 from evoexp import expansions, shipped
 from evoexp.commands.evaluate import flatten, motion_file, read_motion, shape_text
 from evoexp.commands.hashes import with_candidates
-from evoexp.errors import EvoexpError, MotionFileError, NothingStored, RevisionMismatch, SettingError, UnknownHash
+from evoexp.errors import (
+    EvoexpError,
+    MotionFileError,
+    NothingStored,
+    RevisionMismatch,
+    SettingError,
+    UnknownHash,
+)
 from evoexp.playback.recording import Heading, Recording, record
 from evoexp.playback.stored import CHOICES, chosen_log, stored_recording
 from evoexp.playback.timing import SpeedLimits
@@ -25,19 +32,35 @@ def add_motion_arguments(parser: argparse.ArgumentParser, ending: str) -> None:
         "what",
         nargs="+",
         metavar="HASH | LOG.mcap | MOTION KEY=VALUE",
-        help="any unique prefix of a run's hash, or a replicate's log; or a motion file (.json, .npy) in the planner's "
-        "documented shape, as for evaluate, with an experiment",
+        help="any unique prefix of a run's hash, or a replicate's log; or a motion file (.json, "
+        ".npy) in the planner's documented shape, as for evaluate, with an experiment",
     )
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--replicate", type=int, metavar="K", help="this replicate of the run")
     for name, text in zip(
-        CHOICES, ("of least cost (the default)", "of greatest cost", "first refuted one"), strict=True
+        CHOICES,
+        ("of least cost (the default)", "of greatest cost", "first refuted one"),
+        strict=True,
     ):
-        which.add_argument(f"--{name}", dest="choice", action="store_const", const=name, help=f"the replicate: {text}")
-    parser.add_argument("--only", default="", metavar="LABEL", help="of an experiment's conditions, this one")
-    parser.add_argument("--turn-speed", type=float, default=45.0, metavar="DEG/S", help="limit of joints that turn")
-    parser.add_argument("--slide-speed", type=float, metavar="UNIT/S", help="limit of joints that slide")
-    parser.add_argument("-o", "--output", type=Path, metavar=f"FILE{ending}", help="by default in outputs/motions/")
+        which.add_argument(
+            f"--{name}",
+            dest="choice",
+            action="store_const",
+            const=name,
+            help=f"the replicate: {text}",
+        )
+    parser.add_argument(
+        "--only", default="", metavar="LABEL", help="of an experiment's conditions, this one"
+    )
+    parser.add_argument(
+        "--turn-speed", type=float, default=45.0, metavar="DEG/S", help="limit of joints that turn"
+    )
+    parser.add_argument(
+        "--slide-speed", type=float, metavar="UNIT/S", help="limit of joints that slide"
+    )
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar=f"FILE{ending}", help="by default in outputs/motions/"
+    )
 
 
 def recordings(arguments: argparse.Namespace) -> list[Recording]:
@@ -55,7 +78,9 @@ def recordings(arguments: argparse.Namespace) -> list[Recording]:
     runs = [_run(word) for word in words]
     titles = _titles([run for run in runs if isinstance(run, RunDirectory)])
     return [
-        stored_recording(run, run.name, limits) if isinstance(run, Path) else _stored(run, titles, arguments, limits)
+        stored_recording(run, run.name, limits)
+        if isinstance(run, Path)
+        else _stored(run, titles, arguments, limits)
         for run in runs
     ]
 
@@ -76,8 +101,16 @@ def output_path(arguments: argparse.Namespace, found: list[Recording], ending: s
     """Return where the file goes."""
     if arguments.output is not None:
         return Path(arguments.output)
-    files = [word for word in arguments.what if "=" not in word and any("=" in other for other in arguments.what)]
-    names = [f"{r.condition_id[:12]}-{r.heading.replicate:04d}" for r in found] if not files else [Path(files[0]).stem]
+    files = [
+        word
+        for word in arguments.what
+        if "=" not in word and any("=" in other for other in arguments.what)
+    ]
+    names = (
+        [f"{r.condition_id[:12]}-{r.heading.replicate:04d}" for r in found]
+        if not files
+        else [Path(files[0]).stem]
+    )
     return outputs_root() / FOLDER / ("+".join(names) + ending)
 
 
@@ -116,23 +149,32 @@ def _run(word: str) -> RunDirectory | Path:
 def _stored(
     run: RunDirectory, titles: Mapping[str, str], arguments: argparse.Namespace, limits: SpeedLimits
 ) -> Recording:
-    choice = arguments.replicate if arguments.replicate is not None else arguments.choice or CHOICES[0]
+    choice = (
+        arguments.replicate if arguments.replicate is not None else arguments.choice or CHOICES[0]
+    )
     try:
         return stored_recording(chosen_log(run, choice), titles[run.condition_id], limits)
     except RevisionMismatch as error:
         known = run.manifest().get("command", "evoexp run experiment=…")
-        raise RevisionMismatch(f"run {run.hash12}: {error}; run it anew with what is installed: {known}") from None
+        raise RevisionMismatch(
+            f"run {run.hash12}: {error}; run it anew with what is installed: {known}"
+        ) from None
 
 
 def _not_here(word: str, error: UnknownHash) -> EvoexpError:
     found = shipped.find(word)
     if len(found) == 1:
-        return NothingStored(f"condition {found[0].condition_id[:12]}: not run here; run it: {found[0].command}")
+        return NothingStored(
+            f"condition {found[0].condition_id[:12]}: not run here; run it: {found[0].command}"
+        )
     return with_candidates(error, outputs_root())
 
 
 def _titles(runs: list[RunDirectory]) -> dict[str, str]:
-    """Return what to call runs: an experiment that has all of them, and their labels in it; else what they ran as."""
+    """Return what to call runs: an experiment that has all of them, and their labels in it.
+
+    Else what they ran as.
+    """
     names: dict[str, dict[str, str]] = {run.condition_id: {} for run in runs}
     for row in shipped.shipped() if len(names) > 1 else ():
         if row.condition_id in names:
@@ -140,7 +182,9 @@ def _titles(runs: list[RunDirectory]) -> dict[str, str]:
     common = set.intersection(*(set(labels) for labels in names.values())) if names else set()
     if common:
         first = next(name for name in next(iter(names.values())) if name in common)
-        return {condition_id: f"{first} · {labels[first]}" for condition_id, labels in names.items()}
+        return {
+            condition_id: f"{first} · {labels[first]}" for condition_id, labels in names.items()
+        }
     found = {}
     for run in runs:
         manifest = run.manifest()
@@ -165,5 +209,7 @@ def _own(words: list[str], only: str, limits: SpeedLimits) -> list[Recording]:
             elif len(found) < MANY:
                 found.append(record(condition, solution, Heading(f"{path.name} · {label}"), limits))
     if not found:
-        raise MotionFileError(f"{path}: must be {'; '.join(dict.fromkeys(misfits))} (start and goal included)")
+        raise MotionFileError(
+            f"{path}: must be {'; '.join(dict.fromkeys(misfits))} (start and goal included)"
+        )
     return found

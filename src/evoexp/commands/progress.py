@@ -5,7 +5,14 @@ from types import TracebackType
 from typing import Self
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    SpinnerColumn,
+    TextColumn,
+    TimeElapsedColumn,
+)
 
 PLAIN_INTERVAL_S = 5.0  # [s] between plain lines
 
@@ -42,7 +49,10 @@ class BatchProgress:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         """Leave its last state."""
         self._bar.stop()
@@ -60,7 +70,10 @@ class BatchProgress:
             self._plain()
 
     def _plain(self) -> None:
-        text = f"replicates: {self._done} of {self._total} done, {self._failed} failed, ETA {self._eta()}"
+        text = (
+            f"replicates: {self._done} of {self._total} done, {self._failed} failed, ETA "
+            f"{self._eta()}"
+        )
         self._console.print(text, soft_wrap=True)
 
     def _eta(self) -> str:

@@ -19,7 +19,11 @@ from evoexp.store.run_directory import outputs_root, resolve
 
 MAX_NAMED = 4  # runs whose hashes a report's name spells out
 _HASH = re.compile("[0-9a-fA-F]{4,64}")
-_SILENT = ("experiment", "budget", "runner")  # overrides that the command of a report need not repeat
+_SILENT = (
+    "experiment",
+    "budget",
+    "runner",
+)  # overrides that the command of a report need not repeat
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,7 +32,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     for action in parser._actions:
         if action.dest == "overrides":
             action.metavar, action.nargs = "EXPERIMENT | HASH ... [KEY=VALUE ...]", "+"
-            action.help = "an experiment and overrides as for run, or prefixes of the hashes of stored runs"
+            action.help = (
+                "an experiment and overrides as for run, or prefixes of the hashes of stored runs"
+            )
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -41,7 +47,9 @@ def main(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _pages(names: Sequence[str], overrides: Sequence[str], multirun: bool, only: Sequence[str]) -> list[Path]:
+def _pages(
+    names: Sequence[str], overrides: Sequence[str], multirun: bool, only: Sequence[str]
+) -> list[Path]:
     known = options("experiment")
     if names and not any(name in known for name in names):
         for name in names:
@@ -55,12 +63,17 @@ def _pages(names: Sequence[str], overrides: Sequence[str], multirun: bool, only:
     for name in names:
         if name not in known:
             raise UnknownOption("experiment", name, known)
-    experiments = expansions.expand([*chosen, *overrides], multirun=multirun or len(names) > 1, only=only)
+    experiments = expansions.expand(
+        [*chosen, *overrides], multirun=multirun or len(names) > 1, only=only
+    )
     return [of_experiment(experiment, overrides, multirun, only) for experiment in experiments]
 
 
 def of_experiment(
-    experiment: Experiment, overrides: Sequence[str], multirun: bool = False, only: Sequence[str] = ()
+    experiment: Experiment,
+    overrides: Sequence[str],
+    multirun: bool = False,
+    only: Sequence[str] = (),
 ) -> Path:
     """Draw the report of one experiment; `run` ends with it, too.
 
@@ -79,7 +92,11 @@ def of_experiment(
     words += ["--only", ",".join(only)] if only else []
     words += ["-m"] if multirun else []
     request = build.Request(
-        experiment.report_name, experiment.name, experiment.budget, experiment.conditions, shlex.join(words)
+        experiment.report_name,
+        experiment.name,
+        experiment.budget,
+        experiment.conditions,
+        shlex.join(words),
     )
     return build.report(request, experiment.report, outputs_root(), experiment.num_replicates)
 
@@ -91,5 +108,9 @@ def _of_runs(prefixes: Sequence[str]) -> Path:
     name = "+".join(found)
     if len(found) > MAX_NAMED:
         name = f"{len(found)}_runs+{hashlib.sha256(name.encode()).hexdigest()[:8]}"
-    settings = expansions.expand([f"experiment={options('experiment')[0]}", "report=paper"])[0].report
-    return build.report(build.Request(name, "", "", tuple(found.items())), settings, outputs_root(), None)
+    settings = expansions.expand([f"experiment={options('experiment')[0]}", "report=paper"])[
+        0
+    ].report
+    return build.report(
+        build.Request(name, "", "", tuple(found.items())), settings, outputs_root(), None
+    )

@@ -23,7 +23,11 @@ FEW = 8  # replicates below this are run here, without worker processes
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("what", metavar="HASH|LOG.mcap", help="any unique prefix of a run's hash, or a replicate's log")
+    parser.add_argument(
+        "what",
+        metavar="HASH|LOG.mcap",
+        help="any unique prefix of a run's hash, or a replicate's log",
+    )
     parser.add_argument("--replicate", type=int, metavar="K", help="only this replicate of the run")
 
 
@@ -41,7 +45,10 @@ def main(arguments: argparse.Namespace) -> int:
         return _report(console, _compare_all(_logs(run, arguments.replicate)))
     except RevisionMismatch as error:
         known = run.manifest().get("command", "evoexp run experiment=…")
-        text = f"run {run.hash12}: {error}; its results cannot be compared. Run it anew with what is installed: {known}"
+        text = (
+            f"run {run.hash12}: {error}; its results cannot be compared. Run it anew with what is "
+            f"installed: {known}"
+        )
         raise RevisionMismatch(text) from None
 
 
@@ -49,7 +56,9 @@ def _logs(run: RunDirectory, replicate: int | None) -> list[Path]:
     done = sorted(run.completed())
     if replicate is not None and replicate not in done:
         there = ", ".join(_spans(done)) or "none"
-        raise NothingStored(f"run {run.hash12}: no finished replicate {replicate} (finished: {there})")
+        raise NothingStored(
+            f"run {run.hash12}: no finished replicate {replicate} (finished: {there})"
+        )
     if not done:
         raise NothingStored(f"run {run.hash12}: no finished replicate to compare with")
     return [run.log_path(k) for k in ([replicate] if replicate is not None else done)]
@@ -83,27 +92,48 @@ def _report(console: Console, comparisons: Sequence[Comparison]) -> int:
     diverging = [comparison for comparison in comparisons if not comparison.matches]
     if diverging:
         lines = diverging[0].environment or ("none: the environment is the same",)
-        console.print("differences of environment:", *(f"  {line}" for line in lines), sep="\n", soft_wrap=True)
+        console.print(
+            "differences of environment:",
+            *(f"  {line}" for line in lines),
+            sep="\n",
+            soft_wrap=True,
+        )
     console.print(f"{len(comparisons) - len(diverging)} of {len(comparisons)} MATCH")
     return 1 if diverging else 0
 
 
-def _without_stored_run(console: Console, prefix: str, replicate: int | None, error: UnknownHash) -> int:
-    """Compare replicate 0 of a shipped condition with the shipped table; nothing was ever run here."""
+def _without_stored_run(
+    console: Console, prefix: str, replicate: int | None, error: UnknownHash
+) -> int:
+    """Compare replicate 0 of a shipped condition with the shipped table.
+
+    Nothing was ever run here.
+    """
     found = shipped.find(prefix)
     if len(found) > 1:
         raise AmbiguousHash(prefix, [row.condition_id[:12] for row in found])
     if not found:
         raise UnknownHash(f"NOTHING TO COMPARE: {with_candidates(error, outputs_root())}")
     if replicate not in (None, 0):
-        where = f"is neither stored in {outputs_root()} nor in the shipped table, which holds replicate 0"
+        where = (
+            f"is neither stored in {outputs_root()} nor in the shipped table, which holds "
+            "replicate 0"
+        )
         raise UnknownHash(f"NOTHING TO COMPARE: replicate {replicate} of {prefix} {where}")
     row = found[0]
-    experiment = expansions.expand([f"experiment={row.experiment}", f"budget={row.budget}"], only=[row.label])[0]
+    experiment = expansions.expand(
+        [f"experiment={row.experiment}", f"budget={row.budget}"], only=[row.label]
+    )[0]
     condition = experiment.conditions[0].condition
     summary = run_replicate(condition, 0).summary
-    matches = same_fingerprint(fingerprint(condition, summary), row.digest) and condition.id == row.condition_id
+    matches = (
+        same_fingerprint(fingerprint(condition, summary), row.digest)
+        and condition.id == row.condition_id
+    )
     verdict = Text("MATCH", "green") if matches else Text("DIVERGES", "red")
     console.print(f"{row.condition_id[:12]} replicate 0 against the shipped table:", verdict)
-    console.print(f"({row.experiment}, {row.label}, budget {row.budget}; store it: {row.command})", soft_wrap=True)
+    console.print(
+        f"({row.experiment}, {row.label}, budget {row.budget}; store it: {row.command})",
+        soft_wrap=True,
+    )
     return 0 if matches else 1

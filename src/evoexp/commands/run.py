@@ -32,7 +32,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Run; exit code 1 if a replicate failed."""
     console = plain_console()
-    experiments = expansions.expand(arguments.overrides, multirun=arguments.multirun, only=arguments.only)
+    experiments = expansions.expand(
+        arguments.overrides, multirun=arguments.multirun, only=arguments.only
+    )
     for experiment in experiments:
         if (figures := experiment.report.figures) not in (None, *PAGES):
             raise UnknownOption("report.figures", str(figures), PAGES)
@@ -55,7 +57,9 @@ def main(arguments: argparse.Namespace) -> int:
             if not arguments.no_report:
                 from evoexp.commands.report import of_experiment  # pandas
 
-                page = of_experiment(experiment, arguments.overrides, arguments.multirun, arguments.only)
+                page = of_experiment(
+                    experiment, arguments.overrides, arguments.multirun, arguments.only
+                )
                 console.print(f"report: {page}", soft_wrap=True)
     finally:
         if failures:
@@ -66,7 +70,9 @@ def main(arguments: argparse.Namespace) -> int:
 def _command(arguments: argparse.Namespace) -> str:
     """Return the command as it could be typed again."""
     only = ["--only", ",".join(arguments.only)] if arguments.only else []
-    return shlex.join(["evoexp", "run", *(["-m"] if arguments.multirun else []), *arguments.overrides, *only])
+    return shlex.join(
+        ["evoexp", "run", *(["-m"] if arguments.multirun else []), *arguments.overrides, *only]
+    )
 
 
 def _run(batch: Batch, console: Console) -> list[Outcome]:
@@ -74,18 +80,29 @@ def _run(batch: Batch, console: Console) -> list[Outcome]:
         console.print("nothing to run: every replicate is there")
         return []
     failures = []
-    with BatchProgress(console, len(batch.jobs)) as progress, contextlib.closing(batch.run()) as outcomes:
+    with (
+        BatchProgress(console, len(batch.jobs)) as progress,
+        contextlib.closing(batch.run()) as outcomes,
+    ):
         for outcome in outcomes:
             progress.advance(outcome.failed)
             if outcome.failed:
                 failures.append(outcome)
-                print(f"failed: {outcome.condition_id[:12]} #{outcome.replicate}: {outcome.reason}", file=sys.stderr)
+                print(
+                    f"failed: {outcome.condition_id[:12]} #{outcome.replicate}: {outcome.reason}",
+                    file=sys.stderr,
+                )
     return failures
 
 
 def _notes(experiment: Experiment, label: str, command: str) -> dict[str, Any]:
     """What a new run's manifest says of why it was made; no part of its identity."""
-    return {"experiment": experiment.name, "budget": experiment.budget, "label": label, "command": command}
+    return {
+        "experiment": experiment.name,
+        "budget": experiment.budget,
+        "label": label,
+        "command": command,
+    }
 
 
 def summary_table(experiment: Experiment) -> Table:

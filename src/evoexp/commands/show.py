@@ -51,7 +51,9 @@ def _show_shipped(console: Console, prefix: str, error: UnknownHash) -> int:
     row = found[0]
     _print_head(console, row.condition_id)
     console.print(f"not run here; run it: {row.command}", soft_wrap=True)
-    experiment = expansions.expand([f"experiment={row.experiment}", f"budget={row.budget}"], only=[row.label])[0]
+    experiment = expansions.expand(
+        [f"experiment={row.experiment}", f"budget={row.budget}"], only=[row.label]
+    )[0]
     text = experiment.conditions[0].condition.to_json()
     _print_config(console, json.loads(text))
     _print_notes(console, text)
@@ -62,11 +64,15 @@ def _print_head(console: Console, condition_id: str) -> None:
     console.print(f"condition {condition_id}", soft_wrap=True)
     for row in shipped.shipped():
         if row.condition_id == condition_id:
-            console.print(f"shipped as {row.experiment}, {row.label}, budget {row.budget}", soft_wrap=True)
+            console.print(
+                f"shipped as {row.experiment}, {row.label}, budget {row.budget}", soft_wrap=True
+            )
 
 
 def _print_config(console: Console, config: dict[str, Any]) -> None:
-    text = yaml.safe_dump(config, sort_keys=False, default_flow_style=None, allow_unicode=True, width=110)
+    text = yaml.safe_dump(
+        config, sort_keys=False, default_flow_style=None, allow_unicode=True, width=110
+    )
     console.print(text, soft_wrap=True)
 
 
@@ -74,7 +80,9 @@ def _print_notes(console: Console, config_json: bytes) -> None:
     """Print what a planner has to say of its own settings, if it has."""
     try:
         planner, problem = Condition.from_json(config_json).prepare()
-    except EvoexpError as error:  # stored by another revision of the code: the run can be shown all the same
+    except (
+        EvoexpError
+    ) as error:  # stored by another revision of the code: the run can be shown all the same
         console.print(f"notes: {error}", soft_wrap=True)
         return
     for note in planner.notes(problem) if hasattr(planner, "notes") else ():
@@ -93,14 +101,20 @@ def _replicates(run: RunDirectory) -> Table:
     table = new_table(f"replicates in {run.path}")
     add_columns(table, "#", right=True)
     add_columns(table, "status")
-    add_columns(table, "best cost", "solved", "certified", "clearance", "evaluations", "CPU s", right=True)
+    add_columns(
+        table, "best cost", "solved", "certified", "clearance", "evaluations", "CPU s", right=True
+    )
     add_columns(table, "digest, or why it failed")
     for row in read_summaries(run).to_dict("records"):
         if row["status"] == "done":
-            verdict = ["–" if pd.isna(row[name]) else str(row[name]) for name in ("solved", "certified")]
+            verdict = [
+                "–" if pd.isna(row[name]) else str(row[name]) for name in ("solved", "certified")
+            ]
             numbers = [f"{row['clearance']:.4g}", str(row["evaluations"]), f"{row['cpu_s']:.3f}"]
             cells = [f"{row['best_cost']:.6g}", *verdict, *numbers]
             table.add_row(str(row["replicate"]), "done", *cells, str(row["digest"]))
         else:
-            table.add_row(str(row["replicate"]), Text("failed", "red"), *6 * ["–"], str(row["stop_reason"]))
+            table.add_row(
+                str(row["replicate"]), Text("failed", "red"), *6 * ["–"], str(row["stop_reason"])
+            )
     return table

@@ -1,6 +1,7 @@
 """Individuals as strings of bits, one whole number per gene: decoding, crossover, mutation.
 
-A gene of B bits is a number in [0, 2^B), its highest bit the first of its part of the string; B ≤ 52.
+A gene of B bits is a number in [0, 2^B), its highest bit the first of its part of the string; B ≤
+52.
 """
 
 from evoexp.draws import draw
@@ -14,8 +15,8 @@ def decode_strings(strings, bits, gray, limits, out):  # type: ignore[no-untyped
     Args:
         strings: (genes, individuals).
         bits: B.
-        gray: Whether they are reflected Gray codes: then every bit of n is the parity of all Gray bits above and its
-            own.
+        gray: Whether they are reflected Gray codes: then every bit of n is the parity of all Gray
+            bits above and its own.
         limits: (genes, 2) l and h of each gene.
         out: (genes, ≥ individuals), written.
     """
@@ -32,10 +33,12 @@ def decode_strings(strings, bits, gray, limits, out):  # type: ignore[no-untyped
 
 @kernel
 def cross_strings(uniforms, strings, bits, parents, rate, out):  # type: ignore[no-untyped-def]
-    """Cut pairs of parents at one site and exchange what follows (Chen & Zalzala 1995, section 3.2).
+    """Cut pairs of parents at one site and exchange what follows.
 
-    Parents 2k and 2k + 1 form a pair; an odd last one stays alone. A pair is cut with probability `rate`, before one of
-    the bits 1 … all − 1, each equally likely. What is not cut is copied.
+    Chen & Zalzala 1995, section 3.2.
+
+    Parents 2k and 2k + 1 form a pair; an odd last one stays alone. A pair is cut with probability
+    `rate`, before one of the bits 1 … all − 1, each equally likely. What is not cut is copied.
 
     Args:
         uniforms: (2 × pairs,): decision, site.
@@ -65,8 +68,9 @@ def cross_strings(uniforms, strings, bits, parents, rate, out):  # type: ignore[
 def flip_strings(draws, strings, bits, count, rate):  # type: ignore[no-untyped-def]
     """Flip every bit with probability p, in place (Holland 1975).
 
-    Most bits stay: how many do before the next one is flipped is geometrically distributed, ⌊ln(1 − u) / ln(1 − p)⌋
-    (Devroye 1986, section X.2), which takes a number per flipped bit and not per bit.
+    Most bits stay: how many do before the next one is flipped is geometrically distributed, ⌊ln(1 −
+    u) / ln(1 − p)⌋ (Devroye 1986, section X.2), which takes a number per flipped bit and not per
+    bit.
 
     Args:
         draws: See `evoexp.draws`.

@@ -12,22 +12,30 @@ _FLOOR_GUARD = 1e-9  # [-] 0.29 × 100 is 28.999999999999996
 
 
 class CoevolutionSettings(Component):
-    """Settings of co-evolving populations, the same for each of them (Curkovic et al. 2013, section 3).
+    """Settings of co-evolving populations, the same for each of them (Curkovic et al.
+
+    2013, section 3).
 
     Attributes:
         population_size: Individuals per population and generation [-].
         num_generations: Generations after the initial one [-].
         crossover_rate: Probability that a pair of parents is crossed [-].
-        mutation_rate: Probability that one allele of an individual is mutated, at the first generation [-].
-        mutation_decay: What `mutation_rate` has lost at the last generation (Eq. 10) [-]; 0: it is constant.
+        mutation_rate: Probability that one allele of an individual is mutated, at the first
+            generation [-].
+        mutation_decay: What `mutation_rate` has lost at the last generation (Eq. 10) [-]; 0: it is
+            constant.
         mutation_step: Largest change of an allele (Eq. 9) [deg].
         mutation_direction: `one_sided` as Eq. 9 is printed (alleles only grow), or `symmetric`.
-        selection: Weight on the roulette wheel: the `inverse` of the cost, or its `difference` to the highest.
-        num_elites: Best individuals of each population copied untouched into the next generation [-].
+        selection: Weight on the roulette wheel: the `inverse` of the cost, or its `difference` to
+            the highest.
+        num_elites: Best individuals of each population copied untouched into the next generation
+            [-].
         hall_depth: Share of a population that the hall of fame may hold [-]; 0: no hall.
-        hall_memory: Generations after which a team of the hall gives way to any new one [-]; None: never.
+        hall_memory: Generations after which a team of the hall gives way to any new one [-]; None:
+            never.
         hall_frozen: Whether a full hall stays as it is (an ablation).
-        restart_after: Generations without a feasible team before fresh populations are drawn [-]; None: never.
+        restart_after: Generations without a feasible team before fresh populations are drawn [-];
+            None: never.
     """
 
     component: ClassVar[str] = "coevolutionary"
@@ -49,7 +57,11 @@ class CoevolutionSettings(Component):
     @model_validator(mode="after")
     def _rate_stays_a_probability(self) -> Self:
         if self.mutation_decay > self.mutation_rate:
-            raise SettingError("mutation_decay", f"at most mutation_rate ({self.mutation_rate})", self.mutation_decay)
+            raise SettingError(
+                "mutation_decay",
+                f"at most mutation_rate ({self.mutation_rate})",
+                self.mutation_decay,
+            )
         return self
 
     @model_validator(mode="after")
@@ -58,20 +70,32 @@ class CoevolutionSettings(Component):
             must = "0, or large enough for one pair (at least 1/population_size)"
             raise SettingError("hall_depth", must, self.hall_depth)
         if self.hall_depth == 0.0 and self.hall_memory is not None:
-            raise SettingError("hall_memory", "null where there is no hall (hall_depth is 0)", self.hall_memory)
+            raise SettingError(
+                "hall_memory", "null where there is no hall (hall_depth is 0)", self.hall_memory
+            )
         if self.hall_depth == 0.0 and self.hall_frozen:
-            raise SettingError("hall_frozen", "false where there is no hall (hall_depth is 0)", self.hall_frozen)
+            raise SettingError(
+                "hall_frozen", "false where there is no hall (hall_depth is 0)", self.hall_frozen
+            )
         if self.hall_frozen and self.hall_memory is not None:
-            raise SettingError("hall_memory", "null where the hall is frozen (hall_frozen)", self.hall_memory)
+            raise SettingError(
+                "hall_memory", "null where the hall is frozen (hall_frozen)", self.hall_memory
+            )
         return self
 
     @model_validator(mode="after")
     def _copies_fit(self) -> Self:
         if self.num_elites > self.population_size:
-            raise SettingError("num_elites", f"at most population_size ({self.population_size})", self.num_elites)
+            raise SettingError(
+                "num_elites", f"at most population_size ({self.population_size})", self.num_elites
+            )
         if self.num_offspring < 0:
             most = self.population_size - self.num_hall_teams
-            raise SettingError("num_elites", f"at most population_size less the hall's teams ({most})", self.num_elites)
+            raise SettingError(
+                "num_elites",
+                f"at most population_size less the hall's teams ({most})",
+                self.num_elites,
+            )
         return self
 
     @property
@@ -81,5 +105,8 @@ class CoevolutionSettings(Component):
 
     @property
     def num_offspring(self) -> int:
-        """Individuals of a population that are new in a generation, beside the elites and a full hall."""
+        """Individuals of a population that are new in a generation.
+
+        Beside the elites and a full hall.
+        """
         return self.population_size - self.num_elites - self.num_hall_teams

@@ -7,7 +7,10 @@ from evoexp.records import FloatArray
 
 
 def num_uniforms(num_arms: int, num_pairs: int) -> int:
-    """Return how many uniform numbers `site_crossover` takes: per pair one to decide, and a site per arm."""
+    """Return how many uniform numbers `site_crossover` takes.
+
+    Per pair one to decide, and a site per arm.
+    """
     return num_pairs * (1 + num_arms)
 
 
@@ -20,12 +23,14 @@ def site_crossover(
     max_distance: float,
     out: FloatArray,
 ) -> None:
-    """Cross strings at one site per arm, where the parents are close (Rana & Zalzala 1995, section 3.4b).
+    """Cross strings at one site per arm, where the parents are close.
 
-    Parents 2k and 2k + 1 form a pair; an odd last one stays alone. A pair is crossed with probability `rate`, and only
-    if at the sites chosen in both arms' portions the two parents' via-points are closer than `max_distance`. Each child
-    takes the part before the site from one parent and the part from the site on from the other, arm by arm. What is not
-    crossed is copied.
+    Rana & Zalzala 1995, section 3.4b.
+
+    Parents 2k and 2k + 1 form a pair; an odd last one stays alone. A pair is crossed with
+    probability `rate`, and only if at the sites chosen in both arms' portions the two parents'
+    via-points are closer than `max_distance`. Each child takes the part before the site from one
+    parent and the part from the site on from the other, arm by arm. What is not crossed is copied.
 
     Args:
         rng: Source of `num_uniforms` uniform numbers.
@@ -76,7 +81,10 @@ def cross_at_sites(uniforms, population, parents, arm_slices, rate, max_distance
 
 
 def num_single_point_uniforms(num_pairs: int) -> int:
-    """Return how many uniform numbers `single_point_crossover` takes: per pair a decision and a site."""
+    """Return how many uniform numbers `single_point_crossover` takes.
+
+    Per pair a decision and a site.
+    """
     return 2 * num_pairs
 
 
@@ -85,8 +93,8 @@ def single_point_crossover(
 ) -> None:
     """Cut pairs of parents at one site and exchange what follows (Curkovic et al. 2013, section 3).
 
-    Parents 2k and 2k + 1 form a pair; an odd last one stays alone. A pair is cut with probability `rate`, before one of
-    the genes 1 … genes − 1, each equally likely. What is not cut is copied.
+    Parents 2k and 2k + 1 form a pair; an odd last one stays alone. A pair is cut with probability
+    `rate`, before one of the genes 1 … genes − 1, each equally likely. What is not cut is copied.
 
     Args:
         rng: Source of `num_single_point_uniforms` uniform numbers, whatever the rate.
@@ -98,9 +106,16 @@ def single_point_crossover(
     Raises:
         ValueError: If the offspring do not fit.
     """
-    if genomes.ndim != 2 or out.ndim != 2 or len(out) != len(genomes) or out.shape[1] < len(parents):
+    if (
+        genomes.ndim != 2
+        or out.ndim != 2
+        or len(out) != len(genomes)
+        or out.shape[1] < len(parents)
+    ):
         raise ValueError(f"{len(parents)} offspring of {genomes.shape} do not fit {out.shape}")
-    cross_single_point(rng.random(num_single_point_uniforms(len(parents) // 2)), genomes, parents, rate, out)
+    cross_single_point(
+        rng.random(num_single_point_uniforms(len(parents) // 2)), genomes, parents, rate, out
+    )
 
 
 @kernel
@@ -110,7 +125,9 @@ def cross_single_point(uniforms, genomes, parents, rate, out):  # type: ignore[n
     for gene in range(num_genes):
         source, target = genomes[gene], out[gene]
         for k in range(num_offspring):
-            target[k] = source[np.uint64(parents[k])]  # numba would look whether it counts from the end
+            target[k] = source[
+                np.uint64(parents[k])
+            ]  # numba would look whether it counts from the end
     if num_genes < 2:
         return
     for pair in range(num_offspring // 2):

@@ -1,4 +1,7 @@
-"""Crossover of real genomes gene by gene: uniform, arithmetic, BLX-α. One-point crossover is in `crossover`."""
+"""Crossover of real genomes gene by gene: uniform, arithmetic, BLX-α.
+
+One-point crossover is in `crossover`.
+"""
 
 from evoexp.numerics import kernel
 
@@ -9,7 +12,10 @@ ONE_POINT, UNIFORM, ARITHMETIC, BLX_ALPHA = range(4)
 
 
 def num_gene_uniforms(num_genes: int, num_pairs: int) -> int:
-    """Return how many uniform numbers `cross_genes` takes, whatever the kind: per pair a decision, per gene two."""
+    """Return how many uniform numbers `cross_genes` takes, whatever the kind.
+
+    Per pair a decision, per gene two.
+    """
     return num_pairs * (1 + 2 * num_genes)
 
 
@@ -20,9 +26,11 @@ def cross_genes(kind, uniforms, genomes, parents, rate, alpha, limits, out):  # 
     Parents 2k and 2k + 1 form a pair; an odd last one stays alone.
 
     - uniform (Syswerda 1989): every gene is exchanged with probability 1/2.
-    - arithmetic (Michalewicz 1992): the children are λ x + (1 − λ) y and (1 − λ) x + λ y, one λ in [0, 1) per pair.
-    - BLX-α (Eshelman & Schaffer 1993): every gene of either child is drawn uniformly from [l − α d, h + α d), where l
-      and h are the lesser and the greater of both parents' genes and d = h − l; it is then brought within its limits.
+    - arithmetic (Michalewicz 1992): the children are λ x + (1 − λ) y and (1 − λ) x + λ y, one λ in
+      [0, 1) per pair.
+    - BLX-α (Eshelman & Schaffer 1993): every gene of either child is drawn uniformly from [l − α d,
+      h + α d), where l and h are the lesser and the greater of both parents' genes and d = h − l;
+      it is then brought within its limits.
 
     Args:
         kind: UNIFORM, ARITHMETIC or BLX_ALPHA.

@@ -26,15 +26,17 @@ def mutate_genes(  # type: ignore[no-untyped-def]
 
     With w a uniform number in [0, 1) and z a normal deviate:
 
-    - non-uniform (Michalewicz 1992): x + (h − x) r s or x − (x − l) r s, each direction with probability 1/2; r is
-      uniform in [0, 1) and s = (1 − t/T)^b falls over the generations (`non_uniform_spread`).
+    - non-uniform (Michalewicz 1992): x + (h − x) r s or x − (x − l) r s, each direction with
+      probability 1/2; r is uniform in [0, 1) and s = (1 − t/T)^b falls over the generations
+      (`non_uniform_spread`).
     - Gaussian (Schwefel 1981): x + s (h − l) z, brought within the limits.
     - uniform reset (Michalewicz 1992): l + w (h − l).
 
     Args:
         kind: NON_UNIFORM, GAUSSIAN or UNIFORM_RESET.
-        scope: GENE: every gene is mutated with probability `rate`; INDIVIDUAL: every individual is, in one gene. A
-            gene's number decides; where it is below the rate, their ratio is the amount, uniform again.
+        scope: GENE: every gene is mutated with probability `rate`; INDIVIDUAL: every individual is,
+            in one gene. A gene's number decides; where it is below the rate, their ratio is the
+            amount, uniform again.
         uniforms: As many as `num_mutation_uniforms`.
         normals: (genes, ≥ count) normal deviates, read by the Gaussian kind only.
         genomes: (genes, ≥ count), changed.
@@ -58,14 +60,24 @@ def mutate_genes(  # type: ignore[no-untyped-def]
                 gene = min(int(uniforms[3 * k + 1] * num_genes), num_genes - 1)
                 z = normals[gene, k] if kind == GAUSSIAN else 0.0
                 genomes[gene, k] = _mutant(
-                    kind, genomes[gene, k], uniforms[3 * k + 2], z, spread, limits[gene, 0], limits[gene, 1]
+                    kind,
+                    genomes[gene, k],
+                    uniforms[3 * k + 2],
+                    z,
+                    spread,
+                    limits[gene, 0],
+                    limits[gene, 1],
                 )
 
 
 @kernel
 def _mutant(kind, x, w, z, spread, low, high):  # type: ignore[no-untyped-def]
     if kind == NON_UNIFORM:
-        mutant = x + (high - x) * (2.0 * w) * spread if w < 0.5 else x - (x - low) * (2.0 * w - 1.0) * spread
+        mutant = (
+            x + (high - x) * (2.0 * w) * spread
+            if w < 0.5
+            else x - (x - low) * (2.0 * w - 1.0) * spread
+        )
     elif kind == GAUSSIAN:
         mutant = x + spread * (high - low) * z
     else:

@@ -1,14 +1,18 @@
-"""The hall of fame of co-evolving populations: the best teams of collaborators (Curkovic et al. 2013, section 3).
+"""The hall of fame of co-evolving populations: the best teams of collaborators (Curkovic et al.
 
-A team has one individual of every population; for two populations it is a pair. Its key is (collisions within the team,
-sum of its members' own costs): lower is better. Nothing is random and every tie is settled by an order.
+2013, section 3).
+
+A team has one individual of every population; for two populations it is a pair. Its key is
+(collisions within the team, sum of its members' own costs): lower is better. Nothing is random and
+every tie is settled by an order.
 
 Arrays that all functions share, for P ≥ 2 populations of N individuals:
 
-- collisions  # (pairs of populations, ≥ N, ≥ N) integers, pairs in the order (0, 1), (0, 2), …, (1, 2), …: how often
-  individual i of the first population of a pair collides with individual j of the second.
-- own  # (P, ≥ N) what an individual costs whoever its collaborators are; inf is allowed, NaN is not. Summed in the
-  order of the populations.
+- collisions  # (pairs of populations, ≥ N, ≥ N) integers, pairs in the order (0, 1), (0, 2), …, (1,
+  2), …: how often individual i of the first population of a pair collides with individual j of the
+  second.
+- own  # (P, ≥ N) what an individual costs whoever its collaborators are; inf is allowed, NaN is
+  not. Summed in the order of the populations.
 - front  # (P, ≥ N) bool: the non-dominated individuals of each population.
 """
 
@@ -61,7 +65,10 @@ class Hall(NamedTuple):
         return len(self.teams)
 
     def moved(self, first: int) -> "Hall":
-        """Return the hall as it lies in the next populations: in each of them the k-th team's member at first + k."""
+        """Return the hall as it lies in the next populations.
+
+        In each of them the k-th team's member at first + k.
+        """
         teams = np.empty_like(self.teams)
         teams[:] = np.arange(first, first + self.num_teams)[:, np.newaxis]
         return self._replace(teams=teams)
@@ -87,19 +94,21 @@ class BestTeam(NamedTuple):
 def form_teams(collisions: np.ndarray, own: FloatArray, front: np.ndarray) -> Teams:
     """Give every member of a front its best collaborators.
 
-    They are chosen population by population, in order of index: the fewest collisions with all who are in the team
-    already, then the lowest own cost, then the lowest index.
+    They are chosen population by population, in order of index: the fewest collisions with all who
+    are in the team already, then the lowest own cost, then the lowest index.
 
     Returns:
-        The teams in the order of the members they were formed around: population by population, index by index. A team
-        may come up several times.
+        The teams in the order of the members they were formed around: population by population,
+        index by index. A team may come up several times.
 
     Raises:
         ValueError: If the shapes contradict each other.
     """
     _check(collisions, own, front.shape)
     most = int(np.count_nonzero(front))
-    formed = Teams(np.empty((most, len(own)), dtype=np.int64), np.empty(most, dtype=np.int64), np.empty(most))
+    formed = Teams(
+        np.empty((most, len(own)), dtype=np.int64), np.empty(most, dtype=np.int64), np.empty(most)
+    )
     gather_teams(collisions, own, front, own.shape[1], *formed)
     return formed
 
@@ -115,8 +124,9 @@ def update_hall(
 ) -> Hall:
     """Choose the next hall: the best of its teams and of those formed around the fronts.
 
-    Candidates are taken by key; among equals the hall's own come first, in their order, then the new ones in the order
-    of `form_teams`. Nobody is in two teams. Keys of old teams are computed anew from the arrays given.
+    Candidates are taken by key; among equals the hall's own come first, in their order, then the
+    new ones in the order of `form_teams`. Nobody is in two teams. Keys of old teams are computed
+    anew from the arrays given.
 
     Args:
         collisions: See the module.
@@ -124,32 +134,38 @@ def update_hall(
         front: See the module.
         hall: The present one, its members' places in the present populations.
         depth: Most teams that it holds.
-        memory: A team that entered more than this many generations ago is taken only where no new team can be; the same
-            team formed again is not new. None: no such rule.
-        frozen: Whether the hall's teams stay, and new ones only fill what is free. Overrides `memory`.
+        memory: A team that entered more than this many generations ago is taken only where no new
+            team can be; the same team formed again is not new. None: no such rule.
+        frozen: Whether the hall's teams stay, and new ones only fill what is free. Overrides
+            `memory`.
 
     Returns:
-        The next hall, at most `depth` teams, ages counted on; its members' places are in the present populations.
+        The next hall, at most `depth` teams, ages counted on; its members' places are in the
+        present populations.
 
     Raises:
         ValueError: If the shapes contradict each other or the hall is larger than `depth`.
     """
     _check(collisions, own, front.shape)
     if hall.teams.shape[1] != len(own) or hall.num_teams > depth:
-        raise ValueError(f"a hall of {hall.teams.shape} is not one of at most {depth} teams of {len(own)}")
+        raise ValueError(
+            f"a hall of {hall.teams.shape} is not one of at most {depth} teams of {len(own)}"
+        )
     teams, ages = np.empty((depth, len(own)), dtype=np.int64), np.empty(depth, dtype=np.int64)
     teams[: hall.num_teams], ages[: hall.num_teams] = hall.teams, hall.ages
     hits, costs = np.empty(depth, dtype=np.int64), np.empty(depth)
     count, limit = own.shape[1], memory or 0
-    held = renew_hall(collisions, own, front, count, teams, ages, hall.num_teams, limit, frozen, hits, costs)
+    held = renew_hall(
+        collisions, own, front, count, teams, ages, hall.num_teams, limit, frozen, hits, costs
+    )
     return Hall(teams[:held], ages[:held], hits[:held], costs[:held])
 
 
 def best_team(collisions: np.ndarray, own: FloatArray) -> BestTeam:
     """Search all teams without a collision for the lowest sum of own costs; exact.
 
-    Of teams with the same sum, the one whose indices come first in lexicographic order, population 0 leading. A team of
-    infinite cost is none.
+    Of teams with the same sum, the one whose indices come first in lexicographic order, population
+    0 leading. A team of infinite cost is none.
 
     Raises:
         ValueError: If the shapes contradict each other.
@@ -164,18 +180,26 @@ def _check(collisions: np.ndarray, own: FloatArray, front_shape: tuple[int, ...]
     num, count = own.shape
     enough = collisions.ndim == 3 and min(collisions.shape[1:]) >= count
     if num < 2 or front_shape != own.shape or not enough or len(collisions) != num * (num - 1) // 2:
-        raise ValueError(f"collisions {collisions.shape}, costs {own.shape} and front {front_shape} do not match")
+        raise ValueError(
+            f"collisions {collisions.shape}, costs {own.shape} and front {front_shape} do not match"
+        )
 
 
 @kernel
 def pair_index(num, first, second):  # type: ignore[no-untyped-def]
-    """Return where populations first < second of `num` stand in the order (0, 1), (0, 2), …, (1, 2), …."""
+    """Return where populations first < second of `num` stand in the order (0, 1), (0, 2), …, (1.
+
+    2), ….
+    """
     return first * (2 * num - first - 1) // 2 + second - first - 1
 
 
 @kernel
 def rate_team(collisions, own, team):  # type: ignore[no-untyped-def]
-    """Return the key of a team (P,): collisions within it, and the sum of its members' own costs."""
+    """Return the key of a team (P,).
+
+    Collisions within it, and the sum of its members' own costs.
+    """
     num, hits, cost = len(team), 0, 0.0
     for p in range(num):
         cost += own[p, team[p]]
@@ -195,7 +219,9 @@ def sort_by_cost(own, count):  # type: ignore[no-untyped-def]
 
 @kernel
 def choose_collaborator(collisions, team, seed, population, order):  # type: ignore[no-untyped-def]
-    """Return who of a population, tried in `order` (N,), has the fewest collisions with those already in a team (P,).
+    """Return who of a population, tried in `order`.
+
+    N,), has the fewest collisions with those already in a team (P,.
 
     These are the member of population `seed` and those of all populations before this one.
     """
@@ -217,7 +243,8 @@ def choose_collaborator(collisions, team, seed, population, order):  # type: ign
 def gather_teams(collisions, own, front, count, teams, team_collisions, team_costs):  # type: ignore[no-untyped-def]
     """The kernel of `form_teams`, for other kernels, on the first `count` individuals.
 
-    Writes teams (≥ members of fronts, P), team_collisions and team_costs (≥ members of fronts,); returns how many.
+    Writes teams (≥ members of fronts, P), team_collisions and team_costs (≥ members of fronts,);
+    returns how many.
     """
     num, filled = len(own), 0
     order = sort_by_cost(own, count)
@@ -237,19 +264,34 @@ def gather_teams(collisions, own, front, count, teams, team_collisions, team_cos
 
 @kernel
 def renew_hall(  # type: ignore[no-untyped-def]
-    collisions, own, front, count, teams, ages, num_teams, memory, frozen, team_collisions, team_costs
+    collisions,
+    own,
+    front,
+    count,
+    teams,
+    ages,
+    num_teams,
+    memory,
+    frozen,
+    team_collisions,
+    team_costs,
 ):
     """The kernel of `update_hall`, for other kernels, on the first `count` individuals.
 
-    Teams (depth, P) and ages (depth,) are read up to `num_teams` and rewritten; team_collisions and team_costs (depth,)
-    are written. A `memory` of 0 is no rule. Returns how many teams the hall holds then.
+    Teams (depth, P) and ages (depth,) are read up to `num_teams` and rewritten; team_collisions and
+    team_costs (depth,) are written. A `memory` of 0 is no rule. Returns how many teams the hall
+    holds then.
     """
     most = num_teams
     for p in range(len(own)):
         for i in range(count):
             most += 1 if front[p, i] else 0
     pool, pool_ages = np.empty((most, len(own)), dtype=np.int64), np.zeros(most, dtype=np.int64)
-    ranks, hits, costs = np.zeros(most, dtype=np.int64), np.empty(most, dtype=np.int64), np.empty(most)
+    ranks, hits, costs = (
+        np.zeros(most, dtype=np.int64),
+        np.empty(most, dtype=np.int64),
+        np.empty(most),
+    )
     for k in range(num_teams):
         pool[k], pool_ages[k] = teams[k], ages[k] + 1
         hits[k], costs[k] = rate_team(collisions, own, pool[k])
@@ -257,7 +299,9 @@ def renew_hall(  # type: ignore[no-untyped-def]
             ranks[k] = k - num_teams  # before all new ones, in the order they have
         elif 0 < memory < pool_ages[k]:
             ranks[k] = 1  # behind all new ones
-    gather_teams(collisions, own, front, count, pool[num_teams:], hits[num_teams:], costs[num_teams:])
+    gather_teams(
+        collisions, own, front, count, pool[num_teams:], hits[num_teams:], costs[num_teams:]
+    )
     left = np.empty(most, dtype=np.int64)  # candidates that can still be taken, in order
     num_left = 0
     for k in range(most):
@@ -292,7 +336,10 @@ def is_among(team, teams, num_teams):  # type: ignore[no-untyped-def]
 
 @kernel
 def drop_rivals(pool, team, left, num_left):  # type: ignore[no-untyped-def]
-    """Remove from left (≥ num_left,) what shares a member with a team (P,), in order; return how many are left."""
+    """Remove from left (≥ num_left,) what shares a member with a team (P,), in order.
+
+    Return how many are left.
+    """
     kept = 0
     for c in range(num_left):
         shares = False
@@ -305,13 +352,22 @@ def drop_rivals(pool, team, left, num_left):  # type: ignore[no-untyped-def]
 
 @kernel
 def find_best_team(collisions, own, count, team):  # type: ignore[no-untyped-def]
-    """The kernel of `best_team`, for kernels, on the first `count` individuals; writes team (P,), returns cost."""
-    return find_best_pair(collisions, own, count, team) if len(own) == 2 else search_teams(collisions, own, count, team)
+    """The kernel of `best_team`, for kernels, on the first `count` individuals.
+
+    Writes team (P,), returns cost.
+    """
+    return (
+        find_best_pair(collisions, own, count, team)
+        if len(own) == 2
+        else search_teams(collisions, own, count, team)
+    )
 
 
 @kernel
 def find_best_pair(collisions, own, count, team):  # type: ignore[no-untyped-def]
-    """`find_best_team` of two populations: the cheapest free partner of all of the second, four candidates at a time.
+    """`find_best_team` of two populations.
+
+    The cheapest free partner of all of the second, four candidates at a time.
 
     Rounding is monotone: the lowest sum of an individual is the sum with its cheapest partner.
     """
@@ -344,10 +400,13 @@ def find_best_pair(collisions, own, count, team):  # type: ignore[no-untyped-def
 
 @kernel
 def search_teams(collisions, own, count, team):  # type: ignore[no-untyped-def]
-    """`find_best_team` of any number of populations: depth first, cheapest individuals first, with bounds.
+    """`find_best_team` of any number of populations.
 
-    Bounds are summed in the order of the populations like the costs themselves, so rounding cannot make one too high.
-    Where a bound only equals the best cost, a branch is worth it if its indices come first in lexicographic order.
+    Depth first, cheapest individuals first, with bounds.
+
+    Bounds are summed in the order of the populations like the costs themselves, so rounding cannot
+    make one too high. Where a bound only equals the best cost, a branch is worth it if its indices
+    come first in lexicographic order.
     """
     num, order = len(own), sort_by_cost(own, count)
     ranks, trial, partial = np.zeros(num, dtype=np.int64), np.full(num, -1), np.zeros(num + 1)
@@ -378,7 +437,10 @@ def search_teams(collisions, own, count, team):  # type: ignore[no-untyped-def]
 
 @kernel
 def comes_first(trial, team, level):  # type: ignore[no-untyped-def]
-    """Return whether trial (P,), known up to `level`, can still come before a team (P,) in lexicographic order."""
+    """Return whether trial (P,), known up to `level`.
+
+    Can still come before a team (P,) in lexicographic order.
+    """
     for p in range(level + 1):
         if trial[p] != team[p]:
             return trial[p] < team[p]

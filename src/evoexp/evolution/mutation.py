@@ -7,7 +7,10 @@ from evoexp.records import FloatArray
 
 
 def num_allele_uniforms(count: int) -> int:
-    """Return how many uniform numbers `allele_mutation` takes: per individual a decision, a gene and an amount."""
+    """Return how many uniform numbers `allele_mutation` takes.
+
+    Per individual a decision, a gene and an amount.
+    """
     return 3 * count
 
 
@@ -20,11 +23,13 @@ def allele_mutation(
     limit: float,
     symmetric: bool,
 ) -> None:
-    """Change at most one allele of each individual by a random amount, in place (Curkovic et al. 2013, Eq. 9).
+    """Change at most one allele of each individual by a random amount, in place (Curkovic et al.
 
-    With probability `rate` one gene, each equally likely, gets q + r with r uniform in (0, step], as printed, or in
-    [−step, step) in the symmetric reading. The change is made only if the result lies in [0, limit); otherwise the
-    allele keeps its value.
+    2013, Eq. 9).
+
+    With probability `rate` one gene, each equally likely, gets q + r with r uniform in (0, step],
+    as printed, or in [−step, step) in the symmetric reading. The change is made only if the result
+    lies in [0, limit); otherwise the allele keeps its value.
 
     Args:
         rng: Source of `num_allele_uniforms` uniform numbers, whatever the rate.
@@ -40,12 +45,17 @@ def allele_mutation(
     """
     if genomes.ndim != 2 or not len(genomes) or not 0 <= count <= genomes.shape[1]:
         raise ValueError(f"genomes are (genes, at least {count} individuals), were {genomes.shape}")
-    mutate_allele(rng.random(num_allele_uniforms(count)), genomes, count, rate, step, limit, symmetric)
+    mutate_allele(
+        rng.random(num_allele_uniforms(count)), genomes, count, rate, step, limit, symmetric
+    )
 
 
 @kernel
 def mutate_allele(uniforms, genomes, count, rate, step, limit, symmetric):  # type: ignore[no-untyped-def]
-    """The kernel of `allele_mutation`, for other kernels; per individual: decision, gene, amount."""
+    """The kernel of `allele_mutation`, for other kernels.
+
+    Per individual: decision, gene, amount.
+    """
     num_genes = len(genomes)
     for k in range(count):
         if not uniforms[3 * k] < rate:

@@ -12,7 +12,8 @@ class SelectiveSettings(GeneticSettings):
     """What real and binary coding share; `RealGenetic` and `BinaryGenetic` are complete.
 
     Attributes:
-        selection: `tournament`; `roulette` with weights 1/cost; `rank`: roulette with linear weights.
+        selection: `tournament`; `roulette` with weights 1/cost; `rank`: roulette with linear
+            weights.
         tournament_size: Individuals per tournament [-].
         rank_pressure: Offspring expected of the best one, in linear ranking [-].
     """
@@ -28,10 +29,13 @@ class RealGenetic(SelectiveSettings):
     """Genomes of real numbers within limits.
 
     Attributes:
-        crossover: `one_point`, `uniform`, `arithmetic`, `blx_alpha`; of a pair, with probability `crossover_rate`.
-        blend_alpha: α of BLX-α: how far beyond the parents children may lie, in units of their distance [-].
+        crossover: `one_point`, `uniform`, `arithmetic`, `blx_alpha`; of a pair, with probability
+            `crossover_rate`.
+        blend_alpha: α of BLX-α: how far beyond the parents children may lie, in units of their
+            distance [-].
         mutation: `non_uniform`, `gaussian`, `uniform_reset`.
-        mutation_scope: Whether `mutation_rate` is the probability of every `gene`, or of one gene of an `individual`.
+        mutation_scope: Whether `mutation_rate` is the probability of every `gene`, or of one gene
+            of an `individual`.
         mutation_power: b of non-uniform mutation [-].
         mutation_std: Standard deviation of Gaussian mutation, in units of a gene's range [-].
     """
@@ -47,7 +51,9 @@ class RealGenetic(SelectiveSettings):
 
 
 class BinaryGenetic(SelectiveSettings):
-    """Genomes of bits: every gene a plain binary number; one-point crossover between bits, mutation bit by bit.
+    """Genomes of bits: every gene a plain binary number.
+
+    One-point crossover between bits, mutation bit by bit.
 
     Attributes:
         bits_per_gene: B; a gene takes 2^B values, its limits included [-].

@@ -7,10 +7,12 @@ from evoexp.records import FloatArray
 
 
 def pareto_front(criteria: FloatArray) -> np.ndarray:
-    """Return which individuals are not dominated (Curkovic et al. 2013, section 3: the front of four criteria).
+    """Return which individuals are not dominated (Curkovic et al.
 
-    One dominates another if it is no worse in every criterion and better in at least one. Exact ties are all kept. An
-    individual with a NaN neither dominates nor is on the front.
+    2013, section 3: the front of four criteria).
+
+    One dominates another if it is no worse in every criterion and better in at least one. Exact
+    ties are all kept. An individual with a NaN neither dominates nor is on the front.
 
     Args:
         criteria: (criteria, individuals), all minimised; ±inf are allowed.
@@ -30,14 +32,19 @@ def pareto_front(criteria: FloatArray) -> np.ndarray:
 
 @kernel
 def non_dominated(criteria, count, out):  # type: ignore[no-untyped-def]
-    """The kernel of `pareto_front`, for other kernels: of the first `count` individuals; writes out (≥ count,) bool.
+    """The kernel of `pareto_front`, for other kernels: of the first `count` individuals.
 
-    Whom a dominated individual dominates, its own dominator dominates too: only those not dominated so far are compared
-    with all. Four criteria per pass stay in registers; where fewer are left the last is repeated: no matter.
+    Writes out (≥ count,) bool.
+
+    Whom a dominated individual dominates, its own dominator dominates too: only those not dominated
+    so far are compared with all. Four criteria per pass stay in registers; where fewer are left the
+    last is repeated: no matter.
     """
     last = len(criteria) - 1
     dominated = np.zeros(count, dtype=np.int64)
-    verdicts = np.empty(count, dtype=np.int64)  # on i beside j: bit 0 better in some criterion, bit 1 worse in some
+    verdicts = np.empty(
+        count, dtype=np.int64
+    )  # on i beside j: bit 0 better in some criterion, bit 1 worse in some
     for m in range(last + 1):
         for i in range(count):
             dominated[i] |= 1 if criteria[m, i] != criteria[m, i] else 0  # NaN

@@ -7,10 +7,12 @@ from evoexp.numerics import kernel
 
 @kernel
 def choose_by_tournament(uniforms, costs, size, parents):  # type: ignore[no-untyped-def]
-    """Draw parents as winners of tournaments (Goldberg & Deb 1991): the lowest cost of `size` drawn with replacement.
+    """Draw parents as winners of tournaments (Goldberg & Deb 1991).
 
-    Among equal costs, infinite ones included, the one drawn first wins; so a population without one feasible member is
-    sampled uniformly.
+    The lowest cost of `size` drawn with replacement.
+
+    Among equal costs, infinite ones included, the one drawn first wins; so a population without one
+    feasible member is sampled uniformly.
 
     Args:
         uniforms: (parents × size) in [0, 1).
@@ -31,8 +33,9 @@ def choose_by_tournament(uniforms, costs, size, parents):  # type: ignore[no-unt
 def rank_weights(costs, pressure, out):  # type: ignore[no-untyped-def]
     """Weigh individuals linearly by their rank for the roulette wheel (Baker 1985).
 
-    With r = 0 for the highest of P costs and P − 1 for the lowest, the weight 2 − s + 2 (s − 1) r / (P − 1) is how
-    often an individual is expected among P parents. Equal costs, infinite ones included, share the mean of their ranks.
+    With r = 0 for the highest of P costs and P − 1 for the lowest, the weight 2 − s + 2 (s − 1) r /
+    (P − 1) is how often an individual is expected among P parents. Equal costs, infinite ones
+    included, share the mean of their ranks.
 
     Args:
         costs: (individuals,).

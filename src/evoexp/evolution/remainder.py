@@ -1,4 +1,7 @@
-"""Stochastic remainder sampling without replacement: parents as many times as expected, but for less than one copy."""
+"""Stochastic remainder sampling without replacement.
+
+Parents as many times as expected, but for less than one copy.
+"""
 
 import numpy as np
 
@@ -8,28 +11,35 @@ from evoexp.records import FloatArray
 
 @kernel
 def num_remainder_uniforms(num, count):  # type: ignore[no-untyped-def]
-    """Return how many uniform numbers it takes to choose `count` parents out of `num` individuals; for kernels, too."""
+    """Return how many uniform numbers it takes to choose `count` parents out of `num` individuals.
+
+    For kernels, too.
+    """
     return num + 1 + count
 
 
 def stochastic_remainder(rng: np.random.Generator, expected: FloatArray) -> np.ndarray:
-    """Choose parents by stochastic remainder sampling without replacement (Chen & Zalzala 1995, sections 2.3 and 3.2).
+    """Choose parents by stochastic remainder sampling without replacement.
 
-    Everyone becomes a parent as often as the whole part of its expected number says. For the places left, the
-    remainders are scanned once, in random order: they are added up, and whoever brings the sum past u, u + 1, u + 2, …
-    gets one of the places, u being one uniform number. So nobody gets more than one, and everybody gets one with
-    exactly the probability of its remainder.
+    Chen & Zalzala 1995, sections 2.3 and 3.2.
 
-    Goldberg's scan, which tosses a coin per remainder until the places are full, is biased: in the order of indices
-    against those that come late, and in any order against small remainders (of 0.9 and 0.1 the second one gets the
-    place with probability 0.06).
+    Everyone becomes a parent as often as the whole part of its expected number says. For the places
+    left, the remainders are scanned once, in random order: they are added up, and whoever brings
+    the sum past u, u + 1, u + 2, … gets one of the places, u being one uniform number. So nobody
+    gets more than one, and everybody gets one with exactly the probability of its remainder.
+
+    Goldberg's scan, which tosses a coin per remainder until the places are full, is biased: in the
+    order of indices against those that come late, and in any order against small remainders (of 0.9
+    and 0.1 the second one gets the place with probability 0.06).
 
     Args:
         rng: Source of `num_remainder_uniforms` uniform numbers.
-        expected: (individuals,) ≥ 0, as `scaling.scale_linearly` returns them; their sum is the number of parents.
+        expected: (individuals,) ≥ 0, as `scaling.scale_linearly` returns them; their sum is the
+            number of parents.
 
     Returns:
-        (parents,) indices in random order: neighbours are a random pairing; k occurs ⌊expected[k]⌋ times or once more.
+        (parents,) indices in random order: neighbours are a random pairing; k occurs ⌊expected[k]⌋
+        times or once more.
 
     Raises:
         ValueError: If a number is negative or not finite, or the sum is no whole number.
@@ -42,7 +52,9 @@ def stochastic_remainder(rng: np.random.Generator, expected: FloatArray) -> np.n
         raise ValueError(f"expected must add up to a whole number of parents, was {total}")
     parents = np.empty(count, dtype=np.int64)
     order = np.empty(len(expected), dtype=np.int64)
-    choose_by_remainders(rng.random(num_remainder_uniforms(len(expected), count)), expected, order, parents)
+    choose_by_remainders(
+        rng.random(num_remainder_uniforms(len(expected), count)), expected, order, parents
+    )
     return parents
 
 
@@ -53,7 +65,8 @@ def choose_by_remainders(uniforms, expected, order, parents):  # type: ignore[no
     Args:
         uniforms: (`num_remainder_uniforms`,) in [0, 1).
         expected: (individuals,) ≥ 0, adding up to the number of parents but for rounding.
-        order: (individuals,) scratch: the random order of the scan; negative where a place was given.
+        order: (individuals,) scratch: the random order of the scan; negative where a place was
+            given.
         parents: (parents,) written.
     """
     num, count, filled = len(expected), len(parents), 0
@@ -80,7 +93,11 @@ def choose_by_remainders(uniforms, expected, order, parents):  # type: ignore[no
             filled += 1
             pointer += 1.0
     for k in range(num):  # a place that rounding left
-        if filled < count and order[k] >= 0 and (_remainder(expected[order[k]]) > 0.0 or total == 0.0):
+        if (
+            filled < count
+            and order[k] >= 0
+            and (_remainder(expected[order[k]]) > 0.0 or total == 0.0)
+        ):
             parents[filled] = order[k]
             filled += 1
     for k in range(count):

@@ -7,24 +7,29 @@ from evoexp.records import FloatArray
 
 
 def scale_linearly(costs: FloatArray, count: int, multiple: float = 2.0) -> FloatArray:
-    """Return the numbers of copies that linear scaling expects (Goldberg 1989; Chen & Zalzala 1995, Eqs. 5 and 16).
+    """Return the numbers of copies that linear scaling expects (Goldberg 1989.
 
-    The paper scales a fitness f = C_m − C to f' = a f + b, whose mean is that of f and whose maximum is `multiple`
-    times the mean; what becomes negative is 0. An individual then expects f' / mean(f') copies:
+    Chen & Zalzala 1995, Eqs. 5 and 16).
+
+    The paper scales a fitness f = C_m − C to f' = a f + b, whose mean is that of f and whose
+    maximum is `multiple` times the mean; what becomes negative is 0. An individual then expects f'
+    / mean(f') copies:
 
         f' / mean(f) = 1 + (multiple − 1) (mean(C) − C) / (mean(C) − min(C)),
 
-    which does not depend on C_m (nor on the unit of the costs), so C_m is no setting. After the negative ones were set
-    to 0 the mean is above the wanted one, and all are divided by it: the best then expects fewer than `multiple`.
+    which does not depend on C_m (nor on the unit of the costs), so C_m is no setting. After the
+    negative ones were set to 0 the mean is above the wanted one, and all are divided by it: the
+    best then expects fewer than `multiple`.
 
     Args:
-        costs: (individuals,) lower is better; those that are not finite expect no copy and have no say in the mean.
+        costs: (individuals,) lower is better; those that are not finite expect no copy and have no
+            say in the mean.
         count: Number of parents.
         multiple: Copies that the best one expects if there is a parent per individual, > 1 [-].
 
     Returns:
-        (individuals,) ≥ 0; their sum is `count` but for rounding. Equal finite costs expect equally many, and without
-        any finite cost all do.
+        (individuals,) ≥ 0; their sum is `count` but for rounding. Equal finite costs expect equally
+        many, and without any finite cost all do.
 
     Raises:
         ValueError: If an argument cannot be.

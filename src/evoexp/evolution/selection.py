@@ -30,7 +30,9 @@ def elites(costs: FloatArray, count: int) -> np.ndarray:
 
 
 def distinct(rng: np.random.Generator, num: int, count: int) -> np.ndarray:
-    """Draw `count` distinct indices out of 0 … num − 1, in random order: the head of a Fisher–Yates shuffle.
+    """Draw `count` distinct indices out of 0 … num − 1, in random order.
+
+    The head of a Fisher–Yates shuffle.
 
     Args:
         rng: Source of `count` uniform numbers.
@@ -70,7 +72,10 @@ def spin_roulette(weights, uniforms, chosen):  # type: ignore[no-untyped-def]
 
 @kernel
 def choose_elites(costs, chosen):  # type: ignore[no-untyped-def]
-    """The kernel of `elites`, for other kernels: insertion into a short list; a later equal cost stays behind."""
+    """The kernel of `elites`, for other kernels: insertion into a short list.
+
+    A later equal cost stays behind.
+    """
     count, filled = len(chosen), 0
     for k in range(len(costs)):
         if filled == count and (count == 0 or not costs[k] < costs[chosen[count - 1]]):
@@ -85,7 +90,10 @@ def choose_elites(costs, chosen):  # type: ignore[no-untyped-def]
 
 @kernel
 def shuffle_head(uniforms, slots):  # type: ignore[no-untyped-def]
-    """The kernel of `distinct`, for other kernels; the first len(uniforms) of `slots` are the draw."""
+    """The kernel of `distinct`, for other kernels.
+
+    The first len(uniforms) of `slots` are the draw.
+    """
     num = len(slots)
     for k in range(len(uniforms)):
         other = k + min(int(uniforms[k] * (num - k)), num - k - 1)
@@ -96,7 +104,8 @@ def shuffle_head(uniforms, slots):  # type: ignore[no-untyped-def]
 def inverse_weights(costs, out):  # type: ignore[no-untyped-def]
     """Weigh individuals by 1/cost for the roulette wheel (Curkovic et al. 2013, methods I–VIII).
 
-    A cost of inf or NaN weighs 0. If any cost is 0, only those of cost 0 can be drawn: they weigh 1, all others 0.
+    A cost of inf or NaN weighs 0. If any cost is 0, only those of cost 0 can be drawn: they weigh
+    1, all others 0.
 
     Args:
         costs: (individuals,) ≥ 0; below 1e-300 counts as 0: a sum of inverses would overflow.
@@ -115,8 +124,8 @@ def inverse_weights(costs, out):  # type: ignore[no-untyped-def]
 def difference_weights(costs, out):  # type: ignore[no-untyped-def]
     """Weigh individuals by how far they are below the highest finite cost.
 
-    A cost that is not finite weighs 0. If all finite costs are equal, each of them weighs 1: they are equally likely,
-    and what is infeasible is still not drawn.
+    A cost that is not finite weighs 0. If all finite costs are equal, each of them weighs 1: they
+    are equally likely, and what is infeasible is still not drawn.
 
     Args:
         costs: (individuals,).

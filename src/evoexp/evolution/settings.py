@@ -30,7 +30,9 @@ class GeneticSettings(Component):
     @model_validator(mode="after")
     def _elites_fit(self) -> Self:
         if self.num_elites > self.population_size:
-            raise SettingError("num_elites", f"at most population_size ({self.population_size})", self.num_elites)
+            raise SettingError(
+                "num_elites", f"at most population_size ({self.population_size})", self.num_elites
+            )
         return self
 
     @property
@@ -40,5 +42,8 @@ class GeneticSettings(Component):
 
     @property
     def num_evaluations(self) -> int:
-        """Evaluations of a whole run: the initial population, then the offspring of every generation."""
+        """Evaluations of a whole run.
+
+        The initial population, then the offspring of every generation.
+        """
         return self.population_size + self.num_generations * self.num_offspring

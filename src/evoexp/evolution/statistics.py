@@ -1,4 +1,7 @@
-"""What a generation's costs say: kept in one pass of ordered sums, so that the numbers are the same everywhere."""
+"""What a generation's costs say.
+
+Kept in one pass of ordered sums, so that the numbers are the same everywhere.
+"""
 
 from typing import NamedTuple
 

@@ -19,9 +19,11 @@ class StrategySettings(Component):
         num_generations: Cycles at most (per phase of a task).
         patience: Cycles without improvement after which the search is given up.
         selection: `comma`: the next parents are offspring; `plus`: parents may stay.
-        mutation: `uniform` in a box of ±scope around the parent; `gaussian` with the standard deviation below.
+        mutation: `uniform` in a box of ±scope around the parent; `gaussian` with the standard
+            deviation below.
         mutation_std: Of Gaussian mutation, in units of the scope [-].
-        parent_choice: `equal` shares for all parents, or `gaussian`: the better the rank the more offspring.
+        parent_choice: `equal` shares for all parents, or `gaussian`: the better the rank the more
+            offspring.
         parent_std: Of Gaussian parent choice, in units of μ [-].
         crossover_rate: Probability that a child takes every joint from one of two parents.
     """
@@ -43,7 +45,10 @@ class StrategySettings(Component):
 
     @model_validator(mode="after")
     def _parents_fit(self) -> Self:
-        if self.selection == "comma" and self.num_parents > self.num_offspring + self.num_immigrants:
+        if (
+            self.selection == "comma"
+            and self.num_parents > self.num_offspring + self.num_immigrants
+        ):
             must = f"at most num_offspring ({self.num_offspring}) with comma selection"
             raise SettingError("num_parents", must, self.num_parents)
         return self

@@ -8,11 +8,14 @@ from evoexp.numerics import kernel
 from evoexp.records import FloatArray
 
 
-def succeed(population: FloatArray, offspring: FloatArray, num_offspring: int, elites: np.ndarray) -> None:
+def succeed(
+    population: FloatArray, offspring: FloatArray, num_offspring: int, elites: np.ndarray
+) -> None:
     """Put the elites of a population behind the offspring, in place.
 
     Args:
-        population: (…, individuals, padding allowed), replaced: the offspring, then the elites in the order given.
+        population: (…, individuals, padding allowed), replaced: the offspring, then the elites in
+            the order given.
         offspring: (…, offspring, padding allowed).
         num_offspring: How many offspring there are.
         elites: (elites,) indices into the population.
@@ -22,8 +25,14 @@ def succeed(population: FloatArray, offspring: FloatArray, num_offspring: int, e
     """
     rows = population.reshape(math.prod(population.shape[:-1]), -1)
     lanes = offspring.reshape(math.prod(offspring.shape[:-1]), offspring.shape[-1])
-    if len(rows) != len(lanes) or num_offspring > lanes.shape[1] or num_offspring + len(elites) > rows.shape[1]:
-        raise ValueError(f"{num_offspring} of {offspring.shape} and {len(elites)} do not fit {population.shape}")
+    if (
+        len(rows) != len(lanes)
+        or num_offspring > lanes.shape[1]
+        or num_offspring + len(elites) > rows.shape[1]
+    ):
+        raise ValueError(
+            f"{num_offspring} of {offspring.shape} and {len(elites)} do not fit {population.shape}"
+        )
     succeed_rows(rows, lanes, num_offspring, elites)
 
 

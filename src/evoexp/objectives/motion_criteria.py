@@ -1,4 +1,7 @@
-"""Criteria of a robot's motion in the plane (Curkovic et al. 2013, Eqs. 6–8), for whole populations."""
+"""Criteria of a robot's motion in the plane (Curkovic et al. 2013, Eqs.
+
+6–8), for whole populations.
+"""
 
 from typing import ClassVar
 
@@ -36,7 +39,8 @@ def measure_motions(angles, points, weights, criteria, own):  # type: ignore[no-
     """C2, C3, C4 of every individual.
 
     Args:
-        angles: (configurations, 2, ≥ individuals) absolute link angles [rad], start and goal included.
+        angles: (configurations, 2, ≥ individuals) absolute link angles [rad], start and goal
+            included.
         points: (configurations, 4, ≥ individuals) elbow x, y and the end-effector's x, y.
         weights: Of C2, C3, C4.
         criteria: (3, individuals), written: C2, C3, C4.

@@ -1,4 +1,7 @@
-"""The cost of a path over a grid: its length, and how unsafe its nodes are on average (Chen & Zalzala 1995, Eq. 1)."""
+"""The cost of a path over a grid.
+
+Its length, and how unsafe its nodes are on average (Chen & Zalzala 1995, Eq. 1).
+"""
 
 from typing import ClassVar, Self
 
@@ -24,7 +27,9 @@ class PathCost(Component):
     @model_validator(mode="after")
     def _something_costs(self) -> Self:
         if self.distance_weight == 0.0 and self.unsafeness_weight == 0.0:
-            raise SettingError("distance_weight", "above 0, or unsafeness_weight is: else all paths cost 0", 0.0)
+            raise SettingError(
+                "distance_weight", "above 0, or unsafeness_weight is: else all paths cost 0", 0.0
+            )
         return self
 
     @property

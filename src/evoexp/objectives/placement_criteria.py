@@ -6,7 +6,12 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from evoexp.errors import SettingError
-from evoexp.objectives.placement_kernels import RESULTS, measure_both, measure_branches, measure_postures
+from evoexp.objectives.placement_kernels import (
+    RESULTS,
+    measure_both,
+    measure_branches,
+    measure_postures,
+)
 from evoexp.records import FloatArray
 from evoexp.validation import Component, NonNegative, NonNegativeCount, Positive, Rate, Settings
 
@@ -28,7 +33,9 @@ class Avoidance(Settings):
 
 
 class PlacementCriteria(Component):
-    """What a posture costs: E of Eq. 14, at most `greatest`, which is also the cost of an infeasible posture.
+    """What a posture costs: E of Eq.
+
+    14, at most `greatest`, which is also the cost of an infeasible posture.
 
     Attributes:
         torque_norm_weight: ε, of ‖τ‖² (Eq. 10).
@@ -55,7 +62,9 @@ class PlacementCriteria(Component):
             must = "above 0, or another weight: with all of them 0 every posture costs the same"
             raise SettingError("torque_norm_weight", must, self.torque_norm_weight)
         if self.torque_max_weight > 0.0 and not any(self.torque_weights):
-            raise SettingError("torque_weights", "above 0 for one torque at least", list(self.torque_weights))
+            raise SettingError(
+                "torque_weights", "above 0 for one torque at least", list(self.torque_weights)
+            )
         return self
 
     @property
@@ -98,7 +107,10 @@ class Model(NamedTuple):
     limits: FloatArray
 
     def measure(self, angles: FloatArray) -> FloatArray:
-        """Return criteria and branch of postures θ1, θ2 (2, individuals) [deg]: (CRITERIA + 1, individuals)."""
+        """Return criteria and branch of postures θ1, θ2 (2, individuals) [deg].
+
+        (CRITERIA + 1, individuals).
+        """
         angles = np.ascontiguousarray(angles, dtype=np.float64)
         if angles.ndim != 2 or len(angles) != 2:
             raise ValueError(f"angles must have shape (2, individuals), was {angles.shape}")
@@ -107,14 +119,20 @@ class Model(NamedTuple):
         return out
 
     def measure_branches(self, angles: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return E and θ3 [deg] of postures θ1, θ2 (2, individuals) [deg], each (2, individuals): by branch."""
+        """Return E and θ3 [deg] of postures θ1, θ2 (2, individuals) [deg], each (2, individuals).
+
+        By branch.
+        """
         angles = np.ascontiguousarray(angles, dtype=np.float64)
         costs, theta_3 = np.empty(angles.shape), np.empty(angles.shape)
         measure_branches(angles, *self, costs, theta_3)
         return costs, theta_3
 
     def posture(self, theta_1: float, theta_2: float) -> tuple[int, FloatArray, FloatArray]:
-        """Return the better branch (−1: neither is feasible), and all numbers of it and of the other one (RESULTS,)."""
+        """Return the better branch (−1.
+
+        Neither is feasible), and all numbers of it and of the other one (RESULTS,).
+        """
         own, other = np.empty(RESULTS), np.empty(RESULTS)
         branch = measure_both(float(theta_1), float(theta_2), *self, own, other)
         return int(branch), own, other

@@ -1,7 +1,8 @@
 """Criteria of a mobile arm's posture, compiled (Chen & Zalzala 1995, Eqs. 8 and 10–14, 17–19).
 
-The arm's kinematics know nothing of the platform's joints: the posture (θ1, θ2) leaves two values of θ3 that bring the
-end-effector to its height, and the platform stands where the arm's reach then ends at the target.
+The arm's kinematics know nothing of the platform's joints: the posture (θ1, θ2) leaves two values
+of θ3 that bring the end-effector to its height, and the platform stands where the arm's reach then
+ends at the target.
 """
 
 import numpy as np
@@ -16,7 +17,10 @@ RESULTS = 10  # … and τ1, τ2, τ3, θ3 [deg], X_p
 
 @kernel
 def _directions(theta_1, theta_2, task):  # type: ignore[no-untyped-def]
-    """Return θ1, θ2, s1, c1, s12, c12, s123, c123, θ1 + θ2 + θ3 [deg]; the last two NaN where unreachable."""
+    """Return θ1, θ2, s1, c1, s12, c12, s123, c123, θ1 + θ2 + θ3 [deg].
+
+    The last two NaN where unreachable.
+    """
     s1, c1 = sincos(DEGREE * theta_1)
     s12, c12 = sincos(DEGREE * (theta_1 + theta_2))
     s123 = (task[4] - task[0] * s1 - task[1] * s12) / task[2]
@@ -32,11 +36,12 @@ def measure_posture(directions, branch, task, weights, avoided, limits, out):  #
     """Measure one posture; return whether it is feasible: reachable, and within the limits.
 
     Args:
-        directions: What `_directions` makes of θ1 and θ2, which is relative to the first link [deg].
+        directions: What `_directions` makes of θ1 and θ2, which is relative to the first link
+            [deg].
         branch: Of θ3: 0: the third link points to +x, 1: to −x.
         task: (7,) l1, l2, l3, X_e, Y_e, F_x, F_y.
-        weights: (7,) ε, λ, δ of Eq. 14, α1, α2, α3 of Eq. 11, and the greatest value of E and of every criterion, which
-            is what singular and infeasible postures have.
+        weights: (7,) ε, λ, δ of Eq. 14, α1, α2, α3 of Eq. 11, and the greatest value of E and of
+            every criterion, which is what singular and infeasible postures have.
         avoided: (n, 5) γ, link (0: the platform), place on it in [0, 1], X_o, Y_o of Eq. 12.
         limits: (6, 2) of θ1, θ2, θ3 [deg] and τ1, τ2, τ3.
         out: (RESULTS,) written; of what cannot be reached θ3, X_p and torques are NaN.
@@ -76,15 +81,23 @@ def measure_posture(directions, branch, task, weights, avoided, limits, out):  #
     xy = jx1 * jy1 + jx2 * jy2 + jx3 * jy3
     obstacles = _obstacle_costs(platform, (x1, x2, x3), (y1, y2, y3), avoided, cap)
     out[TORQUE_NORM], out[TORQUE_MAX] = min(norm, cap), min(largest, cap)
-    out[OBSTACLE], out[MANIPULABILITY] = min(obstacles, cap), _inverse(xx * yy - xy * xy, cap)  # Eq. 13
-    total = obstacles + weights[0] * norm + weights[1] * largest + weights[2] * out[MANIPULABILITY]  # Eq. 14
+    out[OBSTACLE], out[MANIPULABILITY] = (
+        min(obstacles, cap),
+        _inverse(xx * yy - xy * xy, cap),
+    )  # Eq. 13
+    total = (
+        obstacles + weights[0] * norm + weights[1] * largest + weights[2] * out[MANIPULABILITY]
+    )  # Eq. 14
     out[COST] = min(total, cap) if within else cap
     return within
 
 
 @kernel
 def _obstacle_costs(platform, xs, ys, avoided, cap):  # type: ignore[no-untyped-def]
-    """Return Σ γ E_obs (Eq. 12) of a platform's place and the links' extents; `avoided` as in `measure_posture`."""
+    """Return Σ γ E_obs (Eq. 12) of a platform's place and the links' extents.
+
+    `avoided` as in `measure_posture`.
+    """
     total = 0.0
     for n in range(len(avoided)):
         link, place = avoided[n, 1], avoided[n, 2]
@@ -99,13 +112,18 @@ def _obstacle_costs(platform, xs, ys, avoided, cap):  # type: ignore[no-untyped-
 
 @kernel
 def _inverse(value, cap):  # type: ignore[no-untyped-def]
-    """Return 1 / value, at most `cap`; also where rounding made the value of a singular posture negative."""
+    """Return 1 / value, at most `cap`.
+
+    Also where rounding made the value of a singular posture negative.
+    """
     return 1.0 / value if value * cap > 1.0 else cap
 
 
 @kernel
 def measure_both(theta_1, theta_2, task, weights, avoided, limits, out, other):  # type: ignore[no-untyped-def]
-    """Measure both values of θ3; the better one into `out`, the other one into `other`, both (RESULTS,).
+    """Measure both values of θ3; the better one into `out`, the other one into `other`, both.
+
+    RESULTS,.
 
     Returns:
         Its branch, −1 where neither is feasible.
@@ -123,7 +141,10 @@ def measure_both(theta_1, theta_2, task, weights, avoided, limits, out, other): 
 
 @kernel
 def measure_branches(angles, task, weights, avoided, limits, costs, theta_3):  # type: ignore[no-untyped-def]
-    """Measure both values of θ3 of every posture: costs and θ3 [deg], both (2, individuals), are written."""
+    """Measure both values of θ3 of every posture.
+
+    Costs and θ3 [deg], both (2, individuals), are written.
+    """
     out = np.empty(RESULTS)
     for k in range(angles.shape[1]):
         directions = _directions(angles[0, k], angles[1, k], task)
@@ -149,7 +170,18 @@ def measure_postures(angles, count, task, weights, avoided, limits, out):  # typ
         links[0, k], links[1, k], links[2, k], links[3, k] = s1, c1, s12, c12
         links[4, k], links[5, k], links[6, k] = s123, c123, absolute
     for branch in range(2):
-        _measure_lanes(angles, count, links, branch, task, weights, avoided, limits, branches[branch], within[branch])
+        _measure_lanes(
+            angles,
+            count,
+            links,
+            branch,
+            task,
+            weights,
+            avoided,
+            limits,
+            branches[branch],
+            within[branch],
+        )
     for k in range(count):
         one, two = within[0, k], within[1, k]
         other = two & ((not one) | (branches[0, COST, k] > branches[1, COST, k]))
@@ -162,14 +194,39 @@ def measure_postures(angles, count, task, weights, avoided, limits, out):  # typ
 def _measure_lanes(  # type: ignore[no-untyped-def]
     angles, count, links, branch, task, weights, avoided, limits, out, within
 ):
-    """Measure one branch of a population as `measure_posture` does, bit for bit, individuals innermost."""
-    l1, l2, l3, x_e, f_x, f_y, cap = task[0], task[1], task[2], task[3], task[5], task[6], weights[6]
+    """Measure one branch of a population as `measure_posture` does, bit for bit.
+
+    Individuals innermost.
+    """
+    l1, l2, l3, x_e, f_x, f_y, cap = (
+        task[0],
+        task[1],
+        task[2],
+        task[3],
+        task[5],
+        task[6],
+        weights[6],
+    )
     a1, a2, a3, sign = weights[3], weights[4], weights[5], -1.0 if branch == 1 else 1.0
-    s1, c1, s12, c12, s123, c123, absolute = links[0], links[1], links[2], links[3], links[4], links[5], links[6]
+    s1, c1, s12, c12, s123, c123, absolute = (
+        links[0],
+        links[1],
+        links[2],
+        links[3],
+        links[4],
+        links[5],
+        links[6],
+    )
     obstacles = out[OBSTACLE]
     obstacles[:] = 0.0
     for n in range(len(avoided)):
-        weight, link, place, x_o, y_o = avoided[n, 0], avoided[n, 1], avoided[n, 2], avoided[n, 3], avoided[n, 4]
+        weight, link, place, x_o, y_o = (
+            avoided[n, 0],
+            avoided[n, 1],
+            avoided[n, 2],
+            avoided[n, 3],
+            avoided[n, 4],
+        )
         first = (place if link == 1.0 else 1.0) * (link >= 1.0)
         second, third = (place if link == 2.0 else 1.0) * (link >= 2.0), place * (link >= 3.0)
         for k in range(count):
@@ -198,7 +255,13 @@ def _measure_lanes(  # type: ignore[no-untyped-def]
         largest = b1 if b1 > b2 else b2
         largest = b3 if b3 > largest else largest  # Eq. 11
         reached = abs(s123[k]) <= 1.0
-        free = reached & (low_1 <= theta_1) & (theta_1 <= high_1) & (low_2 <= theta_2) & (theta_2 <= high_2)
+        free = (
+            reached
+            & (low_1 <= theta_1)
+            & (theta_1 <= high_1)
+            & (low_2 <= theta_2)
+            & (theta_2 <= high_2)
+        )
         free = free & (low_3 <= theta_3) & (theta_3 <= high_3) & (least_1 <= t1) & (t1 <= most_1)
         free = free & (least_2 <= t2) & (t2 <= most_2) & (least_3 <= t3) & (t3 <= most_3)
         xx = jx1 * jx1 + jx2 * jx2 + jx3 * jx3
@@ -206,7 +269,9 @@ def _measure_lanes(  # type: ignore[no-untyped-def]
         xy = jx1 * jy1 + jx2 * jy2 + jx3 * jy3
         singular = _inverse(xx * yy - xy * xy, cap)  # Eq. 13
         obstacle = obstacles[k]
-        total = obstacle + weights[0] * norm + weights[1] * largest + weights[2] * singular  # Eq. 14
+        total = (
+            obstacle + weights[0] * norm + weights[1] * largest + weights[2] * singular
+        )  # Eq. 14
         out[TORQUE_NORM, k] = norm if reached & (norm < cap) else cap
         out[TORQUE_MAX, k] = largest if reached & (largest < cap) else cap
         out[MANIPULABILITY, k] = singular if reached else cap

@@ -1,18 +1,24 @@
-"""What a posture costs: terms that a configuration chooses and weighs (Corsépius 2001, section 4.3).
+"""What a posture costs: terms that a configuration chooses and weighs.
 
-Every term is a field of the objective: what is given counts, what is not given does not. The cost is the sum of weight
-× term. Terms and their units:
+Corsépius 2001, section 4.3.
 
-- `goal_distance` [length unit]: of the controlled frame from the goal's point, or from the surface of an object
-  (inside of it the signed distance is negative; what counts is its magnitude).
-- `goal_angle` [rad]: between the controlled frame and the goal's orientation; with the distance a full pose.
-- `axial_approach` [rad]: between the direction across the grasping direction (y of the tool) and the object's axis.
+Every term is a field of the objective: what is given counts, what is not given does not. The cost
+is the sum of weight × term. Terms and their units:
+
+- `goal_distance` [length unit]: of the controlled frame from the goal's point, or from the surface
+  of an object (inside of it the signed distance is negative; what counts is its magnitude).
+- `goal_angle` [rad]: between the controlled frame and the goal's orientation; with the distance a
+  full pose.
+- `axial_approach` [rad]: between the direction across the grasping direction (y of the tool) and
+  the object's axis.
 - `heading` [rad]: between the grasping direction (z of the tool) and the way to the object's axis.
 - `upright` [rad]: between the up axis (y of the tool, z of an object held) and the direction up.
 - `keep_parallel` [rad]: between the grasping direction and the ground plane.
-- `limit_margin` [-]: 1 − the smallest distance of a joint from its limits, in units of half its range.
+- `limit_margin` [-]: 1 − the smallest distance of a joint from its limits, in units of half its
+  range.
 - `collision` [-]: 1 if anything touches, else 0.
-- `free_space` [-]: how far the clearance falls short of `reach`, in units of it; 0 beyond, 1 in contact.
+- `free_space` [-]: how far the clearance falls short of `reach`, in units of it; 0 beyond, 1 in
+  contact.
 """
 
 from typing import ClassVar, Literal, Self
@@ -36,7 +42,9 @@ TERMS = (
     "collision",
     "free_space",
 )
-DISTANCE, ANGLE, AXIAL, HEADING, UPRIGHT, PARALLEL, MARGIN, COLLISION, FREE_SPACE = range(len(TERMS))
+DISTANCE, ANGLE, AXIAL, HEADING, UPRIGHT, PARALLEL, MARGIN, COLLISION, FREE_SPACE = range(
+    len(TERMS)
+)
 COLUMNS = (
     "goal_distance",
     "goal_angle_rad",
@@ -133,7 +141,11 @@ class PostureCost(Component):
             must = "left out with upright, which holds another axis of the same frame"
             raise SettingError("keep_parallel", must, self.keep_parallel.weight)
         if self.free_space is not None and self.collision is None:
-            raise SettingError("free_space", "given with collision, whose distances it rates", self.free_space.weight)
+            raise SettingError(
+                "free_space",
+                "given with collision, whose distances it rates",
+                self.free_space.weight,
+            )
         return self
 
     @property
@@ -153,13 +165,18 @@ class PostureCost(Component):
         """
         for k, name in enumerate(terms):
             if name not in TERMS:
-                raise SettingError(f"{field}[{k}]", f"a cost term ({', '.join(TERMS)})", name, nearest(name, TERMS))
+                raise SettingError(
+                    f"{field}[{k}]", f"a cost term ({', '.join(TERMS)})", name, nearest(name, TERMS)
+                )
             if name not in self.chosen:
                 must = f"a term that the objective gives a weight ({', '.join(self.chosen)})"
                 raise SettingError(f"{field}[{k}]", must, name)
         counting = terms or self.chosen
         given = [getattr(self, name) if name in counting else None for name in TERMS]
-        rates = [term.per_radian if isinstance(term, AngleTerm) else term.weight if term else 0.0 for term in given]
+        rates = [
+            term.per_radian if isinstance(term, AngleTerm) else term.weight if term else 0.0
+            for term in given
+        ]
         return np.array(rates)
 
     @property
@@ -179,9 +196,10 @@ def rate_poses(count, pose, aim, rows):  # type: ignore[no-untyped-def]
     Args:
         count: Configurations.
         pose: (12, configurations) rotation of the controlled frame, row by row, and its origin.
-        aim: (30,) of the goal: 0–8 its rotation, row by row; 9–11 its point; 12–14 the axis of the object; 15–17 its
-            middle; 18 half the length of its axis; 19 its radius; 20–22 half the edges of a box; 23 what the distance
-            is measured to (0: the point, 1: a rod, 2: a cylinder, 3: a box); 24–26 up; 27–29 the local up axis.
+        aim: (30,) of the goal: 0–8 its rotation, row by row; 9–11 its point; 12–14 the axis of the
+            object; 15–17 its middle; 18 half the length of its axis; 19 its radius; 20–22 half the
+            edges of a box; 23 what the distance is measured to (0: the point, 1: a rod, 2: a
+            cylinder, 3: a box); 24–26 up; 27–29 the local up axis.
         rows: (≥ 6, configurations) written.
     """
     for n in range(count):

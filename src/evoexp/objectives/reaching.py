@@ -1,4 +1,7 @@
-"""The objective of Lavoie & Boudreau 2001 without its collisions: how far the tip is off, how much the joints turn."""
+"""The objective of Lavoie & Boudreau 2001 without its collisions.
+
+How far the tip is off, how much the joints turn.
+"""
 
 from typing import ClassVar
 
@@ -33,7 +36,9 @@ class Reaching(Component):
 def measure_reach(  # type: ignore[no-untyped-def]
     starts, ends, lanes, count, arm, target, box, weights, cost, error, displacement
 ):
-    """Write Eqs. 1, 2 and 4 of some individuals, inf where the tip ends outside the box; collisions are not looked at.
+    """Write Eqs. 1, 2 and 4 of some individuals, inf where the tip ends outside the box.
+
+    Collisions are not looked at.
 
     Args:
         starts: (N, individuals) relative joint angles [rad].
@@ -72,16 +77,23 @@ def measure_reach(  # type: ignore[no-untyped-def]
             value[n] = worth if tip_y <= box[3] else np.inf
         for n in range(min(LANES, count - first)):
             individual = lanes[first + n]
-            cost[individual], error[individual], displacement[individual] = value[n], off[n], turned[n]
+            cost[individual], error[individual], displacement[individual] = (
+                value[n],
+                off[n],
+                turned[n],
+            )
 
 
 @kernel
 def measure_reach_from(  # type: ignore[no-untyped-def]
     start, ends, count, arm, target, box, weights, cost, error, displacement
 ):
-    """Measure as `measure_reach` does, bit for bit, a whole table of individuals on the way from one start.
+    """Measure as `measure_reach` does, bit for bit.
 
-    Nothing is gathered, and of the arm only the tip is known: joint after joint, all individuals at once.
+    A whole table of individuals on the way from one start.
+
+    Nothing is gathered, and of the arm only the tip is known: joint after joint, all individuals at
+    once.
 
     Args:
         start: (N,) [rad].

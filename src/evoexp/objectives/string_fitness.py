@@ -1,4 +1,7 @@
-"""Fitness of strings of via-points: short, even and free of collisions (Rana & Zalzala 1995, Eqs. 2–7)."""
+"""Fitness of strings of via-points: short, even and free of collisions (Rana & Zalzala 1995, Eqs.
+
+2–7).
+"""
 
 from typing import ClassVar, NamedTuple
 
@@ -13,8 +16,10 @@ class StringTerms(NamedTuple):
     """Terms of a population of strings.
 
     Attributes:
-        lengths: (arms, individuals) C1, C2, … [deg]: path lengths in configuration space (Eqs. 2, 3).
-        unevenness: (arms, individuals) C3, C4, … [deg]: sum of |distance − mean distance| (Eqs. 4, 5).
+        lengths: (arms, individuals) C1, C2, … [deg]: path lengths in configuration space (Eqs. 2,
+            3).
+        unevenness: (arms, individuals) C3, C4, … [deg]: sum of |distance − mean distance| (Eqs. 4,
+            5).
         collisions: (individuals,) C5: colliding instants i = 1 … N (Eq. 6).
         cost: (individuals,) what Eq. 7 subtracts from C_max.
     """
@@ -26,7 +31,9 @@ class StringTerms(NamedTuple):
 
 
 class StringFitness(Component):
-    """Weights of Eq. 7, read with the sign that punishes collisions: F = C_max − [k1 ΣC + k2 ΣC + k3 C5].
+    """Weights of Eq. 7, read with the sign that punishes collisions.
+
+    F = C_max − [k1 ΣC + k2 ΣC + k3 C5].
 
     Attributes:
         length_weight: k1 [1/deg].
@@ -91,8 +98,8 @@ def count_collisions(clearance, collisions):  # type: ignore[no-untyped-def]
     """Count the instants at which each individual collides (Eq. 6).
 
     Args:
-        clearance: (kinds, instants, substeps, lanes) clearances; an instant collides if any of its substeps has any
-            negative one.
+        clearance: (kinds, instants, substeps, lanes) clearances; an instant collides if any of its
+            substeps has any negative one.
         collisions: (lanes,), written.
     """
     kinds, instants, substeps, lanes = clearance.shape

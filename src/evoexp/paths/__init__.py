@@ -1,1 +1,4 @@
-"""Geometry of strings of via-points, as compiled kernels over whole populations (lanes innermost)."""
+"""Geometry of strings of via-points, as compiled kernels over whole populations.
+
+Lanes innermost.
+"""

@@ -4,9 +4,10 @@ The length between the samples j and j + 1 is that of the cubic through four spe
 
     h/24 (13 (v[j] + v[j+1]) − v[j−1] − v[j+2]).
 
-The loops leave h/24 out and keep every length at or above a twelfth of the trapezoid's, so that L never falls where
-a path turns on the spot. The origin of L is arbitrary (not zero). Four samples per pass: with eight, LLVM meets more
-pairs of rows than it is willing to test for overlap, and does not vectorise (three times slower).
+The loops leave h/24 out and keep every length at or above a twelfth of the trapezoid's, so that L
+never falls where a path turns on the spot. The origin of L is arbitrary (not zero). Four samples
+per pass: with eight, LLVM meets more pairs of rows than it is willing to test for overlap, and does
+not vectorise (three times slower).
 """
 
 from typing import Any
@@ -28,12 +29,25 @@ def between(v0: float, v1: float, v2: float, v3: float) -> float:
 
 @kernel
 def advance_pair(w: Any, knot: Any, other: Any, s: Any, count: Any, u0: float, h: float) -> None:
-    """Write four speeds of a two-joint arm from sample `s` on, and the four lengths that they complete."""
+    """Write four speeds of a two-joint arm from sample `s` on.
+
+    And the four lengths that they complete.
+    """
     u1, u2, u3 = u0 + h, u0 + 2.0 * h, u0 + 3.0 * h
     for lane in range(count):
-        a0, m0, a1, m1 = w[knot + lane], w[knot + ROW + lane], w[knot + R2 + lane], w[knot + R3 + lane]
+        a0, m0, a1, m1 = (
+            w[knot + lane],
+            w[knot + ROW + lane],
+            w[knot + R2 + lane],
+            w[knot + R3 + lane],
+        )
         x0, x1, x2 = a1 - a0 - 2.0 * m0 - m1, 6.0 * m0, 3.0 * (m1 - m0)
-        a0, m0, a1, m1 = w[other + lane], w[other + ROW + lane], w[other + R2 + lane], w[other + R3 + lane]
+        a0, m0, a1, m1 = (
+            w[other + lane],
+            w[other + ROW + lane],
+            w[other + R2 + lane],
+            w[other + R3 + lane],
+        )
         y0, y1, y2 = a1 - a0 - 2.0 * m0 - m1, 6.0 * m0, 3.0 * (m1 - m0)
         p3, p2, p1, L = w[s - R6 + lane], w[s - R4 + lane], w[s - R2 + lane], w[s - R3 + lane]
         x, y = x0 + u0 * (x1 + u0 * x2), y0 + u0 * (y1 + u0 * y2)
@@ -60,17 +74,29 @@ def advance_pair(w: Any, knot: Any, other: Any, s: Any, count: Any, u0: float, h
 
 @kernel
 def root(q0: float, q1: float, q2: float, q3: float, q4: float, u: float) -> float:
-    """Return the speed at u from the coefficients of its square (which rounding may turn negative near zero)."""
+    """Return the speed at u from the coefficients of its square.
+
+    Which rounding may turn negative near zero.
+    """
     square = q0 + u * (q1 + u * (q2 + u * (q3 + u * q4)))
     return np.sqrt(square if square > 0.0 else 0.0)  # type: ignore[no-any-return]
 
 
 @kernel
 def advance(w: Any, q: Any, s: Any, count: Any, u0: float, h: float) -> None:
-    """As `advance_pair` for any number of joints, from the coefficients of the squared speed at row `q`."""
+    """As `advance_pair` for any number of joints.
+
+    From the coefficients of the squared speed at row `q`.
+    """
     u1, u2, u3 = u0 + h, u0 + 2.0 * h, u0 + 3.0 * h
     for lane in range(count):
-        q0, q1, q2, q3, q4 = w[q + lane], w[q + ROW + lane], w[q + R2 + lane], w[q + R3 + lane], w[q + R4 + lane]
+        q0, q1, q2, q3, q4 = (
+            w[q + lane],
+            w[q + ROW + lane],
+            w[q + R2 + lane],
+            w[q + R3 + lane],
+            w[q + R4 + lane],
+        )
         p3, p2, p1, L = w[s - R6 + lane], w[s - R4 + lane], w[s - R2 + lane], w[s - R3 + lane]
         v0 = root(q0, q1, q2, q3, q4, u0)
         w[s + lane] = v0
@@ -91,7 +117,9 @@ def advance(w: Any, q: Any, s: Any, count: Any, u0: float, h: float) -> None:
 
 
 @kernel
-def close_ends(w: Any, knot: Any, joints: Any, pitch: Any, first: Any, last: Any, count: Any) -> None:
+def close_ends(
+    w: Any, knot: Any, joints: Any, pitch: Any, first: Any, last: Any, count: Any
+) -> None:
     """Add the sample at the goal and complete the first and the last two lengths.
 
     Beyond both ends the speed is that of the parabola through the three samples before.
@@ -101,12 +129,21 @@ def close_ends(w: Any, knot: Any, joints: Any, pitch: Any, first: Any, last: Any
     for joint in range(joints):
         row = knot + joint * pitch
         for lane in range(count):
-            slope = (w[row + R2 + lane] - w[row + lane]) + w[row + ROW + lane] + 2.0 * w[row + R3 + lane]
+            slope = (
+                (w[row + R2 + lane] - w[row + lane])
+                + w[row + ROW + lane]
+                + 2.0 * w[row + R3 + lane]
+            )
             w[last + lane] += slope * slope
     for lane in range(count):
         w[last + lane] = np.sqrt(w[last + lane])
     for lane in range(count):
-        v3, v2, v1, v0 = w[last - R6 + lane], w[last - R4 + lane], w[last - R2 + lane], w[last + lane]
+        v3, v2, v1, v0 = (
+            w[last - R6 + lane],
+            w[last - R4 + lane],
+            w[last - R2 + lane],
+            w[last + lane],
+        )
         before = w[last - R3 + lane] + between(v3, v2, v1, v0)
         beyond = 3.0 * (v0 - v1) + v2
         w[last - ROW + lane] = before
@@ -118,8 +155,13 @@ def close_ends(w: Any, knot: Any, joints: Any, pitch: Any, first: Any, last: Any
 
 
 @kernel
-def integrate_speed(w: Any, joints: Any, N: Any, S: Any, count: Any, samples: Any, work: Any) -> None:
-    """Fill the rows of speed and length of all samples, for one arm whose knots stand at the scratch's beginning."""
+def integrate_speed(
+    w: Any, joints: Any, N: Any, S: Any, count: Any, samples: Any, work: Any
+) -> None:
+    """Fill the rows of speed and length of all samples.
+
+    For one arm whose knots stand at the scratch's beginning.
+    """
     pitch = (N + U1) * R2
     h = 1.0 / np.float64(S)
     for lane in range(U3 * R2):

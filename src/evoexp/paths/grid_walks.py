@@ -1,8 +1,8 @@
 """Paths over a grid: random walks toward a target, loop erasure, length.
 
-A path is written into one row of a table: its number of nodes, then their indices. Its first node is the start, its
-last the goal. Which nodes a path has is looked up in `place` (nodes,): a node is in the path if the path has it at its
-place; so nothing needs to be cleared between paths.
+A path is written into one row of a table: its number of nodes, then their indices. Its first node
+is the start, its last the goal. Which nodes a path has is looked up in `place` (nodes,): a node is
+in the path if the path has it at its place; so nothing needs to be cleared between paths.
 """
 
 import numpy as np
@@ -15,13 +15,15 @@ from evoexp.numerics import borrowed, kernel
 def walk(draws, moves, ends, erase, path, place):  # type: ignore[no-untyped-def]
     """Write a random path: every step draws one of the permitted moves, weighted toward the target.
 
-    A neighbour of potential U has the weight U_max − U + 1, U_max being the greatest among the neighbours (Chen &
-    Zalzala 1995, section 2.3: "a neighbouring node which has a lower distance value to the goal, has more chance").
+    A neighbour of potential U has the weight U_max − U + 1, U_max being the greatest among the
+    neighbours (Chen & Zalzala 1995, section 2.3: "a neighbouring node which has a lower distance
+    value to the goal, has more chance").
 
     Args:
         draws: One number is taken per step; if they are used up, the walk breaks off.
-        moves: Neighbours (nodes, moves), see `grids.Grid`; potential after so many steps of the front from the target
-            (≥ greatest number of steps + 1,); those steps (nodes,), see `grids.front`.
+        moves: Neighbours (nodes, moves), see `grids.Grid`; potential after so many steps of the
+            front from the target (≥ greatest number of steps + 1,); those steps (nodes,), see
+            `grids.front`.
         ends: Indices of the node it starts at and of the target, which the front must reach.
         erase: Whether loops are erased.
         path: (≥ nodes + 1,) written; see above.
@@ -55,7 +57,8 @@ def walk_each(draws, moves, ends, erase, first, paths, place):  # type: ignore[n
         paths: (paths, nodes + 1) written.
 
     Returns:
-        How many paths are complete, those before `first` included: fewer than all if the draws did not suffice.
+        How many paths are complete, those before `first` included: fewer than all if the draws did
+        not suffice.
     """
     draws, moves, paths = borrowed((draws, moves, paths))
     for k in range(first, len(paths)):
@@ -71,7 +74,8 @@ def walk_each(draws, moves, ends, erase, first, paths, place):  # type: ignore[n
 def _next_node(uniform, neighbours, potentials, steps, node):  # type: ignore[no-untyped-def]
     """Choose one of a node's neighbours by a uniform number; the node itself if it has none.
 
-    All moves are looked at, without a branch: which ones are permitted or chosen no processor can foresee.
+    All moves are looked at, without a branch: which ones are permitted or chosen no processor can
+    foresee.
     """
     greatest, total, count = 0.0, 0.0, 0
     for move in range(neighbours.shape[1]):
@@ -93,7 +97,9 @@ def _next_node(uniform, neighbours, potentials, steps, node):  # type: ignore[no
 
 @kernel
 def erase_loops(nodes, count, path, place):  # type: ignore[no-untyped-def]
-    """Write a path without its loops: wherever it comes back to a node, what lies between is left out.
+    """Write a path without its loops.
+
+    Wherever it comes back to a node, what lies between is left out.
 
     Args:
         nodes: (≥ count + 1,) a path, its nodes from index 1 on; may be `path` itself.
@@ -108,7 +114,10 @@ def erase_loops(nodes, count, path, place):  # type: ignore[no-untyped-def]
 
 @kernel
 def _leap(nodes, count, path, place):  # type: ignore[no-untyped-def]
-    """Write a path without its loops, by the last place of every node: from there it never comes back."""
+    """Write a path without its loops, by the last place of every node.
+
+    From there it never comes back.
+    """
     kept, k = 0, 1
     while k <= count:
         node = nodes[k]

@@ -1,8 +1,9 @@
 """Grids of nodes: which moves they permit, and wave fronts over them.
 
-A node is known by its whole coordinates, or by its index. Around the nodes of a grid there is a ring of more nodes,
-which are never free; with it nodes are counted, the last coordinate fastest, so that the difference of two
-neighbours' indices tells the move. Moves go to nodes that differ by at most one in every coordinate.
+A node is known by its whole coordinates, or by its index. Around the nodes of a grid there is a
+ring of more nodes, which are never free; with it nodes are counted, the last coordinate fastest, so
+that the difference of two neighbours' indices tells the move. Moves go to nodes that differ by at
+most one in every coordinate.
 """
 
 import itertools
@@ -19,12 +20,15 @@ class Grid(NamedTuple):
     """A grid, and the moves that it permits.
 
     Attributes:
-        free: (nodes along x + 2, along y + 2[, along z + 2]) whether a path may pass a node; never on the ring.
+        free: (nodes along x + 2, along y + 2[, along z + 2]) whether a path may pass a node; never
+            on the ring.
         coordinates: (nodes, dimensions) of every node, those of the ring included.
-        neighbours: (nodes, moves) index of the node that each move leads to, −1 where it is not permitted.
-        changes: (moves,) how many coordinates each move changes; ascending, so that the first 2m moves are lateral.
-        kinds: (greatest difference of neighbours' indices + 1,) how many coordinates a move changes, by that
-            difference.
+        neighbours: (nodes, moves) index of the node that each move leads to, −1 where it is not
+            permitted.
+        changes: (moves,) how many coordinates each move changes; ascending, so that the first 2m
+            moves are lateral.
+        kinds: (greatest difference of neighbours' indices + 1,) how many coordinates a move
+            changes, by that difference.
     """
 
     free: np.ndarray
@@ -43,20 +47,27 @@ class Grid(NamedTuple):
         return int(np.ravel_multi_index(tuple(value + 1 for value in node), self.free.shape))
 
     def inner(self, values: np.ndarray) -> np.ndarray:
-        """Return values (nodes,) as an array over the nodes without the ring, (along x, along y[, along z])."""
+        """Return values (nodes,) as an array over the nodes without the ring,.
+
+        Along x, along y[, along z].
+        """
         return values.reshape(self.free.shape)[(slice(1, -1),) * self.free.ndim]
 
     def moves_within(self, neighbourhood: int) -> int:
-        """Return how many moves change at most so many coordinates: those to p-neighbours come first."""
+        """Return how many moves change at most so many coordinates.
+
+        Those to p-neighbours come first.
+        """
         return int(np.count_nonzero(self.changes <= neighbourhood))
 
 
 def grid(blocked: np.ndarray) -> Grid:
     """Return a grid with its permitted moves.
 
-    A diagonal move is permitted if its two nodes are also joined by lateral moves within the box that they span: in the
-    plane it is forbidden between two blocked nodes only ("It is not permissible for the robot to pass between the
-    corners of obstacle regions", Chen & Zalzala 1995, section 2.1), and may touch the corner of one.
+    A diagonal move is permitted if its two nodes are also joined by lateral moves within the box
+    that they span: in the plane it is forbidden between two blocked nodes only ("It is not
+    permissible for the robot to pass between the corners of obstacle regions", Chen & Zalzala 1995,
+    section 2.1), and may touch the corner of one.
 
     Args:
         blocked: (nodes along x, along y[, along z]), true for a node that is no place to be.
@@ -67,24 +78,36 @@ def grid(blocked: np.ndarray) -> Grid:
     dimensions = blocked.ndim
     if dimensions not in (2, 3):
         raise ValueError(f"blocked must have two or three dimensions, was {blocked.shape}")
-    moves = sorted(itertools.product((-1, 0, 1), repeat=dimensions), key=lambda move: sum(map(abs, move)))[1:]
+    moves = sorted(
+        itertools.product((-1, 0, 1), repeat=dimensions), key=lambda move: sum(map(abs, move))
+    )[1:]
     free = np.pad(~blocked.astype(bool), 1)
     nodes = np.arange(free.size).reshape(free.shape)
     neighbours = np.full((*free.shape, len(moves)), -1, dtype=np.int32)
     inside: tuple[Any, ...] = (slice(1, -1),) * dimensions
-    kinds = np.zeros(int(np.abs(nodes[inside] - _shifted(nodes, (1,) * dimensions)).max()) + 1, dtype=np.int32)
+    kinds = np.zeros(
+        int(np.abs(nodes[inside] - _shifted(nodes, (1,) * dimensions)).max()) + 1, dtype=np.int32
+    )
     for k, move in enumerate(moves):
         permitted = _permitted(free, move)
         neighbours[(*inside, k)] = np.where(permitted, _shifted(nodes, move), -1)
         kinds[abs(int(_shifted(nodes, move).flat[0] - nodes[inside].flat[0]))] = sum(map(abs, move))
     changes = np.array([sum(map(abs, move)) for move in moves], dtype=np.int32)
     coordinates = np.stack(np.unravel_index(nodes.ravel(), free.shape), axis=1).astype(np.int32) - 1
-    return Grid(free, np.ascontiguousarray(coordinates), neighbours.reshape(free.size, -1), changes, kinds)
+    return Grid(
+        free, np.ascontiguousarray(coordinates), neighbours.reshape(free.size, -1), changes, kinds
+    )
 
 
 def _permitted(free: np.ndarray, move: tuple[int, ...]) -> np.ndarray:
-    """Return whether a move can be made from every node: whether any order of its lateral parts passes free nodes."""
-    parts = [tuple(step if axis == other else 0 for other in range(len(move))) for axis, step in enumerate(move)]
+    """Return whether a move can be made from every node.
+
+    Whether any order of its lateral parts passes free nodes.
+    """
+    parts = [
+        tuple(step if axis == other else 0 for other in range(len(move)))
+        for axis, step in enumerate(move)
+    ]
     permitted = np.zeros([size - 2 for size in free.shape], dtype=bool)
     for order in itertools.permutations([part for part in parts if any(part)]):
         place = np.zeros(len(move), dtype=int)
@@ -108,7 +131,13 @@ def front(of: Grid, sources: np.ndarray, neighbourhood: int) -> np.ndarray:
         (nodes,) steps, `UNREACHED` where it never comes.
     """
     steps, queue = np.empty(of.num_nodes, dtype=np.int32), np.empty(of.num_nodes, dtype=np.int32)
-    spread_front(of.neighbours, of.moves_within(neighbourhood), np.asarray(sources, dtype=np.int32), steps, queue)
+    spread_front(
+        of.neighbours,
+        of.moves_within(neighbourhood),
+        np.asarray(sources, dtype=np.int32),
+        steps,
+        queue,
+    )
     return steps
 
 
@@ -144,4 +173,6 @@ def spread_front(neighbours, num_moves, sources, steps, queue):  # type: ignore[
 def _shifted(padded: np.ndarray, move: tuple[int, ...]) -> np.ndarray:
     """Return what stands one move away from every node, of an array with a ring around it."""
     stop = [size - 1 for size in padded.shape]
-    return padded[tuple(slice(1 + step, last + step) for step, last in zip(move, stop, strict=True))]
+    return padded[
+        tuple(slice(1 + step, last + step) for step, last in zip(move, stop, strict=True))
+    ]

@@ -7,7 +7,9 @@ from evoexp.paths.layout import check_arm_slices
 from evoexp.records import FloatArray
 
 
-def path_lengths(via_points: FloatArray, arm_slices: np.ndarray, lengths: FloatArray, unevenness: FloatArray) -> None:
+def path_lengths(
+    via_points: FloatArray, arm_slices: np.ndarray, lengths: FloatArray, unevenness: FloatArray
+) -> None:
     """Write length and unevenness of every arm's path.
 
     Args:
@@ -22,7 +24,9 @@ def path_lengths(via_points: FloatArray, arm_slices: np.ndarray, lengths: FloatA
     check_arm_slices(arm_slices, len(via_points))
     expected = (len(arm_slices), via_points.shape[2])
     if lengths.shape != expected or unevenness.shape != expected:
-        raise ValueError(f"outputs must have shape {expected}, were {lengths.shape} and {unevenness.shape}")
+        raise ValueError(
+            f"outputs must have shape {expected}, were {lengths.shape} and {unevenness.shape}"
+        )
     measure_paths(via_points, arm_slices, lengths, unevenness)
 
 

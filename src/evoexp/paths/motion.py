@@ -9,13 +9,16 @@ from evoexp.records import FloatArray
 
 
 class Motion(NamedTuple):
-    """Configurations passed at instants 0, 1, …, each reached from the one before along a straight line or a cubic.
+    """Configurations passed at instants 0, 1, ….
+
+    Each reached from the one before along a straight line or a cubic.
 
     Time t is counted in instants: segment i covers [i, i + 1], on which u = t − i runs from 0 to 1.
 
     Attributes:
         q: (instants, nq) [rad], lengths for prismatic joints.
-        coefficients: (segments, 4, nq) of q(u) = c0 + c1 u + c2 u² + c3 u³ on every segment; None: straight lines.
+        coefficients: (segments, 4, nq) of q(u) = c0 + c1 u + c2 u² + c3 u³ on every segment; None:
+            straight lines.
     """
 
     q: FloatArray
@@ -64,34 +67,47 @@ class Motion(NamedTuple):
     def speed_bound(self, segment: int, begin: float = 0.0, end: float = 1.0) -> FloatArray:
         """Return an upper bound (nq,) of |dq/du| on a segment's u in [begin, end].
 
-        The derivative's Bézier coefficients on the interval; its values lie between the least and the greatest of them.
+        The derivative's Bézier coefficients on the interval; its values lie between the least and
+        the greatest of them.
         """
         if self.coefficients is None:
             return np.asarray(np.abs(self.q[segment + 1] - self.q[segment]))
         coefficients = np.ascontiguousarray(self.coefficients[segment])
-        return np.array([speed_bound(coefficients, joint, begin, end) for joint in range(coefficients.shape[1])])
+        return np.array(
+            [speed_bound(coefficients, joint, begin, end) for joint in range(coefficients.shape[1])]
+        )
 
 
 def cubic_motion(coefficients: FloatArray) -> Motion:
     """Return a motion from power coefficients (segments, 4, nq), lowest power first.
 
     Raises:
-        ValueError: If their shape is another, or a segment does not begin where the one before ends (to 1e-9).
+        ValueError: If their shape is another, or a segment does not begin where the one before ends
+            (to 1e-9).
     """
     coefficients = np.ascontiguousarray(coefficients, dtype=np.float64)
     if coefficients.ndim != 3 or coefficients.shape[0] == 0 or coefficients.shape[1] != 4:
-        raise ValueError(f"coefficients must have shape (segments, 4, nq), was {coefficients.shape}")
+        raise ValueError(
+            f"coefficients must have shape (segments, 4, nq), was {coefficients.shape}"
+        )
     ends = coefficients.sum(axis=1)
     jumps = np.abs(ends[:-1] - coefficients[1:, 0])
     if jumps.size and jumps.max() > 1e-9 * max(1.0, float(np.abs(coefficients).max())):
         segment = int(jumps.max(axis=1).argmax())
-        raise ValueError(f"coefficients must be continuous, jump by {jumps.max()} behind segment {segment}")
+        raise ValueError(
+            f"coefficients must be continuous, jump by {jumps.max()} behind segment {segment}"
+        )
     return Motion(np.vstack([coefficients[:, 0], ends[-1:]]), coefficients)
 
 
 def spline_motion(spline: Any) -> Motion:
-    """Return the motion of a `scipy.interpolate.CubicSpline` over (nq,) values; its knots become the instants."""
-    widths = np.diff(spline.x)  # scipy counts powers of (x − knot), highest first: (4, segments, nq)
+    """Return the motion of a `scipy.interpolate.CubicSpline` over (nq,) values.
+
+    Its knots become the instants.
+    """
+    widths = np.diff(
+        spline.x
+    )  # scipy counts powers of (x − knot), highest first: (4, segments, nq)
     powers = np.stack([spline.c[3 - p] * (widths**p)[:, None] for p in range(4)], axis=1)
     return cubic_motion(powers)
 
@@ -99,8 +115,8 @@ def spline_motion(spline: Any) -> Motion:
 def clamped_cubic(q: FloatArray) -> Motion:
     """Return the cubic spline through configurations q (instants, nq) that starts and ends at rest.
 
-    Two times continuously differentiable, and as smooth as "a polynomial of the third order to ensure second order
-    derivability" (Curkovic et al. 2013, Fig. 9) can be.
+    Two times continuously differentiable, and as smooth as "a polynomial of the third order to
+    ensure second order derivability" (Curkovic et al. 2013, Fig. 9) can be.
 
     Raises:
         ValueError: If there are fewer than two configurations.
@@ -113,10 +129,15 @@ def clamped_cubic(q: FloatArray) -> Motion:
 
 
 def joint_ranges(motion: Motion) -> FloatArray:
-    """Return the least and the greatest value of every joint over the whole motion, (nq, 2); exact but for rounding."""
+    """Return the least and the greatest value of every joint over the whole motion, (nq, 2).
+
+    Exact but for rounding.
+    """
     c0, c1, c2, c3 = motion.polynomials.transpose(1, 0, 2)  # each (segments, nq)
     values = [motion.q]
-    if motion.coefficients is not None:  # where 3 c3 u² + 2 c2 u + c1 = 0, by the formula that loses no digits
+    if (
+        motion.coefficients is not None
+    ):  # where 3 c3 u² + 2 c2 u + c1 = 0, by the formula that loses no digits
         root = -(c2 + np.copysign(np.sqrt(np.maximum(c2 * c2 - 3.0 * c1 * c3, 0.0)), c2))
         for above, below in ((root, 3.0 * c3), (c1, root)):
             u = np.divide(above, below, out=np.zeros_like(above), where=below != 0.0)
@@ -127,9 +148,14 @@ def joint_ranges(motion: Motion) -> FloatArray:
 
 
 def top_speeds(motion: Motion) -> FloatArray:
-    """Return the greatest |dq/dt| of every joint over the whole motion, (nq,) per instant; exact but for rounding."""
+    """Return the greatest |dq/dt| of every joint over the whole motion, (nq,) per instant.
+
+    Exact but for rounding.
+    """
     _, c1, c2, c3 = motion.polynomials.transpose(1, 0, 2)
-    u = np.divide(-c2, 3.0 * c3, out=np.zeros_like(c2), where=c3 != 0.0)  # where the acceleration vanishes
+    u = np.divide(
+        -c2, 3.0 * c3, out=np.zeros_like(c2), where=c3 != 0.0
+    )  # where the acceleration vanishes
     instants = np.zeros_like(c1), np.ones_like(c1), np.minimum(np.maximum(u, 0.0), 1.0)
     speeds = np.concatenate([np.abs(c1 + u * (2.0 * c2 + 3.0 * u * c3)) for u in instants])
     return np.asarray(speeds.max(axis=0))
@@ -137,7 +163,10 @@ def top_speeds(motion: Motion) -> FloatArray:
 
 @kernel
 def speed_bound(coefficients, joint, begin, end):  # type: ignore[no-untyped-def]
-    """Greatest |dq/du| of a joint on [begin, end] of a segment with `coefficients` (4, nq), or more."""
+    """Greatest |dq/du| of a joint on [begin, end] of a segment with `coefficients` (4, nq).
+
+    Or more.
+    """
     c1, c2, c3 = coefficients[1, joint], 2.0 * coefficients[2, joint], 3.0 * coefficients[3, joint]
     first = abs(c1 + begin * (c2 + begin * c3))
     last = abs(c1 + end * (c2 + end * c3))

@@ -1,21 +1,25 @@
-"""Redistribution: via-points moved to equal arc length along the spline through them (Rana & Zalzala 1995, Sect. 3.3).
+"""Redistribution: via-points moved to equal arc length along the spline through them.
 
-Per arm and block of 64 lanes: fit the splines, integrate the speed (`arc_length`), then find for the targets L·i/N
-their segment (every segment is entered in the bucket of the first target at or after its begin; a running maximum
-fills the gaps) and within it the sample, by a bisection without branches. Between two samples the speed is taken as
-linear, which inverts in closed form; the point is the spline's there.
+Rana & Zalzala 1995, Sect. 3.3.
 
-Accuracy: root mean square (and largest) distance from the converged points in units of their spacing, 100 paths of 21
-points in the plane, fresh walks and populations just crossed over:
+Per arm and block of 64 lanes: fit the splines, integrate the speed (`arc_length`), then find for
+the targets L·i/N their segment (every segment is entered in the bucket of the first target at or
+after its begin; a running maximum fills the gaps) and within it the sample, by a bisection without
+branches. Between two samples the speed is taken as linear, which inverts in closed form; the point
+is the spline's there.
+
+Accuracy: root mean square (and largest) distance from the converged points in units of their
+spacing, 100 paths of 21 points in the plane, fresh walks and populations just crossed over:
 
     8 samples per segment   0.6e-3 … 1.7e-3   (0.8e-2 … 1.2e-2)
     16 samples              1.1e-4 … 2.6e-4   (1.4e-3 … 2.1e-3)
     16 chords               0.8e-3 … 1.1e-3   (0.4e-2 … 0.5e-2)
 
-Gauss's rule with a polynomial inverse needs as many roots for that: near a cusp, which crossed-over paths have, the
-speed is hardly smooth. What limits it (Xeon at 2.5 to 3 GHz, 50 lanes, 2 arms, 21 points, 2 joints, 8 samples: about
-70 µs): the speeds and their integral 30 µs, of which the square roots alone (3 cycles each) take 18; copying records
-from each lane's own place, which no loop can vectorise, 14 µs; the bisection 9 µs; splines 3 µs; and arithmetic.
+Gauss's rule with a polynomial inverse needs as many roots for that: near a cusp, which crossed-over
+paths have, the speed is hardly smooth. What limits it (Xeon at 2.5 to 3 GHz, 50 lanes, 2 arms, 21
+points, 2 joints, 8 samples: about 70 µs): the speeds and their integral 30 µs, of which the square
+roots alone (3 cycles each) take 18; copying records from each lane's own place, which no loop can
+vectorise, 14 µs; the bisection 9 µs; splines 3 µs; and arithmetic.
 """
 
 from typing import Any
@@ -27,16 +31,37 @@ from evoexp.numerics import borrowed, kernel
 from evoexp.paths.arc_length import integrate_speed
 from evoexp.paths.layout import check_arm_slices, check_via_points, padded
 from evoexp.paths.spline import fit_spline
-from evoexp.paths.workspace import R2, R3, R4, R5, R6, R7, R8, ROW, ROW_SHIFT, U0, U1, U3, Redistribution
+from evoexp.paths.workspace import (
+    R2,
+    R3,
+    R4,
+    R5,
+    R6,
+    R7,
+    R8,
+    ROW,
+    ROW_SHIFT,
+    U0,
+    U1,
+    U3,
+    Redistribution,
+)
 
-_LONGEST = 1e300  # a path that is longer has overflowed (garbage in a padded lane0) and stays as it is
+_LONGEST = (
+    1e300  # a path that is longer has overflowed (garbage in a padded lane0) and stays as it is
+)
 
 
 @kernel
-def enter_segments(w: Any, N: Any, S: Any, count: Any, samples: Any, work: Any, entered: Any, at: Any) -> None:
-    """Write to row i of `entered` the last segment that begins at or before target i, or an earlier one or 0.
+def enter_segments(
+    w: Any, N: Any, S: Any, count: Any, samples: Any, work: Any, entered: Any, at: Any
+) -> None:
+    """Write to row i of `entered` the last segment that begins at or before target i.
 
-    Also writes the origin of L, the path's length and its N-th part's reciprocal to the work rows 5, 6 and 7.
+    Or an earlier one or 0.
+
+    Also writes the origin of L, the path's length and its N-th part's reciprocal to the work rows
+    5, 6 and 7.
     """
     end = samples + ROW + N * S * R2
     n = np.float64(N)
@@ -60,8 +85,10 @@ def enter_segments(w: Any, N: Any, S: Any, count: Any, samples: Any, work: Any, 
 
 
 @kernel
-def find_samples(w: Any, fraction: float, S: Any, count: Any, samples: Any, work: Any, segment: Any, at: Any) -> None:
-    """Write the target lengths to work row 0 and to `at` where the last sample of each segment not beyond it stands."""
+def find_samples(
+    w: Any, fraction: float, S: Any, count: Any, samples: Any, work: Any, segment: Any, at: Any
+) -> None:
+    """Write target lengths to work row 0, and to `at` the last sample not beyond each of them."""
     for lane in range(count):
         w[work + lane] = w[work + R5 + lane] + w[work + R6 + lane] * fraction
         at[lane] = segment[lane] * S * R2 + lane
@@ -85,7 +112,12 @@ def gather(w: Any, base: Any, work: Any, count: Any, at: Any) -> None:
     """Copy four consecutive rows, each lane0 from its own place, to the work rows 1..4."""
     for lane in range(count):
         f = base + at[lane]
-        x0, x1, x2, x3 = w[f], w[f + ROW], w[f + R2], w[f + R3]  # all loads first: a store could alias
+        x0, x1, x2, x3 = (
+            w[f],
+            w[f + ROW],
+            w[f + R2],
+            w[f + R3],
+        )  # all loads first: a store could alias
         w[work + ROW + lane] = x0
         w[work + R2 + lane] = x1
         w[work + R3 + lane] = x2
@@ -94,7 +126,10 @@ def gather(w: Any, base: Any, work: Any, count: Any, at: Any) -> None:
 
 @kernel
 def find_parameters(w: Any, S: Any, count: Any, work: Any, at: Any) -> None:
-    """Replace the target lengths by u in [0, 1] within their segments, from the gathered speeds and lengths."""
+    """Replace the target lengths by u in [0, 1] within their segments.
+
+    From the gathered speeds and lengths.
+    """
     h = 1.0 / np.float64(S)
     mask = S - U1
     for lane in range(count):
@@ -114,10 +149,20 @@ def find_parameters(w: Any, S: Any, count: Any, work: Any, at: Any) -> None:
 
 
 @kernel
-def evaluate(via_points: Any, joint: Any, i: Any, lane0: Any, w: Any, work: Any, count: Any) -> None:
-    """Move point i of one joint to the spline's value at u, except on paths without length (or overflowed ones)."""
+def evaluate(
+    via_points: Any, joint: Any, i: Any, lane0: Any, w: Any, work: Any, count: Any
+) -> None:
+    """Move point i of one joint to the spline's value at u, except on paths without length.
+
+    Or overflowed ones.
+    """
     for lane in range(count):
-        a0, m0, a1, m1 = w[work + ROW + lane], w[work + R2 + lane], w[work + R3 + lane], w[work + R4 + lane]
+        a0, m0, a1, m1 = (
+            w[work + ROW + lane],
+            w[work + R2 + lane],
+            w[work + R3 + lane],
+            w[work + R4 + lane],
+        )
         u = w[work + lane]
         x = a0 + u * ((a1 - a0 - 2.0 * m0 - m1) + u * (3.0 * m0 + u * (m1 - m0)))
         old = via_points[joint, i, lane0 + lane]
@@ -127,7 +172,8 @@ def evaluate(via_points: Any, joint: Any, i: Any, lane0: Any, w: Any, work: Any,
 
 @kernel
 def move_points(
-    via_points: Any, first: Any, joints: Any, lane0: Any, count: Any, N: Any, S: Any, w: Any, samples: Any, work: Any,
+    via_points: Any, first: Any, joints: Any, lane0: Any, count: Any, N: Any, S: Any, w: Any,
+    samples: Any, work: Any,
     entered: Any, segment: Any, at: Any,
 ) -> None:  # fmt: skip
     """Move the points 1..N−1 of one arm in one block of lanes."""
@@ -150,7 +196,13 @@ def move_points(
 
 @kernel
 def redistribute_arms(
-    via_points: Any, arm_slices: Any, num_lanes: int, samples_per_segment: int, pivots: Any, w: Any, integers: Any
+    via_points: Any,
+    arm_slices: Any,
+    num_lanes: int,
+    samples_per_segment: int,
+    pivots: Any,
+    w: Any,
+    integers: Any,
 ) -> None:
     """See `redistribute`; num_lanes is a multiple of eight here."""
     via_points, pivots, w, integers = borrowed((via_points, pivots, w, integers))
@@ -162,7 +214,10 @@ def redistribute_arms(
     blocks = (groups + np.uint64(7)) >> U3
     size = ((groups + blocks - U1) // blocks) << U3
     for arm in range(arm_slices.shape[0]):
-        first, joints = np.uint64(arm_slices[arm, 0]), np.uint64(arm_slices[arm, 1] - arm_slices[arm, 0])
+        first, joints = (
+            np.uint64(arm_slices[arm, 0]),
+            np.uint64(arm_slices[arm, 1] - arm_slices[arm, 0]),
+        )
         pitch = (N + U1) * R2
         samples = joints * pitch + R6
         work = samples + (N * S + np.uint64(2)) * R2
@@ -173,17 +228,35 @@ def redistribute_arms(
                 fit_spline(via_points, first + joint, lane0, count, N, pivots, w, joint * pitch)
             integrate_speed(w, joints, N, S, count, samples, work)
             enter_segments(w, N, S, count, samples, work, entered, at)
-            move_points(via_points, first, joints, lane0, count, N, S, w, samples, work, entered, segment, at)
+            move_points(
+                via_points,
+                first,
+                joints,
+                lane0,
+                count,
+                N,
+                S,
+                w,
+                samples,
+                work,
+                entered,
+                segment,
+                at,
+            )
 
 
 def redistribute(
-    via_points: NDArray[np.float64], arm_slices: NDArray[np.int64], num_lanes: int, workspace: Redistribution
+    via_points: NDArray[np.float64],
+    arm_slices: NDArray[np.int64],
+    num_lanes: int,
+    workspace: Redistribution,
 ) -> None:
-    """Move the via-points of every arm's path to equal arc length along the cubic spline through them, in place.
+    """Move the via-points of every arm's path to equal arc length along its spline, in place.
 
-    The spline runs over the index 0..N (Rana & Zalzala 1995, Sect. 3.3). The end points keep their bits; a path
-    without length keeps all of them. Lengths come from `samples_per_segment` speeds per segment by a rule of fourth
-    order: 8 are about as accurate as 16 chords, 16 about five times better.
+    The spline runs over the index 0..N (Rana & Zalzala 1995, Sect. 3.3). The end points keep their
+    bits; a path without length keeps all of them. Lengths come from `samples_per_segment` speeds
+    per segment by a rule of fourth order: 8 are about as accurate as 16 chords, 16 about five times
+    better.
 
     Args:
         via_points: Paths, any unit common to the joints of an arm.  # (nq, N + 1, lanes)
@@ -198,7 +271,10 @@ def redistribute(
     nq, num_points, lanes = via_points.shape
     check_arm_slices(arm_slices, nq, workspace.max_joints)
     if num_points != workspace.num_via_points + 1:
-        raise ValueError(f"via_points: the workspace is for {workspace.num_via_points + 1} points, was {num_points}")
+        raise ValueError(
+            f"via_points: the workspace is for {workspace.num_via_points + 1} points, was "
+            f"{num_points}"
+        )
     if num_points > 2:
         redistribute_arms(
             via_points, arm_slices, padded(num_lanes, lanes), workspace.samples_per_segment,

@@ -11,7 +11,10 @@ from evoexp.paths.layout import check_via_points, padded
 
 @kernel
 def relax_points(via_points: Any, delta: float, num_lanes: int) -> None:
-    """See `relax`; two loops per point, because one that reads and writes neighbouring rows does not vectorise."""
+    """See `relax`; two loops per point.
+
+    Because one that reads and writes neighbouring rows does not vectorise.
+    """
     middle = np.empty(num_lanes)
     for j in range(via_points.shape[0]):
         for i in range(1, via_points.shape[1] - 1):
@@ -23,10 +26,12 @@ def relax_points(via_points: Any, delta: float, num_lanes: int) -> None:
 
 
 def relax(via_points: NDArray[np.float64], delta: float, num_lanes: int) -> None:
-    """Move every via-point by `delta` toward the middle of its neighbours, in place and in order (one sweep).
+    """Move every via-point by `delta` toward the middle of its neighbours, in place and in order.
 
-    Point i sees point i−1 as already moved: the loop of Rana & Zalzala 1995, Eqs 8 and 9, as it is written. The ends
-    stay. delta = 0 changes nothing.
+    One sweep.
+
+    Point i sees point i−1 as already moved: the loop of Rana & Zalzala 1995, Eqs 8 and 9, as it is
+    written. The ends stay. delta = 0 changes nothing.
 
     Args:
         via_points: Paths.  # (nq, N + 1, lanes)

@@ -13,8 +13,13 @@ from evoexp.paths.workspace import R2, R3, R4, ROW, U1, U2
 
 
 @kernel
-def fit_spline(via_points: Any, joint: Any, lane0: Any, count: Any, N: Any, pivots: Any, w: Any, knots: Any) -> None:
-    """Copy one joint's coordinates to the scratch w at `knots` and solve for m beside them (Thomas algorithm)."""
+def fit_spline(
+    via_points: Any, joint: Any, lane0: Any, count: Any, N: Any, pivots: Any, w: Any, knots: Any
+) -> None:
+    """Copy one joint's coordinates to the scratch w at `knots` and solve for m beside them.
+
+    Thomas algorithm.
+    """
     pivot = pivots[0]
     for lane in range(count):
         a, a_next = via_points[joint, 0, lane0 + lane], via_points[joint, 1, lane0 + lane]
@@ -46,7 +51,12 @@ def fit_spline(via_points: Any, joint: Any, lane0: Any, count: Any, N: Any, pivo
 def square_speed(w: Any, knot: Any, out: Any, count: Any) -> None:
     """Write the five coefficients of s'(u)² of one joint on the segment that begins at `knot`."""
     for lane in range(count):
-        a0, m0, a1, m1 = w[knot + lane], w[knot + ROW + lane], w[knot + R2 + lane], w[knot + R3 + lane]
+        a0, m0, a1, m1 = (
+            w[knot + lane],
+            w[knot + ROW + lane],
+            w[knot + R2 + lane],
+            w[knot + R3 + lane],
+        )
         b0, b1, b2 = a1 - a0 - 2.0 * m0 - m1, 6.0 * m0, 3.0 * (m1 - m0)
         w[out + lane] = b0 * b0
         w[out + ROW + lane] = 2.0 * b0 * b1
@@ -57,9 +67,17 @@ def square_speed(w: Any, knot: Any, out: Any, count: Any) -> None:
 
 @kernel
 def add_square_speed(w: Any, knot: Any, given: Any, out: Any, count: Any) -> None:
-    """Write to `out` the coefficients at `given` plus those of one joint more (in place would not vectorise)."""
+    """Write to `out` the coefficients at `given` plus those of one joint more.
+
+    In place would not vectorise.
+    """
     for lane in range(count):
-        a0, m0, a1, m1 = w[knot + lane], w[knot + ROW + lane], w[knot + R2 + lane], w[knot + R3 + lane]
+        a0, m0, a1, m1 = (
+            w[knot + lane],
+            w[knot + ROW + lane],
+            w[knot + R2 + lane],
+            w[knot + R3 + lane],
+        )
         b0, b1, b2 = a1 - a0 - 2.0 * m0 - m1, 6.0 * m0, 3.0 * (m1 - m0)
         w[out + lane] = w[given + lane] + b0 * b0
         w[out + ROW + lane] = w[given + ROW + lane] + 2.0 * b0 * b1
@@ -70,7 +88,10 @@ def add_square_speed(w: Any, knot: Any, given: Any, out: Any, count: Any) -> Non
 
 @kernel
 def square_speeds(w: Any, knot: Any, joints: Any, pitch: Any, work: Any, count: Any) -> Any:
-    """Return where the coefficients of |s'(u)|² over all joints of an arm were written (`work`, or eight rows on)."""
+    """Return where the coefficients of |s'(u)|² over all joints of an arm were written.
+
+    `work`, or eight rows on.
+    """
     here, there = work, work + U2 * R4
     square_speed(w, knot, here, count)
     for joint in range(U1, joints):

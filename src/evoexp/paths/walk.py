@@ -1,4 +1,7 @@
-"""New strings of via-points by a random walk from start to goal (Rana & Zalzala 1995, section 3.3)."""
+"""New strings of via-points by a random walk from start to goal.
+
+Rana & Zalzala 1995, section 3.3.
+"""
 
 import numpy as np
 
@@ -7,7 +10,10 @@ from evoexp.records import FloatArray
 
 
 def num_uniforms(arm_slices: np.ndarray, num_via_points: int) -> int:
-    """Return how many uniform numbers one string takes: per step an angle fewer than the arm has joints."""
+    """Return how many uniform numbers one string takes.
+
+    Per step an angle fewer than the arm has joints.
+    """
     return int(sum((num_via_points - 1) * (stop - first - 1) for first, stop in arm_slices))
 
 
@@ -23,10 +29,10 @@ def walk(
 ) -> None:
     """Write new strings into some lanes.
 
-    Every arm takes N − 1 steps of length step · D / N, D its straight distance from start to goal. A step goes in the
-    direction of the goal, each of whose angles is turned by a uniform random angle: in the plane of two joints the one
-    angle, in space azimuth and elevation, and so on. The goal itself is the last point. An arm of one joint has no
-    angle to turn.
+    Every arm takes N − 1 steps of length step · D / N, D its straight distance from start to goal.
+    A step goes in the direction of the goal, each of whose angles is turned by a uniform random
+    angle: in the plane of two joints the one angle, in space azimuth and elevation, and so on. The
+    goal itself is the last point. An arm of one joint has no angle to turn.
 
     Args:
         via_points: (nq, N + 1, lanes), written in the given lanes.
@@ -45,14 +51,17 @@ def walk(
         expected = (len(lanes), num_uniforms(arm_slices, via_points.shape[1] - 1))
         limit = via_points.shape[2]
         raise ValueError(
-            f"uniforms must have shape {expected}, was {uniforms.shape}; lanes must lie within 0..{limit - 1}; "
-            f"start, goal and arm_slices must be of {len(via_points)} joints"
+            f"uniforms must have shape {expected}, was {uniforms.shape}; lanes must lie within "
+            f"0..{limit - 1}; start, goal and arm_slices must be of {len(via_points)} joints"
         )
 
 
 @kernel
 def walk_strings(via_points, lanes, uniforms, start, goal, arm_slices, step, max_turn):  # type: ignore[no-untyped-def]
-    """The kernel of `walk`, for other kernels; returns false, and writes nothing, if the arrays do not fit."""
+    """The kernel of `walk`, for other kernels.
+
+    Returns false, and writes nothing, if the arrays do not fit.
+    """
     num = via_points.shape[1] - 1
     needed = 0
     if len(start) != len(via_points) or len(goal) != len(via_points):
@@ -91,11 +100,13 @@ def walk_strings(via_points, lanes, uniforms, start, goal, arm_slices, step, max
 
 @kernel
 def _turn(direction, first, stop, uniforms, s, taken, max_turn):  # type: ignore[no-untyped-def]
-    """Turn the hyperspherical angles of a direction, the azimuth first; return what scales it to a unit vector.
+    """Turn the hyperspherical angles of a direction, the azimuth first.
 
-    The angle of coordinate k stands between the axis k and what the coordinates before it make up, of length `below`.
-    Turning it takes (below, direction[k]) around; the coordinates before keep their proportions. A direction straight
-    along a later axis has azimuth 0.
+    Return what scales it to a unit vector.
+
+    The angle of coordinate k stands between the axis k and what the coordinates before it make up,
+    of length `below`. Turning it takes (below, direction[k]) around; the coordinates before keep
+    their proportions. A direction straight along a later axis has azimuth 0.
     """
     x = direction[first]
     if stop - first == 1:

@@ -1,6 +1,9 @@
-"""Many random walks over a grid between the same two nodes: some at a time, one step of each after the other.
+"""Many random walks over a grid between the same two nodes.
 
-A step waits for the one before it, which says where to look; meanwhile the other walkers take theirs.
+Some at a time, one step of each after the other.
+
+A step waits for the one before it, which says where to look; meanwhile the other walkers take
+theirs.
 """
 
 from typing import Any
@@ -43,9 +46,18 @@ class Walkers:
         """
         nodes = len(choices[0])
         if paths.ndim != 2 or paths.shape[1] != nodes + 1 or paths.dtype != np.int32:
-            raise ValueError(f"paths must be int32 (paths, {nodes + 1}), were {paths.dtype} {paths.shape}")
-        lanes = np.full(LANES, ends[0], dtype=np.uint64), np.ones(LANES, dtype=np.uint64), np.arange(LANES)
-        trails, places = np.empty((LANES, nodes + 1), dtype=np.int32), np.zeros((LANES, nodes), dtype=np.int32)
+            raise ValueError(
+                f"paths must be int32 (paths, {nodes + 1}), were {paths.dtype} {paths.shape}"
+            )
+        lanes = (
+            np.full(LANES, ends[0], dtype=np.uint64),
+            np.ones(LANES, dtype=np.uint64),
+            np.arange(LANES),
+        )
+        trails, places = (
+            np.empty((LANES, nodes + 1), dtype=np.int32),
+            np.zeros((LANES, nodes), dtype=np.int32),
+        )
         trails[:, 0], trails[:, 1], places[:, ends[0]] = -1, ends[0], 1
         self._progress = np.array([LANES, 0])
         self._state: Any = self._progress, lanes, trails, places
@@ -61,7 +73,9 @@ class Walkers:
         return int(self._progress[COMPLETE])
 
     def go(self, words: np.ndarray) -> int:
-        """Go on until all paths are complete or the random words (uint64) are used up; return how many were taken.
+        """Go on until all paths are complete or the random words (uint64) are used up.
+
+        Return how many were taken.
 
         Half a word says where one walker goes, the lower one where that with the even number does.
         """
@@ -74,8 +88,8 @@ class Walkers:
 def _go(words, choices, ends, erase, state, paths):  # type: ignore[no-untyped-def]
     """The kernel of `Walkers`.
 
-    Loops are erased where they close, in `trails`; of a node that a trail passes, `places` knows the place. Nothing of
-    a step is a branch, which would be guessed wrong.
+    Loops are erased where they close, in `trails`; of a node that a trail passes, `places` knows
+    the place. Nothing of a step is a branch, which would be guessed wrong.
     """
     words, (totals, slots), state, paths = borrowed((words, choices, state, paths))
     progress, (walkers, counts, _), trails, places = state
@@ -85,13 +99,22 @@ def _go(words, choices, ends, erase, state, paths):  # type: ignore[no-untyped-d
         for pair in range(WORDS):
             word = words[taken + pair]
             for half in range(2):
-                lane = np.uint64(2 * pair + half)  # without a sign, as an index might count from the end
+                lane = np.uint64(
+                    2 * pair + half
+                )  # without a sign, as an index might count from the end
                 random = word >> HALF if half else word & LOW
                 node = walkers[lane]
                 node = np.uint64(slots[node, random * totals[node] >> HALF])
-                count, known = counts[lane], np.uint64(places[lane, node])  # known since an earlier walk, perhaps
-                again = np.uint64(erase & (known <= count) & (trails[lane, known] == np.int32(node)))
-                count = count + ONE + (known - count - ONE) * again  # so written it stays without a branch
+                count, known = (
+                    counts[lane],
+                    np.uint64(places[lane, node]),
+                )  # known since an earlier walk, perhaps
+                again = np.uint64(
+                    erase & (known <= count) & (trails[lane, known] == np.int32(node))
+                )
+                count = (
+                    count + ONE + (known - count - ONE) * again
+                )  # so written it stays without a branch
                 trails[lane, count] = node
                 places[lane, node] = count
                 walkers[lane], counts[lane] = node, count
@@ -105,7 +128,10 @@ def _go(words, choices, ends, erase, state, paths):  # type: ignore[no-untyped-d
 
 @kernel
 def _look_at(walker, ends, erase, state, paths):  # type: ignore[no-untyped-def]
-    """Have a walker who has arrived begin the next path, and one whose trail is full erase its loops."""
+    """Have a walker who has arrived begin the next path.
+
+    And one whose trail is full erase its loops.
+    """
     progress, (walkers, counts, rows), trails, places = state
     if walkers[walker] == ends[1]:
         row = rows[walker]
@@ -125,7 +151,9 @@ def _look_at(walker, ends, erase, state, paths):  # type: ignore[no-untyped-def]
         counts[walker] = trails[walker, 0]
 
 
-def choice_table(neighbours: np.ndarray, potentials: FloatArray, steps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def choice_table(
+    neighbours: np.ndarray, potentials: FloatArray, steps: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the choices of walks to one target at every node: every move as often as it weighs.
 
     Args:
@@ -134,8 +162,9 @@ def choice_table(neighbours: np.ndarray, potentials: FloatArray, steps: np.ndarr
         steps: (nodes,) of the front from the target.
 
     Returns:
-        Sums of the weights (nodes,), and where such a move leads to, (nodes, greatest sum). Both are empty if the
-        weights are no whole numbers, or if the table would be large; then only `grid_walks.walk` is left.
+        Sums of the weights (nodes,), and where such a move leads to, (nodes, greatest sum). Both
+        are empty if the weights are no whole numbers, or if the table would be large; then only
+        `grid_walks.walk` is left.
     """
     permitted = neighbours >= 0
     potential = np.where(permitted, potentials[steps[neighbours]], -np.inf)

@@ -1,9 +1,12 @@
-"""What redistribution needs besides the via-points: the constant factor of the splines and scratch memory.
+"""What redistribution needs besides the via-points.
 
-The scratch is one flat array of rows of 64 lanes; a kernel addresses it as `floats[base + r * ROW + lane]` with a
-constant r. Only with such constant distances does LLVM see that rows do not overlap and vectorise loops that read and
-write several of them. Indices are unsigned: a signed one would be tested for wrap-around, which prevents vectorising.
-Rows, for J joints, N segments and S samples per segment:
+The constant factor of the splines and scratch memory.
+
+The scratch is one flat array of rows of 64 lanes; a kernel addresses it as `floats[base + r * ROW +
+lane]` with a constant r. Only with such constant distances does LLVM see that rows do not overlap
+and vectorise loops that read and write several of them. Indices are unsigned: a signed one would be
+tested for wrap-around, which prevents vectorising. Rows, for J joints, N segments and S samples per
+segment:
 
 - knot i of joint j: a (the coordinate), then m (a sixth of the spline's second derivative there);
 - sample −3 … N·S + 1: v (the speed), then L (the arc length up to there);
@@ -26,7 +29,9 @@ EndCondition = Literal["natural", "clamped"]
 
 
 class Redistribution(NamedTuple):
-    """Settings, constant factor and scratch of `redistribute`; one per thread, made by `prepare_redistribution`.
+    """Settings, constant factor and scratch of `redistribute`.
+
+    One per thread, made by `prepare_redistribution`.
 
     Attributes:
         num_via_points: N; a path has the N + 1 points 0..N.
@@ -48,11 +53,13 @@ class Redistribution(NamedTuple):
 
 
 def spline_pivots(num_segments: int, end_condition: EndCondition) -> NDArray[np.float64]:
-    """Return the reciprocal pivots (N + 1,) of the system for m, a sixth of a cubic spline's second derivatives.
+    """Return the reciprocal pivots (N + 1,) of the system for m.
 
-    Inside, m[i−1] + 4 m[i] + m[i+1] = a[i−1] − 2 a[i] + a[i+1]. Clamped ends (slope zero) add the first equation
-    2 m[0] + m[1] = a[1] − a[0] and the last, m[N−1] + 2 m[N] = a[N−1] − a[N]. Natural ones have m[0] = m[N] = 0, which
-    a reciprocal of zero achieves.
+    A sixth of a cubic spline's second derivatives.
+
+    Inside, m[i−1] + 4 m[i] + m[i+1] = a[i−1] − 2 a[i] + a[i+1]. Clamped ends (slope zero) add the
+    first equation 2 m[0] + m[1] = a[1] − a[0] and the last, m[N−1] + 2 m[N] = a[N−1] − a[N].
+    Natural ones have m[0] = m[N] = 0, which a reciprocal of zero achieves.
     """
     clamped = end_condition == "clamped"
     pivots = np.zeros(num_segments + 1)
@@ -82,7 +89,8 @@ def prepare_redistribution(
         num_via_points: N; a path has the N + 1 points 0..N.
         max_joints: The most joints that one arm may have.
         end_condition: `natural` or `clamped` (zero slope at both ends).
-        samples_per_segment: Speeds evaluated per segment, a power of two from 8 to 1024; see `redistribute`.
+        samples_per_segment: Speeds evaluated per segment, a power of two from 8 to 1024; see
+            `redistribute`.
 
     Raises:
         ValueError: A setting out of range.
@@ -95,7 +103,9 @@ def prepare_redistribution(
         raise ValueError(f"end_condition: must be 'natural' or 'clamped', was {end_condition!r}")
     samples = samples_per_segment
     if not 8 <= samples <= MAX_SAMPLES or samples & (samples - 1):
-        raise ValueError(f"samples_per_segment: must be a power of two from 8 to {MAX_SAMPLES}, was {samples}")
+        raise ValueError(
+            f"samples_per_segment: must be a power of two from 8 to {MAX_SAMPLES}, was {samples}"
+        )
     rows = 2 * max_joints * (num_via_points + 1) + 2 * (num_via_points * samples + 5) + WORK_ROWS
     return Redistribution(
         num_via_points,

@@ -1,12 +1,13 @@
 """Co-evolving populations, one per robot (Curkovic, Jerbic & Stipancic 2013).
 
-An individual is a path of one robot: K configurations of two absolute link angles between start and goal, which are
-given. What it is worth depends on all individuals of the other robots' populations. The answer is a team: one
-individual of every population, free of collision with each other. Nothing here knows how many robots there are.
+An individual is a path of one robot: K configurations of two absolute link angles between start and
+goal, which are given. What it is worth depends on all individuals of the other robots' populations.
+The answer is a team: one individual of every population, free of collision with each other. Nothing
+here knows how many robots there are.
 
-A population is an array (robots, 2 K, individuals) [rad]: the angles of configuration 1, of configuration 2, …. A
-solution is flat: robot by robot, configuration by configuration, link by link (robots × (K + 2) × 2) [deg], start and
-goal included.
+A population is an array (robots, 2 K, individuals) [rad]: the angles of configuration 1, of
+configuration 2, …. A solution is flat: robot by robot, configuration by configuration, link by link
+(robots × (K + 2) × 2) [deg], start and goal included.
 """
 
 from collections.abc import Iterator
@@ -61,12 +62,16 @@ class Problem(NamedTuple):
 
 
 class Coevolution(Component):
-    """The co-evolutionary algorithm of Curkovic et al., sections 2 and 3; methods I–VIII are settings of it.
+    """The co-evolutionary algorithm of Curkovic et al., sections 2 and 3.
+
+    Methods I–VIII are settings of it.
 
     Attributes:
-        chromosome_length: L, even: two link angles for each of K = L/2 configurations between start and goal [-].
-        interpolation: What is executed between configurations: straight lines in the joint angles, or a cubic spline
-            that starts and ends at rest (Fig. 9). The verdict judges that; the search looks at the configurations.
+        chromosome_length: L, even: two link angles for each of K = L/2 configurations between start
+            and goal [-].
+        interpolation: What is executed between configurations: straight lines in the joint angles,
+            or a cubic spline that starts and ends at rest (Fig. 9). The verdict judges that; the
+            search looks at the configurations.
         speed_limit: Of the end-effector (Eqs. 2, 3); no part of the search.
         ga: Populations, generations, rates, hall of fame.
         objective: Weights of C1 … C4.
@@ -103,18 +108,24 @@ class Coevolution(Component):
         assembly = robot.build()
         collision = self.collision.bind(assembly, scenario.obstacles)
         if len(collision.arms) < 2:
-            raise SettingError("robot", "two robots or more, which evolve together", len(collision.arms))
+            raise SettingError(
+                "robot", "two robots or more, which evolve together", len(collision.arms)
+            )
         bases, lengths = (np.array([arm[k] for arm in collision.arms]) for k in range(2))
         start, goal = (DEGREE * ends for ends in scenario.ends(bases, lengths))
         moving = np.array([r not in scenario.stationary for r in range(len(collision.arms))])
         bodies = scene(assembly, scenario.obstacles)
-        problem = Problem(assembly, collision, start, goal, moving, bodies, scenario.security_margin)
+        problem = Problem(
+            assembly, collision, start, goal, moving, bodies, scenario.security_margin
+        )
         for name, posture in (("q_start", start), ("q_goal", goal)):
             if contact := collision.contact(posture):
                 relative = np.stack([posture[:, 0], posture[:, 1] - posture[:, 0]], axis=1).ravel()
                 closest = " and ".join(bodies.nearest_pair(relative))
                 given = (posture / DEGREE).round(9).tolist()
-                raise SettingError(f"scenario.{name}", f"free of collision ({contact}: {closest})", given)
+                raise SettingError(
+                    f"scenario.{name}", f"free of collision ({contact}: {closest})", given
+                )
         return problem
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
@@ -128,7 +139,8 @@ class Coevolution(Component):
             hall = self._renewed(populations, found, hall)
             waiting = 0 if record.feasible else waiting + 1
             if ga.restart_after is not None and waiting >= ga.restart_after:
-                # "If no convergence has occurred, …, the algorithm generates new populations" (section 3).
+                # "If no convergence has occurred, …, the algorithm generates new populations"
+                # (section 3).
                 populations, waiting = self.sample(problem, rng, ga.population_size), 0
                 hall = Hall.empty(len(problem.start))
             else:
@@ -142,12 +154,17 @@ class Coevolution(Component):
         depth = self.ga.num_hall_teams
         if not depth:
             return hall
-        teams, ages = np.empty((depth, len(populations)), dtype=np.int64), np.empty(depth, dtype=np.int64)
+        teams, ages = (
+            np.empty((depth, len(populations)), dtype=np.int64),
+            np.empty(depth, dtype=np.int64),
+        )
         teams[: hall.num_teams], ages[: hall.num_teams] = hall.teams, hall.ages
         collisions, costs = np.empty(depth, dtype=np.int64), np.empty(depth)
         rules = self.ga.hall_memory or 0, self.ga.hall_frozen
         found_keys = found.criteria, found.collisions, found.teamable
-        held = renew(populations, *found_keys, rules, teams, ages, hall.num_teams, (collisions, costs))
+        held = renew(
+            populations, *found_keys, rules, teams, ages, hall.num_teams, (collisions, costs)
+        )
         return Hall(teams[:held], ages[:held], collisions[:held], costs[:held])
 
     def _bred(
@@ -159,7 +176,10 @@ class Coevolution(Component):
         hall: Hall,
         index: int,
     ) -> FloatArray:
-        """Return the next populations: offspring, then elites, then the members of the hall, unchanged."""
+        """Return the next populations.
+
+        Offspring, then elites, then the members of the hall, unchanged.
+        """
         ga, bred = self.ga, np.empty_like(populations)
         rate = decayed_rate(ga.mutation_rate, ga.mutation_decay, index, ga.num_generations)
         count = ga.population_size - ga.num_elites - hall.num_teams
@@ -171,19 +191,32 @@ class Coevolution(Component):
         return bred
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
-        """Return populations of uniform genes, (robots, 2 K, count); robots that stand still keep their posture."""
+        """Return populations of uniform genes, (robots, 2 K, count).
+
+        Robots that stand still keep their posture.
+        """
         genes = HALF_TURN * rng.random((len(problem.start), 2 * self.num_configurations, count))
         for robot in np.flatnonzero(~problem.moving):
             genes[robot] = np.tile(problem.start[robot], self.num_configurations)[:, None]
         return genes
 
     def evaluated(self, problem: Problem, populations: FloatArray) -> Evaluated:
-        """Evaluate populations (robots, 2 K, individuals), everybody against everybody of the other robots (Eq. 4)."""
+        """Evaluate populations (robots, 2 K, individuals).
+
+        Everybody against everybody of the other robots (Eq. 4).
+        """
         collision, robots, count = problem.collision, len(populations), populations.shape[2]
         criteria, own = np.empty((robots, 4, count)), np.empty((robots, count))
-        paths, points = (np.empty((robots, self.num_configurations + 2, rows, count)) for rows in (2, 4))
-        arms, weights = np.array([(*arm.base, *arm.lengths) for arm in collision.arms]), self.objective.own_weights
-        measure(populations, problem.start, problem.goal, arms, weights, paths, points, criteria, own)
+        paths, points = (
+            np.empty((robots, self.num_configurations + 2, rows, count)) for rows in (2, 4)
+        )
+        arms, weights = (
+            np.array([(*arm.base, *arm.lengths) for arm in collision.arms]),
+            self.objective.own_weights,
+        )
+        measure(
+            populations, problem.start, problem.goal, arms, weights, paths, points, criteria, own
+        )
         lines = [collision.outlines(r, paths[r], points[r]) for r in range(robots)]
         blocked = np.array([collision.with_obstacles(r, lines[r]) for r in range(robots)])
         hits, sums = [], blocked * count  # an obstacle is in the way whoever the collaborator is
@@ -194,7 +227,9 @@ class Coevolution(Component):
             sums[b] += crossings.sums_2
         criteria[:, 0] = sums
         pairs = hits[0][np.newaxis] if len(hits) == 1 else np.array(hits)
-        return Evaluated(self.objective.collision_weight * sums + own, criteria, own, pairs, blocked)
+        return Evaluated(
+            self.objective.collision_weight * sums + own, criteria, own, pairs, blocked
+        )
 
     def cost(self, problem: Problem, population: FloatArray) -> Judgement:
         """Judge the individuals of the first robot, each by its cheapest collision-free team."""
@@ -212,9 +247,13 @@ class Coevolution(Component):
 
     def solution(self, problem: Problem, population: FloatArray, individual: int) -> FloatArray:
         """Return the team of an individual of the first robot as a flat solution."""
-        return self.team_solution(problem, population, self.evaluated(problem, population).team_of(individual))
+        return self.team_solution(
+            problem, population, self.evaluated(problem, population).team_of(individual)
+        )
 
-    def team_solution(self, problem: Problem, population: FloatArray, team: np.ndarray) -> FloatArray:
+    def team_solution(
+        self, problem: Problem, population: FloatArray, team: np.ndarray
+    ) -> FloatArray:
         """Return one individual of every population as a flat solution."""
         parts = []
         for r, individual in enumerate(team):
@@ -223,18 +262,24 @@ class Coevolution(Component):
         return np.concatenate(parts)
 
     def motion(self, problem: Problem, solution: FloatArray) -> Motion:
-        """Return the joint-space motion of a solution, from configuration to configuration in equal times."""
+        """Return the joint-space motion of a solution.
+
+        From configuration to configuration in equal times.
+        """
         absolute = self._curve(problem, solution).q
         relative = absolute.reshape(len(absolute), -1, 2).copy()
         relative[:, :, 1] -= relative[:, :, 0]  # the models' joints turn against the link before
         return self._interpolated(relative.reshape(absolute.shape))
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
-        """Return the criteria of every robot of one team, and what the executed curve asks of its joints.
+        """Return the criteria of every robot of one team.
+
+        And what the executed curve asks of its joints.
 
         Returns:
-            C1 … C4 (C1 against the team's other robots only), how far the curve leaves the range [0, π] of link angles,
-            and the largest turn of a link per sampling step, at the curve's fastest instant.
+            C1 … C4 (C1 against the team's other robots only), how far the curve leaves the range
+            [0, π] of link angles, and the largest turn of a link per sampling step, at the curve's
+            fastest instant.
 
         Raises:
             ValueError: If the solution has another size than robots × (K + 2) × 2.
@@ -255,7 +300,9 @@ class Coevolution(Component):
     def notes(self, problem: Problem) -> list[str]:
         """Return what Eqs. 2 and 3 say of the chromosome's length, line by line."""
         lengths = [arm.lengths for arm in problem.collision.arms]
-        return length_notes(self.speed_limit, lengths, problem.start, problem.goal, self.chromosome_length)
+        return length_notes(
+            self.speed_limit, lengths, problem.start, problem.goal, self.chromosome_length
+        )
 
     def shape(self, problem: Problem) -> tuple[tuple[int, int], ...]:
         """Return the documented shape of a solution: per robot, (K + 2, 2)."""
@@ -299,7 +346,11 @@ class _Record:
         best = best_team(found.collisions, found.teamable)
         if best.cost < self.cost or index == 0:
             self.cost = best.cost
-            team = best.individuals if best.found else np.array([int(np.argmin(costs)) for costs in found.costs])
+            team = (
+                best.individuals
+                if best.found
+                else np.array([int(np.argmin(costs)) for costs in found.costs])
+            )
             self.solution = planner.team_solution(self.problem, populations, team)
             self.terms = found.terms_of(team)
         statistics = cost_statistics(found.costs.ravel())

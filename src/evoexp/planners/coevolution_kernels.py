@@ -7,7 +7,12 @@ from evoexp.evolution.crossover import cross_single_point
 from evoexp.evolution.hall_of_fame import renew_hall
 from evoexp.evolution.mutation import mutate_allele
 from evoexp.evolution.pareto import non_dominated
-from evoexp.evolution.selection import choose_elites, difference_weights, inverse_weights, spin_roulette
+from evoexp.evolution.selection import (
+    choose_elites,
+    difference_weights,
+    inverse_weights,
+    spin_roulette,
+)
 from evoexp.numerics import kernel
 from evoexp.objectives.motion_criteria import measure_motions
 
@@ -17,12 +22,14 @@ def breed(uniforms, populations, costs, moving, teams, settings, bred):  # type:
     """Write the next populations: offspring, then elites, then the members of the hall, unchanged.
 
     Args:
-        uniforms: (moving robots, numbers) uniform in [0, 1): parents, then cross-over, then mutation.
+        uniforms: (moving robots, numbers) uniform in [0, 1): parents, then cross-over, then
+            mutation.
         populations: (robots, genes, individuals).
         costs: (robots, individuals).
         moving: (robots,) false for robots that stand still: their populations are copied.
         teams: (teams, robots) members of the hall.
-        settings: num_elites; whether weights are inverse costs; crossover_rate; mutation rate, step, limit, symmetric.
+        settings: num_elites; whether weights are inverse costs; crossover_rate; mutation rate,
+            step, limit, symmetric.
         bred: Like populations, written.
     """
     num_elites, inverse, crossover_rate, rate, step, limit, symmetric = settings
@@ -55,7 +62,9 @@ def breed(uniforms, populations, costs, moving, teams, settings, bred):  # type:
 
 @kernel
 def renew(populations, criteria, collisions, own, settings, teams, ages, num_teams, keys):  # type: ignore[no-untyped-def]
-    """Renew the hall of fame from the Pareto fronts of all populations, without copies; return how many teams it holds.
+    """Renew the hall of fame from the Pareto fronts of all populations, without copies.
+
+    Return how many teams it holds.
 
     Args:
         populations: (robots, genes, individuals).
@@ -74,18 +83,31 @@ def renew(populations, criteria, collisions, own, settings, teams, ages, num_tea
         non_dominated(criteria[robot], count, fronts[robot])
     drop_copies(populations, teams[:num_teams], fronts)
     return renew_hall(
-        collisions, own, fronts, count, teams, ages, num_teams, settings[0], settings[1], keys[0], keys[1]
+        collisions,
+        own,
+        fronts,
+        count,
+        teams,
+        ages,
+        num_teams,
+        settings[0],
+        settings[1],
+        keys[0],
+        keys[1],
     )
 
 
 @kernel
 def drop_copies(populations, teams, fronts):  # type: ignore[no-untyped-def]
-    """Take copies of other members, and of the hall's, off the fronts: they would fill the hall with one pair.
+    """Take copies of other members, and of the hall's, off the fronts.
+
+    They would fill the hall with one pair.
 
     Args:
         populations: (robots, genes, individuals).
         teams: (teams, robots) members of the hall.
-        fronts: (robots, individuals) bool, changed: of equal genomes the first stays, none if the hall has one.
+        fronts: (robots, individuals) bool, changed: of equal genomes the first stays, none if the
+            hall has one.
     """
     for robot in range(len(populations)):
         genes, front = populations[robot], fronts[robot]

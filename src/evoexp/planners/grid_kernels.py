@@ -1,7 +1,8 @@
 """Generations of paths over a grid, compiled (Chen & Zalzala 1995, section 2.3).
 
-A population is a table of paths (individuals, nodes + 1), each row as `paths.grid_walks` says, and of their lengths,
-mean unsafenesses and costs (3, individuals). Many generations are one call; settings travel as plain tuples.
+A population is a table of paths (individuals, nodes + 1), each row as `paths.grid_walks` says, and
+of their lengths, mean unsafenesses and costs (3, individuals). Many generations are one call;
+settings travel as plain tuples.
 """
 
 from evoexp.draws import draw, draw_index, draw_many, used_up
@@ -42,12 +43,13 @@ def evolve(draws, generations, world, weights, breeding, tables, memory, records
         draws: See `evoexp.draws`.
         generations: The present one, and the one to reach.
         world: See `advance`, and so are `weights`, `breeding` and `memory`.
-        tables: Paths (places, individuals, nodes + 1) and results (places, 3, individuals) of some generations; number
-            g has place g modulo the number of places.
+        tables: Paths (places, individuals, nodes + 1) and results (places, 3, individuals) of some
+            generations; number g has place g modulo the number of places.
         records: (places, 4) see `record`.
 
     Returns:
-        The generation reached: an earlier one if the draws did not suffice. Then it is to go on there with more.
+        The generation reached: an earlier one if the draws did not suffice. Then it is to go on
+        there with more.
     """
     draws, world, tables, memory, records = borrowed((draws, world, tables, memory, records))
     paths, results = tables
@@ -64,7 +66,10 @@ def evolve(draws, generations, world, weights, breeding, tables, memory, records
 
 @kernel
 def record(results, out):  # type: ignore[no-untyped-def]
-    """Note in `out` (4,) index of the best, mean and deviation of the costs, and the number of paths: all are valid."""
+    """Note in `out` (4,) index of the best, mean and deviation of the costs.
+
+    And the number of paths: all are valid.
+    """
     out[0], out[1], out[2] = summarise(results[COST])
     out[3] = results.shape[1]
 
@@ -75,14 +80,15 @@ def advance(draws, world, weights, breeding, population, following, memory):  # 
 
     Args:
         draws: See `evoexp.draws`.
-        world: (neighbours, moves of a front, coordinates, kinds, unsafeness, potentials, fronts); `fronts`
-            (nodes, nodes) holds the steps to every node from every other, or nothing.
+        world: (neighbours, moves of a front, coordinates, kinds, unsafeness, potentials, fronts);
+            `fronts` (nodes, nodes) holds the steps to every node from every other, or nothing.
         weights: ε and λ of Eq. 1.
-        breeding: Whether loops are erased; multiple of the scaling; crossover's rate and reach; mutation's rate.
+        breeding: Whether loops are erased; multiple of the scaling; crossover's rate and reach;
+            mutation's rate.
         population: Paths (individuals, nodes + 1) and results (3, individuals).
         following: The same, written.
-        memory: (parents (offspring,), elites (elites,), expected copies and order of the scan (individuals,)), scratch
-            of `cross`.
+        memory: (parents (offspring,), elites (elites,), expected copies and order of the scan
+            (individuals,)), scratch of `cross`.
 
     Returns:
         Whether the draws sufficed; if not, what is written is not complete.
@@ -101,7 +107,9 @@ def advance(draws, world, weights, breeding, population, following, memory):  # 
         crossed = False
         if first + 1 < count and draw(draws) < crossover_rate:
             pair = paths[parents[first]], paths[parents[first + 1]]
-            crossed = cross(draws, world, pair, (erase, reach), (children[first], children[first + 1]), scratch)
+            crossed = cross(
+                draws, world, pair, (erase, reach), (children[first], children[first + 1]), scratch
+            )
         for k in range(first, min(first + 2, count)):
             changed = crossed
             if not crossed:
@@ -142,9 +150,10 @@ def copy_path(path, out):  # type: ignore[no-untyped-def]
 def cross(draws, world, parents, settings, children, scratch):  # type: ignore[no-untyped-def]
     """Exchange the remainders of two paths at a node that both pass, or at two nodes that are near.
 
-    "If the path pair have coincident points, then select one randomly as the crossover site and exchange the remainder
-    of the two paths"; if not, a pair of nodes at most `reach` apart (in every coordinate), drawn among all such pairs,
-    is connected, by a move or by a node between. Start and goal, which all paths have in common, are no sites.
+    "If the path pair have coincident points, then select one randomly as the crossover site and
+    exchange the remainder of the two paths"; if not, a pair of nodes at most `reach` apart (in
+    every coordinate), drawn among all such pairs, is connected, by a move or by a node between.
+    Start and goal, which all paths have in common, are no sites.
 
     Args:
         draws: See `evoexp.draws`.
@@ -152,8 +161,8 @@ def cross(draws, world, parents, settings, children, scratch):  # type: ignore[n
         parents: Two paths.
         settings: Whether loops are erased; reach.
         children: Two paths, written if the parents are crossed.
-        scratch: Places in a path (nodes,), a path (3 nodes + 3,), sites (2, nodes + 1), steps of a front and its queue
-            (nodes,), a walk (nodes + 1,).
+        scratch: Places in a path (nodes,), a path (3 nodes + 3,), sites (2, nodes + 1), steps of a
+            front and its queue (nodes,), a walk (nodes + 1,).
 
     Returns:
         Whether they are: there may be no site.
@@ -184,17 +193,21 @@ def cross(draws, world, parents, settings, children, scratch):  # type: ignore[n
 
 @kernel
 def exchange_without_loops(head, tail, i, j, sites, child):  # type: ignore[no-untyped-def]
-    """Write the head of a path up to its node i and the tail of another behind its node j, without loops.
+    """Write the head of a path up to its node i and the tail of another behind its node j.
 
-    Neither path has loops, so a loop begins in the head and ends in the tail: at a site. Erasing loops one by one
-    leaves the head up to the first node at which any node of the tail comes back to it, and the tail from there.
+    Without loops.
+
+    Neither path has loops, so a loop begins in the head and ends in the tail: at a site. Erasing
+    loops one by one leaves the head up to the first node at which any node of the tail comes back
+    to it, and the tail from there.
 
     Args:
         head: A path without loops.
         tail: Another one.
         i: Place of a node in the head.
         j: Place of the same node in the tail.
-        sites: (2, sites) places in `head` and in `tail` of all nodes that both have, but start and goal.
+        sites: (2, sites) places in `head` and in `tail` of all nodes that both have, but start and
+            goal.
         child: Written.
     """
     least, behind = i, j
@@ -212,7 +225,10 @@ def exchange_without_loops(head, tail, i, j, sites, child):  # type: ignore[no-u
 
 @kernel
 def _join(head, i, link, tail, j, joined):  # type: ignore[no-untyped-def]
-    """Write the head of a path up to i, a node between if `link` is one, another's tail from j; return how many."""
+    """Write the head of a path up to i, a node between if `link` is one, another's tail from j.
+
+    Return how many.
+    """
     count = i
     for k in range(1, i + 1):
         joined[k] = head[k]
@@ -227,7 +243,9 @@ def _join(head, i, link, tail, j, joined):  # type: ignore[no-untyped-def]
 
 @kernel
 def coincident_sites(one, two, place, sites):  # type: ignore[no-untyped-def]
-    """Write where two paths pass the same node, start and goal left out, into `sites` (2, nodes + 1); return how often.
+    """Write where two paths pass the same node, start and goal left out, into `sites` (2.
+
+    Nodes + 1); return how often.
 
     Of a node that the first path passes several times, the last time counts.
     """
@@ -237,14 +255,19 @@ def coincident_sites(one, two, place, sites):  # type: ignore[no-untyped-def]
     for k in range(2, two[0]):
         known = place[two[k]]
         known = known if (known >= 2) & (known < one[0]) else 0
-        sites[0, count], sites[1, count] = known, k  # kept by counting it: a branch would be guessed wrong often
+        sites[0, count], sites[1, count] = (
+            known,
+            k,
+        )  # kept by counting it: a branch would be guessed wrong often
         count += (known > 0) & (one[known] == two[k])
     return count
 
 
 @kernel
 def near_sites(draws, coordinates, one, two, reach):  # type: ignore[no-untyped-def]
-    """Draw a pair of nodes of two paths that are at most `reach` apart in every coordinate; (0, 0) if there is none.
+    """Draw a pair of nodes of two paths that are at most `reach` apart in every coordinate.
+
+    (0, 0) if there is none.
 
     Args:
         draws: See `evoexp.draws`.
@@ -289,7 +312,9 @@ def _near(coordinates, one, two, reach):  # type: ignore[no-untyped-def]
 
 @kernel
 def connection(draws, neighbours, one, two):  # type: ignore[no-untyped-def]
-    """Return a node between two others, drawn among all that moves join to both (moves have two directions).
+    """Return a node between two others, drawn among all that moves join to both.
+
+    Moves have two directions.
 
     `CONNECTED` if a move joins the two themselves, `NOT_CONNECTED` if there is no such node.
     """
@@ -317,7 +342,10 @@ def connection(draws, neighbours, one, two):  # type: ignore[no-untyped-def]
 
 @kernel
 def mutate(draws, world, erase, path, scratch):  # type: ignore[no-untyped-def]
-    """Replace what lies between two nodes of a path, drawn at random, by a random walk from one to the other."""
+    """Replace what lies between two nodes of a path, drawn at random.
+
+    By a random walk from one to the other.
+    """
     neighbours, num_moves, _, _, _, potentials, fronts = world
     place, joined, _, steps, queue, walked = scratch
     count = path[0]
@@ -345,7 +373,10 @@ def mutate(draws, world, erase, path, scratch):  # type: ignore[no-untyped-def]
 
 @kernel
 def settle(nodes, count, erase, path, place):  # type: ignore[no-untyped-def]
-    """Write a path that was put together, without its loops if these are erased or if it would not fit otherwise."""
+    """Write a path that was put together.
+
+    Without its loops if these are erased or if it would not fit otherwise.
+    """
     if erase or count > len(path) - 1:
         erase_loops(nodes, count, path, place)
     else:

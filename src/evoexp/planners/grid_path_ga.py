@@ -1,11 +1,14 @@
-"""Safe paths over a grid by a genetic algorithm on paths of any length (Chen & Zalzala 1995, section 2).
+"""Safe paths over a grid by a genetic algorithm on paths of any length.
 
-Every individual is a path of neighbouring nodes from start to goal. It is valid by construction: random walks make
-moves that the grid permits, and crossover and mutation put such walks together. Its cost is its length and the mean
-unsafeness of its nodes, which a wave front from obstacles tells.
+Chen & Zalzala 1995, section 2.
 
-A population is a table of whole numbers, see `paths.grid_walks`; a solution is flat: the coordinates of its nodes, x,
-y[, z] of one after the other, as many as there are.
+Every individual is a path of neighbouring nodes from start to goal. It is valid by construction:
+random walks make moves that the grid permits, and crossover and mutation put such walks together.
+Its cost is its length and the mean unsafeness of its nodes, which a wave front from obstacles
+tells.
+
+A population is a table of whole numbers, see `paths.grid_walks`; a solution is flat: the
+coordinates of its nodes, x, y[, z] of one after the other, as many as there are.
 """
 
 import functools
@@ -35,8 +38,11 @@ from evoexp.validation import Component, NonNegativeCount
 FEW_NODES = 2048  # of grids so small the steps between all nodes are worked out once: at most 8 MB
 STRETCH = 8  # generations that are computed in one call of a kernel, at most
 BLOCK = 16384  # uniform numbers drawn at once, at least
-STEPS_PER_WALK = 3.5  # as a multiple of the fewest: for so many steps random words are drawn at first
-FEW_WORDS = 512  # (a multiple of `WORDS`) are drawn whenever these do not suffice; what is left at the end is lost
+STEPS_PER_WALK = (
+    3.5  # as a multiple of the fewest: for so many steps random words are drawn at first
+)
+# (a multiple of `WORDS`) are drawn whenever these do not suffice; what is left at the end is lost
+FEW_WORDS = 512
 
 
 class Problem(NamedTuple):
@@ -44,7 +50,8 @@ class Problem(NamedTuple):
 
     Attributes:
         fields: Grid, unsafeness, potentials.
-        moves: What walks to the goal need, see `grid_walks.walk`; the last of it are the steps of every node to it.
+        moves: What walks to the goal need, see `grid_walks.walk`; the last of it are the steps of
+            every node to it.
         choices: The same as a table, see `walkers.choice_table`.
         ends: Indices of start and goal.
         world: What the kernels of a generation need, see `grid_kernels.advance`.
@@ -93,9 +100,10 @@ class GridPathGa(Component):
     """The algorithm of Chen & Zalzala, section 2.3.
 
     Attributes:
-        revisits: Whether a path may pass a node again; if not, loops are erased wherever they arise.
-        crossover_reach: How far apart two nodes may be, in every coordinate, to cross paths there that have no node in
-            common [cell].
+        revisits: Whether a path may pass a node again; if not, loops are erased wherever they
+            arise.
+        crossover_reach: How far apart two nodes may be, in every coordinate, to cross paths there
+            that have no node in common [cell].
         ga: Population, generations, rates; `mutation_rate` is per path.
         objective: Weights of Eq. 1.
         collision: The potential fields.
@@ -140,7 +148,9 @@ class GridPathGa(Component):
             walkers.go(rng.bit_generator.random_raw(num_words))
             num_words = FEW_WORDS
 
-    def _fill_one_by_one(self, problem: Problem, rng: np.random.Generator, paths: np.ndarray) -> None:
+    def _fill_one_by_one(
+        self, problem: Problem, rng: np.random.Generator, paths: np.ndarray
+    ) -> None:
         """Fill a table of paths where moves weigh such that there is no table of choices."""
         draws, complete = Draws(BLOCK), 0
         place = np.zeros(problem.fields.grid.num_nodes, dtype=np.int32)
@@ -154,7 +164,10 @@ class GridPathGa(Component):
         Raises:
             ValueError: If a path is empty or longer than the table is wide.
         """
-        if population.ndim != 2 or not 1 <= population[:, 0].min() <= population[:, 0].max() < population.shape[1]:
+        if (
+            population.ndim != 2
+            or not 1 <= population[:, 0].min() <= population[:, 0].max() < population.shape[1]
+        ):
             raise ValueError(f"paths must be (individuals, longest + 1), was {population.shape}")
         results = np.empty((RESULTS, len(population)))
         grid_kernels.measure_all(population, problem.world, self.objective.weights, results)
@@ -171,7 +184,9 @@ class GridPathGa(Component):
         return Motion(np.ascontiguousarray(self._nodes(problem, solution)))
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
-        """Return D, S and cost of a path, and what is wrong with it; the cost is inf if anything is.
+        """Return D, S and cost of a path, and what is wrong with it.
+
+        The cost is inf if anything is.
 
         Raises:
             SettingError: If it has fewer than two nodes, or one that is none of the grid's.
@@ -183,7 +198,9 @@ class GridPathGa(Component):
         are_nodes = ((nodes == np.floor(nodes)) & (nodes >= 0) & (nodes <= last)).all(axis=1)
         if not are_nodes.all():
             k, inside = int(are_nodes.argmin()), " × ".join(f"0..{value}" for value in last)
-            raise SettingError(f"path[{k}]", f"a node of the grid, whole numbers ({inside})", nodes[k].tolist())
+            raise SettingError(
+                f"path[{k}]", f"a node of the grid, whole numbers ({inside})", nodes[k].tolist()
+            )
         indices = np.ravel_multi_index(tuple(nodes.astype(np.int64).T + 1), own.free.shape)
         path = np.array([len(nodes), *indices], dtype=np.int32)
         made = (own.neighbours[indices[:-1]] == indices[1:, None]).any(axis=1)
@@ -202,7 +219,10 @@ class GridPathGa(Component):
         return named_terms(results[:, 0], len(nodes)) | faults | {"cost": cost}
 
     def shape(self, problem: Problem) -> tuple[Any, ...]:
-        """Return the documented shape of a solution: any number of nodes of two or three coordinates."""
+        """Return the documented shape of a solution.
+
+        Any number of nodes of two or three coordinates.
+        """
         return (..., (problem.fields.grid.free.ndim,))
 
     def _nodes(self, problem: Problem, solution: FloatArray) -> FloatArray:
@@ -221,15 +241,29 @@ class _Search(Stretches):
         self.costs = self._results[:, COST]
         count = ga.num_offspring
         parents, elites = np.empty(count, dtype=np.int64), np.empty(ga.num_elites, dtype=np.int64)
-        choosing = parents, elites, np.empty(ga.population_size), np.empty(ga.population_size, dtype=np.int64)
-        integers = [np.zeros(size, dtype=np.int32) for size in (nodes, 3 * nodes + 3, nodes, nodes, nodes + 1)]
+        choosing = (
+            parents,
+            elites,
+            np.empty(ga.population_size),
+            np.empty(ga.population_size, dtype=np.int64),
+        )
+        integers = [
+            np.zeros(size, dtype=np.int32)
+            for size in (nodes, 3 * nodes + 3, nodes, nodes, nodes + 1)
+        ]
         place, joined, steps, queue, walked = integers
         sites = np.zeros((2, nodes + 1), dtype=np.int32)
         memory = choosing, (place, joined, sites, steps, queue, walked)
         rates = ga.scaling_multiple, ga.crossover_rate, planner.crossover_reach, ga.mutation_rate
         self._world = problem.world, planner.objective.weights
         tables = self._paths, self._results
-        self._arguments = (*self._world, (not planner.revisits, *rates), tables, memory, self.records)
+        self._arguments = (
+            *self._world,
+            (not planner.revisits, *rates),
+            tables,
+            memory,
+            self.records,
+        )
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw and measure the initial population."""
@@ -264,17 +298,25 @@ def trimmed(paths: np.ndarray) -> np.ndarray:
 def _prepared(collision: PotentialFields, robot: FloorPlatform, scenario: GridMotion) -> Problem:
     """Prepare what many planners share that differ in weights and rates alone."""
     if robot.dimensions != len(scenario.size):
-        raise SettingError("robot.dimensions", f"as many as the grid has ({len(scenario.size)})", robot.dimensions)
+        raise SettingError(
+            "robot.dimensions", f"as many as the grid has ({len(scenario.size)})", robot.dimensions
+        )
     fields = collision.bind(scenario.blocked())
     own = fields.grid
     start, goal = own.index_of(scenario.start), own.index_of(scenario.goal)
     for name, node in (("start", start), ("goal", goal)):
         if not own.free.flat[node]:
-            must = f"a node of an unsafeness of at most collision.max_unsafeness ({collision.max_unsafeness:g})"
+            must = (
+                "a node of an unsafeness of at most collision.max_unsafeness "
+                f"({collision.max_unsafeness:g})"
+            )
             raise SettingError(f"scenario.{name}", must, float(fields.unsafeness[node]))
     steps = fields.steps_to(goal)
     if steps[start] == UNREACHED:
-        must = f"a node that can be reached from the start {list(scenario.start)}; obstacles are between"
+        must = (
+            f"a node that can be reached from the start {list(scenario.start)}; obstacles are "
+            "between"
+        )
         raise SettingError("scenario.goal", must, list(scenario.goal))
     world: tuple[Any, ...] = (
         own.neighbours,
@@ -288,7 +330,9 @@ def _prepared(collision: PotentialFields, robot: FloorPlatform, scenario: GridMo
     bodies = scene(robot.build(), scenario.bodies())
     moves = own.neighbours, fields.potentials, steps
     world += (_fronts(fields),)
-    return Problem(fields, moves, choice_table(*moves), ends, world, bodies, scenario.security_margin)
+    return Problem(
+        fields, moves, choice_table(*moves), ends, world, bodies, scenario.security_margin
+    )
 
 
 def named_terms(results: FloatArray, num_nodes: Any) -> dict[str, float]:
@@ -298,7 +342,10 @@ def named_terms(results: FloatArray, num_nodes: Any) -> dict[str, float]:
 
 
 def _fronts(fields: Fields) -> np.ndarray:
-    """Return the steps to every node from every other, (nodes, nodes), of small grids; else (0, nodes)."""
+    """Return the steps to every node from every other, (nodes, nodes), of small grids.
+
+    Else (0, nodes).
+    """
     nodes = fields.grid.num_nodes
     fronts = np.empty((nodes if nodes <= FEW_NODES else 0, nodes), dtype=np.int16)
     queue, source = np.empty(nodes, dtype=np.int32), np.empty(1, dtype=np.int32)

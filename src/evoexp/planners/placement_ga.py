@@ -1,10 +1,11 @@
 """Docking postures of a mobile arm (Chen & Zalzala 1995, sections 3 and 4.2).
 
-A genetic algorithm over θ1 and θ2 in binary code; θ3 and the platform's place X_p follow from where the end-effector
-shall be (Eqs. 17 and 18). θ3 has two values, both are evaluated and the better one is kept. The cost is E of Eq. 14;
-infeasible postures cost E_m, the paper's fitness is f = E_m − E.
+A genetic algorithm over θ1 and θ2 in binary code; θ3 and the platform's place X_p follow from where
+the end-effector shall be (Eqs. 17 and 18). θ3 has two values, both are evaluated and the better one
+is kept. The cost is E of Eq. 14; infeasible postures cost E_m, the paper's fitness is f = E_m − E.
 
-A population is an array (2, individuals) of strings of bits, a number per angle. A solution is flat: θ1, θ2 [deg].
+A population is an array (2, individuals) of strings of bits, a number per angle. A solution is
+flat: θ1, θ2 [deg].
 """
 
 from collections.abc import Iterator
@@ -104,7 +105,10 @@ class PlacementGa(Component):
             raise SettingError("planner.angle_range", must, list(self.angle_range))
         reach = sum(robot.link_lengths)
         if abs(scenario.target[1]) > reach:
-            must = f"within the arm's reach: Y_e between −{reach:g} and {reach:g} (the links' lengths together)"
+            must = (
+                f"within the arm's reach: Y_e between −{reach:g} and {reach:g} (the links' "
+                "lengths together)"
+            )
             raise SettingError("scenario.target", must, list(scenario.target))
         task = np.array([*robot.link_lengths, *scenario.target, *scenario.force])
         avoided = self.objective.avoided(scenario.obstacle_points())
@@ -133,18 +137,23 @@ class PlacementGa(Component):
     def _judged(self, problem: Problem, population: np.ndarray) -> FloatArray:
         rows = np.empty((ROWS, population.shape[1]))
         strings = np.ascontiguousarray(population, dtype=np.int64)
-        placement_kernels.judge(strings, self.coded(problem), tuple(problem.model), population.shape[1], rows)
+        placement_kernels.judge(
+            strings, self.coded(problem), tuple(problem.model), population.shape[1], rows
+        )
         return rows
 
     def coded(self, problem: Problem) -> tuple[int, bool, FloatArray]:
-        """Return what kernels decode strings by: bits per gene, whether they are Gray codes, limits [deg]."""
+        """Return what kernels decode strings by.
+
+        Bits per gene, whether they are Gray codes, limits [deg].
+        """
         return self.bits_per_gene, self.coding == "gray", problem.angle_limits
 
     def motion(self, problem: Problem, solution: FloatArray) -> Motion | None:
         """Return the posture of a solution as a motion that stays there; None if it is infeasible.
 
-        The answer of the algorithm is a posture: how to get there is another question. Its bodies are judged all the
-        same, by their exact distances.
+        The answer of the algorithm is a posture: how to get there is another question. Its bodies
+        are judged all the same, by their exact distances.
         """
         branch, own, _ = problem.model.posture(*_two(solution))
         if branch < 0:
@@ -153,20 +162,29 @@ class PlacementGa(Component):
         return Motion(np.stack([q, q]))
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
-        """Return everything about both values of θ3: the better one plain, the other one as `other_…`.
+        """Return everything about both values of θ3.
 
-        `branch` is 0 where the third link points to +x, 1 to −x, −1 where no θ3 is feasible. What cannot be reached is
-        NaN, its criteria and its cost are E_m.
+        The better one plain, the other one as `other_…`.
+
+        `branch` is 0 where the third link points to +x, 1 to −x, −1 where no θ3 is feasible. What
+        cannot be reached is NaN, its criteria and its cost are E_m.
 
         Raises:
             ValueError: If the solution has another size than 2.
         """
         branch, *both = problem.model.posture(*_two(solution))
-        named = {"branch": float(branch), "theta_1_deg": float(solution[0]), "theta_2_deg": float(solution[1])}
+        named = {
+            "branch": float(branch),
+            "theta_1_deg": float(solution[0]),
+            "theta_2_deg": float(solution[1]),
+        }
         for prefix, numbers in zip(BRANCHES, both, strict=True):
             named |= {f"{prefix}cost": float(numbers[0])}
             named |= {f"{prefix}{name}": float(numbers[1 + k]) for k, name in enumerate(NAMES)}
-            named |= {f"{prefix}theta_3_deg": float(numbers[THETA_3]), f"{prefix}platform_x": float(numbers[PLATFORM])}
+            named |= {
+                f"{prefix}theta_3_deg": float(numbers[THETA_3]),
+                f"{prefix}platform_x": float(numbers[PLATFORM]),
+            }
             named |= {f"{prefix}torque_{k + 1}": float(numbers[TORQUE + k]) for k in range(3)}
         return named
 
@@ -185,7 +203,10 @@ class _Search(Stretches):
         self._strings = np.empty((self.num_places, GENES, size), dtype=np.int64)
         self._rows = np.empty((self.num_places, ROWS, size))
         self.costs = self._rows[:, FIRST_CRITERION]
-        parents, elites = np.empty(ga.num_offspring, dtype=np.int64), np.empty(ga.num_elites, dtype=np.int64)
+        parents, elites = (
+            np.empty(ga.num_offspring, dtype=np.int64),
+            np.empty(ga.num_elites, dtype=np.int64),
+        )
         memory = np.empty(size), np.empty(size, dtype=np.int64), parents, elites
         rates = ga.scaling_multiple, ga.crossover_rate, ga.mutation_rate
         self._judging = planner.coded(problem), tuple(problem.model)
@@ -204,7 +225,10 @@ class _Search(Stretches):
 
     def found(self, place: int, individual: int) -> Found:
         """Return angles, criteria and whether they are feasible."""
-        angles, own = self._rows[place, :GENES, individual].copy(), self._rows[place, FIRST_CRITERION:, individual]
+        angles, own = (
+            self._rows[place, :GENES, individual].copy(),
+            self._rows[place, FIRST_CRITERION:, individual],
+        )
         _, *criteria, branch = own.tolist()
         return Found(angles, dict(zip(NAMES, criteria, strict=True)), branch >= 0.0)
 

@@ -1,7 +1,7 @@
 """Generations of the placement search, compiled (Chen & Zalzala 1995, section 3.2).
 
-A population is strings of bits (2, individuals), see `evolution.bit_coding`, and what they are worth in rows,
-individuals innermost: θ1 and θ2 [deg], the criteria, the branch of θ3.
+A population is strings of bits (2, individuals), see `evolution.bit_coding`, and what they are
+worth in rows, individuals innermost: θ1 and θ2 [deg], the criteria, the branch of θ3.
 """
 
 from evoexp.draws import draw_many, used_up
@@ -27,16 +27,19 @@ def evolve(draws, generations, breeding, coding, model, tables, memory, records)
         breeding: Scaling multiple, crossover rate, mutation rate.
         coding: Bits per gene, whether they are Gray codes, (2, 2) limits of the angles [deg].
         model: See `objectives.placement_kernels.measure_posture`: task, weights, avoided, limits.
-        tables: Strings (places, 2, individuals) and rows (places, ROWS, individuals) of some generations; number g has
-            place g modulo the number of places.
-        memory: (individuals,) expected numbers of copies, (individuals,) order of the scan, (offspring,) parents,
-            (elites,).
+        tables: Strings (places, 2, individuals) and rows (places, ROWS, individuals) of some
+            generations; number g has place g modulo the number of places.
+        memory: (individuals,) expected numbers of copies, (individuals,) order of the scan,
+            (offspring,) parents, (elites,).
         records: (places, 4) see `record`.
 
     Returns:
-        The generation reached: an earlier one if the draws did not suffice. Then it is to go on there with more.
+        The generation reached: an earlier one if the draws did not suffice. Then it is to go on
+        there with more.
     """
-    draws, coding, model, tables, memory, records = borrowed((draws, coding, model, tables, memory, records))
+    draws, coding, model, tables, memory, records = borrowed(
+        (draws, coding, model, tables, memory, records)
+    )
     strings, rows = tables
     first, last = generations
     for generation in range(first, last):
@@ -92,7 +95,10 @@ def judge(strings, coding, model, count, rows):  # type: ignore[no-untyped-def]
 
 @kernel
 def record(rows, out):  # type: ignore[no-untyped-def]
-    """Note in `out` (4,) index of the best, mean and deviation of the costs, and how many postures are feasible."""
+    """Note in `out` (4,) index of the best, mean and deviation of the costs.
+
+    And how many postures are feasible.
+    """
     out[0], out[1], out[2] = summarise(rows[GENES + COST])
     feasible = 0
     for k in range(rows.shape[1]):

@@ -1,18 +1,22 @@
-"""Postures as individuals: an evolution strategy whose winner's ancestry is the path (Corsépius 2001).
+"""Postures as individuals: an evolution strategy whose winner's ancestry is the path.
 
-An individual is one posture. The search begins with the momentary posture alone; every cycle generates offspring by
-random steps within a local scope of the parents (Fig. 2), rates them in configuration and in work space at once, and
-selects the best as the next parents. When an individual meets the goal, the path is its line of ancestors, from the
-start on: nobody plans it, and inverse kinematics is solved on the way. A task may have several phases, each a search of
-its own that begins at the posture where the last one ended.
+Corsépius 2001.
 
-A population is an array (nq, individuals) [rad]. A solution is flat: the ancestry, postures × nq [rad], from the start
-to the best so far, through all phases.
+An individual is one posture. The search begins with the momentary posture alone; every cycle
+generates offspring by random steps within a local scope of the parents (Fig. 2), rates them in
+configuration and in work space at once, and selects the best as the next parents. When an
+individual meets the goal, the path is its line of ancestors, from the start on: nobody plans it,
+and inverse kinematics is solved on the way. A task may have several phases, each a search of its
+own that begins at the posture where the last one ended.
 
-What "best so far" means: the individual of the lowest cost in its phase; once one meets the goal, that one (of several
-the cheapest), whose cost need not be the lowest. Costs of different phases are worth nothing to each other: while a
-phase before the last is searched, the plan's cost is inf and the phase's own stands in the term `cost`. Individuals
-that collide or pass a hard limit are rated, but are never parents; means and deviations are over the others.
+A population is an array (nq, individuals) [rad]. A solution is flat: the ancestry, postures × nq
+[rad], from the start to the best so far, through all phases.
+
+What "best so far" means: the individual of the lowest cost in its phase; once one meets the goal,
+that one (of several the cheapest), whose cost need not be the lowest. Costs of different phases are
+worth nothing to each other: while a phase before the last is searched, the plan's cost is inf and
+the phase's own stands in the term `cost`. Individuals that collide or pass a hard limit are rated,
+but are never parents; means and deviations are over the others.
 """
 
 from collections.abc import Iterator
@@ -43,7 +47,9 @@ OVERSIZED = 1.0 + 1e-9  # steps beyond the scope by more than rounding
 class Judgement:
     """Postures judged by the first phase."""
 
-    def __init__(self, rows: FloatArray, feasible: np.ndarray, met: np.ndarray, chosen: tuple[int, ...]) -> None:
+    def __init__(
+        self, rows: FloatArray, feasible: np.ndarray, met: np.ndarray, chosen: tuple[int, ...]
+    ) -> None:
         self.cost = np.where(feasible, rows[COST], np.inf)
         self.rows, self.feasible, self.collision_queries = rows, met, rows.shape[1]
         self._chosen = chosen
@@ -62,9 +68,10 @@ class PostureEs(Component):
     """The evolution strategy of Corsépius, section 4.
 
     Attributes:
-        scope: How far a joint may step at most: one number for all joints, or one per joint [rad], lengths for sliding
-            joints.
-        edge_check: Configurations tested between a parent and its child; 0: postures only, as in the paper.
+        scope: How far a joint may step at most: one number for all joints, or one per joint [rad],
+            lengths for sliding joints.
+        edge_check: Configurations tested between a parent and its child; 0: postures only, as in
+            the paper.
         ga: Parents, offspring, selection, mutation, when to stop.
         objective: Terms of the cost.
         collision: What stands for the bodies.
@@ -128,22 +135,30 @@ class PostureEs(Component):
         return np.concatenate([problem.start, population[:, individual]])
 
     def motion(self, problem: Problem, solution: FloatArray) -> Motion:
-        """Return the motion of a solution: from posture to posture in equal times, straight in joint space."""
+        """Return the motion of a solution.
+
+        From posture to posture in equal times, straight in joint space.
+        """
         return Motion(np.ascontiguousarray(self._postures(problem, solution)))
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
         """Return the terms of the last posture in its phase, and what the whole path is like.
 
-        `phase_1_end` and so on are the postures at which phases end, counted from 0; −1: not reached.
+        `phase_1_end` and so on are the postures at which phases end, counted from 0; −1: not
+        reached.
 
         Raises:
             ValueError: If the solution is no list of postures.
         """
         postures = self._postures(problem, solution)
         found = spans(problem, postures)
-        terms = named(found[-1].judged.rows[:, -1], self.chosen) | path_terms(postures, problem.scope)
+        terms = named(found[-1].judged.rows[:, -1], self.chosen) | path_terms(
+            postures, problem.scope
+        )
         for k in range(len(problem.phases) if len(problem.phases) > 1 else 0):
-            terms[f"phase_{k + 1}_end"] = float(found[k].last) if k < len(found) and found[k].reached else -1.0
+            terms[f"phase_{k + 1}_end"] = (
+                float(found[k].last) if k < len(found) and found[k].reached else -1.0
+            )
         return (
             terms
             | {"infeasible_postures": float(sum(np.sum(~s.judged.feasible) for s in found))}
@@ -151,9 +166,20 @@ class PostureEs(Component):
         )
 
     def listing(self, problem: Problem, solution: FloatArray) -> tuple[list[str], list[list[Any]]]:
-        """Return names and rows of a table, one row per posture: its phase, terms, cost, step from the one before."""
+        """Return names and rows of a table, one row per posture.
+
+        Its phase, terms, cost, step from the one before.
+        """
         postures = self._postures(problem, solution)
-        names = ["posture", "phase", *(COLUMNS[k] for k in self.chosen), "cost", "goal", "step_rad", "step_scopes"]
+        names = [
+            "posture",
+            "phase",
+            *(COLUMNS[k] for k in self.chosen),
+            "cost",
+            "goal",
+            "step_rad",
+            "step_scopes",
+        ]
         rows: list[list[Any]] = []
         for span in spans(problem, postures):
             for n in range(0 if span.first == 0 else 1, span.last - span.first + 1):
@@ -173,9 +199,15 @@ class PostureEs(Component):
         return posture_problem.notes(problem)
 
     def _tilts(self, found: list[Span], postures: FloatArray) -> dict[str, float]:
-        """Return the greatest tilts at postures and on the motion between them, where a phase limits them."""
+        """Return the greatest tilts at postures and on the motion between them.
+
+        Where a phase limits them.
+        """
         terms = {}
-        for term, limit in ((UPRIGHT, self.objective.upright), (PARALLEL, self.objective.keep_parallel)):
+        for term, limit in (
+            (UPRIGHT, self.objective.upright),
+            (PARALLEL, self.objective.keep_parallel),
+        ):
             if limit is None:
                 continue
             at, between = [0.0], [0.0]
@@ -183,7 +215,11 @@ class PostureEs(Component):
                 if span.stage.judging[4][term] > 0.0:
                     at.append(float(span.judged.rows[term].max()))
                     between.append(
-                        float(judge(span.stage, dense(postures[span.first : span.last + 1])).rows[term].max())
+                        float(
+                            judge(span.stage, dense(postures[span.first : span.last + 1]))
+                            .rows[term]
+                            .max()
+                        )
                     )
             terms[f"greatest_{TERMS[term]}_deg"] = max(at) / DEGREE
             terms[f"greatest_{TERMS[term]}_between_deg"] = max(between) / DEGREE
@@ -205,7 +241,10 @@ class _Record:
         self._node, self._solution, self._path = -1, np.empty(0), {"": 0.0}
 
     def generation(self, search: Search, phase: int, stop_reason: str) -> Generation:
-        """Return the record of the cycle that a search has done last, or of the posture that it begins with."""
+        """Return the record of the cycle that a search has done last.
+
+        Or of the posture that it begins with.
+        """
         memory, problem, planner = search.memory, self.problem, self.planner
         count = memory.offspring.shape[1]
         self.index += 1
@@ -214,11 +253,19 @@ class _Record:
         self.cycles += min(search.cycles, 1)
         if search.best != self._node:
             postures = search.ancestry.path(search.best)
-            self._node, self._solution, self._path = search.best, postures.ravel(), path_terms(postures, problem.scope)
+            self._node, self._solution, self._path = (
+                search.best,
+                postures.ravel(),
+                path_terms(postures, problem.scope),
+            )
         last = phase == len(problem.phases) - 1
         costs = memory.rows[COST]
         summary = cost_statistics(np.where(memory.feasible, costs, np.inf))
-        statistics = {"phase": phase + 1.0, "cycles": float(self.cycles), "idle_cycles": float(search.idle)}
+        statistics = {
+            "phase": phase + 1.0,
+            "cycles": float(self.cycles),
+            "idle_cycles": float(search.idle),
+        }
         several = len(problem.phases) > 1
         return Generation(
             index=self.index,
@@ -244,7 +291,10 @@ def named(row: FloatArray, chosen: tuple[int, ...]) -> dict[str, float]:
 
 
 def path_terms(postures: FloatArray, scope: FloatArray) -> dict[str, float]:
-    """Return what a path (postures, nq) is like: steps in units of the scope, and how many are larger than it."""
+    """Return what a path (postures, nq) is like.
+
+    Steps in units of the scope, and how many are larger than it.
+    """
     steps = np.abs(np.diff(postures, axis=0)) / scope
     longest = steps.max(axis=1) if len(steps) else np.zeros(0)
     return {
@@ -255,7 +305,12 @@ def path_terms(postures: FloatArray, scope: FloatArray) -> dict[str, float]:
 
 
 def dense(postures: FloatArray) -> FloatArray:
-    """Return configurations along the straight motion through postures (postures, nq): (nq, configurations)."""
+    """Return configurations along the straight motion through postures (postures, nq).
+
+    (nq, configurations).
+    """
     shares = np.arange(DENSE) / DENSE
     between = postures[:-1, None, :] + shares[:, None] * np.diff(postures, axis=0)[:, None, :]
-    return np.ascontiguousarray(np.concatenate([between.reshape(-1, postures.shape[1]), postures[-1:]]).T)
+    return np.ascontiguousarray(
+        np.concatenate([between.reshape(-1, postures.shape[1]), postures[-1:]]).T
+    )

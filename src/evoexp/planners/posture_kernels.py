@@ -1,7 +1,8 @@
 """One cycle of the evolution strategy on postures, compiled (Corsépius 2001, Algorithm 1).
 
-A population is an array (nq, individuals) [rad]. What postures are judged by travels as a plain tuple, which
-`posture_stages` makes; settings of the strategy as another, which `posture_search` makes.
+A population is an array (nq, individuals) [rad]. What postures are judged by travels as a plain
+tuple, which `posture_stages` makes; settings of the strategy as another, which `posture_search`
+makes.
 """
 
 import numpy as np
@@ -37,9 +38,10 @@ def judge(q, judging, rows, feasible, met):  # type: ignore[no-untyped-def]
 
     Args:
         q: (nq, postures) [rad].
-        judging: The kinematic table; joint and local pose of the controlled frame; aim of `rate_poses`; weights of the
-            terms (0: does not count); hard limits of the two tilts [rad]; limits (nq, 2); tables of the collision
-            model; reach of the preference for free space; tolerances [length unit, rad].
+        judging: The kinematic table; joint and local pose of the controlled frame; aim of
+            `rate_poses`; weights of the terms (0: does not count); hard limits of the two tilts
+            [rad]; limits (nq, 2); tables of the collision model; reach of the preference for free
+            space; tolerances [length unit, rad].
         rows: (ROWS, postures) written.
         feasible: (postures,) written.
         met: (postures,) written.
@@ -54,7 +56,15 @@ def judge(q, judging, rows, feasible, met):  # type: ignore[no-untyped-def]
     if weights[COLLISION] > 0.0:
         rated = weights[FREE_SPACE] > 0.0
         primitive_clearances(
-            tables[0], tables[1], tables[2], tables[3], tables[4], reach if rated else 0.0, not rated, q, clearance
+            tables[0],
+            tables[1],
+            tables[2],
+            tables[3],
+            tables[4],
+            reach if rated else 0.0,
+            not rated,
+            q,
+            clearance,
         )
         for n in range(count):
             least = min(clearance[0, n], min(clearance[1, n], clearance[2, n]))
@@ -106,9 +116,12 @@ def judge_edges(parents, origin, offspring, substeps, judging, feasible):  # typ
 
 @kernel
 def breed(uniforms, normals, parents, num_parents, num_bred, breeding, offspring, origin):  # type: ignore[no-untyped-def]
-    """Write offspring and the parent of each: a parent, perhaps crossed with another, mutated, within the limits.
+    """Write offspring and the parent of each.
 
-    The columns behind `num_bred` are immigrants, uniform within the limits; their parent is the nearest one.
+    A parent, perhaps crossed with another, mutated, within the limits.
+
+    The columns behind `num_bred` are immigrants, uniform within the limits; their parent is the
+    nearest one.
 
     Args:
         uniforms: (uniforms,) in [0, 1), taken in order.
@@ -116,8 +129,8 @@ def breed(uniforms, normals, parents, num_parents, num_bred, breeding, offspring
         parents: (nq, ≥ num_parents), the best first.
         num_parents: How many there are.
         num_bred: Children of parents.
-        breeding: Scope (nq,) [rad]; limits (nq, 2); mutation and its deviation; parent choice and its deviation;
-            crossover rate.
+        breeding: Scope (nq,) [rad]; limits (nq, 2); mutation and its deviation; parent choice and
+            its deviation; crossover rate.
         offspring: (nq, offspring) written.
         origin: (offspring,) written.
     """
@@ -158,7 +171,10 @@ def breed(uniforms, normals, parents, num_parents, num_bred, breeding, offspring
 
 @kernel
 def nearest_parent(offspring, n, parents, num_parents, scope):  # type: ignore[no-untyped-def]
-    """Return the parent from which the greatest step of a joint, in units of its scope, is least."""
+    """Return the parent from which the greatest step of a joint, in units of its scope.
+
+    Is least.
+    """
     best, least = 0, np.inf
     for p in range(num_parents):
         step = 0.0
@@ -182,11 +198,12 @@ def advance(uniforms, normals, bred, plus, substeps, breeding, judging, members,
         breeding: See `breed`.
         judging: See `judge`.
         members: Parents (nq, μ), their costs (μ,), how many there are.
-        memory: Offspring (nq, n), origin (n,), rows (ROWS, n), feasible (n,), met (n,): all written.
+        memory: Offspring (nq, n), origin (n,), rows (ROWS, n), feasible (n,), met (n,): all
+            written.
 
     Returns:
-        Indices of the next parents, the best first: below n offspring, from n on parents (none: all parents stay);
-        index of the winner, which meets the goal at the least cost, −1 if none does.
+        Indices of the next parents, the best first: below n offspring, from n on parents (none: all
+        parents stay); index of the winner, which meets the goal at the least cost, −1 if none does.
     """
     parents, parent_costs, num_parents = members
     offspring, origin, rows, feasible, met = memory

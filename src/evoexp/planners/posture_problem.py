@@ -16,17 +16,29 @@ from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly, Robot
 from evoexp.robots.poses import local_pose
 from evoexp.scenarios.obstacles import CAPSULE, CYLINDER, ObstacleTable, obstacle_table
-from evoexp.scenarios.posture_task import Phase, PointGoal, PoseGoal, PostureTask, ShiftGoal, SurfaceGoal
+from evoexp.scenarios.posture_task import (
+    Phase,
+    PointGoal,
+    PoseGoal,
+    PostureTask,
+    ShiftGoal,
+    SurfaceGoal,
+)
 
 
 def prepare(
-    robot: Robot, task: PostureTask, scope: tuple[float, ...], objective: PostureCost, collision: CollisionModel
+    robot: Robot,
+    task: PostureTask,
+    scope: tuple[float, ...],
+    objective: PostureCost,
+    collision: CollisionModel,
 ) -> Problem:
     """Return the problem of a task.
 
     Raises:
-        SettingError: If a joint has no limits, the start or the scope does not fit the robot, the start collides, a
-            goal is out of reach, a contact names nothing, or a goal and the terms that rate it contradict each other.
+        SettingError: If a joint has no limits, the start or the scope does not fit the robot, the
+            start collides, a goal is out of reach, a contact names nothing, or a goal and the terms
+            that rate it contradict each other.
     """
     assembly = _built(robot)
     if assembly.num_arms != 1:
@@ -38,7 +50,9 @@ def prepare(
     tool = assembly.tools[0]
     for k, name in enumerate(task.names):
         if name in bodies.names:
-            raise SettingError(f"scenario.obstacles[{k}].name", "a name that no body of the robot has", name)
+            raise SettingError(
+                f"scenario.obstacles[{k}].name", "a name that no body of the robot has", name
+            )
     phases = task.all_phases
     problem = Problem(
         assembly,
@@ -74,7 +88,10 @@ def _built(robot: Robot) -> Assembly:
 
 @functools.lru_cache(maxsize=16)
 def _bodies(robot: Robot, collision: CollisionModel) -> BodyModel:
-    """Return a robot's bodies, kept: finding those that never touch takes longer than preparing all else."""
+    """Return a robot's bodies, kept.
+
+    Finding those that never touch takes longer than preparing all else.
+    """
     return collision.bind(_built(robot))
 
 
@@ -87,7 +104,9 @@ def notes(problem: Problem) -> tuple[str, ...]:
     ]
     for what, pairs in (("always touch", bodies.always), ("never touch", bodies.never)):
         if pairs:
-            lines.append(f"{what}, not tested: " + ", ".join(f"{names[a]} with {names[b]}" for a, b in pairs))
+            lines.append(
+                f"{what}, not tested: " + ", ".join(f"{names[a]} with {names[b]}" for a, b in pairs)
+            )
     return tuple(lines)
 
 
@@ -103,7 +122,10 @@ def _limits(assembly: Assembly) -> FloatArray:
 
 
 def _units(assembly: Assembly) -> FloatArray:
-    """Return (nq,) what turns the scenario's values into those of the model: degrees, lengths of sliding joints."""
+    """Return (nq,) what turns the scenario's values into those of the model.
+
+    Degrees, lengths of sliding joints.
+    """
     units = np.full(assembly.model.nq, DEGREE)
     units[assembly.table.index_q[assembly.table.prismatic]] = 1.0
     return units
@@ -111,7 +133,9 @@ def _units(assembly: Assembly) -> FloatArray:
 
 def _start(task: PostureTask, assembly: Assembly, limits: FloatArray) -> FloatArray:
     if len(task.q_start) != assembly.model.nq:
-        raise SettingError("scenario.q_start", f"one value per joint ({assembly.model.nq})", len(task.q_start))
+        raise SettingError(
+            "scenario.q_start", f"one value per joint ({assembly.model.nq})", len(task.q_start)
+        )
     units = _units(assembly)
     start = np.array(task.q_start) * units
     for k, (value, (least, greatest)) in enumerate(zip(start, limits, strict=True)):
@@ -134,7 +158,11 @@ def _weights(task: PostureTask, objective: PostureCost, obstacles: ObstacleTable
     for k, phase in enumerate(task.all_phases):
         subgoal = k < len(task.subgoals)
         field = f"scenario.phases[{k - len(task.subgoals)}].terms"
-        on_the_way = tuple(name for name in objective.chosen if name in ("goal_distance", "limit_margin", "collision"))
+        on_the_way = tuple(
+            name
+            for name in objective.chosen
+            if name in ("goal_distance", "limit_margin", "collision")
+        )
         weights = objective.weights(on_the_way if subgoal else phase.terms, field)
         if not subgoal:
             _check_terms(phase, weights, task, obstacles, field)
@@ -142,34 +170,56 @@ def _weights(task: PostureTask, objective: PostureCost, obstacles: ObstacleTable
     return np.array(rows)
 
 
-def _check_terms(phase: Phase, weights: FloatArray, task: PostureTask, obstacles: ObstacleTable, field: str) -> None:
+def _check_terms(
+    phase: Phase, weights: FloatArray, task: PostureTask, obstacles: ObstacleTable, field: str
+) -> None:
     """Refuse terms that the goal of a phase gives no meaning, or that contradict it."""
     goal, where = phase.goal, field.removesuffix("terms") + "goal"
     if weights[0] == 0.0:
-        raise SettingError(field, "terms with goal_distance: every goal is a place", list(phase.terms))
+        raise SettingError(
+            field, "terms with goal_distance: every goal is a place", list(phase.terms)
+        )
     if weights[ANGLE] > 0.0 and not isinstance(goal, PoseGoal | ShiftGoal):
-        raise SettingError(where, f"a pose, since goal_angle rates its orientation (or {field} without it)", goal.kind)
+        raise SettingError(
+            where,
+            f"a pose, since goal_angle rates its orientation (or {field} without it)",
+            goal.kind,
+        )
     if isinstance(goal, PoseGoal) and weights[ANGLE] == 0.0:
         raise SettingError(where, "a point, since no goal_angle rates its orientation", "pose")
     for term in (AXIAL, HEADING):
         if weights[term] > 0.0 and not isinstance(goal, SurfaceGoal):
-            must = f"the surface of an object, since {TERMS[term]} rates the way to it (or {field} without it)"
+            must = (
+                f"the surface of an object, since {TERMS[term]} rates the way to it (or {field} "
+                "without it)"
+            )
             raise SettingError(where, must, goal.kind)
     if isinstance(goal, SurfaceGoal):
         kind = obstacles.kind[task.names.index(goal.object)]
         shape = task.obstacles[task.names.index(goal.object)].shape
         if shape == "half_space":
-            raise SettingError(f"{where}.object", "a sphere, box, capsule or cylinder", "half_space")
+            raise SettingError(
+                f"{where}.object", "a sphere, box, capsule or cylinder", "half_space"
+            )
         if weights[AXIAL] > 0.0 and kind not in (CYLINDER, CAPSULE):
-            raise SettingError(f"{where}.object", "a cylinder or capsule, since axial_approach rates its axis", shape)
+            raise SettingError(
+                f"{where}.object",
+                "a cylinder or capsule, since axial_approach rates its axis",
+                shape,
+            )
 
 
-def _covers(task: PostureTask, obstacles: ObstacleTable, collision: CollisionModel) -> dict[int, Cover]:
+def _covers(
+    task: PostureTask, obstacles: ObstacleTable, collision: CollisionModel
+) -> dict[int, Cover]:
     """Return covers of the objects that are taken hold of, in their own frames."""
     taken = {task.names.index(phase.object) for phase in task.phases if phase.then == "attach"}
     shapes = obstacle_shapes(obstacles)
     return {
-        k: collision.cover(pin.GeometryObject(task.names[k], 0, 0, pin.SE3.Identity(), shapes[k][0])) for k in taken
+        k: collision.cover(
+            pin.GeometryObject(task.names[k], 0, 0, pin.SE3.Identity(), shapes[k][0])
+        )
+        for k in taken
     }
 
 
@@ -179,13 +229,18 @@ def _check_contacts(task: PostureTask, names: tuple[str, ...]) -> None:
             for name in pair:
                 if name not in names:
                     must = f"names of bodies or obstacles ({', '.join(names)})"
-                    raise SettingError(f"scenario.phases[{k}].contacts[{c}]", must, name, nearest(name, names))
+                    raise SettingError(
+                        f"scenario.phases[{k}].contacts[{c}]", must, name, nearest(name, names)
+                    )
 
 
 def reach(assembly: Assembly, limits: FloatArray) -> tuple[FloatArray, float]:
-    """Return a point (3,) that stands still, and how far from it the tool can be at most: all links stretched out.
+    """Return a point (3,) that stands still, and how far from it the tool can be at most.
 
-    The point lies on the axis of the first joint, where the second one stands if that is on this axis, too.
+    All links stretched out.
+
+    The point lies on the axis of the first joint, where the second one stands if that is on this
+    axis, too.
     """
     table, tool = assembly.table, assembly.tools[0]
     joint, far = tool.joint - 1, float(np.sqrt(np.sum(tool.position * tool.position)))
@@ -206,7 +261,10 @@ def _stroke(assembly: Assembly, limits: FloatArray, joint: int) -> float:
 
 
 def _check_reach(problem: Problem) -> None:
-    """Refuse goals that the stretched arm cannot reach while it holds nothing, in the scene as it begins."""
+    """Refuse goals that the stretched arm cannot reach while it holds nothing.
+
+    In the scene as it begins.
+    """
     task = problem.task
     center, far = reach(problem.assembly, problem.limits)
     held, ways = False, len(task.subgoals)
@@ -217,14 +275,21 @@ def _check_reach(problem: Problem) -> None:
             point = np.array(goal.point)
         elif isinstance(goal, SurfaceGoal):
             index = task.names.index(goal.object)
-            point, field = problem.obstacles.center[index], f"scenario.phases[{k - ways}].goal.object"
-            size = float(np.sum(problem.obstacles.size[index]))  # no point of it is farther from its middle
+            point, field = (
+                problem.obstacles.center[index],
+                f"scenario.phases[{k - ways}].goal.object",
+            )
+            size = float(
+                np.sum(problem.obstacles.size[index])
+            )  # no point of it is farther from its middle
         if point is not None:
             away = float(np.sqrt(np.sum((point - center) ** 2))) - size
             if away - task.position_tolerance > far:
                 where = ", ".join(f"{value:g}" for value in center)
                 must = f"within reach, {far:.4g} {task.length_unit} from ({where})"
-                raise SettingError(field, f"{must} (check_reach=false searches it anyway)", f"{away:.4g} away")
+                raise SettingError(
+                    field, f"{must} (check_reach=false searches it anyway)", f"{away:.4g} away"
+                )
         held = {"attach": True, "detach": False}.get(phase.then, held)
 
 
@@ -238,8 +303,14 @@ def _infeasible(problem: Problem, start: FloatArray) -> SettingError:
     distances = np.array([result.min_distance for result in placements.distanceResults])
     stage = begin(problem, 0, start, problem.first_situation)
     if judge(stage, start[:, None]).rows[TERMS.index("collision"), 0] == 0.0:
-        return SettingError("scenario.q_start", "within the hard limits of upright and keep_parallel", given)
+        return SettingError(
+            "scenario.q_start", "within the hard limits of upright and keep_parallel", given
+        )
     one, two = scene.pair_names(int(np.argmin(distances)))
     least, unit = float(distances.min()), problem.task.length_unit
-    how = "touch each other" if least <= 0.0 else f"are {least:.3g} {unit} apart, less than their covers need"
+    how = (
+        "touch each other"
+        if least <= 0.0
+        else f"are {least:.3g} {unit} apart, less than their covers need"
+    )
     return SettingError("scenario.q_start", f"free of collision ({one} and {two} {how})", given)

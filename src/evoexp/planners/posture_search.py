@@ -1,4 +1,7 @@
-"""The evolution strategy on postures, cycle by cycle, with the ancestry of everybody (Corsépius 2001, section 4.2)."""
+"""The evolution strategy on postures, cycle by cycle, with the ancestry of everybody.
+
+Corsépius 2001, section 4.2.
+"""
 
 from typing import Any, NamedTuple
 
@@ -21,10 +24,17 @@ class Ancestry:
     """
 
     def __init__(self, nq: int) -> None:
-        self.postures, self.parents, self.count = np.empty((ROOM, nq)), np.empty(ROOM, dtype=np.int64), 0
+        self.postures, self.parents, self.count = (
+            np.empty((ROOM, nq)),
+            np.empty(ROOM, dtype=np.int64),
+            0,
+        )
 
     def add(self, postures: FloatArray, parents: Any) -> np.ndarray:
-        """Append postures (n, nq) with the nodes of their parents (−1: none); return their nodes."""
+        """Append postures (n, nq) with the nodes of their parents (−1: none).
+
+        Return their nodes.
+        """
         stop = self.count + len(postures)
         while stop > len(self.parents):
             self.postures = np.concatenate([self.postures, np.empty_like(self.postures)])
@@ -55,7 +65,9 @@ class Memory(NamedTuple):
     def of(cls, nq: int, count: int) -> "Memory":
         """Return memory for `count` individuals."""
         flags = np.empty(count, dtype=np.bool_), np.empty(count, dtype=np.bool_)
-        return cls(np.empty((nq, count)), np.empty(count, dtype=np.int64), np.empty((ROWS, count)), *flags)
+        return cls(
+            np.empty((nq, count)), np.empty(count, dtype=np.int64), np.empty((ROWS, count)), *flags
+        )
 
 
 class Search:
@@ -72,7 +84,13 @@ class Search:
     """
 
     def __init__(
-        self, ga: StrategySettings, problem: Any, judging: tuple[Any, ...], substeps: int, ancestry: Ancestry, node: int
+        self,
+        ga: StrategySettings,
+        problem: Any,
+        judging: tuple[Any, ...],
+        substeps: int,
+        ancestry: Ancestry,
+        node: int,
     ) -> None:
         self.ga, self.judging, self.substeps, self.ancestry = ga, judging, substeps, ancestry
         nq, size = len(problem.scope), ga.num_parents
@@ -86,7 +104,11 @@ class Search:
             ga.parent_std,
             ga.crossover_rate,
         )
-        self._parents, self._costs, self._nodes = np.empty((nq, room)), np.empty(room), np.empty(room, dtype=np.int64)
+        self._parents, self._costs, self._nodes = (
+            np.empty((nq, room)),
+            np.empty(room),
+            np.empty(room, dtype=np.int64),
+        )
         self._num_parents = 1
         self._parents[:, 0], self._nodes[0] = ancestry.postures[node], node
         self.memory = Memory.of(nq, 1)
@@ -112,7 +134,15 @@ class Search:
         members = (self._parents, self._costs, self._num_parents)
         plus = ga.selection == "plus"
         chosen, winner = posture_kernels.advance(
-            uniforms, normals, bred, plus, self.substeps, self._breeding, self.judging, members, tuple(self.memory)
+            uniforms,
+            normals,
+            bred,
+            plus,
+            self.substeps,
+            self._breeding,
+            self.judging,
+            members,
+            tuple(self.memory),
         )
         self.cycles += 1
         self._succeed(chosen, int(winner), count)

@@ -1,7 +1,10 @@
-"""The phases of a task as the search meets them: goals, things held, what may touch, and the bodies of each phase.
+"""The phases of a task as the search meets them.
 
-Where an object is when a phase begins depends on the postures before; the rest is made once. A phase ends at the first
-posture that meets its goal, so a list of postures tells by itself which phase each belongs to.
+Goals, things held, what may touch, and the bodies of each phase.
+
+Where an object is when a phase begins depends on the postures before; the rest is made once. A
+phase ends at the first posture that meets its goal, so a list of postures tells by itself which
+phase each belongs to.
 """
 
 from typing import Any, NamedTuple
@@ -22,7 +25,14 @@ from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.poses import IDENTITY, compose, frame_pose, invert, pose_of
 from evoexp.scenarios.obstacles import BOX, CYLINDER, ObstacleTable, rotation_matrix
-from evoexp.scenarios.posture_task import Phase, PointGoal, PoseGoal, PostureTask, ShiftGoal, SurfaceGoal
+from evoexp.scenarios.posture_task import (
+    Phase,
+    PointGoal,
+    PoseGoal,
+    PostureTask,
+    ShiftGoal,
+    SurfaceGoal,
+)
 
 KEPT = 64  # stages and scenes that a problem keeps
 
@@ -90,7 +100,10 @@ class Problem(NamedTuple):
 
     def parts(self, motion: Motion) -> list[Part]:
         """Return what the certifier judges: the motion phase by phase, each with its own bodies."""
-        return [Part(scene_of(self, span.stage), span.first, span.last) for span in spans(self, motion.q)]
+        return [
+            Part(scene_of(self, span.stage), span.first, span.last)
+            for span in spans(self, motion.q)
+        ]
 
     def spans(self, postures: FloatArray) -> "list[Span]":
         """Return the phases of a list of postures (postures, nq) [rad], as far as it gets."""
@@ -117,7 +130,8 @@ class Stage(NamedTuple):
         number: Of the phase, from 0.
         phase: The phase.
         situation: Where things are in it.
-        controlled: Index into the kinematic table, and local pose (12,), of the frame that is controlled.
+        controlled: Index into the kinematic table, and local pose (12,), of the frame that is
+            controlled.
         judging: What `posture_kernels.judge` takes.
     """
 
@@ -174,13 +188,18 @@ def judge(stage: Stage, q: FloatArray) -> Judged:
     """Judge postures q (nq, postures) [rad]."""
     q = np.ascontiguousarray(q)
     count = q.shape[1]
-    found = Judged(np.empty((ROWS, count)), np.empty(count, dtype=np.bool_), np.empty(count, dtype=np.bool_))
+    found = Judged(
+        np.empty((ROWS, count)), np.empty(count, dtype=np.bool_), np.empty(count, dtype=np.bool_)
+    )
     posture_kernels.judge(q, stage.judging, *found)
     return found
 
 
 def begin(problem: Problem, index: int, q: FloatArray, situation: Situation) -> Stage:
-    """Begin a phase at posture q (nq,). Stages are kept: a path is walked again for its verdict and its terms."""
+    """Begin a phase at posture q (nq,).
+
+    Stages are kept: a path is walked again for its verdict and its terms.
+    """
     moved = not _unmoved(problem, situation) or situation.held >= 0
     key = (index, situation.poses.tobytes(), situation.grasp.tobytes()) if moved else (index,)
     if isinstance(problem.phases[index].goal, ShiftGoal):
@@ -249,7 +268,13 @@ def spans(problem: Problem, postures: FloatArray) -> list[Span]:
 def scene_of(problem: Problem, stage: Stage) -> Scene:
     """Return the bodies of a phase, for the exact verdict."""
     situation = stage.situation
-    key = ("scene", stage.phase.contacts, situation.held, situation.grasp.tobytes(), situation.poses.tobytes())
+    key = (
+        "scene",
+        stage.phase.contacts,
+        situation.held,
+        situation.grasp.tobytes(),
+        situation.poses.tobytes(),
+    )
     if key not in problem.memory:
         problem.memory[key] = _scene(problem, stage)
     bodies: Scene = problem.memory[key]
@@ -261,7 +286,9 @@ def _scene(problem: Problem, stage: Stage) -> Scene:
     items = list(assembly.geometry.geometryObjects)
     geometry = pin.GeometryModel()
     for item in items:
-        geometry.addGeometryObject(pin.GeometryObject(item.name, item.parentJoint, 0, item.placement, item.geometry))
+        geometry.addGeometryObject(
+            pin.GeometryObject(item.name, item.parentJoint, 0, item.placement, item.geometry)
+        )
     for k, (shape, placement) in enumerate(obstacle_shapes(placed_obstacles(problem, situation))):
         joint, where = 0, placement
         if k == situation.held:
@@ -269,7 +296,9 @@ def _scene(problem: Problem, stage: Stage) -> Scene:
             alignment = pose_of(assembly.table.alignment[joint - 1], np.zeros(3))
             pose = compose(alignment, situation.grasp)
             where = pin.SE3(pose[:9].reshape(3, 3), pose[9:])
-        geometry.addGeometryObject(pin.GeometryObject(problem.task.names[k], joint, 0, where, shape))
+        geometry.addGeometryObject(
+            pin.GeometryObject(problem.task.names[k], joint, 0, where, shape)
+        )
     allowed = _allowed(problem, stage.phase)
     pairs = list(problem.bodies.pairs)
     for k in range(len(problem.task.names)):
@@ -278,7 +307,9 @@ def _scene(problem: Problem, stage: Stage) -> Scene:
             watched = [*_apart_from_tool(problem), *others]
             pairs += [(body, len(items) + k) for body in watched]
         else:
-            pairs += [(body, len(items) + k) for body, item in enumerate(items) if item.parentJoint > 0]
+            pairs += [
+                (body, len(items) + k) for body, item in enumerate(items) if item.parentJoint > 0
+            ]
     names = [item.name for item in geometry.geometryObjects]
     for a, b in pairs:
         if frozenset((names[a], names[b])) not in allowed:
@@ -301,14 +332,20 @@ def _allowed(problem: Problem, phase: Phase) -> set[frozenset[str]]:
 
 
 def _apart_from_tool(problem: Problem) -> list[int]:
-    """Return the bodies that an object in the tool must not touch: all but those beside the tool's joint."""
+    """Return the bodies that an object in the tool must not touch.
+
+    All but those beside the tool's joint.
+    """
     joint, parents = problem.tool[0] + 1, problem.assembly.model.parents
     items = problem.assembly.geometry.geometryObjects
     return [k for k, item in enumerate(items) if item.parentJoint not in (joint, parents[joint])]
 
 
 def _surroundings(problem: Problem, phase: Phase, situation: Situation) -> tuple[Any, ...]:
-    """Return obstacles, pairs (body, obstacle) that may touch, and the object carried: for `BodyModel.collision`."""
+    """Return obstacles, pairs (body, obstacle) that may touch, and the object carried.
+
+    For `BodyModel.collision`.
+    """
     names, bodies = problem.task.names, problem.bodies.names
     allowed = _allowed(problem, phase)
     held = situation.held
@@ -317,7 +354,11 @@ def _surroundings(problem: Problem, phase: Phase, situation: Situation) -> tuple
     table = ObstacleTable(*(np.ascontiguousarray(column[left]) for column in table))
     own = len(bodies)
     numbers = {name: k for k, name in enumerate(bodies)} | ({names[held]: own} if held >= 0 else {})
-    moving = {k for k, item in enumerate(problem.assembly.geometry.geometryObjects) if item.parentJoint > 0} | {own}
+    moving = {
+        k
+        for k, item in enumerate(problem.assembly.geometry.geometryObjects)
+        if item.parentJoint > 0
+    } | {own}
     ignored = tuple(
         (number, place)
         for name, number in numbers.items()
@@ -330,18 +371,31 @@ def _surroundings(problem: Problem, phase: Phase, situation: Situation) -> tuple
     joint = problem.tool[0] + 1
     pose = compose(pose_of(problem.assembly.table.alignment[joint - 1], np.zeros(3)), grasp)
     start, end = (_moved(pose, points) for points in (cover.start, cover.end))
-    watched = [k for k in _apart_from_tool(problem) if frozenset((bodies[k], names[held])) not in allowed]
-    return table, ignored, Carried(joint, Cover(start, end, cover.radius, cover.inflation), tuple(watched))
+    watched = [
+        k for k in _apart_from_tool(problem) if frozenset((bodies[k], names[held])) not in allowed
+    ]
+    return (
+        table,
+        ignored,
+        Carried(joint, Cover(start, end, cover.radius, cover.inflation), tuple(watched)),
+    )
 
 
 def _moved(pose: FloatArray, points: FloatArray) -> FloatArray:
     x, y, z = points.T
-    rows = [(pose[3 * e] * x + pose[3 * e + 1] * y + pose[3 * e + 2] * z) + pose[9 + e] for e in range(3)]
+    rows = [
+        (pose[3 * e] * x + pose[3 * e + 1] * y + pose[3 * e + 2] * z) + pose[9 + e]
+        for e in range(3)
+    ]
     return np.column_stack(rows)
 
 
 def _aim(
-    problem: Problem, phase: Phase, q: FloatArray, situation: Situation, controlled: tuple[int, FloatArray]
+    problem: Problem,
+    phase: Phase,
+    q: FloatArray,
+    situation: Situation,
+    controlled: tuple[int, FloatArray],
 ) -> FloatArray:
     """Return what `rate_poses` measures a frame by."""
     goal, aim = phase.goal, np.zeros(30)

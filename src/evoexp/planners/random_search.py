@@ -1,4 +1,7 @@
-"""Random search: what a planner's own sampling reaches without any evolution, at equal evaluations."""
+"""Random search: what a planner's own sampling reaches without any evolution.
+
+At equal evaluations.
+"""
 
 from collections.abc import Iterator
 from typing import Any, ClassVar
@@ -14,8 +17,8 @@ from evoexp.validation import Component
 class RandomSearch(Component):
     """Draws every individual as the wrapped planner draws its initial population.
 
-    A generation draws as many individuals as the planner would evaluate in it, so that both are equal in evaluations at
-    every generation.
+    A generation draws as many individuals as the planner would evaluate in it, so that both are
+    equal in evaluations at every generation.
 
     Attributes:
         planner: The planner whose sampling, cost and budget are used.
@@ -44,7 +47,10 @@ class RandomSearch(Component):
             if judged.cost[statistics.best] < best_cost or index == 0:
                 best_cost = float(judged.cost[statistics.best])
                 best = planner.solution(problem, population, statistics.best)
-                terms, solved = judged.named_terms(statistics.best), bool(judged.feasible[statistics.best])
+                terms, solved = (
+                    judged.named_terms(statistics.best),
+                    bool(judged.feasible[statistics.best]),
+                )
             yield Generation(
                 index=index,
                 best=best,

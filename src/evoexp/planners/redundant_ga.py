@@ -1,17 +1,19 @@
 """Point-to-point motion of a redundant planar arm among ellipses (Lavoie & Boudreau 2001).
 
-The motion has two sub-paths, straight in joint space: from the start to a posture A whose tip is near the via point
-(SP1), from A to a posture B whose tip is near the goal and inside the box (SP2). A genetic algorithm searches A; if it
-is successful, a second one searches B; both are repeated until both are successful, up to `num_attempts` times.
+The motion has two sub-paths, straight in joint space: from the start to a posture A whose tip is
+near the via point (SP1), from A to a posture B whose tip is near the goal and inside the box (SP2).
+A genetic algorithm searches A; if it is successful, a second one searches B; both are repeated
+until both are successful, up to `num_attempts` times.
 
-A population is an array (joints, individuals) [rad] of end postures of one sub-path, or (joints × bits, individuals). A
-solution is flat: three postures (start, A, B) × joints [rad].
+A population is an array (joints, individuals) [rad] of end postures of one sub-path, or (joints ×
+bits, individuals). A solution is flat: three postures (start, A, B) × joints [rad].
 
-What "best so far" means: only the second search has whole plans, each worth the objective of SP2 (Eq. 4). The best so
-far is the plan of the lowest one over all generations and attempts; a successful attempt has found it, since whatever
-came before was no success. Until there is a plan of finite cost its place is taken by the best posture A of any attempt
-so far, as a plan that stays there, at the cost inf. In generations of SP1 the best cost is inf, too: there is no plan;
-the costs of the individuals are their objective of SP1.
+What "best so far" means: only the second search has whole plans, each worth the objective of SP2
+(Eq. 4). The best so far is the plan of the lowest one over all generations and attempts; a
+successful attempt has found it, since whatever came before was no success. Until there is a plan of
+finite cost its place is taken by the best posture A of any attempt so far, as a plan that stays
+there, at the cost inf. In generations of SP1 the best cost is inf, too: there is no plan; the costs
+of the individuals are their objective of SP1.
 """
 
 from collections.abc import Generator, Iterator
@@ -34,7 +36,11 @@ from evoexp.robots.planar_ends import LANES
 from evoexp.scenarios.pick_and_place import PickAndPlace
 from evoexp.validation import Component, Count, Positive
 
-TERMS = (("of", ""), ("position_error", ""), ("joint_displacement", "_rad"))  # of each sub-path, with unit
+TERMS = (
+    ("of", ""),
+    ("position_error", ""),
+    ("joint_displacement", "_rad"),
+)  # of each sub-path, with unit
 ANYWHERE = np.array([-np.inf, np.inf, -np.inf, np.inf])  # the box of SP1
 
 
@@ -94,7 +100,8 @@ class RedundantGa(Component):
         num_attempts: How often SP1 and SP2 are searched at most.
         stop_cost_sp1: The search of SP1 ends where the objective is smaller.
         stop_cost_sp2: The same of SP2.
-        success: A sub-path is successful below its stopping cost (`threshold`), or if its cost is `finite`.
+        success: A sub-path is successful below its stopping cost (`threshold`), or if its cost is
+            `finite`.
         ga: Population, generations, operators.
         objective: Weights of Eq. 4.
         collision: Positions and chords that are tested.
@@ -137,10 +144,15 @@ class RedundantGa(Component):
         targets = np.array([scenario.via_point, scenario.goal_point])
         boxes = np.array([ANYWHERE, scenario.box])
         bodies = scene(assembly, table)
-        return Problem(assembly, collision, start, limits, targets, boxes, bodies, scenario.security_margin)
+        return Problem(
+            assembly, collision, start, limits, targets, boxes, bodies, scenario.security_margin
+        )
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
-        """Yield the generations of all searches, one after the other; their indices go on counting."""
+        """Yield the generations of all searches, one after the other.
+
+        Their indices go on counting.
+        """
         record = _Record(self, problem)
         for _ in range(self.num_attempts):
             record.attempts += 1
@@ -152,9 +164,17 @@ class RedundantGa(Component):
                     return
 
     def _search(
-        self, problem: Problem, rng: np.random.Generator, record: "_Record", path: int, start: FloatArray
+        self,
+        problem: Problem,
+        rng: np.random.Generator,
+        record: "_Record",
+        path: int,
+        start: FloatArray,
     ) -> Generator[Generation, None, Found]:
-        """Search the end of one sub-path (0: SP1, 1: SP2); yield its generations, return the best end."""
+        """Search the end of one sub-path (0: SP1, 1: SP2).
+
+        Yield its generations, return the best end.
+        """
         search = Search(self.ga, problem.joint_limits, self._judging(problem, path), start)
         search.begin(rng)
         yield record.generation(search, path, self.ga.population_size)
@@ -184,29 +204,41 @@ class RedundantGa(Component):
     def cost(self, problem: Problem, population: FloatArray) -> Judgement:
         """Judge pairs of postures A and B (2, joints, individuals): what random search draws.
 
-        A pair costs what its SP2 does if its SP1 is successful, so it is judged as a finished plan of the algorithm is.
-        It is one evaluation of random search and takes two of the objective.
+        A pair costs what its SP2 does if its SP1 is successful, so it is judged as a finished plan
+        of the algorithm is. It is one evaluation of random search and takes two of the objective.
         """
         starts = np.broadcast_to(problem.start[:, None], population.shape[1:])
-        terms = np.array([self._judge(problem, 0, starts, population[0]), self._judge(problem, 1, *population)])
+        terms = np.array(
+            [self._judge(problem, 0, starts, population[0]), self._judge(problem, 1, *population)]
+        )
         cost = np.where(self.successful(0, terms[0, 0]), terms[1, 0], np.inf)
         queries = 2 * problem.collision.queries * population.shape[2]
         return Judgement(cost, np.asarray(self.successful(1, cost)), terms, queries)
 
-    def _judge(self, problem: Problem, path: int, starts: FloatArray, ends: FloatArray) -> FloatArray:
+    def _judge(
+        self, problem: Problem, path: int, starts: FloatArray, ends: FloatArray
+    ) -> FloatArray:
         """Return cost, position error and joint displacement of sub-paths, (3, individuals)."""
         count = starts.shape[1]
         lanes, results = np.arange(count + LANES), np.empty((RESULTS, count))
         starts, ends = np.ascontiguousarray(starts), np.ascontiguousarray(ends)
         hit = np.zeros(count, dtype=np.bool_)
-        redundant_kernels.judge(starts, ends, lanes, count, self._judging(problem, path), results, hit)
+        redundant_kernels.judge(
+            starts, ends, lanes, count, self._judging(problem, path), results, hit
+        )
         return results
 
     def _judging(self, problem: Problem, path: int) -> tuple[Any, ...]:
         """Return what the kernels judge a sub-path by; see `redundant_kernels.judge`."""
         collision = problem.collision
         where = problem.targets[path], problem.boxes[path]
-        return tuple(collision.arm), collision.ellipses, collision.path, *where, self.objective.weights
+        return (
+            tuple(collision.arm),
+            collision.ellipses,
+            collision.path,
+            *where,
+            self.objective.weights,
+        )
 
     def solution(self, problem: Problem, population: FloatArray, individual: int) -> FloatArray:
         """Return a pair of postures A and B as a flat solution."""
@@ -217,7 +249,9 @@ class RedundantGa(Component):
         return Motion(np.ascontiguousarray(self._postures(problem, solution)))
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
-        """Return the terms of both sub-paths, and where each first touches (counted from 1; 0: it does not).
+        """Return the terms of both sub-paths, and where each first touches (counted from 1.
+
+        0: it does not).
 
         Raises:
             ValueError: If the solution has another size than 3 × joints.
@@ -227,14 +261,25 @@ class RedundantGa(Component):
         for k in range(2):
             found = problem.collision.contact(*postures[k : k + 2])
             position, obstacle, link, swept = found or (0, 0, 0, False)
-            named |= {f"contact_position_sp{k + 1}": float(position), f"contact_link_sp{k + 1}": float(link)}
-            named |= {f"contact_obstacle_sp{k + 1}": float(obstacle), f"contact_swept_sp{k + 1}": float(swept)}
+            named |= {
+                f"contact_position_sp{k + 1}": float(position),
+                f"contact_link_sp{k + 1}": float(link),
+            }
+            named |= {
+                f"contact_obstacle_sp{k + 1}": float(obstacle),
+                f"contact_swept_sp{k + 1}": float(swept),
+            }
         return named
 
     def judge_plan(self, problem: Problem, solution: FloatArray) -> FloatArray:
-        """Return cost, position error and joint displacement of both sub-paths of a solution, (2, 3)."""
+        """Return cost, position error and joint displacement of both sub-paths of a solution,.
+
+        2, 3.
+        """
         postures = self._postures(problem, solution)
-        return np.array([self._judge(problem, k, *postures[k : k + 2, :, None])[:, 0] for k in range(2)])
+        return np.array(
+            [self._judge(problem, k, *postures[k : k + 2, :, None])[:, 0] for k in range(2)]
+        )
 
     def shape(self, problem: Problem) -> tuple[tuple[int], ...]:
         """Return the documented shape of a solution: three postures of (joints,)."""
@@ -254,13 +299,19 @@ class _Record:
         self.planner, self.problem = planner, problem
         self.attempts, self.index = 0, -1
         self.via = Found(np.inf, problem.start, np.empty(0))  # the posture A that SP2 starts from
-        self.cost, self.via_cost = np.inf, np.inf  # of the best plan, and of SP1 where there is none
+        self.cost, self.via_cost = (
+            np.inf,
+            np.inf,
+        )  # of the best plan, and of SP1 where there is none
         self.solution: FloatArray | None = None
         self.terms: dict[str, float] = {}
         self.evaluations = self.queries = 0
 
     def generation(self, search: Search, path: int, count: int) -> Generation:
-        """Update the best plan by a population of which `count` are new, and return the generation's record."""
+        """Update the best plan by a population of which `count` are new.
+
+        And return the generation's record.
+        """
         best, summary = search.best, search.summary
         self.index += 1
         self.evaluations += count
@@ -288,7 +339,10 @@ class _Record:
         )
 
     def _improve_via(self, best: Found) -> None:
-        """While there is no plan of finite cost: keep the best posture A as a plan that stays there."""
+        """While there is no plan of finite cost.
+
+        Keep the best posture A as a plan that stays there.
+        """
         if self.solution is None or (self.cost == np.inf and best.cost < self.via_cost):
             self.via_cost, self.solution = best.cost, self._plan(best.posture, best.posture)
             self.terms = named_terms(self.planner.judge_plan(self.problem, self.solution))

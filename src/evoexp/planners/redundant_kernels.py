@@ -1,8 +1,9 @@
 """One generation of end postures of a sub-path, compiled (Lavoie & Boudreau 2001).
 
-A population is a table of rows, individuals innermost: the genes; the joint angles, which are the genes themselves in
-real coding and follow them in binary coding; then cost, position error and joint displacement. A whole generation is
-one call; settings travel as plain tuples, which `redundant_search` makes.
+A population is a table of rows, individuals innermost: the genes; the joint angles, which are the
+genes themselves in real coding and follow them in binary coding; then cost, position error and
+joint displacement. A whole generation is one call; settings travel as plain tuples, which
+`redundant_search` makes.
 """
 
 import numpy as np
@@ -27,12 +28,13 @@ def advance(draws, breeding, judging, starts, memory):  # type: ignore[no-untype
     """Replace a population by the next one.
 
     Args:
-        draws: Uniform numbers for selection, crossover and mutation; (joints, ≥ offspring) normal deviates.
+        draws: Uniform numbers for selection, crossover and mutation; (joints, ≥ offspring) normal
+            deviates.
         breeding: See `breed`.
         judging: See `judge`.
         starts: (joints, ≥ offspring) start of the sub-path, the same for all [rad].
-        memory: Tables of the population and of its offspring; parents (offspring,), places of the elites, scratch
-            (individuals + LANES,) for indices, (individuals,) for hits.
+        memory: Tables of the population and of its offspring; parents (offspring,), places of the
+            elites, scratch (individuals + LANES,) for indices, (individuals,) for hits.
 
     Returns:
         See `summary`.
@@ -54,7 +56,10 @@ def advance(draws, breeding, judging, starts, memory):  # type: ignore[no-untype
 
 @kernel
 def summary(costs):  # type: ignore[no-untyped-def]
-    """Return index of the best, mean and standard deviation of the finite costs, and how many are finite."""
+    """Return index of the best, mean and standard deviation of the finite costs.
+
+    And how many are finite.
+    """
     best, mean, std = summarise(costs)
     finite = 0
     for k in range(len(costs)):
@@ -68,15 +73,18 @@ def breed(draws, breeding, costs, genomes, parents, out):  # type: ignore[no-unt
 
     Args:
         draws: See `advance`.
-        breeding: Number of genes; whether they are bits; (selection, tournament size, rank pressure); (crossover, its
-            rate, α); (mutation, its scope, its rate, its spread); limits of the joints.
+        breeding: Number of genes; whether they are bits; (selection, tournament size, rank
+            pressure); (crossover, its rate, α); (mutation, its scope, its rate, its spread); limits
+            of the joints.
         costs: (individuals,) of the parents' generation.
         genomes: (genes, individuals) theirs.
         parents: (offspring,) written.
         out: (genes, ≥ offspring) written.
     """
     selecting, crossing, mutating, normals = draws
-    _, binary, (selection, size, pressure), (crossover, crossing_rate, alpha), mutation, limits = breeding
+    _, binary, (selection, size, pressure), (crossover, crossing_rate, alpha), mutation, limits = (
+        breeding
+    )
     kind, scope, rate, spread = mutation
     if selection == TOURNAMENT:
         choose_by_tournament(selecting, costs, size, parents)
@@ -101,7 +109,9 @@ def breed(draws, breeding, costs, genomes, parents, out):  # type: ignore[no-unt
 def judge_children(  # type: ignore[no-untyped-def]
     starts, angles, population, offspring, parents, num_genes, judging, lanes, hit
 ):
-    """Write Eq. 4 and its parts for all offspring; who ends outside the box, or is its own parent, is not tested.
+    """Write Eq. 4 and its parts for all offspring.
+
+    Who ends outside the box, or is its own parent, is not tested.
 
     Args:
         starts: (joints, ≥ offspring), the same for all [rad].
@@ -109,7 +119,8 @@ def judge_children(  # type: ignore[no-untyped-def]
         population: Table of the parents' generation.
         offspring: Table of the offspring, its last rows written.
         parents: (offspring,).
-        num_genes: Rows that make a child its own parent if they are equal; it then costs what the parent does.
+        num_genes: Rows that make a child its own parent if they are equal; it then costs what the
+            parent does.
         judging: See `judge`.
         lanes: (≥ offspring + LANES) scratch.
         hit: (≥ offspring,) scratch.
@@ -117,7 +128,12 @@ def judge_children(  # type: ignore[no-untyped-def]
     arm, ellipses, path, target, box, weights = judging
     row = len(population) - RESULTS
     cost, known = offspring[row], population[row]
-    start, count, error, displacement = starts[:, 0].copy(), len(parents), offspring[row + 1], offspring[row + 2]
+    start, count, error, displacement = (
+        starts[:, 0].copy(),
+        len(parents),
+        offspring[row + 1],
+        offspring[row + 2],
+    )
     measure_reach_from(start, angles, count, arm, target, box, weights, cost, error, displacement)
     inside = 0
     for k in range(count):
@@ -138,21 +154,28 @@ def judge_children(  # type: ignore[no-untyped-def]
 
 @kernel
 def judge(starts, ends, lanes, count, judging, results, hit):  # type: ignore[no-untyped-def]
-    """Write Eq. 4 and its parts for some individuals; the tip outside the box is found before any collision is sought.
+    """Write Eq. 4 and its parts for some individuals.
+
+    The tip outside the box is found before any collision is sought.
 
     Args:
         starts: (joints, individuals) [rad].
         ends: (joints, individuals) [rad].
         lanes: (≥ count + LANES) indices of individuals, changed.
         count: How many.
-        judging: Arm, ellipses and path of the collision model; target, box and weights of the objective.
+        judging: Arm, ellipses and path of the collision model; target, box and weights of the
+            objective.
         results: (3, individuals) written: cost, position error, joint displacement.
         hit: (individuals,) scratch.
     """
-    starts, ends, lanes, judging, results, hit = borrowed((starts, ends, lanes, judging, results, hit))
+    starts, ends, lanes, judging, results, hit = borrowed(
+        (starts, ends, lanes, judging, results, hit)
+    )
     arm, ellipses, path, target, box, weights = judging
     cost = results[0]
-    measure_reach(starts, ends, lanes, count, arm, target, box, weights, cost, results[1], results[2])
+    measure_reach(
+        starts, ends, lanes, count, arm, target, box, weights, cost, results[1], results[2]
+    )
     left = 0
     for k in range(count):
         individual = lanes[k]

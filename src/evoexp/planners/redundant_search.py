@@ -1,4 +1,7 @@
-"""One genetic search for the end posture of a sub-path (Lavoie & Boudreau 2001): its memory, its calls of kernels."""
+"""One genetic search for the end posture of a sub-path (Lavoie & Boudreau 2001).
+
+Its memory, its calls of kernels.
+"""
 
 from typing import Any, NamedTuple
 
@@ -59,7 +62,9 @@ class Search:
         summary: Of the costs.
     """
 
-    def __init__(self, ga: SelectiveSettings, limits: FloatArray, judging: tuple[Any, ...], start: FloatArray) -> None:
+    def __init__(
+        self, ga: SelectiveSettings, limits: FloatArray, judging: tuple[Any, ...], start: FloatArray
+    ) -> None:
         """Take the settings, and memory for a population.
 
         Args:
@@ -73,12 +78,19 @@ class Search:
         self._binary = isinstance(ga, BinaryGenetic)
         self._num_genes = joints * ga.bits_per_gene if isinstance(ga, BinaryGenetic) else joints
         first = self._num_genes if self._binary else 0
-        table, offspring = np.empty((first + joints + RESULTS, size)), np.empty((first + joints + RESULTS, count))
+        table, offspring = (
+            np.empty((first + joints + RESULTS, size)),
+            np.empty((first + joints + RESULTS, count)),
+        )
         parents, elites = np.empty(count, dtype=np.int64), np.empty(ga.num_elites, dtype=np.int64)
         self._lanes, self._hit = np.arange(size + LANES), np.zeros(size, dtype=np.bool_)
         self._memory = (table, offspring, parents, elites, self._lanes, self._hit)
         self._starts = np.repeat(start[:, None], size, axis=1)
-        self.genomes, self._angles, self._results = table[: self._num_genes], table[first:-RESULTS], table[-RESULTS:]
+        self.genomes, self._angles, self._results = (
+            table[: self._num_genes],
+            table[first:-RESULTS],
+            table[-RESULTS:],
+        )
         self.costs = self._results[0]
         self._count, self._mutation = count, _mutation(ga)
         selecting = (SELECTIONS.index(ga.selection), ga.tournament_size, ga.rank_pressure)
@@ -88,12 +100,23 @@ class Search:
         self.best, self.summary = Found(np.inf, start, np.empty(0)), Summary(0, np.nan, np.nan, 0)
 
     def _places(self, crossover: int) -> tuple[int, int, int]:
-        """Return where a generation's uniform numbers for crossover and for mutation begin, and how many there are."""
+        """Return where a generation's uniform numbers for crossover and for mutation begin.
+
+        And how many there are.
+        """
         ga, count, num_genes = self._ga, self._count, self._num_genes
         pairs = count // 2
         chosen = count * (ga.tournament_size if ga.selection == "tournament" else 1)
-        crossed = num_single_point_uniforms(pairs) if crossover == ONE_POINT else num_gene_uniforms(num_genes, pairs)
-        mutated = num_genes * count if self._binary else num_mutation_uniforms(num_genes, count, self._mutation[1])
+        crossed = (
+            num_single_point_uniforms(pairs)
+            if crossover == ONE_POINT
+            else num_gene_uniforms(num_genes, pairs)
+        )
+        mutated = (
+            num_genes * count
+            if self._binary
+            else num_mutation_uniforms(num_genes, count, self._mutation[1])
+        )
         return chosen, chosen + crossed, chosen + crossed + mutated
 
     def begin(self, rng: np.random.Generator) -> None:
@@ -115,11 +138,19 @@ class Search:
         uniforms = rng.random(end)
         kind, scope, rate, spread = self._mutation
         if kind == NON_UNIFORM and isinstance(self._ga, RealGenetic):
-            spread = float(non_uniform_spread(index, self._ga.num_generations, self._ga.mutation_power))
-        normals = standard_normal(rng, (self._num_genes, self._count)) if kind == GAUSSIAN else _NO_NORMALS
+            spread = float(
+                non_uniform_spread(index, self._ga.num_generations, self._ga.mutation_power)
+            )
+        normals = (
+            standard_normal(rng, (self._num_genes, self._count))
+            if kind == GAUSSIAN
+            else _NO_NORMALS
+        )
         draws = (uniforms[:crossing], uniforms[crossing:mutating], uniforms[mutating:], normals)
         breeding = (*self._breeding, (kind, scope, rate, spread), self._limits)
-        found = redundant_kernels.advance(draws, breeding, self._judging, self._starts, self._memory)
+        found = redundant_kernels.advance(
+            draws, breeding, self._judging, self._starts, self._memory
+        )
         self._summarise(found)
 
     def _summarise(self, found: tuple[int, float, float, int]) -> None:
@@ -142,4 +173,9 @@ def _mutation(ga: SelectiveSettings) -> tuple[int, int, float, float]:
     """Return mutation, its scope, its rate, its spread."""
     if not isinstance(ga, RealGenetic):
         return NON_UNIFORM, GENE, ga.mutation_rate, 0.0
-    return MUTATIONS.index(ga.mutation), SCOPES.index(ga.mutation_scope), ga.mutation_rate, ga.mutation_std
+    return (
+        MUTATIONS.index(ga.mutation),
+        SCOPES.index(ga.mutation_scope),
+        ga.mutation_rate,
+        ga.mutation_std,
+    )

@@ -13,7 +13,9 @@ from evoexp.draws import Draws
 from evoexp.evolution.scaled_settings import ScaledGenetic
 from evoexp.records import FloatArray, Generation
 
-RECORD = 4  # what kernels note of a generation: index of the best, mean and deviation of costs, how many are feasible
+# what kernels note of a generation: index of the best, mean and deviation of costs, how many are
+# feasible
+RECORD = 4
 
 
 class Found(NamedTuple):
@@ -25,7 +27,9 @@ class Found(NamedTuple):
 
 
 class Stretches(ABC):
-    """The generations of one run; the last ones are kept, generation g at place g modulo `num_places`.
+    """The generations of one run.
+
+    The last ones are kept, generation g at place g modulo `num_places`.
 
     Attributes:
         num_places: As many as are computed at a time, and the one they go on from.
@@ -74,7 +78,10 @@ class Stretches(ABC):
             )
 
     def _place(self, index: int, rng: np.random.Generator) -> int:
-        """Return the place of a generation, computing it and some that follow it first if need be."""
+        """Return the place of a generation.
+
+        Computing it and some that follow it first if need be.
+        """
         if index == 0:
             self.begin(rng)
             self._known = 0
@@ -92,7 +99,10 @@ class Stretches(ABC):
 
     @abstractmethod
     def go_on(self, draws: tuple[np.ndarray, np.ndarray], first: int, last: int) -> int:
-        """Compute the generations after `first` up to `last`; return the one reached, as far as the draws suffice."""
+        """Compute the generations after `first` up to `last`.
+
+        Return the one reached, as far as the draws suffice.
+        """
 
     @abstractmethod
     def found(self, place: int, individual: int) -> Found:
@@ -100,4 +110,7 @@ class Stretches(ABC):
 
     @abstractmethod
     def population(self, place: int, is_last: bool) -> np.ndarray:
-        """Return the population at a place; of the last generation, which is hashed, nothing but its individuals."""
+        """Return the population at a place.
+
+        Of the last generation, which is hashed, nothing but its individuals.
+        """

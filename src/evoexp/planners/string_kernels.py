@@ -1,7 +1,8 @@
 """One generation of strings of via-points, compiled (Rana & Zalzala 1995, section 3.4).
 
-A whole generation is one call: between kernels, Python's own work would cost half as much as theirs. Populations are
-arrays (nq, N + 1, individuals), padded to whole vectors; settings travel as plain tuples, which `via_point_ga` makes.
+A whole generation is one call: between kernels, Python's own work would cost half as much as
+theirs. Populations are arrays (nq, N + 1, individuals), padded to whole vectors; settings travel as
+plain tuples, which `via_point_ga` makes.
 """
 
 import numpy as np
@@ -25,7 +26,8 @@ def advance(uniforms, draws, arm_slices, breeding, smoothing, judging, memory): 
     """Replace a population by the next one.
 
     Args:
-        uniforms: Random numbers of the whole generation, as many as `draws` and the new trajectories take.
+        uniforms: Random numbers of the whole generation, as many as `draws` and the new
+            trajectories take.
         draws: How many offspring, numbers for cross-over, and new trajectories there are.
         arm_slices: (arms, 2) rows of each arm.
         breeding: See `breed`.
@@ -34,13 +36,14 @@ def advance(uniforms, draws, arm_slices, breeding, smoothing, judging, memory): 
         memory: population, its costs and collisions; offspring, their terms; places of the elites.
 
     Returns:
-        Index of the best, mean and standard deviation of the finite costs, number of collision-free individuals.
+        Index of the best, mean and standard deviation of the finite costs, number of collision-free
+        individuals.
     """
     population, costs, collisions, offspring, terms, elites = memory
     count = draws[0]
     choose_elites(costs, elites)
-    # (a) Reproduction, (b) cross-over, and (d) mutation before (c): a new trajectory, too, is redistributed and relaxed
-    # once.
+    # (a) Reproduction, (b) cross-over, and (d) mutation before (c): a new trajectory, too, is
+    # redistributed and relaxed once.
     breed(uniforms, draws, arm_slices, breeding, population, costs, offspring)
     # (c) Redistribution and relaxation.
     smooth(offspring, count, arm_slices, smoothing)
@@ -65,12 +68,22 @@ def breed(uniforms, draws, arm_slices, breeding, population, costs, offspring): 
         uniforms: See `advance`.
         draws: See `advance`.
         arm_slices: See `advance`.
-        breeding: C_max, rate and distance of cross-over, rate of mutation, step and turn of a walk, start, goal.
+        breeding: C_max, rate and distance of cross-over, rate of mutation, step and turn of a walk,
+            start, goal.
         population: The parents' generation.
         costs: (individuals,) theirs.
         offspring: Written.
     """
-    fitness_offset, crossover_rate, crossover_distance, mutation_rate, walk_step, max_turn, start, goal = breeding
+    (
+        fitness_offset,
+        crossover_rate,
+        crossover_distance,
+        mutation_rate,
+        walk_step,
+        max_turn,
+        start,
+        goal,
+    ) = breeding
     count, pairs, new = draws
     # (a) Weighted roulette wheel; neighbours in the order drawn are the random pairs of (b).
     wheel, parents = np.empty(len(costs)), np.empty(count, dtype=np.int64)
@@ -78,14 +91,25 @@ def breed(uniforms, draws, arm_slices, breeding, population, costs, offspring): 
     spin_roulette(wheel, uniforms[:count], parents)
     # (b) One site per arm, at the same index in both parents.
     sites = uniforms[count : count + pairs]
-    cross_at_sites(sites, population, parents, arm_slices, crossover_rate, crossover_distance, offspring)
+    cross_at_sites(
+        sites, population, parents, arm_slices, crossover_rate, crossover_distance, offspring
+    )
     # (d) New trajectories in distinct places, each with the mutation's probability.
     slots, first = np.arange(count), count + pairs
     shuffle_head(uniforms[first : first + new], slots)
     walks = uniforms[first + 2 * new :].reshape((new, -1)) if new else np.empty((0, 0))
     for k in range(new):
         if uniforms[first + new + k] < mutation_rate:
-            walk_strings(offspring, slots[k : k + 1], walks[k : k + 1], start, goal, arm_slices, walk_step, max_turn)
+            walk_strings(
+                offspring,
+                slots[k : k + 1],
+                walks[k : k + 1],
+                start,
+                goal,
+                arm_slices,
+                walk_step,
+                max_turn,
+            )
 
 
 @kernel
@@ -96,7 +120,8 @@ def smooth(strings, count, arm_slices, smoothing):  # type: ignore[no-untyped-de
         strings: (nq, N + 1, ≥ count), changed.
         count: Of strings.
         arm_slices: See `advance`.
-        smoothing: Whether to redistribute, its samples per segment, pivots and scratch; delta of the relaxation.
+        smoothing: Whether to redistribute, its samples per segment, pivots and scratch; delta of
+            the relaxation.
     """
     redistribution, samples, pivots, floats, integers, delta = smoothing
     lanes = -(-count // 8) * 8  # whole vectors

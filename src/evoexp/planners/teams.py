@@ -1,7 +1,7 @@
 """Populations evaluated all against all, and the teams in them (Curkovic et al. 2013, Eqs. 4–8).
 
-A team is one individual of every population: its paths are executed together. What individuals are worth on their own
-and how often they collide stands in `Evaluated`; everything else here reads it.
+A team is one individual of every population: its paths are executed together. What individuals are
+worth on their own and how often they collide stands in `Evaluated`; everything else here reads it.
 """
 
 from itertools import combinations
@@ -38,11 +38,13 @@ class Evaluated(NamedTuple):
 
     @property
     def num_feasible(self) -> int:
-        """Individuals of the first robot that have a collision-free partner in every other population."""
+        """Individuals of the first robot with a collision-free partner in every population."""
         return int(count_partnered(self.collisions, self.blocked))
 
     def team_of(self, individual: int) -> np.ndarray:
-        """Return the cheapest collision-free team with an individual of the first robot; else one that collides little.
+        """Return the cheapest collision-free team with an individual of the first robot.
+
+        Else one that collides little.
 
         Returns:
             (robots,) index of the member in each population.
@@ -73,7 +75,10 @@ class Evaluated(NamedTuple):
         return hits + sum(int(self.blocked[r, i]) for r, i in enumerate(team))
 
     def terms_of(self, team: np.ndarray) -> dict[str, float]:
-        """Return C1 … C4 of every robot of a team (robots,) by name; C1 against the team's other robots only."""
+        """Return C1 … C4 of every robot of a team (robots,) by name.
+
+        C1 against the team's other robots only.
+        """
         met = [int(self.blocked[r, i]) for r, i in enumerate(team)]
         for pair, (a, b) in enumerate(combinations(range(len(team)), 2)):
             hits = int(self.collisions[pair, team[a], team[b]])
@@ -122,7 +127,11 @@ def count_partnered(collisions, blocked):  # type: ignore[no-untyped-def]
     for i in range(blocked.shape[1]):
         partnered = blocked[0, i] == 0
         for other in range(1, len(blocked)):
-            row, usable, found = collisions[pair_index(len(blocked), 0, other), i], blocked[other], False
+            row, usable, found = (
+                collisions[pair_index(len(blocked), 0, other), i],
+                blocked[other],
+                False,
+            )
             for j in range(blocked.shape[1]):
                 found |= (row[j] == 0) & (usable[j] == 0)
             partnered &= found

@@ -1,11 +1,15 @@
-"""A mission in two stages: where to dock and in which posture, then a safe path there (Chen & Zalzala 1995).
+"""A mission in two stages: where to dock and in which posture, then a safe path there.
 
-The first stage is the placement search of section 3, the second the path search of section 2, whose goal is the node
-nearest to the docking place that the first one chose. What they find is one motion: along the path from node to node,
-to the docking place itself, then from the travel posture to the one that was found.
+Chen & Zalzala 1995.
 
-A solution is flat: θ1, θ2 [deg], then the coordinates of the path's nodes. Its cost is E (Eq. 14) + C (Eq. 1). While
-the first stage is at work there is no path, and the cost is inf; the costs of its individuals are their E.
+The first stage is the placement search of section 3, the second the path search of section 2, whose
+goal is the node nearest to the docking place that the first one chose. What they find is one
+motion: along the path from node to node, to the docking place itself, then from the travel posture
+to the one that was found.
+
+A solution is flat: θ1, θ2 [deg], then the coordinates of the path's nodes. Its cost is E (Eq. 14) +
+C (Eq. 1). While the first stage is at work there is no path, and the cost is inf; the costs of its
+individuals are their E.
 """
 
 from collections.abc import Generator, Iterator
@@ -70,7 +74,9 @@ class TwoStage(Component):
             SettingError: If one of them cannot be solved, or the grid is not of a floor.
         """
         if len(scenario.grid.size) != 2:
-            raise SettingError("scenario.grid.size", "of a floor, two numbers", list(scenario.grid.size))
+            raise SettingError(
+                "scenario.grid.size", "of a floor, two numbers", list(scenario.grid.size)
+            )
         placement = self.placement.prepare(robot.arm(), scenario.docking)
         path = self.path.prepare(robot.platform(), scenario.grid)
         bodies = scene(robot.build(), scenario.grid.bodies(), self_pairs=True)
@@ -88,7 +94,11 @@ class TwoStage(Component):
         terms, cost, best = {}, None, np.empty(0)
         for last in self.placement.evolve(problem.placement, rng):
             if last.best_cost != cost:
-                terms = self._posture_terms(problem, last.best) | dict.fromkeys(PATH, 0.0) | {"sub_path": 1.0}
+                terms = (
+                    self._posture_terms(problem, last.best)
+                    | dict.fromkeys(PATH, 0.0)
+                    | {"sub_path": 1.0}
+                )
                 cost, best = last.best_cost, np.concatenate([last.best, start])
             yield last._replace(
                 best=best,
@@ -101,7 +111,9 @@ class TwoStage(Component):
         assert last is not None, "a planner yields its initial population at least"
         return last
 
-    def _drive(self, problem: Problem, rng: np.random.Generator, docked: Record) -> Iterator[Record]:
+    def _drive(
+        self, problem: Problem, rng: np.random.Generator, docked: Record
+    ) -> Iterator[Record]:
         """Search the path to the docking place that was found."""
         posture = self._posture_terms(problem, docked.best) | {"sub_path": 2.0}
         terms, path, best = posture, np.empty(0), np.empty(0)
@@ -121,15 +133,23 @@ class TwoStage(Component):
             )
 
     def _path_problem(self, problem: Problem, angles: FloatArray) -> Any:
-        """Return the problem of the second stage: as prepared, or with the node nearest to another docking place."""
+        """Return the problem of the second stage.
+
+        As prepared, or with the node nearest to another docking place.
+        """
         grid = problem.scenario.grid
         node = tuple(int(np.floor(value + 0.5)) for value in self.docking_place(problem, angles))
         if node == grid.goal:
             return problem.path
-        return self.path.prepare(problem.robot.platform(), type(grid)(**(dict(grid) | {"goal": node})))
+        return self.path.prepare(
+            problem.robot.platform(), type(grid)(**(dict(grid) | {"goal": node}))
+        )
 
     def docking_place(self, problem: Problem, angles: FloatArray) -> FloatArray:
-        """Return where on the floor (2,) the platform stands in a posture (θ1, θ2) [length unit]."""
+        """Return where on the floor (2,) the platform stands in a posture (θ1.
+
+        Θ2) [length unit].
+        """
         x, y = problem.scenario.task_origin
         return np.array([x + self.placement.evaluate(problem.placement, angles)["platform_x"], y])
 
@@ -139,7 +159,10 @@ class TwoStage(Component):
         return named | {"posture_cost": float(terms["cost"])}
 
     def motion(self, problem: Problem, solution: FloatArray) -> Motion | None:
-        """Return the whole motion, (nodes + 2, 5) in equal times; None if the posture is infeasible."""
+        """Return the whole motion, (nodes + 2, 5) in equal times.
+
+        None if the posture is infeasible.
+        """
         angles, nodes = self._parts(solution)
         posture = self.placement.motion(problem.placement, angles)
         if posture is None:
@@ -151,7 +174,9 @@ class TwoStage(Component):
         return Motion(q)
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
-        """Return the terms of posture and path, the last leg from node to docking place, and the cost of both.
+        """Return the terms of posture and path, the last leg from node to docking place.
+
+        And the cost of both.
 
         Raises:
             SettingError: If there is no path, or it leaves the grid.
@@ -164,7 +189,10 @@ class TwoStage(Component):
         return posture | path | both | {"cost": posture["posture_cost"] + both["path_cost"]}
 
     def shape(self, problem: Problem) -> tuple[Any, ...]:
-        """Return the documented shape of a solution: θ1 and θ2, then any number of nodes, in pairs."""
+        """Return the documented shape of a solution.
+
+        Θ1 and θ2, then any number of nodes, in pairs.
+        """
         return (..., (ANGLES,))
 
     def _parts(self, solution: FloatArray) -> tuple[FloatArray, FloatArray]:

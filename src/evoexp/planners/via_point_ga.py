@@ -1,11 +1,12 @@
 """Multi-arm motion as strings of via-points (Rana & Zalzala 1995).
 
-An individual is one string per arm: N + 1 configurations from start to goal; the i-th via-points of all arms belong to
-the same instant. Configuration space is in degrees, angles are not wrapped. Nothing here knows how many arms there are,
-how many joints they have, or whether they move in a plane or in space: that is the collision model's business.
+An individual is one string per arm: N + 1 configurations from start to goal; the i-th via-points of
+all arms belong to the same instant. Configuration space is in degrees, angles are not wrapped.
+Nothing here knows how many arms there are, how many joints they have, or whether they move in a
+plane or in space: that is the collision model's business.
 
-A population is an array (nq, N + 1, individuals), individuals innermost. A solution is flat: arm by arm, instant by
-instant, joint by joint (arms × (N + 1) × joints) [deg], start and goal included.
+A population is an array (nq, N + 1, individuals), individuals innermost. A solution is flat: arm by
+arm, instant by instant, joint by joint (arms × (N + 1) × joints) [deg], start and goal included.
 """
 
 from collections.abc import Iterator
@@ -32,7 +33,9 @@ from evoexp.robots.assembly import Assembly, Robot
 from evoexp.scenarios.arm_motion import ArmMotion
 from evoexp.validation import Component, Count, NonNegativeCount, Positive, Rate
 
-SAMPLES = tuple(2**k for k in range(3, 11))  # of the speed per segment that the redistribution can take
+SAMPLES = tuple(
+    2**k for k in range(3, 11)
+)  # of the speed per segment that the redistribution can take
 LANES = 8  # individuals are padded to whole vectors
 SAMPLES_BETWEEN = 100  # configurations per segment where a clearance between via-points is sampled
 
@@ -86,7 +89,10 @@ class Judgement(NamedTuple):
         """Return the terms of one individual by name: C1 … of Eqs. 2–6."""
         lengths, unevenness, collisions, _ = self.terms
         named = {f"length_arm_{a + 1}_deg": float(row[individual]) for a, row in enumerate(lengths)}
-        named |= {f"unevenness_arm_{a + 1}_deg": float(row[individual]) for a, row in enumerate(unevenness)}
+        named |= {
+            f"unevenness_arm_{a + 1}_deg": float(row[individual])
+            for a, row in enumerate(unevenness)
+        }
         return named | {"collisions": float(collisions[individual])}
 
 
@@ -100,7 +106,8 @@ class ViaPointGa(Component):
         num_new_trajectories: Offspring replaced by new trajectories per generation.
         crossover_distance: Strings are crossed only where they are closer than this [deg].
         relaxation_step: delta of Eqs. 8, 9.
-        redistribution: Whether via-points are redistributed evenly along a spline (off: an ablation).
+        redistribution: Whether via-points are redistributed evenly along a spline (off: an
+            ablation).
         spline_end: End condition of that spline.
         samples_per_segment: Samples of its arc length between two via-points.
         ga: Population, generations, elites, rates.
@@ -127,14 +134,17 @@ class ViaPointGa(Component):
     def _samples_halve(self) -> Self:
         count = self.samples_per_segment
         if count not in SAMPLES:
-            raise SettingError("samples_per_segment", f"one of {', '.join(map(str, SAMPLES))}", count)
+            raise SettingError(
+                "samples_per_segment", f"one of {', '.join(map(str, SAMPLES))}", count
+            )
         return self
 
     def prepare(self, robot: Robot, scenario: ArmMotion) -> Problem:
         """Build the robot and check that start and goal fit it and are free of collision.
 
         Raises:
-            SettingError: If they do not, or if more new trajectories are asked for than there are offspring.
+            SettingError: If they do not, or if more new trajectories are asked for than there are
+                offspring.
         """
         if self.num_new_trajectories > self.ga.num_offspring:
             must = f"at most the offspring of a generation ({self.ga.num_offspring})"
@@ -146,10 +156,17 @@ class ViaPointGa(Component):
             clearance = collision.clearance(q[:, None])
             if clearance.least[0] < 0.0:
                 what = "two arms" if clearance.between_arms[0] < 0.0 else "an arm and an obstacle"
-                must = f"free of collision ({what} overlap by {-clearance.least[0]:.3g} {scenario.length_unit})"
-                raise SettingError(f"scenario.{name}", must, [list(arm) for arm in getattr(scenario, name)])
+                must = (
+                    f"free of collision ({what} overlap by {-clearance.least[0]:.3g} "
+                    f"{scenario.length_unit})"
+                )
+                raise SettingError(
+                    f"scenario.{name}", must, [list(arm) for arm in getattr(scenario, name)]
+                )
         joints = int(np.max(assembly.arm_slices[:, 1] - assembly.arm_slices[:, 0]))
-        spline = prepare_redistribution(self.num_via_points, joints, self.spline_end, self.samples_per_segment)
+        spline = prepare_redistribution(
+            self.num_via_points, joints, self.spline_end, self.samples_per_segment
+        )
         bodies = scene(assembly, collision.obstacles)
         return Problem(assembly, collision, start, goal, spline, bodies, scenario.security_margin)
 
@@ -195,10 +212,15 @@ class ViaPointGa(Component):
 
     def solution(self, problem: Problem, population: FloatArray, individual: int) -> FloatArray:
         """Return one individual of a population as a flat solution."""
-        return np.concatenate([population[a:b, :, individual].T.ravel() for a, b in problem.arm_slices])
+        return np.concatenate(
+            [population[a:b, :, individual].T.ravel() for a, b in problem.arm_slices]
+        )
 
     def motion(self, problem: Problem, solution: FloatArray) -> Motion:
-        """Return the joint-space motion of a solution: from via-point to via-point in equal times, straight."""
+        """Return the joint-space motion of a solution.
+
+        From via-point to via-point in equal times, straight.
+        """
         return Motion(np.ascontiguousarray(DEGREE * self._strings_of(problem, solution).T))
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
@@ -228,7 +250,9 @@ class ViaPointGa(Component):
         if solution.shape != (sum(sizes),):
             raise ValueError(f"a solution has {sum(sizes)} values, was {solution.shape}")
         parts = np.split(solution, np.cumsum(sizes)[:-1])
-        return np.vstack([p.reshape(shape).T for p, shape in zip(parts, self.shape(problem), strict=True)])
+        return np.vstack(
+            [p.reshape(shape).T for p, shape in zip(parts, self.shape(problem), strict=True)]
+        )
 
 
 class _Found(NamedTuple):
@@ -239,7 +263,10 @@ class _Found(NamedTuple):
 
 
 class _Strings:
-    """The population-wide steps of one planner on one problem, with their settings as kernels take them."""
+    """The population-wide steps of one planner on one problem.
+
+    With their settings as kernels take them.
+    """
 
     def __init__(self, planner: ViaPointGa, problem: Problem) -> None:
         self.planner, self.problem, ga, spline = planner, problem, planner.ga, problem.spline
@@ -249,29 +276,53 @@ class _Strings:
         pairs = crossover.num_uniforms(self.num_arms, ga.num_offspring // 2)
         self.draws = (ga.num_offspring, pairs, planner.num_new_trajectories)
         self.num_drawn = sum(self.draws) + planner.num_new_trajectories * (1 + self.num_uniforms)
-        rates = (ga.crossover_rate, planner.crossover_distance, ga.mutation_rate, planner.walk_step, self.max_turn)
+        rates = (
+            ga.crossover_rate,
+            planner.crossover_distance,
+            ga.mutation_rate,
+            planner.walk_step,
+            self.max_turn,
+        )
         self.breeding = (planner.objective.fitness_offset, *rates, problem.start, problem.goal)
         factor = (spline.samples_per_segment, spline.pivots, spline.floats, spline.integers)
         self.smoothing = (planner.redistribution, *factor, planner.relaxation_step)
-        self.judging = (planner.collision.collision_substeps, planner.objective.weights, problem.collision.tables)
+        self.judging = (
+            planner.collision.collision_substeps,
+            planner.objective.weights,
+            problem.collision.tables,
+        )
 
     def empty(self, count: int) -> FloatArray:
         """Return memory for strings, padded to whole vectors and holding zeros."""
         lanes = max(LANES, -(-count // LANES) * LANES)
         return np.zeros((self.nq, self.planner.num_via_points + 1, lanes))
 
-    def new_trajectories(self, rng: np.random.Generator, population: FloatArray, lanes: np.ndarray) -> None:
+    def new_trajectories(
+        self, rng: np.random.Generator, population: FloatArray, lanes: np.ndarray
+    ) -> None:
         """Write random walks from start to goal into some lanes (section 3.3)."""
         problem, step = self.problem, self.planner.walk_step
         uniforms = rng.random((len(lanes), self.num_uniforms))
-        walk(population, lanes, uniforms, problem.start, problem.goal, problem.arm_slices, step, self.max_turn)
+        walk(
+            population,
+            lanes,
+            uniforms,
+            problem.start,
+            problem.goal,
+            problem.arm_slices,
+            step,
+            self.max_turn,
+        )
 
     def smooth(self, population: FloatArray, count: int) -> None:
         """Redistribute and relax the first `count` strings."""
         string_kernels.smooth(population, count, self.problem.arm_slices, self.smoothing)
 
     def judge(self, population: FloatArray, count: int) -> Judgement:
-        """Return cost and terms of the first `count` strings; the arrays of terms keep the padding."""
+        """Return cost and terms of the first `count` strings.
+
+        The arrays of terms keep the padding.
+        """
         judged = self.unjudged(population, count)
         string_kernels.judge(population, self.problem.arm_slices, self.judging, tuple(judged.terms))
         return judged
@@ -284,10 +335,15 @@ class _Strings:
         return Judgement(terms.cost, terms, self.planner.num_via_points * self.judging[0] * count)
 
     def advance(self, rng: np.random.Generator, memory: tuple[Any, ...]) -> _Found:
-        """Replace the population in `memory` by the next one; offspring and their terms are there afterwards."""
+        """Replace the population in `memory` by the next one.
+
+        Offspring and their terms are there afterwards.
+        """
         uniforms = rng.random(self.num_drawn)
         settings = (self.breeding, self.smoothing, self.judging)
-        *found, feasible = string_kernels.advance(uniforms, self.draws, self.problem.arm_slices, *settings, memory)
+        *found, feasible = string_kernels.advance(
+            uniforms, self.draws, self.problem.arm_slices, *settings, memory
+        )
         return _Found(CostStatistics(*found), feasible)
 
 
@@ -310,7 +366,7 @@ class _Best:
         evaluations: int,
         queries: int,
     ) -> Generation:
-        """Update the best by a population (judged in its first lanes) and return the generation's record."""
+        """Update the best by a judged population and return the generation's record."""
         k, mean, std = found.costs
         cost = float(costs[k])
         if cost < self.cost or self.solution is None:
@@ -335,19 +391,29 @@ class _Best:
 
 
 def sampled(strings: FloatArray, samples: int) -> FloatArray:
-    """Return configurations along straight segments, the via-points included: (nq, N · samples + 1)."""
+    """Return configurations along straight segments, the via-points included.
+
+    (nq, N · samples + 1).
+    """
     inside = interpolate_linear(np.repeat(strings[:, :, None], LANES, axis=2), samples)[..., 0]
     return np.hstack([strings[:, :1], inside.reshape(len(strings), -1)])
 
 
 def _least_distances(problem: Problem, at: Clearance, between: Clearance) -> dict[str, float]:
-    """Least distances of circle centres, as in the paper's Fig. 7: to another arm's, and to an obstacle's surface."""
+    """Least distances of circle centres, as in the paper's Fig.
+
+    7: to another arm's, and to an obstacle's surface.
+    """
     radius = problem.collision.radius
     distances = {}
     if np.isfinite(at.between_arms).any():
         distances["arm_distance_at_via_points"] = float(np.min(at.between_arms)) + 2.0 * radius
-        distances["arm_distance_between_sampled"] = float(np.min(between.between_arms)) + 2.0 * radius
+        distances["arm_distance_between_sampled"] = (
+            float(np.min(between.between_arms)) + 2.0 * radius
+        )
     if np.isfinite(at.to_obstacles).any():
         distances["obstacle_distance_at_via_points"] = float(np.min(at.to_obstacles)) + radius
-        distances["obstacle_distance_between_sampled"] = float(np.min(between.to_obstacles)) + radius
+        distances["obstacle_distance_between_sampled"] = (
+            float(np.min(between.to_obstacles)) + radius
+        )
     return distances

@@ -20,7 +20,8 @@ class Contact(NamedTuple):
 
     Attributes:
         begin: Of the contact [instants].
-        end: Of it, to 1e-6; where bodies part for less than a tick, they are said to touch all the same.
+        end: Of it, to 1e-6; where bodies part for less than a tick, they are said to touch all the
+            same.
         pair: The bodies that touch first.
     """
 
@@ -33,7 +34,8 @@ class Clearance(NamedTuple):
     """Exact distances.
 
     Attributes:
-        least: (ticks,) between any two bodies that are watched [length unit]; 0 where they touch, inf if none are.
+        least: (ticks,) between any two bodies that are watched [length unit]; 0 where they touch,
+            inf if none are.
         pairs: (ticks,) the two that are nearest; empty if none are watched.
         contacts: In the order of time.
     """
@@ -44,7 +46,10 @@ class Clearance(NamedTuple):
 
 
 def parts_of(problem: Any, motion: Motion) -> list[Part]:
-    """Return the pieces of a motion that have bodies of their own; of most problems the whole motion is one."""
+    """Return the pieces of a motion that have bodies of their own.
+
+    Of most problems the whole motion is one.
+    """
     if hasattr(problem, "parts"):
         return list(problem.parts(motion))
     return [Part(problem.scene, 0, motion.num_segments)]
@@ -72,7 +77,9 @@ def clearance(parts: list[Part], motion: Motion, times: FloatArray) -> Clearance
         pairs.append(watch.name(pair))
     for part in parts:
         inside = times[(times > part.first) & (times < part.last)]
-        contacts += _contacts(watches[id(part)], part, motion, np.array([*inside, float(part.last)]))
+        contacts += _contacts(
+            watches[id(part)], part, motion, np.array([*inside, float(part.last)])
+        )
     return Clearance(np.array(least), tuple(pairs), _joined(contacts))
 
 
@@ -93,11 +100,16 @@ class _Watch:
 
     def touching(self, t: float) -> bool:
         """Return whether any pair is in contact."""
-        return any(self._distance(pair, t) <= level for pair, level in enumerate(self.scene.tolerances))
+        return any(
+            self._distance(pair, t) <= level for pair, level in enumerate(self.scene.tolerances)
+        )
 
 
 def _contacts(watch: _Watch, part: Part, motion: Motion, ticks: FloatArray) -> list[Contact]:
-    """Return the contacts of one piece: the certifier finds where each begins, ticks and bisection where it ends."""
+    """Return the contacts of one piece.
+
+    The certifier finds where each begins, ticks and bisection where it ends.
+    """
     found: list[Contact] = []
     t = float(part.first)
     while t < part.last or (t == part.last == part.first and not found):
@@ -128,7 +140,10 @@ def _contacts(watch: _Watch, part: Part, motion: Motion, ticks: FloatArray) -> l
 
 
 def remainder(motion: Motion, t: float, last: int) -> Motion:
-    """Return what is left of a motion from t on up to an instant; its first segment is what is left of one."""
+    """Return what is left of a motion from t on up to an instant.
+
+    Its first segment is what is left of one.
+    """
     segment = min(int(t), max(motion.num_segments - 1, 0))
     u = t - segment
     q = motion.q[segment : last + 1]

@@ -39,7 +39,14 @@ def bodies(recording: Recording, roles: Iterable[str]) -> list[Any]:
     """
     chosen, names = set(roles), frame_names(recording)
     return [
-        entity(shape, names[shape.frame], shape.pose, OPACITY[shape.role], recording.view.radius, shape.name)
+        entity(
+            shape,
+            names[shape.frame],
+            shape.pose,
+            OPACITY[shape.role],
+            recording.view.radius,
+            shape.name,
+        )
         for shape in recording.shapes
         if shape.role in chosen
     ]
@@ -69,11 +76,15 @@ def marks(recording: Recording) -> list[Any]:
             points=[_point(point) for point in way],
             color=_colour(arm_colour(arm), 1.0),
         )
-        found.append(SceneEntity(frame_id=WORLD, id=f"way of arm {arm + 1}", frame_locked=True, lines=[line]))
+        found.append(
+            SceneEntity(frame_id=WORLD, id=f"way of arm {arm + 1}", frame_locked=True, lines=[line])
+        )
     size = 0.02 * recording.view.radius
     for target in recording.targets:
         pose = _pose(np.array([*target.point, 0.0, 0.0, 0.0, 1.0]))
-        ball = SpherePrimitive(pose=pose, size=_vector(np.full(3, size)), color=_colour("#882255", 1.0))
+        ball = SpherePrimitive(
+            pose=pose, size=_vector(np.full(3, size)), color=_colour("#882255", 1.0)
+        )
         text = TextPrimitive(
             pose=pose,
             billboard=True,
@@ -83,7 +94,9 @@ def marks(recording: Recording) -> list[Any]:
             text=f" {target.name}",
         )
         name = f"target {target.name}"
-        found.append(SceneEntity(frame_id=WORLD, id=name, frame_locked=True, spheres=[ball], texts=[text]))
+        found.append(
+            SceneEntity(frame_id=WORLD, id=name, frame_locked=True, spheres=[ball], texts=[text])
+        )
     return found
 
 
@@ -92,7 +105,9 @@ def frame_names(recording: Recording) -> list[str]:
     return [*(frame.name for frame in recording.frames), WORLD]
 
 
-def entity(shape: Shape, frame: str, pose: FloatArray, opacity: float, radius: float, name: str) -> Any:
+def entity(
+    shape: Shape, frame: str, pose: FloatArray, opacity: float, radius: float, name: str
+) -> Any:
     """Return a body as one entity: what coal knows as one shape is drawn once.
 
     Args:
@@ -103,7 +118,13 @@ def entity(shape: Shape, frame: str, pose: FloatArray, opacity: float, radius: f
         radius: Of the view, for half-spaces.
         name: The entity's.
     """
-    own = arm_colour(shape.arm) if shape.role == "arm" else OBJECT if shape.role == "object" else OBSTACLE
+    own = (
+        arm_colour(shape.arm)
+        if shape.role == "arm"
+        else OBJECT
+        if shape.role == "object"
+        else OBSTACLE
+    )
     primitives = _primitives(shape.outline, pin.XYZQUATToSE3(pose), _colour(own, opacity), radius)
     return SceneEntity(frame_id=frame, id=name, frame_locked=True, **primitives)
 
@@ -125,7 +146,9 @@ def _primitives(outline: Outline, place: Any, colour: Any, radius: float) -> dic
         return {"cubes": [_solid(CubePrimitive, place, size, colour)]}
     if kind in ("sphere", "ellipsoid"):
         axes = size * 3 if kind == "sphere" else size
-        return {"spheres": [_solid(SpherePrimitive, place, tuple(2.0 * axis for axis in axes), colour)]}
+        return {
+            "spheres": [_solid(SpherePrimitive, place, tuple(2.0 * axis for axis in axes), colour)]
+        }
     if kind == "half_space":
         depth, edge = SLAB * radius, FAR * radius
         below = place * pin.SE3(np.eye(3), np.array([0.0, 0.0, -0.5 * depth]))
@@ -135,14 +158,23 @@ def _primitives(outline: Outline, place: Any, colour: Any, radius: float) -> dic
         assert outline.triangles is not None
         points = [_point(point) for point in outline.points]
         indices = outline.triangles.ravel().tolist()
-        return {"triangles": [TriangleListPrimitive(pose=_placed(place), points=points, color=colour, indices=indices)]}
+        return {
+            "triangles": [
+                TriangleListPrimitive(
+                    pose=_placed(place), points=points, color=colour, indices=indices
+                )
+            ]
+        }
     across, length = 2.0 * size[0], size[1]
     scale = {"bottom_scale": 1.0, "top_scale": 0.0 if kind == "cone" else 1.0}
     found: dict[str, list[Any]] = {
         "cylinders": [_solid(CylinderPrimitive, place, (across, across, length), colour, **scale)]
     }
     if kind == "capsule":
-        ends = [place * pin.SE3(np.eye(3), np.array([0.0, 0.0, z])) for z in (-0.5 * length, 0.5 * length)]
+        ends = [
+            place * pin.SE3(np.eye(3), np.array([0.0, 0.0, z]))
+            for z in (-0.5 * length, 0.5 * length)
+        ]
         found["spheres"] = [_solid(SpherePrimitive, end, (across,) * 3, colour) for end in ends]
     return found
 

@@ -15,7 +15,9 @@ GRID = 200  # points per segment at which toppra keeps to the limits
 
 
 def along_lines(motion: Motion, speeds: FloatArray, accelerations: FloatArray) -> Timed:
-    """Return the fastest timing of straight lines with a stop wherever they meet: ramp up, run, ramp down on each.
+    """Return the fastest timing of straight lines with a stop wherever they meet.
+
+    Ramp up, run, ramp down on each.
 
     Args:
         motion: Of straight segments.
@@ -35,7 +37,11 @@ def along_lines(motion: Motion, speeds: FloatArray, accelerations: FloatArray) -
         total = rise + 1.0 / v
         share = 0.5 * v * rise
         begin = times[-1]
-        for time, done, speed in ((rise, share, v), (total - rise, 1.0 - share, v), (total, 1.0, 0.0)):
+        for time, done, speed in (
+            (rise, share, v),
+            (total - rise, 1.0 - share, v),
+            (total, 1.0, 0.0),
+        ):
             if time > times[-1] - begin + 1e-12:  # no run on a short way
                 times.append(begin + time)
                 positions.append(before + done * way)
@@ -46,7 +52,9 @@ def along_lines(motion: Motion, speeds: FloatArray, accelerations: FloatArray) -
 
 
 def along_curve(motion: Motion, speeds: FloatArray, accelerations: FloatArray) -> Timed | None:
-    """Return the fastest timing of a smooth curve by toppra (Pham & Pham 2018); None where that is not installed.
+    """Return the fastest timing of a smooth curve by toppra (Pham & Pham 2018).
+
+    None where that is not installed.
 
     Args:
         motion: Of cubic segments.
@@ -60,13 +68,19 @@ def along_curve(motion: Motion, speeds: FloatArray, accelerations: FloatArray) -
     toppra.setup_logging("ERROR")
     last = float(motion.num_segments)
     path = _path(toppra, motion)
-    between = toppra.constraint.DiscretizationType.Interpolation  # else limits are kept at the points of the grid only
+    between = (
+        toppra.constraint.DiscretizationType.Interpolation
+    )  # else limits are kept at the points of the grid only
     bounds = [
         toppra.constraint.JointVelocityConstraint(np.stack([-speeds, speeds], axis=1)),
-        toppra.constraint.JointAccelerationConstraint(np.stack([-accelerations, accelerations], axis=1), between),
+        toppra.constraint.JointAccelerationConstraint(
+            np.stack([-accelerations, accelerations], axis=1), between
+        ),
     ]
     grid = np.linspace(0.0, last, GRID * motion.num_segments + 1)
-    found = toppra.algorithm.TOPPRA(bounds, path, gridpoints=grid, parametrizer="ParametrizeConstAccel")
+    found = toppra.algorithm.TOPPRA(
+        bounds, path, gridpoints=grid, parametrizer="ParametrizeConstAccel"
+    )
     timed = found.compute_trajectory(0.0, 0.0)
     times = np.linspace(0.0, float(timed.duration), POINTS_PER_SEGMENT * motion.num_segments + 1)
     return times, np.asarray(timed(times)), np.asarray(timed(times, 1))

@@ -1,4 +1,7 @@
-"""Motions as one self-contained page: plays offline in any browser, asks the network for nothing."""
+"""Motions as one self-contained page.
+
+Plays offline in any browser, asks the network for nothing.
+"""
 
 import base64
 import html
@@ -32,8 +35,13 @@ def page(recordings: Sequence[Recording]) -> bytes:
     """
     assets = resources.files("evoexp") / "assets"
     text = (assets / "motion_page.html").read_text(encoding="utf-8")
-    data = json.dumps([_motion(recording) for recording in recordings], separators=(",", ":"), allow_nan=False)
-    values = {name: (assets / f"{FILES[name]}.{kind}").read_text(encoding="utf-8") for name, kind in PARTS.items()}
+    data = json.dumps(
+        [_motion(recording) for recording in recordings], separators=(",", ":"), allow_nan=False
+    )
+    values = {
+        name: (assets / f"{FILES[name]}.{kind}").read_text(encoding="utf-8")
+        for name, kind in PARTS.items()
+    }
     values["title"] = html.escape(" | ".join(recording.heading.title for recording in recordings))
     values["motions"] = data.replace("<", "\\u003c")  # nothing in it can end the script element
     return re.sub(r"\{\{(\w+)\}\}", lambda found: values[found[1]], text).encode()
@@ -60,8 +68,13 @@ def _motion(recording: Recording) -> dict[str, Any]:
         "poses": _packed(recording.poses.world),
         "shapes": [_shape(shape) for shape in recording.shapes],
         "dots": _dots(recording),
-        "ways": [{"colour": arm_colour(k), "points": _packed(way)} for k, way in enumerate(recording.traces)],
-        "targets": [{"name": target.name, "point": target.point.tolist()} for target in recording.targets],
+        "ways": [
+            {"colour": arm_colour(k), "points": _packed(way)}
+            for k, way in enumerate(recording.traces)
+        ],
+        "targets": [
+            {"name": target.name, "point": target.point.tolist()} for target in recording.targets
+        ],
         "clearance": [_number(value) for value in clearance.least],
         "pairs": pairs,
         "nearest": [pairs.index(pair) for pair in clearance.pairs],
@@ -91,8 +104,14 @@ def _shape(shape: Shape) -> dict[str, Any]:
 
 def _dots(recording: Recording) -> list[dict[str, Any]]:
     """Return the joints of links that are lines, which nothing else shows."""
-    lines = {shape.frame: shape.arm for shape in recording.shapes if shape.role == "arm" and shape.outline.is_line}
-    return [{"frame": frame, "colour": arm_colour(arm)} for frame, arm in lines.items() if frame >= 0]
+    lines = {
+        shape.frame: shape.arm
+        for shape in recording.shapes
+        if shape.role == "arm" and shape.outline.is_line
+    }
+    return [
+        {"frame": frame, "colour": arm_colour(arm)} for frame, arm in lines.items() if frame >= 0
+    ]
 
 
 def _legend(recording: Recording) -> list[tuple[str, str]]:

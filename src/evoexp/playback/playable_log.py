@@ -1,7 +1,8 @@
 """A motion as an MCAP that plays: in Foxglove's own schemas, without URDF, layout or ROS.
 
-The clock is the trajectory's: 0 at the start, as fast as the joints' speed limits permit. How the search went has
-another axis, its generations: it stands in one message at the start, whose arrays a plot takes as they are.
+The clock is the trajectory's: 0 at the start, as fast as the joints' speed limits permit. How the
+search went has another axis, its generations: it stands in one message at the start, whose arrays a
+plot takes as they are.
 """
 
 import io
@@ -30,11 +31,21 @@ MOTION = "evoexp.motion"  # name of the metadata record
 LAYOUT = "foxglove_layout.json"
 SECOND = 1_000_000_000  # [ns]
 CHUNK_SIZE = 56 * 1024  # [B]
-NUMBER, NUMBERS, TEXT = {"type": "number"}, {"type": "array", "items": {"type": "number"}}, {"type": "string"}
+NUMBER, NUMBERS, TEXT = (
+    {"type": "number"},
+    {"type": "array", "items": {"type": "number"}},
+    {"type": "string"},
+)
 CLEARANCE = {
     "title": "evoexp.Clearance",
     "type": "object",
-    "properties": {"instant": NUMBER, "clearance": NUMBER, "required": NUMBER, "contact": NUMBER, "pair": TEXT},
+    "properties": {
+        "instant": NUMBER,
+        "clearance": NUMBER,
+        "required": NUMBER,
+        "contact": NUMBER,
+        "pair": TEXT,
+    },
 }
 IMPROVEMENTS = {
     "title": "evoexp.Improvements",
@@ -59,7 +70,12 @@ def playable_log(recording: Recording) -> bytes:
     found = [row for row in recording.heading.improvements if np.isfinite(row[1])]
     if found:
         generations, costs = zip(*found, strict=True)
-        out.json("/improvements", IMPROVEMENTS, 0, {"generation": list(generations), "best_cost": list(costs)})
+        out.json(
+            "/improvements",
+            IMPROVEMENTS,
+            0,
+            {"generation": list(generations), "best_cost": list(costs)},
+        )
     said = _said(recording)
     for k, instant in enumerate(recording.times):
         now = nanoseconds(recording, instant)
@@ -120,7 +136,10 @@ class _Playable:
 
     def _add(self, topic: str, encoding: str, schema: str, moment: int, data: bytes) -> None:
         if topic not in self._channels:
-            self._channels[topic] = [self.writer.register_channel(topic, encoding, self._schemas[schema]), 0]
+            self._channels[topic] = [
+                self.writer.register_channel(topic, encoding, self._schemas[schema]),
+                0,
+            ]
         channel = self._channels[topic]
         self.writer.add_message(channel[0], moment, data, moment, channel[1])
         channel[1] += 1
@@ -155,8 +174,14 @@ def _joints(recording: Recording, k: int, now: int) -> Any:
 
 def _clearance(recording: Recording, k: int) -> dict[str, Any]:
     least, instant = float(recording.clearance.least[k]), float(recording.times[k])
-    touching = any(contact.begin <= instant <= contact.end for contact in recording.clearance.contacts)
-    values: dict[str, Any] = {"instant": instant, "required": recording.margin, "contact": float(touching)}
+    touching = any(
+        contact.begin <= instant <= contact.end for contact in recording.clearance.contacts
+    )
+    values: dict[str, Any] = {
+        "instant": instant,
+        "required": recording.margin,
+        "contact": float(touching),
+    }
     values["pair"] = recording.clearance.pairs[k]
     return values | ({"clearance": least} if np.isfinite(least) else {})
 
@@ -164,7 +189,11 @@ def _clearance(recording: Recording, k: int) -> dict[str, Any]:
 def _said(recording: Recording) -> list[tuple[int, Any]]:
     """Return what there is to say of the motion, each at its moment, in the order of time."""
     verdict, unit, rows = recording.verdict, recording.length_unit, []
-    answer = {True: "certified: no two bodies ever touch", False: "refuted: bodies touch", None: "undecided"}
+    answer = {
+        True: "certified: no two bodies ever touch",
+        False: "refuted: bodies touch",
+        None: "undecided",
+    }
     rows.append((0.0, Log.INFO, f"{recording.heading.title}: {answer[verdict.certified]}"))
     if verdict.certified is not False and verdict.clearance_at is not None:
         kept = verdict.certified_margin is not False
@@ -172,12 +201,20 @@ def _said(recording: Recording) -> list[tuple[int, Any]]:
         text += "" if kept else f", less than the required {recording.margin:g} {unit}"
         rows.append((verdict.clearance_at, Log.INFO if kept else Log.WARNING, text))
     for contact in recording.clearance.contacts:
-        rows.append((contact.begin, Log.ERROR, f"refuted at instant {contact.begin:.9g}: {contact.pair} touch"))
+        rows.append(
+            (
+                contact.begin,
+                Log.ERROR,
+                f"refuted at instant {contact.begin:.9g}: {contact.pair} touch",
+            )
+        )
         rows.append((contact.end, Log.INFO, f"free again at instant {contact.end:.6g}"))
     messages = []
     for instant, level, text in sorted(rows, key=lambda row: row[0]):
         now = nanoseconds(recording, instant)
-        messages.append((now, Log(timestamp=_stamp(now), level=level, message=text, name="certifier")))
+        messages.append(
+            (now, Log(timestamp=_stamp(now), level=level, message=text, name="certifier"))
+        )
     return messages
 
 

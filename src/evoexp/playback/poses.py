@@ -66,12 +66,17 @@ def ticks(motion: Motion, prismatic: np.ndarray, size: float) -> FloatArray:
 
 
 def frames_of(model: Any, carried: list[str]) -> tuple[Frame, ...]:
-    """Return the frames: all joints of a model, then objects that are carried, which know the world only."""
+    """Return the frames: all joints of a model, then objects that are carried.
+
+    Which know the world only.
+    """
     joints = [Frame(model.names[k], int(model.parents[k]) - 1) for k in range(1, model.njoints)]
     return (*joints, *(Frame(f"object {name}", -1) for name in carried))
 
 
-def poses(model: Any, motion: Motion, times: FloatArray, parts: list[Part], carried: list[str]) -> Poses:
+def poses(
+    model: Any, motion: Motion, times: FloatArray, parts: list[Part], carried: list[str]
+) -> Poses:
     """Return where all frames are.
 
     Args:
@@ -89,7 +94,9 @@ def poses(model: Any, motion: Motion, times: FloatArray, parts: list[Part], carr
         for joint in range(1, model.njoints):
             world[k, joint - 1], local[k, joint - 1] = pose(data.oMi[joint]), pose(data.liMi[joint])
         for c, (joint, placement) in enumerate(places[id(part_at(parts, t))]):
-            world[k, model.njoints - 1 + c] = local[k, model.njoints - 1 + c] = pose(data.oMi[joint] * placement)
+            world[k, model.njoints - 1 + c] = local[k, model.njoints - 1 + c] = pose(
+                data.oMi[joint] * placement
+            )
     return Poses(_continuous(world), _continuous(local))
 
 

@@ -1,4 +1,7 @@
-"""One motion, ready to be watched: the neutral record that pages, playable logs and trajectories are written from."""
+"""One motion, ready to be watched.
+
+The neutral record that pages, playable logs and trajectories are written from.
+"""
 
 from itertools import product
 from typing import NamedTuple
@@ -137,7 +140,8 @@ def record(
     motion = planner.motion(problem, solution)
     if motion is None or getattr(problem, "scene", None) is None:
         raise NoMotion(
-            f"{heading.title}: the answer of '{type(planner).component}' is no motion here: nothing to watch"
+            f"{heading.title}: the answer of '{type(planner).component}' is no motion here: "
+            "nothing to watch"
         )
     robot = condition.robot
     assert isinstance(robot, Robot)
@@ -157,7 +161,9 @@ def record(
         condition_id=condition.id,
         config_json=condition.to_json(),
         length_unit=condition.length_unit,
-        joints=tuple(Joint(name, bool(slides)) for name, slides in zip(names, prismatic, strict=True)),
+        joints=tuple(
+            Joint(name, bool(slides)) for name, slides in zip(names, prismatic, strict=True)
+        ),
         motion=motion,
         times=times,
         q=np.array([motion.at(float(t)) for t in times]),
@@ -192,7 +198,9 @@ def _shapes(scene: Scene, assembly: Assembly, carried: list[str]) -> tuple[Shape
     arms = assembly.body_arms or (0,) * assembly.geometry.ngeoms
     joints = assembly.model.njoints - 1
     found = []
-    for k, (name, (shape, joint, placement)) in enumerate(zip(scene.names, scene.shapes, strict=True)):
+    for k, (name, (shape, joint, placement)) in enumerate(
+        zip(scene.names, scene.shapes, strict=True)
+    ):
         drawn, shift = outline(shape)
         frame, where = int(joint) - 1, placement * shift
         if name in carried:
@@ -204,7 +212,10 @@ def _shapes(scene: Scene, assembly: Assembly, carried: list[str]) -> tuple[Shape
 
 
 def _tools(assembly: Assembly) -> list[tuple[int, FloatArray]]:
-    """Return the frame and the point in it of every arm's tool; of a robot without tools its last link's end."""
+    """Return the frame and the point in it of every arm's tool.
+
+    Of a robot without tools its last link's end.
+    """
     if assembly.tools:
         return [(tool.joint - 1, tool.position) for tool in assembly.tools]
     last = assembly.links[-1]
@@ -212,7 +223,10 @@ def _tools(assembly: Assembly) -> list[tuple[int, FloatArray]]:
 
 
 def _view(shapes: tuple[Shape, ...], world: FloatArray, places: tuple[Target, ...]) -> View:
-    """Return what has to be seen: what moves, wherever it goes, obstacles that are not too large, targets."""
+    """Return what has to be seen.
+
+    What moves, wherever it goes, obstacles that are not too large, targets.
+    """
     moving = [shape for shape in shapes if shape.role == "arm"]
     ways = [_corners(shape, world) for shape in moving]
     room = float(np.ptp(np.concatenate(ways), axis=0).max())

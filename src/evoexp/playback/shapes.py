@@ -18,8 +18,9 @@ class Outline(NamedTuple):
 
     Attributes:
         kind: What it is.
-        size: box: the edges | sphere: radius | ellipsoid: semi-axes | capsule, cylinder, cone: radius, length (that of
-            a capsule is its segment's) | half-space (all points with z ≤ 0) and mesh: nothing.
+        size: box: the edges | sphere: radius | ellipsoid: semi-axes | capsule, cylinder, cone:
+            radius, length (that of a capsule is its segment's) | half-space (all points with z ≤ 0)
+            and mesh: nothing.
         points: (points, 3) corners of a mesh; None otherwise.
         triangles: (triangles, 3) indices of corners.
     """
@@ -36,7 +37,10 @@ class Outline(NamedTuple):
 
     @property
     def reach(self) -> float:
-        """Greatest distance of its points from its frame's origin; 0 of a half-space, which has no end."""
+        """Greatest distance of its points from its frame's origin.
+
+        0 of a half-space, which has no end.
+        """
         if self.points is not None:
             return float(np.sqrt((self.points**2).sum(axis=1).max()))
         if self.kind == "box":
@@ -56,7 +60,8 @@ class Shape(NamedTuple):
         frame: The frame that moves it, an index of `Recording.frames`; −1: the world.
         pose: (7,) of the outline in that frame: position, quaternion x, y, z, w.
         outline: What it looks like.
-        role: A part of an arm, an obstacle, or an object, which is an obstacle that is carried for a while.
+        role: A part of an arm, an obstacle, or an object, which is an obstacle that is carried for
+            a while.
         arm: Which arm it belongs to; −1: none.
     """
 
@@ -69,7 +74,9 @@ class Shape(NamedTuple):
 
 
 def outline(shape: Any) -> tuple[Outline, Any]:
-    """Return a coal shape as it is drawn, and where its outline's frame lies in the shape's, a `pin.SE3`.
+    """Return a coal shape as it is drawn, and where its outline's frame lies in the shape's.
+
+    A `pin.SE3`.
 
     Raises:
         UnsupportedShape: If there is no way to draw it.
@@ -93,7 +100,10 @@ def outline(shape: Any) -> tuple[Outline, Any]:
 
 
 def _mesh(shape: Any) -> tuple[FloatArray, np.ndarray]:
-    """Return corners and triangles of a mesh, turned as seen from outside if the file has them all the wrong way."""
+    """Return corners and triangles of a mesh.
+
+    Turned as seen from outside if the file has them all the wrong way.
+    """
     convex = hasattr(shape, "polygons")
     if convex:
         points = np.array([shape.point(k) for k in range(shape.num_points)])

@@ -44,7 +44,8 @@ def chosen_log(run: RunDirectory, choice: str | int) -> Path:
 
     Args:
         run: The run.
-        choice: Its index, or "best", "worst" (by cost), "refuted": the first one that the exact verdict refutes.
+        choice: Its index, or "best", "worst" (by cost), "refuted": the first one that the exact
+            verdict refutes.
 
     Raises:
         NothingStored: If there is no such replicate.
@@ -52,7 +53,9 @@ def chosen_log(run: RunDirectory, choice: str | int) -> Path:
     done = sorted(run.completed())
     if isinstance(choice, int):
         if choice not in done:
-            raise NothingStored(f"run {run.hash12}: no finished replicate {choice} (finished: {_listed(done)})")
+            raise NothingStored(
+                f"run {run.hash12}: no finished replicate {choice} (finished: {_listed(done)})"
+            )
         return run.log_path(choice)
     rows = read_summaries(run)
     rows = rows[rows["status"] == "done"].sort_values("replicate")
@@ -68,7 +71,10 @@ def chosen_log(run: RunDirectory, choice: str | int) -> Path:
 
 
 def _finite_first(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return replicates with those that found nothing feasible behind the others, which the worst is one of."""
+    """Return replicates with those that found nothing feasible behind the others.
+
+    Which the worst is one of.
+    """
     infinite = rows["best_cost"].astype("float64") == float("inf")
     return pd.concat([rows[~infinite], rows[infinite]])
 

@@ -24,9 +24,15 @@ class Target(NamedTuple):
 
 
 def targets(scenario: Any, robot: Any) -> tuple[Target, ...]:
-    """Return the places that a scenario names for a robot; tasks given by configurations have none."""
+    """Return the places that a scenario names for a robot.
+
+    Tasks given by configurations have none.
+    """
     if isinstance(scenario, PickAndPlace):
-        return (_target("via point", scenario.via_point), _target("goal point", scenario.goal_point))
+        return (
+            _target("via point", scenario.via_point),
+            _target("goal point", scenario.goal_point),
+        )
     if isinstance(scenario, Docking):
         return (_target("target", scenario.target),)
     if isinstance(scenario, Mission):
@@ -34,7 +40,11 @@ def targets(scenario: Any, robot: Any) -> tuple[Target, ...]:
         return (_target("target", (x + along, y, robot.body_height + up)),)
     if isinstance(scenario, PostureTask):
         goals = ((phase.name, phase.goal) for phase in scenario.all_phases)
-        return tuple(_target(name, goal.point) for name, goal in goals if isinstance(goal, PointGoal | PoseGoal))
+        return tuple(
+            _target(name, goal.point)
+            for name, goal in goals
+            if isinstance(goal, PointGoal | PoseGoal)
+        )
     return ()
 
 

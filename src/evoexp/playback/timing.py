@@ -1,4 +1,7 @@
-"""From instants to seconds: as fast as the joints' speed limits permit, in equal times from instant to instant."""
+"""From instants to seconds: as fast as the joints' speed limits permit.
+
+In equal times from instant to instant.
+"""
 
 from typing import NamedTuple
 
@@ -31,7 +34,7 @@ class SpeedLimits(NamedTuple):
 
 
 def seconds_per_instant(motion: Motion, limits: FloatArray) -> float:
-    """Return the least time from instant to instant in which no joint exceeds its limit anywhere [s].
+    """Return the least time from instant to instant within all joints' limits [s].
 
     Args:
         motion: The motion.
@@ -46,7 +49,9 @@ def seconds_per_instant(motion: Motion, limits: FloatArray) -> float:
 
 
 def velocities(motion: Motion, times: FloatArray, seconds: float) -> FloatArray:
-    """Return dq/dt at instants, (ticks, nq) [rad/s or length unit/s]; where straight lines meet, that of the later one.
+    """Return dq/dt at instants, (ticks, nq) [rad/s or length unit/s].
+
+    Where straight lines meet, that of the later one.
 
     Args:
         motion: The motion.

@@ -1,8 +1,11 @@
-"""A motion as a joint trajectory, for a robot or MoveIt: names, times, positions, and velocities where they say more.
+"""A motion as a joint trajectory, for a robot or MoveIt.
 
-What a controller makes of the points is the motion that was judged: without velocities it goes straight from point to
-point; with velocities it goes along the cubic that they determine: the spline's own piece (uniform timing), or a
-straight piece's ramp up, run and ramp down (optimal timing).
+Names, times, positions, and velocities where they say more.
+
+What a controller makes of the points is the motion that was judged: without velocities it goes
+straight from point to point; with velocities it goes along the cubic that they determine: the
+spline's own piece (uniform timing), or a straight piece's ramp up, run and ramp down (optimal
+timing).
 """
 
 import csv
@@ -43,15 +46,19 @@ class Trajectory(NamedTuple):
     velocities: FloatArray | None
 
 
-def trajectory(recording: Recording, timing: Timing, limits: SpeedLimits, ramp: float) -> Trajectory:
+def trajectory(
+    recording: Recording, timing: Timing, limits: SpeedLimits, ramp: float
+) -> Trajectory:
     """Return a motion in time.
 
     Args:
         recording: The motion, whose `seconds` come from the same limits.
-        timing: uniform: equal times from instant to instant, as short as the speed limits permit | optimal: as fast as
-            speed and acceleration limits permit along the path, with a stop wherever straight lines meet.
+        timing: uniform: equal times from instant to instant, as short as the speed limits permit |
+            optimal: as fast as speed and acceleration limits permit along the path, with a stop
+            wherever straight lines meet.
         limits: Of speeds.
-        ramp: Time from rest to a joint's greatest speed [s]: limits accelerations, of the optimal timing only.
+        ramp: Time from rest to a joint's greatest speed [s]: limits accelerations, of the optimal
+            timing only.
 
     Raises:
         BadTiming: If there is no such timing, or what it needs is not installed.
@@ -60,14 +67,18 @@ def trajectory(recording: Recording, timing: Timing, limits: SpeedLimits, ramp: 
     prismatic = np.array([joint.prismatic for joint in recording.joints])
     if timing == "uniform":
         instants = np.arange(float(motion.num_segments + 1))
-        speeds = None if motion.coefficients is None else velocities(motion, instants, recording.seconds)
+        speeds = (
+            None if motion.coefficients is None else velocities(motion, instants, recording.seconds)
+        )
         times, positions = recording.seconds * instants, motion.q
     else:
         speed = limits.of(prismatic, recording.size)
         along = along_lines if motion.coefficients is None else along_curve
         found = along(motion, speed, speed / ramp)
         if found is None:
-            raise BadTiming("--timing optimal of a curve needs toppra: pip install 'evoexp[timing]'")
+            raise BadTiming(
+                "--timing optimal of a curve needs toppra: pip install 'evoexp[timing]'"
+            )
         times, positions, speeds = found
     names = tuple(joint.name for joint in recording.joints)
     units = tuple(recording.length_unit if slides else "rad" for slides in prismatic)
@@ -75,7 +86,10 @@ def trajectory(recording: Recording, timing: Timing, limits: SpeedLimits, ramp: 
 
 
 def as_json(recording: Recording, found: Trajectory) -> bytes:
-    """Return a trajectory with the fields of `trajectory_msgs/JointTrajectory`, times in seconds."""
+    """Return a trajectory with the fields of `trajectory_msgs/JointTrajectory`.
+
+    Times in seconds.
+    """
     points = []
     for k, time in enumerate(found.times.tolist()):
         point: dict[str, Any] = {"time_from_start": time, "positions": found.positions[k].tolist()}
@@ -96,10 +110,15 @@ def as_json(recording: Recording, found: Trajectory) -> bytes:
 def as_csv(found: Trajectory) -> bytes:
     """Return a trajectory as a table: time, positions, and velocities if there are any."""
     columns = [found.times[:, None], found.positions]
-    names = ["time_s", *(f"{joint}_{unit}" for joint, unit in zip(found.joints, found.units, strict=True))]
+    names = [
+        "time_s",
+        *(f"{joint}_{unit}" for joint, unit in zip(found.joints, found.units, strict=True)),
+    ]
     if found.velocities is not None:
         columns.append(found.velocities)
-        names += [f"{joint}_{unit}_per_s" for joint, unit in zip(found.joints, found.units, strict=True)]
+        names += [
+            f"{joint}_{unit}_per_s" for joint, unit in zip(found.joints, found.units, strict=True)
+        ]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(names)

@@ -1,9 +1,12 @@
-"""What is the best path over a grid: Dijkstra for length alone, a frontier of length against unsafeness otherwise.
+"""What is the best path over a grid.
 
-The cost ε D + λ S of Chen & Zalzala 1995 has the mean S = ΣS / N in it, so no shortest-path algorithm minimises it.
-Two things can be had: good paths, from the frontier of D + μ ΣS over all μ; and a bound below all paths, the exact
-optimum over walks, which may pass nodes again. For a given number N of nodes a walk's cost ε D + (λ / N) ΣS is
-additive, so dynamic programming over 1 … N nodes finds the best walk, for every N.
+Dijkstra for length alone, a frontier of length against unsafeness otherwise.
+
+The cost ε D + λ S of Chen & Zalzala 1995 has the mean S = ΣS / N in it, so no shortest-path
+algorithm minimises it. Two things can be had: good paths, from the frontier of D + μ ΣS over all μ;
+and a bound below all paths, the exact optimum over walks, which may pass nodes again. For a given
+number N of nodes a walk's cost ε D + (λ / N) ΣS is additive, so dynamic programming over 1 … N
+nodes finds the best walk, for every N.
 """
 
 from typing import Any, ClassVar, NamedTuple
@@ -20,7 +23,9 @@ BLOCK = 16  # numbers of nodes whose walks are bounded together
 LANES = 32  # numbers of nodes whose walks are looked for together
 VECTOR = 16  # numbers of them are filled up to a multiple
 TILE = 4  # moves that are compared together
-SAFEST_OF_SHORTEST = 1e-6  # [1] weight of ΣS where length alone counts: decides among equally short paths only
+SAFEST_OF_SHORTEST = (
+    1e-6  # [1] weight of ΣS where length alone counts: decides among equally short paths only
+)
 
 
 class Network(NamedTuple):
@@ -45,10 +50,12 @@ class GridFrontier(Reference):
     """The frontier scan, and the bound by walks.
 
     Attributes:
-        num_weights: Values of μ, from `least_weight` to `greatest_weight` by equal ratios, after the very smallest.
+        num_weights: Values of μ, from `least_weight` to `greatest_weight` by equal ratios, after
+            the very smallest.
         least_weight: Of μ [cell].
         greatest_weight: Of μ [cell].
-        max_nodes: Of the walks; longer ones are not looked at, and cannot be better if ε is not very small.
+        max_nodes: Of the walks; longer ones are not looked at, and cannot be better if ε is not
+            very small.
     """
 
     component: ClassVar[str] = "grid_frontier"
@@ -61,10 +68,11 @@ class GridFrontier(Reference):
     def truth(self, problem: Any) -> Truth:
         """Return the best path of the frontier; where nodes may be passed again, the best walk.
 
-        Its terms: `lower_bound`, the cost of the best walk; `walk_nodes`, its number of nodes; `bound_is_reached`,
-        whether a path was found that costs as little. Its arrays: `frontier` (μ, D, S, nodes, cost), one row per
-        distinct path; `walks` (nodes, cost), one row per number of nodes looked at; `walk`, nodes of the best one;
-        `goal_field` (NaN where no path can be) and `unsafeness`, (nodes along x, along y[, along z]).
+        Its terms: `lower_bound`, the cost of the best walk; `walk_nodes`, its number of nodes;
+        `bound_is_reached`, whether a path was found that costs as little. Its arrays: `frontier`
+        (μ, D, S, nodes, cost), one row per distinct path; `walks` (nodes, cost), one row per number
+        of nodes looked at; `walk`, nodes of the best one; `goal_field` (NaN where no path can be)
+        and `unsafeness`, (nodes along x, along y[, along z]).
         """
         network, (epsilon, lam) = network_of(problem), self.planner.objective.weights
         paths = frontier(network, self._weights() if lam else np.array([SAFEST_OF_SHORTEST]))
@@ -80,7 +88,11 @@ class GridFrontier(Reference):
             best = walk if self._judged(problem, walk)[3] <= rows[:, 4].min() else best
         solution = self._solution(problem, best)
         cost = self._judged(problem, best)[3]
-        terms = {"lower_bound": bound, "walk_nodes": len(walk), "bound_is_reached": abs(cost - bound) <= 1e-9 * cost}
+        terms = {
+            "lower_bound": bound,
+            "walk_nodes": len(walk),
+            "bound_is_reached": abs(cost - bound) <= 1e-9 * cost,
+        }
         fields = problem.fields
         arrays = {
             "frontier": rows,
@@ -109,11 +121,15 @@ def network_of(problem: Any) -> Network:
     own = problem.fields.grid
     tails, moves = np.nonzero(own.neighbours >= 0)
     lengths = np.sqrt(own.changes[moves].astype(np.float64))
-    return Network(tails, own.neighbours[tails, moves], lengths, problem.fields.unsafeness, problem.ends)
+    return Network(
+        tails, own.neighbours[tails, moves], lengths, problem.fields.unsafeness, problem.ends
+    )
 
 
 def frontier(network: Network, weights: FloatArray) -> list[tuple[float, np.ndarray]]:
-    """Return the paths that minimise D + μ ΣS (Dijkstra), each with the first μ that it was found for.
+    """Return the paths that minimise D + μ ΣS (Dijkstra).
+
+    Each with the first μ that it was found for.
 
     Args:
         network: The moves.
@@ -124,7 +140,9 @@ def frontier(network: Network, weights: FloatArray) -> list[tuple[float, np.ndar
     dijkstra: Any = csgraph.dijkstra
     count, edges = len(network.unsafeness), np.arange(1.0, len(network.tails) + 1.0)
     graph: Any = csr_array((edges, (network.tails, network.heads)), shape=(count, count))
-    order = graph.data.astype(np.int64) - 1  # of the edges in the graph: with another μ only its numbers change
+    order = (
+        graph.data.astype(np.int64) - 1
+    )  # of the edges in the graph: with another μ only its numbers change
     lengths, unsafeness = network.lengths[order], network.unsafeness[network.heads[order]]
     found: dict[tuple[int, ...], float] = {}
     for mu in weights:
@@ -140,7 +158,9 @@ def frontier(network: Network, weights: FloatArray) -> list[tuple[float, np.ndar
 def best_walk(
     network: Network, epsilon: float, lam: float, known: float, max_nodes: int
 ) -> tuple[FloatArray, np.ndarray]:
-    """Return what the best walks of some numbers of nodes cost (numbers, 2), and the best of all (nodes,).
+    """Return what the best walks of some numbers of nodes cost (numbers, 2), and the best of all.
+
+    Nodes,.
 
     Numbers whose walks are shown to be no better are left out.
 
@@ -160,7 +180,9 @@ def best_walk(
     arrivals = arrivals_of(network, epsilon)
     costs = np.full(most + 1, np.inf)
     lasts = np.arange(BLOCK, most + BLOCK, BLOCK)
-    below = walk_costs(arrivals, lam / lasts, most)  # for the numbers of a block λ / N is at least that of its last
+    below = walk_costs(
+        arrivals, lam / lasts, most
+    )  # for the numbers of a block λ / N is at least that of its last
     whole = np.flatnonzero(lasts <= most)
     costs[lasts[whole]] = below[lasts[whole], whole]
     others = np.setdiff1d(np.arange(2, most + 1), lasts)
@@ -173,7 +195,9 @@ def best_walk(
             if bound < costs.min():  # which may be less by now
                 costs[count] = cost
     if not np.isfinite(costs.min()):
-        raise SettingError("reference.max_nodes", "as many as a path from start to goal has", max_nodes)
+        raise SettingError(
+            "reference.max_nodes", "as many as a path from start to goal has", max_nodes
+        )
     best = int(costs.argmin())
     walk = _best_walk(*arrivals, lam / best, best)
     numbers = np.flatnonzero(np.isfinite(costs))
@@ -181,7 +205,9 @@ def best_walk(
 
 
 class Arrivals(NamedTuple):
-    """The permitted moves by the nodes where they end, each with as many: the missing ones have infinite lengths.
+    """The permitted moves by the nodes where they end, each with as many.
+
+    The missing ones have infinite lengths.
 
     Attributes:
         tails: (nodes, moves) node where each comes from; a multiple of `TILE` moves.
@@ -200,7 +226,9 @@ def arrivals_of(network: Network, epsilon: float) -> Arrivals:
     """Return the permitted moves by their ends; see `best_walk`."""
     order = np.argsort(network.heads, kind="stable")
     heads, count = network.heads[order], len(network.unsafeness)
-    rank = np.arange(len(heads)) - np.searchsorted(heads, heads)  # among the moves that end at the same node
+    rank = np.arange(len(heads)) - np.searchsorted(
+        heads, heads
+    )  # among the moves that end at the same node
     moves = -(-(int(rank.max()) + 1) // TILE) * TILE
     tails, lengths = np.zeros((count, moves), dtype=np.int64), np.full((count, moves), np.inf)
     tails[heads, rank] = network.tails[order]
@@ -209,9 +237,17 @@ def arrivals_of(network: Network, epsilon: float) -> Arrivals:
 
 
 def walk_costs(arrivals: Arrivals, weights: FloatArray, count: int) -> FloatArray:
-    """Return the least ε D + μ ΣS of walks of 0 … `count` nodes, for several μ: (count + 1, weights)."""
-    filled = np.pad(weights, (0, -len(weights) % VECTOR), mode="edge")  # what is left over would not be vector code
-    costs, present = np.full((count + 1, len(filled)), np.inf), np.full((len(arrivals.tails), len(filled)), np.inf)
+    """Return the least ε D + μ ΣS of walks of 0 … `count` nodes, for several μ.
+
+    (count + 1, weights).
+    """
+    filled = np.pad(
+        weights, (0, -len(weights) % VECTOR), mode="edge"
+    )  # what is left over would not be vector code
+    costs, present = (
+        np.full((count + 1, len(filled)), np.inf),
+        np.full((len(arrivals.tails), len(filled)), np.inf),
+    )
     present[arrivals.ends[0]] = filled * arrivals.unsafeness[arrivals.ends[0]]
     _walk_costs(*arrivals, filled, costs, present, np.full_like(present, np.inf))
     return costs[:, : len(weights)]
@@ -225,7 +261,8 @@ def _walk_costs(tails, lengths, unsafeness, ends, weights, costs, present, follo
         tails: As of `Arrivals`, and so are `lengths`, `unsafeness` and `ends`.
         weights: (weights,) values of μ.
         costs: (numbers of nodes, weights) inf; written from two nodes on.
-        present: (nodes, weights) what the walk of one node costs, inf where it does not end; overwritten.
+        present: (nodes, weights) what the walk of one node costs, inf where it does not end;
+            overwritten.
         following: (nodes, weights) inf; overwritten.
     """
     num, lanes = len(unsafeness), len(weights)
@@ -235,13 +272,23 @@ def _walk_costs(tails, lengths, unsafeness, ends, weights, costs, present, follo
                 continue  # nothing arrives: infinite at all times
             own = unsafeness[node]
             for tile in range(0, tails.shape[1], TILE):
-                a, b, c, d = tails[node, tile], tails[node, tile + 1], tails[node, tile + 2], tails[node, tile + 3]
+                a, b, c, d = (
+                    tails[node, tile],
+                    tails[node, tile + 1],
+                    tails[node, tile + 2],
+                    tails[node, tile + 3],
+                )
                 to_a, to_b = lengths[node, tile], lengths[node, tile + 1]
                 to_c, to_d = lengths[node, tile + 2], lengths[node, tile + 3]
                 for lane in range(lanes):
                     least = min(present[a, lane] + to_a, present[b, lane] + to_b)
-                    least = min(least, present[c, lane] + to_c, present[d, lane] + to_d) + weights[lane] * own
-                    following[node, lane] = least if tile == 0 else min(following[node, lane], least)
+                    least = (
+                        min(least, present[c, lane] + to_c, present[d, lane] + to_d)
+                        + weights[lane] * own
+                    )
+                    following[node, lane] = (
+                        least if tile == 0 else min(following[node, lane], least)
+                    )
         present, following = following, present
         for lane in range(lanes):
             costs[k, lane] = present[ends[1], lane]
@@ -249,7 +296,10 @@ def _walk_costs(tails, lengths, unsafeness, ends, weights, costs, present, follo
 
 @kernel
 def _best_walk(tails, lengths, unsafeness, ends, mu, count):  # type: ignore[no-untyped-def]
-    """Return the walk of `count` nodes that has the least ε D + μ ΣS, (count,); arguments as of `_walk_costs`."""
+    """Return the walk of `count` nodes that has the least ε D + μ ΣS, (count,).
+
+    Arguments as of `_walk_costs`.
+    """
     num = len(unsafeness)
     before = np.zeros((count + 1, num), dtype=np.int64)
     present, following = np.full(num, np.inf), np.full(num, np.inf)

@@ -1,6 +1,7 @@
 """Conventional optimisers from many starts: where they end, and how often that is not the optimum.
 
-"Calculus based methods are local in scope and easy to get stuck in local minima" (Chen & Zalzala 1995, section 1).
+"Calculus based methods are local in scope and easy to get stuck in local minima" (Chen & Zalzala
+1995, section 1).
 """
 
 from typing import Any, ClassVar
@@ -22,18 +23,21 @@ MOST_TRIES = 1000  # places looked at per start
 
 
 class PlacementConventional(Reference):
-    """What local methods end at, each from the same starts: feasible postures spread evenly over all of them.
+    """What local methods end at, each from the same starts.
 
-    Arrays, one row per start: `starts` (starts, 3): θ1, θ2, θ3 [deg]; `newton` (of minimax problems `bounded`) and
-    `subgradient`, each (starts, 3): θ1, θ2 [deg], E of where the method ended; inf where it broke a limit or left
-    the target.
+    Feasible postures spread evenly over all of them.
+
+    Arrays, one row per start: `starts` (starts, 3): θ1, θ2, θ3 [deg]; `newton` (of minimax problems
+    `bounded`) and `subgradient`, each (starts, 3): θ1, θ2 [deg], E of where the method ended; inf
+    where it broke a limit or left the target.
 
     - newton: sequential quadratic programming (scipy's SLSQP).
     - subgradient: see `placement_subgradient`.
-    - bounded: the same, the greatest torque as a variable above all torques; on E itself, which has kinks, rounding
-      would decide where it ends.
+    - bounded: the same, the greatest torque as a variable above all torques; on E itself, which has
+      kinks, rounding would decide where it ends.
 
-    Terms: `<method>_evaluations`: of E per start; derivatives of `newton` and `bounded` are exact and not counted.
+    Terms: `<method>_evaluations`: of E per start; derivatives of `newton` and `bounded` are exact
+    and not counted.
 
     Attributes:
         num_starts: Starts.
@@ -52,17 +56,26 @@ class PlacementConventional(Reference):
         model = directions_of(problem.model, problem.angle_limits)
         starts, places = self._starts(problem, model)
         programme = Programme(model)
-        ends = {"bounded" if programme.minimax else "newton": [descend(programme, x) for x in starts]}
+        ends = {
+            "bounded" if programme.minimax else "newton": [descend(programme, x) for x in starts]
+        }
         ends["subgradient"] = self._slide(model, starts)
-        arrays = {name: np.array([_row(model, programme, end) for end in found]) for name, found in ends.items()}
+        arrays = {
+            name: np.array([_row(model, programme, end) for end in found])
+            for name, found in ends.items()
+        }
         every = np.concatenate(list(arrays.values()))
-        best = min(every, key=lambda row: (round(float(row[2]), 6), *row[:2]))  # of mirror images always the same
+        best = min(
+            every, key=lambda row: (round(float(row[2]), 6), *row[:2])
+        )  # of mirror images always the same
         spent = {name: sum(end.evaluations for end in found) for name, found in ends.items()}
         terms = {f"{name}_evaluations": total / self.num_starts for name, total in spent.items()}
         solved = bool(np.isfinite(best[2]))
         solution = best[:2].copy()
         cost = float(problem.model.posture(*solution)[1][0])  # at the angles that are kept
-        return Truth(solution, cost, solved, sum(spent.values()), terms, arrays | {"starts": places})
+        return Truth(
+            solution, cost, solved, sum(spent.values()), terms, arrays | {"starts": places}
+        )
 
     def _starts(self, problem: Any, model: Directions) -> tuple[list[FloatArray], FloatArray]:
         """Return feasible postures as directions, and as θ1, θ2, θ3 [deg] (starts, 3)."""
@@ -74,12 +87,18 @@ class PlacementConventional(Reference):
             numbers = np.arange(first + 1, min(first + chunk, count) + 1)
             pairs = low[:, None] + (high - low)[:, None] * ((0.5 + numbers * R2[:, None]) % 1.0)
             costs, theta_3 = problem.model.measure_branches(pairs)
-            rows = np.stack([*np.repeat(pairs[:, :, None], 2, axis=2), theta_3.T], axis=2).reshape(-1, 3)
+            rows = np.stack([*np.repeat(pairs[:, :, None], 2, axis=2), theta_3.T], axis=2).reshape(
+                -1, 3
+            )
             found += list(rows[(problem.model.weights[6] > costs.T).ravel()])
             if len(found) >= self.num_starts:
                 break
         else:
-            raise SettingError("reference.num_starts", f"at most {len(found)}, the feasible postures", self.num_starts)
+            raise SettingError(
+                "reference.num_starts",
+                f"at most {len(found)}, the feasible postures",
+                self.num_starts,
+            )
         places = np.array(found[: self.num_starts])
         return [model.directions(place[:2], float(place[2])) for place in places], places
 
@@ -87,11 +106,29 @@ class PlacementConventional(Reference):
         steps = self.first_step / np.sqrt(np.arange(1.0, self.num_steps + 1.0))
         x = np.pad(np.column_stack(starts), ((0, 0), (0, -len(starts) % LANES)), mode="edge")
         ends, costs = np.empty(x.shape), np.empty(x.shape[1])
-        slide(x, steps, model.lengths, model.target, model.force, model.weights, model.avoided, ends, costs)
+        slide(
+            x,
+            steps,
+            model.lengths,
+            model.target,
+            model.force,
+            model.weights,
+            model.avoided,
+            ends,
+            costs,
+        )
         evaluations = 7 * self.num_steps
         return [End(ends[:, k].copy(), float(costs[k]), evaluations) for k in range(len(starts))]
 
 
 def _row(model: Directions, programme: Programme, end: End) -> FloatArray:
-    """Return θ1, θ2 [deg] and E of an end; E is inf where the end is no posture that was asked for."""
-    return np.array([*np.round(model.theta(end.x), DIGITS), end.cost if programme.is_legal(end.x, 1e-6) else np.inf])
+    """Return θ1, θ2 [deg] and E of an end.
+
+    E is inf where the end is no posture that was asked for.
+    """
+    return np.array(
+        [
+            *np.round(model.theta(end.x), DIGITS),
+            end.cost if programme.is_legal(end.x, 1e-6) else np.inf,
+        ]
+    )

@@ -12,7 +12,8 @@ from evoexp.references.truth import Reference, Truth
 class PlacementLandscape(Reference):
     """E over all θ1 and θ2, the better θ3 of each.
 
-    Arrays: `theta_1` and `theta_2` (angles,) [deg]; `cost` (angles of θ1, angles of θ2): E, NaN where infeasible.
+    Arrays: `theta_1` and `theta_2` (angles,) [deg]; `cost` (angles of θ1, angles of θ2): E, NaN
+    where infeasible.
 
     Attributes:
         num_angles: Values of either angle, both ends of their range included.
@@ -34,4 +35,11 @@ class PlacementLandscape(Reference):
         arrays = {"theta_1": one, "theta_2": two, "cost": cost}
         share_feasible = float(np.count_nonzero(feasible)) / pairs.shape[1]
         terms = {"share_feasible": share_feasible}
-        return Truth(pairs[:, best].copy(), float(found[0, best]), bool(feasible[best]), pairs.shape[1], terms, arrays)
+        return Truth(
+            pairs[:, best].copy(),
+            float(found[0, best]),
+            bool(feasible[best]),
+            pairs.shape[1],
+            terms,
+            arrays,
+        )

@@ -1,6 +1,7 @@
 """The task of a mobile arm's posture once more, over absolute link angles: for optimisers.
 
-x = (φ1, φ2, φ3) [rad] are the directions of the three links; one equation ties them: the end-effector's height.
+x = (φ1, φ2, φ3) [rad] are the directions of the three links; one equation ties them: the
+end-effector's height.
 """
 
 from typing import NamedTuple
@@ -42,8 +43,14 @@ class Directions(NamedTuple):
     def bounds(self) -> FloatArray:
         """Return the limits that there are, (m, 3); see `placement_programme.measure`."""
         rows = []
-        for k, (least, greatest) in enumerate(np.concatenate([self.joint_limits, self.torque_limits])):
-            rows += [(float(k), sign, limit) for sign, limit in ((1.0, least), (-1.0, greatest)) if np.isfinite(limit)]
+        for k, (least, greatest) in enumerate(
+            np.concatenate([self.joint_limits, self.torque_limits])
+        ):
+            rows += [
+                (float(k), sign, limit)
+                for sign, limit in ((1.0, least), (-1.0, greatest))
+                if np.isfinite(limit)
+            ]
         return np.array(rows, dtype=np.float64).reshape(len(rows), 3)
 
     def theta(self, x: FloatArray) -> FloatArray:
@@ -63,7 +70,8 @@ def directions_of(model: Model, angle_limits: FloatArray) -> Directions:
 
     Args:
         model: See `placement_criteria`.
-        angle_limits: (2, 2) of the planner's genes [deg]; they limit θ1 and θ2 where they leave out anything.
+        angle_limits: (2, 2) of the planner's genes [deg]; they limit θ1 and θ2 where they leave out
+            anything.
     """
     task, joints = model.task, model.limits[:3].copy()
     for k, (least, greatest) in enumerate(angle_limits):

@@ -1,4 +1,7 @@
-"""The best posture there is: a dense search over all angles, then every promising local minimum polished."""
+"""The best posture there is: a dense search over all angles.
+
+Then every promising local minimum polished.
+"""
 
 from typing import Annotated, Any, ClassVar
 
@@ -20,8 +23,8 @@ SAME = 1e-3  # [deg] two minima so close are one
 class PlacementOptimum(Reference):
     """The exact optimum of `placement_ga`'s cost, and all local minima that the search saw.
 
-    Arrays: `minima` (minima, 3): θ1, θ2 [deg], E, the best one first. The optimum has 15 digits, more than any code of
-    16 bits per angle.
+    Arrays: `minima` (minima, 3): θ1, θ2 [deg], E, the best one first. The optimum has 15 digits,
+    more than any code of 16 bits per angle.
 
     Attributes:
         num_angles: Values of either angle that the dense search takes.
@@ -35,7 +38,10 @@ class PlacementOptimum(Reference):
 
     def truth(self, problem: Any) -> Truth:
         """Search, polish, and judge the best by the planner's own kernels."""
-        model, cap = directions_of(problem.model, problem.angle_limits), float(problem.model.weights[6])
+        model, cap = (
+            directions_of(problem.model, problem.angle_limits),
+            float(problem.model.weights[6]),
+        )
         programme, ends = Programme(model), []
         exact: list[FloatArray] = []
         evaluations = 2 * self.num_angles * self.num_angles
@@ -49,18 +55,27 @@ class PlacementOptimum(Reference):
                 exact += [] if polished is None else ends[-1:]
         minima = _distinct(problem.model, ends)
         if not len(minima):
-            return Truth(problem.angle_limits.mean(axis=1), cap, False, evaluations, {"num_minima": 0.0})
+            return Truth(
+                problem.angle_limits.mean(axis=1), cap, False, evaluations, {"num_minima": 0.0}
+            )
         best, cost = minima[0, :2].copy(), float(minima[0, 2])
-        return Truth(best, cost, True, evaluations, {"num_minima": float(len(minima))}, {"minima": minima})
+        return Truth(
+            best, cost, True, evaluations, {"num_minima": float(len(minima))}, {"minima": minima}
+        )
 
 
 def _is_among(known: list[FloatArray], theta: FloatArray) -> bool:
     """Return whether θ1 and θ2 are those of something known."""
-    return any(np.abs((theta - other[:2] + TURN / 2) % TURN - TURN / 2).max() <= SAME for other in known)
+    return any(
+        np.abs((theta - other[:2] + TURN / 2) % TURN - TURN / 2).max() <= SAME for other in known
+    )
 
 
 def _distinct(model: Model, found: list[FloatArray]) -> FloatArray:
-    """Return distinct feasible minima θ1, θ2, E (minima, 3), the lowest first, by the planner's own kernels."""
+    """Return distinct feasible minima θ1, θ2, E (minima, 3), the lowest first.
+
+    By the planner's own kernels.
+    """
     rows: list[FloatArray] = []
     measured = [(theta, model.posture(*theta)) for theta in found]
     feasible = [np.array([*theta, own[0]]) for theta, (branch, own, _) in measured if branch >= 0]

@@ -1,4 +1,7 @@
-"""Local optimisation of a mobile arm's posture: sequential quadratic programming, then Newton on its conditions."""
+"""Local optimisation of a mobile arm's posture.
+
+Sequential quadratic programming, then Newton on its conditions.
+"""
 
 from typing import Any, NamedTuple
 
@@ -26,7 +29,10 @@ class End(NamedTuple):
 
 
 def descend(programme: Programme, x: FloatArray, most_steps: int = 200) -> End:
-    """Minimise E from x by sequential quadratic programming (scipy's SLSQP), the minimax term as a bound t."""
+    """Minimise E from x by sequential quadratic programming (scipy's SLSQP).
+
+    The minimax term as a bound t.
+    """
     from scipy import optimize  # takes long to load
 
     minimize: Any = optimize.minimize  # whose overloads no callable of ours fits
@@ -42,7 +48,9 @@ def descend(programme: Programme, x: FloatArray, most_steps: int = 200) -> End:
 
 
 def polish(programme: Programme, x: FloatArray) -> End | None:
-    """Return the local minimum near the end of `descend`, to rounding: Newton on the Karush–Kuhn–Tucker conditions.
+    """Return the local minimum near the end of `descend`, to rounding.
+
+    Newton on the Karush–Kuhn–Tucker conditions.
 
     The conditions that hold with equality are taken from x; None where Newton does not converge.
     """
@@ -71,5 +79,7 @@ def polish(programme: Programme, x: FloatArray) -> End | None:
 def _jacobian(function: Any, y: FloatArray) -> FloatArray:
     """Return derivatives by central differences: Newton's steps need no more digits."""
     h = 1e-5
-    columns = [(function(y + h * unit) - function(y - h * unit)) / (2.0 * h) for unit in np.eye(len(y))]
+    columns = [
+        (function(y + h * unit) - function(y - h * unit)) / (2.0 * h) for unit in np.eye(len(y))
+    ]
     return np.column_stack(columns)

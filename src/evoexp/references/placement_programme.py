@@ -1,8 +1,10 @@
-"""A mobile arm's posture as a smooth programme, compiled: what is minimised, what binds, and all derivatives.
+"""A mobile arm's posture as a smooth programme, compiled.
 
-z = (φ1, φ2, φ3) [rad] are the directions of the three links; one equation ties them: the end-effector's height. The
-minimax term is a bound: z = (φ1, φ2, φ3, t), t above every |α τ|. Nothing is shared with the planner's own kernels,
-which know joint angles only.
+What is minimised, what binds, and all derivatives.
+
+z = (φ1, φ2, φ3) [rad] are the directions of the three links; one equation ties them: the
+end-effector's height. The minimax term is a bound: z = (φ1, φ2, φ3, t), t above every |α τ|.
+Nothing is shared with the planner's own kernels, which know joint angles only.
 """
 
 from typing import Any
@@ -13,12 +15,18 @@ from evoexp.numerics import kernel, sincos
 from evoexp.records import FloatArray
 from evoexp.references.placement_model import Directions
 
-OBJECTIVE, HEIGHT, MARGINS = 0, 1, 2  # rows of what is measured: what is minimised, must be 0, must not be negative
+OBJECTIVE, HEIGHT, MARGINS = (
+    0,
+    1,
+    2,
+)  # rows of what is measured: what is minimised, must be 0, must not be negative
 TORQUE_BOUNDS = 6  # margins of the minimax term: t − α τ and t + α τ
 
 
 class Programme:
-    """Least smooth(x) + λ t, t above every |α τ|, height 0, margins not negative; t is left out where λ is 0.
+    """Least smooth(x) + λ t, t above every |α τ|, height 0, margins not negative.
+
+    T is left out where λ is 0.
 
     Attributes:
         minimax: Whether there is t.
@@ -35,7 +43,9 @@ class Programme:
         self._where = b""
 
     def measured(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the objective, the height and the margins at z, (2 + margins,), and their derivatives (…, len(z)).
+        """Return the objective, the height and the margins at z,.
+
+        2 + margins,), and their derivatives (…, len(z.
 
         Both arrays are used again: they hold until the next call.
         """
@@ -81,10 +91,11 @@ def measure(z, numbers, avoided, bounds, values, slopes):  # type: ignore[no-unt
 
     Args:
         z: (3,) or, with t, (4,).
-        numbers: (13,) l1, l2, l3, X_e, Y_e, F_x, F_y, ε, λ, δ, α1, α2, α3; see `placement_model.Directions`.
+        numbers: (13,) l1, l2, l3, X_e, Y_e, F_x, F_y, ε, λ, δ, α1, α2, α3; see
+            `placement_model.Directions`.
         avoided: (n, 5) γ, link, place, X_o, Y_o of Eq. 12.
-        bounds: (m, 3) what is limited (0, 1, 2: a joint angle; 3, 4, 5: a torque), 1.0 or −1.0: from below or above,
-            the limit.
+        bounds: (m, 3) what is limited (0, 1, 2: a joint angle; 3, 4, 5: a torque), 1.0 or −1.0:
+            from below or above, the limit.
         values: (2 + margins,) written: what is minimised, the height, the margins.
         slopes: (2 + margins, len(z)) written: their derivatives.
     """
@@ -93,7 +104,9 @@ def measure(z, numbers, avoided, bounds, values, slopes):  # type: ignore[no-unt
     for k in range(3):
         s, c = sincos(z[k])
         across[k], up[k] = numbers[k] * c, numbers[k] * s
-        turns[k] = -numbers[5] * across[k] - numbers[6] * up[k]  # of every torque from the k-th joint inwards
+        turns[k] = (
+            -numbers[5] * across[k] - numbers[6] * up[k]
+        )  # of every torque from the k-th joint inwards
     slopes[:, :] = 0.0
     jx, jy, xx, yy, xy, total = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(2, -1, -1):
@@ -106,11 +119,21 @@ def measure(z, numbers, avoided, bounds, values, slopes):  # type: ignore[no-unt
         total += delta / determinant
     reach, sum_x, sum_y, sum_torques = jy, 0.0, 0.0, 0.0
     for k in range(3):
-        sum_x, sum_y, sum_torques = sum_x + jx, sum_y + jy, sum_torques + torques[k]  # of joints up to the k-th
+        sum_x, sum_y, sum_torques = (
+            sum_x + jx,
+            sum_y + jy,
+            sum_torques + torques[k],
+        )  # of joints up to the k-th
         slopes[0, k] = 2.0 * epsilon * sum_torques * turns[k]
         if delta != 0.0:
-            of_xx, of_yy, of_xy = -2.0 * sum_x * across[k], -2.0 * sum_y * up[k], -sum_y * across[k] - sum_x * up[k]
-            slopes[0, k] -= delta * (of_xx * yy + xx * of_yy - 2.0 * xy * of_xy) / (determinant * determinant)
+            of_xx, of_yy, of_xy = (
+                -2.0 * sum_x * across[k],
+                -2.0 * sum_y * up[k],
+                -sum_y * across[k] - sum_x * up[k],
+            )
+            slopes[0, k] -= (
+                delta * (of_xx * yy + xx * of_yy - 2.0 * xy * of_xy) / (determinant * determinant)
+            )
         jx, jy = jx + up[k], jy - across[k]
     for n in range(len(avoided)):
         total += _avoid(avoided[n], numbers[3] - reach, across, up, slopes[0])
@@ -174,5 +197,7 @@ def _avoid(one, platform, across, up, slope):  # type: ignore[no-untyped-def]
     square = dx * dx + dy * dy
     for k in range(3):
         share = (one[2] if k + 1 == int(one[1]) else 1.0) if k < int(one[1]) else 0.0
-        slope[k] -= 2.0 * one[0] * (dx * (1.0 - share) * up[k] + dy * share * across[k]) / (square * square)
+        slope[k] -= (
+            2.0 * one[0] * (dx * (1.0 - share) * up[k] + dy * share * across[k]) / (square * square)
+        )
     return one[0] / square

@@ -1,4 +1,6 @@
-"""A dense search for postures, compiled: E over all θ1 and θ2, both values of θ3, and its local minima.
+"""A dense search for postures, compiled.
+
+E over all θ1 and θ2, both values of θ3, and its local minima.
 
 Over directions, as all of this room: nothing is shared with the planner's own kernels.
 """
@@ -15,11 +17,13 @@ PI, WHOLE = 3.141592653589793, 6.283185307179586  # [rad]
 ON_LIMIT = 1e-9  # [rad], of torques [-]: what breaks a limit by less is on it
 
 
-def lowest(model: Directions, angle_limits: FloatArray, num_angles: int, cap: float, count: int) -> list[FloatArray]:
+def lowest(
+    model: Directions, angle_limits: FloatArray, num_angles: int, cap: float, count: int
+) -> list[FloatArray]:
     """Return directions (3,) [rad] of the lowest local minima of a dense search, the lowest first.
 
-    Both values of θ3 are sheets of one surface, joined where the third link is upright: a place at that edge is a
-    minimum only if nothing around it on the other sheet is lower.
+    Both values of θ3 are sheets of one surface, joined where the third link is upright: a place at
+    that edge is a minimum only if nothing around it on the other sheet is lower.
 
     Args:
         model: The criteria.
@@ -32,7 +36,9 @@ def lowest(model: Directions, angle_limits: FloatArray, num_angles: int, cap: fl
     angles = np.radians(angle_limits[:, :1] + (angle_limits[:, 1:] - angle_limits[:, :1]) * share)
     costs, sines = search(model, angles)
     least = np.zeros(costs.shape, dtype=np.bool_)
-    mark_minima(costs, np.abs(sines) <= 1.0, angle_limits[:, 1] - angle_limits[:, 0] >= TURN, cap, least)
+    mark_minima(
+        costs, np.abs(sines) <= 1.0, angle_limits[:, 1] - angle_limits[:, 0] >= TURN, cap, least
+    )
     found = np.flatnonzero(least)
     found = found[np.argsort(costs.ravel()[found], kind="stable")][:count]
     places = zip(*np.unravel_index(found, costs.shape), strict=True)
@@ -40,15 +46,17 @@ def lowest(model: Directions, angle_limits: FloatArray, num_angles: int, cap: fl
 
 
 def search(model: Directions, angles: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return E, without any cap, over a grid of angles, and the sine of the third link's direction that it takes.
+    """Return E, without any cap, over a grid of angles.
+
+    And the sine of the third link's direction that it takes.
 
     Args:
         model: The criteria.
         angles: (2, n) θ1 and θ2 [rad].
 
     Returns:
-        E (2, n, n): branch (0: the third link points to +x), θ1, θ2; inf where the target is out of reach or a limit is
-        broken. Sines (n, n): beyond ±1 where it is out of reach.
+        E (2, n, n): branch (0: the third link points to +x), θ1, θ2; inf where the target is out of
+        reach or a limit is broken. Sines (n, n): beyond ±1 where it is out of reach.
     """
     num = angles.shape[1]
     costs, sines = np.full((2, num, num), np.inf), np.empty((num, num))
@@ -99,7 +107,10 @@ def _search(angles, lengths, target, force, weights, avoided, numbers, bounds, c
 
 @kernel
 def _wrapped(before, after):  # type: ignore[no-untyped-def]
-    """Return a link's direction in turns so that the joint's angle to the link before is in [−π, π) [rad]."""
+    """Return a link's direction in turns so that the joint's angle to the link before is in [−π.
+
+    Π) [rad].
+    """
     return after - WHOLE * np.floor((after - before + PI) / WHOLE)
 
 
@@ -125,7 +136,9 @@ def mark_minima(costs, in_reach, turns, cap, least):  # type: ignore[no-untyped-
         for i in range(num):
             for j in range(num):
                 cost = costs[branch, i, j]
-                if not cost < cap or (0 < j < num - 1 and min(costs[branch, i, j - 1], costs[branch, i, j + 1]) < cost):
+                if not cost < cap or (
+                    0 < j < num - 1 and min(costs[branch, i, j - 1], costs[branch, i, j + 1]) < cost
+                ):
                     continue  # as almost all are
                 on_own, on_other, at_edge = True, True, False
                 for k in range(9):

@@ -1,15 +1,18 @@
 """A projected subgradient method for a mobile arm's posture, compiled: the same bits everywhere.
 
-Pin & Culioli (1992), whom Chen & Zalzala (1995) compare with, solved the minimax problem by one; its details are not
-printed. Here: steps of given lengths against the slope of E along the surface of postures that reach the target, each
-followed by a projection onto that surface. All starts go together, innermost in memory.
+Pin & Culioli (1992), whom Chen & Zalzala (1995) compare with, solved the minimax problem by one;
+its details are not printed. Here: steps of given lengths against the slope of E along the surface
+of postures that reach the target, each followed by a projection onto that surface. All starts go
+together, innermost in memory.
 """
 
 import numpy as np
 
 from evoexp.numerics import kernel, sincos
 
-H = 1e-6  # [rad] of central differences; beside a kink the slope is that of the side where x is, or between both
+# [rad] of central differences; beside a kink the slope is that of the side where x is, or between
+# both
+H = 1e-6
 PROJECTIONS = 3  # Newton steps back to the surface
 LANES = 32  # starts come in multiples of it: what is left over would not be vector code
 
@@ -20,7 +23,8 @@ def costs_of(x, lengths, target, force, weights, avoided, across, up, costs):  #
 
     Args:
         x: (3, ≥ places) directions [rad].
-        lengths: See `placement_model.Directions`, and so `target`, `force`, `weights` and `avoided`.
+        lengths: See `placement_model.Directions`, and so `target`, `force`, `weights` and
+            `avoided`.
         across: (3, ≥ places) written: the links' extents along x.
         up: (3, ≥ places) written: along y.
         costs: (places,) written.
@@ -35,7 +39,11 @@ def costs_of(x, lengths, target, force, weights, avoided, across, up, costs):  #
         jx3, jy3 = -up[2, n], across[2, n]
         jx2, jy2 = jx3 - up[1, n], jy3 + across[1, n]
         jx1, jy1 = jx2 - up[0, n], jy2 + across[0, n]
-        t1, t2, t3 = jx1 * force[0] + jy1 * force[1], jx2 * force[0] + jy2 * force[1], jx3 * force[0] + jy3 * force[1]
+        t1, t2, t3 = (
+            jx1 * force[0] + jy1 * force[1],
+            jx2 * force[0] + jy2 * force[1],
+            jx3 * force[0] + jy3 * force[1],
+        )
         norm = t3 * t3 + t2 * t2 + t1 * t1
         largest = max(max(abs(weights[5] * t3), abs(weights[4] * t2)), abs(weights[3] * t1))
         xx = jx3 * jx3 + jx2 * jx2 + jx1 * jx1
@@ -45,7 +53,9 @@ def costs_of(x, lengths, target, force, weights, avoided, across, up, costs):  #
         costs[n] = weights[0] * norm + weights[1] * largest + manipulability
     for m in range(len(avoided)):
         link = int(avoided[m, 1])
-        one = (avoided[m, 2] if link == 1 else 1.0) if link >= 1 else 0.0  # of each link: what lies before the point
+        one = (
+            (avoided[m, 2] if link == 1 else 1.0) if link >= 1 else 0.0
+        )  # of each link: what lies before the point
         two = (avoided[m, 2] if link == 2 else 1.0) if link >= 2 else 0.0
         three = avoided[m, 2] if link == 3 else 0.0
         for n in range(len(costs)):
@@ -60,7 +70,8 @@ def slide(x, steps, lengths, target, force, weights, avoided, ends, costs):  # t
     """Follow the method from every start.
 
     Args:
-        x: (3, starts) directions that reach the target [rad]; overwritten. A multiple of `LANES` starts.
+        x: (3, starts) directions that reach the target [rad]; overwritten. A multiple of `LANES`
+            starts.
         steps: (steps,) their lengths [rad].
         lengths: As of `costs_of`, and so are the next four.
         ends: (3, starts) written: the best place of every way.
@@ -86,7 +97,10 @@ def slide(x, steps, lengths, target, force, weights, avoided, ends, costs):  # t
                 normal[k, n] = lengths[k] * sincos(x[k, n])[1]
         for n in range(num):
             a, b, c = normal[0, n], normal[1, n], normal[2, n]
-            inner, square = slope[0, n] * a + slope[1, n] * b + slope[2, n] * c, a * a + b * b + c * c
+            inner, square = (
+                slope[0, n] * a + slope[1, n] * b + slope[2, n] * c,
+                a * a + b * b + c * c,
+            )
             share = inner / square if square > 0.0 else 0.0
             a, b, c = slope[0, n] - share * a, slope[1, n] - share * b, slope[2, n] - share * c
             slope[0, n], slope[1, n], slope[2, n] = a, b, c
@@ -116,7 +130,9 @@ def _copy(x, out):  # type: ignore[no-untyped-def]
 
 @kernel
 def _project(x, lengths, target, moves, normal, heights):  # type: ignore[no-untyped-def]
-    """Bring the end-effectors back to their height, by the shortest way to first order; with `moves` 0 nothing moves.
+    """Bring the end-effectors back to their height, by the shortest way to first order.
+
+    With `moves` 0 nothing moves.
 
     Args:
         x: (3, starts) directions [rad].
@@ -138,7 +154,10 @@ def _project(x, lengths, target, moves, normal, heights):  # type: ignore[no-unt
 
 @kernel
 def _heights(x, lengths, target, normal, heights):  # type: ignore[no-untyped-def]
-    """Write by how much the end-effectors are above their target (starts,), and its derivatives (3, starts)."""
+    """Write by how much the end-effectors are above their target (starts,), and its derivatives.
+
+    3, starts.
+    """
     for n in range(len(heights)):
         heights[n] = -target[1]
     for k in range(3):

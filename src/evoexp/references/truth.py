@@ -1,8 +1,9 @@
-"""What a reference is: a deterministic truth about the problem of the planner that it stands beside.
+"""References: deterministic truths about the problem of the planner that they stand beside.
 
-An exact optimum, a frontier, a landscape, what a conventional method ends at: computed once, run and stored like a
-condition of one replicate, its arrays attached to the log. Libraries such as scipy may compute it, which are not
-reproducible bit by bit; so `reproduce` compares its numbers, to 1e-9, and not its digest.
+An exact optimum, a frontier, a landscape, what a conventional method ends at: computed once, run
+and stored like a condition of one replicate, its arrays attached to the log. Libraries such as
+scipy may compute it, which are not reproducible bit by bit; so `reproduce` compares its numbers, to
+1e-9, and not its digest.
 """
 
 from collections.abc import Iterator, Mapping
@@ -23,8 +24,10 @@ class Truth(NamedTuple):
         cost: Its cost, as the planner's own; lower is better, inf: there is none.
         solved: Whether the planner's own model accepts it.
         evaluations: Of the planner's cost that it took.
-        terms: Numbers of its own (the share of starts that end at the optimum, say), beside those of `evaluate`.
-        arrays: What is drawn or tabulated, by name: attached to the log as `<name>.npy`, any shape, float64 or int64.
+        terms: Numbers of its own (the share of starts that end at the optimum, say), beside those
+            of `evaluate`.
+        arrays: What is drawn or tabulated, by name: attached to the log as `<name>.npy`, any shape,
+            float64 or int64.
     """
 
     best: FloatArray
@@ -36,7 +39,9 @@ class Truth(NamedTuple):
 
 
 class Reference(Component):
-    """Base of every reference; a subclass has `truth`. Everything else is as the planner beside it has it.
+    """Base of every reference; a subclass has `truth`.
+
+    Everything else is as the planner beside it has it.
 
     Attributes:
         planner: The planner whose problem, cost and solutions it shares.

@@ -1,1 +1,4 @@
-"""Report: reads outputs only; results, statistics, claims and figures. Never imports batch or planners."""
+"""Report: reads outputs only; results, statistics, claims and figures.
+
+Never imports batch or planners.
+"""

@@ -1,4 +1,7 @@
-"""The bodies that the exact verdict judges: how far they are apart along a motion, and where they first touch."""
+"""The bodies that the exact verdict judges.
+
+How far they are apart along a motion, and where they first touch.
+"""
 
 import numpy as np
 import pinocchio as pin
@@ -12,7 +15,9 @@ from evoexp.report.results import ConditionResults
 
 
 def distances(scene: Scene, q: FloatArray) -> FloatArray:
-    """Return the least distance of bodies that must not touch at each configuration; 0 where they do.
+    """Return the least distance of bodies that must not touch at each configuration.
+
+    0 where they do.
 
     Args:
         scene: The bodies.
@@ -21,20 +26,29 @@ def distances(scene: Scene, q: FloatArray) -> FloatArray:
     data, geometry = scene.model.createData(), scene.geometry.createData()
     found = np.empty(q.shape[1])
     for k, configuration in enumerate(np.ascontiguousarray(q.T)):
-        pin.updateGeometryPlacements(scene.model, data, scene.geometry, geometry, DEGREE * configuration)
+        pin.updateGeometryPlacements(
+            scene.model, data, scene.geometry, geometry, DEGREE * configuration
+        )
         pin.computeDistances(scene.geometry, geometry)
-        found[k] = min(geometry.distanceResults[pair].min_distance for pair in range(len(scene.pairs)))
+        found[k] = min(
+            geometry.distanceResults[pair].min_distance for pair in range(len(scene.pairs))
+        )
     return np.maximum(found, 0.0)
 
 
 def refuted(condition: ConditionResults) -> dict[int, tuple[float, str]]:
-    """Return when and between which bodies the first contact is, by replicate whose motion the verdict refutes."""
+    """Return when and between which bodies the first contact is.
+
+    By replicate whose motion the verdict refutes.
+    """
     rows = condition.summaries[condition.summaries["refuted_at"].notna()]
     found = zip(rows.index, rows["refuted_at"], rows["refuted_pair"], strict=True)
     return {int(replicate): (float(instant), str(pair)) for replicate, instant, pair in found}
 
 
-def contact(prepared: Prepared, solution: FloatArray, instant: float, pair: str) -> tuple[float, float]:
+def contact(
+    prepared: Prepared, solution: FloatArray, instant: float, pair: str
+) -> tuple[float, float]:
     """Return where two bodies touch in the plane (x, y).
 
     Args:

@@ -26,7 +26,8 @@ class Request(NamedTuple):
         experiment: Name of the experiment; empty for runs given by their hashes.
         budget: Name of the budget; empty for runs given by their hashes.
         conditions: (label, condition) in the order of the experiment.
-        arguments: What was asked for, as words of the command line: "rana_planar budget=smoke"; derived if empty.
+        arguments: What was asked for, as words of the command line: "rana_planar budget=smoke";
+            derived if empty.
     """
 
     report_name: str
@@ -41,7 +42,11 @@ class Request(NamedTuple):
         if self.arguments:
             return self.arguments
         if self.experiment and "+" not in self.report_name:
-            return self.experiment if self.budget == "paper" else f"{self.experiment} budget={self.budget}"
+            return (
+                self.experiment
+                if self.budget == "paper"
+                else f"{self.experiment} budget={self.budget}"
+            )
         return " ".join(dict.fromkeys(condition.id[:12] for _, condition in self.conditions))
 
     @property
@@ -52,7 +57,9 @@ class Request(NamedTuple):
         return f"evoexp run {self.words}" if self.arguments else f"evoexp show {self.words}"
 
 
-def report(request: Request, settings: ReportSettings, outputs: Path, num_replicates: int | None) -> Path:
+def report(
+    request: Request, settings: ReportSettings, outputs: Path, num_replicates: int | None
+) -> Path:
     """Write a report and return the path of its `index.md`.
 
     Args:
@@ -66,7 +73,14 @@ def report(request: Request, settings: ReportSettings, outputs: Path, num_replic
         UnknownOption: If the settings name a page that does not exist.
         CorruptLog: If a log cannot be trusted.
     """
-    found = gather(outputs, request.conditions, num_replicates, request.experiment, request.budget, request.hint)
+    found = gather(
+        outputs,
+        request.conditions,
+        num_replicates,
+        request.experiment,
+        request.budget,
+        request.hint,
+    )
     page = page_of(found, settings)
     directory = outputs / "reports" / request.report_name
     files: dict[str, bytes] = {}
@@ -83,7 +97,9 @@ def report(request: Request, settings: ReportSettings, outputs: Path, num_replic
 
 def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:
     """Return the files of one figure: pictures, data rows, sidecar."""
-    from evoexp.report.style import drawn  # matplotlib; `evoexp run` loads this file before anything is drawn
+    from evoexp.report.style import (
+        drawn,
+    )  # matplotlib; `evoexp run` loads this file before anything is drawn
 
     table = drawing.table()
     images = drawn(lambda: drawing.draw(table), settings.formats, settings.dpi)

@@ -1,4 +1,7 @@
-"""Chen & Zalzala 1995, section 4.2: which conditions belong to one criterion, and what the paper prints of it."""
+"""Chen & Zalzala 1995, section 4.2.
+
+Which conditions belong to one criterion, and what the paper prints of it.
+"""
 
 from typing import Any, NamedTuple
 
@@ -8,7 +11,11 @@ from evoexp.records import FloatArray
 from evoexp.report.proportions import Proportion
 from evoexp.report.results import ConditionResults, Results
 
-METHODS = {"newton": "Newton-type", "bounded": "Newton-type, smooth form", "subgradient": "subgradient"}
+METHODS = {
+    "newton": "Newton-type",
+    "bounded": "Newton-type, smooth form",
+    "subgradient": "subgradient",
+}
 CLOSE = (0.001, 0.01)  # [-] gaps to the optimum that shares are told of
 
 
@@ -93,7 +100,10 @@ class Case(NamedTuple):
         return dict(planner.evaluate(problem, np.asarray(angles, dtype=np.float64)))
 
     def ends(self) -> dict[str, FloatArray]:
-        """Return where conventional methods ended, (starts, 3): θ1, θ2 [deg], E, by the method's name."""
+        """Return where conventional methods ended, (starts, 3).
+
+        Θ1, θ2 [deg], E, by the method's name.
+        """
         if self.conventional is None:
             return {}
         found = {}
@@ -129,7 +139,11 @@ def _role(condition: ConditionResults) -> str:
 
 def _name(condition: ConditionResults) -> str:
     objective = condition.planner.objective
-    weights = objective.torque_norm_weight, objective.torque_max_weight, objective.manipulability_weight
+    weights = (
+        objective.torque_norm_weight,
+        objective.torque_max_weight,
+        objective.manipulability_weight,
+    )
     links = [one.link for one in objective.avoidances]
     names = {
         (True, False, False, ()): "least torque norm",

@@ -1,4 +1,7 @@
-"""Verdicts on what a paper claims, computed from results; below the paper's budget nothing is judged."""
+"""Verdicts on what a paper claims, computed from results.
+
+Below the paper's budget nothing is judged.
+"""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -6,9 +9,23 @@ from typing import NamedTuple
 import numpy as np
 
 from evoexp.records import FloatArray
-from evoexp.report.statistics import Effect, RankSum, SignedRank, effect, holm, quantile, rank_sum, signed_rank
+from evoexp.report.statistics import (
+    Effect,
+    RankSum,
+    SignedRank,
+    effect,
+    holm,
+    quantile,
+    rank_sum,
+    signed_rank,
+)
 
-REPRODUCED, CONTRADICTED, INCONCLUSIVE, NOT_JUDGED = "reproduced", "contradicted", "inconclusive", "not judged"
+REPRODUCED, CONTRADICTED, INCONCLUSIVE, NOT_JUDGED = (
+    "reproduced",
+    "contradicted",
+    "inconclusive",
+    "not judged",
+)
 
 
 class Claim(NamedTuple):
@@ -35,7 +52,8 @@ class Comparison(NamedTuple):
         num_seeds: Replicates that both have.
         median_difference: Of first minus second.
         test: Signed-rank test of the pairs.
-        p_adjusted: Its p-value by Holm over all quantities compared; equal to the plain one until `adjusted`.
+        p_adjusted: Its p-value by Holm over all quantities compared; equal to the plain one until
+            `adjusted`.
         unpaired: The same values tested as independent samples.
         unpaired_adjusted: Its p-value by Holm, a family of its own.
         better: A12 of the first being better than the second.
@@ -51,7 +69,10 @@ class Comparison(NamedTuple):
     better: Effect
 
     def says(self, significance: float) -> int:
-        """Return 1 if the first is significantly better, −1 if it is significantly worse, 0 if neither."""
+        """Return 1 if the first is significantly better, −1 if it is significantly worse.
+
+        0 if neither.
+        """
         if self.p_adjusted >= significance or self.better.a12 == 0.5:
             return 0
         return 1 if self.better.a12 > 0.5 else -1
@@ -91,7 +112,9 @@ def judge_better(not_judged: str, comparison: Comparison | None, significance: f
     return {1: REPRODUCED, -1: CONTRADICTED}.get(comparison.says(significance), INCONCLUSIVE)
 
 
-def judge_better_than_all(not_judged: str, comparisons: Sequence[Comparison], significance: float) -> str:
+def judge_better_than_all(
+    not_judged: str, comparisons: Sequence[Comparison], significance: float
+) -> str:
     """Judge a claim that one condition is better than each of several others.
 
     Args:
@@ -110,7 +133,9 @@ def judge_better_than_all(not_judged: str, comparisons: Sequence[Comparison], si
     return REPRODUCED if found and 0 not in found else INCONCLUSIVE
 
 
-def judge_best(not_judged: str, comparisons: Sequence[Comparison], best_median: bool, significance: float) -> str:
+def judge_best(
+    not_judged: str, comparisons: Sequence[Comparison], best_median: bool, significance: float
+) -> str:
     """Judge a claim that one of several settings is the best.
 
     Args:
@@ -120,8 +145,9 @@ def judge_best(not_judged: str, comparisons: Sequence[Comparison], best_median: 
         significance: Below this adjusted p-value a difference counts.
 
     Returns:
-        Contradicted by one that is significantly better; reproduced if it has the best median and one other setting at
-        least is significantly worse: neighbours of a best setting are about as good, so not all need be.
+        Contradicted by one that is significantly better; reproduced if it has the best median and
+        one other setting at least is significantly worse: neighbours of a best setting are about as
+        good, so not all need be.
     """
     if not_judged:
         return NOT_JUDGED
@@ -132,7 +158,12 @@ def judge_best(not_judged: str, comparisons: Sequence[Comparison], best_median: 
 
 
 def compare(
-    quantity: str, first: FloatArray, second: FloatArray, lower_is_better: bool, confidence: float, num_resamples: int
+    quantity: str,
+    first: FloatArray,
+    second: FloatArray,
+    lower_is_better: bool,
+    confidence: float,
+    num_resamples: int,
 ) -> Comparison:
     """Compare a quantity of two conditions, seed by seed.
 
@@ -148,13 +179,20 @@ def compare(
     sign = -1.0 if lower_is_better else 1.0
     better = effect(sign * first, sign * second, confidence, num_resamples)
     differences = np.zeros(len(first))
-    np.subtract(first, second, out=differences, where=first != second)  # two infinite costs do not differ
+    np.subtract(
+        first, second, out=differences, where=first != second
+    )  # two infinite costs do not differ
     median = quantile(differences, 0.5)
-    return Comparison(quantity, len(first), median, test, test.p_value, unpaired, unpaired.p_value, better)
+    return Comparison(
+        quantity, len(first), median, test, test.p_value, unpaired, unpaired.p_value, better
+    )
 
 
 def adjusted(comparisons: list[Comparison]) -> list[Comparison]:
-    """Return comparisons with p-values adjusted by Holm over all of them, each of both tests a family."""
+    """Return comparisons with p-values adjusted by Holm over all of them.
+
+    Each of both tests a family.
+    """
     paired = holm([comparison.test.p_value for comparison in comparisons])
     unpaired = holm([comparison.unpaired.p_value for comparison in comparisons])
     found = zip(comparisons, paired, unpaired, strict=True)

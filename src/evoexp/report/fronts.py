@@ -7,7 +7,9 @@ from evoexp.store.run_directory import RunDirectory
 
 
 def read_fronts(results: Results, condition: ConditionResults, replicate: int) -> list[FrontRow]:
-    """Return what a finished replicate's log says of its populations' criteria, one record per population.
+    """Return what a finished replicate's log says of its populations' criteria.
+
+    One record per population.
 
     Args:
         results: That the condition is one of.
@@ -17,4 +19,6 @@ def read_fronts(results: Results, condition: ConditionResults, replicate: int) -
     Raises:
         CorruptLog: If the log cannot be trusted.
     """
-    return read_log(RunDirectory(results.outputs, condition.condition.id).log_path(replicate)).fronts
+    return read_log(
+        RunDirectory(results.outputs, condition.condition.id).log_path(replicate)
+    ).fronts

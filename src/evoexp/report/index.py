@@ -29,7 +29,10 @@ def render(page: Page, results: Results, settings: ReportSettings, command: str)
         f"{page.introduction}\n" if page.introduction else "",
         _section("Conditions", _conditions(results, settings)),
         _section("Results", _quantities(page, results)),
-        *(_section(t.heading, markdown.table(t.headers, t.rows) + f"\n{t.note}\n" * bool(t.note)) for t in page.tables),
+        *(
+            _section(t.heading, markdown.table(t.headers, t.rows) + f"\n{t.note}\n" * bool(t.note))
+            for t in page.tables
+        ),
         _section("Claims", _claims(page.claims)),
         _section("Known defects and checks", _checks(page.checks)),
         *(_section(heading, _comparison(rows, settings)) for heading, rows in page.comparisons),
@@ -60,26 +63,43 @@ def _incomplete(results: Results) -> str:
         for c in results.conditions
         if c.done < c.planned
     ]
-    return f"> **Partial results.** {'; '.join(missing)}. Everything below is drawn from what is there.\n" * bool(
-        missing
+    return (
+        f"> **Partial results.** {'; '.join(missing)}. Everything below is drawn from what is "
+        "there.\n" * bool(missing)
     )
 
 
 def _conditions(results: Results, settings: ReportSettings) -> str:
     rows = []
     for c in results.conditions:
-        interval = markdown.percent(wilson(c.solved, c.done, settings.confidence)) if c.done else "–"
+        interval = (
+            markdown.percent(wilson(c.solved, c.done, settings.confidence)) if c.done else "–"
+        )
         solved = f"{markdown.share(c.solved, c.done)} ({interval})" if c.done else "–"
         verdicts = c.verdicts
-        margin = f"{markdown.share(verdicts.with_margin, verdicts.judged)}" if verdicts.judged else "–"
-        rows.append((c.label, f"`{c.hash12}`", c.done, c.planned, c.failed, solved, *_verdicts(verdicts), margin))
+        margin = (
+            f"{markdown.share(verdicts.with_margin, verdicts.judged)}" if verdicts.judged else "–"
+        )
+        rows.append(
+            (
+                c.label,
+                f"`{c.hash12}`",
+                c.done,
+                c.planned,
+                c.failed,
+                solved,
+                *_verdicts(verdicts),
+                margin,
+            )
+        )
     exact = ("certified", "refuted", "undecided", "solved, yet refuted", "margin certified")
     headers = ("condition", "hash", "done", "planned", "failed", "solved", *exact)
     level = f"{100 * settings.confidence:g} %"
     note = (
-        f"\"Solved\": the paper's own model accepts the best solution; in brackets Wilson's {level} interval. "
-        '"Certified", "refuted": the exact verdict on the whole continuous motion, by the distance of the bodies '
-        'themselves; "margin certified": they never come closer than the scenario\'s security margin.\n'
+        "\"Solved\": the paper's own model accepts the best solution; in brackets Wilson's "
+        f'{level} interval. "Certified", "refuted": the exact verdict on the whole continuous '
+        'motion, by the distance of the bodies themselves; "margin certified": they never come '
+        "closer than the scenario's security margin.\n"
     )
     return f"{markdown.table(headers, rows)}\n{note}"
 
@@ -103,7 +123,10 @@ def _quantities(page: Page, results: Results) -> str:
         ]
         names = [q.name if q.unit == "–" else f"{q.name} [{q.unit}]" for q in page.quantities]
         return f"{markdown.table(('condition', *names), cells)}\n{note}"
-    rows = [(q.name, q.unit, *(markdown.spread(q.spreads[label]) for label in labels)) for q in page.quantities]
+    rows = [
+        (q.name, q.unit, *(markdown.spread(q.spreads[label]) for label in labels))
+        for q in page.quantities
+    ]
     return f"{markdown.table(('quantity', 'unit', *heads), rows)}\n{note}"
 
 
@@ -137,25 +160,33 @@ def _comparison(rows: Iterable[Comparison], settings: ReportSettings) -> str:
     tests = ("Wilcoxon p", "adjusted", "Mann–Whitney p", "adjusted")
     headers = ("quantity", "common seeds", "median difference", "A12 of being better", *tests)
     note = (
-        "Difference: first minus second, seed by seed. A12 (Vargha and Delaney): probability that a run of the first "
-        f"is better than one of the second, ties count half; in brackets the {100 * settings.confidence:g} % "
-        f"percentile interval of {settings.num_resamples} resamples of seeds. Two tests, "
-        "two-sided: Wilcoxon's signed-rank test of the pairs, which verdicts follow, and Mann and Whitney's of the "
-        "same values as independent samples; adjusted: Holm over the rows of this table, test by test.\n"
+        "Difference: first minus second, seed by seed. A12 (Vargha and Delaney): probability "
+        "that a run of the first is better than one of the second, ties count half; in brackets "
+        f"the {100 * settings.confidence:g} % percentile interval of {settings.num_resamples} "
+        "resamples of seeds. Two tests, two-sided: Wilcoxon's signed-rank test of the pairs, "
+        "which verdicts follow, and Mann and Whitney's of the same values as independent "
+        "samples; adjusted: Holm over the rows of this table, test by test.\n"
     )
     return f"{markdown.table(headers, cells)}\n{note}"
 
 
 def _figure(drawing: Drawing, settings: ReportSettings) -> str:
     shown = next((kind for kind in ("png", "svg") if kind in settings.formats), None)
-    files = [*(f"{drawing.stem}.{kind}" for kind in settings.formats), f"{drawing.stem}.csv", f"{drawing.stem}.json"]
+    files = [
+        *(f"{drawing.stem}.{kind}" for kind in settings.formats),
+        f"{drawing.stem}.csv",
+        f"{drawing.stem}.json",
+    ]
     links = " · ".join(f"[{name.rsplit('.', 1)[1]}]({name})" for name in files)
     picture = f"![{drawing.title}]({drawing.stem}.{shown})\n\n" if shown else ""
     return f"### {drawing.title}\n\n{picture}{drawing.caption}\n\n{links}\n"
 
 
 def _parameters(results: Results) -> str:
-    """One row per setting; where conditions differ, one value per group of conditions that agree."""
+    """One row per setting; where conditions differ.
+
+    One value per group of conditions that agree.
+    """
     by_name: dict[str, dict[Parameter, list[str]]] = {}
     for condition in results.conditions:
         for parameter in parameters(results, condition):
@@ -164,7 +195,14 @@ def _parameters(results: Results) -> str:
     for name in _ordered(by_name):
         for parameter, labels in by_name[name].items():
             where = "" if len(labels) == len(results.conditions) else f" ({', '.join(labels)})"
-            rows.append((f"`{name}`{where}", parameter.value, parameter.unit or "–", parameter.source or "–"))
+            rows.append(
+                (
+                    f"`{name}`{where}",
+                    parameter.value,
+                    parameter.unit or "–",
+                    parameter.source or "–",
+                )
+            )
     return markdown.table(("setting", "value", "unit", "source"), rows)
 
 
@@ -177,5 +215,9 @@ def _ordered(by_name: dict[str, dict[Parameter, list[str]]]) -> Iterator[str]:
 
 
 def _failures(results: Results) -> str:
-    rows = [(c.label, replicate, reason) for c in results.conditions for replicate, reason in c.failures.items()]
+    rows = [
+        (c.label, replicate, reason)
+        for c in results.conditions
+        for replicate, reason in c.failures.items()
+    ]
     return markdown.table(("condition", "replicate", "reason"), rows) if rows else ""

@@ -1,4 +1,7 @@
-"""Executed motions of robots of two links, in absolute link angles: straight or curved between configurations."""
+"""Executed motions of robots of two links, in absolute link angles.
+
+Straight or curved between configurations.
+"""
 
 from typing import NamedTuple
 
@@ -35,7 +38,9 @@ class Sampled(NamedTuple):
 def executed(prepared: Prepared, solution: FloatArray) -> Motion:
     """Return what is executed of a solution, in absolute link angles [rad], robot by robot."""
     polynomials = prepared.planner.motion(prepared.problem, solution).polynomials.copy()
-    links = polynomials.reshape(*polynomials.shape[:2], -1, 2)  # joints turn against the link before
+    links = polynomials.reshape(
+        *polynomials.shape[:2], -1, 2
+    )  # joints turn against the link before
     links[..., 1] += links[..., 0]
     return cubic_motion(polynomials)
 
@@ -58,7 +63,9 @@ def sampled(motion: Motion, samples: int) -> Sampled:
 
 
 def speed_limits(prepared: Prepared) -> FloatArray:
-    """Return how far either link of every robot may turn per sampling step (Curkovic et al. 2013, Eq. 2).
+    """Return how far either link of every robot may turn per sampling step (Curkovic et al.
+
+    2013, Eq. 2).
 
     Returns:
         (robots, 2) [deg].
@@ -69,7 +76,10 @@ def speed_limits(prepared: Prepared) -> FloatArray:
 
 
 def times_over_limit(prepared: Prepared, solution: FloatArray) -> float:
-    """Return the greatest speed of any link over what Eq. 2 allows it, at a motion's fastest instant [-]."""
+    """Return the greatest speed of any link over what Eq.
+
+    2 allows it, at a motion's fastest instant [-].
+    """
     turns = top_speeds(executed(prepared, solution)).reshape(-1, 2) / DEGREE
     return float(np.max(turns / speed_limits(prepared)))
 
@@ -77,7 +87,9 @@ def times_over_limit(prepared: Prepared, solution: FloatArray) -> float:
 def straight(prepared: Prepared) -> FloatArray:
     """Return the solution whose link angles go straight from start to goal, flat [deg]."""
     problem, parts = prepared.problem, []
-    for start, goal, (rows, _) in zip(problem.start, problem.goal, prepared.planner.shape(problem), strict=True):
+    for start, goal, (rows, _) in zip(
+        problem.start, problem.goal, prepared.planner.shape(problem), strict=True
+    ):
         share = np.linspace(0.0, 1.0, rows)[:, None]
         parts.append((((1.0 - share) * start + share * goal) / DEGREE).ravel())
     return np.concatenate(parts)

@@ -34,11 +34,18 @@ def configurations(prepared: Prepared, solution: FloatArray) -> FloatArray:
 
 
 def straight_line(prepared: Prepared) -> FloatArray:
-    """Return the solution whose arms go straight from start to goal in configuration space, flat [deg]."""
+    """Return the solution whose arms go straight from start to goal in configuration space.
+
+    Flat [deg].
+    """
     problem, parts = prepared.problem, []
-    for (first, stop), (rows, _) in zip(problem.arm_slices, prepared.planner.shape(problem), strict=True):
+    for (first, stop), (rows, _) in zip(
+        problem.arm_slices, prepared.planner.shape(problem), strict=True
+    ):
         share = np.linspace(0.0, 1.0, rows)[:, None]
-        parts.append(((1.0 - share) * problem.start[first:stop] + share * problem.goal[first:stop]).ravel())
+        parts.append(
+            ((1.0 - share) * problem.start[first:stop] + share * problem.goal[first:stop]).ravel()
+        )
     return np.concatenate(parts)
 
 
@@ -58,7 +65,9 @@ def dense(q: FloatArray, samples: int) -> tuple[FloatArray, FloatArray]:
     return times, (1.0 - share) * q[:, before] + share * q[:, before + 1]
 
 
-def joint_positions(assembly: Assembly, q: FloatArray) -> Iterator[tuple[int, int, FloatArray, FloatArray]]:
+def joint_positions(
+    assembly: Assembly, q: FloatArray
+) -> Iterator[tuple[int, int, FloatArray, FloatArray]]:
     """Yield (arm, link of the arm, start (instants, 3), end (instants, 3)) of every link.
 
     Args:
@@ -68,18 +77,23 @@ def joint_positions(assembly: Assembly, q: FloatArray) -> Iterator[tuple[int, in
     frames = [frame.copy() for frame in _frames(assembly, q)]
     numbers = [0] * assembly.num_arms
     for link in assembly.links:
-        start = np.array([frame[link.joint] @ np.append(link.start, 1.0) for frame in frames])[:, :3]
+        start = np.array([frame[link.joint] @ np.append(link.start, 1.0) for frame in frames])[
+            :, :3
+        ]
         end = np.array([frame[link.joint] @ np.append(link.end, 1.0) for frame in frames])[:, :3]
         yield link.arm, numbers[link.arm], start, end
         numbers[link.arm] += 1
 
 
 def obstacle_outlines(table: ObstacleTable, reach: float = 1.0) -> list[FloatArray]:
-    """Return the outlines of obstacles as seen along z, each (points, 2), first and last point the same.
+    """Return the outlines of obstacles as seen along z, each (points, 2).
+
+    First and last point the same.
 
     Args:
         table: The obstacles.
-        reach: A half-space is drawn as a strip of this length to both sides of its point, a tenth of it deep.
+        reach: A half-space is drawn as a strip of this length to both sides of its point, a tenth
+            of it deep.
     """
     turn = np.linspace(0.0, 2.0 * np.pi, OUTLINE_POINTS)
     circle = np.column_stack([np.cos(turn), np.sin(turn)])
@@ -90,7 +104,10 @@ def obstacle_outlines(table: ObstacleTable, reach: float = 1.0) -> list[FloatArr
             corners = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0), (-1, -1, 0)]) * size
             outline = (corners @ matrix.T)[:, :2]
         elif kind == CYLINDER:
-            ends = [np.column_stack([size[0] * circle, np.full(len(circle), z)]) for z in (-size[1], size[1])]
+            ends = [
+                np.column_stack([size[0] * circle, np.full(len(circle), z)])
+                for z in (-size[1], size[1])
+            ]
             points = (np.vstack(ends) @ matrix.T)[:, :2]
             hull = ConvexHull(points).vertices
             outline = points[[*hull, hull[0]]]
@@ -103,7 +120,9 @@ def obstacle_outlines(table: ObstacleTable, reach: float = 1.0) -> list[FloatArr
         else:
             along = np.zeros(2) if kind == SPHERE else size[1] * matrix[:2, 2]
             outline = size[0] * circle + np.where((circle @ along >= 0.0)[:, None], along, -along)
-            if kind != SPHERE and along.any():  # the outline begins where it turns from one end to the other
+            if (
+                kind != SPHERE and along.any()
+            ):  # the outline begins where it turns from one end to the other
                 first = int(np.argmax(np.diff(circle @ along >= 0.0))) + 1
                 outline = np.roll(outline[:-1], -first, axis=0)
                 outline = np.vstack([outline, outline[:1]])
@@ -112,7 +131,9 @@ def obstacle_outlines(table: ObstacleTable, reach: float = 1.0) -> list[FloatArr
 
 
 def sphere_centres(collision: Any, q: FloatArray) -> list[FloatArray]:
-    """Return the centres of the collision model's circles or spheres at one configuration, per arm (spheres, 3).
+    """Return the centres of the collision model's circles or spheres at one configuration.
+
+    Per arm (spheres, 3).
 
     Args:
         collision: The bound collision model.
@@ -139,7 +160,10 @@ def centre_distances(problem: Any, q: FloatArray) -> FloatArray:
 
 
 class LinkDistance:
-    """Exact distances between the links of different arms: coal, on the shapes that the robot is made of."""
+    """Exact distances between the links of different arms.
+
+    Coal, on the shapes that the robot is made of.
+    """
 
     def __init__(self, assembly: Assembly) -> None:
         """Take the robot's own geometry and pair the links of different arms."""
@@ -153,7 +177,10 @@ class LinkDistance:
         self._pairs = range(len(self._geometry.collisionPairs))
 
     def nearest(self, q: FloatArray) -> Nearest:
-        """Return the nearest points of two arms at one configuration (nq,) [deg]; 0 where links cross."""
+        """Return the nearest points of two arms at one configuration (nq,) [deg].
+
+        0 where links cross.
+        """
         self._compute(q)
         results = [self._placements.distanceResults[k] for k in self._pairs]
         least = min(results, key=lambda result: float(result.min_distance))
@@ -161,15 +188,22 @@ class LinkDistance:
         return Nearest(max(0.0, float(least.min_distance)), points)
 
     def __call__(self, q: FloatArray) -> FloatArray:
-        """Return the least distance at each configuration (nq, configurations) [deg]; 0 where links cross."""
+        """Return the least distance at each configuration (nq, configurations) [deg].
+
+        0 where links cross.
+        """
         distances = np.empty(q.shape[1])
         for k, configuration in enumerate(np.ascontiguousarray(q.T)):
             self._compute(configuration)
-            distances[k] = min(self._placements.distanceResults[pair].min_distance for pair in self._pairs)
+            distances[k] = min(
+                self._placements.distanceResults[pair].min_distance for pair in self._pairs
+            )
         return np.maximum(distances, 0.0)
 
     def _compute(self, q: FloatArray) -> None:
-        pin.updateGeometryPlacements(self._model, self._data, self._geometry, self._placements, DEGREE * q)
+        pin.updateGeometryPlacements(
+            self._model, self._data, self._geometry, self._placements, DEGREE * q
+        )
         pin.computeDistances(self._geometry, self._placements)
 
 

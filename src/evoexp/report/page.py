@@ -34,7 +34,10 @@ class Drawing(NamedTuple):
 
 
 class Quantity(NamedTuple):
-    """A row of the table of results: a quantity of a finished replicate, median and quartiles per condition."""
+    """A row of the table of results.
+
+    A quantity of a finished replicate, median and quartiles per condition.
+    """
 
     name: str
     unit: str

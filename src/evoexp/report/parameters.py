@@ -1,7 +1,8 @@
 """Parameters of conditions with unit and source, as the comments of the shipped options state them.
 
-A condition does not know which options it was composed of, so each of its components is compared with all shipped
-options of its group: the one that agrees in most settings is named, and settings that differ from it are overrides.
+A condition does not know which options it was composed of, so each of its components is compared
+with all shipped options of its group: the one that agrees in most settings is named, and settings
+that differ from it are overrides.
 """
 
 import functools
@@ -56,7 +57,9 @@ def parameters(results: Results, condition: ConditionResults) -> list[Parameter]
     for part, value in config.items():
         if WRAPPED in value:  # a control or a reference around the planner
             outer = {key: v for key, v in value.items() if key != WRAPPED}
-            found += _component("reference" if condition.is_reference else "control", outer, preferred)
+            found += _component(
+                "reference" if condition.is_reference else "control", outer, preferred
+            )
             value = value[WRAPPED]
         found += _component(part, value, preferred)
     root = option(config_directory() / "config.yaml")
@@ -71,18 +74,28 @@ def planned_replicates(experiment: str) -> int:
     """Return the number of replicates that an experiment has without any cap or override."""
     path = config_directory() / "experiment" / f"{experiment}.yaml"
     own = yaml.safe_load(path.read_text()).get("num_replicates") if path.is_file() else None
-    return int(own if own is not None else option(config_directory() / "config.yaml")["num_replicates"].value)
+    return int(
+        own
+        if own is not None
+        else option(config_directory() / "config.yaml")["num_replicates"].value
+    )
 
 
 def overridden(found: Iterable[Parameter]) -> list[str]:
-    """Return the names of settings that are no longer the paper's; another seed is as good as any."""
+    """Return the names of settings that are no longer the paper's.
+
+    Another seed is as good as any.
+    """
     changed = (p for p in found if p.source == OVERRIDE or p.source.startswith("budget"))
     return [p.name for p in changed if p.name != "seed"]
 
 
 @functools.cache
 def option(path: Path) -> dict[str, Entry]:
-    """Return the values of an option file with their comments, by dotted key; its defaults filled in."""
+    """Return the values of an option file with their comments, by dotted key.
+
+    Its defaults filled in.
+    """
     text = path.read_text()
     node = yaml.compose(text)
     entries: dict[str, Entry] = {}
@@ -98,13 +111,19 @@ def option(path: Path) -> dict[str, Entry]:
 
 
 def _taken_in(base: Any, path: Path, entries: dict[str, Entry]) -> dict[str, Entry]:
-    """Return the entries of an option that another one takes in: `name`, `name@part` or `/group@part: name`."""
+    """Return the entries of an option that another one takes in.
+
+    `name`, `name@part` or `/group@part: name`.
+    """
     key, name = next(iter(base.items())) if isinstance(base, dict) else ("", str(base))
     name, _, part = name.partition("@")
     if key:
         group, _, part = key.removeprefix("/").partition("@")
         entries.pop(part, None)  # what stood there was taken from a group
-        return {f"{part}.{own}": entry for own, entry in option(path.parents[1] / group / f"{name}.yaml").items()}
+        return {
+            f"{part}.{own}": entry
+            for own, entry in option(path.parents[1] / group / f"{name}.yaml").items()
+        }
     prefix = f"{part}." if part else ""
     return {prefix + own: entry for own, entry in option(path.parent / f"{name}.yaml").items()}
 
@@ -131,7 +150,9 @@ def _comment(lines: list[str], node: Any) -> tuple[str, str]:
     return "" if unit == "-" else unit, match["source"].strip()
 
 
-def _component(group: str, config: dict[str, Any], preferred: dict[str, str]) -> Iterator[Parameter]:
+def _component(
+    group: str, config: dict[str, Any], preferred: dict[str, str]
+) -> Iterator[Parameter]:
     """Yield the settings of one component, and of the groups that its option takes in."""
     name, entries = _option_of(group, config, preferred.get(group))
     revision = config.get("revision")
@@ -159,16 +180,24 @@ def _setting(
             yield _parameter(f"{group}.{path}", leaf, entries.get(path), OVERRIDE)
 
 
-def _option_of(group: str, config: dict[str, Any], preferred: str | None) -> tuple[str, dict[str, Entry]]:
-    """Return name and entries of the shipped option that a component agrees with most and lacks least of."""
+def _option_of(
+    group: str, config: dict[str, Any], preferred: str | None
+) -> tuple[str, dict[str, Entry]]:
+    """Return name and entries of the shipped option that is nearest to a component."""
     leaves = dict(_flat(config, ""))
     best: tuple[tuple[int, bool], str, dict[str, Entry]] = ((-(10**9), False), "", {})
     for path in sorted((config_directory() / group).glob("*.yaml")):
         entries = option(path)
         if TARGET not in entries or entries[TARGET].value != config[TARGET]:
             continue
-        agreeing = sum(_same(value, entries[key].value) for key, value in leaves.items() if key in entries)
-        lacking = sum(key not in leaves for key, entry in entries.items() if not _REFERENCE.match(str(entry.value)))
+        agreeing = sum(
+            _same(value, entries[key].value) for key, value in leaves.items() if key in entries
+        )
+        lacking = sum(
+            key not in leaves
+            for key, entry in entries.items()
+            if not _REFERENCE.match(str(entry.value))
+        )
         score = (agreeing - lacking, path.stem == preferred)
         if score > best[0]:
             best = (score, path.stem, entries)
@@ -215,7 +244,9 @@ def _capped(parameter: Parameter, budget: str) -> Parameter:
     path = config_directory() / "budget" / f"{budget}.yaml"
     if parameter.source != OVERRIDE or not budget or not path.is_file():
         return parameter
-    key = {"num_replicates": "max_replicates", "ga.num_generations": "max_generations"}.get(parameter.name)
+    key = {"num_replicates": "max_replicates", "ga.num_generations": "max_generations"}.get(
+        parameter.name
+    )
     caps = option(path)
     if key in caps and str(caps[key].value) == parameter.value:
         return parameter._replace(source=f"budget {budget}")
@@ -224,7 +255,9 @@ def _capped(parameter: Parameter, budget: str) -> Parameter:
 
 def _same(value: Any, shipped: Any) -> bool:
     if isinstance(value, list) and isinstance(shipped, list):
-        return len(value) == len(shipped) and all(_same(a, b) for a, b in zip(value, shipped, strict=True))
+        return len(value) == len(shipped) and all(
+            _same(a, b) for a, b in zip(value, shipped, strict=True)
+        )
     if isinstance(shipped, str) and isinstance(value, float):  # 1e-3 is a text to YAML 1.1
         try:
             return float(shipped) == value

@@ -1,7 +1,9 @@
-"""Grids of numbers as a paper prints them, beside those that are computed; rows that were set wrongly are aligned.
+"""Grids of numbers as a paper prints them, beside those that are computed.
 
-A printed row may have a number too many or one too few. Rows are aligned by the fewest such slips; what is left over is
-a wrong number, a number too many, or one that is missing.
+Rows that were set wrongly are aligned.
+
+A printed row may have a number too many or one too few. Rows are aligned by the fewest such slips;
+what is left over is a wrong number, a number too many, or one that is missing.
 """
 
 import difflib
@@ -19,8 +21,13 @@ WRONG, MISSING, SURPLUS = "wrong", "missing", "surplus"
 
 
 def printed(name: str) -> list[list[list[str]]]:
-    """Return the grids of an asset, each a list of rows of words; empty lines stand between grids, `;` is a comment."""
-    lines = resources.files("evoexp").joinpath("assets", name).read_text(encoding="utf-8").splitlines()
+    """Return the grids of an asset, each a list of rows of words.
+
+    Empty lines stand between grids, `;` is a comment.
+    """
+    lines = (
+        resources.files("evoexp").joinpath("assets", name).read_text(encoding="utf-8").splitlines()
+    )
     blocks = "\n".join(line for line in lines if not line.startswith(";")).split("\n\n")
     return [[row.split() for row in block.strip().splitlines()] for block in blocks]
 
@@ -35,16 +42,21 @@ def rows_of(values: FloatArray, blocked: np.ndarray, edge: str = BLOCKED) -> lis
     """
     free = np.pad(~blocked, 1)
     beside = free[:-2, 1:-1] | free[2:, 1:-1] | free[1:-1, :-2] | free[1:-1, 2:]
-    words = np.where(blocked, np.where(beside, edge, BLOCKED), np.vectorize(lambda v: f"{v:g}")(values))
+    words = np.where(
+        blocked, np.where(beside, edge, BLOCKED), np.vectorize(lambda v: f"{v:g}")(values)
+    )
     return [[str(word) for word in row] for row in words.T[::-1]]
 
 
-def compare(name: str, computed: Sequence[Sequence[str]], given: Sequence[Sequence[str]]) -> pd.DataFrame:
+def compare(
+    name: str, computed: Sequence[Sequence[str]], given: Sequence[Sequence[str]]
+) -> pd.DataFrame:
     """Return every cell of a grid with what is printed there.
 
     Returns:
-        Columns field, row (from the top), column, computed, printed, slip: empty, `wrong`, `missing` (nothing is
-        printed for the cell) or `surplus` (printed before the column, and belongs to no cell).
+        Columns field, row (from the top), column, computed, printed, slip: empty, `wrong`,
+        `missing` (nothing is printed for the cell) or `surplus` (printed before the column, and
+        belongs to no cell).
     """
     found: list[tuple[object, ...]] = []
     for row, (own, theirs) in enumerate(zip(computed, given, strict=True)):

@@ -29,7 +29,9 @@ class Proportion(NamedTuple):
 
 
 def newcombe(one: Proportion, two: Proportion, confidence: float) -> Interval:
-    """Return an interval of the difference `one` − `two` (Newcombe 1998, method 10: from Wilson's intervals).
+    """Return an interval of the difference `one` − `two` (Newcombe 1998, method 10.
+
+    From Wilson's intervals).
 
     Args:
         one: Of some runs; without any the interval is [−1, 1].
@@ -46,9 +48,15 @@ def newcombe(one: Proportion, two: Proportion, confidence: float) -> Interval:
 
 
 def fisher_exact(one: Proportion, two: Proportion) -> float:
-    """Return the two-sided p-value of Fisher's exact test: tables at most as likely as the one that was found."""
+    """Return the two-sided p-value of Fisher's exact test.
+
+    Tables at most as likely as the one that was found.
+    """
     count, total = one.having + two.having, one.total + two.total
     least, greatest = max(0, count - two.total), min(count, one.total)
-    ways = [math.comb(one.total, k) * math.comb(two.total, count - k) for k in range(least, greatest + 1)]
+    ways = [
+        math.comb(one.total, k) * math.comb(two.total, count - k)
+        for k in range(least, greatest + 1)
+    ]
     found = ways[one.having - least]
     return float(Fraction(sum(way for way in ways if way <= found), math.comb(total, count)))

@@ -18,7 +18,9 @@ from evoexp.store.messages import TERM
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.tables import read_generations, read_summaries
 
-WRAPPED = "planner"  # the field of a control (random search) that holds the planner it stands beside
+WRAPPED = (
+    "planner"  # the field of a control (random search) that holds the planner it stands beside
+)
 
 
 class Verdicts(NamedTuple):
@@ -44,8 +46,8 @@ class Verdicts(NamedTuple):
 class StoredLogs:
     """What the logs of some finished replicates hold, each part read when it is first asked for.
 
-    A page that draws no convergence reads no generation; thousands of logs are looked at one by one, and only the
-    columns stay.
+    A page that draws no convergence reads no generation; thousands of logs are looked at one by
+    one, and only the columns stay.
     """
 
     def __init__(self, run: RunDirectory, replicates: Sequence[int], best: int | None) -> None:
@@ -71,7 +73,11 @@ class StoredLogs:
     @functools.cached_property
     def first_solution(self) -> FloatArray | None:
         """Best of the initial population of the best replicate; None where nothing is finished."""
-        return None if self._best is None else read_log(self._run.log_path(self._best)).solutions[0].values
+        return (
+            None
+            if self._best is None
+            else read_log(self._run.log_path(self._best)).solutions[0].values
+        )
 
     def array(self, name: str) -> NDArray[Any]:
         """Return an array attached to the log of the best replicate.
@@ -143,7 +149,9 @@ class ConditionResults(NamedTuple):
     @property
     def verdicts(self) -> Verdicts:
         """Count of the exact verdicts."""
-        motions = self.summaries[self.summaries["clearance"].notna() & ~np.isnan(self.column("clearance"))]
+        motions = self.summaries[
+            self.summaries["clearance"].notna() & ~np.isnan(self.column("clearance"))
+        ]
         certified, margin = motions["certified"], motions["certified_margin"]
         refuted = certified.eq(False).fillna(False)
         return Verdicts(
@@ -181,7 +189,9 @@ class ConditionResults(NamedTuple):
         return self.condition.is_reference
 
     def array(self, name: str) -> NDArray[Any]:
-        """Return an array that the best replicate attached to its log; a reference has one replicate.
+        """Return an array that the best replicate attached to its log.
+
+        A reference has one replicate.
 
         Raises:
             KeyError: If there is none of this name.
@@ -221,7 +231,10 @@ class Results(NamedTuple):
 
     @property
     def main(self) -> tuple[ConditionResults, ...]:
-        """Those with data that are no controls and no references; controls where there is nothing else."""
+        """Those with data that are no controls and no references.
+
+        Controls where there is nothing else.
+        """
         return tuple(c for c in self.evolved if not c.is_control) or self.evolved
 
     @property
@@ -267,20 +280,34 @@ def gather(
         NothingStored: If no replicate of any condition is there, done or failed.
         CorruptLog: If a log cannot be trusted.
     """
-    found = tuple(_read(outputs, label, condition, num_replicates) for label, condition in conditions)
+    found = tuple(
+        _read(outputs, label, condition, num_replicates) for label, condition in conditions
+    )
     if not any(condition.done or condition.failed for condition in found):
-        raise NothingStored(f"{experiment or 'report'}: nothing stored in {outputs}; try: {command}")
+        raise NothingStored(
+            f"{experiment or 'report'}: nothing stored in {outputs}; try: {command}"
+        )
     return Results(experiment, budget, found, outputs)
 
 
-def _read(outputs: Path, label: str, condition: Condition, num_replicates: int | None) -> ConditionResults:
+def _read(
+    outputs: Path, label: str, condition: Condition, num_replicates: int | None
+) -> ConditionResults:
     run = RunDirectory(outputs, condition.id)
     stored = run.completed() | run.failed()
-    planned = max(stored, default=-1) + 1 if num_replicates is None else condition.num_replicates(num_replicates)
+    planned = (
+        max(stored, default=-1) + 1
+        if num_replicates is None
+        else condition.num_replicates(num_replicates)
+    )
     if stored:
         run.check()
     rows = read_summaries(run)
-    rows = rows[rows["replicate"] < planned].sort_values("replicate", kind="stable").set_index("replicate")
+    rows = (
+        rows[rows["replicate"] < planned]
+        .sort_values("replicate", kind="stable")
+        .set_index("replicate")
+    )
     done, failed = rows[rows["status"] == "done"], rows[rows["status"] == "failed"]
     best = _best_replicate(done) if len(done) else None
     return ConditionResults(
@@ -295,7 +322,9 @@ def _read(outputs: Path, label: str, condition: Condition, num_replicates: int |
 
 
 def _best_replicate(done: pd.DataFrame) -> int:
-    return int(done.index[int(np.argmin(done["best_cost"].to_numpy(dtype=np.float64, na_value=np.nan)))])
+    return int(
+        done.index[int(np.argmin(done["best_cost"].to_numpy(dtype=np.float64, na_value=np.nan)))]
+    )
 
 
 def _code(run: RunDirectory) -> dict[str, Any]:

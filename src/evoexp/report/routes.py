@@ -12,7 +12,9 @@ Signature = tuple[int, ...]
 
 
 class Route(NamedTuple):
-    """Paths that can be bent into each other without passing over an obstacle, as far as signatures tell.
+    """Paths that can be bent into each other without passing over an obstacle.
+
+    As far as signatures tell.
 
     Attributes:
         name: A, B, …; the most frequent one of all is A.
@@ -35,18 +37,27 @@ def signature(path: FloatArray, centres: FloatArray) -> Signature:
     before, after = path[:-1, None, :], path[1:, None, :]
     crosses = (before[..., 0] < centres[:, 0]) != (after[..., 0] < centres[:, 0])
     run = np.where(crosses, after[..., 0] - before[..., 0], 1.0)
-    height = before[..., 1] + (centres[:, 0] - before[..., 0]) / run * (after[..., 1] - before[..., 1])
+    height = before[..., 1] + (centres[:, 0] - before[..., 0]) / run * (
+        after[..., 1] - before[..., 1]
+    )
     above = crosses & (height > centres[:, 1])
     return tuple(int(value) for value in (above * np.sign(run)).sum(axis=0))
 
 
 def inside_points(boxes: Sequence[Sequence[int]]) -> FloatArray:
-    """Return a point inside each of some boxes (x0, y0, x1, y1) of nodes; none has the x of a node."""
-    return np.array([[0.5 * (x0 + x1) + 0.26, 0.5 * (y0 + y1)] for x0, y0, x1, y1 in boxes]).reshape(-1, 2)
+    """Return a point inside each of some boxes (x0, y0, x1, y1) of nodes.
+
+    None has the x of a node.
+    """
+    return np.array(
+        [[0.5 * (x0 + x1) + 0.26, 0.5 * (y0 + y1)] for x0, y0, x1, y1 in boxes]
+    ).reshape(-1, 2)
 
 
 def routes(paths: Mapping[Any, FloatArray], centres: FloatArray) -> list[Route]:
-    """Return paths grouped by signature, the most frequent route first; of equals the one of the first path.
+    """Return paths grouped by signature, the most frequent route first.
+
+    Of equals the one of the first path.
 
     Args:
         paths: Key → (nodes, 2).

@@ -18,9 +18,12 @@ class ReportSettings(Settings):
         confidence: Level of every interval.
         significance: Below this adjusted p-value a difference counts in a verdict.
         num_resamples: Of every bootstrap interval.
-        samples_per_segment: Configurations per segment of a path at which figures measure distances.
-        threshold_ratio: Cost that "effort to a threshold" means, in units of the scene's lower bound.
-        figures: Name of the page that draws the experiment; None: conditions, convergence and parameters only.
+        samples_per_segment: Configurations per segment of a path at which figures measure
+            distances.
+        threshold_ratio: Cost that "effort to a threshold" means, in units of the scene's lower
+            bound.
+        figures: Name of the page that draws the experiment; None: conditions, convergence and
+            parameters only.
     """
 
     formats: Annotated[tuple[Literal["svg", "png", "pdf"], ...], Field(min_length=1)]

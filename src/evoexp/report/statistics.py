@@ -1,6 +1,9 @@
-"""Statistics over replicates: the seed is the unit, and replicates of two conditions with one index share a seed.
+"""Statistics over replicates.
 
-Costs may be infinite (infeasible). Medians, ranks and effect sizes stay defined then; nothing here takes a mean.
+The seed is the unit, and replicates of two conditions with one index share a seed.
+
+Costs may be infinite (infeasible). Medians, ranks and effect sizes stay defined then; nothing here
+takes a mean.
 """
 
 import functools
@@ -75,7 +78,9 @@ class Effect(NamedTuple):
 
 
 def quantile(values: FloatArray, share: float) -> float:
-    """Return a quantile by linear interpolation of order statistics; NaN is ignored, ±inf is a value.
+    """Return a quantile by linear interpolation of order statistics.
+
+    NaN is ignored, ±inf is a value.
 
     Args:
         values: (n,).
@@ -106,12 +111,15 @@ def wilson(successes: int, trials: int, confidence: float) -> Interval:
     center = (p + z * z / (2 * n)) / (1 + z * z / n)
     half = z / (1 + z * z / n) * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
     return Interval(
-        0.0 if successes == 0 else max(0.0, center - half), 1.0 if successes == n else min(1.0, center + half)
+        0.0 if successes == 0 else max(0.0, center - half),
+        1.0 if successes == n else min(1.0, center + half),
     )
 
 
 def signed_rank(x: FloatArray, y: FloatArray) -> SignedRank:
-    """Test whether paired values differ (Wilcoxon 1945); equal pairs are left out, ties share their mean rank.
+    """Test whether paired values differ (Wilcoxon 1945).
+
+    Equal pairs are left out, ties share their mean rank.
 
     Args:
         x: (pairs,); infinite values are compared as such.
@@ -128,7 +136,9 @@ def signed_rank(x: FloatArray, y: FloatArray) -> SignedRank:
 
 
 def rank_sum(x: FloatArray, y: FloatArray) -> RankSum:
-    """Test whether values of two samples differ (Mann and Whitney 1947); ties share their mean rank.
+    """Test whether values of two samples differ (Mann and Whitney 1947).
+
+    Ties share their mean rank.
 
     Args:
         x: (n,); infinite values are compared as such.
@@ -172,12 +182,16 @@ def effect(x: FloatArray, y: FloatArray, confidence: float, num_resamples: int) 
         return Effect(math.nan, Interval(math.nan, math.nan))
     wins = (x[:, None] > y) + 0.5 * (x[:, None] == y)  # (pairs, pairs)
     weights = _weights(len(x), num_resamples)
-    resampled = ((weights @ wins) * weights).sum(axis=1) / len(x) ** 2  # multiples of 1/2 are exact in any order
+    resampled = ((weights @ wins) * weights).sum(axis=1) / len(
+        x
+    ) ** 2  # multiples of 1/2 are exact in any order
     return Effect(vargha_delaney(x, y), _percentiles(resampled, confidence))
 
 
 def expected_effort(effort: FloatArray, solved: np.ndarray) -> float:
-    """Return the expected running time (Hansen et al. 2009): all effort spent, over the runs that succeeded.
+    """Return the expected running time (Hansen et al.
+
+    2009): all effort spent, over the runs that succeeded.
 
     Args:
         effort: (runs,) of every run, failed ones included.
@@ -190,7 +204,9 @@ def expected_effort(effort: FloatArray, solved: np.ndarray) -> float:
     return float(np.sum(effort)) / having if having else math.inf
 
 
-def expected_interval(effort: FloatArray, solved: np.ndarray, confidence: float, num_resamples: int) -> Interval:
+def expected_interval(
+    effort: FloatArray, solved: np.ndarray, confidence: float, num_resamples: int
+) -> Interval:
     """Return the percentile interval of the expected running time over resampled runs.
 
     Args:
@@ -199,15 +215,23 @@ def expected_interval(effort: FloatArray, solved: np.ndarray, confidence: float,
         confidence: Level of the interval.
         num_resamples: Of the bootstrap.
     """
-    return _percentiles(_resampled_effort(_weights(len(effort), num_resamples), effort, solved), confidence)
+    return _percentiles(
+        _resampled_effort(_weights(len(effort), num_resamples), effort, solved), confidence
+    )
 
 
 def effort_ratio(
-    one: tuple[FloatArray, np.ndarray], two: tuple[FloatArray, np.ndarray], confidence: float, num_resamples: int
+    one: tuple[FloatArray, np.ndarray],
+    two: tuple[FloatArray, np.ndarray],
+    confidence: float,
+    num_resamples: int,
 ) -> Interval:
-    """Return the percentile interval of the ratio of two expected running times, one over two, on common seeds.
+    """Return the percentile interval of the ratio of two expected running times, one over two.
 
-    Resamples in which neither succeeds say nothing and are left out; without any the interval is [0, inf].
+    On common seeds.
+
+    Resamples in which neither succeeds say nothing and are left out; without any the interval is
+    [0, inf].
 
     Args:
         one: Effort and success of every run, (runs,) each.
@@ -229,7 +253,9 @@ def effort_ratio(
 def _weights(size: int, num_resamples: int) -> np.ndarray:
     """Return how often each of `size` runs is drawn, (resamples, size)."""
     rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
-    return np.array([np.bincount(rng.integers(0, size, size), minlength=size) for _ in range(num_resamples)])
+    return np.array(
+        [np.bincount(rng.integers(0, size, size), minlength=size) for _ in range(num_resamples)]
+    )
 
 
 def _resampled_effort(weights: np.ndarray, effort: FloatArray, solved: np.ndarray) -> FloatArray:
@@ -271,7 +297,9 @@ def _normal_p(ranks: np.ndarray, doubled: int) -> float:
 
 def _exact_rank_sum_p(ranks: np.ndarray, size: int, doubled: int) -> float:
     """Two-sided p over all choices of `size` of the ranks."""
-    choices = np.zeros((size + 1, int(ranks.sum()) + 1))  # (how many are chosen, their sum): number of ways
+    choices = np.zeros(
+        (size + 1, int(ranks.sum()) + 1)
+    )  # (how many are chosen, their sum): number of ways
     choices[0, 0] = 1.0
     for k, rank in enumerate(ranks):
         for chosen in range(min(k + 1, size), 0, -1):
@@ -290,5 +318,8 @@ def _normal_rank_sum_p(ranks: np.ndarray, size: int, doubled: int) -> float:
 
 
 def _two_sided(deviation: float, variance: float) -> float:
-    """Probability that a normal deviate is as far from its mean; erfc keeps the far tail, where cdf gives 0."""
+    """Probability that a normal deviate is as far from its mean.
+
+    Erfc keeps the far tail, where cdf gives 0.
+    """
     return math.erfc(abs(deviation) / math.sqrt(2.0 * variance)) if variance else 1.0

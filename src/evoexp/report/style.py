@@ -1,4 +1,7 @@
-"""How figures look: one place for sizes, fonts and colours. No pyplot, no global state left behind."""
+"""How figures look: one place for sizes, fonts and colours.
+
+No pyplot, no global state left behind.
+"""
 
 import io
 from collections.abc import Callable, Sequence
@@ -10,7 +13,16 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 ARM_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")  # Okabe & Ito 2008
-CONDITION_COLOURS = ("#332288", "#CC6677", "#117733", "#DDAA33", "#88CCEE", "#882255", "#44AA99", "#999933")  # Tol
+CONDITION_COLOURS = (
+    "#332288",
+    "#CC6677",
+    "#117733",
+    "#DDAA33",
+    "#88CCEE",
+    "#882255",
+    "#44AA99",
+    "#999933",
+)  # Tol
 NEUTRAL, FAINT, FORBIDDEN = "#333333", "#9a9a9a", "#882255"
 ARM_SYMBOLS = ("θ", "α", "β", "γ", "δ", "ε")  # θ and α are the paper's
 SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
@@ -46,7 +58,9 @@ _RC: dict[str, Any] = {
 }
 
 
-_METADATA: dict[str, dict[str, Any]] = {  # nothing that changes from one day, or one machine, to the next
+_METADATA: dict[
+    str, dict[str, Any]
+] = {  # nothing that changes from one day, or one machine, to the next
     "svg": {"Date": None, "Creator": "evoexp"},
     "png": {"Software": "evoexp"},
     "pdf": {"CreationDate": None, "Creator": "evoexp", "Producer": None},

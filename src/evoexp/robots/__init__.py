@@ -1,1 +1,4 @@
-"""Robots: descriptions that build a Pinocchio model with coal geometry, and the kinematic table derived from it."""
+"""Robots: descriptions that build a Pinocchio model with coal geometry.
+
+And the kinematic table derived from it.
+"""

@@ -21,12 +21,17 @@ class Arms(Robot):
 
     @classmethod
     def read_files(cls, settings: dict[str, Any], field: str) -> dict[str, Any]:
-        """Return settings whose `path` and `srdf`, where given, are those of all arms out of a URDF."""
+        """Return settings whose `path` and `srdf`, where given.
+
+        Are those of all arms out of a URDF.
+        """
         settings = dict(settings)
         given = {name: settings.pop(name) for name in ("path", "srdf") if name in settings}
         shared = {name: path for name, path in given.items() if path is not None}
         if shared and isinstance(settings.get("arms"), list):
-            settings["arms"] = [{**shared, **arm} if arm.get(TARGET) == "urdf" else arm for arm in settings["arms"]]
+            settings["arms"] = [
+                {**shared, **arm} if arm.get(TARGET) == "urdf" else arm for arm in settings["arms"]
+            ]
         return settings
 
     def chains(self) -> tuple[Chain, ...]:

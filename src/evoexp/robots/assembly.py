@@ -1,4 +1,7 @@
-"""What a robot description builds: one Pinocchio model, one configuration vector, arms as slices of it."""
+"""What a robot description builds.
+
+One Pinocchio model, one configuration vector, arms as slices of it.
+"""
 
 from typing import Any, NamedTuple
 
@@ -12,7 +15,10 @@ from evoexp.validation import Component
 
 
 class Link(NamedTuple):
-    """A straight link: a line segment, thickened by a radius, that moves with one joint; a tool has no length."""
+    """A straight link: a line segment, thickened by a radius, that moves with one joint.
+
+    A tool has no length.
+    """
 
     arm: int
     joint: int  # index of the Pinocchio joint that moves it; 0: it stands still
@@ -39,8 +45,8 @@ class Assembly(NamedTuple):
 
     Attributes:
         model: Pinocchio model of all arms together.
-        geometry: Exact bodies as coal shapes; of robots given by links one capsule per link (of radius 0 for line
-            links), in order of `links`.
+        geometry: Exact bodies as coal shapes; of robots given by links one capsule per link (of
+            radius 0 for line links), in order of `links`.
         links: Links as segments.
         arm_slices: (arms, 2) first and one-past-last index of each arm in q.
         table: The kinematic table of the model.
@@ -65,7 +71,10 @@ class Assembly(NamedTuple):
 
 
 class Robot(Component):
-    """Base of every robot description: gives its arms; building them together is the same for all."""
+    """Base of every robot description: gives its arms.
+
+    Building them together is the same for all.
+    """
 
     def chains(self) -> tuple["Chain", ...]:
         """Return the arms, in the order of their slices of q."""
@@ -94,7 +103,16 @@ class Robot(Component):
             disabled |= chain.disabled_pairs()
             slices.append((first, model.nq))
         ranges, table = np.array(slices, dtype=np.int64), kinematic_table(model)
-        return Assembly(model, geometry, tuple(links), ranges, table, tuple(arms), tuple(tools), frozenset(disabled))
+        return Assembly(
+            model,
+            geometry,
+            tuple(links),
+            ranges,
+            table,
+            tuple(arms),
+            tuple(tools),
+            frozenset(disabled),
+        )
 
 
 class Chain(Robot):
@@ -109,7 +127,9 @@ class Chain(Robot):
         raise NotImplementedError
 
     def append_bodies(self, model: Any, arm: int, first_joint: int, links: list[Link]) -> list[Any]:
-        """Return the bodies as `pin.GeometryObject`: the links themselves, unless an arm has others.
+        """Return the bodies as `pin.GeometryObject`.
+
+        The links themselves, unless an arm has others.
 
         Args:
             model: With the arm's joints.
@@ -120,7 +140,10 @@ class Chain(Robot):
         return [link_capsule(link, "") for link in links]
 
     def tool(self, model: Any, first_joint: int, links: list[Link]) -> Tool:
-        """Return the tool's frame: at the end of the last link, turned as its joint, unless an arm has another."""
+        """Return the tool's frame: at the end of the last link, turned as its joint.
+
+        Unless an arm has another.
+        """
         return Tool(links[-1].joint, np.eye(3), links[-1].end)
 
     def disabled_pairs(self) -> set[frozenset[str]]:
@@ -129,15 +152,24 @@ class Chain(Robot):
 
 
 def link_capsule(link: Link, name: str) -> Any:
-    """Return a link as a `pin.GeometryObject` with a coal capsule from its start to its end, a tool with a sphere."""
+    """Return a link as a `pin.GeometryObject` with a coal capsule from its start to its end.
+
+    A tool with a sphere.
+    """
     if link.is_tool:
-        return pin.GeometryObject(name, link.joint, 0, pin.SE3(np.eye(3), link.start), coal.Sphere(link.radius))
+        return pin.GeometryObject(
+            name, link.joint, 0, pin.SE3(np.eye(3), link.start), coal.Sphere(link.radius)
+        )
     shape = coal.Capsule(link.radius, float(np.linalg.norm(link.end - link.start)))
     return pin.GeometryObject(name, link.joint, 0, _along(link.start, link.end), shape)
 
 
-def sphere_geometry(assembly: Assembly, centres: FloatArray, joints: np.ndarray, radii: FloatArray) -> Any:
-    """Return spheres fixed to joints as a `pin.GeometryModel`: the papers' own collision models, in coal.
+def sphere_geometry(
+    assembly: Assembly, centres: FloatArray, joints: np.ndarray, radii: FloatArray
+) -> Any:
+    """Return spheres fixed to joints as a `pin.GeometryModel`.
+
+    The papers' own collision models, in coal.
 
     Args:
         assembly: The robot.
@@ -148,7 +180,9 @@ def sphere_geometry(assembly: Assembly, centres: FloatArray, joints: np.ndarray,
     geometry = pin.GeometryModel()
     for k, (centre, joint, radius) in enumerate(zip(centres, joints, radii, strict=True)):
         placement = pin.SE3(np.eye(3), centre)
-        geometry.addGeometryObject(pin.GeometryObject(f"sphere_{k}", int(joint), 0, placement, coal.Sphere(radius)))
+        geometry.addGeometryObject(
+            pin.GeometryObject(f"sphere_{k}", int(joint), 0, placement, coal.Sphere(radius))
+        )
     return geometry
 
 
@@ -158,5 +192,7 @@ def _along(start: FloatArray, end: FloatArray) -> Any:
     length = np.linalg.norm(direction)
     rotation = np.eye(3)
     if length > 0.0:
-        rotation = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), direction / length).toRotationMatrix()
+        rotation = pin.Quaternion.FromTwoVectors(
+            np.array([0.0, 0.0, 1.0]), direction / length
+        ).toRotationMatrix()
     return pin.SE3(rotation, 0.5 * (start + end))

@@ -85,12 +85,17 @@ def body_geometry(body: Body, field: str) -> tuple[Any, Any]:
     if length == 0.0:
         raise SettingError(f"{field}.end", "another point than start", list(body.end))
     kind = coal.Capsule if isinstance(body, CapsuleBody) else coal.Cylinder
-    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), along / length).toRotationMatrix()
+    turn = pin.Quaternion.FromTwoVectors(
+        np.array([0.0, 0.0, 1.0]), along / length
+    ).toRotationMatrix()
     return kind(body.radius, length), pin.SE3(turn, 0.5 * (start + end))
 
 
 def placed(position: Point3, angles: Point3) -> Any:
-    """Return the `pin.SE3` of a position and roll, pitch, yaw [deg] about fixed axes x, y, z, in this order."""
+    """Return the `pin.SE3` of a position and roll, pitch, yaw [deg] about fixed axes x, y, z.
+
+    In this order.
+    """
     (sr, cr), (sp, cp), (sy, cy) = (sincos(DEGREE * angle) for angle in angles)
     rotation: FloatArray = np.array(
         [

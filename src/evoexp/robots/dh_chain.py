@@ -1,4 +1,7 @@
-"""An arm given by its Denavit–Hartenberg table, with bodies on its links (Corsépius 2001, section 4.1)."""
+"""An arm given by its Denavit–Hartenberg table, with bodies on its links.
+
+Corsépius 2001, section 4.1.
+"""
 
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -15,7 +18,9 @@ from evoexp.validation import Settings
 
 
 class DhJoint(Settings):
-    """One row of a table in the distal (standard) form: turn about z, shift along z, shift along x, turn about x.
+    """One row of a table in the distal (standard) form.
+
+    Turn about z, shift along z, shift along x, turn about x.
 
     Attributes:
         dh: a, α, d, θ at q = 0 [length unit, deg, length unit, deg].
@@ -28,7 +33,10 @@ class DhJoint(Settings):
     kind: Literal["revolute", "prismatic"] = "revolute"
 
     def behind(self) -> Any:
-        """Return the `pin.SE3` from the frame that the joint moves to the next joint's frame: a, α, d, θ at q = 0."""
+        """Return the `pin.SE3` from the frame that the joint moves to the next joint's frame.
+
+        A, α, d, θ at q = 0.
+        """
         a, alpha, d, theta = self.dh
         s, c = sincos(DEGREE * theta)
         sa, ca = sincos(DEGREE * alpha)
@@ -37,10 +45,12 @@ class DhJoint(Settings):
 
 
 class DhChain(Chain):
-    """Joints one behind the other, each about (or along) the z axis of the frame before, as ⁰T₁ ¹T₂ … ⁿ⁻¹Tₙ.
+    """Joints one behind the other, each about (or along) the z axis of the frame before.
 
-    Body frames: a body of joint k is given in the frame k of the table, which moves with joint k (a body of joint 0 in
-    the base's).
+    As ⁰T₁ ¹T₂ … ⁿ⁻¹Tₙ.
+
+    Body frames: a body of joint k is given in the frame k of the table, which moves with joint k (a
+    body of joint 0 in the base's).
 
     Attributes:
         joints: Rows of the table, from the base to the last joint.
@@ -48,7 +58,8 @@ class DhChain(Chain):
         base_position: Of the frame 0 in the world [length unit].
         base_rotation: Its roll, pitch, yaw [deg].
         tool_position: Of the tool's frame in the last one [length unit].
-        tool_rotation: Its roll, pitch, yaw [deg]; z is the main grasping direction, y stands across it.
+        tool_rotation: Its roll, pitch, yaw [deg]; z is the main grasping direction, y stands across
+            it.
     """
 
     component: ClassVar[str] = "dh_chain"

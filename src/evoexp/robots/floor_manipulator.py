@@ -1,4 +1,7 @@
-"""A platform that moves over a floor, with an arm of three links upright on it (Chen & Zalzala 1995, both examples)."""
+"""A platform that moves over a floor, with an arm of three links upright on it.
+
+Chen & Zalzala 1995, both examples.
+"""
 
 from typing import ClassVar
 
@@ -16,10 +19,12 @@ NUM_JOINTS = 5
 
 
 class FloorManipulator(Robot):
-    """Prismatic joints along x and y, then three revolute ones in the upright plane through x; q = (x, y, θ1, θ2, θ3).
+    """Prismatic joints along x and y, then three revolute ones in the upright plane through x.
 
-    Positive angles lift a link that points to +x. The platform is an upright cylinder; the arm's first joint stands in
-    the middle of its top.
+    Q = (x, y, θ1, θ2, θ3).
+
+    Positive angles lift a link that points to +x. The platform is an upright cylinder; the arm's
+    first joint stands in the middle of its top.
 
     Attributes:
         body_radius: Of the platform [length unit of the scene].
@@ -36,7 +41,7 @@ class FloorManipulator(Robot):
     link_radius: NonNegative = 0.0
 
     def build(self) -> Assembly:
-        """Return the model with the platform as its first body and the links of the arm behind it."""
+        """Return the model: the platform as its first body, then the links of the arm."""
         model, geometry = pin.Model(), pin.GeometryModel()
         first = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "platform_x")
         parent = model.addJoint(first, pin.JointModelPY(), pin.SE3.Identity(), "platform_y")
@@ -52,7 +57,12 @@ class FloorManipulator(Robot):
             links.append(Link(0, parent, np.zeros(3), place, self.link_radius))
             geometry.addGeometryObject(link_capsule(links[-1], f"link_{k + 1}"))
         return Assembly(
-            model, geometry, tuple(links), np.array([[0, model.nq]]), kinematic_table(model), (0,) * len(links)
+            model,
+            geometry,
+            tuple(links),
+            np.array([[0, model.nq]]),
+            kinematic_table(model),
+            (0,) * len(links),
         )
 
     def platform(self) -> FloorPlatform:
@@ -62,4 +72,6 @@ class FloorManipulator(Robot):
     def arm(self) -> MobileArm:
         """Return the arm on a platform that moves along a line."""
         size = (2.0 * self.body_radius, min(self.body_height, self.body_radius))
-        return MobileArm(link_lengths=self.link_lengths, platform_size=size, link_radius=self.link_radius)
+        return MobileArm(
+            link_lengths=self.link_lengths, platform_size=size, link_radius=self.link_radius
+        )

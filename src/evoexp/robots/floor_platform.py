@@ -16,7 +16,8 @@ class FloorPlatform(Robot):
 
     Attributes:
         body_radius: Of the cylinder [length unit of the scene].
-        body_height: Of the cylinder, which stands on the floor z = 0; in three dimensions it is centred on its place.
+        body_height: Of the cylinder, which stands on the floor z = 0; in three dimensions it is
+            centred on its place.
         dimensions: How many directions it moves along.
     """
 
@@ -38,4 +39,6 @@ class FloorPlatform(Robot):
         placement = pin.SE3(np.eye(3), 0.5 * (start + end))
         geometry.addGeometryObject(pin.GeometryObject("platform", parent, 0, placement, shape))
         links = (Link(0, parent, start, end, self.body_radius),)
-        return Assembly(model, geometry, links, np.array([[0, model.nq]]), kinematic_table(model), (0,))
+        return Assembly(
+            model, geometry, links, np.array([[0, model.nq]]), kinematic_table(model), (0,)
+        )

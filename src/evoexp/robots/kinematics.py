@@ -1,13 +1,14 @@
 """The kinematic table of a Pinocchio model, and forward kinematics of whole batches from it.
 
-The table is derived from any `pin.Model` whose joints have one degree of freedom. Each joint's frame is turned so that
-the joint moves about (or along) its own z axis: the rotation of a revolute joint then mixes two columns only. Kernels
-keep the configurations innermost, in blocks of `BLOCK` lanes, and use evoexp's own sine and cosine: the result does not
-depend on the CPU's vector width.
+The table is derived from any `pin.Model` whose joints have one degree of freedom. Each joint's
+frame is turned so that the joint moves about (or along) its own z axis: the rotation of a revolute
+joint then mixes two columns only. Kernels keep the configurations innermost, in blocks of `BLOCK`
+lanes, and use evoexp's own sine and cosine: the result does not depend on the CPU's vector width.
 
-What makes the loops over lanes vector code: a block's frames are one flat array, whose rows are constant distances
-apart (otherwise the checks that nothing overlaps become too many, and LLVM stays scalar); indices are unsigned (no
-wrap-around); and no views are made inside (each counts references).
+What makes the loops over lanes vector code: a block's frames are one flat array, whose rows are
+constant distances apart (otherwise the checks that nothing overlaps become too many, and LLVM stays
+scalar); indices are unsigned (no wrap-around); and no views are made inside (each counts
+references).
 """
 
 from typing import Any, NamedTuple
@@ -20,7 +21,10 @@ from evoexp.numerics import kernel, sincos
 from evoexp.records import FloatArray
 
 BLOCK = 64
-"""Configurations that a kernel carries through all its steps at once; its scratch stays in the first-level cache."""
+"""Configurations that a kernel carries through all its steps at once.
+
+Its scratch stays in the first-level cache.
+"""
 
 U = np.uint64
 
@@ -41,12 +45,15 @@ class KinematicTable(NamedTuple):
     Attributes:
         parent: (joints,) index into the table, −1 for the world.
         index_q: (joints,) the joint's place in q.
-        prismatic: (joints,) true for a joint that slides along its z axis, false for one that turns about it.
+        prismatic: (joints,) true for a joint that slides along its z axis, false for one that turns
+            about it.
         turned: (joints,) true where the placement's rotation is not the identity.
         rotation: (joints, 9) placement in the parent's frame, row by row.
         translation: (joints, 3).
-        alignment: (joints, 3, 3) from the table's frame of a joint to Pinocchio's: columns are the table's axes.
-        planar: Whether every joint turns about the world's z, so that everything moves in parallel planes.
+        alignment: (joints, 3, 3) from the table's frame of a joint to Pinocchio's: columns are the
+            table's axes.
+        planar: Whether every joint turns about the world's z, so that everything moves in parallel
+            planes.
     """
 
     parent: np.ndarray
@@ -59,7 +66,7 @@ class KinematicTable(NamedTuple):
     planar: bool
 
     def local(self, joint: int, point: FloatArray) -> FloatArray:
-        """Return a point given in the frame of Pinocchio's joint `joint` (≥ 1) in the table's frame of it."""
+        """Return a point of Pinocchio's frame of joint `joint` (≥ 1) in the table's frame of it."""
         return np.asarray(self.alignment[joint - 1].T @ point)
 
 
@@ -84,10 +91,14 @@ def kinematic_table(model: Any) -> KinematicTable:
         placement = model.jointPlacements[k + 1]
         rotation[k] = (before.T @ placement.rotation @ alignment[k]).ravel()
         translation[k] = before.T @ placement.translation
-    turned = np.array([not np.array_equal(matrix, np.eye(3).ravel()) for matrix in rotation], dtype=np.bool_)
+    turned = np.array(
+        [not np.array_equal(matrix, np.eye(3).ravel()) for matrix in rotation], dtype=np.bool_
+    )
     index_q = np.array([model.idx_qs[j] for j in range(1, model.njoints)], dtype=np.int64)
     planar = not prismatic.any() and all(_keeps_plane(matrix) for matrix in rotation)
-    return KinematicTable(parent, index_q, prismatic, turned, rotation, translation, alignment, planar)
+    return KinematicTable(
+        parent, index_q, prismatic, turned, rotation, translation, alignment, planar
+    )
 
 
 def forward_kinematics(table: KinematicTable, q: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -98,8 +109,9 @@ def forward_kinematics(table: KinematicTable, q: FloatArray) -> tuple[FloatArray
         q: (nq, configurations) [rad], lengths for prismatic joints.
 
     Returns:
-        Rotations (joints, 3, 3, configurations) and origins (joints, 3, configurations) in the world. The rotations are
-        those of the table's frames; times `alignment` transposed they are Pinocchio's.
+        Rotations (joints, 3, 3, configurations) and origins (joints, 3, configurations) in the
+        world. The rotations are those of the table's frames; times `alignment` transposed they are
+        Pinocchio's.
 
     Raises:
         ValueError: If q has not as many rows as the model has coordinates.
@@ -125,14 +137,19 @@ def _forward_kinematics(  # type: ignore[no-untyped-def]
     for first in range(0, total, BLOCK):
         count = min(BLOCK, total - first)
         load_block(q, first, count, 1.0, block_q)
-        block_frames(parent, index_q, prismatic, turned, rotation, translation, block_q, frames, scratch)
+        block_frames(
+            parent, index_q, prismatic, turned, rotation, translation, block_q, frames, scratch
+        )
         rotations[:, :, first : first + count] = by_row[:, :9, :count]
         origins[:, :, first : first + count] = by_row[:, 9:, :count]
 
 
 @kernel
 def load_block(q, first, count, unit, out):  # type: ignore[no-untyped-def]
-    """Copy `count` configurations of q (nq, configurations) from `first` on, times a unit, to a block (nq · BLOCK,)."""
+    """Copy `count` configurations of q.
+
+    Nq, configurations) from `first` on, times a unit, to a block (nq · BLOCK,.
+    """
     for k in range(q.shape[0]):
         row = U(k) * U(BLOCK)
         for n in range(count):
@@ -172,7 +189,11 @@ def block_frames(  # type: ignore[no-untyped-def]
                 lane = U(n)
                 s, c = sincos(q[row + lane])
                 for e in range(3):
-                    x, y, z = U(3 * e * BLOCK) + lane, U((3 * e + 1) * BLOCK) + lane, U((3 * e + 2) * BLOCK) + lane
+                    x, y, z = (
+                        U(3 * e * BLOCK) + lane,
+                        U((3 * e + 1) * BLOCK) + lane,
+                        U((3 * e + 2) * BLOCK) + lane,
+                    )
                     frames[own + x] = scratch[x] * c + scratch[y] * s
                     frames[own + y] = scratch[y] * c - scratch[x] * s
                     frames[own + z] = scratch[z]
@@ -206,7 +227,9 @@ def _place(parent, turned, rotation, translation, frames, placed):  # type: igno
                 ax, ay, az = rotation[column], rotation[3 + column], rotation[6 + column]
                 for n in range(BLOCK):
                     lane = U(n)
-                    placed[c + lane] = frames[x + lane] * ax + frames[y + lane] * ay + frames[z + lane] * az
+                    placed[c + lane] = (
+                        frames[x + lane] * ax + frames[y + lane] * ay + frames[z + lane] * az
+                    )
             else:
                 for n in range(BLOCK):
                     placed[c + U(n)] = frames[before + c + U(n)]
@@ -222,7 +245,8 @@ def block_planar_frames(parent, index_q, rotation, translation, q, frames):  # t
         rotation: See `KinematicTable`.
         translation: See `KinematicTable`.
         q: (nq · BLOCK,).
-        frames: (joints · PLANAR_ROWS · BLOCK,), written: sine and cosine of the angle from the world's x axis, x, y.
+        frames: (joints · PLANAR_ROWS · BLOCK,), written: sine and cosine of the angle from the
+            world's x axis, x, y.
     """
     for k in range(len(parent)):
         own, row = U(k) * U(PLANAR_ROWS * BLOCK), U(index_q[k]) * U(BLOCK)
@@ -259,9 +283,13 @@ def _axis(model: Any, data: Any, neutral: FloatArray, joint: int) -> tuple[Float
     name = model.names[joint]
     if model.nqs[joint] != 1 or model.nvs[joint] != 1:
         kind = model.joints[joint].shortname()
-        raise UnsupportedJoint(f"robot: joint '{name}' ({kind}) must have one coordinate, has {model.nqs[joint]}")
+        raise UnsupportedJoint(
+            f"robot: joint '{name}' ({kind}) must have one coordinate, has {model.nqs[joint]}"
+        )
     jacobian = pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.LOCAL)
-    jacobian = np.reshape(jacobian, (6, -1))[:, model.idx_vs[joint]]  # one joint alone comes as a vector
+    jacobian = np.reshape(jacobian, (6, -1))[
+        :, model.idx_vs[joint]
+    ]  # one joint alone comes as a vector
     linear, angular = jacobian[:3], jacobian[3:]
     slides = bool(np.linalg.norm(angular) < 0.5)
     if not slides and np.linalg.norm(linear) > 1e-12:

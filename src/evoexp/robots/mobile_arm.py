@@ -1,4 +1,7 @@
-"""An arm of three links on a platform that moves along a line (Chen & Zalzala 1995, section 4.2, Fig. 3)."""
+"""An arm of three links on a platform that moves along a line.
+
+Chen & Zalzala 1995, section 4.2, Fig. 3.
+"""
 
 from typing import Any, ClassVar, Self
 
@@ -19,8 +22,8 @@ NUM_JOINTS = 3  # of the arm
 class MobileArm(Chain):
     """One prismatic joint along x, on it three revolute joints about z; q = (X_p, θ1, θ2, θ3).
 
-    The first revolute joint stands in the middle of the platform, on the line that the platform moves along (y = 0).
-    Every joint angle is relative to the link before.
+    The first revolute joint stands in the middle of the platform, on the line that the platform
+    moves along (y = 0). Every joint angle is relative to the link before.
 
     Attributes:
         link_lengths: l1, l2, l3 [length unit of the scene].
@@ -47,7 +50,9 @@ class MobileArm(Chain):
                     raise SettingError(f"{name}[{k}]", must, [least, greatest])
         length, height = self.platform_size
         if length <= height:
-            raise SettingError("platform_size", "[length, height] with length > height", [length, height])
+            raise SettingError(
+                "platform_size", "[length, height] with length > height", [length, height]
+            )
         return self
 
     @property
@@ -73,4 +78,7 @@ class MobileArm(Chain):
     def append_bodies(self, model: Any, arm: int, first_joint: int, links: list[Link]) -> list[Any]:
         """Return the platform, by that name, and the arm's links."""
         platform, *own = links
-        return [link_capsule(platform, "platform"), *super().append_bodies(model, arm, first_joint, own)]
+        return [
+            link_capsule(platform, "platform"),
+            *super().append_bodies(model, arm, first_joint, own),
+        ]

@@ -23,7 +23,8 @@ class PlanarChain(Chain):
         base_angle: Direction of the first link at q = 0, from +x [deg].
         link_radius: Half the thickness of every link; 0: a line.
         tool_radius: Of a ball around the tip; 0: none.
-        joint_limits: Least and greatest angle of every joint [rad], as the papers print them; None: any angle.
+        joint_limits: Least and greatest angle of every joint [rad], as the papers print them; None:
+            any angle.
     """
 
     component: ClassVar[str] = "planar_chain"
@@ -44,11 +45,18 @@ class PlanarChain(Chain):
             raise SettingError("joint_limits", must, len(self.joint_limits))
         for k, (least, greatest) in enumerate(self.joint_limits):
             if not least < greatest:
-                raise SettingError(f"joint_limits[{k}]", "[least, greatest] with least < greatest", [least, greatest])
+                raise SettingError(
+                    f"joint_limits[{k}]",
+                    "[least, greatest] with least < greatest",
+                    [least, greatest],
+                )
         return self
 
     def append_to(self, model: Any, arm: int) -> list[Link]:
-        """Add one revolute joint per link; a tool is one link more, of no length, on the last joint."""
+        """Add one revolute joint per link.
+
+        A tool is one link more, of no length, on the last joint.
+        """
         parent = 0
         s, c = sincos(DEGREE * self.base_angle)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -57,8 +65,12 @@ class PlanarChain(Chain):
         for k, length in enumerate(self.link_lengths):
             parent = model.addJoint(parent, pin.JointModelRZ(), placement, f"arm_{arm}_joint_{k}")
             if self.joint_limits is not None:
-                model.lowerPositionLimit[parent - 1], model.upperPositionLimit[parent - 1] = self.joint_limits[k]
-            links.append(Link(arm, parent, np.zeros(3), np.array([length, 0.0, 0.0]), self.link_radius))
+                model.lowerPositionLimit[parent - 1], model.upperPositionLimit[parent - 1] = (
+                    self.joint_limits[k]
+                )
+            links.append(
+                Link(arm, parent, np.zeros(3), np.array([length, 0.0, 0.0]), self.link_radius)
+            )
             placement = pin.SE3(np.eye(3), np.array([length, 0.0, 0.0]))
         if self.tool_radius > 0.0:
             tip = links[-1].end

@@ -1,4 +1,7 @@
-"""Where the link ends of one planar arm are along straight joint-space paths, for whole populations."""
+"""Where the link ends of one planar arm are along straight joint-space paths.
+
+For whole populations.
+"""
 
 from typing import NamedTuple
 
@@ -39,7 +42,13 @@ def planar_arm(assembly: Assembly) -> PlanarArm:
     straight = all(not link.start.any() and not link.end[1:].any() for link in links)
     chained = table.planar and np.array_equal(table.parent, np.arange(len(table.parent)) - 1)
     bent = bool(table.turned[1:].any()) or bool(table.translation[:, 2].any())
-    if assembly.num_arms != 1 or not straight or not chained or bent or len(links) != len(table.parent):
+    if (
+        assembly.num_arms != 1
+        or not straight
+        or not chained
+        or bent
+        or len(links) != len(table.parent)
+    ):
         joints = ", ".join(f"{stop - first} joints" for first, stop in assembly.arm_slices)
         raise SettingError("robot", "one planar arm in the plane z = 0", joints)
     x, y, _ = table.translation[0]
@@ -57,7 +66,8 @@ def block_ends(starts, ends, arm, position, num_positions, angle, at_x, at_y, x,
         arm: (N,) link lengths; base x, base y, direction of the first link at angle 0 [rad].
         position: j of Eq. 3; at j = M the end itself is taken, without any rounding.
         num_positions: M.
-        angle: (LANES,) scratch: running sums are kept apart from what is written, or the loop stays scalar.
+        angle: (LANES,) scratch: running sums are kept apart from what is written, or the loop stays
+            scalar.
         at_x: (LANES,) likewise.
         at_y: (LANES,) likewise.
         x: ((N + 1) × LANES) written.
@@ -81,7 +91,9 @@ def block_ends(starts, ends, arm, position, num_positions, angle, at_x, at_y, x,
 
 @kernel
 def begin_turning(starts, ends, arm, position, num_positions, angle, step, turn):  # type: ignore[no-untyped-def]
-    """Write directions of the links at one position, and how they turn from one position to the next.
+    """Write directions of the links at one position.
+
+    And how they turn from one position to the next.
 
     Args:
         starts: (N × LANES) joint angles [rad].
@@ -91,9 +103,16 @@ def begin_turning(starts, ends, arm, position, num_positions, angle, step, turn)
         num_positions: M.
         angle: (LANES,) scratch.
         step: (LANES,) scratch.
-        turn: (4, N × LANES) written: sine and cosine of every link's direction, and of its turn per position.
+        turn: (4, N × LANES) written: sine and cosine of every link's direction, and of its turn per
+            position.
     """
-    share, sine, cosine, turn_sine, turn_cosine = position / num_positions, turn[0], turn[1], turn[2], turn[3]
+    share, sine, cosine, turn_sine, turn_cosine = (
+        position / num_positions,
+        turn[0],
+        turn[1],
+        turn[2],
+        turn[3],
+    )
     angle[:], step[:] = arm[3], 0.0
     for k in range(len(arm[0])):
         for n in range(LANES):
@@ -107,9 +126,12 @@ def begin_turning(starts, ends, arm, position, num_positions, angle, step, turn)
 
 @kernel
 def turned_ends(arm, at_x, at_y, turn, x, y):  # type: ignore[no-untyped-def]
-    """Turn all links on by one position and write their ends, as `block_ends` does but without sines.
+    """Turn all links on by one position and write their ends.
 
-    Every turn adds some 2e-16 to the error of a direction; whoever takes many of them begins anew now and then.
+    As `block_ends` does but without sines.
+
+    Every turn adds some 2e-16 to the error of a direction; whoever takes many of them begins anew
+    now and then.
 
     Args:
         arm: See `block_ends`.

@@ -1,4 +1,7 @@
-"""Poses as 12 numbers: nine of the rotation, row by row, then the position; sums in one order, everywhere the same."""
+"""Poses as 12 numbers: nine of the rotation, row by row, then the position.
+
+Sums in one order, everywhere the same.
+"""
 
 from typing import Any
 
@@ -6,19 +9,30 @@ import numpy as np
 
 from evoexp.numerics import kernel
 from evoexp.records import FloatArray
-from evoexp.robots.kinematics import BLOCK, SPATIAL_ROWS, KinematicTable, U, block_frames, load_block
+from evoexp.robots.kinematics import (
+    BLOCK,
+    SPATIAL_ROWS,
+    KinematicTable,
+    U,
+    block_frames,
+    load_block,
+)
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
 
 def pose_of(rotation: Any, position: Any) -> FloatArray:
     """Return (12,) of a rotation (3, 3) and a position (3,)."""
-    return np.concatenate([np.asarray(rotation, dtype=np.float64).ravel(), np.asarray(position, dtype=np.float64)])
+    return np.concatenate(
+        [np.asarray(rotation, dtype=np.float64).ravel(), np.asarray(position, dtype=np.float64)]
+    )
 
 
 def local_pose(table: KinematicTable, joint: int, rotation: Any, position: Any) -> FloatArray:
-    """Return (12,) in the table's frame of a joint what is given in Pinocchio's frame of joint `joint` (≥ 1)."""
-    return np.asarray(compose(pose_of(table.alignment[joint - 1].T, np.zeros(3)), pose_of(rotation, position)))
+    """Return a pose of Pinocchio's frame of joint `joint` (≥ 1) in the table's frame, (12,)."""
+    return np.asarray(
+        compose(pose_of(table.alignment[joint - 1].T, np.zeros(3)), pose_of(rotation, position))
+    )
 
 
 @kernel
@@ -63,18 +77,30 @@ def frame_poses(table, joint, local, q, out):  # type: ignore[no-untyped-def]
     for first in range(0, q.shape[1], BLOCK):
         count = min(BLOCK, q.shape[1] - first)
         load_block(q, first, count, 1.0, block_q)
-        block_frames(parent, index_q, prismatic, turned, rotation, translation, block_q, frames, scratch)
+        block_frames(
+            parent, index_q, prismatic, turned, rotation, translation, block_q, frames, scratch
+        )
         for e in range(3):
-            x, y, z = own + U(3 * e * BLOCK), own + U((3 * e + 1) * BLOCK), own + U((3 * e + 2) * BLOCK)
+            x, y, z = (
+                own + U(3 * e * BLOCK),
+                own + U((3 * e + 1) * BLOCK),
+                own + U((3 * e + 2) * BLOCK),
+            )
             o = own + U((9 + e) * BLOCK)
             for k in range(3):
                 for n in range(count):
                     i = U(n)
-                    turned_axis = frames[x + i] * local[k] + frames[y + i] * local[3 + k] + frames[z + i] * local[6 + k]
+                    turned_axis = (
+                        frames[x + i] * local[k]
+                        + frames[y + i] * local[3 + k]
+                        + frames[z + i] * local[6 + k]
+                    )
                     out[3 * e + k, first + n] = turned_axis
             for n in range(count):
                 i = U(n)
-                moved = frames[x + i] * local[9] + frames[y + i] * local[10] + frames[z + i] * local[11]
+                moved = (
+                    frames[x + i] * local[9] + frames[y + i] * local[10] + frames[z + i] * local[11]
+                )
                 out[9 + e, first + n] = frames[o + i] + moved
 
 

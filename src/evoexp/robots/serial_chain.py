@@ -1,4 +1,7 @@
-"""An arm in space, given joint by joint: where each joint stands behind the one before, and its axis."""
+"""An arm in space, given joint by joint.
+
+Where each joint stands behind the one before, and its axis.
+"""
 
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -18,8 +21,10 @@ class SerialJoint(Settings):
     """One joint.
 
     Attributes:
-        axis: Direction that it turns about or slides along, in the frame of the joint before; any length but 0.
-        offset: From the joint before (from the base for the first one), at q = 0 [length unit of the scene].
+        axis: Direction that it turns about or slides along, in the frame of the joint before; any
+            length but 0.
+        offset: From the joint before (from the base for the first one), at q = 0 [length unit of
+            the scene].
         kind: Whether it turns or slides.
     """
 
@@ -37,14 +42,19 @@ class SerialJoint(Settings):
         """Return Pinocchio's joint model."""
         axis = np.array(self.axis)
         unit = axis / np.sqrt(np.sum(axis * axis))
-        return (pin.JointModelPrismaticUnaligned if self.kind == "prismatic" else pin.JointModelRevoluteUnaligned)(unit)
+        return (
+            pin.JointModelPrismaticUnaligned
+            if self.kind == "prismatic"
+            else pin.JointModelRevoluteUnaligned
+        )(unit)
 
 
 class SerialChain(Chain):
     """Joints one behind the other; at q = 0 all frames are parallel to the base's.
 
-    A link is the straight segment from one joint to the next, the last one to the tip; joints that stand in the same
-    place have none between them. The segment from the base to the first joint is a link that does not move.
+    A link is the straight segment from one joint to the next, the last one to the tip; joints that
+    stand in the same place have none between them. The segment from the base to the first joint is
+    a link that does not move.
 
     Attributes:
         joints: From the base to the tip.
@@ -69,7 +79,9 @@ class SerialChain(Chain):
         base, parent, links = np.array(self.base_position), 0, []
         for k, joint in enumerate(self.joints):
             offset = np.array(joint.offset)
-            placement = pin.SE3(turn, base + turn @ offset) if k == 0 else pin.SE3(np.eye(3), offset)
+            placement = (
+                pin.SE3(turn, base + turn @ offset) if k == 0 else pin.SE3(np.eye(3), offset)
+            )
             start, end = (base, base + turn @ offset) if k == 0 else (np.zeros(3), offset)
             links.append(Link(arm, parent, start, end, self.link_radius))
             parent = model.addJoint(parent, joint.model(), placement, f"arm_{arm}_joint_{k}")

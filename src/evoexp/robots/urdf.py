@@ -1,7 +1,10 @@
-"""A robot of one's own, out of a URDF: its joints, limits and collision bodies, primitives and meshes.
+"""A robot of one's own, out of a URDF.
 
-The files are read once, at the door: a configuration holds the hashes of their contents, which travel with it
-(`evoexp.attachments`). Where they lay and what they were called is no part of any identity.
+Its joints, limits and collision bodies, primitives and meshes.
+
+The files are read once, at the door: a configuration holds the hashes of their contents, which
+travel with it (`evoexp.attachments`). Where they lay and what they were called is no part of any
+identity.
 """
 
 import tempfile
@@ -44,7 +47,8 @@ class Urdf(Chain):
         base_frame: The link, fixed to the ground, whose frame stands at the base; empty: the root.
         base_position: Where the base stands in the world [m].
         base_rotation: Its roll, pitch, yaw [deg].
-        tool_frame: The link or joint whose frame is the tool's; empty: the link farthest down the tree.
+        tool_frame: The link or joint whose frame is the tool's; empty: the link farthest down the
+            tree.
     """
 
     component: ClassVar[str] = "urdf"
@@ -62,7 +66,8 @@ class Urdf(Chain):
         """Return settings with the contents of files in the place of their paths.
 
         Raises:
-            SettingError: If a file is missing or is no URDF, or a joint is of another kind than evoexp's kinematics.
+            SettingError: If a file is missing or is no URDF, or a joint is of another kind than
+                evoexp's kinematics.
         """
         settings = dict(settings)
         if "path" not in settings:
@@ -75,7 +80,9 @@ class Urdf(Chain):
         names = dict.fromkeys(str(mesh.get("filename")) for mesh in root.iterfind(MESH))
         if names:
             found = {name: _mesh(name, Path(path), f"{field}.path") for name in names}
-            settings["meshes"] = [{"name": name, "file": {SHA256: keep(data)}} for name, data in found.items()]
+            settings["meshes"] = [
+                {"name": name, "file": {SHA256: keep(data)}} for name, data in found.items()
+            ]
         if srdf is not None:
             content = _content(srdf, f"{field}.srdf")
             _parsed(content, f"{field}.srdf", "robot")
@@ -83,13 +90,18 @@ class Urdf(Chain):
         return settings
 
     def append_to(self, model: Any, arm: int) -> list[Link]:
-        """Add the joints; a link is the line from a joint to one behind it, the last to the tool."""
+        """Add the joints; a link is the line from a joint to one behind it.
+
+        The last to the tool.
+        """
         own, first = self._model(), model.njoints
         base = self._base(own)
         for joint in range(1, own.njoints):
             parent, placement = own.parents[joint], own.jointPlacements[joint]
             before = (0, base * placement) if parent == 0 else (first + parent - 1, placement)
-            added = model.addJoint(before[0], own.joints[joint], before[1], f"arm_{arm}_{own.names[joint]}")
+            added = model.addJoint(
+                before[0], own.joints[joint], before[1], f"arm_{arm}_{own.names[joint]}"
+            )
             index = own.idx_qs[joint]
             model.lowerPositionLimit[model.idx_qs[added]] = own.lowerPositionLimit[index]
             model.upperPositionLimit[model.idx_qs[added]] = own.upperPositionLimit[index]
@@ -122,7 +134,9 @@ class Urdf(Chain):
         for item, stem in zip(items, stems, strict=True):
             name = stem if stems.count(stem) == 1 else item.name
             joint = item.parentJoint
-            where = (first_joint + joint - 1, item.placement) if joint else (0, base * item.placement)
+            where = (
+                (first_joint + joint - 1, item.placement) if joint else (0, base * item.placement)
+            )
             bodies.append(pin.GeometryObject(name, where[0], 0, where[1], item.geometry))
         if not bodies:
             raise SettingError("robot.path", "a URDF with collision bodies", None)
@@ -131,7 +145,11 @@ class Urdf(Chain):
     def tool(self, model: Any, first_joint: int, links: list[Link]) -> Tool:
         """Return the tool's frame."""
         own = self._model()
-        frames = [frame for frame in own.frames if frame.type in (pin.FrameType.BODY, pin.FrameType.FIXED_JOINT)]
+        frames = [
+            frame
+            for frame in own.frames
+            if frame.type in (pin.FrameType.BODY, pin.FrameType.FIXED_JOINT)
+        ]
         name = self.tool_frame or max(frames, key=lambda frame: _depth(own, frame)).name
         frame = _frame(own, name, "tool_frame")
         if frame.parentJoint == 0:
@@ -150,8 +168,16 @@ class Urdf(Chain):
         of_link: dict[str, set[str]] = {}
         for name, stem in zip(names, stems, strict=True):
             of_link.setdefault(stem, set()).add(stem if stems.count(stem) == 1 else name)
-        pairs = [(str(pair.get("link1")), str(pair.get("link2"))) for pair in root.iterfind("disable_collisions")]
-        return {frozenset((a, b)) for one, two in pairs for a in of_link.get(one, ()) for b in of_link.get(two, ())}
+        pairs = [
+            (str(pair.get("link1")), str(pair.get("link2")))
+            for pair in root.iterfind("disable_collisions")
+        ]
+        return {
+            frozenset((a, b))
+            for one, two in pairs
+            for a in of_link.get(one, ())
+            for b in of_link.get(two, ())
+        }
 
     def _model(self) -> Any:
         try:
@@ -170,10 +196,14 @@ class Urdf(Chain):
                 places[mesh.name] = str(place)
             try:
                 text = _plain(self.urdf.content, places)
-                return pin.buildGeomFromUrdfString(model, text, pin.GeometryType.COLLISION, None, directory)
+                return pin.buildGeomFromUrdfString(
+                    model, text, pin.GeometryType.COLLISION, None, directory
+                )
             except (ValueError, RuntimeError) as error:
                 reason = str(error).strip().splitlines()[0].replace(directory, "")
-                raise SettingError("robot.path", "a URDF whose collision bodies can be read", reason) from None
+                raise SettingError(
+                    "robot.path", "a URDF whose collision bodies can be read", reason
+                ) from None
 
     def _base(self, model: Any) -> Any:
         """Return the `pin.SE3` of the root in the world."""
@@ -211,7 +241,11 @@ def _check_joints(root: Any, field: str) -> None:
         kind = joint.get("type")
         if kind not in (*MOVING, "fixed") or joint.find("mimic") is not None:
             what = "mimic" if joint.find("mimic") is not None else kind
-            hint = "; a continuous joint can be given limits, as a revolute one" if kind == "continuous" else ""
+            hint = (
+                "; a continuous joint can be given limits, as a revolute one"
+                if kind == "continuous"
+                else ""
+            )
             must = f"a URDF whose joints are {', '.join(MOVING)} or fixed{hint}"
             raise SettingError(field, must, f"joint '{joint.get('name')}' of type {what}")
 

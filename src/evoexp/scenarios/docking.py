@@ -1,4 +1,7 @@
-"""Where the end-effector of a mobile arm shall be, what load it carries there, and what stands around."""
+"""Where the end-effector of a mobile arm shall be, what load it carries there.
+
+And what stands around.
+"""
 
 from typing import ClassVar
 

@@ -14,10 +14,11 @@ _PNG = b"\x89PNG\r\n\x1a\n"
 def read_map(content: bytes, size: tuple[int, ...], field: str) -> np.ndarray:
     """Return the occupancy grid that a file holds.
 
-    A text has one line per y, the greatest y first, as one looks at a map: `*` or `#` for a blocked node, `+` or `.`
-    for a free one, blanks between them at will; `;` begins a comment. In three dimensions there is one such block of
-    lines per z, the least z first, with an empty line between blocks. A PNG (two dimensions) has one pixel per node,
-    black for a blocked one, white for a free one.
+    A text has one line per y, the greatest y first, as one looks at a map: `*` or `#` for a blocked
+    node, `+` or `.` for a free one, blanks between them at will; `;` begins a comment. In three
+    dimensions there is one such block of lines per z, the least z first, with an empty line between
+    blocks. A PNG (two dimensions) has one pixel per node, black for a blocked one, white for a free
+    one.
 
     Args:
         content: Of the file.
@@ -35,14 +36,20 @@ def read_map(content: bytes, size: tuple[int, ...], field: str) -> np.ndarray:
     blocked = layers[:, ::-1, :].transpose(2, 1, 0)  # (x, y, z)
     blocked = blocked[:, :, 0] if len(size) == 2 and blocked.shape[2] == 1 else blocked
     if blocked.shape != tuple(size):
-        raise SettingError(field, f"a map of {_text(size)} nodes, as scenario.size says", _text(blocked.shape))
+        raise SettingError(
+            field, f"a map of {_text(size)} nodes, as scenario.size says", _text(blocked.shape)
+        )
     return np.ascontiguousarray(blocked)
 
 
 def _read_text(content: bytes, field: str) -> np.ndarray:
     """Return layers (z, rows, columns)."""
     try:
-        lines = [line.partition(COMMENT)[0] for line in content.decode().splitlines() if line[:1] != COMMENT]
+        lines = [
+            line.partition(COMMENT)[0]
+            for line in content.decode().splitlines()
+            if line[:1] != COMMENT
+        ]
     except UnicodeDecodeError:
         raise SettingError(field, "a text or a PNG", "neither") from None
     blocks: list[list[str]] = [[]]
@@ -72,7 +79,9 @@ def _read_png(content: bytes, field: str) -> np.ndarray:
         raise SettingError(field, "a PNG that can be read", str(error)) from None
     pixels = np.asarray(picture)
     if wrong := sorted({int(value) for value in np.unique(pixels)} - {0, 255}):
-        raise SettingError(field, "a PNG of black (blocked) and white (free) pixels", f"grey {wrong[0]}")
+        raise SettingError(
+            field, "a PNG of black (blocked) and white (free) pixels", f"grey {wrong[0]}"
+        )
     return np.asarray(pixels == 0)
 
 

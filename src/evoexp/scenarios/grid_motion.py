@@ -18,16 +18,20 @@ POST = 0.02  # [cell] thickness of bodies that span one node: a box has some
 
 
 class GridMotion(Component):
-    """A path is wanted over a grid whose nodes are one length unit apart (Chen & Zalzala 1995, section 2).
+    """A path is wanted over a grid whose nodes are one length unit apart.
+
+    Chen & Zalzala 1995, section 2.
 
     Attributes:
         size: How many nodes there are along x, y[, z].
         start: Node (x, y[, z]), counted from 0; y points up.
         goal: Node.
-        obstacle_height: Of what stands on the floor, where the grid is two-dimensional [length unit].
+        obstacle_height: Of what stands on the floor, where the grid is two-dimensional [length
+            unit].
         security_margin: Clearance between bodies that the task requires [length unit].
         length_unit: Name of the unit that nodes are apart.
-        obstacles: Blocks of nodes from (x0, y0[, z0]) to (x1, y1[, z1]), both included: x0, y0, x1, y1.
+        obstacles: Blocks of nodes from (x0, y0[, z0]) to (x1, y1[, z1]), both included: x0, y0, x1,
+            y1.
         map: A file with more obstacles, see `grid_maps.read_map`.
     """
 
@@ -51,14 +55,21 @@ class GridMotion(Component):
         for k, corners in enumerate(self.obstacles):
             half = len(self.size)
             if len(corners) != 2 * half:
-                raise SettingError(f"obstacles[{k}]", f"two corners, {2 * half} numbers", list(corners))
-            if any(not 0 <= a <= b < n for a, b, n in zip(corners[:half], corners[half:], self.size, strict=True)):
+                raise SettingError(
+                    f"obstacles[{k}]", f"two corners, {2 * half} numbers", list(corners)
+                )
+            if any(
+                not 0 <= a <= b < n
+                for a, b, n in zip(corners[:half], corners[half:], self.size, strict=True)
+            ):
                 must = f"from a lower to an upper corner inside the grid ({self.inside})"
                 raise SettingError(f"obstacles[{k}]", must, list(corners))
         return self
 
     def _check_node(self, name: str, node: tuple[int, ...]) -> None:
-        if len(node) != len(self.size) or any(not 0 <= a < n for a, n in zip(node, self.size, strict=True)):
+        if len(node) != len(self.size) or any(
+            not 0 <= a < n for a, n in zip(node, self.size, strict=True)
+        ):
             raise SettingError(name, f"a node inside the grid ({self.inside})", list(node))
 
     @property
@@ -81,19 +92,27 @@ class GridMotion(Component):
         for name in ("start", "goal"):
             node = getattr(self, name)
             if nodes[node]:
-                raise SettingError(f"scenario.{name}", "a free node; an obstacle is there", list(node))
+                raise SettingError(
+                    f"scenario.{name}", "a free node; an obstacle is there", list(node)
+                )
         return nodes
 
     def bodies(self) -> tuple[BoxObstacle, ...]:
-        """Return obstacles as boxes that span the centres of their nodes, and stand on the floor in two dimensions.
+        """Return obstacles as boxes that span the centres of their nodes.
 
-        They are not grown by half a cell: then they would touch the moves past their corners, which are permitted.
+        And stand on the floor in two dimensions.
+
+        They are not grown by half a cell: then they would touch the moves past their corners, which
+        are permitted.
         """
         half = len(self.size)
         found = [(corners[:half], corners[half:]) for corners in self.obstacles]
         if self.map is not None:
             found += blocks(read_map(self.map.content, self.size, "scenario.map"))
-        return tuple(self._box(np.array(low, dtype=float), np.array(high, dtype=float)) for low, high in found)
+        return tuple(
+            self._box(np.array(low, dtype=float), np.array(high, dtype=float))
+            for low, high in found
+        )
 
     def _box(self, low: np.ndarray, high: np.ndarray) -> BoxObstacle:
         size, center = np.maximum(high - low, POST).tolist(), (0.5 * (low + high)).tolist()
@@ -107,10 +126,12 @@ class GridMotion(Component):
 
 
 def blocks(nodes: np.ndarray) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
-    """Return blocks of nodes (lower corner, upper corner) that together cover a set, and nothing else.
+    """Return blocks of nodes (lower corner, upper corner) that together cover a set.
 
-    Blocks may overlap. Where blocks meet, a slit of one cell may stay open between the bodies that span their centres;
-    it leads nowhere, because paths go over free nodes.
+    And nothing else.
+
+    Blocks may overlap. Where blocks meet, a slit of one cell may stay open between the bodies that
+    span their centres; it leads nowhere, because paths go over free nodes.
 
     Args:
         nodes: (nodes along x, along y[, along z]).
@@ -127,7 +148,9 @@ def blocks(nodes: np.ndarray) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
                 while high[along] + 1 < nodes.shape[along]:
                     wider = high.copy()
                     wider[along] += 1
-                    if not nodes[tuple(slice(a, b + 1) for a, b in zip(low, wider, strict=True))].all():
+                    if not nodes[
+                        tuple(slice(a, b + 1) for a, b in zip(low, wider, strict=True))
+                    ].all():
                         break
                     high = wider
             covered[tuple(slice(a, b + 1) for a, b in zip(low, high, strict=True))] = True

@@ -1,7 +1,9 @@
-"""Planar robots of two links that move from one posture to another; angles of links are absolute, from +x.
+"""Planar robots of two links that move from one posture to another.
 
-A posture is given by its two link angles or, as in Curkovic et al. 2013, by where the end-effector is; of the two
-elbows that reach it, the one asked for is taken.
+Angles of links are absolute, from +x.
+
+A posture is given by its two link angles or, as in Curkovic et al. 2013, by where the end-effector
+is; of the two elbows that reach it, the one asked for is taken.
 """
 
 from typing import Annotated, ClassVar, Literal, Self
@@ -24,7 +26,8 @@ class Posture(Settings):
     Attributes:
         angles: Of the links, absolute, from +x [deg].
         tip: Of the end-effector (x, y) [length unit of the scene].
-        elbow: Which of the two elbows that reach `tip`: the one to its left or to its right, seen from the base.
+        elbow: Which of the two elbows that reach `tip`: the one to its left or to its right, seen
+            from the base.
     """
 
     angles: Annotated[Vector, Field(min_length=2, max_length=2)] | None = None
@@ -34,7 +37,9 @@ class Posture(Settings):
     @model_validator(mode="after")
     def _one_of_both(self) -> Self:
         if (self.angles is None) == (self.tip is None):
-            raise SettingError("angles", "given, or else tip with elbow", None if self.angles is None else "both")
+            raise SettingError(
+                "angles", "given, or else tip with elbow", None if self.angles is None else "both"
+            )
         if (self.tip is None) != (self.elbow is None):
             raise SettingError("elbow", "given with tip, and only then (left or right)", self.elbow)
         return self
@@ -54,7 +59,13 @@ class Posture(Settings):
             angles = np.array(self.angles)
         else:
             assert self.tip is not None
-            angles = _reach(f"{field}.tip", np.array(self.tip), base, lengths, 1.0 if self.elbow == "left" else -1.0)
+            angles = _reach(
+                f"{field}.tip",
+                np.array(self.tip),
+                base,
+                lengths,
+                1.0 if self.elbow == "left" else -1.0,
+            )
         for k, angle in enumerate(angles):
             if not 0.0 <= angle <= HALF_TURN:
                 must = "within [0, 180] deg, where the genes live"
@@ -68,7 +79,8 @@ class LinkMotion(Component):
     Attributes:
         q_start: Posture of every robot at the start.
         q_goal: At the goal.
-        stationary: Robots (counted from 0) that keep their start posture; their goal must be the same.
+        stationary: Robots (counted from 0) that keep their start posture; their goal must be the
+            same.
         security_margin: Clearance between bodies that the task requires [length unit].
         length_unit: Name of the scene's unit of length.
         obstacles: What does not move.
@@ -96,8 +108,13 @@ class LinkMotion(Component):
         found = []
         for name, postures in (("q_start", self.q_start), ("q_goal", self.q_goal)):
             if len(postures) != len(bases):
-                raise SettingError(f"scenario.{name}", f"one posture per robot ({len(bases)})", len(postures))
-            rows = [p.link_angles(f"scenario.{name}[{r}]", bases[r], lengths[r]) for r, p in enumerate(postures)]
+                raise SettingError(
+                    f"scenario.{name}", f"one posture per robot ({len(bases)})", len(postures)
+                )
+            rows = [
+                p.link_angles(f"scenario.{name}[{r}]", bases[r], lengths[r])
+                for r, p in enumerate(postures)
+            ]
             found.append(np.array(rows))
         for robot in self.stationary:
             if not 0 <= robot < len(bases):
@@ -108,7 +125,9 @@ class LinkMotion(Component):
         return found[0], found[1]
 
 
-def _reach(field: str, tip: FloatArray, base: FloatArray, lengths: FloatArray, side: float) -> FloatArray:
+def _reach(
+    field: str, tip: FloatArray, base: FloatArray, lengths: FloatArray, side: float
+) -> FloatArray:
     """Return the link angles (2,) [deg] in [−180, 360) that bring the end-effector to a place."""
     x, y = tip - base
     squared = float(x * x + y * y)
@@ -118,7 +137,9 @@ def _reach(field: str, tip: FloatArray, base: FloatArray, lengths: FloatArray, s
         least, most = abs(first - second), first + second
         must = f"{least:g} to {most:g} away from the robot's base"
         raise SettingError(field, must, f"{float(np.sqrt(squared)):g} away")
-    bend = -side * acos(cosine)  # of the second link against the first: an elbow on the left bends to the right
+    bend = -side * acos(
+        cosine
+    )  # of the second link against the first: an elbow on the left bends to the right
     sine_bend = -side * np.sqrt(max(0.0, 1.0 - cosine * cosine))
     one = atan2(float(y), float(x)) - atan2(second * sine_bend, first + second * cosine)
     return np.array([one, one + bend]) / DEGREE

@@ -13,8 +13,8 @@ class Mission(Component):
     Attributes:
         grid: The floor; its goal is where the platform is expected to dock.
         docking: The task of the arm, in a plane whose origin is at `task_origin`.
-        task_origin: Where on the floor the task's X = 0 is (x, y); X points along x, the task's Y = 0 is the height of
-            the arm's first joint [length unit].
+        task_origin: Where on the floor the task's X = 0 is (x, y); X points along x, the task's Y =
+            0 is the height of the arm's first joint [length unit].
         travel_posture: θ1, θ2, θ3 while the platform drives [deg].
     """
 

@@ -22,7 +22,8 @@ class NamedObstacle(Settings):
     """What all obstacles have.
 
     Attributes:
-        name: By which contacts, objects and verdicts speak of it; without one it is `obstacle_1` and so on.
+        name: By which contacts, objects and verdicts speak of it; without one it is `obstacle_1`
+            and so on.
     """
 
     name: str = ""
@@ -77,10 +78,12 @@ class HalfSpaceObstacle(NamedObstacle):
 
 
 class EllipseObstacle(NamedObstacle):
-    """An ellipse in the plane with its inside; in space an ellipsoid whose third semi-axis, along z, is the second one.
+    """An ellipse in the plane with its inside.
 
-    The third semi-axis decides nothing for links that move in the plane of the centre: in a plane of symmetry of a
-    convex body, distances are those of its section.
+    In space an ellipsoid whose third semi-axis, along z, is the second one.
+
+    The third semi-axis decides nothing for links that move in the plane of the centre: in a plane
+    of symmetry of a convex body, distances are those of its section.
 
     Attributes:
         center: Of the ellipse.
@@ -95,7 +98,12 @@ class EllipseObstacle(NamedObstacle):
 
 
 Obstacle = Annotated[
-    SphereObstacle | BoxObstacle | CapsuleObstacle | CylinderObstacle | HalfSpaceObstacle | EllipseObstacle,
+    SphereObstacle
+    | BoxObstacle
+    | CapsuleObstacle
+    | CylinderObstacle
+    | HalfSpaceObstacle
+    | EllipseObstacle,
     Field(discriminator="shape"),
 ]
 
@@ -106,10 +114,11 @@ class ObstacleTable(NamedTuple):
     Attributes:
         kind: (obstacles,) SPHERE, BOX, CAPSULE, CYLINDER, HALF_SPACE or ELLIPSE.
         center: (obstacles, 3); of a half-space a point of its boundary.
-        rotation: (obstacles, 9) from the obstacle's frame to the world, row by row; capsules and cylinders lie along
-            their z axis, a half-space is all points with z ≤ 0.
-        size: (obstacles, 3): radius | half the edges | radius, half the length, 0 (capsules and cylinders; the length
-            of a capsule is that of its segment) | unused (half-spaces) | semi-axes.
+        rotation: (obstacles, 9) from the obstacle's frame to the world, row by row; capsules and
+            cylinders lie along their z axis, a half-space is all points with z ≤ 0.
+        size: (obstacles, 3): radius | half the edges | radius, half the length, 0 (capsules and
+            cylinders; the length of a capsule is that of its segment) | unused (half-spaces) |
+            semi-axes.
     """
 
     kind: np.ndarray
@@ -143,7 +152,11 @@ def obstacle_table(obstacles: tuple[Any, ...]) -> ObstacleTable:
     )
     for k, obstacle in enumerate(obstacles):
         if isinstance(obstacle, SphereObstacle):
-            table.kind[k], table.center[k], table.size[k, 0] = SPHERE, _point(obstacle.center), obstacle.radius
+            table.kind[k], table.center[k], table.size[k, 0] = (
+                SPHERE,
+                _point(obstacle.center),
+                obstacle.radius,
+            )
         elif isinstance(obstacle, BoxObstacle):
             table.kind[k], table.center[k] = BOX, _point(obstacle.center)
             table.size[k] = 0.5 * np.array([*obstacle.size, 1.0][:3])
@@ -155,14 +168,18 @@ def obstacle_table(obstacles: tuple[Any, ...]) -> ObstacleTable:
         elif isinstance(obstacle, HalfSpaceObstacle):
             axis, length = _direction(_point(obstacle.normal))
             if length == 0.0:
-                raise SettingError(f"scenario.obstacles[{k}].normal", "a direction", list(obstacle.normal))
+                raise SettingError(
+                    f"scenario.obstacles[{k}].normal", "a direction", list(obstacle.normal)
+                )
             table.kind[k], table.center[k] = HALF_SPACE, _point(obstacle.point)
             table.rotation[k] = _z_along(axis).ravel()
         else:
             start, end = _point(obstacle.start), _point(obstacle.end)
             axis, length = _direction(end - start)
             if length == 0.0:
-                raise SettingError(f"scenario.obstacles[{k}].end", "another point than start", list(obstacle.end))
+                raise SettingError(
+                    f"scenario.obstacles[{k}].end", "another point than start", list(obstacle.end)
+                )
             table.kind[k] = CYLINDER if isinstance(obstacle, CylinderObstacle) else CAPSULE
             table.center[k] = 0.5 * (start + end)
             table.size[k, :2] = obstacle.radius, 0.5 * length
@@ -196,6 +213,12 @@ def _z_along(axis: FloatArray) -> FloatArray:
     """Return a rotation whose z axis is the given unit vector."""
     x, y, z = axis
     helper = np.array([1.0, 0.0, 0.0]) if abs(x) < 0.9 else np.array([0.0, 1.0, 0.0])
-    first = np.array([helper[1] * z - helper[2] * y, helper[2] * x - helper[0] * z, helper[0] * y - helper[1] * x])
+    first = np.array(
+        [
+            helper[1] * z - helper[2] * y,
+            helper[2] * x - helper[0] * z,
+            helper[0] * y - helper[1] * x,
+        ]
+    )
     first /= np.sqrt(first[0] * first[0] + first[1] * first[1] + first[2] * first[2])
     return np.column_stack([first, np.cross(axis, first), axis])

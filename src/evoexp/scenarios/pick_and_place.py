@@ -12,13 +12,16 @@ Point2 = tuple[float, float]
 
 
 class PickAndPlace(Component):
-    """Start posture, via point and goal point of one planar arm's tip (Lavoie & Boudreau 2001, section 4).
+    """Start posture, via point and goal point of one planar arm's tip.
+
+    Lavoie & Boudreau 2001, section 4.
 
     Attributes:
         q_start: Posture at the start, joint angles relative to the link before [rad].
         via_point: Where the tip shall be at the end of the first sub-path (x, y) [length unit].
         goal_point: Where it shall be at the end of the second one.
-        box_x: Least and greatest x of the box in which the tip must be at the end of the second sub-path.
+        box_x: Least and greatest x of the box in which the tip must be at the end of the second
+            sub-path.
         box_y: The same of y.
         obstacle_shift: By how much obstacles and box are moved together (dx, dy).
         security_margin: Clearance between bodies that the task requires.
@@ -43,7 +46,9 @@ class PickAndPlace(Component):
         for name in ("box_x", "box_y"):
             least, greatest = getattr(self, name)
             if not least < greatest:
-                raise SettingError(name, "[least, greatest] with least < greatest", [least, greatest])
+                raise SettingError(
+                    name, "[least, greatest] with least < greatest", [least, greatest]
+                )
         return self
 
     @property

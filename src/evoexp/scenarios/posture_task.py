@@ -1,7 +1,9 @@
-"""What an arm shall do among obstacles: a start posture, and phases that each end where a goal is met.
+"""What an arm shall do among obstacles.
 
-A task of one phase is a reaching task; manoeuvres such as pick-and-place are a list of them (Corsépius 2001, section
-4.3: fitness functions and termination criteria together make a manoeuvre).
+A start posture, and phases that each end where a goal is met.
+
+A task of one phase is a reaching task; manoeuvres such as pick-and-place are a list of them
+(Corsépius 2001, section 4.3: fitness functions and termination criteria together make a manoeuvre).
 """
 
 from typing import Annotated, ClassVar, Literal, Self
@@ -60,14 +62,16 @@ AnyGoal = Annotated[PointGoal | PoseGoal | SurfaceGoal | ShiftGoal, Field(discri
 class Phase(Settings):
     """One manoeuvre.
 
-    What is controlled is the tool's frame, or, while an object is held, the object's: its centre, its own axes.
+    What is controlled is the tool's frame, or, while an object is held, the object's: its centre,
+    its own axes.
 
     Attributes:
         name: For reports.
         goal: Where it ends.
         terms: Cost terms that count in it; empty: all of the objective.
         contacts: Pairs of names (bodies, obstacles) that may touch in it.
-        then: Whether the robot takes hold of an object when the goal is met, or lets go of what it holds.
+        then: Whether the robot takes hold of an object when the goal is met, or lets go of what it
+            holds.
         object: What it takes hold of.
     """
 
@@ -91,7 +95,8 @@ class PostureTask(Component):
         up: The direction that counts as up.
         security_margin: Clearance between bodies that the task requires [length unit].
         length_unit: Name of the scene's unit of length.
-        check_reach: Whether a goal that no posture can reach is refused; false: it is searched all the same.
+        check_reach: Whether a goal that no posture can reach is refused; false: it is searched all
+            the same.
         obstacles: What stands around, things to be grasped included.
     """
 
@@ -112,14 +117,24 @@ class PostureTask(Component):
     def _holds_one_thing_at_a_time(self) -> Self:
         for k, name in enumerate(self.names):
             if name in self.names[:k]:
-                raise SettingError(f"obstacles[{k}].name", "a name that no other obstacle has", name)
+                raise SettingError(
+                    f"obstacles[{k}].name", "a name that no other obstacle has", name
+                )
         held = ""
         for k, phase in enumerate(self.phases):
             field = f"phases[{k}]"
             if (phase.then == "attach") != bool(phase.object):
-                raise SettingError(f"{field}.object", "given with then: attach, and only then", phase.object or None)
+                raise SettingError(
+                    f"{field}.object",
+                    "given with then: attach, and only then",
+                    phase.object or None,
+                )
             if phase.then == "attach" and held:
-                raise SettingError(f"{field}.then", f"detach before anything else is taken ({held} is held)", "attach")
+                raise SettingError(
+                    f"{field}.then",
+                    f"detach before anything else is taken ({held} is held)",
+                    "attach",
+                )
             if phase.then == "detach" and not held:
                 raise SettingError(f"{field}.then", "attach in a phase before", "detach")
             if isinstance(phase.goal, SurfaceGoal) and phase.goal.object == held:
@@ -129,7 +144,9 @@ class PostureTask(Component):
             if phase.then == "attach":
                 shape = self.obstacles[self.index_of(phase.object, f"{field}.object")].shape
                 if shape in ("half_space", "ellipse"):
-                    raise SettingError(f"{field}.object", "a sphere, box, capsule or cylinder", f"a {shape}")
+                    raise SettingError(
+                        f"{field}.object", "a sphere, box, capsule or cylinder", f"a {shape}"
+                    )
             held = {"attach": phase.object, "detach": ""}.get(phase.then, held)
         if not any(self.up):
             raise SettingError("up", "a direction, not (0, 0, 0)", list(self.up))
@@ -138,7 +155,9 @@ class PostureTask(Component):
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the obstacles."""
-        return tuple(obstacle.name or f"obstacle_{k + 1}" for k, obstacle in enumerate(self.obstacles))
+        return tuple(
+            obstacle.name or f"obstacle_{k + 1}" for k, obstacle in enumerate(self.obstacles)
+        )
 
     def index_of(self, name: str, field: str) -> int:
         """Return the index of an obstacle.

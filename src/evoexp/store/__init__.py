@@ -1,1 +1,4 @@
-"""What is kept: run directories, self-contained logs, derived tables, and the digests that compare them."""
+"""What is kept: run directories, self-contained logs, derived tables.
+
+And the digests that compare them.
+"""

@@ -1,6 +1,9 @@
-"""The bytes of an MCAP, checked as a whole before anything in them is believed, then walked record by record.
+"""The bytes of an MCAP, checked as a whole before anything in them is believed.
 
-mcap's own readers check neither the summary section nor that the file ends where it should, and cost ten times as much.
+Then walked record by record.
+
+mcap's own readers check neither the summary section nor that the file ends where it should, and
+cost ten times as much.
 """
 
 import struct
@@ -69,11 +72,13 @@ class Container(NamedTuple):
 
 @contextmanager
 def unreadable_is_corrupt(name: str) -> Iterator[None]:
-    """Turn whatever decoding damaged or foreign bytes can raise into one line that names the log."""
+    """Turn any error of decoding damaged or foreign bytes into one line that names the log."""
     try:
         yield
     except _UNREADABLE as error:
-        raise CorruptLog(f"{name}: unreadable: {type(error).__name__}: {' '.join(str(error).split())}") from error
+        raise CorruptLog(
+            f"{name}: unreadable: {type(error).__name__}: {' '.join(str(error).split())}"
+        ) from error
 
 
 def check(content: bytes, name: str) -> Container:
@@ -88,10 +93,16 @@ def check(content: bytes, name: str) -> Container:
         raise CorruptLog(f"{name}: not an MCAP file")
     smallest = len(_MAGIC) + _DATA_END.size + _TAIL
     if len(content) < smallest or content[-len(_MAGIC) :] != _MAGIC:
-        raise CorruptLog(f"{name}: cut or overwritten: {len(content)} bytes that do not end as an MCAP ends")
-    opcode, length, summary_start, _, summary_crc = _FOOTER.unpack_from(content, len(content) - _TAIL)
+        raise CorruptLog(
+            f"{name}: cut or overwritten: {len(content)} bytes that do not end as an MCAP ends"
+        )
+    opcode, length, summary_start, _, summary_crc = _FOOTER.unpack_from(
+        content, len(content) - _TAIL
+    )
     data_end = summary_start - _DATA_END.size
-    if (opcode, length) != (Opcode.FOOTER, 20) or not len(_MAGIC) <= data_end <= len(content) - smallest + len(_MAGIC):
+    if (opcode, length) != (Opcode.FOOTER, 20) or not len(_MAGIC) <= data_end <= len(
+        content
+    ) - smallest + len(_MAGIC):
         raise CorruptLog(f"{name}: altered: its footer is damaged")
     view = memoryview(content)
     opcode, length, data_crc = _DATA_END.unpack_from(content, data_end)

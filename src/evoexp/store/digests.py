@@ -1,4 +1,7 @@
-"""The chain of digests that tells whether two runs did the same, and since which generation they did not."""
+"""The chain of digests that tells whether two runs did the same.
+
+And since which generation they did not.
+"""
 
 import ctypes
 from collections.abc import Callable
@@ -11,7 +14,9 @@ from numpy.typing import NDArray
 
 
 class Chain:
-    """xxh3-128 chain over a replicate: link_g = xxh3_128(link_{g-1} ‖ costs ‖ best ‖ generator state).
+    """xxh3-128 chain over a replicate.
+
+    Link_g = xxh3_128(link_{g-1} ‖ costs ‖ best ‖ generator state).
 
     The generator is only read, never drawn from.
     """
@@ -55,8 +60,8 @@ class Chain:
 def array_bytes(array: NDArray[Any]) -> bytes:
     """Return an array's values as bytes: C order, float64 or int64, little-endian.
 
-    Every NaN becomes the one positive quiet NaN, because neither IEEE 754 nor LLVM says which payload an operation
-    yields. The sign of a zero is specified, so -0.0 stays distinct from 0.0.
+    Every NaN becomes the one positive quiet NaN, because neither IEEE 754 nor LLVM says which
+    payload an operation yields. The sign of a zero is specified, so -0.0 stays distinct from 0.0.
     """
     if array.dtype.char != "d":
         array = array.astype(np.float64 if array.dtype.kind == "f" else np.int64)
@@ -67,19 +72,29 @@ def array_bytes(array: NDArray[Any]) -> bytes:
 
 
 def state_bytes(bit_generator: np.random.PCG64) -> bytes:
-    """Return the state of a PCG64: state (16), increment (16), has_uint32 (4), uinteger (4), all little-endian."""
+    """Return the state of a PCG64.
+
+    State (16), increment (16), has_uint32 (4), uinteger (4), all little-endian.
+    """
     state: Any = bit_generator.state
     words = state["state"]
     half = state["has_uint32"] | state["uinteger"] << 32
     return b"".join(
-        (words["state"].to_bytes(16, "little"), words["inc"].to_bytes(16, "little"), half.to_bytes(8, "little"))
+        (
+            words["state"].to_bytes(16, "little"),
+            words["inc"].to_bytes(16, "little"),
+            half.to_bytes(8, "little"),
+        )
     )
 
 
 def state_reader(bit_generator: np.random.PCG64) -> Callable[[], bytes]:
-    """Return a function that gives `state_bytes` of this generator, ten times faster where numpy's layout is known.
+    """Return a function that gives `state_bytes` of this generator.
 
-    numpy publishes the address of the state but not its layout, so the layout is tried on a generator of our own first.
+    Ten times faster where numpy's layout is known.
+
+    numpy publishes the address of the state but not its layout, so the layout is tried on a
+    generator of our own first.
     """
     return _read_memory(bit_generator) if _layout_is_known() else lambda: state_bytes(bit_generator)
 
@@ -87,7 +102,9 @@ def state_reader(bit_generator: np.random.PCG64) -> Callable[[], bytes]:
 def _read_memory(bit_generator: np.random.PCG64) -> Callable[[], bytes]:
     # struct {struct {uint128 state, increment} *words; int has_uint32; uint32 uinteger;}
     address: int = bit_generator.ctypes.state_address
-    words = memoryview((ctypes.c_uint8 * 32).from_address(ctypes.c_void_p.from_address(address).value or 0))
+    words = memoryview(
+        (ctypes.c_uint8 * 32).from_address(ctypes.c_void_p.from_address(address).value or 0)
+    )
     half = memoryview((ctypes.c_uint8 * 8).from_address(address + ctypes.sizeof(ctypes.c_void_p)))
 
     def read(owner: np.random.PCG64 = bit_generator) -> bytes:  # the owner keeps the memory alive

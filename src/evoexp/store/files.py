@@ -12,10 +12,13 @@ _SUFFIX = ".tmp"
 
 
 def write_files(contents: Mapping[Path, bytes]) -> None:
-    """Write files, each atomically and durably: temporary file, fsync, rename, and then fsync of the directory.
+    """Write files, each atomically and durably.
 
-    No file is renamed before its bytes are on the disk: a name always means a whole file. A batch is cheaper than its
-    files one by one: they are synced at once, which the disk answers together, and the directory once.
+    Temporary file, fsync, rename, and then fsync of the directory.
+
+    No file is renamed before its bytes are on the disk: a name always means a whole file. A batch
+    is cheaper than its files one by one: they are synced at once, which the disk answers together,
+    and the directory once.
     """
     files = [(path.with_name(f".{path.name}.{os.getpid()}{_SUFFIX}"), path) for path in contents]
     renamed = 0
@@ -48,7 +51,10 @@ def _write_all(paths: Sequence[Path], contents: Sequence[bytes]) -> None:
 
 @cache
 def _threads() -> ThreadPoolExecutor:
-    """Return the threads that write, which stay: starting them takes as long as syncing two files."""
+    """Return the threads that write, which stay.
+
+    Starting them takes as long as syncing two files.
+    """
     return ThreadPoolExecutor(NUM_THREADS, "write")
 
 
@@ -61,7 +67,10 @@ def _write(path: Path, content: bytes) -> None:
 
 
 def sync_directory(path: Path) -> None:
-    """Make renames and new names in a directory durable; where the system cannot open directories, do nothing."""
+    """Make renames and new names in a directory durable.
+
+    Where the system cannot open directories, do nothing.
+    """
     with suppress(PermissionError):  # Windows
         descriptor = os.open(path, os.O_RDONLY)
         try:

@@ -24,7 +24,9 @@ from evoexp.store.messages import (
 )
 
 LIBRARY = "evoexp"  # pinned, so that a log's bytes do not tell mcap's version
-SCHEMA_VERSION = 2  # of everything a log holds; raised when a reader of the old version would misunderstand
+SCHEMA_VERSION = (
+    2  # of everything a log holds; raised when a reader of the old version would misunderstand
+)
 RUN = "evoexp.run"
 SUMMARY = "evoexp.summary"
 ENVIRONMENT = "evoexp.environment"
@@ -40,7 +42,10 @@ _TICK = 1_000_000_000  # [ns] the synthetic clock: one second per generation
 
 
 class _Pending(NamedTuple):
-    """What is kept of a generation that waits to be encoded; nothing of the planner's memory, which is large."""
+    """What is kept of a generation that waits to be encoded.
+
+    Nothing of the planner's memory, which is large.
+    """
 
     row: dict[str, Any]
     costs: bytes
@@ -56,7 +61,10 @@ class Finished(NamedTuple):
 
 
 class ContentDigest:
-    """xxh3-128 over (topic, schema, encoding, log_time, sequence, data) of every message, in the order written."""
+    """xxh3-128 over (topic, schema, encoding, log_time, sequence, data) of every message.
+
+    In the order written.
+    """
 
     def __init__(self) -> None:
         """Start with no message."""
@@ -80,14 +88,21 @@ def array_file(array: NDArray[Any]) -> bytes:
     """Return an array as the bytes of a `.npy` file: C order, float64 or int64, little-endian."""
     kind = "<f8" if array.dtype.kind == "f" else "<i8"
     buffer = io.BytesIO()
-    np.lib.format.write_array(buffer, np.ascontiguousarray(array, dtype=kind), version=(1, 0), allow_pickle=False)
+    np.lib.format.write_array(
+        buffer, np.ascontiguousarray(array, dtype=kind), version=(1, 0), allow_pickle=False
+    )
     return buffer.getvalue()
 
 
 class _Channel:
-    """A channel of the log: its id, its identity in the content digest, and how many messages it has."""
+    """A channel of the log: its id, its identity in the content digest.
 
-    def __init__(self, writer: Writer, topic: str, record: type, terms: tuple[str, ...] = ()) -> None:
+    And how many messages it has.
+    """
+
+    def __init__(
+        self, writer: Writer, topic: str, record: type, terms: tuple[str, ...] = ()
+    ) -> None:
         name = f"evoexp.{record.__name__.removesuffix('Row')}"
         schema_id = writer.register_schema(name, "jsonschema", json_schema(record, terms))
         self.id = writer.register_channel(topic, "json", schema_id)
@@ -98,8 +113,8 @@ class _Channel:
 class Log:
     """The log of one replicate: written generation by generation, finished into bytes.
 
-    The same content gives the same messages, chain and digests; wall and CPU times and the environment are metadata
-    and enter none of them.
+    The same content gives the same messages, chain and digests; wall and CPU times and the
+    environment are metadata and enter none of them.
     """
 
     def __init__(
@@ -115,11 +130,13 @@ class Log:
 
         Args:
             condition_id: Full hash of the condition, 64 hex digits.
-            config_json: The condition's configuration, from which alone the replicate can be run again.
+            config_json: The condition's configuration, from which alone the replicate can be run
+                again.
             replicate: Index of the replicate.
             rng: The replicate's generator, whose state enters the chain; never drawn from here.
             attachments: Further files that the condition needs, by name.
-            environment: Versions, CPU features and what else may explain a difference; any JSON values.
+            environment: Versions, CPU features and what else may explain a difference; any JSON
+                values.
 
         Raises:
             ValueError: An attachment called like the configuration.
@@ -134,7 +151,9 @@ class Log:
         self._last: Generation | None = None
         self._pending: list[_Pending] = []
         self._best_bytes = b""  # array_bytes of the best so far
-        self._best = self._written = b""  # of the generation encoded last, and of the last solution written
+        self._best = self._written = (
+            b""  # of the generation encoded last, and of the last solution written
+        )
         self._best_cost = self._written_cost = np.inf
         self._buffer = io.BytesIO()
         self._writer = Writer(
@@ -147,7 +166,11 @@ class Log:
             enable_data_crcs=True,
         )
         self._writer.start(profile="", library=LIBRARY)
-        run = {"condition": condition_id, "replicate": str(replicate), "schema_version": str(SCHEMA_VERSION)}
+        run = {
+            "condition": condition_id,
+            "replicate": str(replicate),
+            "schema_version": str(SCHEMA_VERSION),
+        }
         self._writer.add_metadata(RUN, run)
         self._attach(CONFIG, config_json)
         for name, data in sorted((attachments or {}).items()):
@@ -156,10 +179,11 @@ class Log:
             self._attach(name, data)
 
     def write(self, generation: Generation) -> None:
-        """Append a generation, and its best solution where that is strictly better than the last one written.
+        """Append a generation, and its best solution where that is better than the last written.
 
-        What the planner may change is copied here; encoding waits for a batch of generations, because between kernels
-        its code would run from a cold cache each time (a fifth of a replicate's time).
+        What the planner may change is copied here; encoding waits for a batch of generations,
+        because between kernels its code would run from a cold cache each time (a fifth of a
+        replicate's time).
         """
         if generation.terms.keys() != self._terms.keys():
             self._terms = {name: TERM + name for name in sorted(generation.terms)}
@@ -208,7 +232,10 @@ class Log:
         if self._last is None:
             raise ValueError("finish: no generation was written")
         if (summary.condition, summary.replicate) != (self._condition_id, self._replicate):
-            raise ValueError(f"finish: summary of {summary.condition[:12]} replicate {summary.replicate}, not of this")
+            raise ValueError(
+                f"finish: summary of {summary.condition[:12]} replicate {summary.replicate}, not "
+                "of this"
+            )
         if self._best != self._written or self._best_cost != self._written_cost:
             self._write_solution(self._last.index)
         summary = summary._replace(digest=self._chain.finish(self._last.population))
@@ -220,7 +247,9 @@ class Log:
 
     def _attach(self, name: str, data: bytes) -> None:
         media_type = "application/json" if name.endswith(".json") else "application/octet-stream"
-        self._writer.add_attachment(create_time=0, log_time=0, name=name, media_type=media_type, data=data)
+        self._writer.add_attachment(
+            create_time=0, log_time=0, name=name, media_type=media_type, data=data
+        )
 
     def _write_solution(self, index: int) -> None:
         self._written, self._written_cost = self._best, self._best_cost

@@ -1,7 +1,7 @@
 """Logs read back: whole and verified, or only the part that is asked for.
 
-Every reader first checks the whole file against its checksums (0.1 ms per log), so that none is ever silently wrong;
-only `read_log` also decodes every message and compares the content digest.
+Every reader first checks the whole file against its checksums (0.1 ms per log), so that none is
+ever silently wrong; only `read_log` also decodes every message and compares the content digest.
 """
 
 import io
@@ -15,13 +15,28 @@ from typing import Any, NamedTuple
 import numpy as np
 import orjson
 from mcap.opcode import Opcode
-from mcap.records import Attachment, AttachmentIndex, Channel, ChunkIndex, Metadata, MetadataIndex, Schema
+from mcap.records import (
+    Attachment,
+    AttachmentIndex,
+    Channel,
+    ChunkIndex,
+    Metadata,
+    MetadataIndex,
+    Schema,
+)
 from numpy.typing import NDArray
 
 from evoexp.errors import CorruptLog
 from evoexp.records import FrontRow, GenerationRow, ReplicateSummary, SolutionRow
 from evoexp.store import log as written
-from evoexp.store.container import Container, Message, check, chunk_messages, parse, unreadable_is_corrupt
+from evoexp.store.container import (
+    Container,
+    Message,
+    check,
+    chunk_messages,
+    parse,
+    unreadable_is_corrupt,
+)
 from evoexp.store.messages import (
     NONFINITE,
     TERM,
@@ -70,7 +85,8 @@ def read_log(source: Source) -> LogContents:
         source: Path of a log, or its bytes.
 
     Raises:
-        CorruptLog: The log is empty, cut, altered, foreign, of a newer schema version, or cannot be opened.
+        CorruptLog: The log is empty, cut, altered, foreign, of a newer schema version, or cannot be
+            opened.
     """
     container, name = _open(source)
     with unreadable_is_corrupt(name):
@@ -80,13 +96,17 @@ def read_log(source: Source) -> LogContents:
         messages, content_digest = _messages(container, index)
         metadata = _metadata(container, index, written.SUMMARY, name)
         if content_digest != decode_values(metadata)[written.CONTENT_DIGEST]:
-            raise CorruptLog(f"{name}: altered: its messages do not give the content digest it carries")
+            raise CorruptLog(
+                f"{name}: altered: its messages do not give the content digest it carries"
+            )
         summary = _summary(metadata, run, name)
         return LogContents(
             condition_id=run["condition"],
             config_json=attachments.pop(written.CONFIG),
             replicate=summary.replicate,
-            generations=[decode_generation(data) for data in messages.get(written.GENERATION_TOPIC, ())],
+            generations=[
+                decode_generation(data) for data in messages.get(written.GENERATION_TOPIC, ())
+            ],
             solutions=[decode_solution(data) for data in messages.get(written.SOLUTION_TOPIC, ())],
             fronts=[decode_front(data) for data in messages.get(written.FRONT_TOPIC, ())],
             summary=summary,
@@ -120,7 +140,9 @@ def _indexed(source: Source) -> Iterator[tuple[Container, "_Index"]]:
 
 
 def read_solution(source: Source) -> SolutionRow:
-    """Return a log's last solution, the best of the replicate; only the chunk that holds it is decompressed.
+    """Return a log's last solution, the best of the replicate.
+
+    Only the chunk that holds it is decompressed.
 
     Raises:
         CorruptLog: As `read_log`, except that the content digest is not compared.
@@ -128,7 +150,9 @@ def read_solution(source: Source) -> SolutionRow:
     with _indexed(source) as (container, index):
         channel_id = index.channels[written.SOLUTION_TOPIC].id
         last = [chunk for chunk in index.chunks if channel_id in chunk.message_index_offsets][-1]
-        solutions = [data for channel, _, _, data in container.messages_at(last) if channel == channel_id]
+        solutions = [
+            data for channel, _, _, data in container.messages_at(last) if channel == channel_id
+        ]
         return decode_solution(solutions[-1])
 
 
@@ -139,7 +163,9 @@ def array_names(source: Source) -> list[str]:
         CorruptLog: As `read_log`, except that the content digest is not compared.
     """
     with _indexed(source) as (_, index):
-        return sorted(n.removesuffix(written.ARRAY) for n in index.attachments if n.endswith(written.ARRAY))
+        return sorted(
+            n.removesuffix(written.ARRAY) for n in index.attachments if n.endswith(written.ARRAY)
+        )
 
 
 def read_array(source: Source, array: str) -> NDArray[Any]:
@@ -167,7 +193,9 @@ def decode_array(data: bytes) -> NDArray[Any]:
 
 
 def generation_columns(source: Source) -> dict[str, NDArray[Any]]:
-    """Return the records on /generation, without their chain, as one array per field and term, each (generations,).
+    """Return the records on /generation, without their chain, as one array per field and term.
+
+    Each (generations,).
 
     A term that a generation does not have is NaN there.
 
@@ -181,7 +209,9 @@ def generation_columns(source: Source) -> dict[str, NDArray[Any]]:
 
 
 def _columns(rows: list[dict[str, Any]]) -> dict[str, NDArray[Any]]:
-    kinds = {name: DTYPES[kind] for name, kind in field_types(GenerationRow).items() if name != "chain"}
+    kinds = {
+        name: DTYPES[kind] for name, kind in field_types(GenerationRow).items() if name != "chain"
+    }
     for row in rows:
         if NONFINITE in row:
             restore(row)
@@ -192,8 +222,13 @@ def _columns(rows: list[dict[str, Any]]) -> dict[str, NDArray[Any]]:
         absent = dict.fromkeys((name for name in names if name.startswith(TERM)), np.nan)
         rows = [absent | row for row in rows]
     kinds |= dict.fromkeys(sorted(name for name in names if name.startswith(TERM)), np.float64)
-    values = zip(*map(operator.itemgetter(*kinds), rows), strict=True) if rows else [()] * len(kinds)
-    return {name: np.array(column, dtype=kinds[name]) for name, column in zip(kinds, values, strict=True)}
+    values = (
+        zip(*map(operator.itemgetter(*kinds), rows), strict=True) if rows else [()] * len(kinds)
+    )
+    return {
+        name: np.array(column, dtype=kinds[name])
+        for name, column in zip(kinds, values, strict=True)
+    }
 
 
 def _open(source: Source) -> tuple[Container, str]:
@@ -233,15 +268,21 @@ def _metadata(container: Container, index: _Index, record: str, name: str) -> di
 
 
 def _run(container: Container, index: _Index, name: str) -> dict[str, str]:
-    """Return the metadata that says whose log this is, or raise for a foreign one or one of another version."""
+    """Return the metadata that says whose log this is.
+
+    Or raise for a foreign one or one of another version.
+    """
     if written.RUN not in index.metadata:
-        raise CorruptLog(f"{name}: not a log of evoexp: an MCAP without metadata record '{written.RUN}'")
+        raise CorruptLog(
+            f"{name}: not a log of evoexp: an MCAP without metadata record '{written.RUN}'"
+        )
     run = _metadata(container, index, written.RUN, name)
     version = int(run["schema_version"])
     if version != written.SCHEMA_VERSION:
         age = "a newer" if version > written.SCHEMA_VERSION else "an older"
         raise CorruptLog(
-            f"{name}: written by {age} evoexp: schema version {version}, this one reads {written.SCHEMA_VERSION}"
+            f"{name}: written by {age} evoexp: schema version {version}, this one reads "
+            f"{written.SCHEMA_VERSION}"
         )
     return run
 
@@ -258,7 +299,9 @@ def _bodies(container: Container, opcode: int, record: Any) -> Iterator[Any]:
 
 
 def _all_messages(container: Container) -> Iterator[Message]:
-    chunks: Iterable[bytes] = (body for opcode, body in container.data_section() if opcode == Opcode.CHUNK)
+    chunks: Iterable[bytes] = (
+        body for opcode, body in container.data_section() if opcode == Opcode.CHUNK
+    )
     return (message for chunk in chunks for message in chunk_messages(chunk))
 
 

@@ -1,4 +1,7 @@
-"""Where something was computed: versions, processor, code. Noted, compared, and never part of an identity."""
+"""Where something was computed: versions, processor, code.
+
+Noted, compared, and never part of an identity.
+"""
 
 import os
 import platform
@@ -31,7 +34,8 @@ _DISTRIBUTIONS = (
     "pyarrow",
 )
 
-# Those that decide which instructions a compiler may choose; the rest of the flags says nothing about numbers.
+# Those that decide which instructions a compiler may choose; the rest of the flags says nothing
+# about numbers.
 _VECTOR_PREFIXES = ("sse", "ssse", "avx", "fma", "f16c", "bmi", "amx", "asimd", "sve", "neon", "fp")
 
 
@@ -48,13 +52,19 @@ class Difference(NamedTuple):
 
 
 def manifest(condition_id: str) -> dict[str, Any]:
-    """Return what `manifest.json` says of a run: its full hash, the environment, the state of the code."""
+    """Return what `manifest.json` says of a run.
+
+    Its full hash, the environment, the state of the code.
+    """
     return {"condition": condition_id, **environment(), "git": git_state()}
 
 
 @cache
 def environment() -> dict[str, Any]:
-    """Return versions, platform and processor, without importing any of the packages; 15 ms, once per process."""
+    """Return versions, platform and processor, without importing any of the packages.
+
+    15 ms, once per process.
+    """
     return {
         "versions": {"python": platform.python_version(), **_versions()},
         "platform": {
@@ -68,7 +78,10 @@ def environment() -> dict[str, Any]:
 
 @cache
 def git_state() -> dict[str, Any] | None:
-    """Return commit and dirty flag of the checkout that this package is imported from; None where it is none."""
+    """Return commit and dirty flag of the checkout that this package is imported from.
+
+    None where it is none.
+    """
     root = Path(__file__).resolve().parents[3]  # <root>/src/evoexp/store/manifest.py
     if not (root / ".git").exists() or not (root / "pyproject.toml").exists():
         return None
@@ -80,8 +93,8 @@ def git_state() -> dict[str, Any] | None:
 def differences(was: Mapping[str, Any], now: Mapping[str, Any]) -> list[Difference]:
     """Return the entries in which two manifests or environments differ, in alphabetical order.
 
-    Only what both describe is compared section by section: a log's environment has no condition and no git state.
-    Of two lists (the features of processors) only what the other lacks is named.
+    Only what both describe is compared section by section: a log's environment has no condition and
+    no git state. Of two lists (the features of processors) only what the other lacks is named.
     """
     shared = was.keys() & now.keys() - {"condition"}
     before = dict(_leaves({name: was[name] for name in shared}))
@@ -124,7 +137,9 @@ def _cpu() -> dict[str, Any]:
     pairs = (line.partition(":") for line in text.splitlines())
     entries = {name.strip().lower(): value.strip() for name, _, value in pairs}
     flags = (entries.get("flags") or entries.get("features") or "").split()
-    features = sorted(flag for flag in flags if flag.startswith(_VECTOR_PREFIXES) and not flag.startswith("fpu"))
+    features = sorted(
+        flag for flag in flags if flag.startswith(_VECTOR_PREFIXES) and not flag.startswith("fpu")
+    )
     return {"name": entries.get("model name") or platform.processor() or None, "features": features}
 
 
@@ -132,7 +147,9 @@ def _git(root: Path, *arguments: str) -> str | None:
     command = ["git", "--no-optional-locks", "-C", str(root), *arguments]
     clean = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=False, env=clean)
+        done = subprocess.run(
+            command, capture_output=True, text=True, timeout=10, check=False, env=clean
+        )
     except (OSError, subprocess.SubprocessError, ValueError):
         return None
     return done.stdout.strip() if done.returncode == 0 else None

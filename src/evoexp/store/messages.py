@@ -1,7 +1,9 @@
-"""Records as JSON and back: flat, fixed key order, and the non-finite numbers that JSON has no word for kept exactly.
+"""Records as JSON and back: flat, fixed key order.
 
-A non-finite number is written as null and named in `nonfinite`, a key that is there only when needed:
-`{"best_cost": "inf"}` for a field, `{"values": {"3": "nan"}}` for an element of an array.
+And the non-finite numbers that JSON has no word for kept exactly.
+
+A non-finite number is written as null and named in `nonfinite`, a key that is there only when
+needed: `{"best_cost": "inf"}` for a field, `{"values": {"3": "nan"}}` for an element of an array.
 """
 
 import math
@@ -12,7 +14,15 @@ from typing import Any, get_type_hints
 import numpy as np
 import orjson
 
-from evoexp.records import FloatArray, FrontRow, Generation, GenerationRow, ReplicateSummary, SolutionRow, flatten
+from evoexp.records import (
+    FloatArray,
+    FrontRow,
+    Generation,
+    GenerationRow,
+    ReplicateSummary,
+    SolutionRow,
+    flatten,
+)
 
 TERM = "term_"
 NONFINITE = "nonfinite"
@@ -28,15 +38,21 @@ _JSON_TYPES: dict[Any, dict[str, Any]] = {
 
 @cache
 def field_types(record: type) -> dict[str, Any]:
-    """Return a record's fields and their types in order, without `terms`, which becomes one field per term."""
+    """Return a record's fields and their types in order, without `terms`.
+
+    Which becomes one field per term.
+    """
     return {name: kind for name, kind in get_type_hints(record).items() if name != "terms"}
 
 
 @cache
 def json_schema(record: type, terms: tuple[str, ...] = ()) -> bytes:
-    """Return the JSON Schema of a record's messages, in the subset that Foxglove reads (one type per field).
+    """Return the JSON Schema of a record's messages, in the subset that Foxglove reads.
 
-    Any number may be null, which JSON Schema could only say with a union type; see the module's first lines.
+    One type per field.
+
+    Any number may be null, which JSON Schema could only say with a union type; see the module's
+    first lines.
     """
     properties = {name: _JSON_TYPES[kind] for name, kind in field_types(record).items()}
     if record is FrontRow:  # a matrix travels flat
@@ -77,7 +93,8 @@ def encode_generation(row: dict[str, Any], chain: str) -> bytes:
         row: Of `generation_row`; becomes complete here.
         chain: The generation's link, 32 hex digits.
     """
-    # One addition per number decides the usual case; a sum that overflows only takes the longer way.
+    # One addition per number decides the usual case; a sum that overflows only takes the longer
+    # way.
     total = sum(row.values())
     row["chain"] = chain
     return orjson.dumps(row if math.isfinite(total) else _flagged(row))
@@ -146,8 +163,12 @@ def decode_front(data: bytes) -> FrontRow:
 def _encode_with_array(row: dict[str, Any], name: str) -> bytes:
     array = row[name]
     finite = math.isfinite(row.get("cost", 0.0))
-    if array.size and finite:  # argmin and argmax stop at NaN; cheaper than np.isfinite for arrays this short
-        finite = math.isfinite(array.item(array.argmin())) and math.isfinite(array.item(array.argmax()))
+    if (
+        array.size and finite
+    ):  # argmin and argmax stop at NaN; cheaper than np.isfinite for arrays this short
+        finite = math.isfinite(array.item(array.argmin())) and math.isfinite(
+            array.item(array.argmax())
+        )
     return orjson.dumps(row if finite else _flagged(row), option=orjson.OPT_SERIALIZE_NUMPY)
 
 

@@ -1,4 +1,7 @@
-"""The directory of one condition, `runs/<hash12>/`: where it is, what is finished in it, and who may write."""
+"""The directory of one condition, `runs/<hash12>/`.
+
+Where it is, what is finished in it, and who may write.
+"""
 
 import hashlib
 import json
@@ -25,7 +28,9 @@ class StoreError(EvoexpError):
 
 
 class RunDirectory:
-    """One condition's run: `config.json`, `manifest.json`, `replicates/`, `summary.parquet`, `.lock`.
+    """One condition's run: `config.json`, `manifest.json`, `replicates/`, `summary.parquet`.
+
+    `.lock`.
 
     Reading needs no lock. Every writing method is for the one process that holds `lock()`.
 
@@ -70,13 +75,19 @@ class RunDirectory:
         """Return where the reason of a failed replicate is or will be."""
         return self.replicates / f"{replicate:04d}.failed.json"
 
-    def create(self, config_json: bytes, manifest: Mapping[str, Any], files: Mapping[str, bytes] | None = None) -> None:
+    def create(
+        self,
+        config_json: bytes,
+        manifest: Mapping[str, Any],
+        files: Mapping[str, bytes] | None = None,
+    ) -> None:
         """Create what is missing; a configuration and manifest already there stay as they are.
 
         Args:
             config_json: Canonical form of the condition.
             manifest: See `manifest.manifest`.
-            files: Contents of the files that the condition refers to, by the names that `attachments.attached` gives.
+            files: Contents of the files that the condition refers to, by the names that
+                `attachments.attached` gives.
 
         Raises:
             StoreError: The directory is damaged or belongs to another condition.
@@ -86,7 +97,10 @@ class RunDirectory:
     def _missing_files(
         self, config_json: bytes, manifest: Mapping[str, Any], files: Mapping[str, bytes]
     ) -> dict[Path, bytes]:
-        """Return what `create` is to write, the configuration behind the files that it refers to; make directories."""
+        """Return what `create` is to write, the configuration behind the files that it refers to.
+
+        Make directories.
+        """
         if hashlib.sha256(config_json).hexdigest() != self.condition_id:
             raise ValueError(f"config_json: is not of condition {self.hash12}")
         self.replicates.mkdir(parents=True, exist_ok=True)
@@ -99,24 +113,30 @@ class RunDirectory:
                 missing[self.path / name] = content
             missing[self.path / "config.json"] = config_json
         if not (self.path / "manifest.json").exists():
-            missing[self.path / "manifest.json"] = json.dumps(manifest, indent=2, sort_keys=True).encode() + b"\n"
+            missing[self.path / "manifest.json"] = (
+                json.dumps(manifest, indent=2, sort_keys=True).encode() + b"\n"
+            )
         return missing
 
     def check(self) -> None:
         """Raise unless `config.json` is this very condition's.
 
         Raises:
-            StoreError: It is missing, damaged, or of a condition that shares the first twelve digits.
+            StoreError: It is missing, damaged, or of a condition that shares the first twelve
+                digits.
         """
         stored = _stored_id(self.path)
         if stored != self.condition_id:
             raise StoreError(
-                f"{self.path}: holds condition {stored}, which shares its first {HASH_LENGTH} digits with "
-                f"{self.condition_id}; keep one of them in another EVOEXP_OUTPUTS"
+                f"{self.path}: holds condition {stored}, which shares its first {HASH_LENGTH} "
+                f"digits with {self.condition_id}; keep one of them in another EVOEXP_OUTPUTS"
             )
 
     def config_json(self) -> bytes:
-        """Return the canonical form of the condition, checked; the files that it refers to are kept."""
+        """Return the canonical form of the condition, checked.
+
+        The files that it refers to are kept.
+        """
         self.check()
         keep_all(path.read_bytes() for path in sorted((self.path / PREFIX).glob("*")))
         return (self.path / "config.json").read_bytes()
@@ -144,7 +164,9 @@ class RunDirectory:
             StoreError: The file is missing or damaged.
         """
         failure = _read_object(self.failure_path(replicate))
-        if not (isinstance(failure.get("reason"), str) and isinstance(failure.get("traceback"), str)):
+        if not (
+            isinstance(failure.get("reason"), str) and isinstance(failure.get("traceback"), str)
+        ):
             raise StoreError(f"{self.failure_path(replicate)}: damaged: no reason and traceback")
         return failure
 
@@ -169,7 +191,8 @@ class RunDirectory:
     def lock(self) -> Iterator[None]:
         """Hold the run for writing; an operating-system lock that dies with its process.
 
-        The same object may lock again inside. Temporary files that a killed parent left are removed.
+        The same object may lock again inside. Temporary files that a killed parent left are
+        removed.
 
         Raises:
             Busy: Another process, or another object of this one, holds the run.
@@ -178,7 +201,9 @@ class RunDirectory:
         try:
             self._lock.acquire()
         except Timeout as error:
-            raise Busy(f"run {self.hash12}: another process is writing it now ({self.path})") from error
+            raise Busy(
+                f"run {self.hash12}: another process is writing it now ({self.path})"
+            ) from error
         try:
             remove_stale((self.path, self.replicates))
             yield
@@ -195,19 +220,25 @@ class RunDirectory:
 
 @contextmanager
 def lock_all(runs: Iterable[RunDirectory]) -> Iterator[None]:
-    """Hold several runs, taken in the order of their hashes so that two processes cannot wait for each other.
+    """Hold several runs, taken in the order of their hashes: no two processes wait in a ring.
 
     Raises:
         Busy: One of them is held; none is then held from here.
     """
     with ExitStack() as stack:
-        for _, run in sorted({run.path: run for run in runs}.items(), key=lambda item: item[1].condition_id):
+        for _, run in sorted(
+            {run.path: run for run in runs}.items(), key=lambda item: item[1].condition_id
+        ):
             stack.enter_context(run.lock())
         yield
 
 
-def create_all(runs: Iterable[tuple[RunDirectory, bytes, Mapping[str, Any], Mapping[str, bytes]]]) -> None:
-    """Create several runs as `RunDirectory.create` does, given its arguments; cheaper than one by one.
+def create_all(
+    runs: Iterable[tuple[RunDirectory, bytes, Mapping[str, Any], Mapping[str, bytes]]],
+) -> None:
+    """Create several runs as `RunDirectory.create` does, given its arguments.
+
+    Cheaper than one by one.
 
     Raises:
         StoreError: A directory is damaged or belongs to another condition; no file is then written.
@@ -269,7 +300,9 @@ def _stored_id(path: Path) -> str:
     except OSError as error:
         raise StoreError(f"{config}: cannot be read: {error.strerror or error}") from error
     if not stored.startswith(path.name):
-        raise StoreError(f"{config}: damaged: its hash {stored[:HASH_LENGTH]} is not the directory's name")
+        raise StoreError(
+            f"{config}: damaged: its hash {stored[:HASH_LENGTH]} is not the directory's name"
+        )
     return stored
 
 

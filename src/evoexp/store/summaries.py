@@ -21,24 +21,36 @@ Stamps = dict[str, list[int]]  # file name → size [B], modification time [ns]
 
 _VERSION = 2  # of the table's columns; another one is rebuilt
 _KEY = b"evoexp"
-_KNOWN: dict[Path, tuple[tuple[int, int, int], pa.Table]] = {}  # tables that this process wrote or read
-_PLAIN: dict[Any, pa.DataType] = {str: pa.string(), int: pa.int64(), float: pa.float64(), bool: pa.bool_()}
+_KNOWN: dict[
+    Path, tuple[tuple[int, int, int], pa.Table]
+] = {}  # tables that this process wrote or read
+_PLAIN: dict[Any, pa.DataType] = {
+    str: pa.string(),
+    int: pa.int64(),
+    float: pa.float64(),
+    bool: pa.bool_(),
+}
 _ARROW = _PLAIN | {kind | None: arrow for kind, arrow in _PLAIN.items()}
 _BASE = [pa.field(name, _ARROW[kind]) for name, kind in field_types(ReplicateSummary).items()]
 
 
-def write_summary(run: RunDirectory, written: Mapping[int, ReplicateSummary] | None = None) -> pa.Table:
-    """Bring `summary.parquet` up to date with the logs and failures of a run, whose lock the caller holds.
+def write_summary(
+    run: RunDirectory, written: Mapping[int, ReplicateSummary] | None = None
+) -> pa.Table:
+    """Bring `summary.parquet` up to date with the logs and failures of a run.
+
+    Whose lock the caller holds.
 
     Rows of files that did not change since the table was written are taken from it.
 
     Args:
         run: Whose.
-        written: Summaries of logs that the caller has just written, by replicate: those are not read again.
+        written: Summaries of logs that the caller has just written, by replicate: those are not
+            read again.
 
     Returns:
-        One row per replicate, done or failed, in order; a failed one has condition, replicate, status and stop_reason,
-        everything else is null.
+        One row per replicate, done or failed, in order; a failed one has condition, replicate,
+        status and stop_reason, everything else is null.
 
     Raises:
         CorruptLog: A log is damaged or of another replicate.
@@ -47,7 +59,10 @@ def write_summary(run: RunDirectory, written: Mapping[int, ReplicateSummary] | N
     stamps = _stamps(run)
     if stored is not None and _stored_stamps(stored) == stamps:
         return stored
-    rows = {run.log_path(replicate).name: flatten(summary) for replicate, summary in (written or {}).items()}
+    rows = {
+        run.log_path(replicate).name: flatten(summary)
+        for replicate, summary in (written or {}).items()
+    }
     table = _build(run, stored, stamps, rows)
     sink = pa.BufferOutputStream()
     pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
@@ -59,7 +74,8 @@ def write_summary(run: RunDirectory, written: Mapping[int, ReplicateSummary] | N
 def summary_table(runs: Runs) -> pa.Table:
     """Return the summaries of one or several runs, one row per replicate.
 
-    A missing, damaged or stale `summary.parquet` is rebuilt, and written where nobody else holds the run.
+    A missing, damaged or stale `summary.parquet` is rebuilt, and written where nobody else holds
+    the run.
 
     Returns:
         Columns as `ReplicateSummary`, `terms` as `term_<name>` in alphabetical order.
@@ -70,7 +86,9 @@ def summary_table(runs: Runs) -> pa.Table:
     tables = [_current(run) for run in distinct(runs)]
     table = pa.concat_tables([_table([], pa.schema(_BASE)), *tables], promote_options="default")
     names = [field.name for field in _BASE]
-    return table.select(names + sorted(set(table.column_names) - set(names))).replace_schema_metadata(None)
+    return table.select(
+        names + sorted(set(table.column_names) - set(names))
+    ).replace_schema_metadata(None)
 
 
 def distinct(runs: Runs) -> list[RunDirectory]:
@@ -88,12 +106,18 @@ def _current(run: RunDirectory) -> pa.Table:
     try:
         with run.lock():
             return write_summary(run)
-    except (Busy, OSError):  # somebody writes the run, or it may only be read: the rows are the same
+    except (
+        Busy,
+        OSError,
+    ):  # somebody writes the run, or it may only be read: the rows are the same
         return _build(run, stored, stamps)
 
 
 def _stamps(run: RunDirectory) -> Stamps:
-    """Return what tells whether the files behind the table changed, in the order of the replicates."""
+    """Return what tells whether the files behind the table changed.
+
+    In the order of the replicates.
+    """
     paths = {replicate: run.log_path(replicate) for replicate in run.completed()}
     paths |= {replicate: run.failure_path(replicate) for replicate in run.failed()}
     stamps: Stamps = {}
@@ -142,7 +166,10 @@ def _stored_stamps(table: pa.Table) -> Stamps:
 
 
 def _build(
-    run: RunDirectory, stored: pa.Table | None, stamps: Stamps, written: Mapping[str, dict[str, Any]] | None = None
+    run: RunDirectory,
+    stored: pa.Table | None,
+    stamps: Stamps,
+    written: Mapping[str, dict[str, Any]] | None = None,
 ) -> pa.Table:
     known: dict[str, dict[str, Any]] = {}
     if stored is not None:
@@ -165,7 +192,10 @@ def _table(rows: Sequence[Mapping[str, Any]], schema: pa.Schema) -> pa.Table:
 
 
 def _column(values: list[Any], kind: pa.DataType) -> pa.Array:
-    """Return values, None where there is none, as a column: `pa.array` would load pandas, a third of a second."""
+    """Return values, None where there is none, as a column.
+
+    `pa.array` would load pandas, a third of a second.
+    """
     given = np.array([value is not None for value in values], dtype=np.bool_)
     buffers = [None if given.all() else pa.py_buffer(np.packbits(given, bitorder="little"))]
     if kind == pa.string():
@@ -173,8 +203,12 @@ def _column(values: list[Any], kind: pa.DataType) -> pa.Array:
         ends = np.cumsum([0, *map(len, texts)], dtype=np.int32)
         buffers += [pa.py_buffer(ends), pa.py_buffer(b"".join(texts))]
     else:
-        numbers = np.array([0 if value is None else value for value in values], dtype=kind.to_pandas_dtype())
-        buffers.append(pa.py_buffer(np.packbits(numbers, bitorder="little") if kind == pa.bool_() else numbers))
+        numbers = np.array(
+            [0 if value is None else value for value in values], dtype=kind.to_pandas_dtype()
+        )
+        buffers.append(
+            pa.py_buffer(np.packbits(numbers, bitorder="little") if kind == pa.bool_() else numbers)
+        )
     return pa.Array.from_buffers(kind, len(values), buffers)
 
 
@@ -182,7 +216,12 @@ def _row(run: RunDirectory, path: Path) -> dict[str, Any]:
     replicate = int(path.name.split(".")[0])
     if path.suffix == ".json":
         reason = run.failure(replicate)["reason"]
-        return {"condition": run.condition_id, "replicate": replicate, "status": "failed", "stop_reason": reason}
+        return {
+            "condition": run.condition_id,
+            "replicate": replicate,
+            "status": "failed",
+            "stop_reason": reason,
+        }
     summary = read_summary(path)
     if (summary.condition, summary.replicate) != (run.condition_id, replicate):
         theirs = f"replicate {summary.replicate} of {summary.condition[:12]}"

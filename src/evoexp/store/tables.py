@@ -17,8 +17,8 @@ def read_summaries(runs: Runs) -> pd.DataFrame:
     """Return the summaries of one or several runs, one row per replicate; see `summary_table`.
 
     Returns:
-        Its columns. Numbers and booleans are Arrow's (`double[pyarrow]`, …), in which ±inf, NaN and missing stay three
-        things; text is pandas' own.
+        Its columns. Numbers and booleans are Arrow's (`double[pyarrow]`, …), in which ±inf, NaN and
+        missing stay three things; text is pandas' own.
 
     Raises:
         CorruptLog: A log is damaged or of another replicate.
@@ -37,8 +37,8 @@ def read_generations(runs: Runs, replicates: Collection[int] | None = None) -> p
         replicates: Which ones of every run, done or not; None: all.
 
     Returns:
-        Columns condition (categorical), replicate, those of `GenerationRow` without its chain, and `term_<name>` in
-        alphabetical order, NaN where a generation lacks the term.
+        Columns condition (categorical), replicate, those of `GenerationRow` without its chain, and
+        `term_<name>` in alphabetical order, NaN where a generation lacks the term.
 
     Raises:
         CorruptLog: A log is damaged.
@@ -54,15 +54,25 @@ def read_generations(runs: Runs, replicates: Collection[int] | None = None) -> p
     lengths = [len(columns["index"]) for columns in parts]
     categories = pd.Index([run.condition_id for run in directories], dtype="str")
     frame: dict[str, Any] = {
-        "condition": pd.Categorical.from_codes(np.repeat(np.array(codes, dtype=np.int32), lengths), categories),
+        "condition": pd.Categorical.from_codes(
+            np.repeat(np.array(codes, dtype=np.int32), lengths), categories
+        ),
         "replicate": np.repeat(np.array(indices, dtype=np.int64), lengths),
     }
-    kinds = {name: DTYPES[kind] for name, kind in field_types(GenerationRow).items() if name != "chain"}
-    kinds |= dict.fromkeys(sorted({name for columns in parts for name in columns} - set(kinds)), np.float64)
-    for name, kind in kinds.items():  # a column leaves the parts when it is in the frame: nothing is there twice
+    kinds = {
+        name: DTYPES[kind] for name, kind in field_types(GenerationRow).items() if name != "chain"
+    }
+    kinds |= dict.fromkeys(
+        sorted({name for columns in parts for name in columns} - set(kinds)), np.float64
+    )
+    for (
+        name,
+        kind,
+    ) in kinds.items():  # a column leaves the parts when it is in the frame: nothing is there twice
         pieces = (columns.pop(name, None) for columns in parts)
         filled = (
-            np.full(length, np.nan) if piece is None else piece for piece, length in zip(pieces, lengths, strict=True)
+            np.full(length, np.nan) if piece is None else piece
+            for piece, length in zip(pieces, lengths, strict=True)
         )
         frame[name] = np.concatenate([np.empty(0, dtype=kind), *filled])
     return pd.DataFrame(frame, copy=False)

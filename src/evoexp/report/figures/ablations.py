@@ -1,4 +1,7 @@
-"""Ablations: one quantity of every condition side by side, and how much better the first condition is."""
+"""Ablations: one quantity of every condition side by side.
+
+And how much better the first condition is.
+"""
 
 import textwrap
 from collections.abc import Callable, Mapping
@@ -29,13 +32,18 @@ def values_table(results: Results, quantities: Mapping[str, Values]) -> pd.DataF
         quantities: Name with unit → its values of a condition, (done,); inf: never.
 
     Returns:
-        Columns quantity, position, condition, replicate, value, failed (replicates of the condition).
+        Columns quantity, position, condition, replicate, value, failed (replicates of the
+        condition).
     """
     parts = []
     for name, values in quantities.items():
         for position, c in enumerate(results.with_data):
             given = {"quantity": name, "position": position, "condition": c.label}
-            parts.append(pd.DataFrame(given | {"replicate": c.summaries.index, "value": values(c), "failed": c.failed}))
+            parts.append(
+                pd.DataFrame(
+                    given | {"replicate": c.summaries.index, "value": values(c), "failed": c.failed}
+                )
+            )
     return pd.concat(parts, ignore_index=True)
 
 
@@ -52,7 +60,13 @@ def draw_values(table: pd.DataFrame) -> Figure:
             never = int(np.isinf(own["value"]).sum())
             if never:
                 place = (1.01, position)
-                axes.annotate(f"{never} never", place, xycoords=axes.get_yaxis_transform(), fontsize=6.5, va="center")
+                axes.annotate(
+                    f"{never} never",
+                    place,
+                    xycoords=axes.get_yaxis_transform(),
+                    fontsize=6.5,
+                    va="center",
+                )
         middle = quantile(rows.loc[rows["position"] == 0, "value"].to_numpy(), 0.5)
         if np.isfinite(middle):
             axes.axvline(middle, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
@@ -62,15 +76,22 @@ def draw_values(table: pd.DataFrame) -> Figure:
         if axes.get_xlim()[1] >= THOUSANDS:
             axes.xaxis.set_major_formatter(EngFormatter())  # 200 k
     counts = (
-        table[table["quantity"] == quantities[0]].groupby("position").agg(n=("value", "size"), failed=("failed", "max"))
+        table[table["quantity"] == quantities[0]]
+        .groupby("position")
+        .agg(n=("value", "size"), failed=("failed", "max"))
     )
-    names = [f"{labels[k]}  (n = {n}{f', {failed} failed' if failed else ''})" for k, n, failed in counts.itertuples()]
+    names = [
+        f"{labels[k]}  (n = {n}{f', {failed} failed' if failed else ''})"
+        for k, n, failed in counts.itertuples()
+    ]
     panels[0].set_yticks(list(counts.index), names)
     panels[0].set_ylim(len(labels) - 0.4, -0.6)
     return figure
 
 
-def effects_table(comparisons: dict[str, tuple[Comparison, ...]], significance: float) -> pd.DataFrame:
+def effects_table(
+    comparisons: dict[str, tuple[Comparison, ...]], significance: float
+) -> pd.DataFrame:
     """Return how often the first condition is better.
 
     Args:
@@ -78,16 +99,17 @@ def effects_table(comparisons: dict[str, tuple[Comparison, ...]], significance: 
         significance: Below this adjusted p-value a difference counts.
 
     Returns:
-        Columns quantity, condition (the other one), a12, lower, upper, p_adjusted, seeds, significance.
+        Columns quantity, condition (the other one), a12, lower, upper, p_adjusted, seeds,
+        significance.
     """
     rows = [
         (quantity, c.quantity, c.better.a12, *c.better.interval, c.p_adjusted, c.num_seeds)
         for quantity, found in comparisons.items()
         for c in found
     ]
-    return pd.DataFrame(rows, columns=["quantity", "condition", "a12", "lower", "upper", "p_adjusted", "seeds"]).assign(
-        significance=significance
-    )
+    return pd.DataFrame(
+        rows, columns=["quantity", "condition", "a12", "lower", "upper", "p_adjusted", "seeds"]
+    ).assign(significance=significance)
 
 
 def draw_effects(table: pd.DataFrame) -> Figure:
@@ -104,7 +126,14 @@ def draw_effects(table: pd.DataFrame) -> Figure:
         axes.hlines(y, low, high, color=style.ARM_COLOURS[0], linewidth=1.4)
         level = float(rows["significance"].iloc[0])
         clear = rows["p_adjusted"].to_numpy(np.float64) < level
-        axes.plot(a12[clear], y[clear], "o", color=style.ARM_COLOURS[0], markersize=5, label=f"adjusted p < {level:g}")
+        axes.plot(
+            a12[clear],
+            y[clear],
+            "o",
+            color=style.ARM_COLOURS[0],
+            markersize=5,
+            label=f"adjusted p < {level:g}",
+        )
         axes.plot(
             a12[~clear],
             y[~clear],

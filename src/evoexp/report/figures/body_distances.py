@@ -13,30 +13,43 @@ STRAIGHT = -1  # instead of a replicate
 
 
 def distances_table(conditions: tuple[ConditionResults, ...], samples: int) -> pd.DataFrame:
-    """Return the least distance of bodies along every replicate's motion and along the straight line.
+    """Return the bodies' least distance along every replicate's motion and the straight line.
 
     Args:
         conditions: With data.
         samples: Configurations per segment.
 
     Returns:
-        Columns condition, position, replicate (−1: straight line in link angles), best (whether it is the best one),
-        refuted (by the exact verdict), instant, distance [length unit], length_unit.
+        Columns condition, position, replicate (−1: straight line in link angles), best (whether it
+        is the best one), refuted (by the exact verdict), instant, distance [length unit],
+        length_unit.
     """
     parts = []
     for position, c in enumerate(conditions):
         prepared, refuted = c.prepared, bodies.refuted(c)
-        for replicate, solution in {STRAIGHT: link_motions.straight(prepared), **c.solutions}.items():
+        for replicate, solution in {
+            STRAIGHT: link_motions.straight(prepared),
+            **c.solutions,
+        }.items():
             found = link_motions.sampled(link_motions.executed(prepared, solution), samples)
             columns = {"condition": c.label, "position": position, "replicate": replicate}
             columns |= {"best": replicate == c.best_replicate, "refuted": replicate in refuted}
             columns |= {"instant": found.instants}
-            parts.append(pd.DataFrame(columns | {"distance": bodies.distances(prepared.problem.scene, found.q)}))
-    return rounded(pd.concat(parts, ignore_index=True)).assign(length_unit=conditions[0].condition.length_unit)
+            parts.append(
+                pd.DataFrame(
+                    columns | {"distance": bodies.distances(prepared.problem.scene, found.q)}
+                )
+            )
+    return rounded(pd.concat(parts, ignore_index=True)).assign(
+        length_unit=conditions[0].condition.length_unit
+    )
 
 
 def draw_distances(table: pd.DataFrame) -> Figure:
-    """Draw the distance against the instant, a panel per condition: best replicate, range over all, straight line."""
+    """Draw the distance against the instant, a panel per condition.
+
+    Best replicate, range over all, straight line.
+    """
     positions = sorted(table["position"].unique())
     columns = min(COLUMNS, len(positions))
     lines = -(-len(positions) // columns)
@@ -55,9 +68,20 @@ def draw_distances(table: pd.DataFrame) -> Figure:
             elif best:
                 axes.plot(own["instant"], own["distance"], color=colour)
                 at = own[own["instant"] == own["instant"].round()]
-                axes.plot(at["instant"], at["distance"], "o", color=colour, mec="white", markersize=5, clip_on=False)
+                axes.plot(
+                    at["instant"],
+                    at["distance"],
+                    "o",
+                    color=colour,
+                    mec="white",
+                    markersize=5,
+                    clip_on=False,
+                )
         refuted = rows[rows["replicate"] != STRAIGHT].groupby("replicate")["refuted"].first()
-        axes.set_title(f"{rows['condition'].iloc[0]}: {int(refuted.sum())} of {len(refuted)} refuted", fontsize=7.5)
+        axes.set_title(
+            f"{rows['condition'].iloc[0]}: {int(refuted.sum())} of {len(refuted)} refuted",
+            fontsize=7.5,
+        )
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     panels[0].set_xlim(0.0, table["instant"].max())
     panels[0].set_ylim(bottom=-0.02 * float(table["distance"].max()))
@@ -67,7 +91,15 @@ def draw_distances(table: pd.DataFrame) -> Figure:
         if k >= len(panels) - columns:
             axes.set_xlabel("sampling step (whole: configurations)")
     axes, grey = panels[0], style.NEUTRAL
-    axes.plot([], [], color=grey, marker="o", mec="white", ms=5, label="best replicate, dots: configurations")
+    axes.plot(
+        [],
+        [],
+        color=grey,
+        marker="o",
+        mec="white",
+        ms=5,
+        label="best replicate, dots: configurations",
+    )
     axes.fill_between([], [], color=grey, alpha=0.18, linewidth=0, label="range over replicates")
     axes.plot([], [], ":", color=style.FAINT, label="straight line in link angles")
     style.legend_below(figure, axes, 3)

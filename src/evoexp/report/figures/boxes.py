@@ -18,7 +18,10 @@ def draw_box(
     colour: str,
     orientation: Literal["horizontal", "vertical"] = "horizontal",
 ) -> None:
-    """Draw median, quartiles and whiskers (to the last value within 1.5 interquartile ranges) of finite values (n,)."""
+    """Draw median, quartiles and whiskers.
+
+    To the last value within 1.5 interquartile ranges) of finite values (n,.
+    """
     values = values[np.isfinite(values)]
     if not len(values):
         return

@@ -19,18 +19,23 @@ DASH_DOTTED = (0, (5, 1.5, 1, 1.5))
 
 
 def cost_table(results: Results) -> pd.DataFrame:
-    """Return median and quartiles of best and average cost over replicates, per condition and generation.
+    """Return median and quartiles of best and average cost over replicates.
+
+    Per condition and generation.
 
     Returns:
-        Columns condition, position, quantity, generation, evaluations, median, lower, upper, replicates; a reference
-        has one row.
+        Columns condition, position, quantity, generation, evaluations, median, lower, upper,
+        replicates; a reference has one row.
     """
     parts = [_condition(results, condition, None) for condition in results.evolved]
     return pd.concat([*parts, *_references(results)], ignore_index=True)
 
 
 def fitness_table(results: Results) -> pd.DataFrame:
-    """Return the same of the paper's fitness, of conditions whose objective turns a cost into one."""
+    """Return the same of the paper's fitness.
+
+    Of conditions whose objective turns a cost into one.
+    """
     parts = [_condition(results, c, c.planner.objective) for c in results.evolved]
     return pd.concat(parts, ignore_index=True)
 
@@ -41,8 +46,16 @@ def draw_cost(table: pd.DataFrame) -> Figure:
     axes = figure.subplots()
     beside = table["quantity"] == REFERENCE
     _curves(axes, table[~beside], tuple(NAMES))
-    for position, label, cost in table.loc[beside, ["position", "condition", "median"]].itertuples(index=False):
-        axes.axhline(cost, color=style.condition_colour(position), linestyle=DASH_DOTTED, linewidth=1.0, label=label)
+    for position, label, cost in table.loc[beside, ["position", "condition", "median"]].itertuples(
+        index=False
+    ):
+        axes.axhline(
+            cost,
+            color=style.condition_colour(position),
+            linestyle=DASH_DOTTED,
+            linewidth=1.0,
+            label=label,
+        )
     axes.set_ylabel("cost")
     style.legend_below(figure, axes, 2)
     return figure
@@ -57,7 +70,13 @@ def draw_best(table: pd.DataFrame) -> Figure:
     for (position, condition), curve in groups(best, ["position", "condition"]):
         kind = "-" if position < len(style.CONDITION_COLOURS) else (0, (4, 1.5))
         label = f"{condition} ({_counts(curve)})"
-        axes.plot(curve[across], curve["median"], linestyle=kind, color=style.condition_colour(position), label=label)
+        axes.plot(
+            curve[across],
+            curve["median"],
+            linestyle=kind,
+            color=style.condition_colour(position),
+            label=label,
+        )
     axes.set_xlim(0, max(1, int(best[across].max())))
     axes.set_xlabel(across)
     axes.set_ylabel("best cost so far (median)")
@@ -66,7 +85,10 @@ def draw_best(table: pd.DataFrame) -> Figure:
 
 
 def draw_fitness(table: pd.DataFrame) -> Figure:
-    """Draw best and average fitness against generations: over the whole range, and where the best ones are."""
+    """Draw best and average fitness against generations.
+
+    Over the whole range, and where the best ones are.
+    """
     figure = style.figure(4.1)
     whole, close = figure.subplots(1, 2)
     for axes in (whole, close):
@@ -101,7 +123,8 @@ def _condition(results: Results, condition: ConditionResults, objective: Any) ->
                     "quantity": NAMES[column],
                     "generation": [index for index, _ in generations],
                     "evaluations": [
-                        quantile(group["evaluations"].to_numpy(np.float64), 0.5) for _, group in generations
+                        quantile(group["evaluations"].to_numpy(np.float64), 0.5)
+                        for _, group in generations
                     ],
                     "median": [quantile(v, 0.5) for v in values],
                     "lower": [quantile(v, 0.25) for v in values],
@@ -115,9 +138,16 @@ def _condition(results: Results, condition: ConditionResults, objective: Any) ->
 
 def _references(results: Results) -> list[pd.DataFrame]:
     """Return the costs of references, which have no generations, one row each."""
-    shown = [c for c in results.references if c not in results.evolved and np.isfinite(c.column("best_cost")).all()]
+    shown = [
+        c
+        for c in results.references
+        if c not in results.evolved and np.isfinite(c.column("best_cost")).all()
+    ]
     return [
-        _condition(results, c, None).iloc[:1].assign(quantity=REFERENCE, generation=0, evaluations=0.0) for c in shown
+        _condition(results, c, None)
+        .iloc[:1]
+        .assign(quantity=REFERENCE, generation=0, evaluations=0.0)
+        for c in shown
     ]
 
 
@@ -130,7 +160,9 @@ def _curves(axes: Axes, table: pd.DataFrame, columns: tuple[str, ...]) -> None:
             curve = rows[rows["quantity"] == NAMES[column]].replace([np.inf, -np.inf], np.nan)
             kind = "-" if column == "best_cost" else (0, (3, 1.5))
             label = f"{condition}, {NAMES[column]} ({_counts(curve)})"
-            axes.fill_between(curve[across], curve["lower"], curve["upper"], color=colour, alpha=0.18, linewidth=0)
+            axes.fill_between(
+                curve[across], curve["lower"], curve["upper"], color=colour, alpha=0.18, linewidth=0
+            )
             axes.plot(curve[across], curve["median"], linestyle=kind, color=colour, label=label)
     axes.set_xlim(0, max(1, int(table[across].max())))
     axes.set_xlabel(across)
@@ -139,8 +171,15 @@ def _curves(axes: Axes, table: pd.DataFrame, columns: tuple[str, ...]) -> None:
 
 
 def _across(table: pd.DataFrame) -> str:
-    """Return the common axis: generations where all conditions spend the same in each, else evaluations."""
-    return "generation" if table.groupby("generation")["evaluations"].nunique().max() == 1 else "evaluations"
+    """Return the common axis: generations where all conditions spend the same in each.
+
+    Else evaluations.
+    """
+    return (
+        "generation"
+        if table.groupby("generation")["evaluations"].nunique().max() == 1
+        else "evaluations"
+    )
 
 
 def _counts(curve: pd.DataFrame) -> str:

@@ -13,12 +13,15 @@ def rates_table(rows: Sequence[tuple[str, int, str, int, int, float, float]]) ->
     """Return shares of motions.
 
     Args:
-        rows: (defect, position, condition, failing motions, solved motions, lower and upper end of the interval).
+        rows: (defect, position, condition, failing motions, solved motions, lower and upper end of
+            the interval).
 
     Returns:
         Columns defect, position, condition, failing, solved, share, lower, upper.
     """
-    table = pd.DataFrame(rows, columns=["defect", "position", "condition", "failing", "solved", "lower", "upper"])
+    table = pd.DataFrame(
+        rows, columns=["defect", "position", "condition", "failing", "solved", "lower", "upper"]
+    )
     return table.assign(share=table["failing"] / table["solved"].clip(lower=1))
 
 
@@ -35,7 +38,14 @@ def draw_rates(table: pd.DataFrame) -> Figure:
             axes.hlines(y, rows["lower"], rows["upper"], color=colour, linewidth=1.6)
             axes.plot(rows["share"], [y], "o", color=colour, markersize=5)
             text = f"{rows['failing'].iloc[0]}/{rows['solved'].iloc[0]}"
-            axes.annotate(text, (1.0, y), xycoords=axes.get_yaxis_transform(), fontsize=6.5, va="center", ha="left")
+            axes.annotate(
+                text,
+                (1.0, y),
+                xycoords=axes.get_yaxis_transform(),
+                fontsize=6.5,
+                va="center",
+                ha="left",
+            )
         axes.set_xlim(-0.03, 1.03)
         axes.set_xlabel("share of solved motions")
         axes.set_title(defect, fontsize=7.5)

@@ -1,4 +1,7 @@
-"""How probable an error below x is, with a band and the printed percentages (Lavoie & Boudreau 2001, Fig. 3)."""
+"""How probable an error below x is, with a band and the printed percentages.
+
+Lavoie & Boudreau 2001, Fig. 3.
+"""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -35,8 +38,8 @@ def distribution_table(
         confidence: Level of Wilson's intervals, each for itself.
 
     Returns:
-        Columns series (found: holds for x from this row's error, exclusive, to the next one's; printed), position,
-        condition, error, having, total, share, lower, upper, length_unit.
+        Columns series (found: holds for x from this row's error, exclusive, to the next one's;
+        printed), position, condition, error, having, total, share, lower, upper, length_unit.
     """
     rows: list[tuple[object, ...]] = []
     for c in results.with_data:
@@ -48,7 +51,17 @@ def distribution_table(
             rows.append((FOUND, *given, error, *share, share.share, *share.interval(confidence)))
         for error, share in printed(c):
             rows.append((PRINTED, *given, error, *share, share.share, *share.interval(confidence)))
-    names = ["series", "position", "condition", "error", "having", "total", "share", "lower", "upper"]
+    names = [
+        "series",
+        "position",
+        "condition",
+        "error",
+        "having",
+        "total",
+        "share",
+        "lower",
+        "upper",
+    ]
     unit = results.with_data[0].condition.length_unit
     return pd.DataFrame(rows, columns=names).astype({"error": "float64"}).assign(length_unit=unit)
 
@@ -60,7 +73,9 @@ def draw_distribution(table: pd.DataFrame) -> Figure:
     printed = table[table["series"] == PRINTED]
     greatest = max(2.1, 1.05 * float(table["error"].max()))
     for axes in (whole, close):
-        for (position, condition), rows in groups(table[table["series"] == FOUND], ["position", "condition"]):
+        for (position, condition), rows in groups(
+            table[table["series"] == FOUND], ["position", "condition"]
+        ):
             _curve(axes, rows, greatest, style.condition_colour(int(position)), str(condition))
         for position, rows in groups(printed, "position"):
             _points(axes, rows, style.condition_colour(int(position)))
@@ -89,7 +104,15 @@ def _curve(axes: Axes, rows: pd.DataFrame, greatest: float, colour: str, name: s
     last = rows.iloc[[-1]].assign(error=greatest)
     rows = pd.concat([rows, last], ignore_index=True)
     label = f"{name} (n = {int(rows['total'].iloc[0])})"
-    axes.fill_between(rows["error"], rows["lower"], rows["upper"], step="post", color=colour, alpha=0.22, linewidth=0)
+    axes.fill_between(
+        rows["error"],
+        rows["lower"],
+        rows["upper"],
+        step="post",
+        color=colour,
+        alpha=0.22,
+        linewidth=0,
+    )
     axes.step(rows["error"], rows["share"], where="post", color=colour, label=label)
 
 
@@ -97,15 +120,40 @@ def _points(axes: Axes, rows: pd.DataFrame, colour: str) -> None:
     """Draw the printed points of one arm with the intervals of the paper's own sample."""
     name = f"printed, {rows['condition'].iloc[0]} (their n = {int(rows['total'].iloc[0])})"
     axes.vlines(rows["error"], rows["lower"], rows["upper"], color=colour, linewidth=1.0, zorder=4)
-    axes.plot(rows["error"], rows["share"], "D", color="white", mec=colour, mew=1.4, ms=5, zorder=5, label=name)
+    axes.plot(
+        rows["error"],
+        rows["share"],
+        "D",
+        color="white",
+        mec=colour,
+        mew=1.4,
+        ms=5,
+        zorder=5,
+        label=name,
+    )
 
 
 def _label(axes: Axes, row: Any, greatest: bool) -> None:
-    """Write a printed percentage beside its point: above the greatest one at an x, below the others."""
+    """Write a printed percentage beside its point.
+
+    Above the greatest one at an x, below the others.
+    """
     left = row.error > 0.7 * axes.get_xlim()[1]
     place = (-6 if left else 7, 4 if greatest else -10)
     halo = [withStroke(linewidth=2.5, foreground="white")]
-    look: dict[str, Any] = {"color": style.condition_colour(row.position), "fontsize": 7.5, "path_effects": halo}
+    look: dict[str, Any] = {
+        "color": style.condition_colour(row.position),
+        "fontsize": 7.5,
+        "path_effects": halo,
+    }
     side = "right" if left else "left"
     at = (row.error, row.share)
-    axes.annotate(f"{100 * row.share:.1f} %", at, xytext=place, textcoords="offset points", ha=side, zorder=6, **look)
+    axes.annotate(
+        f"{100 * row.share:.1f} %",
+        at,
+        xytext=place,
+        textcoords="offset points",
+        ha=side,
+        zorder=6,
+        **look,
+    )

@@ -1,4 +1,7 @@
-"""Costs of paths over a grid: against generations (Chen & Zalzala 1995, Fig. 2), and above the best known."""
+"""Costs of paths over a grid: against generations (Chen & Zalzala 1995, Fig.
+
+2), and above the best known.
+"""
 
 import numpy as np
 import pandas as pd
@@ -15,16 +18,20 @@ EXACT, BOUND = "best path known", "no path costs less"
 
 
 def costs_table(found: tuple[Group, ...]) -> pd.DataFrame:
-    """Return median and quartiles of costs over replicates, per weighting, condition and generation.
+    """Return median and quartiles of costs over replicates, per weighting.
+
+    Condition and generation.
 
     Returns:
-        Columns panel, position (of the condition in its panel), condition, quantity (best so far, average, and of
-        references two lines of one row), generation, median, lower, upper.
+        Columns panel, position (of the condition in its panel), condition, quantity (best so far,
+        average, and of references two lines of one row), generation, median, lower, upper.
     """
     rows: list[tuple[object, ...]] = []
     for group in found:
         for position, c in enumerate(group.conditions):
-            quantities = {"best so far": "best_cost"} | ({AVERAGE: "mean_cost"} if position == 0 else {})
+            quantities = {"best so far": "best_cost"} | (
+                {AVERAGE: "mean_cost"} if position == 0 else {}
+            )
             for name, column in quantities.items():
                 for generation, own in c.generations.groupby("index"):
                     values = spread(own[column].to_numpy(dtype=np.float64))
@@ -43,9 +50,13 @@ def draw_costs(table: pd.DataFrame) -> Figure:
     figure = style.figure(2.7)
     panels = figure.subplots(1, len(names), squeeze=False)[0]
     for axes, (name, rows) in zip(panels, grouped(table, "panel"), strict=True):
-        for (position, quantity), line in grouped(rows[rows["position"] >= 0], ["position", "quantity"]):
+        for (position, quantity), line in grouped(
+            rows[rows["position"] >= 0], ["position", "quantity"]
+        ):
             _curve(axes, line, style.condition_colour(int(position)), dashed=quantity == AVERAGE)
-        for (kind, line), pattern in zip(grouped(rows[rows["position"] < 0], "quantity"), (":", "-."), strict=False):
+        for (kind, line), pattern in zip(
+            grouped(rows[rows["position"] < 0], "quantity"), (":", "-."), strict=False
+        ):
             at = float(line["median"].iloc[0])
             axes.axhline(at, color=style.NEUTRAL, linewidth=1.0, linestyle=pattern, label=str(kind))
         axes.set_title(str(name))
@@ -60,19 +71,34 @@ def _curve(axes: Axes, line: pd.DataFrame, colour: str, *, dashed: bool) -> None
     """Draw a median, and its quartiles unless it is dashed."""
     label, x = str(line["condition"].iloc[0]), line["generation"]
     if dashed:
-        axes.plot(x, line["median"], color=colour, linestyle="--", linewidth=0.9, label=f"{label}, average")
+        axes.plot(
+            x,
+            line["median"],
+            color=colour,
+            linestyle="--",
+            linewidth=0.9,
+            label=f"{label}, average",
+        )
         return
     axes.plot(x, line["median"], color=colour, label=label)
     axes.fill_between(x, line["lower"], line["upper"], color=colour, alpha=0.18, linewidth=0)
 
 
 def gaps_table(found: tuple[Group, ...]) -> pd.DataFrame:
-    """Return every run's gap to the best path known: columns panel, position, condition, replicate, gap_percent."""
+    """Return every run's gap to the best path known.
+
+    Columns panel, position, condition, replicate, gap_percent.
+    """
     parts = []
     for group in found:
         for position, c in enumerate(group.conditions):
             kind = _kind(c.label, group.name)
-            given = {"panel": _title(group), "position": position, "condition": kind, "replicate": c.summaries.index}
+            given = {
+                "panel": _title(group),
+                "position": position,
+                "condition": kind,
+                "replicate": c.summaries.index,
+            }
             parts.append(pd.DataFrame(given | {"gap_percent": gaps(c, group.optimum)}))
     return pd.concat(parts, ignore_index=True)
 
@@ -88,7 +114,9 @@ def draw_gaps(table: pd.DataFrame) -> Figure:
             steps = np.concatenate([[0.0], np.arange(1, len(values) + 1) / len(values)])
             x = np.concatenate([[min(values[0], 0.0)], values])
             colour = style.condition_colour(int(position))
-            axes.step(x, 100.0 * steps, where="post", color=colour, label=str(own["condition"].iloc[0]))
+            axes.step(
+                x, 100.0 * steps, where="post", color=colour, label=str(own["condition"].iloc[0])
+            )
         axes.axvline(0.0, color=style.NEUTRAL, linewidth=1.0, linestyle=":")
         axes.set_title(str(name))
         axes.set_xlabel("cost above best known [%]")

@@ -1,4 +1,7 @@
-"""Paths over a grid: the workspace with its obstacles, and what goes through it (Chen & Zalzala 1995, Fig. 2)."""
+"""Paths over a grid: the workspace with its obstacles, and what goes through it.
+
+Chen & Zalzala 1995, Fig. 2.
+"""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -54,7 +57,8 @@ def paths_table(panels: Sequence[Panel]) -> pd.DataFrame:
     """Return everything that is drawn.
 
     Returns:
-        Columns panel, unit, kind, text, number (of the line), share, x, y; an obstacle has two rows, its corners.
+        Columns panel, unit, kind, text, number (of the line), share, x, y; an obstacle has two
+        rows, its corners.
     """
     rows: list[tuple[object, ...]] = []
     for panel in panels:
@@ -62,13 +66,22 @@ def paths_table(panels: Sequence[Panel]) -> pd.DataFrame:
         for number, (x0, y0, x1, y1) in enumerate(panel.boxes):
             rows += [(*head, OBSTACLE, "", number, 1.0, x, y) for x, y in ((x0, y0), (x1, y1))]
         for number, line in enumerate(panel.lines):
-            rows += [(*head, line.kind, line.text, number, line.share, x, y) for x, y in line.path.tolist()]
-    return pd.DataFrame(rows, columns=["panel", "unit", "kind", "text", "number", "share", "x", "y"])
+            rows += [
+                (*head, line.kind, line.text, number, line.share, x, y)
+                for x, y in line.path.tolist()
+            ]
+    return pd.DataFrame(
+        rows, columns=["panel", "unit", "kind", "text", "number", "share", "x", "y"]
+    )
 
 
 def draw_paths(table: pd.DataFrame) -> Figure:
     """Draw workspaces side by side: all runs faint, one run, the reference."""
-    colours = {FAINT: "#88aacc", MEDIAN: style.CONDITION_COLOURS[0], EXACT: style.CONDITION_COLOURS[1]}
+    colours = {
+        FAINT: "#88aacc",
+        MEDIAN: style.CONDITION_COLOURS[0],
+        EXACT: style.CONDITION_COLOURS[1],
+    }
     styles: dict[str, dict[str, Any]] = {
         FAINT: {"linewidth": 0.5, "alpha": 0.45},
         MEDIAN: {"linewidth": 1.8},
@@ -86,13 +99,18 @@ def draw_paths(table: pd.DataFrame) -> Figure:
 
 def draw_routes(table: pd.DataFrame) -> Figure:
     """Draw one path per route, as wide as it is frequent, with a legend per workspace."""
-    names = sorted({str(kind) for kind in table["kind"] if kind != OBSTACLE}, key=lambda name: (len(name), name))
+    names = sorted(
+        {str(kind) for kind in table["kind"] if kind != OBSTACLE},
+        key=lambda name: (len(name), name),
+    )
     figure, panels = _panels(table, 3.1)
     for axes, (_, rows) in zip(panels, groups(table, "panel"), strict=True):
         for (kind, _), line in groups(rows[rows["kind"] != OBSTACLE], ["kind", "number"]):
             colour = style.condition_colour(names.index(str(kind)))
             width = 0.8 + 3.2 * float(line["share"].iloc[0])
-            axes.plot(line["x"], line["y"], color=colour, linewidth=width, label=line["text"].iloc[0])
+            axes.plot(
+                line["x"], line["y"], color=colour, linewidth=width, label=line["text"].iloc[0]
+            )
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.24), ncols=2, fontsize=6.5)
     return figure
 
@@ -105,7 +123,9 @@ def _panels(table: pd.DataFrame, height: float) -> tuple[Figure, np.ndarray]:
     for axes, (name, rows) in zip(panels, groups(table, "panel"), strict=True):
         for _, corners in groups(rows[rows["kind"] == OBSTACLE], "number"):
             (x0, x1), (y0, y1) = corners["x"], corners["y"]
-            axes.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, facecolor="#bbbbbb", edgecolor=style.NEUTRAL))
+            axes.add_patch(
+                Rectangle((x0, y0), x1 - x0, y1 - y0, facecolor="#bbbbbb", edgecolor=style.NEUTRAL)
+            )
         _ends(axes, rows[rows["kind"] != OBSTACLE])
         style.operational_axes(axes, str(rows["unit"].iloc[0]))
         axes.set_xlim(table["x"].min() - 1.0, table["x"].max() + 1.0)

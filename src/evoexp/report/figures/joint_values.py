@@ -1,4 +1,7 @@
-"""Link angles of a motion against time, and how fast the links turn (Curkovic et al. 2013, Fig. 9 and Eq. 2)."""
+"""Link angles of a motion against time, and how fast the links turn (Curkovic et al. 2013, Fig.
+
+9 and Eq. 2).
+"""
 
 from typing import Any
 
@@ -21,8 +24,8 @@ def joints_table(condition: ConditionResults) -> pd.DataFrame:
     """Return link angles and their speeds along the best replicate's motion.
 
     Returns:
-        Columns robot, link, instant, at_configuration, angle_deg, turn_deg (per sampling step, to the right of the
-        instant), limit_deg (of Eq. 2).
+        Columns robot, link, instant, at_configuration, angle_deg, turn_deg (per sampling step, to
+        the right of the instant), limit_deg (of Eq. 2).
     """
     prepared = condition.prepared
     motion = link_motions.executed(prepared, condition.solutions[condition.best_replicate])
@@ -31,7 +34,10 @@ def joints_table(condition: ConditionResults) -> pd.DataFrame:
     for robot, own in enumerate(limits):
         for link, limit in enumerate(own):
             columns = {"robot": robot, "link": link, "instant": found.instants}
-            columns |= {"angle_deg": found.links[:, robot, link], "turn_deg": np.abs(found.speeds[:, robot, link])}
+            columns |= {
+                "angle_deg": found.links[:, robot, link],
+                "turn_deg": np.abs(found.speeds[:, robot, link]),
+            }
             parts.append(pd.DataFrame(columns).assign(limit_deg=limit))
     table = rounded(pd.concat(parts, ignore_index=True))
     table.insert(3, "at_configuration", table["instant"] == table["instant"].round())
@@ -39,7 +45,10 @@ def joints_table(condition: ConditionResults) -> pd.DataFrame:
 
 
 def draw_joints(table: pd.DataFrame) -> Figure:
-    """Draw link angles in their range, and beside them the turn per sampling step with its limit."""
+    """Draw link angles in their range.
+
+    And beside them the turn per sampling step with its limit.
+    """
     robots = sorted(table["robot"].unique())
     figure = style.figure(1.9 * len(robots) + 1.0)
     panels = figure.subplots(len(robots), 2, sharex=True, squeeze=False)
@@ -55,9 +64,25 @@ def draw_joints(table: pd.DataFrame) -> Figure:
     grey = style.NEUTRAL
     handles = [
         *(Line2D([], [], color=grey, linestyle=KINDS[k], label=f"link {k + 1}") for k in range(2)),
-        Line2D([], [], color=grey, marker="o", mec="white", linestyle="none", ms=5, label="configurations"),
+        Line2D(
+            [],
+            [],
+            color=grey,
+            marker="o",
+            mec="white",
+            linestyle="none",
+            ms=5,
+            label="configurations",
+        ),
         Line2D([], [], color=style.FORBIDDEN, linewidth=0.9, label="range [0, 180°]"),
-        Line2D([], [], color=style.FORBIDDEN, linewidth=1.2, linestyle=":", label="limit of a link, Eq. 2"),
+        Line2D(
+            [],
+            [],
+            color=style.FORBIDDEN,
+            linewidth=1.2,
+            linestyle=":",
+            label="limit of a link, Eq. 2",
+        ),
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     return figure
@@ -74,7 +99,15 @@ def _robot(angles: Axes, turns: Axes, table: pd.DataFrame, colour: str) -> None:
         angles.plot(rows["instant"], rows["angle_deg"], color=colour, linestyle=kind)
         turns.plot(rows["instant"], rows["turn_deg"], color=colour, linestyle=kind)
         at = rows[rows["at_configuration"]]
-        angles.plot(at["instant"], at["angle_deg"], "o", color=colour, mec="white", markersize=5, clip_on=False)
+        angles.plot(
+            at["instant"],
+            at["angle_deg"],
+            "o",
+            color=colour,
+            mec="white",
+            markersize=5,
+            clip_on=False,
+        )
         limit = float(rows["limit_deg"].iloc[0])
         turns.axhline(limit, color=style.FORBIDDEN, linewidth=1.2, linestyle=":")
         beside: dict[str, Any] = {"xycoords": turns.get_yaxis_transform(), "fontsize": 6.5}

@@ -1,4 +1,7 @@
-"""The landscape of a posture's fitness over θ1 and θ2, and where searches end on it (Chen & Zalzala 1995, Fig. 9)."""
+"""The landscape of a posture's fitness over θ1 and θ2, and where searches end on it.
+
+Chen & Zalzala 1995, Fig. 9.
+"""
 
 from typing import Any
 
@@ -16,7 +19,14 @@ GRID, RUN, PAPER, OPTIMUM, MINIMUM = "grid", "GA, runs", "paper", "optimum", "ot
 LOOKS: dict[str, dict[str, Any]] = {
     RUN: {"marker": ".", "color": "#ffffff", "mec": "#000000", "mew": 0.4, "ms": 5, "zorder": 5},
     MINIMUM: {"marker": "v", "color": "none", "mec": "#D55E00", "mew": 1.2, "ms": 7, "zorder": 6},
-    OPTIMUM: {"marker": "*", "color": "#D55E00", "mec": "#ffffff", "mew": 0.5, "ms": 12, "zorder": 7},
+    OPTIMUM: {
+        "marker": "*",
+        "color": "#D55E00",
+        "mec": "#ffffff",
+        "mew": 0.5,
+        "ms": 12,
+        "zorder": 7,
+    },
     PAPER: {"marker": "+", "color": "#000000", "mew": 1.6, "ms": 10, "zorder": 8},
 }
 
@@ -33,11 +43,18 @@ def landscape_table(cases: list[Case]) -> pd.DataFrame:
             continue
         one, two, cost = (case.landscape.array(name) for name in ("theta_1", "theta_2", "cost"))
         x, y = np.meshgrid(one, two, indexing="ij")
-        rows = [pd.DataFrame({"theta_1_deg": x.ravel(), "theta_2_deg": y.ravel(), "cost": cost.ravel()})]
+        rows = [
+            pd.DataFrame({"theta_1_deg": x.ravel(), "theta_2_deg": y.ravel(), "cost": cost.ravel()})
+        ]
         rows[0]["element"] = GRID
         for element, angles in _points(case).items():
             costs = [case.measured(pair)["cost"] for pair in angles]
-            told = {"theta_1_deg": angles[:, 0], "theta_2_deg": angles[:, 1], "cost": costs, "element": element}
+            told = {
+                "theta_1_deg": angles[:, 0],
+                "theta_2_deg": angles[:, 1],
+                "cost": costs,
+                "element": element,
+            }
             rows.append(pd.DataFrame(told))
         parts.append(pd.concat(rows, ignore_index=True).assign(panel=panel, case=case.name))
     names = ["panel", "case", "element", "theta_1_deg", "theta_2_deg", "cost"]
@@ -60,18 +77,27 @@ def _points(case: Case) -> dict[str, Any]:
 
 
 def draw_landscape(table: pd.DataFrame) -> Figure:
-    """Draw E in colours, one column per criterion, white where no posture is feasible; below: around the best."""
+    """Draw E in colours, one column per criterion, white where no posture is feasible.
+
+    Below: around the best.
+    """
     panels = [rows for _, rows in groups(table, "panel")]
     figure = style.figure(7.4)
     places = figure.subplots(2, len(panels), squeeze=False)
     for column, rows in enumerate(panels):
-        grid = rows[rows["element"] == GRID].pivot(index="theta_2_deg", columns="theta_1_deg", values="cost")
+        grid = rows[rows["element"] == GRID].pivot(
+            index="theta_2_deg", columns="theta_1_deg", values="cost"
+        )
         costs = grid.to_numpy()
         least, x, y = float(np.nanmin(costs)), grid.columns.to_numpy(), grid.index.to_numpy()
         for axes, widest in zip(places[:, column], (20.0, 3.0), strict=True):
             norm = LogNorm(vmin=least, vmax=least * widest)
-            image = axes.pcolormesh(x, y, costs, norm=norm, cmap="viridis_r", shading="nearest", rasterized=True)
-            ticks = least * np.array([1.0, 1.5, 2.0, 3.0] if widest < 10.0 else [1.0, 2.0, 5.0, 10.0, 20.0])
+            image = axes.pcolormesh(
+                x, y, costs, norm=norm, cmap="viridis_r", shading="nearest", rasterized=True
+            )
+            ticks = least * np.array(
+                [1.0, 1.5, 2.0, 3.0] if widest < 10.0 else [1.0, 2.0, 5.0, 10.0, 20.0]
+            )
             bar = figure.colorbar(image, ax=axes, extend="max", shrink=0.8)
             bar.set_ticks(ticks.tolist(), labels=[f"{tick:.3g}" for tick in ticks])
             bar.minorticks_off()
@@ -79,12 +105,20 @@ def draw_landscape(table: pd.DataFrame) -> Figure:
             for element, look in LOOKS.items():
                 own = rows[rows["element"] == element]
                 if len(own):
-                    axes.plot(own["theta_1_deg"], own["theta_2_deg"], linestyle="none", label=element, **look)
+                    axes.plot(
+                        own["theta_1_deg"],
+                        own["theta_2_deg"],
+                        linestyle="none",
+                        label=element,
+                        **look,
+                    )
             axes.set_xlabel("θ₁ [deg]")
             axes.set_ylabel("θ₂ [deg]")
             axes.set_aspect("equal")
             axes.grid(False)
-        places[0, column].set(xlim=(x.min(), x.max()), ylim=(y.min(), y.max()), title=rows["case"].iloc[0])
+        places[0, column].set(
+            xlim=(x.min(), x.max()), ylim=(y.min(), y.max()), title=rows["case"].iloc[0]
+        )
         places[0, column].xaxis.set_major_locator(MultipleLocator(90.0))
         places[0, column].yaxis.set_major_locator(MultipleLocator(90.0))
         best = rows[rows["element"].isin([OPTIMUM, PAPER, RUN])]

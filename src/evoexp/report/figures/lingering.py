@@ -14,7 +14,9 @@ Shown = tuple[str, ConditionResults, np.ndarray]
 
 
 def places_table(shown: Sequence[Shown]) -> pd.DataFrame:
-    """Return how many nodes of every unsafeness the paths of some conditions pass, on average over the runs.
+    """Return how many nodes of every unsafeness the paths of some conditions pass.
+
+    On average over the runs.
 
     Args:
         shown: (name, condition, unsafeness (along x, along y)).

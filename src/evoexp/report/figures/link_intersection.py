@@ -1,4 +1,7 @@
-"""The intersection test of two links at one configuration (Curkovic et al. 2013, Fig. 7, Eqs. 11 and 12)."""
+"""The intersection test of two links at one configuration (Curkovic et al. 2013, Fig. 7, Eqs.
+
+11 and 12).
+"""
 
 from typing import Any
 
@@ -19,12 +22,12 @@ VECTORS = ("a", "b", "c", "d")  # of the paper: links of robot 1, then of robot 
 
 
 def intersection_table(condition: ConditionResults) -> pd.DataFrame:
-    """Return links and intersection where both robots go straight from start to goal and their top links cross best.
+    """Return links and intersection of two robots that go straight, where their top links cross.
 
     Returns:
-        Columns element (a, b, c, d: link vectors; base: from base to base; point: P), x, y, x_end, y_end
-        [length unit], angle_deg (of a link from +x), mu, nu (where P lies on b and on d), instant, crossing,
-        length_unit.
+        Columns element (a, b, c, d: link vectors; base: from base to base; point: P), x, y, x_end,
+        y_end [length unit], angle_deg (of a link from +x), mu, nu (where P lies on b and on d),
+        instant, crossing, length_unit.
     """
     prepared = condition.prepared
     problem = prepared.problem
@@ -44,7 +47,9 @@ def intersection_table(condition: ConditionResults) -> pd.DataFrame:
     _, x, y, x_end, y_end, _ = rows[1]
     at = (x + mu[k] * (x_end - x), y + mu[k] * (y_end - y))
     rows += [("base", *one.base, *two.base, np.nan), ("point", *at, *at, np.nan)]
-    table = rounded(pd.DataFrame(rows, columns=["element", "x", "y", "x_end", "y_end", "angle_deg"]))
+    table = rounded(
+        pd.DataFrame(rows, columns=["element", "x", "y", "x_end", "y_end", "angle_deg"])
+    )
     return table.assign(
         mu=round(float(mu[k]), 9),
         nu=round(float(nu[k]), 9),
@@ -55,24 +60,54 @@ def intersection_table(condition: ConditionResults) -> pd.DataFrame:
 
 
 def draw_intersection(table: pd.DataFrame) -> Figure:
-    """Draw the links as the paper's vectors, their angles, the bases' distance and the intersection."""
+    """Draw the links as the paper's vectors, their angles.
+
+    The bases' distance and the intersection.
+    """
     figure = style.figure(4.3, 5.4)
     axes = figure.subplots()
     style.operational_axes(axes, table["length_unit"].iloc[0])
     rows = {row.element: row for row in records(table)}
-    size = max(float(np.hypot(rows[v].x_end - rows[v].x, rows[v].y_end - rows[v].y)) for v in VECTORS)
+    size = max(
+        float(np.hypot(rows[v].x_end - rows[v].x, rows[v].y_end - rows[v].y)) for v in VECTORS
+    )
     for k, name in enumerate(VECTORS):
         _vector(axes, rows[name], style.arm_colour(k // 2), k + 1, size)
     base, point = rows["base"], rows["point"]
-    axes.annotate("", (base.x_end, base.y_end), (base.x, base.y), arrowprops={"arrowstyle": "<->", "shrinkB": 0})
+    axes.annotate(
+        "",
+        (base.x_end, base.y_end),
+        (base.x, base.y),
+        arrowprops={"arrowstyle": "<->", "shrinkB": 0},
+    )
     text: dict[str, Any] = {"textcoords": "offset points", "ha": "center"}
-    axes.annotate("d·i", (0.5 * (base.x + base.x_end), 0.5 * (base.y + base.y_end)), xytext=(0, -12), **text)
+    axes.annotate(
+        "d·i", (0.5 * (base.x + base.x_end), 0.5 * (base.y + base.y_end)), xytext=(0, -12), **text
+    )
     for robot, (name, mark) in enumerate((("b", "O₁"), ("d", "O₂"))):
         row = rows[name]
-        axes.plot(row.x, row.y, "o", color="white", markeredgecolor=style.arm_colour(robot), markersize=6, zorder=4)
+        axes.plot(
+            row.x,
+            row.y,
+            "o",
+            color="white",
+            markeredgecolor=style.arm_colour(robot),
+            markersize=6,
+            zorder=4,
+        )
         axes.annotate(mark, (row.x, row.y), xytext=(-11 if robot == 0 else 11, 4), **text)
-    axes.plot(point.x, point.y, "X", color=style.FORBIDDEN, markeredgecolor="white", markersize=9, zorder=6)
-    axes.annotate("P", (point.x, point.y), xytext=(0, 9), color=style.FORBIDDEN, weight="bold", **text)
+    axes.plot(
+        point.x,
+        point.y,
+        "X",
+        color=style.FORBIDDEN,
+        markeredgecolor="white",
+        markersize=9,
+        zorder=6,
+    )
+    axes.annotate(
+        "P", (point.x, point.y), xytext=(0, 9), color=style.FORBIDDEN, weight="bold", **text
+    )
     first = rows["a"]
     word = "the links cross" if first.crossing else "the links do not cross"
     axes.set_title(f"μ = {first.mu:.3f}, ν = {first.nu:.3f}: {word}")
@@ -85,15 +120,46 @@ def _vector(axes: Any, row: Any, colour: str, number: int, size: float) -> None:
     """Draw one link as a vector with its name and its angle from +x."""
     arrow = {"arrowstyle": "-|>", "color": colour, "linewidth": 2.2, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", (row.x_end, row.y_end), (row.x, row.y), arrowprops=arrow)
-    axes.plot([row.x, row.x_end], [row.y, row.y_end], color=colour, linewidth=0.1)  # for the limits of the axes
+    axes.plot(
+        [row.x, row.x_end], [row.y, row.y_end], color=colour, linewidth=0.1
+    )  # for the limits of the axes
     away = np.array([-(row.y_end - row.y), row.x_end - row.x]) / size * 10.0
     middle = 0.5 * (row.x + row.x_end), 0.5 * (row.y + row.y_end)
-    look: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "va": "center", "color": colour}
+    look: dict[str, Any] = {
+        "textcoords": "offset points",
+        "ha": "center",
+        "va": "center",
+        "color": colour,
+    }
     axes.annotate(row.element, middle, xytext=tuple(away), weight="bold", **look)
     radius = 0.2 * size
-    axes.plot([row.x, row.x + 1.5 * radius], [row.y, row.y], ":", color=style.FAINT, linewidth=0.9, zorder=1)
-    axes.add_patch(Arc((row.x, row.y), 2 * radius, 2 * radius, theta1=0.0, theta2=row.angle_deg, color=colour, lw=0.9))
+    axes.plot(
+        [row.x, row.x + 1.5 * radius],
+        [row.y, row.y],
+        ":",
+        color=style.FAINT,
+        linewidth=0.9,
+        zorder=1,
+    )
+    axes.add_patch(
+        Arc(
+            (row.x, row.y),
+            2 * radius,
+            2 * radius,
+            theta1=0.0,
+            theta2=row.angle_deg,
+            color=colour,
+            lw=0.9,
+        )
+    )
     half = np.radians(0.5 * row.angle_deg)
     place = row.x + 1.45 * radius * np.cos(half), row.y + 1.45 * radius * np.sin(half)
     subscript = str(number).translate(style.SUBSCRIPTS)
-    axes.annotate(f"φ{subscript} = {row.angle_deg:.0f}°", place, ha="left", va="center", color=colour, fontsize=7)
+    axes.annotate(
+        f"φ{subscript} = {row.angle_deg:.0f}°",
+        place,
+        ha="left",
+        va="center",
+        color=colour,
+        fontsize=7,
+    )

@@ -13,7 +13,14 @@ from evoexp.report.chen_cases import Case
 from evoexp.report.statistics import quantile
 from evoexp.report.tables import groups, records, rounded
 
-METHODS = ("GA", "GA, elitism", "random search", "Newton-type", "Newton-type, smooth form", "subgradient")
+METHODS = (
+    "GA",
+    "GA, elitism",
+    "random search",
+    "Newton-type",
+    "Newton-type, smooth form",
+    "subgradient",
+)
 LEAST_GAP = 1e-6  # [-] what is drawn of a smaller one
 POSTURES = ("exact optimum", "best run", "paper's angles")
 
@@ -22,15 +29,17 @@ def _colour(method: str) -> str:
     return style.condition_colour(METHODS.index(method)) if method in METHODS else style.NEUTRAL
 
 
-# ------------------------------------------------------------------------------------------------------------ fitness
+# ------------------------------------------------------------------------------------------ fitness
 
 
 def fitness_table(cases: list[Case]) -> pd.DataFrame:
-    """Return median and quartiles of the best fitness f = E_m − E so far over runs, and the optimum's.
+    """Return median and quartiles of the best fitness f = E_m − E so far over runs.
+
+    And the optimum's.
 
     Returns:
-        Columns panel, case, quantity, method, generation, median, lower, upper, average (of a generation, median over
-        runs), runs, optimum.
+        Columns panel, case, quantity, method, generation, median, lower, upper, average (of a
+        generation, median over runs), runs, optimum.
     """
     rows = []
     for panel, case in enumerate(cases):
@@ -46,7 +55,9 @@ def fitness_table(cases: list[Case]) -> pd.DataFrame:
                 told = (*spread, quantile(average, 0.5), len(values), optimum)
                 rows.append((panel, case.name, quantity, method, index, *told))
     names = ["median", "lower", "upper", "average", "runs", "optimum"]
-    return rounded(pd.DataFrame(rows, columns=["panel", "case", "quantity", "method", "generation", *names]))
+    return rounded(
+        pd.DataFrame(rows, columns=["panel", "case", "quantity", "method", "generation", *names])
+    )
 
 
 def draw_fitness(table: pd.DataFrame) -> Figure:
@@ -57,12 +68,21 @@ def draw_fitness(table: pd.DataFrame) -> Figure:
         for method, own in groups(rows, "method"):
             colour = _colour(method)
             label = f"{method} (n = {int(own['runs'].max())})"
-            axes.fill_between(own["generation"], own["lower"], own["upper"], color=colour, alpha=0.18, linewidth=0)
+            axes.fill_between(
+                own["generation"], own["lower"], own["upper"], color=colour, alpha=0.18, linewidth=0
+            )
             axes.plot(own["generation"], own["median"], color=colour, label=label)
-        axes.axhline(optimum, color=style.NEUTRAL, linestyle=(0, (5, 1.5, 1, 1.5)), linewidth=1.0, label="optimum")
+        axes.axhline(
+            optimum,
+            color=style.NEUTRAL,
+            linestyle=(0, (5, 1.5, 1, 1.5)),
+            linewidth=1.0,
+            label="optimum",
+        )
         late = rows[rows["generation"] >= min(3, int(rows["generation"].max()))]
         far = max(float((late[["lower", "upper"]] - optimum).abs().to_numpy().max()), 1e-9)
-        low, high = (optimum - 0.08 * far, optimum + far) if rows["quantity"].iloc[0].startswith("t") else (
+        low, high = (optimum - 0.08 * far,
+        optimum + far) if rows["quantity"].iloc[0].startswith("t") else (
             optimum - far,
             optimum + 0.08 * far,
         )  # fmt: skip
@@ -76,7 +96,7 @@ def draw_fitness(table: pd.DataFrame) -> Figure:
     return figure
 
 
-# --------------------------------------------------------------------------------------------------------------- gaps
+# --------------------------------------------------------------------------------------------- gaps
 
 
 def gaps_table(cases: list[Case]) -> pd.DataFrame:
@@ -92,7 +112,11 @@ def gaps_table(cases: list[Case]) -> pd.DataFrame:
         for method, values in costs.items():
             gaps = np.maximum(case.gaps(values), 0.0)
             position = METHODS.index(method)
-            parts.append(pd.DataFrame({"gap": gaps}).assign(panel=panel, case=case.name, method=method, at=position))
+            parts.append(
+                pd.DataFrame({"gap": gaps}).assign(
+                    panel=panel, case=case.name, method=method, at=position
+                )
+            )
     return rounded(pd.concat(parts, ignore_index=True)[["panel", "case", "method", "at", "gap"]])
 
 
@@ -102,12 +126,23 @@ def draw_gaps(table: pd.DataFrame) -> Figure:
     for axes, (_, rows) in zip(places, groups(table, "panel"), strict=False):
         for _, own in groups(rows, "at"):
             method = own["method"].iloc[0]
-            x = np.sort(np.clip(np.nan_to_num(own["gap"].to_numpy(), posinf=np.inf), LEAST_GAP, None))
+            x = np.sort(
+                np.clip(np.nan_to_num(own["gap"].to_numpy(), posinf=np.inf), LEAST_GAP, None)
+            )
             share = np.arange(1, len(x) + 1) / len(x)
             finite = np.isfinite(x)
             kind: Any = "-" if METHODS.index(method) < 3 else (0, (4, 1.5))
-            steps = {"color": _colour(method), "linestyle": kind, "label": f"{method} (n = {len(x)})"}
-            axes.step(np.append(x[finite], 1e2), np.append(share[finite], finite.mean()), where="post", **steps)
+            steps = {
+                "color": _colour(method),
+                "linestyle": kind,
+                "label": f"{method} (n = {len(x)})",
+            }
+            axes.step(
+                np.append(x[finite], 1e2),
+                np.append(share[finite], finite.mean()),
+                where="post",
+                **steps,
+            )
         for close in (0.001, 0.01):
             axes.axvline(close, color=style.FAINT, linewidth=0.8, linestyle=":")
         axes.set_xscale("log")
@@ -120,21 +155,26 @@ def draw_gaps(table: pd.DataFrame) -> Figure:
     return figure
 
 
-# ----------------------------------------------------------------------------------------------------------- postures
+# ----------------------------------------------------------------------------------------- postures
 
 
 def postures_table(cases: list[Case]) -> pd.DataFrame:
-    """Return the links of the exact optimum, of the best run and at the paper's angles, platform, obstacles, force.
+    """Return the links of the exact optimum, of the best run and at the paper's angles, platform.
+
+    Obstacles, force.
 
     Returns:
-        Columns panel, case, element (platform, link, obstacle, force, target), posture, x, y, x_end, y_end, size.
+        Columns panel, case, element (platform, link, obstacle, force, target), posture, x, y,
+        x_end, y_end, size.
     """
     rows: list[tuple[Any, ...]] = []
     for panel, case in enumerate(cases):
         head = (panel, case.name)
         scenario: Any = case.any.condition.scenario
         for obstacle, (x, y) in zip(scenario.obstacles, scenario.obstacle_points(), strict=True):
-            rows.append((*head, "obstacle", "", x, y, x, y, float(getattr(obstacle, "radius", 0.0))))
+            rows.append(
+                (*head, "obstacle", "", x, y, x, y, float(getattr(obstacle, "radius", 0.0)))
+            )
         force = np.array(scenario.force) / max(float(np.hypot(*scenario.force)), 1e-12)
         x, y = scenario.target
         rows.append((*head, "force", "", x, y, x + 0.6 * force[0], y + 0.6 * force[1], 0.0))
@@ -163,7 +203,9 @@ def _links(case: Case, posture: str, found: dict[str, float]) -> list[tuple[Any,
     robot: Any = case.any.condition.robot
     x, y, angle = found["platform_x"], 0.0, 0.0
     length, height = robot.platform_size
-    rows: list[tuple[Any, ...]] = [("platform", posture, x - length / 2, -height / 2, x + length / 2, height / 2, 0.0)]
+    rows: list[tuple[Any, ...]] = [
+        ("platform", posture, x - length / 2, -height / 2, x + length / 2, height / 2, 0.0)
+    ]
     for k, link in enumerate(robot.link_lengths):
         angle += np.radians(found[f"theta_{k + 1}_deg"])
         end = x + link * np.cos(angle), y + link * np.sin(angle)
@@ -176,7 +218,11 @@ def draw_postures(table: pd.DataFrame) -> Figure:
     """Draw one panel per criterion."""
     figure, places = _panels(table["panel"].nunique(), 2.6)
     looks = dict(
-        zip(POSTURES, ((style.NEUTRAL, 3.4), (style.ARM_COLOURS[0], 1.7), (style.ARM_COLOURS[1], 1.1)), strict=True)
+        zip(
+            POSTURES,
+            ((style.NEUTRAL, 3.4), (style.ARM_COLOURS[0], 1.7), (style.ARM_COLOURS[1], 1.1)),
+            strict=True,
+        )
     )
     for axes, (_, rows) in zip(places, groups(table, "panel"), strict=False):
         style.operational_axes(axes, "unit")
@@ -186,7 +232,16 @@ def draw_postures(table: pd.DataFrame) -> Figure:
             if len(own):
                 _draw_posture(axes, own, posture, colour, width)
         for row in records(rows[rows["element"] == "obstacle"]):
-            axes.plot(row.x, row.y, "X", color=style.FORBIDDEN, ms=7, mec="white", zorder=8, label="obstacle")
+            axes.plot(
+                row.x,
+                row.y,
+                "X",
+                color=style.FORBIDDEN,
+                ms=7,
+                mec="white",
+                zorder=8,
+                label="obstacle",
+            )
         for row in records(rows[rows["element"] == "force"]):
             arrow = {"arrowstyle": "-|>", "color": style.ARM_COLOURS[2], "linewidth": 1.4}
             axes.annotate("", (row.x_end, row.y_end), (row.x, row.y), arrowprops=arrow, zorder=7)
@@ -205,9 +260,16 @@ def _draw_posture(axes: Axes, rows: pd.DataFrame, label: str, colour: str, width
     axes.plot(x, y, "o-", color=colour, linewidth=width, ms=3.0, mfc="white", label=label, zorder=5)
     for row in records(rows[rows["element"] == "platform"]):
         height = row.y_end - row.y
-        look: dict[str, Any] = {"fill": False, "edgecolor": colour, "linewidth": 0.6 * width, "zorder": 4}
+        look: dict[str, Any] = {
+            "fill": False,
+            "edgecolor": colour,
+            "linewidth": 0.6 * width,
+            "zorder": 4,
+        }
         rounded_ends = f"round,pad=0,rounding_size={0.499 * height}"
-        box = FancyBboxPatch((row.x, row.y), row.x_end - row.x, height, boxstyle=rounded_ends, **look)
+        box = FancyBboxPatch(
+            (row.x, row.y), row.x_end - row.x, height, boxstyle=rounded_ends, **look
+        )
         axes.add_patch(box)
 
 

@@ -1,4 +1,7 @@
-"""Model drawings of planar arms: the arms and their angles, via-points, links as touching circles."""
+"""Model drawings of planar arms.
+
+The arms and their angles, via-points, links as touching circles.
+"""
 
 from typing import Any
 
@@ -23,8 +26,8 @@ def arms_table(condition: ConditionResults) -> pd.DataFrame:
     """Return links and joint angles at start and goal.
 
     Returns:
-        Columns posture, arm, joint, x, y, x_end, y_end [length unit], reference_deg (the direction an angle is
-        measured from), angle_deg, length_unit.
+        Columns posture, arm, joint, x, y, x_end, y_end [length unit], reference_deg (the direction
+        an angle is measured from), angle_deg, length_unit.
     """
     problem = condition.prepared.problem
     rows = []
@@ -35,7 +38,9 @@ def arms_table(condition: ConditionResults) -> pd.DataFrame:
             direction = np.degrees(np.arctan2(y, x))
             rows.append((posture, arm, joint, *start[0, :2], *end[0, :2], direction - angle, angle))
     names = ["posture", "arm", "joint", "x", "y", "x_end", "y_end", "reference_deg", "angle_deg"]
-    return rounded(pd.DataFrame(rows, columns=names)).assign(length_unit=condition.condition.length_unit)
+    return rounded(pd.DataFrame(rows, columns=names)).assign(
+        length_unit=condition.condition.length_unit
+    )
 
 
 def draw_arms(table: pd.DataFrame) -> Figure:
@@ -51,10 +56,20 @@ def draw_arms(table: pd.DataFrame) -> Figure:
     for row in records(table[(table["joint"] == 0) & (table["posture"] == "start")]):
         _base(axes, row.x, row.y)
         below: dict[str, Any] = {"xytext": (0, -22), "textcoords": "offset points", "ha": "center"}
-        axes.annotate(f"arm {row.arm + 1}", (row.x, row.y), color=style.arm_colour(row.arm), **below)
+        axes.annotate(
+            f"arm {row.arm + 1}", (row.x, row.y), color=style.arm_colour(row.arm), **below
+        )
     handles = [
         Line2D([], [], color=style.NEUTRAL, linewidth=3, marker="o", markersize=4, label="start"),
-        Line2D([], [], color=style.NEUTRAL, linewidth=2, alpha=0.35, linestyle=(0, (2, 1)), label="goal"),
+        Line2D(
+            [],
+            [],
+            color=style.NEUTRAL,
+            linewidth=2,
+            alpha=0.35,
+            linestyle=(0, (2, 1)),
+            label="goal",
+        ),
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=2)
     axes.margins(0.12)
@@ -62,7 +77,9 @@ def draw_arms(table: pd.DataFrame) -> Figure:
 
 
 def via_points_table(condition: ConditionResults) -> pd.DataFrame:
-    """Return via-points of the best replicate: the best of its initial population, and its final best.
+    """Return via-points of the best replicate.
+
+    The best of its initial population, and its final best.
 
     Returns:
         Columns stage, arm, instant, joint_1_deg, joint_2_deg.
@@ -72,7 +89,9 @@ def via_points_table(condition: ConditionResults) -> pd.DataFrame:
         "best of the initial population": condition.first_solution,
         "best at the end": condition.solutions[condition.best_replicate],
     }
-    parts = [path_table(condition, solution).assign(stage=stage) for stage, solution in solutions.items()]
+    parts = [
+        path_table(condition, solution).assign(stage=stage) for stage, solution in solutions.items()
+    ]
     return pd.concat(parts, ignore_index=True)
 
 
@@ -90,7 +109,9 @@ def draw_via_points(table: pd.DataFrame) -> Figure:
             colour = style.arm_colour(arm) if final else style.FAINT
             x, y = rows["joint_1_deg"].to_numpy(), rows["joint_2_deg"].to_numpy()
             marker = "o" if final else "s"
-            axes.plot(x, y, color=colour, linewidth=0.9, marker=marker, markersize=4 if final else 3)
+            axes.plot(
+                x, y, color=colour, linewidth=0.9, marker=marker, markersize=4 if final else 3
+            )
             if final:
                 _numbers(axes, x, y, rows["instant"].to_numpy())
         axes.margins(0.1)
@@ -114,8 +135,8 @@ def circles_table(condition: ConditionResults) -> pd.DataFrame:
     """Return links and circles of the best replicate at its via-point of least centre distance.
 
     Returns:
-        Columns element (link, circle, centres, bodies), arm, x, y, x_end, y_end, radius, distance [length unit],
-        safety_distance, instant, length_unit.
+        Columns element (link, circle, centres, bodies), arm, x, y, x_end, y_end, radius, distance
+        [length unit], safety_distance, instant, length_unit.
     """
     problem = condition.prepared.problem
     q = motions.configurations(condition.prepared, condition.solutions[condition.best_replicate])
@@ -131,7 +152,9 @@ def circles_table(condition: ConditionResults) -> pd.DataFrame:
     a, b = _closest(centres)
     rows.append(("centres", -1, *a[:2], *b[:2], np.nan, float(np.linalg.norm(a - b))))
     nearest = motions.LinkDistance(problem.assembly).nearest(at)
-    rows.append(("bodies", -1, *nearest.points[0, :2], *nearest.points[1, :2], np.nan, nearest.distance))
+    rows.append(
+        ("bodies", -1, *nearest.points[0, :2], *nearest.points[1, :2], np.nan, nearest.distance)
+    )
     names = ["element", "arm", "x", "y", "x_end", "y_end", "radius", "distance"]
     return rounded(pd.DataFrame(rows, columns=names)).assign(
         safety_distance=condition.condition.scenario.security_margin,  # type: ignore[attr-defined]
@@ -148,20 +171,41 @@ def draw_circles(table: pd.DataFrame) -> Figure:
     style.operational_axes(axes, unit)
     for row in records(table[table["element"] == "circle"]):
         colour = style.arm_colour(row.arm)
-        axes.add_patch(Circle((row.x, row.y), row.radius, facecolor=colour, alpha=0.14, linewidth=0))
-        axes.add_patch(Circle((row.x, row.y), row.radius, fill=False, edgecolor=colour, linewidth=0.8))
+        axes.add_patch(
+            Circle((row.x, row.y), row.radius, facecolor=colour, alpha=0.14, linewidth=0)
+        )
+        axes.add_patch(
+            Circle((row.x, row.y), row.radius, fill=False, edgecolor=colour, linewidth=0.8)
+        )
         axes.plot(row.x, row.y, ".", color=colour, markersize=3)
     for arm, links in groups(table[table["element"] == "link"], "arm"):
         draw_arm(axes, arm, links)
         _base(axes, links["x"].iloc[0], links["y"].iloc[0])
     for row in records(table[table["distance"].notna()]):
         centres = row.element == "centres"
-        label = f"least distance of {'circle centres' if centres else 'the links'}: {row.distance:.3f} {unit}"
-        look: dict[str, Any] = {"color": "black", "lw": 3} if centres else {"color": style.ARM_COLOURS[3], "ls": ":"}
+        label = (
+            f"least distance of {'circle centres' if centres else 'the links'}: "
+            f"{row.distance:.3f} {unit}"
+        )
+        look: dict[str, Any] = (
+            {"color": "black", "lw": 3} if centres else {"color": style.ARM_COLOURS[3], "ls": ":"}
+        )
         axes.plot([row.x, row.x_end], [row.y, row.y_end], zorder=6, label=label, **look)
     safety = table["safety_distance"].iloc[0]
-    axes.plot([], [], "o", color=style.FAINT, fillstyle="none", label=f"circles of radius r = {radius:g} {unit}")
-    axes.plot([], [], " ", label=f"collision below 2r = {2 * radius:g} {unit}; safety distance {safety:g} {unit}")
+    axes.plot(
+        [],
+        [],
+        "o",
+        color=style.FAINT,
+        fillstyle="none",
+        label=f"circles of radius r = {radius:g} {unit}",
+    )
+    axes.plot(
+        [],
+        [],
+        " ",
+        label=f"collision below 2r = {2 * radius:g} {unit}; safety distance {safety:g} {unit}",
+    )
     axes.set_title(f"instant {int(table['instant'].iloc[0])}")
     axes.margins(0.08)
     style.legend_below(figure, axes, 1)
@@ -177,19 +221,38 @@ def path_table(condition: ConditionResults, solution: FloatArray) -> pd.DataFram
     for arm, (values, shape) in enumerate(zip(parts, shapes, strict=True)):
         points = values.reshape(shape)
         columns = {"arm": arm, "instant": np.arange(shape[0])}
-        frames.append(pd.DataFrame(columns | {"joint_1_deg": points[:, 0], "joint_2_deg": points[:, 1]}))
+        frames.append(
+            pd.DataFrame(columns | {"joint_1_deg": points[:, 0], "joint_2_deg": points[:, 1]})
+        )
     return pd.concat(frames, ignore_index=True)
 
 
-def draw_arm(axes: Axes, arm: int, rows: pd.DataFrame, *, alpha: float = 1.0, dashed: bool = False) -> None:
+def draw_arm(
+    axes: Axes, arm: int, rows: pd.DataFrame, *, alpha: float = 1.0, dashed: bool = False
+) -> None:
     """Draw an arm's links, given by rows with x, y, x_end, y_end in order."""
     x = [*rows["x"], rows["x_end"].iloc[-1]]
     y = [*rows["y"], rows["y_end"].iloc[-1]]
     kind = (0, (2, 1)) if dashed else "-"
     axes.plot(
-        x, y, linestyle=kind, color=style.arm_colour(arm), linewidth=2 if dashed else 3, alpha=alpha, zorder=3 + dashed
+        x,
+        y,
+        linestyle=kind,
+        color=style.arm_colour(arm),
+        linewidth=2 if dashed else 3,
+        alpha=alpha,
+        zorder=3 + dashed,
     )
-    axes.plot(x[:-1], y[:-1], "o", color="white", markeredgecolor=style.arm_colour(arm), alpha=alpha, zorder=4, ms=5)
+    axes.plot(
+        x[:-1],
+        y[:-1],
+        "o",
+        color="white",
+        markeredgecolor=style.arm_colour(arm),
+        alpha=alpha,
+        zorder=4,
+        ms=5,
+    )
     axes.plot(x[-1], y[-1], "o", color=style.arm_colour(arm), alpha=alpha, markersize=4, zorder=4)
 
 
@@ -205,11 +268,15 @@ def _angle(axes: Axes, row: Any) -> None:
     s, c = sincos(DEGREE * reference)
     axes.plot([x, x + 1.5 * c], [y, y + 1.5 * s], ":", color=style.NEUTRAL, linewidth=0.8, zorder=1)
     first, last = sorted((reference, reference + angle))
-    axes.add_patch(Arc((x, y), 2 * radius, 2 * radius, theta1=first, theta2=last, color=colour, linewidth=1.0))
+    axes.add_patch(
+        Arc((x, y), 2 * radius, 2 * radius, theta1=first, theta2=last, color=colour, linewidth=1.0)
+    )
     s, c = sincos(DEGREE * (reference + 0.5 * angle))
     text = f"{style.joint_symbol(arm, joint)} = {angle:g}°"
     place = (x + (radius + 0.25) * c, y + (radius + 0.25) * s)
-    axes.annotate(text, place, ha="left" if c >= 0 else "right", va="center", color=colour, zorder=5)
+    axes.annotate(
+        text, place, ha="left" if c >= 0 else "right", va="center", color=colour, zorder=5
+    )
 
 
 def _numbers(axes: Axes, x: FloatArray, y: FloatArray, instants: np.ndarray) -> None:
@@ -218,7 +285,10 @@ def _numbers(axes: Axes, x: FloatArray, y: FloatArray, instants: np.ndarray) -> 
     for k, instant in enumerate(instants):
         if instant % NUMBERED == 0 or k == len(instants) - 1:
             along = np.array(
-                [x[min(k + 1, len(x) - 1)] - x[max(k - 1, 0)], y[min(k + 1, len(y) - 1)] - y[max(k - 1, 0)]]
+                [
+                    x[min(k + 1, len(x) - 1)] - x[max(k - 1, 0)],
+                    y[min(k + 1, len(y) - 1)] - y[max(k - 1, 0)],
+                ]
             )
             side = 9.0 * np.array([-along[1], along[0]]) / max(float(np.linalg.norm(along)), 1e-9)
             place: dict[str, Any] = {
@@ -227,7 +297,9 @@ def _numbers(axes: Axes, x: FloatArray, y: FloatArray, instants: np.ndarray) -> 
                 "ha": "center",
                 "va": "center",
             }
-            axes.annotate(str(instant), (x[k], y[k]), fontsize=7, path_effects=[halo], zorder=6, **place)
+            axes.annotate(
+                str(instant), (x[k], y[k]), fontsize=7, path_effects=[halo], zorder=6, **place
+            )
 
 
 def _closest(centres: list[FloatArray]) -> tuple[FloatArray, FloatArray]:

@@ -20,7 +20,10 @@ from evoexp.report.tables import groups, rounded
 STAGES = 5  # panels that a motion is cut into; the sixth holds all of it
 CENTRES, LINKS = "circle centres", "links"
 BEST, AT_VIA_POINTS, STRAIGHT = "best replicate", "best replicate, at via-points", "straight line"
-CLOSEST, REFUTED = "closest over the whole motion, every replicate (exact)", "refuted: first contact of bodies"
+CLOSEST, REFUTED = (
+    "closest over the whole motion, every replicate (exact)",
+    "refuted: first contact of bodies",
+)
 LOWEST, HIGHEST = "lowest of all replicates", "highest of all replicates"
 
 
@@ -28,9 +31,10 @@ def snapshots_table(condition: ConditionResults) -> pd.DataFrame:
     """Return all links at every instant of the best replicate's motion.
 
     Returns:
-        Columns stage, first, last (instants of the stage), instant, arm, link, x, y, x_end, y_end [length unit],
-        length_unit. An instant between two stages belongs to both; the last stage holds all. Obstacles are rows of
-        stage −1: arm is −1, link the obstacle, one row per edge of its outline.
+        Columns stage, first, last (instants of the stage), instant, arm, link, x, y, x_end, y_end
+        [length unit], length_unit. An instant between two stages belongs to both; the last stage
+        holds all. Obstacles are rows of stage −1: arm is −1, link the obstacle, one row per edge of
+        its outline.
     """
     problem = condition.prepared.problem
     q = motions.configurations(condition.prepared, condition.solutions[condition.best_replicate])
@@ -48,7 +52,9 @@ def snapshots_table(condition: ConditionResults) -> pd.DataFrame:
     for k, outline in enumerate(motions.obstacle_outlines(problem.collision.obstacles, reach)):
         rows += [(-1, 0, last, 0, -1, k, *a, *b) for a, b in itertools.pairwise(outline)]
     names = ["stage", "first", "last", "instant", "arm", "link", "x", "y", "x_end", "y_end"]
-    return rounded(pd.DataFrame(rows, columns=names)).assign(length_unit=condition.condition.length_unit)
+    return rounded(pd.DataFrame(rows, columns=names)).assign(
+        length_unit=condition.condition.length_unit
+    )
 
 
 def draw_snapshots(table: pd.DataFrame) -> Figure:
@@ -76,15 +82,40 @@ def draw_snapshots(table: pd.DataFrame) -> Figure:
         style.operational_axes(axes, unit)
         axes.label_outer()
         first, last = rows["first"].iloc[0], rows["last"].iloc[0]
-        axes.set_title(f"all instants {first}–{last}" if k == len(stages) - 1 else f"instants {first}–{last}")
+        axes.set_title(
+            f"all instants {first}–{last}" if k == len(stages) - 1 else f"instants {first}–{last}"
+        )
     panels[0, 0].set_xlim(left, right)
     panels[0, 0].set_ylim(low, high)
     arms = sorted(table["arm"].unique())
-    handles = [Line2D([], [], color=style.arm_colour(a), linewidth=3, label=f"arm {a + 1}") for a in arms]
+    handles = [
+        Line2D([], [], color=style.arm_colour(a), linewidth=3, label=f"arm {a + 1}") for a in arms
+    ]
     dashes = (0, (2, 1))
-    handles.append(Line2D([], [], color=style.FAINT, linewidth=1.4, linestyle=dashes, label="first instant of a panel"))
-    handles.append(Line2D([], [], color=style.NEUTRAL, linewidth=3, marker="o", ms=4, label="last instant of a panel"))
-    handles.append(Line2D([], [], color=style.NEUTRAL, linewidth=0.8, linestyle=":", label="trace of the tip"))
+    handles.append(
+        Line2D(
+            [],
+            [],
+            color=style.FAINT,
+            linewidth=1.4,
+            linestyle=dashes,
+            label="first instant of a panel",
+        )
+    )
+    handles.append(
+        Line2D(
+            [],
+            [],
+            color=style.NEUTRAL,
+            linewidth=3,
+            marker="o",
+            ms=4,
+            label="last instant of a panel",
+        )
+    )
+    handles.append(
+        Line2D([], [], color=style.NEUTRAL, linewidth=0.8, linestyle=":", label="trace of the tip")
+    )
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
 
@@ -93,7 +124,8 @@ def paths_table(condition: ConditionResults) -> pd.DataFrame:
     """Return the paths of all replicates and the straight line, in configuration space.
 
     Returns:
-        Columns series (replicate, best, straight line), replicate (−1: none), arm, instant, joint_1_deg, joint_2_deg.
+        Columns series (replicate, best, straight line), replicate (−1: none), arm, instant,
+        joint_1_deg, joint_2_deg.
     """
     parts = []
     for replicate, solution in condition.solutions.items():
@@ -116,8 +148,24 @@ def draw_paths(table: pd.DataFrame) -> Figure:
             x, y = rows["joint_1_deg"].to_numpy(), rows["joint_2_deg"].to_numpy()
             if series == "best":
                 axes.plot(x, y, color=colour, linewidth=1.8, marker="o", markersize=3, zorder=4)
-                axes.plot(x[0], y[0], "s", color="white", markeredgecolor=style.NEUTRAL, markersize=7, zorder=5)
-                axes.plot(x[-1], y[-1], "*", color="white", markeredgecolor=style.NEUTRAL, markersize=11, zorder=5)
+                axes.plot(
+                    x[0],
+                    y[0],
+                    "s",
+                    color="white",
+                    markeredgecolor=style.NEUTRAL,
+                    markersize=7,
+                    zorder=5,
+                )
+                axes.plot(
+                    x[-1],
+                    y[-1],
+                    "*",
+                    color="white",
+                    markeredgecolor=style.NEUTRAL,
+                    markersize=11,
+                    zorder=5,
+                )
             elif series == STRAIGHT:
                 axes.plot(x, y, ":", color=style.NEUTRAL, linewidth=1.1, zorder=3)
             else:
@@ -126,7 +174,15 @@ def draw_paths(table: pd.DataFrame) -> Figure:
     count = table.loc[table["replicate"] >= 0, "replicate"].nunique()
     grey = style.NEUTRAL
     handles = [
-        Line2D([], [], color=grey, linewidth=1.8, marker="o", ms=3, label="best replicate, its via-points"),
+        Line2D(
+            [],
+            [],
+            color=grey,
+            linewidth=1.8,
+            marker="o",
+            ms=3,
+            label="best replicate, its via-points",
+        ),
         Line2D([], [], color=grey, linewidth=0.8, alpha=0.4, label=f"all replicates (n = {count})"),
         Line2D([], [], color=grey, linewidth=1.1, linestyle=":", label=STRAIGHT),
         Line2D([], [], color="none", marker="s", mec=grey, mfc="white", ms=7, label="start"),
@@ -137,15 +193,15 @@ def draw_paths(table: pd.DataFrame) -> Figure:
 
 
 def sampled_distances(condition: ConditionResults, samples: int) -> pd.DataFrame:
-    """Return both distances between the arms along every replicate's motion and along the straight line.
+    """Return the arms' two distances along every replicate's motion and the straight line.
 
     Args:
         condition: With data.
         samples: Configurations per segment.
 
     Returns:
-        Columns replicate (−1: the straight line), instant (a fraction between via-points), centres and links: least
-        distances of circle centres and of the links themselves [length unit].
+        Columns replicate (−1: the straight line), instant (a fraction between via-points), centres
+        and links: least distances of circle centres and of the links themselves [length unit].
     """
     prepared = condition.prepared
     links = motions.LinkDistance(prepared.problem.assembly)
@@ -166,7 +222,8 @@ def distances_table(condition: ConditionResults, sampled: pd.DataFrame) -> pd.Da
         sampled: Of `sampled_distances`.
 
     Returns:
-        Columns measure (circle centres, links), series, instant, distance, safety_distance [length unit], length_unit.
+        Columns measure (circle centres, links), series, instant, distance, safety_distance [length
+        unit], length_unit.
     """
     best = sampled[sampled["replicate"] == condition.best_replicate]
     straight = sampled[sampled["replicate"] == -1]
@@ -181,7 +238,12 @@ def distances_table(condition: ConditionResults, sampled: pd.DataFrame) -> pd.Da
             (HIGHEST, every[column].max()),
             (STRAIGHT, straight.set_index("instant")[column]),
         ):
-            columns = {"measure": measure, "series": series, "instant": values.index, "distance": values.to_numpy()}
+            columns = {
+                "measure": measure,
+                "series": series,
+                "instant": values.index,
+                "distance": values.to_numpy(),
+            }
             parts.append(pd.DataFrame(columns))
     margin = condition.condition.scenario.security_margin  # type: ignore[attr-defined]
     table = rounded(pd.concat([*parts, *_exact(condition)], ignore_index=True))
@@ -189,7 +251,10 @@ def distances_table(condition: ConditionResults, sampled: pd.DataFrame) -> pd.Da
 
 
 def _exact(condition: ConditionResults) -> Iterator[pd.DataFrame]:
-    """Yield what the exact certifier found: where the arms of every replicate are closest, and where bodies touch."""
+    """Yield what the exact certifier found.
+
+    Where the arms of every replicate are closest, and where bodies touch.
+    """
     rows = condition.summaries
     between = rows["clearance_pair"].str.count("arm_").eq(2) & rows["clearance_at"].notna()
     for series, kept, at, distance in (
@@ -198,11 +263,16 @@ def _exact(condition: ConditionResults) -> Iterator[pd.DataFrame]:
     ):
         found = np.zeros(len(kept)) if distance is None else kept[distance].to_numpy(np.float64)
         instants = kept[at].to_numpy(np.float64)
-        yield pd.DataFrame({"measure": LINKS, "series": series, "instant": instants, "distance": found})
+        yield pd.DataFrame(
+            {"measure": LINKS, "series": series, "instant": instants, "distance": found}
+        )
 
 
 def draw_distances(table: pd.DataFrame) -> Figure:
-    """Draw the least distance between the arms against the instant, in the paper's model and between the links."""
+    """Draw the least distance between the arms against the instant.
+
+    In the paper's model and between the links.
+    """
     figure = style.figure(5.4)
     panels = figure.subplots(2, 1, sharex=True)
     unit, safety = table["length_unit"].iloc[0], float(table["safety_distance"].iloc[0])
@@ -235,9 +305,20 @@ def _distances(axes: Axes, rows: pd.DataFrame, safety: float, unit: str) -> None
         linewidth=0,
         label="range over replicates",
     )
-    axes.plot(series[STRAIGHT]["instant"], series[STRAIGHT]["distance"], ":", color=style.FAINT, lw=1.2, label=STRAIGHT)
     axes.plot(
-        series[BEST]["instant"], series[BEST]["distance"], color=colour, lw=1.3, label=f"{BEST}, between via-points too"
+        series[STRAIGHT]["instant"],
+        series[STRAIGHT]["distance"],
+        ":",
+        color=style.FAINT,
+        lw=1.2,
+        label=STRAIGHT,
+    )
+    axes.plot(
+        series[BEST]["instant"],
+        series[BEST]["distance"],
+        color=colour,
+        lw=1.3,
+        label=f"{BEST}, between via-points too",
     )
     points = series[AT_VIA_POINTS]
     axes.plot(
@@ -252,7 +333,10 @@ def _distances(axes: Axes, rows: pd.DataFrame, safety: float, unit: str) -> None
         clip_on=False,
         zorder=4,
     )
-    for name, look in ((CLOSEST, {"marker": "D", "ms": 3.2}), (REFUTED, {"marker": "X", "ms": 8, "mec": "white"})):
+    for name, look in (
+        (CLOSEST, {"marker": "D", "ms": 3.2}),
+        (REFUTED, {"marker": "X", "ms": 8, "mec": "white"}),
+    ):
         if name in series:
             red = style.FORBIDDEN if name == REFUTED else style.NEUTRAL
             axes.plot(
@@ -284,9 +368,15 @@ def _snapshot(axes: Axes, rows: pd.DataFrame, whole: bool) -> None:
             if instant == last:
                 draw_arm(axes, arm, links)
             elif instant == first:
-                axes.plot(x, y, linestyle=(0, (2, 1)), color=colour, linewidth=1.4, alpha=0.8, zorder=2)
+                axes.plot(
+                    x, y, linestyle=(0, (2, 1)), color=colour, linewidth=1.4, alpha=0.8, zorder=2
+                )
             else:
                 between.append(np.column_stack([x, y]))
                 shades.append(0.25 if whole else 0.7 - 0.5 * (last - instant) / (last - first))
-        axes.add_collection(LineCollection(between, colors=colour, linewidths=1.0, alpha=shades or None, zorder=1))
-        axes.plot(own["x"].iloc[0], own["y"].iloc[0], "s", color=style.NEUTRAL, markersize=6, zorder=2)
+        axes.add_collection(
+            LineCollection(between, colors=colour, linewidths=1.0, alpha=shades or None, zorder=1)
+        )
+        axes.plot(
+            own["x"].iloc[0], own["y"].iloc[0], "s", color=style.NEUTRAL, markersize=6, zorder=2
+        )

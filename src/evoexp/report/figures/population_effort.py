@@ -1,4 +1,7 @@
-"""Success and expected effort against one setting, one series per task (Corsépius 2001, section 5)."""
+"""Success and expected effort against one setting, one series per task.
+
+Corsépius 2001, section 5.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -41,8 +44,9 @@ def effort_table(
         num_resamples: Of the bootstrap.
 
     Returns:
-        Columns quantity, kind (share, effort), position (of the task), task, value (of the setting), expected (a share,
-        or the effort spent per success; inf without one, NaN of no runs), lower, upper, having, total.
+        Columns quantity, kind (share, effort), position (of the task), task, value (of the
+        setting), expected (a share, or the effort spent per success; inf without one, NaN of no
+        runs), lower, upper, having, total.
     """
     rows: list[tuple[object, ...]] = []
     for position, task in enumerate(found):
@@ -56,10 +60,23 @@ def effort_table(
                 interval = expected_interval(spent, having, confidence, num_resamples)
                 expected = expected_effort(spent, having)
                 rows.append((name, EFFORT, *given, expected, *interval, c.solved, c.done))
-    names = ["quantity", "kind", "position", "task", "value", "expected", "lower", "upper", "having", "total"]
+    names = [
+        "quantity",
+        "kind",
+        "position",
+        "task",
+        "value",
+        "expected",
+        "lower",
+        "upper",
+        "having",
+        "total",
+    ]
     table = pd.DataFrame(rows, columns=names)
     order = {name: k for k, name in enumerate([*shares, *effort])}
-    return table.sort_values("quantity", key=lambda column: column.map(order), kind="stable", ignore_index=True)
+    return table.sort_values(
+        "quantity", key=lambda column: column.map(order), kind="stable", ignore_index=True
+    )
 
 
 def draw_effort(table: pd.DataFrame, setting: str, marked: float) -> Figure:
@@ -87,7 +104,9 @@ def draw_effort(table: pd.DataFrame, setting: str, marked: float) -> Figure:
     return figure
 
 
-def ratios_table(rows: Mapping[str, Sequence[Any]], names: Sequence[str], reference: float) -> pd.DataFrame:
+def ratios_table(
+    rows: Mapping[str, Sequence[Any]], names: Sequence[str], reference: float
+) -> pd.DataFrame:
     """Return the effort of every value over that of the recommended one.
 
     Args:
@@ -96,14 +115,36 @@ def ratios_table(rows: Mapping[str, Sequence[Any]], names: Sequence[str], refere
         reference: The recommended value.
 
     Returns:
-        Columns quantity, kind (ratio), position, task, value, expected (the ratio), lower, upper, bound, reference.
+        Columns quantity, kind (ratio), position, task, value, expected (the ratio), lower, upper,
+        bound, reference.
     """
     found = [
-        (metric, RATIO, names.index(row.task), row.task, row.value, row.ratio, *row.interval, row.bound, reference)
+        (
+            metric,
+            RATIO,
+            names.index(row.task),
+            row.task,
+            row.value,
+            row.ratio,
+            *row.interval,
+            row.bound,
+            reference,
+        )
         for metric, own in rows.items()
         for row in own
     ]
-    columns = ["quantity", "kind", "position", "task", "value", "expected", "lower", "upper", "bound", "reference"]
+    columns = [
+        "quantity",
+        "kind",
+        "position",
+        "task",
+        "value",
+        "expected",
+        "lower",
+        "upper",
+        "bound",
+        "reference",
+    ]
     return pd.DataFrame(found, columns=columns)
 
 
@@ -121,7 +162,13 @@ def draw_ratios(table: pd.DataFrame, setting: str) -> Figure:
         bounds = own[own["bound"] != 1.0].drop_duplicates("value").sort_values("value")
         if len(bounds):
             x = [*bounds["value"], own["reference"].iloc[0]]
-            axes.plot(x, [*bounds["bound"], 1.0], color=style.NEUTRAL, linewidth=1.2, linestyle=(0, (1, 1.5)))
+            axes.plot(
+                x,
+                [*bounds["bound"], 1.0],
+                color=style.NEUTRAL,
+                linewidth=1.2,
+                linestyle=(0, (1, 1.5)),
+            )
         axes.set_xlabel(setting)
         axes.set_title(f"{NUMBERS[k]}  {quantity}")
         axes.tick_params(axis="x", labelsize=6.5)

@@ -1,4 +1,7 @@
-"""How a search comes near its goal: best so far against cycles, phase by phase; why searches end."""
+"""How a search comes near its goal: best so far against cycles, phase by phase.
+
+Why searches end.
+"""
 
 import numpy as np
 import pandas as pd
@@ -23,16 +26,20 @@ VISIBLE = 1e-6  # [length unit] tolerances below are no line
 def history_table(results: Results) -> pd.DataFrame:
     """Return cost and distance of the best so far, per phase and cycle of the phase.
 
-    A search that has ended keeps its last value, so that every cycle counts all runs that began the phase.
+    A search that has ended keeps its last value, so that every cycle counts all runs that began the
+    phase.
 
     Returns:
-        Columns position, condition, phase (name), order (of phases), quantity, cycle, median, lower, upper, begun (runs
-        that began the phase), running (of them still searching), tolerance, length_unit.
+        Columns position, condition, phase (name), order (of phases), quantity, cycle, median,
+        lower, upper, begun (runs that began the phase), running (of them still searching),
+        tolerance, length_unit.
     """
     parts = []
     for position, c in enumerate(results.main):
         names = measures.phase_names(c)
-        rows = c.generations[["replicate", "index", "term_phase", "term_goal_distance", "term_cost"]]
+        rows = c.generations[
+            ["replicate", "index", "term_phase", "term_goal_distance", "term_cost"]
+        ]
         for phase, own in groups(rows, "term_phase"):
             cycle = own.groupby("replicate")["index"].rank(method="first").astype(int) - 1
             own = own.assign(cycle=cycle)
@@ -63,7 +70,9 @@ def history_table(results: Results) -> pd.DataFrame:
 
 
 def draw_history(table: pd.DataFrame) -> Figure:
-    """Draw medians with quartiles of the distance, one panel per phase; of one phase alone, the cost beside it.
+    """Draw medians with quartiles of the distance, one panel per phase.
+
+    Of one phase alone, the cost beside it.
 
     Where there are many conditions, each has its own panel, with a line per phase.
     """
@@ -72,9 +81,14 @@ def draw_history(table: pd.DataFrame) -> Figure:
     if many:
         panels = [(table["position"] == k, name, DISTANCE) for k, name in _conditions(table)]
     elif len(phases) == 1:
-        panels = [(table["phase"] == phases[0], f"{'ab'[k]}  {what}", what) for k, what in enumerate((COST, DISTANCE))]
+        panels = [
+            (table["phase"] == phases[0], f"{'ab'[k]}  {what}", what)
+            for k, what in enumerate((COST, DISTANCE))
+        ]
     else:
-        panels = [(table["phase"] == name, f"{k + 1}  {name}", DISTANCE) for k, name in enumerate(phases)]
+        panels = [
+            (table["phase"] == name, f"{k + 1}  {name}", DISTANCE) for k, name in enumerate(phases)
+        ]
     columns = min(PER_LINE, len(panels))
     lines = -(-len(panels) // columns)
     figure = style.figure((2.1 if many else 2.4) * lines + 0.8)
@@ -84,13 +98,21 @@ def draw_history(table: pd.DataFrame) -> Figure:
         rows = table[chosen & (table["quantity"] == quantity)]
         _curves(axes, rows, "phase" if many else "condition", names)
         if quantity == DISTANCE and rows["tolerance"].iloc[0] >= VISIBLE:
-            axes.axhline(rows["tolerance"].iloc[0], color=style.NEUTRAL, linewidth=0.9, linestyle=(0, (4, 2)))
+            axes.axhline(
+                rows["tolerance"].iloc[0], color=style.NEUTRAL, linewidth=0.9, linestyle=(0, (4, 2))
+            )
         axes.set_title(title, fontsize=8)
         axes.set_xlabel("cycle of the phase")
         unit = rows["length_unit"].iloc[0]
-        axes.set_ylabel(f"distance [{unit}]" if quantity == DISTANCE else "cost of the best so far [-]")
-    handles = [Line2D([], [], color=style.condition_colour(k), label=name) for k, name in enumerate(names)]
-    handles.append(Line2D([], [], color=style.NEUTRAL, linewidth=0.9, linestyle=(0, (4, 2)), label="tolerance"))
+        axes.set_ylabel(
+            f"distance [{unit}]" if quantity == DISTANCE else "cost of the best so far [-]"
+        )
+    handles = [
+        Line2D([], [], color=style.condition_colour(k), label=name) for k, name in enumerate(names)
+    ]
+    handles.append(
+        Line2D([], [], color=style.NEUTRAL, linewidth=0.9, linestyle=(0, (4, 2)), label="tolerance")
+    )
     figure.legend(handles=handles, loc="outside lower center", ncols=4)
     return figure
 
@@ -99,10 +121,17 @@ def _curves(axes: Axes, table: pd.DataFrame, by: str, names: list[str]) -> None:
     """Draw one curve per condition or phase, with its number of runs at the end."""
     for name, curve in groups(table, by):
         colour = style.condition_colour(names.index(name))
-        axes.fill_between(curve["cycle"], curve["lower"], curve["upper"], color=colour, alpha=0.2, linewidth=0)
+        axes.fill_between(
+            curve["cycle"], curve["lower"], curve["upper"], color=colour, alpha=0.2, linewidth=0
+        )
         axes.plot(curve["cycle"], curve["median"], color=colour)
-        text, place = f" {curve['begun'].iloc[0]}", (curve["cycle"].iloc[-1], curve["median"].iloc[-1])
-        axes.annotate(text, place, fontsize=6, color=colour, va="center", ha="left", annotation_clip=False)
+        text, place = (
+            f" {curve['begun'].iloc[0]}",
+            (curve["cycle"].iloc[-1], curve["median"].iloc[-1]),
+        )
+        axes.annotate(
+            text, place, fontsize=6, color=colour, va="center", ha="left", annotation_clip=False
+        )
     axes.set_yscale("log")
     axes.set_xlim(0, max(1, int(table["cycle"].max())))
     axes.xaxis.set_major_locator(MaxNLocator(nbins=4, integer=True))
@@ -123,8 +152,8 @@ def phases_table(results: Results, confidence: float) -> pd.DataFrame:
     """Return how each phase went, over all conditions with several.
 
     Returns:
-        Columns position, condition, order, phase, begun, reached, share, lower, upper (of those that began it), cycles,
-        cycles_lower, cycles_upper (quartiles).
+        Columns position, condition, order, phase, begun, reached, share, lower, upper (of those
+        that began it), cycles, cycles_lower, cycles_upper (quartiles).
     """
     rows = []
     for position, c in enumerate(results.main):
@@ -151,7 +180,14 @@ def draw_phases(table: pd.DataFrame) -> Figure:
         left.hlines(y, 100 * row.lower, 100 * row.upper, color=colour, linewidth=1.6)
         left.plot([100 * row.share], [y], "o", color=colour, markersize=4.5)
         text = f" {row.reached}/{row.begun}"
-        left.annotate(text, (1.0, y), xycoords=left.get_yaxis_transform(), fontsize=6.5, va="center", ha="left")
+        left.annotate(
+            text,
+            (1.0, y),
+            xycoords=left.get_yaxis_transform(),
+            fontsize=6.5,
+            va="center",
+            ha="left",
+        )
         right.hlines(y, row.cycles_lower, row.cycles_upper, color=colour, linewidth=1.6)
         right.plot([row.cycles], [y], "o", color=colour, markersize=4.5)
         name = f"{row.order + 1}  {row.phase}"

@@ -1,4 +1,7 @@
-"""Robots as they are and as they are tested: coal's geometry beside the spheres (Corsépius 2001, Figs. 3 and 4)."""
+"""Robots as they are and as they are tested.
+
+Coal's geometry beside the spheres (Corsépius 2001, Figs. 3 and 4).
+"""
 
 from collections.abc import Sequence
 from typing import Any
@@ -25,8 +28,8 @@ def models_table(shown: Sequence[tuple[str, ConditionResults]]) -> pd.DataFrame:
         shown: (title, a condition of the robot).
 
     Returns:
-        Columns position, robot, element (body, cover), name (of the body), those of `solids`, inflation (of all its
-        covers), length_unit.
+        Columns position, robot, element (body, cover), name (of the body), those of `solids`,
+        inflation (of all its covers), length_unit.
     """
     rows: list[tuple[Any, ...]] = []
     for position, (title, c) in enumerate(shown):
@@ -41,7 +44,16 @@ def models_table(shown: Sequence[tuple[str, ConditionResults]]) -> pd.DataFrame:
             rows.append((position, title, BODY, item.name, *_row(item.geometry, place), *end))
         for name, joint, cover in zip(bodies.names, joints, bodies.covers, strict=True):
             for start, stop, radius in zip(cover.start, cover.end, cover.radius, strict=True):
-                rows.append((position, title, COVER, name, *_capsule(data.oMi[joint], start, stop, radius), *end))
+                rows.append(
+                    (
+                        position,
+                        title,
+                        COVER,
+                        name,
+                        *_capsule(data.oMi[joint], start, stop, radius),
+                        *end,
+                    )
+                )
     names = ["position", "robot", "element", "name", *solids.COLUMNS, "inflation", "length_unit"]
     return rounded(pd.DataFrame(rows, columns=names))
 
@@ -66,7 +78,9 @@ def draw_models(table: pd.DataFrame) -> Figure:
             else:
                 kinds = {solids.BALL: "spheres", solids.ROD: "capsules"}
                 counts = own["shape"].value_counts()
-                what = ", ".join(f"{counts[kind]} {name}" for kind, name in kinds.items() if kind in counts)
+                what = ", ".join(
+                    f"{counts[kind]} {name}" for kind, name in kinds.items() if kind in counts
+                )
                 axes.set_title(f"{what}, at most {rows['inflation'].iloc[0]:.3g} {unit} beyond")
     return figure
 
@@ -87,7 +101,11 @@ def _capsule(joint: Any, start: Any, stop: Any, radius: float) -> tuple[Any, ...
     """Return a sphere, or a capsule between two points, given in a joint's frame."""
     along = np.asarray(stop) - np.asarray(start)
     half = 0.5 * float(np.sqrt((along**2).sum()))
-    turn = np.eye(3) if half == 0.0 else pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), along).matrix()
+    turn = (
+        np.eye(3)
+        if half == 0.0
+        else pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), along).matrix()
+    )
     where = joint.act(0.5 * (np.asarray(start) + np.asarray(stop)))
     shape = solids.BALL if half == 0.0 else solids.ROD
     return (shape, *where, *(joint.rotation @ turn).ravel(), radius, half, 0.0)

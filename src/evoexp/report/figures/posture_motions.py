@@ -1,4 +1,7 @@
-"""Paths of postures in space: stick figures among the obstacles, earlier ones fainter; phase by phase."""
+"""Paths of postures in space: stick figures among the obstacles, earlier ones fainter.
+
+Phase by phase.
+"""
 
 from typing import Any, NamedTuple
 
@@ -44,8 +47,9 @@ def motions_table(shown: list[Shown]) -> pd.DataFrame:
     """Return links at every posture, tips, goals, obstacles where they are, objects that are held.
 
     Returns:
-        Columns panel, title, element (link, tip, goal, obstacle, held), instant (posture of the path), name, x, y, z,
-        x_end, y_end, z_end (of a link), those of `solids` (of obstacles and objects), length_unit.
+        Columns panel, title, element (link, tip, goal, obstacle, held), instant (posture of the
+        path), name, x, y, z, x_end, y_end, z_end (of a link), those of `solids` (of obstacles and
+        objects), length_unit.
     """
     rows: list[dict[str, Any]] = []
     panel = 0
@@ -58,7 +62,11 @@ def motions_table(shown: list[Shown]) -> pd.DataFrame:
         for number, span in enumerate(parts):
             first = span.first if one.by_phase else 0
             title = f"{number + 1}  {span.stage.phase.name}" if one.by_phase else one.title
-            given = {"panel": panel, "title": title, "length_unit": one.condition.condition.length_unit}
+            given = {
+                "panel": panel,
+                "title": title,
+                "length_unit": one.condition.condition.length_unit,
+            }
             for row in _panel(problem, span, postures, first):
                 rows.append(given | row)
             panel += 1
@@ -87,7 +95,14 @@ def draw_motions(table: pd.DataFrame) -> Figure:
             _draw(plane, rows, "xy")
     grey = style.NEUTRAL
     handles = [
-        Line2D([], [], color=style.arm_colour(0), linewidth=0.8, alpha=0.4, label="postures, the later the stronger"),
+        Line2D(
+            [],
+            [],
+            color=style.arm_colour(0),
+            linewidth=0.8,
+            alpha=0.4,
+            label="postures, the later the stronger",
+        ),
         Line2D([], [], color=style.arm_colour(0), linewidth=2.4, label="last posture"),
         Line2D([], [], color=style.arm_colour(1), linewidth=1.0, label="way of the tool"),
         Line2D([], [], color="none", marker="*", mec=grey, mfc="white", ms=9, label="goal"),
@@ -97,7 +112,10 @@ def draw_motions(table: pd.DataFrame) -> Figure:
 
 
 def _panel(problem: Any, span: Any, postures: FloatArray, first: int) -> list[dict[str, Any]]:
-    """Return the rows of one panel: postures from `first` to the end of the span, things as they are in it."""
+    """Return the rows of one panel.
+
+    Postures from `first` to the end of the span, things as they are in it.
+    """
     own = postures[first : span.last + 1]
     rows: list[dict[str, Any]] = []
     for _, link, start, end in motions.joint_positions(problem.assembly, own.T / DEGREE):
@@ -107,10 +125,18 @@ def _panel(problem: Any, span: Any, postures: FloatArray, first: int) -> list[di
     joint, local = problem.tool
     for n, q in enumerate(own):
         tip = frame_pose(problem.assembly.table, joint, local, q)[9:]
-        rows.append({"element": TIP, "instant": first + n, "name": "tool"} | dict(zip("xyz", tip, strict=True)))
-    goal = span.stage.judging[3][9:12] if span.stage.phase.goal.kind != "surface" else span.stage.judging[3][15:18]
+        rows.append(
+            {"element": TIP, "instant": first + n, "name": "tool"}
+            | dict(zip("xyz", tip, strict=True))
+        )
+    goal = (
+        span.stage.judging[3][9:12]
+        if span.stage.phase.goal.kind != "surface"
+        else span.stage.judging[3][15:18]
+    )
     rows.append(
-        {"element": GOAL, "instant": span.last, "name": span.stage.phase.name} | dict(zip("xyz", goal, strict=True))
+        {"element": GOAL, "instant": span.last, "name": span.stage.phase.name}
+        | dict(zip("xyz", goal, strict=True))
     )
     situation = span.stage.situation
     table = problem.obstacles_in(span.stage)
@@ -126,7 +152,9 @@ def _panel(problem: Any, span: Any, postures: FloatArray, first: int) -> list[di
             found = solids.solid(shape, where)
             if found is not None:
                 given = dict(zip(solids.COLUMNS, found, strict=True))
-                rows.append({"element": element, "instant": instant, "name": problem.task.names[k]} | given)
+                rows.append(
+                    {"element": element, "instant": instant, "name": problem.task.names[k]} | given
+                )
     return rows
 
 
@@ -135,7 +163,12 @@ def _points(rows: pd.DataFrame) -> FloatArray:
     links = rows[rows["element"] == LINK]
     solid = rows[rows["element"].isin([OBSTACLE, HELD])]
     goal = rows[rows["element"] == GOAL]
-    parts = [links[["x", "y", "z"]], links[PATH], goal[["x", "y", "z"]], pd.DataFrame(solids.corners(solid))]
+    parts = [
+        links[["x", "y", "z"]],
+        links[PATH],
+        goal[["x", "y", "z"]],
+        pd.DataFrame(solids.corners(solid)),
+    ]
     return np.vstack([part.to_numpy(dtype=np.float64) for part in parts])
 
 
@@ -152,10 +185,30 @@ def _draw(axes: Any, rows: pd.DataFrame, names: str) -> None:
         points = [[links[name].iloc[0], *links[f"{name}_end"]] for name in names]
         newest = instant == last
         shade = 1.0 if newest else 0.12 + 0.4 * (instant - first) / max(1, last - first)
-        axes.plot(*points, color=style.arm_colour(0), linewidth=2.4 if newest else 0.8, alpha=shade, zorder=5)
+        axes.plot(
+            *points,
+            color=style.arm_colour(0),
+            linewidth=2.4 if newest else 0.8,
+            alpha=shade,
+            zorder=5,
+        )
         if newest:
-            axes.plot(*points, "o", color="white", markeredgecolor=style.arm_colour(0), markersize=2.6, zorder=6)
+            axes.plot(
+                *points,
+                "o",
+                color="white",
+                markeredgecolor=style.arm_colour(0),
+                markersize=2.6,
+                zorder=6,
+            )
     tip = rows[rows["element"] == TIP].sort_values("instant")
     axes.plot(*(tip[name] for name in names), color=style.arm_colour(1), linewidth=1.0, zorder=7)
     goal = rows[rows["element"] == GOAL]
-    axes.plot(*(goal[name] for name in names), "*", color="white", markeredgecolor=style.NEUTRAL, ms=8, zorder=8)
+    axes.plot(
+        *(goal[name] for name in names),
+        "*",
+        color="white",
+        markeredgecolor=style.NEUTRAL,
+        ms=8,
+        zorder=8,
+    )

@@ -1,4 +1,7 @@
-"""A local minimum of the search: where it gets stuck, the cost around, and the way that a sub-goal opens."""
+"""A local minimum of the search.
+
+Where it gets stuck, the cost around, and the way that a sub-goal opens.
+"""
 
 from typing import Any
 
@@ -41,7 +44,10 @@ STUCK, HELPED = "stuck", "helped"
 
 
 def pair(shown: tuple[ConditionResults, ...]) -> tuple[ConditionResults, ConditionResults] | None:
-    """Return a task in which runs get stuck, and the same with sub-goals, solved; None without both."""
+    """Return a task in which runs get stuck, and the same with sub-goals, solved.
+
+    None without both.
+    """
     for helped in shown:
         for stuck in shown:
             different = stuck.solved < stuck.done and helped.solved > 0
@@ -51,13 +57,16 @@ def pair(shown: tuple[ConditionResults, ...]) -> tuple[ConditionResults, Conditi
 
 
 def trap_table(stuck: ConditionResults, helped: ConditionResults) -> pd.DataFrame:
-    """Return ways of the tools, distances to the goal along them, and the cost around the median run that is stuck.
+    """Return ways of the tools, distances to the goal along them.
+
+    And the cost around the median run that is stuck.
 
     Returns:
-        Columns element (tool, cell, escape, obstacle, goal), series (stuck, helped), replicate, order, value, those of
-        `solids`, x_end, y_end, scope_deg, joint_x, joint_y, length_unit. Tools: places and distances to the last goal.
-        Cells: two joint angles [deg] and the cost (NaN: infeasible), with the stuck posture and its scope. Escapes:
-        half the edge of a box [scopes], the stuck posture's cost, the least one found in the box.
+        Columns element (tool, cell, escape, obstacle, goal), series (stuck, helped), replicate,
+        order, value, those of `solids`, x_end, y_end, scope_deg, joint_x, joint_y, length_unit.
+        Tools: places and distances to the last goal. Cells: two joint angles [deg] and the cost
+        (NaN: infeasible), with the stuck posture and its scope. Escapes: half the edge of a box
+        [scopes], the stuck posture's cost, the least one found in the box.
     """
     problem = stuck.prepared.problem
     stage = problem.last_stage
@@ -77,7 +86,9 @@ def trap_table(stuck: ConditionResults, helped: ConditionResults) -> pd.DataFram
     for k, (shape, placement) in enumerate(obstacle_shapes(problem.obstacles_in(stage))):
         found = solids.solid(shape, placement)
         if found is not None:
-            rows.append({"element": OBSTACLE, "order": k} | dict(zip(solids.COLUMNS, found, strict=True)))
+            rows.append(
+                {"element": OBSTACLE, "order": k} | dict(zip(solids.COLUMNS, found, strict=True))
+            )
     places = ["x_end", "y_end", "scope_deg"]
     names = ["element", "series", "replicate", "order", "value", *solids.COLUMNS, *places]
     table = rounded(pd.DataFrame(rows).reindex(columns=names))
@@ -91,16 +102,34 @@ def draw_trap(table: pd.DataFrame) -> Figure:
     unit = table["length_unit"].iloc[0]
     for row in records(table[table["element"] == OBSTACLE]):
         solids.draw_outline(above, row, style.FAINT, 0.35)
-    look = {STUCK: (style.arm_colour(1), "without a sub-goal, stuck"), HELPED: (style.arm_colour(0), "with a sub-goal")}
+    look = {
+        STUCK: (style.arm_colour(1), "without a sub-goal, stuck"),
+        HELPED: (style.arm_colour(0), "with a sub-goal"),
+    }
     tools = table[table["element"] == TOOL]
     for series, (colour, _) in look.items():
         for _, rows in groups(tools[tools["series"] == series], "replicate"):
             above.plot(rows["x"], rows["y"], color=colour, linewidth=0.7, alpha=0.45)
             along.plot(rows["order"], rows["value"], color=colour, linewidth=0.7, alpha=0.45)
             if series == STUCK:
-                above.plot(rows["x"].iloc[-1:], rows["y"].iloc[-1:], "x", color=style.FORBIDDEN, markersize=4, zorder=5)
+                above.plot(
+                    rows["x"].iloc[-1:],
+                    rows["y"].iloc[-1:],
+                    "x",
+                    color=style.FORBIDDEN,
+                    markersize=4,
+                    zorder=5,
+                )
     goal = table[table["element"] == GOAL]
-    above.plot(goal["x"], goal["y"], "*", color="white", markeredgecolor=style.NEUTRAL, markersize=10, zorder=6)
+    above.plot(
+        goal["x"],
+        goal["y"],
+        "*",
+        color="white",
+        markeredgecolor=style.NEUTRAL,
+        markersize=10,
+        zorder=6,
+    )
     style.operational_axes(above, unit)
     above.set_title("a  ways of the tools, from above")
     along.set_xlabel("posture of the path")
@@ -109,7 +138,9 @@ def draw_trap(table: pd.DataFrame) -> Figure:
     along.set_ylim(bottom=0.0)
     _landscape(figure, land, table)
     _way_out(escape, table[table["element"] == ESCAPE])
-    handles = [Line2D([], [], color=colour, linewidth=1.6, label=name) for colour, name in look.values()]
+    handles = [
+        Line2D([], [], color=colour, linewidth=1.6, label=name) for colour, name in look.values()
+    ]
     figure.legend(handles=handles, loc="outside lower center", ncols=2)
     return figure
 
@@ -119,34 +150,60 @@ def _landscape(figure: Figure, axes, table: pd.DataFrame) -> None:  # type: igno
     wide = cells.pivot(index="y", columns="x", values="value")
     axes.set_facecolor("#c8c8c8")
     shown = axes.pcolormesh(
-        wide.columns, wide.index, wide.to_numpy(), cmap="viridis_r", shading="nearest", rasterized=True
+        wide.columns,
+        wide.index,
+        wide.to_numpy(),
+        cmap="viridis_r",
+        shading="nearest",
+        rasterized=True,
     )
     figure.colorbar(shown, ax=axes, label="cost [-]", shrink=0.9)
     x, y = cells["x_end"].iloc[0], cells["y_end"].iloc[0]
     axes.plot(x, y, "X", color=style.FORBIDDEN, mec="white", markersize=8)
     scope = cells["scope_deg"].iloc[0]
     corner = x - scope, y - scope
-    axes.add_patch(Rectangle(corner, 2 * scope, 2 * scope, fill=False, edgecolor=style.FORBIDDEN, linewidth=1.2))
+    axes.add_patch(
+        Rectangle(
+            corner, 2 * scope, 2 * scope, fill=False, edgecolor=style.FORBIDDEN, linewidth=1.2
+        )
+    )
     axes.grid(visible=False)
     axes.set_xlabel(f"{style.joint_symbol(0, int(table['joint_x'].iloc[0]) - 1)} [deg]")
     axes.set_ylabel(f"{style.joint_symbol(0, int(table['joint_y'].iloc[0]) - 1)} [deg]")
     axes.set_title("c  cost around a stuck posture (×), its scope")
 
 
-def _tool(problem, stage: Any, series: str, replicate: int, q: FloatArray) -> list[dict[str, object]]:  # type: ignore[no-untyped-def]
+def _tool(
+    problem: Any, stage: Any, series: str, replicate: int, q: FloatArray
+) -> list[dict[str, object]]:
     """Return the places of the tool along a path, and its distances to the goal."""
     distance = problem.judge(stage, q.T).distance
     joint, local = problem.tool
     places = [frame_pose(problem.assembly.table, joint, local, posture)[9:] for posture in q]
     return [
-        {"element": TOOL, "series": series, "replicate": replicate, "order": n, "x": x, "y": y, "z": z, "value": value}
+        {
+            "element": TOOL,
+            "series": series,
+            "replicate": replicate,
+            "order": n,
+            "x": x,
+            "y": y,
+            "z": z,
+            "value": value,
+        }
         for n, ((x, y, z), value) in enumerate(zip(places, distance, strict=True))
     ]
 
 
 def _way_out(axes, table: pd.DataFrame) -> None:  # type: ignore[no-untyped-def]
     """Draw the least cost in boxes around the posture that is stuck."""
-    axes.axhline(table["y"].iloc[0], color=style.FORBIDDEN, linewidth=1.0, linestyle=(0, (4, 2)), label="stuck")
+    axes.axhline(
+        table["y"].iloc[0],
+        color=style.FORBIDDEN,
+        linewidth=1.0,
+        linestyle=(0, (4, 2)),
+        label="stuck",
+    )
     axes.plot(table["x"], table["value"], "o-", color=style.arm_colour(0), markersize=4)
     axes.set_xscale("log", base=2)
     axes.xaxis.set_major_formatter(ScalarFormatter())
@@ -168,7 +225,11 @@ def _cells(problem, stage: Any, end: FloatArray, a: int, b: int) -> list[dict[st
     q[a], q[b] = first, second
     found = problem.judge(stage, q)
     cost = np.where(found.feasible, found.cost, np.nan)
-    same = {"x_end": end[a] / DEGREE, "y_end": end[b] / DEGREE, "scope_deg": problem.scope[a] / DEGREE}
+    same = {
+        "x_end": end[a] / DEGREE,
+        "y_end": end[b] / DEGREE,
+        "scope_deg": problem.scope[a] / DEGREE,
+    }
     return [
         {"element": CELL, "order": n, "x": x, "y": y, "value": value} | same
         for n, (x, y, value) in enumerate(zip(first / DEGREE, second / DEGREE, cost, strict=True))
@@ -176,7 +237,10 @@ def _cells(problem, stage: Any, end: FloatArray, a: int, b: int) -> list[dict[st
 
 
 def _escape(problem, stage: Any, end: FloatArray) -> list[dict[str, object]]:  # type: ignore[no-untyped-def]
-    """Return the least feasible cost of random postures in boxes around a posture, and that posture's own."""
+    """Return the least feasible cost of random postures in boxes around a posture.
+
+    And that posture's own.
+    """
     rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
     low, high = problem.limits.T
     own = float(problem.judge(stage, end[:, None]).cost[0])
@@ -188,6 +252,12 @@ def _escape(problem, stage: Any, end: FloatArray) -> list[dict[str, object]]:  #
         found = problem.judge(stage, q)
         costs = found.cost[found.feasible]
         rows.append(
-            {"element": ESCAPE, "order": n, "x": half, "y": own, "value": costs.min() if len(costs) else np.nan}
+            {
+                "element": ESCAPE,
+                "order": n,
+                "x": half,
+                "y": own,
+                "value": costs.min() if len(costs) else np.nan,
+            }
         )
     return rows

@@ -1,4 +1,7 @@
-"""How near a search gets before it stagnates, and what that costs, against its local scope (Corsépius 2001, Fig. 2)."""
+"""How near a search gets before it stagnates, and what that costs, against its local scope.
+
+Corsépius 2001, Fig. 2.
+"""
 
 import numpy as np
 import pandas as pd
@@ -19,8 +22,9 @@ def floor_table(task: Task) -> pd.DataFrame:
     """Return residual distances and cycles per scope.
 
     Returns:
-        Columns quantity (residual, cycles, point), scope [rad], median, lower, upper (a point: the residual of one run
-        three times), runs, slope (of log residual over log scope, medians), length_unit.
+        Columns quantity (residual, cycles, point), scope [rad], median, lower, upper (a point: the
+        residual of one run three times), runs, slope (of log residual over log scope, medians),
+        length_unit.
     """
     rows: list[tuple[object, ...]] = []
     for scope, c in zip(task.values, task.conditions, strict=True):
@@ -33,7 +37,10 @@ def floor_table(task: Task) -> pd.DataFrame:
 
 
 def slope(task: Task) -> float:
-    """Return the slope of the median residual over the scope, both as logarithms; NaN of fewer than two scopes."""
+    """Return the slope of the median residual over the scope, both as logarithms.
+
+    NaN of fewer than two scopes.
+    """
     medians = np.array([spread(measures.residuals(c)).median for c in task.conditions])
     if len(medians) < 2 or not (medians > 0.0).all():
         return float("nan")
@@ -50,11 +57,24 @@ def draw_floor(table: pd.DataFrame) -> Figure:
     points = table[table["quantity"] == POINT]
     beside = np.exp2(JITTER * (2.0 * ((np.arange(len(points)) * 0.618034) % 1.0) - 1.0))
     left.plot(
-        points["scope"] * beside, points["median"], "o", color=style.arm_colour(0), ms=2.2, alpha=0.35, mec="none"
+        points["scope"] * beside,
+        points["median"],
+        "o",
+        color=style.arm_colour(0),
+        ms=2.2,
+        alpha=0.35,
+        mec="none",
     )
     for axes, quantity in ((left, RESIDUAL), (right, CYCLES)):
         own = table[table["quantity"] == quantity].sort_values("scope")
-        axes.plot(own["scope"], own["median"], "o-", color=style.arm_colour(0), markersize=4.5, linewidth=1.1)
+        axes.plot(
+            own["scope"],
+            own["median"],
+            "o-",
+            color=style.arm_colour(0),
+            markersize=4.5,
+            linewidth=1.1,
+        )
         for row in records(own):
             axes.vlines(row.scope, row.lower, row.upper, color=style.arm_colour(0), linewidth=1.6)
         axes.set_xscale("log")
@@ -64,7 +84,14 @@ def draw_floor(table: pd.DataFrame) -> Figure:
     own = table[table["quantity"] == RESIDUAL].sort_values("scope")
     middle = len(own) // 2
     line = own["median"].iloc[middle] * own["scope"] / own["scope"].iloc[middle]
-    left.plot(own["scope"], line, ":", color=style.NEUTRAL, linewidth=1.1, label="proportional to the scope")
+    left.plot(
+        own["scope"],
+        line,
+        ":",
+        color=style.NEUTRAL,
+        linewidth=1.1,
+        label="proportional to the scope",
+    )
     left.set_yscale("log")
     left.set_ylabel(f"distance to the goal at the end [{unit}]")
     left.set_title(f"a  residual (slope {table['slope'].iloc[0]:.2f})")

@@ -1,4 +1,7 @@
-"""The local search scope: boxes of offspring along a path, the tool's places one step away (Corsépius 2001, Fig. 2)."""
+"""The local search scope: boxes of offspring along a path, the tool's places one step away.
+
+Corsépius 2001, Fig. 2.
+"""
 
 import numpy as np
 import pandas as pd
@@ -20,11 +23,14 @@ STEPS = 3000  # random ones whose hull is drawn
 
 
 def scope_table(condition: ConditionResults, replicate: int) -> pd.DataFrame:
-    """Return a path in the plane of its two liveliest joints, and hulls of the tool's places one step from the start.
+    """Return a path in the plane of its two liveliest joints.
+
+    And hulls of the tool's places one step from the start.
 
     Returns:
-        Columns element (posture, reach, tool), order, x, y (joint angles [deg] of postures, places of the others),
-        half_x, half_y (scope [deg] of the two joints), factor (of the scope), joint_x, joint_y (from 1), length_unit.
+        Columns element (posture, reach, tool), order, x, y (joint angles [deg] of postures, places
+        of the others), half_x, half_y (scope [deg] of the two joints), factor (of the scope),
+        joint_x, joint_y (from 1), length_unit.
     """
     problem = condition.prepared.problem
     q = condition.solutions[replicate].reshape(-1, len(problem.start))
@@ -48,12 +54,17 @@ def scope_table(condition: ConditionResults, replicate: int) -> pd.DataFrame:
         places = np.array([tool(p) for p in np.clip(reached, *problem.limits.T)])
         hull = ConvexHull(places).vertices
         rows += [
-            {"element": REACH, "order": n, "x": x, "y": y, "factor": factor} for n, (x, y) in enumerate(places[hull])
+            {"element": REACH, "order": n, "x": x, "y": y, "factor": factor}
+            for n, (x, y) in enumerate(places[hull])
         ]
-    rows += [{"element": TOOL, "order": n, "x": x, "y": y} for n, (x, y) in enumerate(tool(p) for p in q)]
+    rows += [
+        {"element": TOOL, "order": n, "x": x, "y": y} for n, (x, y) in enumerate(tool(p) for p in q)
+    ]
     names = ["element", "order", "x", "y", "half_x", "half_y", "factor"]
     table = pd.DataFrame(rows).reindex(columns=names)
-    return rounded(table).assign(joint_x=a + 1, joint_y=b + 1, length_unit=condition.condition.length_unit)
+    return rounded(table).assign(
+        joint_x=a + 1, joint_y=b + 1, length_unit=condition.condition.length_unit
+    )
 
 
 def draw_scope(table: pd.DataFrame) -> Figure:
@@ -65,7 +76,14 @@ def draw_scope(table: pd.DataFrame) -> Figure:
     for row in records(path):
         corner = row.x - row.half_x, row.y - row.half_y
         shade = 0.10 + 0.12 * row.order / last
-        box = Rectangle(corner, 2 * row.half_x, 2 * row.half_y, facecolor=style.arm_colour(0), alpha=shade, linewidth=0)
+        box = Rectangle(
+            corner,
+            2 * row.half_x,
+            2 * row.half_y,
+            facecolor=style.arm_colour(0),
+            alpha=shade,
+            linewidth=0,
+        )
         left.add_patch(box)
     left.plot(path["x"], path["y"], "o-", color=style.arm_colour(0), markersize=2.8, linewidth=1.0)
     _ends(left, path)
@@ -73,10 +91,19 @@ def draw_scope(table: pd.DataFrame) -> Figure:
     left.set_ylabel(f"{style.joint_symbol(0, int(table['joint_y'].iloc[0]) - 1)} [deg]")
     left.set_title("a  boxes of offspring along a path")
     left.set_aspect("equal", adjustable="datalim")
-    for k, (factor, rows) in enumerate(sorted(groups(table[table["element"] == REACH], "factor"), reverse=True)):
+    for k, (factor, rows) in enumerate(
+        sorted(groups(table[table["element"] == REACH], "factor"), reverse=True)
+    ):
         colour = style.ARM_COLOURS[(1, 0, 2)[k]]
         rows = rows.sort_values("order")
-        right.fill(rows["x"], rows["y"], facecolor=colour, edgecolor=colour, alpha=0.25, label=f"{factor:g} × scope")
+        right.fill(
+            rows["x"],
+            rows["y"],
+            facecolor=colour,
+            edgecolor=colour,
+            alpha=0.25,
+            label=f"{factor:g} × scope",
+        )
     tool = table[table["element"] == TOOL]
     right.plot(tool["x"], tool["y"], color=style.NEUTRAL, linewidth=1.0, label="way of the tool")
     _ends(right, tool)

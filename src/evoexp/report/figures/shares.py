@@ -15,7 +15,9 @@ MARGIN = 0.08  # [-] of a panel's range, beyond the intervals
 
 
 def shares_table(
-    rows: Sequence[tuple[str, int, str, Proportion]], printed: Mapping[str, float], confidence: float
+    rows: Sequence[tuple[str, int, str, Proportion]],
+    printed: Mapping[str, float],
+    confidence: float,
 ) -> pd.DataFrame:
     """Return shares of runs.
 
@@ -28,7 +30,9 @@ def shares_table(
         Columns quantity, position, condition, having, total, share, lower, upper, printed.
     """
     names = ["quantity", "position", "condition", "having", "total", "share", "lower", "upper"]
-    table = pd.DataFrame([(*given, *p, p.share, *p.interval(confidence)) for *given, p in rows], columns=names)
+    table = pd.DataFrame(
+        [(*given, *p, p.share, *p.interval(confidence)) for *given, p in rows], columns=names
+    )
     return table.assign(printed=table["quantity"].map(dict(printed)).astype("float64"))
 
 
@@ -45,13 +49,24 @@ def draw_shares(table: pd.DataFrame) -> Figure:
         for position, rows in groups(every, "position"):
             colour, y = style.condition_colour(int(position)), rows_of[position]
             if rows["total"].iloc[0]:
-                axes.hlines(y, 100 * rows["lower"], 100 * rows["upper"], color=colour, linewidth=1.6)
+                axes.hlines(
+                    y, 100 * rows["lower"], 100 * rows["upper"], color=colour, linewidth=1.6
+                )
                 axes.plot(100 * rows["share"], [y], "o", color=colour, markersize=4.5)
             text = f" {rows['having'].iloc[0]}/{rows['total'].iloc[0]}"
-            axes.annotate(text, (1.0, y), xycoords=axes.get_yaxis_transform(), fontsize=6.5, va="center", ha="left")
+            axes.annotate(
+                text,
+                (1.0, y),
+                xycoords=axes.get_yaxis_transform(),
+                fontsize=6.5,
+                va="center",
+                ha="left",
+            )
         if len(own):
             for printed in own["printed"].dropna().unique():
-                axes.axvline(100 * printed, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
+                axes.axvline(
+                    100 * printed, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1
+                )
             axes.set_xlim(*_range(100 * own[["lower", "upper", "printed"]].to_numpy()))
         axes.xaxis.set_major_locator(style.few_ticks())
         axes.set_xlabel("share of runs [%]")

@@ -1,4 +1,7 @@
-"""Bodies and obstacles in space: rows of a table that say what and where they are, and their surfaces."""
+"""Bodies and obstacles in space.
+
+Rows of a table that say what and where they are, and their surfaces.
+"""
 
 from typing import Any
 
@@ -20,7 +23,9 @@ AROUND, ALONG = 12, 4  # pieces of a round surface, and of each of its ends
 
 
 def solid(shape: Any, placement: Any) -> tuple[Any, ...] | None:
-    """Return one row of `COLUMNS` for a coal shape and its placement (`pin.SE3`); None for a half-space.
+    """Return one row of `COLUMNS` for a coal shape and its placement (`pin.SE3`).
+
+    None for a half-space.
 
     A mesh, or what else has no row of its own, is the box around it.
     """
@@ -50,20 +55,32 @@ def draw_solid(axes: Any, row: Any, colour: str, alpha: float) -> None:
     if row.shape == BRICK:
         faces = [corners * size @ turn.T + place for corners in _FACES]
         axes.add_collection3d(
-            Poly3DCollection(faces, facecolor=colour, edgecolor=colour, alpha=alpha, linewidth=0.5, zorder=1)
+            Poly3DCollection(
+                faces, facecolor=colour, edgecolor=colour, alpha=alpha, linewidth=0.5, zorder=1
+            )
         )
         return
     x, y, z = np.einsum("ij,jkl->ikl", turn, _grid(row.shape, size)) + place[:, None, None]
-    axes.plot_surface(x, y, z, color=colour, alpha=alpha, linewidth=0, shade=True, antialiased=False)
+    axes.plot_surface(
+        x, y, z, color=colour, alpha=alpha, linewidth=0, shade=True, antialiased=False
+    )
 
 
 def draw_outline(axes: Any, row: Any, colour: str, alpha: float) -> None:
     """Draw a row of `COLUMNS` as seen along z, in plane axes."""
     turn = np.array([getattr(row, name) for name in TURN]).reshape(3, 3)
     size = np.array([getattr(row, name) for name in SIZES])
-    points = np.vstack(_FACES) * size if row.shape == BRICK else _grid(row.shape, size).reshape(3, -1).T
+    points = (
+        np.vstack(_FACES) * size if row.shape == BRICK else _grid(row.shape, size).reshape(3, -1).T
+    )
     seen = (points @ turn.T)[:, :2] + (row.x, row.y)
-    axes.fill(*seen[ConvexHull(seen).vertices].T, facecolor=colour, edgecolor=colour, alpha=alpha, linewidth=0.5)
+    axes.fill(
+        *seen[ConvexHull(seen).vertices].T,
+        facecolor=colour,
+        edgecolor=colour,
+        alpha=alpha,
+        linewidth=0.5,
+    )
 
 
 def corners(table: pd.DataFrame) -> FloatArray:
@@ -71,13 +88,20 @@ def corners(table: pd.DataFrame) -> FloatArray:
     found = [np.empty((0, 3))]
     for _, row in table.iterrows():
         turn = row[TURN].to_numpy(dtype=np.float64).reshape(3, 3)
-        size, place = row[SIZES].to_numpy(dtype=np.float64), row[["x", "y", "z"]].to_numpy(dtype=np.float64)
-        reach = np.abs(turn) @ size if row["shape"] == BRICK else size[0] + np.abs(turn[:, 2]) * size[1]
+        size, place = (
+            row[SIZES].to_numpy(dtype=np.float64),
+            row[["x", "y", "z"]].to_numpy(dtype=np.float64),
+        )
+        reach = (
+            np.abs(turn) @ size if row["shape"] == BRICK else size[0] + np.abs(turn[:, 2]) * size[1]
+        )
         found += [place[None] - reach, place[None] + reach]
     return np.vstack(found)
 
 
-def space(figure: Figure, place: Any, points: FloatArray, unit: str, view: tuple[float, float]) -> Any:
+def space(
+    figure: Figure, place: Any, points: FloatArray, unit: str, view: tuple[float, float]
+) -> Any:
     """Return axes in space, with equal scales, that hold some points.
 
     Args:
@@ -89,7 +113,9 @@ def space(figure: Figure, place: Any, points: FloatArray, unit: str, view: tuple
     """
     axes: Any = figure.add_subplot(place, projection="3d")
     low, high = points.min(axis=0), points.max(axis=0)
-    pad = 0.04 * float((high - low).max()) + 0.5 * np.maximum(0.0, 0.35 * float((high - low).max()) - (high - low))
+    pad = 0.04 * float((high - low).max()) + 0.5 * np.maximum(
+        0.0, 0.35 * float((high - low).max()) - (high - low)
+    )
     for name, least, greatest in zip("xyz", low - pad, high + pad, strict=True):
         getattr(axes, f"set_{name}lim")(least, greatest)
         getattr(axes, f"set_{name}label")(f"{name} [{unit}]", labelpad=-7, fontsize=7)
@@ -109,7 +135,13 @@ def _grid(shape: str, size: FloatArray) -> FloatArray:
     radius, height = _profile(shape, size[0], size[1])
     turned = np.linspace(0.0, 2.0 * np.pi, AROUND + 1)
     level = np.ones_like(turned)
-    return np.array([np.outer(radius, np.cos(turned)), np.outer(radius, np.sin(turned)), np.outer(height, level)])
+    return np.array(
+        [
+            np.outer(radius, np.cos(turned)),
+            np.outer(radius, np.sin(turned)),
+            np.outer(height, level),
+        ]
+    )
 
 
 def _profile(shape: str, radius: float, half: float) -> tuple[FloatArray, FloatArray]:

@@ -1,4 +1,7 @@
-"""Drawings of arms in space: their bodies and spheres, two arms with their named points, motions stage by stage."""
+"""Drawings of arms in space: their bodies and spheres, two arms with their named points.
+
+Motions stage by stage.
+"""
 
 import itertools
 from typing import Any
@@ -34,7 +37,9 @@ def links_table(condition: ConditionResults, q: FloatArray) -> pd.DataFrame:
         for arm, link, start, end in motions.joint_positions(condition.prepared.problem.assembly, q)
         for instant in range(q.shape[1])
     ]
-    return rounded(pd.DataFrame(rows, columns=["instant", *LINK])).assign(length_unit=condition.condition.length_unit)
+    return rounded(pd.DataFrame(rows, columns=["instant", *LINK])).assign(
+        length_unit=condition.condition.length_unit
+    )
 
 
 def arm_table(condition: ConditionResults) -> pd.DataFrame:
@@ -49,7 +54,9 @@ def arm_table(condition: ConditionResults) -> pd.DataFrame:
     first = links[links["arm"] == 0].assign(element="link", radius=np.nan)
     rows = [(0, 0, -1, *centre, *centre) for centre in spheres]
     added = rounded(pd.DataFrame(rows, columns=["instant", *LINK]))
-    added = added.assign(element="sphere", radius=problem.collision.radius, length_unit=first["length_unit"].iloc[0])
+    added = added.assign(
+        element="sphere", radius=problem.collision.radius, length_unit=first["length_unit"].iloc[0]
+    )
     return pd.concat([first, added], ignore_index=True)
 
 
@@ -57,20 +64,26 @@ def draw_arm(table: pd.DataFrame) -> Figure:
     """Draw the arm as touching spheres and as line segments with the paper's point names."""
     figure = style.figure(3.9)
     links, spheres = table[table["element"] == "link"], table[table["element"] == "sphere"]
-    for k, title in enumerate(("a  touching spheres of the collision model", "b  line segments: the links themselves")):
+    for k, title in enumerate(
+        ("a  touching spheres of the collision model", "b  line segments: the links themselves")
+    ):
         axes = _space(figure, (1, 2, k + 1), [links, spheres], table["length_unit"].iloc[0])
         axes.set_title(title)
         _arm(axes, 0, links, width=1.2 if k == 0 else 2.6)
         if k == 0:
             for row in records(spheres):
-                axes.plot_surface(*_ball(row), color=style.arm_colour(0), alpha=0.25, linewidth=0, shade=True)
+                axes.plot_surface(
+                    *_ball(row), color=style.arm_colour(0), alpha=0.25, linewidth=0, shade=True
+                )
         else:
             _name_points(axes, 0, links)
     return figure
 
 
 def two_arms_table(condition: ConditionResults) -> pd.DataFrame:
-    """Return links of all arms at start (instant 0) and goal (instant 1), and how far each reaches around its shoulder.
+    """Return links of all arms at start (instant 0) and goal (instant 1).
+
+    And how far each reaches around its shoulder.
 
     Returns:
         Columns of `links_table` and reach [length unit].
@@ -86,7 +99,10 @@ def two_arms_table(condition: ConditionResults) -> pd.DataFrame:
 
 
 def draw_two_arms(table: pd.DataFrame) -> Figure:
-    """Draw the arms at start and goal, and the part of the workspace that they share, seen from above."""
+    """Draw the arms at start and goal, and the part of the workspace that they share.
+
+    Seen from above.
+    """
     figure = style.figure(4.3)
     unit = table["length_unit"].iloc[0]
     axes = _space(figure, (1, 2, 1), [table], unit)
@@ -96,24 +112,41 @@ def draw_two_arms(table: pd.DataFrame) -> Figure:
     for (arm, instant), rows in groups(table, ["arm", "instant"]):
         _arm(axes, arm, rows, dashed=instant == 1)
         x, y = [rows["x"].iloc[0], *rows["x_end"]], [rows["y"].iloc[0], *rows["y_end"]]
-        above.plot(x, y, color=style.arm_colour(arm), linestyle=(0, (2, 1)) if instant else "-", marker="o", ms=3)
+        above.plot(
+            x,
+            y,
+            color=style.arm_colour(arm),
+            linestyle=(0, (2, 1)) if instant else "-",
+            marker="o",
+            ms=3,
+        )
         if instant == 0:
             _name_points(axes, arm, rows)
             above.plot(x[0], y[0], "s", color=style.NEUTRAL, markersize=7)
             turn = np.linspace(0.0, 360.0, 121)
             circle = np.array([sincos(DEGREE * angle) for angle in turn]) * rows["reach"].iloc[0]
-            above.fill(x[0] + circle[:, 1], y[0] + circle[:, 0], color=style.arm_colour(arm), alpha=0.12, linewidth=0)
+            above.fill(
+                x[0] + circle[:, 1],
+                y[0] + circle[:, 0],
+                color=style.arm_colour(arm),
+                alpha=0.12,
+                linewidth=0,
+            )
     style.operational_axes(above, unit)
-    _legend(figure, table, [Line2D([], [], color=style.NEUTRAL, linestyle=(0, (2, 1)), label="goal")])
+    _legend(
+        figure, table, [Line2D([], [], color=style.NEUTRAL, linestyle=(0, (2, 1)), label="goal")]
+    )
     return figure
 
 
 def snapshots_table(condition: ConditionResults) -> pd.DataFrame:
-    """Return all links at every instant of the best replicate's motion, with the stage it belongs to.
+    """Return all links at every instant of the best replicate's motion.
+
+    With the stage it belongs to.
 
     Returns:
-        Columns of `links_table`, stage, first, last (instants of the stage); an instant between two stages belongs to
-        both; the last stage holds all.
+        Columns of `links_table`, stage, first, last (instants of the stage); an instant between two
+        stages belongs to both; the last stage holds all.
     """
     q = motions.configurations(condition.prepared, condition.solutions[condition.best_replicate])
     table, last = links_table(condition, q), q.shape[1] - 1
@@ -134,14 +167,25 @@ def draw_snapshots(table: pd.DataFrame) -> Figure:
         axes = _space(figure, (lines, 3, k + 1), [table], table["length_unit"].iloc[0], zoom=1.08)
         rows = table[table["stage"] == stage]
         first, last = rows["first"].iloc[0], rows["last"].iloc[0]
-        axes.set_title(f"instants {first}–{last}" if k < len(stages) - 1 else f"all instants {first}–{last}")
+        axes.set_title(
+            f"instants {first}–{last}" if k < len(stages) - 1 else f"all instants {first}–{last}"
+        )
         for (arm, instant), links in groups(rows, ["arm", "instant"]):
             newest = instant == last
             shade = 1.0 if newest else 0.15 + 0.45 * (instant - first) / max(1, last - first)
             _arm(axes, arm, links, width=2.4 if newest else 0.9, alpha=shade, joints=newest)
         for arm, links in groups(rows[rows["link"] == rows["link"].max()], "arm"):
-            axes.plot(links["x_end"], links["y_end"], links["z_end"], ":", color=style.arm_colour(arm), linewidth=1.0)
-    dots = Line2D([], [], color=style.NEUTRAL, linewidth=1.0, linestyle=":", label="trace of the tip")
+            axes.plot(
+                links["x_end"],
+                links["y_end"],
+                links["z_end"],
+                ":",
+                color=style.arm_colour(arm),
+                linewidth=1.0,
+            )
+    dots = Line2D(
+        [], [], color=style.NEUTRAL, linewidth=1.0, linestyle=":", label="trace of the tip"
+    )
     _legend(figure, table, [dots])
     return figure
 
@@ -153,13 +197,20 @@ def _offsets(assembly: Any) -> np.ndarray:
 
 
 def _space(
-    figure: Figure, place: tuple[int, int, int], tables: list[pd.DataFrame], unit: str, *, zoom: float = 1.0
+    figure: Figure,
+    place: tuple[int, int, int],
+    tables: list[pd.DataFrame],
+    unit: str,
+    *,
+    zoom: float = 1.0,
 ) -> Any:
     """Return axes in space with equal scales that hold all links of the tables."""
     axes: Any = figure.add_subplot(*place, projection="3d")
     box = []
     for name in "xyz":
-        values = np.concatenate([table[column].to_numpy() for table in tables for column in (name, f"{name}_end")])
+        values = np.concatenate(
+            [table[column].to_numpy() for table in tables for column in (name, f"{name}_end")]
+        )
         low, high = float(values.min()), float(values.max())
         pad = 0.05 + 0.5 * max(0.0, 0.5 - (high - low))
         getattr(axes, f"set_{name}lim")(low - pad, high + pad)
@@ -189,14 +240,23 @@ def _arm(
     kind: Any = (0, (2, 1)) if dashed else "-"
     axes.plot(*points, linestyle=kind, color=style.arm_colour(arm), linewidth=width, alpha=alpha)
     if joints:
-        axes.plot(*points, "o", color="white", markeredgecolor=style.arm_colour(arm), markersize=3.2, alpha=alpha)
+        axes.plot(
+            *points,
+            "o",
+            color="white",
+            markeredgecolor=style.arm_colour(arm),
+            markersize=3.2,
+            alpha=alpha,
+        )
         base = [values[:1] for values in points]
         axes.plot(*base, "s", color=style.NEUTRAL, markersize=5)
 
 
 def _name_points(axes: Any, arm: int, rows: pd.DataFrame) -> None:
     name = POINT_NAMES[arm] if arm < len(POINT_NAMES) else f"r{arm}"
-    points = np.vstack([rows[["x", "y", "z"]].to_numpy()[:1], rows[["x_end", "y_end", "z_end"]].to_numpy()])
+    points = np.vstack(
+        [rows[["x", "y", "z"]].to_numpy()[:1], rows[["x_end", "y_end", "z_end"]].to_numpy()]
+    )
     for k, (x, y, z) in enumerate(points):
         text = f"{name}{str(k).translate(style.SUBSCRIPTS)}"
         axes.text(x, y, z + 0.09, text, color=style.arm_colour(arm), fontsize=8)

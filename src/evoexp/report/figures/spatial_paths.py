@@ -19,13 +19,22 @@ def paths_table(condition: ConditionResults) -> pd.DataFrame:
     """Return the paths of all replicates and the straight line in both spaces.
 
     Returns:
-        Columns series (best replicate, replicate, straight line), replicate (−1: none), arm, instant, x, y, z (of the
-        tip [length unit]), joint_1_deg, joint_2_deg, … (NaN where an arm has fewer joints), length_unit.
+        Columns series (best replicate, replicate, straight line), replicate (−1: none), arm,
+        instant, x, y, z (of the tip [length unit]), joint_1_deg, joint_2_deg, … (NaN where an arm
+        has fewer joints), length_unit.
     """
-    series = {k: (BEST if k == condition.best_replicate else OTHERS, s) for k, s in condition.solutions.items()}
+    series = {
+        k: (BEST if k == condition.best_replicate else OTHERS, s)
+        for k, s in condition.solutions.items()
+    }
     series[-1] = (STRAIGHT, motions.straight_line(condition.prepared))
-    parts = [_path(condition, solution).assign(series=name, replicate=k) for k, (name, solution) in series.items()]
-    return rounded(pd.concat(parts, ignore_index=True)).assign(length_unit=condition.condition.length_unit)
+    parts = [
+        _path(condition, solution).assign(series=name, replicate=k)
+        for k, (name, solution) in series.items()
+    ]
+    return rounded(pd.concat(parts, ignore_index=True)).assign(
+        length_unit=condition.condition.length_unit
+    )
 
 
 def draw_configuration_space(table: pd.DataFrame) -> Figure:
@@ -53,7 +62,11 @@ def draw_operational_space(table: pd.DataFrame) -> Figure:
     spans = [float(np.ptp(table[name])) for name in "xyz"]
     axes.set_box_aspect([max(span, 0.15 * max(spans)) for span in spans], zoom=1.1)
     arms = sorted(table["arm"].unique())
-    _legend(figure, table, [Line2D([], [], color=style.arm_colour(a), lw=2.2, label=f"arm {a + 1}") for a in arms])
+    _legend(
+        figure,
+        table,
+        [Line2D([], [], color=style.arm_colour(a), lw=2.2, label=f"arm {a + 1}") for a in arms],
+    )
     return figure
 
 
@@ -61,7 +74,9 @@ def _path(condition: ConditionResults, solution: FloatArray) -> pd.DataFrame:
     """Return one solution's joint angles and tips."""
     problem = condition.prepared.problem
     q = motions.configurations(condition.prepared, solution)
-    tips = {arm: end for arm, _, _, end in motions.joint_positions(problem.assembly, q)}  # the last link's end stays
+    tips = {
+        arm: end for arm, _, _, end in motions.joint_positions(problem.assembly, q)
+    }  # the last link's end stays
     frames = []
     for arm, (first, stop) in enumerate(problem.arm_slices):
         columns = {"arm": arm, "instant": np.arange(q.shape[1])}
@@ -77,8 +92,22 @@ def _curves(axes: Any, rows: pd.DataFrame, names: list[str], arm: int) -> None:
         points = [path[name].to_numpy() for name in names]
         if series == BEST:
             axes.plot(*points, color=colour, linewidth=1.8, marker="o", markersize=2.4, zorder=4)
-            axes.plot(*(p[:1] for p in points), "s", color="white", markeredgecolor=style.NEUTRAL, ms=6, zorder=5)
-            axes.plot(*(p[-1:] for p in points), "*", color="white", markeredgecolor=style.NEUTRAL, ms=10, zorder=5)
+            axes.plot(
+                *(p[:1] for p in points),
+                "s",
+                color="white",
+                markeredgecolor=style.NEUTRAL,
+                ms=6,
+                zorder=5,
+            )
+            axes.plot(
+                *(p[-1:] for p in points),
+                "*",
+                color="white",
+                markeredgecolor=style.NEUTRAL,
+                ms=10,
+                zorder=5,
+            )
         elif series == STRAIGHT:
             axes.plot(*points, ":", color=style.NEUTRAL, linewidth=1.1)
         else:
@@ -101,7 +130,15 @@ def _legend(figure: Figure, table: pd.DataFrame, more: list[Line2D] | None = Non
     count, grey = table.loc[table["replicate"] >= 0, "replicate"].nunique(), style.NEUTRAL
     handles = [
         *(more or []),
-        Line2D([], [], color=grey, linewidth=1.8, marker="o", ms=3, label="best replicate, its via-points"),
+        Line2D(
+            [],
+            [],
+            color=grey,
+            linewidth=1.8,
+            marker="o",
+            ms=3,
+            label="best replicate, its via-points",
+        ),
         Line2D([], [], color=grey, linewidth=0.8, alpha=0.4, label=f"all replicates (n = {count})"),
         Line2D([], [], color=grey, linewidth=1.1, linestyle=":", label=STRAIGHT),
         Line2D([], [], color="none", marker="s", mec=grey, mfc="white", ms=6, label="start"),

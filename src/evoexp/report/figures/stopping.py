@@ -27,8 +27,8 @@ def stopping_table(results: Results, errors: Values, effort: Values) -> pd.DataF
         effort: Evaluations to its solutions, (done,); inf: no solution.
 
     Returns:
-        Columns quantity (position error, evaluations), num_generations, stop_cost, condition, median, lower, upper
-        (quartiles over all runs), solved, done, length_unit.
+        Columns quantity (position error, evaluations), num_generations, stop_cost, condition,
+        median, lower, upper (quartiles over all runs), solved, done, length_unit.
     """
     rows: list[tuple[object, ...]] = []
     for name, values in ((ERROR, errors), (EFFORT, effort)):
@@ -36,25 +36,47 @@ def stopping_table(results: Results, errors: Values, effort: Values) -> pd.DataF
             found = spread(values(c))
             given = name, c.planner.ga.num_generations, c.planner.stop_cost_sp2, c.label
             rows.append((*given, found.median, found.lower, found.upper, c.solved, c.done))
-    names = ["quantity", "num_generations", "stop_cost", "condition", "median", "lower", "upper", "solved", "done"]
-    return pd.DataFrame(rows, columns=names).assign(length_unit=results.with_data[0].condition.length_unit)
+    names = [
+        "quantity",
+        "num_generations",
+        "stop_cost",
+        "condition",
+        "median",
+        "lower",
+        "upper",
+        "solved",
+        "done",
+    ]
+    return pd.DataFrame(rows, columns=names).assign(
+        length_unit=results.with_data[0].condition.length_unit
+    )
 
 
 def draw_stopping(table: pd.DataFrame) -> Figure:
-    """Draw medians with quartiles of error and effort against the stopping value, one series per generations."""
+    """Draw medians with quartiles of error and effort against the stopping value.
+
+    One series per generations.
+    """
     figure = style.figure(3.2)
     panels = figure.subplots(1, 2, sharex=True)
     series = sorted(table["num_generations"].unique())
     apart = BESIDE * float(np.ptp(table["stop_cost"]) or 1.0)
-    labels = {ERROR: f"position error [{table['length_unit'].iloc[0]}]", EFFORT: "evaluations to a solution [-]"}
+    labels = {
+        ERROR: f"position error [{table['length_unit'].iloc[0]}]",
+        EFFORT: "evaluations to a solution [-]",
+    }
     for axes, (quantity, label) in zip(panels, labels.items(), strict=True):
         own = table[table["quantity"] == quantity].replace(np.inf, np.nan)
         for k, (generations, rows) in enumerate(groups(own, "num_generations")):
             rows = rows.sort_values("stop_cost")
             x = rows["stop_cost"] + apart * (2 * k - len(series) + 1)
             solved, done = rows["solved"].sum(), rows["done"].sum()
-            name = f"at most {int(generations)} generations ({solved} of {done} runs with a solution)"
-            axes.vlines(x, rows["lower"], rows["upper"], color=style.condition_colour(k), linewidth=1.2)
+            name = (
+                f"at most {int(generations)} generations ({solved} of {done} runs with a solution)"
+            )
+            axes.vlines(
+                x, rows["lower"], rows["upper"], color=style.condition_colour(k), linewidth=1.2
+            )
             look = {"color": style.condition_colour(k), "markersize": 4.5, "linewidth": 1.0}
             axes.plot(x, rows["median"], "o-", label=name, **look)
         axes.set_ylim(bottom=0.0)

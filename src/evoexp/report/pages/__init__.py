@@ -44,4 +44,6 @@ def page_of(results: "Results", settings: ReportSettings) -> "Page":
     if name not in PAGES:
         raise UnknownOption("report.figures", name, PAGES)
     module, _, function = PAGES[name].partition(":")
-    return cast("Page", cast(Any, getattr(importlib.import_module(module), function))(results, settings))
+    return cast(
+        "Page", cast(Any, getattr(importlib.import_module(module), function))(results, settings)
+    )

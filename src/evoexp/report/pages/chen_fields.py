@@ -1,4 +1,7 @@
-"""Chen & Zalzala 1995, Fig. 1: two numerical potential fields, every node's number, and the slips of the print."""
+"""Chen & Zalzala 1995, Fig. 1.
+
+Two numerical potential fields, every node's number, and the slips of the print.
+"""
 
 from functools import partial
 
@@ -18,15 +21,20 @@ from evoexp.report.settings import ReportSettings
 PRINT = "chen_fig_1.txt"
 NAMES = ("(a) potential toward the goal", "(b) potential of obstacles")
 INTRODUCTION = (
-    "Wave fronts over a grid (section 2.1): from the goal, whose potential is 0, and from obstacles and the boundary, "
-    "which is a ring of nodes outside the grid. The potential of obstacles is what the paper calls the unsafeness of a "
-    "node. Obstacles of Fig. 1 are taken from both printed grids together; all other numbers are computed."
+    "Wave fronts over a grid (section 2.1): from the goal, whose potential is 0, and from "
+    "obstacles and the boundary, which is a ring of nodes outside the grid. The potential of "
+    "obstacles is what the paper calls the unsafeness of a node. Obstacles of Fig. 1 are taken "
+    "from both printed grids together; all other numbers are computed."
 )
 
 
 def page(results: Results, settings: ReportSettings) -> Page:
     """Return the page; the generic one where nothing has potential fields."""
-    shown = [c for c in results.with_data if c.is_reference and hasattr(c.planner.collision, "goal_potentials")]
+    shown = [
+        c
+        for c in results.with_data
+        if c.is_reference and hasattr(c.planner.collision, "goal_potentials")
+    ]
     if not shown:
         return generic.page(results, settings)
     of_print = [c for c in shown if _fields(c)[0].shape == (16, 16)]
@@ -51,7 +59,10 @@ def _compared(condition: ConditionResults) -> pd.DataFrame:
     computed = rows_of(goal, blocked), rows_of(unsafeness, blocked, edge)
     given = printed(PRINT)
     return pd.concat(
-        [compare(name, *both) for name, both in zip(NAMES, zip(computed, given, strict=True), strict=True)],
+        [
+            compare(name, *both)
+            for name, both in zip(NAMES, zip(computed, given, strict=True), strict=True)
+        ],
         ignore_index=True,
     )
 
@@ -62,13 +73,20 @@ def _claims(results: Results, table: pd.DataFrame) -> list[Claim]:
         cells = of[of["slip"] != SURPLUS]
         same = int((cells["slip"] == "").sum())
         told = (
-            f"{same} of {len(cells)} nodes as printed; {_count(of, WRONG)} with another number, {_count(of, MISSING)} "
-            f"left out, {_count(of, SURPLUS)} tokens too many (reproduced: every node that is printed, but for single "
-            "slips of the print: at most one in a hundred)"
+            f"{same} of {len(cells)} nodes as printed; {_count(of, WRONG)} with another number, "
+            f"{_count(of, MISSING)} left out, {_count(of, SURPLUS)} tokens too many (reproduced: "
+            "every node that is printed, but for single slips of the print: at most one in a "
+            "hundred)"
         )
         verdict = claims.REPRODUCED if same >= 0.99 * len(cells) else claims.CONTRADICTED
         found.append(
-            claim(f"The wave front gives Fig. 1{name}", "Fig. 1", told, claims.NOT_JUDGED if why else verdict, why)
+            claim(
+                f"The wave front gives Fig. 1{name}",
+                "Fig. 1",
+                told,
+                claims.NOT_JUDGED if why else verdict,
+                why,
+            )
         )
     return found
 
@@ -82,9 +100,9 @@ def _slips(table: pd.DataFrame) -> list[tuple[str, str]]:
     for name in NAMES:
         own = table[(table["field"] == name) & (table["slip"] != "")]
         texts = []
-        for row, column, computed, given, slip in own[["row", "column", "computed", "printed", "slip"]].itertuples(
-            index=False
-        ):
+        for row, column, computed, given, slip in own[
+            ["row", "column", "computed", "printed", "slip"]
+        ].itertuples(index=False):
             place = f"row {row} from the top, column {column}"
             texts.append(
                 {
@@ -94,7 +112,10 @@ def _slips(table: pd.DataFrame) -> list[tuple[str, str]]:
                 }[slip]
             )
         rows.append(
-            (f"Slips of the print, Fig. 1{name} (counted from 0)", "; ".join(texts).replace("*", "\\*") or "none")
+            (
+                f"Slips of the print, Fig. 1{name} (counted from 0)",
+                "; ".join(texts).replace("*", "\\*") or "none",
+            )
         )
     return rows
 
@@ -103,8 +124,8 @@ def _numbers(condition: ConditionResults, table: pd.DataFrame) -> Drawing:
     return Drawing(
         "fig_1_fields",
         "Fig. 1: two numerical potential fields",
-        "Number of every node as the wave fronts give it; black: obstacles (in (b) those with a free node beside them "
-        "have o₀ = 10, as printed). Framed: where the print differs.",
+        "Number of every node as the wave fronts give it; black: obstacles (in (b) those with a "
+        "free node beside them have o₀ = 10, as printed). Framed: where the print differs.",
         lambda: table,
         potential_fields.draw_fields,
         (condition,),
@@ -115,7 +136,8 @@ def _map(condition: ConditionResults) -> Drawing:
     return Drawing(
         f"fields_{'_'.join(map(str, _fields(condition)[0].shape))}",
         f"{condition.label}: the fields as maps",
-        "Dark grey: obstacles. The potential of the goal is not followed downhill: it weighs draws of random walks.",
+        "Dark grey: obstacles. The potential of the goal is not followed downhill: it weighs "
+        "draws of random walks.",
         partial(_map_table, condition),
         potential_fields.draw_maps,
         (condition,),

@@ -12,9 +12,9 @@ from evoexp.report.results import ConditionResults, Results
 from evoexp.report.settings import ReportSettings
 
 INTRODUCTION = (
-    "E over θ1 and θ2, at the better θ3 of each pair; white: no posture reaches the target. The paper draws the "
-    "fitness 250 − E as a surface. The criteria are judged where all methods stand side by side: `evoexp run "
-    "experiment=chen_placement`."
+    "E over θ1 and θ2, at the better θ3 of each pair; white: no posture reaches the target. The "
+    "paper draws the fitness 250 − E as a surface. The criteria are judged where all methods "
+    "stand side by side: `evoexp run experiment=chen_placement`."
 )
 
 
@@ -34,13 +34,20 @@ def page(results: Results, settings: ReportSettings) -> Page:
         costs = case.plain.column("best_cost") if case.plain is not None else np.empty(0)
         best = markdown.number(float(costs.min())) if len(costs) else "–"
         rows.append((case.name, f"{share:.1f} %", len(minima), told or "–", best))
-    headers = ("criterion", "pairs of angles that are feasible", "local minima", "(θ1, θ2): E", "best run of the GA")
+    headers = (
+        "criterion",
+        "pairs of angles that are feasible",
+        "local minima",
+        "(θ1, θ2): E",
+        "best run of the GA",
+    )
     shown = tuple(c for case in cases for c in case[1:] if isinstance(c, ConditionResults))
     drawing = Drawing(
         "fig_9_landscapes",
         "Fig. 9: landscapes",
-        "Points: the best of every run of the genetic algorithm; stars: the exact optimum and its mirror image; "
-        "triangles: the other local minima; cross: the angles that the paper prints.",
+        "Points: the best of every run of the genetic algorithm; stars: the exact optimum and "
+        "its mirror image; triangles: the other local minima; cross: the angles that the paper "
+        "prints.",
         partial(landscapes.landscape_table, cases),
         landscapes.draw_landscape,
         shown,

@@ -1,4 +1,7 @@
-"""What the mean of Eq. 3 of Chen & Zalzala 1995 rewards: paths that stay in safe places, with loops and without."""
+"""What the mean of Eq. 3 of Chen & Zalzala 1995 rewards.
+
+Paths that stay in safe places, with loops and without.
+"""
 
 from functools import partial
 
@@ -15,10 +18,11 @@ from evoexp.report.results import Results
 from evoexp.report.settings import ReportSettings
 
 INTRODUCTION = (
-    "The unsafeness of a path is the mean over its nodes (Eq. 3): every further step in a safe place lowers it. Where "
-    "nodes may be passed again, the best path waits there; the cost of its length alone ends it. The paper does not "
-    "say whether nodes may be passed again; everywhere else loops are erased. For paths with revisits the best walk is "
-    "exact (dynamic programming over the number of nodes); without them it is a bound."
+    "The unsafeness of a path is the mean over its nodes (Eq. 3): every further step in a safe "
+    "place lowers it. Where nodes may be passed again, the best path waits there; the cost of "
+    "its length alone ends it. The paper does not say whether nodes may be passed again; "
+    "everywhere else loops are erased. For paths with revisits the best walk is exact (dynamic "
+    "programming over the number of nodes); without them it is a bound."
 )
 
 
@@ -43,22 +47,34 @@ def _checks(groups: tuple[Group, ...]) -> list[tuple[str, str]]:
         simple = next((g for g in groups if g.weights == free.weights and not g.revisits), None)
         repeats = [_repeated(path) for path in measures.paths(free.main).values()]
         told = (
-            f"{markdown.share(int(np.count_nonzero(repeats)), len(repeats))} runs pass nodes again, median "
-            f"{np.median(repeats):.0f} repeated nodes; median length {_length(free):.0f} cells"
+            f"{markdown.share(int(np.count_nonzero(repeats)), len(repeats))} runs pass nodes "
+            f"again, median {np.median(repeats):.0f} repeated nodes; median length "
+            f"{_length(free):.0f} cells"
         )
-        rows.append((f"{free.name}: lingering", told + (f", {_length(simple):.0f} without revisits" if simple else "")))
-    return rows + [(f"{group.name}: best path known", _truth(group)) for group in groups if group.truth is not None]
+        rows.append(
+            (
+                f"{free.name}: lingering",
+                told + (f", {_length(simple):.0f} without revisits" if simple else ""),
+            )
+        )
+    return rows + [
+        (f"{group.name}: best path known", _truth(group))
+        for group in groups
+        if group.truth is not None
+    ]
 
 
 def _truth(group: Group) -> str:
     assert group.truth is not None
     best = measures.paths(group.truth)[0]
     length, unsafeness, exact = (
-        float(group.truth.column(f"term_{name}")[0]) for name in ("distance", "unsafeness", "bound_is_reached")
+        float(group.truth.column(f"term_{name}")[0])
+        for name in ("distance", "unsafeness", "bound_is_reached")
     )
     return (
-        f"cost {group.optimum:.4g}: length {length:.4g}, mean unsafeness {unsafeness:.3g}, {len(best)} nodes, "
-        f"{_repeated(best)} of them passed before; {'exact' if exact else f'no path is below {group.bound:.4g}'}"
+        f"cost {group.optimum:.4g}: length {length:.4g}, mean unsafeness {unsafeness:.3g}, "
+        f"{len(best)} nodes, {_repeated(best)} of them passed before; "
+        f"{'exact' if exact else f'no path is below {group.bound:.4g}'}"
     )
 
 
@@ -77,8 +93,8 @@ def _drawings(groups: tuple[Group, ...]) -> tuple[Drawing, ...]:
         Drawing(
             "paths",
             "Paths with and without revisits",
-            "Run of median cost of the genetic algorithm, and the best path known. Lines that go back and forth lie on "
-            "each other: the next figure counts nodes.",
+            "Run of median cost of the genetic algorithm, and the best path known. Lines that go "
+            "back and forth lie on each other: the next figure counts nodes.",
             partial(grid_paths.paths_table, [_panel(group) for group in groups]),
             grid_paths.draw_paths,
             shown,
@@ -86,9 +102,12 @@ def _drawings(groups: tuple[Group, ...]) -> tuple[Drawing, ...]:
         Drawing(
             "lingering",
             "How many nodes lie in places of which unsafeness",
-            "Nodes of the best solution of every run: mean number per unsafeness of the node, counted as often as they "
-            "are passed.",
-            partial(lingering.places_table, [(group.name, group.main, _unsafeness(group)) for group in groups]),
+            "Nodes of the best solution of every run: mean number per unsafeness of the node, "
+            "counted as often as they are passed.",
+            partial(
+                lingering.places_table,
+                [(group.name, group.main, _unsafeness(group)) for group in groups],
+            ),
             lingering.draw_places,
             tuple(group.main for group in groups),
         ),

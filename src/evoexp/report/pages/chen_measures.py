@@ -1,4 +1,7 @@
-"""What the pages on the grid paths of Chen & Zalzala 1995 measure alike: groups, gaps to the truth, routes."""
+"""What the pages on the grid paths of Chen & Zalzala 1995 measure alike.
+
+Groups, gaps to the truth, routes.
+"""
 
 from typing import NamedTuple
 
@@ -19,7 +22,8 @@ class Group(NamedTuple):
     """Conditions of one weighting and one rule for loops.
 
     Attributes:
-        name: (a), (b), … in the order of the experiment; those of the paper's Fig. 2 where weightings are its.
+        name: (a), (b), … in the order of the experiment; those of the paper's Fig. 2 where
+            weightings are its.
         weights: ε and λ.
         conditions: GA first, then with elitism, then random search; without the reference.
         truth: The reference; None where it is not there.
@@ -49,12 +53,19 @@ class Group(NamedTuple):
 
 def fits(results: Results) -> bool:
     """Whether there are results, and all of paths over a plane grid."""
-    found = [hasattr(c.planner, "crossover_reach") and len(_size(c)) == 2 for c in results.with_data]
-    return bool(results.evolved) and any(not c.is_reference for c in results.with_data) and all(found)
+    found = [
+        hasattr(c.planner, "crossover_reach") and len(_size(c)) == 2 for c in results.with_data
+    ]
+    return (
+        bool(results.evolved) and any(not c.is_reference for c in results.with_data) and all(found)
+    )
 
 
 def group_list(results: Results) -> tuple[Group, ...]:
-    """Return the conditions by weighting (and by whether nodes may be passed again), in the order of the experiment."""
+    """Return the conditions by weighting (and by whether nodes may be passed again).
+
+    In the order of the experiment.
+    """
     keys: dict[tuple[Weights, bool], list[ConditionResults]] = {}
     for c in results.with_data:
         keys.setdefault((c.planner.objective.weights, c.planner.revisits), []).append(c)
@@ -69,7 +80,9 @@ def group_list(results: Results) -> tuple[Group, ...]:
 
 def shortest(groups: tuple[Group, ...]) -> float:
     """Return the length of the shortest path [cell]; NaN where no reference tells it."""
-    known = [group.truth.array("frontier")[:, 1].min() for group in groups if group.truth is not None]
+    known = [
+        group.truth.array("frontier")[:, 1].min() for group in groups if group.truth is not None
+    ]
     return float(min(known)) if known else np.nan
 
 
@@ -80,7 +93,9 @@ def gaps(condition: ConditionResults, truth: float) -> FloatArray:
 
 def within(condition: ConditionResults, truth: float, share: float) -> Proportion:
     """Return how many runs end with a cost at most so much above a known one."""
-    return Proportion(int(np.count_nonzero(gaps(condition, truth) <= 100.0 * share + 1e-9)), condition.done)
+    return Proportion(
+        int(np.count_nonzero(gaps(condition, truth) <= 100.0 * share + 1e-9)), condition.done
+    )
 
 
 def paths(condition: ConditionResults) -> dict[int, FloatArray]:

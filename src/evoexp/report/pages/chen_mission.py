@@ -1,4 +1,7 @@
-"""What the title of Chen & Zalzala 1995 promises: a safe path and a docking configuration, as one motion."""
+"""What the title of Chen & Zalzala 1995 promises.
+
+A safe path and a docking configuration, as one motion.
+"""
 
 from functools import partial
 from typing import Any
@@ -18,10 +21,12 @@ from evoexp.report.results import ConditionResults, Results
 from evoexp.report.settings import ReportSettings
 
 INTRODUCTION = (
-    "Two searches, one motion: the placement search (section 3) chooses docking place and posture of the arm, the path "
-    "search (section 2) a path over the floor to the node nearest to it. The platform drives along the path, on to the "
-    "docking place, and the arm goes from its travel posture to the one that was chosen. The exact verdict is on the "
-    "whole of it: platform and links against all obstacles, and against each other. The cost is E (Eq. 14) + C (Eq. 1)."
+    "Two searches, one motion: the placement search (section 3) chooses docking place and "
+    "posture of the arm, the path search (section 2) a path over the floor to the node nearest "
+    "to it. The platform drives along the path, on to the docking place, and the arm goes from "
+    "its travel posture to the one that was chosen. The exact verdict is on the whole of it: "
+    "platform and links against all obstacles, and against each other. The cost is E (Eq. 14) + "
+    "C (Eq. 1)."
 )
 
 
@@ -42,7 +47,9 @@ def page(results: Results, settings: ReportSettings) -> Page:
             row("torque norm, squared", "–", column("term_torque_norm")),
             row("greatest torque", "–", column("term_torque_max")),
             row("from the last node to the docking place", "unit", column("term_last_leg")),
-            row("clearance of the bodies over the whole motion (exact)", "unit", column("clearance")),
+            row(
+                "clearance of the bodies over the whole motion (exact)", "unit", column("clearance")
+            ),
             row("evaluations", "–", column("evaluations")),
             row("CPU time of a run, exact verdict included", "s", column("cpu_s")),
             row("CPU time of its searches", "s", measures.search_seconds),
@@ -56,16 +63,27 @@ def _checks(results: Results, settings: ReportSettings) -> tuple[tuple[str, str]
     rows = []
     for c in results.with_data:
         found = c.verdicts
-        share = markdown.percent(Proportion(found.certified, found.judged).interval(settings.confidence))
-        told = f"{markdown.share(found.certified, found.judged)} ({share}) free of contact over the whole motion"
+        share = markdown.percent(
+            Proportion(found.certified, found.judged).interval(settings.confidence)
+        )
+        told = (
+            f"{markdown.share(found.certified, found.judged)} ({share}) free of contact over the "
+            "whole motion"
+        )
         nearest = c.summaries["clearance_pair"].value_counts()
-        told += f"; {found.refuted} touch, {found.undecided} undecided; closest most often: {nearest.index[0]}"
+        told += (
+            f"; {found.refuted} touch, {found.undecided} undecided; closest most often: "
+            f"{nearest.index[0]}"
+        )
         rows.append((f"{c.label}: exact verdicts", told))
         places = np.round(c.column("term_platform_x"), 3)
         spread = (
-            f"between {places.min():g} and {places.max():g}, {np.count_nonzero(places < _target(c)[0])} of {c.done}"
+            f"between {places.min():g} and {places.max():g}, "
+            f"{np.count_nonzero(places < _target(c)[0])} of {c.done}"
         )
-        rows.append((f"{c.label}: docking places X_p", f"{spread} on the near side of the end-effector"))
+        rows.append(
+            (f"{c.label}: docking places X_p", f"{spread} on the near side of the end-effector")
+        )
     return tuple(rows)
 
 
@@ -78,8 +96,9 @@ def _drawing(results: Results) -> Drawing:
     return Drawing(
         "mission",
         "Path and docking posture",
-        "Per condition the run of median cost. Left: the floor, obstacles from centre to centre of their outermost "
-        "nodes. Right: the platform at its docking place, the arm as it drives and as it docks, the force that acts.",
+        "Per condition the run of median cost. Left: the floor, obstacles from centre to centre "
+        "of their outermost nodes. Right: the platform at its docking place, the arm as it "
+        "drives and as it docks, the force that acts.",
         partial(missions.missions_table, shown),
         missions.draw_missions,
         results.with_data,
@@ -90,9 +109,15 @@ def _shown(condition: ConditionResults) -> Shown:
     replicate, prepared = measures.median_replicate(condition), condition.prepared
     scenario: Any = condition.condition.scenario
     robot: Any = condition.condition.robot
-    q, model = prepared.planner.motion(prepared.problem, condition.solutions[replicate]).q, prepared.problem.scene.model
+    q, model = (
+        prepared.planner.motion(prepared.problem, condition.solutions[replicate]).q,
+        prepared.problem.scene.model,
+    )
     (x, _), (reach, above) = scenario.task_origin, scenario.docking.target
-    postures = {name: _joints(model, own, robot.link_lengths[-1]) for name, own in ((TRAVEL, q[-2]), (DOCKED, q[-1]))}
+    postures = {
+        name: _joints(model, own, robot.link_lengths[-1])
+        for name, own in ((TRAVEL, q[-2]), (DOCKED, q[-1]))
+    }
     verdict = condition.summaries.loc[replicate]
     word = "certified" if verdict["certified"] else "not certified"
     return Shown(
@@ -108,7 +133,10 @@ def _shown(condition: ConditionResults) -> Shown:
 
 
 def _joints(model: pin.Model, q: FloatArray, last: float) -> FloatArray:
-    """Return the arm's joints and its end (4, 2): x, and height; `last` is the length of its last link."""
+    """Return the arm's joints and its end (4, 2): x, and height.
+
+    `last` is the length of its last link.
+    """
     data = model.createData()
     pin.forwardKinematics(model, data, q)
     points = [data.oMi[k].translation for k in range(3, model.njoints)]

@@ -19,11 +19,13 @@ from evoexp.report.routes import Route
 from evoexp.report.settings import ReportSettings
 
 INTRODUCTION = (
-    "Individuals are paths from node to node, of any length, valid by construction. The cost is C = ε D + λ S (Eq. 1): "
-    "D is the length in cells (Eq. 2), S the mean unsafeness of the path's nodes (Eq. 3); lower is better. Best path "
-    "known: for λ = 0 the shortest path (Dijkstra), exact; for λ > 0 the best of the frontier of D + μ ΣS over μ. No "
-    "path costs less than the best walk that may pass nodes again (dynamic programming over the number of nodes, "
-    "exact); where that walk lingers, the truth of paths without loops lies between the two."
+    "Individuals are paths from node to node, of any length, valid by construction. The cost is "
+    "C = ε D + λ S (Eq. 1): D is the length in cells (Eq. 2), S the mean unsafeness of the "
+    "path's nodes (Eq. 3); lower is better. Best path known: for λ = 0 the shortest path "
+    "(Dijkstra), exact; for λ > 0 the best of the frontier of D + μ ΣS over μ. No path costs "
+    "less than the best walk that may pass nodes again (dynamic programming over the number of "
+    "nodes, exact); where that walk lingers, the truth of paths without loops lies between the "
+    "two."
 )
 
 
@@ -47,7 +49,12 @@ def page(results: Results, settings: ReportSettings) -> Page:
 def quantities(results: Results, groups: tuple[Group, ...]) -> tuple[Quantity, ...]:
     """Return the rows of the table of results."""
     row, column = partial(generic.quantity, results), generic.by_column
-    truth = {c.label: group for group in groups for c in (*group.conditions, group.truth) if c is not None}
+    truth = {
+        c.label: group
+        for group in groups
+        for c in (*group.conditions, group.truth)
+        if c is not None
+    }
     above = "cost above the best path known (below 0: better than it)"
 
     def gap(optimum: str) -> Values:
@@ -68,7 +75,9 @@ def quantities(results: Results, groups: tuple[Group, ...]) -> tuple[Quantity, .
     )
 
 
-def checks(groups: tuple[Group, ...], settings: ReportSettings, found: list[Route]) -> tuple[tuple[str, str], ...]:
+def checks(
+    groups: tuple[Group, ...], settings: ReportSettings, found: list[Route]
+) -> tuple[tuple[str, str], ...]:
     """Return what is found of the gaps, the weightings, the routes."""
     rows: list[tuple[str, str]] = []
     for group in groups:
@@ -79,13 +88,21 @@ def checks(groups: tuple[Group, ...], settings: ReportSettings, found: list[Rout
     for group in groups:
         own = measures.routes_of(group.main, found)
         text = ", ".join(f"{name} {len(members)}" for name, members in own.items())
-        rows.append((f"{group.name}: routes taken (sides of the obstacles passed), runs each", text))
-    rows.append(("Lingering in safe nodes, which the mean of Eq. 3 rewards", "`evoexp run experiment=chen_lingering`"))
+        rows.append(
+            (f"{group.name}: routes taken (sides of the obstacles passed), runs each", text)
+        )
+    rows.append(
+        (
+            "Lingering in safe nodes, which the mean of Eq. 3 rewards",
+            "`evoexp run experiment=chen_lingering`",
+        )
+    )
     rows.append(
         (
             "Where the obstacles of Fig. 2 are",
-            "is read off the printed map; the platform is a cylinder of an assumed radius, obstacles are boxes between "
-            "the centres of their outermost nodes: every permitted move is free, past corners, too",
+            "is read off the printed map; the platform is a cylinder of an assumed radius, "
+            "obstacles are boxes between the centres of their outermost nodes: every permitted "
+            "move is free, past corners, too",
         )
     )
     return tuple(rows)
@@ -97,15 +114,27 @@ def _gap_text(condition: ConditionResults, group: Group, settings: ReportSetting
     for bound in (0.0, 0.01, 0.05):
         found = measures.within(condition, group.optimum, bound)
         name = "at it or below" if bound == 0.0 else f"within {100 * bound:g} %"
-        shares.append(f"{name} {markdown.share(found.having, found.total)} ({markdown.percent(found.interval(level))})")
+        shares.append(
+            f"{name} {markdown.share(found.having, found.total)} "
+            f"({markdown.percent(found.interval(level))})"
+        )
     return f"{condition.label}: median {median:+.1f} %, {', '.join(shares)}".replace("-", "−")
 
 
 def _truth_text(group: Group) -> str:
     assert group.truth is not None
-    length, unsafeness, nodes = (group.truth.column(f"term_{n}")[0] for n in ("distance", "unsafeness", "num_nodes"))
-    told = f"best path known costs {group.optimum:.4g} (D {length:.4g}, S {unsafeness:.3g}, {nodes:.0f} nodes)"
-    exact = "exact" if group.truth.column("term_bound_is_reached")[0] else f"no path costs less than {group.bound:.4g}"
+    length, unsafeness, nodes = (
+        group.truth.column(f"term_{n}")[0] for n in ("distance", "unsafeness", "num_nodes")
+    )
+    told = (
+        f"best path known costs {group.optimum:.4g} (D {length:.4g}, S {unsafeness:.3g}, "
+        f"{nodes:.0f} nodes)"
+    )
+    exact = (
+        "exact"
+        if group.truth.column("term_bound_is_reached")[0]
+        else f"no path costs less than {group.bound:.4g}"
+    )
     return f"{told}, {exact}; gaps of runs to it"
 
 
@@ -120,14 +149,16 @@ def _same_problem(groups: tuple[Group, ...]) -> list[tuple[str, str]]:
         rows.append(
             (
                 f"{one.name} and {two.name} are nearly the same problem",
-                f"only λ/ε matters: {ratios[0]:.0f} and {ratios[1]:.0f} cells; the best path known is "
-                f"{'the same one' if same else 'another one'}",
+                f"only λ/ε matters: {ratios[0]:.0f} and {ratios[1]:.0f} cells; the best path "
+                f"known is {'the same one' if same else 'another one'}",
             )
         )
     return rows
 
 
-def comparisons(groups: tuple[Group, ...], settings: ReportSettings) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
+def comparisons(
+    groups: tuple[Group, ...], settings: ReportSettings
+) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
     """Return the first condition of each weighting against its others."""
     found, values = [], generic.by_column("best_cost")
     for group in groups:
@@ -149,8 +180,9 @@ def drawings(groups: tuple[Group, ...], found: list[Route]) -> tuple[Drawing, ..
         Drawing(
             "fig_2_costs",
             "Fig. 2: path cost against generations",
-            "Best so far: median and quartiles of the runs; dashed: average of a generation. Random search draws as "
-            "many random walks. Dotted and dash-dotted: what the reference knows.",
+            "Best so far: median and quartiles of the runs; dashed: average of a generation. "
+            "Random search draws as many random walks. Dotted and dash-dotted: what the "
+            "reference knows.",
             partial(grid_costs.costs_table, groups),
             grid_costs.draw_costs,
             shown,
@@ -158,8 +190,8 @@ def drawings(groups: tuple[Group, ...], found: list[Route]) -> tuple[Drawing, ..
         Drawing(
             "fig_2_paths",
             "Fig. 2: paths",
-            "All runs of the genetic algorithm, the one of median cost, and the best path known. Grey: obstacles, from "
-            "centre to centre of their outermost nodes.",
+            "All runs of the genetic algorithm, the one of median cost, and the best path known. "
+            "Grey: obstacles, from centre to centre of their outermost nodes.",
             partial(grid_paths.paths_table, [_panel(group) for group in groups]),
             grid_paths.draw_paths,
             shown,
@@ -167,8 +199,9 @@ def drawings(groups: tuple[Group, ...], found: list[Route]) -> tuple[Drawing, ..
         Drawing(
             "routes",
             "Routes",
-            "Paths that pass the same sides of all obstacles are one route; of each the run of median cost, as wide as "
-            "the route is frequent. A is the most frequent one over all panels.",
+            "Paths that pass the same sides of all obstacles are one route; of each the run of "
+            "median cost, as wide as the route is frequent. A is the most frequent one over all "
+            "panels.",
             partial(grid_paths.paths_table, [_route_panel(group, found) for group in groups]),
             grid_paths.draw_routes,
             main,
@@ -181,7 +214,8 @@ def _gaps(groups: tuple[Group, ...], shown: tuple[ConditionResults, ...]) -> Dra
     return Drawing(
         "gaps",
         "Gaps to the best path known",
-        "Share of runs that end at most so far above it. Random walks may be so far off that the curve starts late.",
+        "Share of runs that end at most so far above it. Random walks may be so far off that the "
+        "curve starts late.",
         partial(grid_costs.gaps_table, groups),
         grid_costs.draw_gaps,
         shown,

@@ -15,7 +15,9 @@ SOURCE = "section 4.1, Fig. 2"
 DISTANCE, UNSAFENESS = "term_distance", "term_unsafeness"
 
 
-def of_paths(results: Results, settings: ReportSettings, groups: tuple[Group, ...]) -> tuple[Claim, ...]:
+def of_paths(
+    results: Results, settings: ReportSettings, groups: tuple[Group, ...]
+) -> tuple[Claim, ...]:
     """Return the claims of Fig. 2: they need its three weightings, in their order."""
     found = [_nearly_shortest(results, groups), *_compromise(results, settings, groups)]
     found += [_decreases(results, group) for group in groups]
@@ -29,15 +31,30 @@ def _nearly_shortest(results: Results, groups: tuple[Group, ...]) -> Claim:
     excess = 100.0 * (first.column(DISTANCE) / shortest - 1.0)
     near = int(np.count_nonzero(excess <= 100.0 * NEAR))
     told = (
-        f"median length {markdown.number(float(np.median(first.column(DISTANCE))))}, {np.median(excess):.1f} % above "
-        f"the shortest {markdown.number(shortest)} (Dijkstra); {markdown.share(near, first.done)} runs within "
-        f"{100 * NEAR:g} % (reproduced: more than half of the runs)"
+        f"median length {markdown.number(float(np.median(first.column(DISTANCE))))}, "
+        f"{np.median(excess):.1f} % above the shortest {markdown.number(shortest)} (Dijkstra); "
+        f"{markdown.share(near, first.done)} runs within {100 * NEAR:g} % (reproduced: more than "
+        "half of the runs)"
     )
-    verdict = claims.NOT_JUDGED if why else claims.REPRODUCED if near > first.done / 2 else claims.CONTRADICTED
-    return claim(f"{first.label}: without safety a nearly shortest path is obtained", SOURCE, told, verdict, why)
+    verdict = (
+        claims.NOT_JUDGED
+        if why
+        else claims.REPRODUCED
+        if near > first.done / 2
+        else claims.CONTRADICTED
+    )
+    return claim(
+        f"{first.label}: without safety a nearly shortest path is obtained",
+        SOURCE,
+        told,
+        verdict,
+        why,
+    )
 
 
-def _compromise(results: Results, settings: ReportSettings, groups: tuple[Group, ...]) -> list[Claim]:
+def _compromise(
+    results: Results, settings: ReportSettings, groups: tuple[Group, ...]
+) -> list[Claim]:
     """Return the claims that compare weightings; none unless there are three."""
     if len(groups) != 3:
         return []
@@ -48,7 +65,10 @@ def _compromise(results: Results, settings: ReportSettings, groups: tuple[Group,
     both = [one for one in (safer[0], shorter) if one is not None]
     told = "; ".join(
         f"{name}: {evidence(one, word)}"
-        for name, word, one in ((f"against {a.label}", "safer", safer[0]), (f"against {c.label}", "shorter", shorter))
+        for name, word, one in (
+            (f"against {a.label}", "safer", safer[0]),
+            (f"against {c.label}", "shorter", shorter),
+        )
         if one is not None
     )
     verdict = claims.judge_better_than_all(why, claims.adjusted(both), settings.significance)
@@ -56,19 +76,36 @@ def _compromise(results: Results, settings: ReportSettings, groups: tuple[Group,
     found = [claim(text, SOURCE, told, verdict, why)]
     verdict = claims.judge_better(why, safer[1], settings.significance)
     told = evidence(safer[1], "safer") if safer[1] else ""
-    found.append(claim(f"{c.label}: a very safe path, safer than {b.label}", SOURCE, told, verdict, why))
+    found.append(
+        claim(f"{c.label}: a very safe path, safer than {b.label}", SOURCE, told, verdict, why)
+    )
     excess = 100.0 * (c.column(DISTANCE) / shortest - 1.0)
     longer = int(np.count_nonzero(excess > 100.0 * MUCH))
     told = (
-        f"median {np.median(excess):.0f} % longer, {markdown.share(longer, c.done)} runs more than {100 * MUCH:g} % "
-        "(reproduced: more than half of the runs)" + _needed(groups[2], shortest)
+        f"median {np.median(excess):.0f} % longer, {markdown.share(longer, c.done)} runs more "
+        f"than {100 * MUCH:g} % (reproduced: more than half of the runs)"
+        + _needed(groups[2], shortest)
     )
-    verdict = claims.NOT_JUDGED if why else claims.REPRODUCED if longer > c.done / 2 else claims.CONTRADICTED
-    return [*found, claim(f"{c.label}: the safe path is much longer than the shortest", SOURCE, told, verdict, why)]
+    verdict = (
+        claims.NOT_JUDGED
+        if why
+        else claims.REPRODUCED
+        if longer > c.done / 2
+        else claims.CONTRADICTED
+    )
+    return [
+        *found,
+        claim(
+            f"{c.label}: the safe path is much longer than the shortest", SOURCE, told, verdict, why
+        ),
+    ]
 
 
 def _needed(group: Group, shortest: float) -> str:
-    """Say how long the best path known is: what the search adds to it is not asked for by the cost."""
+    """Say how long the best path known is.
+
+    What the search adds to it is not asked for by the cost.
+    """
     if group.truth is None:
         return ""
     excess = 100.0 * (float(group.truth.column(DISTANCE)[0]) / shortest - 1.0)
@@ -76,7 +113,10 @@ def _needed(group: Group, shortest: float) -> str:
 
 
 def _decreases(results: Results, group: Group) -> Claim:
-    """Return the claim that costs decrease and converge: the best so far, and the average toward it."""
+    """Return the claim that costs decrease and converge.
+
+    The best so far, and the average toward it.
+    """
     why, c = not_judged(results), group.main
     rows = c.generations.sort_values("index").groupby("replicate")
     first, last = rows.first(), rows.last()
@@ -84,11 +124,13 @@ def _decreases(results: Results, group: Group) -> Claim:
     near = last["mean_cost"] <= 1.05 * last["best_cost_in_generation"]
     holds = int((lower & near).sum())
     told = (
-        f"in {markdown.share(holds, c.done)} runs the best cost falls and the last generation's average is within 5 % "
-        "of its best (reproduced: all of them)"
+        f"in {markdown.share(holds, c.done)} runs the best cost falls and the last generation's "
+        "average is within 5 % of its best (reproduced: all of them)"
     )
     verdict = claims.judge_all(why, holds, c.done, c.planned)
-    return claim(f"{c.label}: path costs decrease and converge with generations", SOURCE, told, verdict, why)
+    return claim(
+        f"{c.label}: path costs decrease and converge with generations", SOURCE, told, verdict, why
+    )
 
 
 def _better_than_random(results: Results, settings: ReportSettings, group: Group) -> list[Claim]:
@@ -96,7 +138,9 @@ def _better_than_random(results: Results, settings: ReportSettings, group: Group
     for control in (c for c in group.conditions if c.is_control):
         one = _compared(group.main, control, "best_cost", settings)
         verdict = claims.judge_better(why, one, settings.significance)
-        text = f"{group.name}: the genetic algorithm is better than random walks at equal evaluations"
+        text = (
+            f"{group.name}: the genetic algorithm is better than random walks at equal evaluations"
+        )
         told = evidence(one, "lower cost") if one else "no common seeds"
         found.append(claim(text, "section 5", told, verdict, why))
     return found

@@ -1,4 +1,7 @@
-"""What the pages on Corsépius 2001 measure alike: effort, paths, phases, and which conditions are one task."""
+"""What the pages on Corsépius 2001 measure alike.
+
+Effort, paths, phases, and which conditions are one task.
+"""
 
 from typing import Any, NamedTuple
 
@@ -34,7 +37,9 @@ class Task(NamedTuple):
 
 def fits(results: Results) -> bool:
     """Whether there are results, and all of postures as individuals."""
-    return bool(results.with_data) and all(hasattr(c.planner, "edge_check") for c in results.with_data)
+    return bool(results.with_data) and all(
+        hasattr(c.planner, "edge_check") for c in results.with_data
+    )
 
 
 def tasks(results: Results, setting: str, of: str = "ga") -> tuple[Task, ...]:
@@ -60,7 +65,9 @@ def tasks(results: Results, setting: str, of: str = "ga") -> tuple[Task, ...]:
 def _task(group: list[ConditionResults], setting: str, of: str) -> Task:
     def value(c: ConditionResults) -> float:
         found = getattr(getattr(c.planner, of) if of else c.planner, setting)
-        return float(found[0] if isinstance(found, tuple) else found)  # a scope that all joints share
+        return float(
+            found[0] if isinstance(found, tuple) else found
+        )  # a scope that all joints share
 
     ordered = sorted(group, key=value)
     return Task(ordered[0].label.split(", ")[0], tuple(value(c) for c in ordered), tuple(ordered))
@@ -105,13 +112,19 @@ def search_seconds(condition: ConditionResults) -> FloatArray:
 def usual_seconds(condition: ConditionResults) -> FloatArray:
     """Return what each run's evaluations take at the median run's price, (done,) [s].
 
-    The first run of a worker process also loads the kernels; one price for all keeps that out of sums.
+    The first run of a worker process also loads the kernels; one price for all keeps that out of
+    sums.
     """
-    return evaluations(condition) * quantile(search_seconds(condition) / evaluations(condition), 0.5)
+    return evaluations(condition) * quantile(
+        search_seconds(condition) / evaluations(condition), 0.5
+    )
 
 
 def residuals(condition: ConditionResults) -> FloatArray:
-    """Return how far from the goal each run ended, in the phase that it ended in, (done,) [length unit]."""
+    """Return how far from the goal each run ended, in the phase that it ended in.
+
+    (done,) [length unit].
+    """
     return np.abs(condition.column("term_goal_distance"))
 
 
@@ -128,11 +141,16 @@ def paths(condition: ConditionResults) -> dict[int, FloatArray]:
 
 def path_lengths(condition: ConditionResults) -> FloatArray:
     """Return the length of each run's path through joint space, (done,) [rad]."""
-    return np.array([np.sqrt((np.diff(q, axis=0) ** 2).sum(axis=1)).sum() for q in paths(condition).values()])
+    return np.array(
+        [np.sqrt((np.diff(q, axis=0) ** 2).sum(axis=1)).sum() for q in paths(condition).values()]
+    )
 
 
 def detours(condition: ConditionResults) -> FloatArray:
-    """Return each path's length over the straight distance of its ends, (done,); NaN where it ends as it began."""
+    """Return each path's length over the straight distance of its ends, (done,).
+
+    NaN where it ends as it began.
+    """
     straight = np.array([np.sqrt(((q[-1] - q[0]) ** 2).sum()) for q in paths(condition).values()])
     found = np.full(len(straight), np.nan)
     np.divide(path_lengths(condition), straight, out=found, where=straight > 0.0)
@@ -184,25 +202,37 @@ def phase_cycles(condition: ConditionResults) -> pd.DataFrame:
     """
     names = phase_names(condition)
     rows = condition.generations
-    begun = rows.assign(phase=rows["term_phase"].astype(int) - 1).groupby(["replicate", "phase"], as_index=False)
+    begun = rows.assign(phase=rows["term_phase"].astype(int) - 1).groupby(
+        ["replicate", "phase"], as_index=False
+    )
     table = begun.size().rename(columns={"size": "cycles"})
     table["cycles"] -= 1  # the posture that a phase begins with
     last = table.groupby("replicate")["phase"].transform("max")
     won = table["replicate"].map(condition.summaries["solved"].astype(bool))
-    return table.assign(reached=(table["phase"] < last) | (won & (table["phase"] == len(names) - 1)))
+    return table.assign(
+        reached=(table["phase"] < last) | (won & (table["phase"] == len(names) - 1))
+    )
 
 
 def median_replicate(condition: ConditionResults, rows: np.ndarray) -> int:
-    """Return the replicate of median evaluations (the lower one of two) among some rows (done,), at least one."""
+    """Return the replicate of median evaluations (the lower one of two) among some rows (done,).
+
+    At least one.
+    """
     candidates = np.flatnonzero(rows)
     ordered = candidates[np.argsort(evaluations(condition)[candidates], kind="stable")]
     return int(condition.summaries.index[ordered[(len(ordered) - 1) // 2]])
 
 
 def shown_replicate(condition: ConditionResults) -> int:
-    """Return the run that figures show: of median evaluations among the solved ones; where none is, among all."""
+    """Return the run that figures show: of median evaluations among the solved ones.
+
+    Where none is, among all.
+    """
     having = solved(condition)
-    return median_replicate(condition, having if having.any() else np.ones(condition.done, dtype=bool))
+    return median_replicate(
+        condition, having if having.any() else np.ones(condition.done, dtype=bool)
+    )
 
 
 def text(proportion: Proportion, confidence: float) -> str:

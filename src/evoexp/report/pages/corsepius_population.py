@@ -18,12 +18,13 @@ from evoexp.report.statistics import Interval, expected_effort, expected_interva
 SETTING = "num_offspring"
 SCALES = {"cycles": (1.0, ""), "evaluations": (1.0, ""), "CPU time": (1e3, "ms")}
 INTRODUCTION = (
-    "λ individuals are generated per cycle, of which 5 are selected; all else is equal, seeds included. Expected "
-    "running time: the effort of all runs, failed ones included, over the number of runs that met the goal: what a "
-    "success costs if one starts again after every failure. Cycles stand for planning time on as many processors as "
-    "individuals, evaluations for time on one; CPU time is that of the search here, at the median run's price of an "
-    "evaluation, and has a fixed part per cycle, which weighs more where λ is small. A smaller λ is not only less "
-    "search per cycle: selection is weaker, too (5 of λ)."
+    "λ individuals are generated per cycle, of which 5 are selected; all else is equal, seeds "
+    "included. Expected running time: the effort of all runs, failed ones included, over the "
+    "number of runs that met the goal: what a success costs if one starts again after every "
+    "failure. Cycles stand for planning time on as many processors as individuals, evaluations "
+    "for time on one; CPU time is that of the search here, at the median run's price of an "
+    "evaluation, and has a fixed part per cycle, which weighs more where λ is small. A smaller λ "
+    "is not only less search per cycle: selection is weaker, too (5 of λ)."
 )
 
 
@@ -52,14 +53,26 @@ def _table(found: tuple[Task, ...], settings: ReportSettings) -> Table:
     level, rows = settings.confidence, []
     for task in found:
         for value, c in zip(task.values, task.conditions, strict=True):
-            shares = (measures.text(one, level) for one in (measures.success(c), measures.refuted(c)))
-            rows.append((task.name, f"{value:g}", *shares, *(_expected(c, metric, settings) for metric in METRICS)))
+            shares = (
+                measures.text(one, level) for one in (measures.success(c), measures.refuted(c))
+            )
+            rows.append(
+                (
+                    task.name,
+                    f"{value:g}",
+                    *shares,
+                    *(_expected(c, metric, settings) for metric in METRICS),
+                )
+            )
     total = sum(c.done for task in found for c in task.conditions)
     note = (
-        f"In brackets {100 * level:g} % intervals: Wilson's of shares, percentiles of {settings.num_resamples} "
-        f"resamples of seeds for expected running times; {total} runs."
+        f"In brackets {100 * level:g} % intervals: Wilson's of shares, percentiles of "
+        f"{settings.num_resamples} resamples of seeds for expected running times; {total} runs."
     )
-    names = (f"expected {metric}{f' [{SCALES[metric][1]}]' if SCALES[metric][1] else ''}" for metric in METRICS)
+    names = (
+        f"expected {metric}{f' [{SCALES[metric][1]}]' if SCALES[metric][1] else ''}"
+        for metric in METRICS
+    )
     headers = ("task", "λ", "goal met", "of these refuted", *names)
     return Table("Success and expected running times", headers, tuple(rows), note)
 
@@ -82,9 +95,13 @@ def _round(value: float) -> str:
 CHECKS = (
     (
         "Intervals of ratios",
-        "by Bonferroni over all of a metric, so that the verdicts of one metric hold together; on common seeds",
+        "by Bonferroni over all of a metric, so that the verdicts of one metric hold together; "
+        "on common seeds",
     ),
-    ("A task that no size solves", "says nothing of effort: the local minimum, `evoexp run experiment=corsepius_wall`"),
+    (
+        "A task that no size solves",
+        "says nothing of effort: the local minimum, `evoexp run experiment=corsepius_wall`",
+    ),
     (
         "The narrow gate at the recommended size",
         "is a matter of the scope, too: `evoexp run experiment=corsepius_gate_narrow`",
@@ -97,28 +114,47 @@ def _drawings(
 ) -> tuple[Drawing, ...]:
     level, names = f"{100 * settings.confidence:g} %", [task.name for task in found]
     shown = tuple(c for task in found for c in task.conditions)
-    effort = {f"{metric} [{'s' if metric == 'CPU time' else '-'}]": values for metric, values in METRICS.items()}
-    shares = {"goal met": measures.success, "of these: in contact between postures": measures.refuted}
+    effort = {
+        f"{metric} [{'s' if metric == 'CPU time' else '-'}]": values
+        for metric, values in METRICS.items()
+    }
+    shares = {
+        "goal met": measures.success,
+        "of these: in contact between postures": measures.refuted,
+    }
     label = "offspring per cycle λ [-]"
     drawn = [
         Drawing(
             "effort",
             "Success and effort against the size",
-            f"a: share of runs that meet the goal; b: of these, the share whose path touches something between two "
-            f"postures; Wilson's {level} intervals. c–e: expected running times, {level} bootstrap intervals; sizes "
-            f"without a success have no point. Dashed: {RECOMMENDED:g}, which the paper recommends.",
-            partial(population_effort.effort_table, found, shares, effort, settings.confidence, settings.num_resamples),
+            "a: share of runs that meet the goal; b: of these, the share whose path touches "
+            f"something between two postures; Wilson's {level} intervals. c–e: expected running "
+            f"times, {level} bootstrap intervals; sizes without a success have no point. Dashed: "
+            f"{RECOMMENDED:g}, which the paper recommends.",
+            partial(
+                population_effort.effort_table,
+                found,
+                shares,
+                effort,
+                settings.confidence,
+                settings.num_resamples,
+            ),
             partial(population_effort.draw_effort, setting=label, marked=RECOMMENDED),
             shown,
         )
     ]
     if any(compared.values()):
         caption = (
-            f"Expected running times in units of that of {RECOMMENDED:g}, with intervals on common seeds, Bonferroni's "
-            "over a panel. Above 1: worse. Dotted: as many more cycles as there are fewer individuals; above it the "
-            "increase is over-proportional. Where one of the two never succeeds, there is no point."
+            f"Expected running times in units of that of {RECOMMENDED:g}, with intervals on "
+            "common seeds, Bonferroni's over a panel. Above 1: worse. Dotted: as many more "
+            "cycles as there are fewer individuals; above it the increase is over-proportional. "
+            "Where one of the two never succeeds, there is no point."
         )
         table = partial(population_effort.ratios_table, compared, names, RECOMMENDED)
         draw = partial(population_effort.draw_ratios, setting="λ [-]")
-        drawn.append(Drawing("ratios", f"Effort against that of {RECOMMENDED:g}", caption, table, draw, shown))
+        drawn.append(
+            Drawing(
+                "ratios", f"Effort against that of {RECOMMENDED:g}", caption, table, draw, shown
+            )
+        )
     return tuple(drawn)

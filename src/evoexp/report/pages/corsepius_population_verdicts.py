@@ -17,7 +17,9 @@ from evoexp.report.settings import ReportSettings
 from evoexp.report.statistics import Interval, effort_ratio, expected_effort, holm
 
 RECOMMENDED = 100.0  # individuals (section 5)
-REASONABLE = 2.0  # [-] a size is reasonable where no other one takes less than half the effort; our reading
+REASONABLE = (
+    2.0  # [-] a size is reasonable where no other one takes less than half the effort; our reading
+)
 SOURCE = "section 5"
 METRICS: dict[str, Values] = {
     "cycles": measures.cycles,
@@ -65,7 +67,9 @@ def of_study(
         larger = [row for row in own if row.value > RECOMMENDED]
         rows += [_no_faster(why, metric, larger), _not_necessarily(why, metric, larger)]
     for metric, own in compared.items():
-        rows.append(_over_proportional(why, metric, [row for row in own if row.value < RECOMMENDED]))
+        rows.append(
+            _over_proportional(why, metric, [row for row in own if row.value < RECOMMENDED])
+        )
     rows.append(_converges_less(why, found, settings))
     rows += [_reasonable(why, metric, found, values) for metric, values in METRICS.items()]
     return tuple(rows)
@@ -74,8 +78,8 @@ def of_study(
 def ratios(found: tuple[Task, ...], metric: str, settings: ReportSettings) -> list[Against]:
     """Return every size against the recommended one, task by task.
 
-    Intervals are of one family: their levels are Bonferroni's over all of them. Tasks that neither size ever solves
-    are left out.
+    Intervals are of one family: their levels are Bonferroni's over all of them. Tasks that neither
+    size ever solves are left out.
     """
     pairs = []
     for task in found:
@@ -95,11 +99,16 @@ def ratios(found: tuple[Task, ...], metric: str, settings: ReportSettings) -> li
     return rows
 
 
-def _on_common_seeds(one: ConditionResults, two: ConditionResults, values: Values) -> list[tuple[FloatArray, Any]]:
+def _on_common_seeds(
+    one: ConditionResults, two: ConditionResults, values: Values
+) -> list[tuple[FloatArray, Any]]:
     """Return effort and success of the replicates that both have."""
     common = one.summaries.index.intersection(two.summaries.index)
     places = [c.summaries.index.get_indexer(common) for c in (one, two)]
-    return [(values(c)[rows], measures.solved(c)[rows]) for c, rows in zip((one, two), places, strict=True)]
+    return [
+        (values(c)[rows], measures.solved(c)[rows])
+        for c, rows in zip((one, two), places, strict=True)
+    ]
 
 
 def told(rows: list[Against], says: int) -> str:
@@ -118,10 +127,17 @@ def _short(ratio: float) -> str:
 def _no_faster(why: str, metric: str, rows: list[Against]) -> Claim:
     """Judge that nothing larger is faster, on any task."""
     says = [row.says for row in rows]
-    verdict = claims.CONTRADICTED if -1 in says else claims.REPRODUCED if 1 in says else claims.INCONCLUSIVE
+    verdict = (
+        claims.CONTRADICTED
+        if -1 in says
+        else claims.REPRODUCED
+        if 1 in says
+        else claims.INCONCLUSIVE
+    )
     text = f"Larger populations do not plan faster, on any task: {metric}"
     evidence = (
-        f"expected {metric} in units of those of 100 (of which λ): less for {told(rows, -1)}. More for {told(rows, 1)} "
+        f"expected {metric} in units of those of 100 (of which λ): less for {told(rows, -1)}. "
+        f"More for {told(rows, 1)} "
     )
     evidence += "(reproduced: none is faster, one at least is slower)"
     return claim(text, SOURCE, evidence, claims.NOT_JUDGED if why else verdict, why)
@@ -134,22 +150,33 @@ def _not_necessarily(why: str, metric: str, rows: list[Against]) -> Claim:
     slower = [n for n in never if any(row.says > 0 for row in rows if row.task == n)]
     verdict = claims.REPRODUCED if slower else claims.INCONCLUSIVE if never else claims.CONTRADICTED
     text = f"Larger populations do not necessarily plan faster: {metric}"
-    evidence = f"of {len(names)} tasks nothing larger than 100 is faster on {len(never)}: {', '.join(never) or '–'}; "
+    evidence = (
+        f"of {len(names)} tasks nothing larger than 100 is faster on {len(never)}: "
+        f"{', '.join(never) or '–'}; "
+    )
     evidence += f"something larger is slower on {len(slower)} of them (reproduced: on one at least)"
     return claim(text, SOURCE, evidence, claims.NOT_JUDGED if why else verdict, why)
 
 
 def _over_proportional(why: str, metric: str, rows: list[Against]) -> Claim:
-    """Judge that smaller populations cost over-proportionally more, on every task and at every size."""
+    """Judge that smaller populations cost over-proportionally more.
+
+    On every task and at every size.
+    """
     says = [row.says for row in rows]
     verdict = claims.CONTRADICTED if -1 in says else claims.INCONCLUSIVE
     if says and 0 not in says and -1 not in says:
         verdict = claims.REPRODUCED
-    meaning = "the ratio exceeds 100/λ" if metric == "cycles" else "the ratio exceeds 1: time goes with evaluations"
+    meaning = (
+        "the ratio exceeds 100/λ"
+        if metric == "cycles"
+        else "the ratio exceeds 1: time goes with evaluations"
+    )
     text = f"Smaller populations increase planning times over-proportionally: {metric}"
     evidence = (
-        f"over-proportional: {meaning}. It does for {told(rows, 1)}. It is below for {told(rows, -1)}. Not certain: "
-        f"{sum(one == 0 for one in says)} of {len(rows)} (reproduced: everywhere)"
+        f"over-proportional: {meaning}. It does for {told(rows, 1)}. It is below for "
+        f"{told(rows, -1)}. Not certain: {sum(one == 0 for one in says)} of {len(rows)} "
+        "(reproduced: everywhere)"
     )
     return claim(text, SOURCE, evidence, claims.NOT_JUDGED if why else verdict, why)
 
@@ -170,19 +197,24 @@ def _converges_less(why: str, found: tuple[Task, ...], settings: ReportSettings)
             texts.append(f"{name} {value:g}: {markdown.share(*one)} for {markdown.share(*two)}")
     verdict = claims.CONTRADICTED if more else claims.REPRODUCED if less else claims.INCONCLUSIVE
     evidence = (
-        f"goal met less often than with 100 in {less} of {len(pairs)} cases, more often in {more} (Fisher's exact "
-        f"tests, Holm): {'; '.join(texts) or '–'} (reproduced: never more often, less often somewhere)"
+        f"goal met less often than with 100 in {less} of {len(pairs)} cases, more often in {more} "
+        f"(Fisher's exact tests, Holm): {'; '.join(texts) or '–'} (reproduced: never more often, "
+        "less often somewhere)"
     )
     text = "Smaller populations reduce convergence"
     return claim(text, SOURCE, evidence, claims.NOT_JUDGED if why else verdict, why)
 
 
 def _reasonable(why: str, metric: str, found: tuple[Task, ...], values: Values) -> Claim:
-    """Judge that 100 is a reasonable size: no other takes less than half its effort, on any task that can be solved."""
+    """Judge that 100 is a reasonable size.
+
+    No other takes less than half its effort, on any task that can be solved.
+    """
     texts, bad, known = [], 0, 0
     for task in found:
         efforts = {
-            v: expected_effort(values(c), measures.solved(c)) for v, c in zip(task.values, task.conditions, strict=True)
+            v: expected_effort(values(c), measures.solved(c))
+            for v, c in zip(task.values, task.conditions, strict=True)
         }
         best = min(efforts, key=lambda value: efforts[value])
         if RECOMMENDED not in efforts or not np.isfinite(efforts[best]):

@@ -25,12 +25,17 @@ def of_tasks(results: Results, settings: ReportSettings) -> tuple[Claim, ...]:
     return (*found, *_redundant(results, settings), *_stuck(results, settings))
 
 
-def _free_of_collision(results: Results, condition: ConditionResults, settings: ReportSettings) -> list[Claim]:
+def _free_of_collision(
+    results: Results, condition: ConditionResults, settings: ReportSettings
+) -> list[Claim]:
     """Judge that binary ratings of distances keep the whole motion free."""
     why, refuted = not_judged(results), measures.refuted(condition)
     free = measures.certified(condition).having
     told = f"{markdown.share(free, refuted.total)} solved runs certified; refuted "
-    told += f"{measures.text(refuted, settings.confidence)}: postures are free, what lies between them is not rated"
+    told += (
+        f"{measures.text(refuted, settings.confidence)}: postures are free, what lies between "
+        "them is not rated"
+    )
     planned = refuted.total if condition.done == condition.planned else 0
     verdict = claims.judge_all(why, free, refuted.total, planned)
     return [claim(f"{condition.label}: paths avoid obstacles", "section 4.3.3", told, verdict, why)]
@@ -44,23 +49,36 @@ def _tilt(results: Results, condition: ConditionResults) -> list[Claim]:
         if limit is None:
             continue
         having = measures.solved(condition)
-        at, between = (condition.column(f"term_greatest_{term}{part}_deg")[having] for part in ("", "_between"))
+        at, between = (
+            condition.column(f"term_greatest_{term}{part}_deg")[having] for part in ("", "_between")
+        )
         if not len(at):
             continue
         kept = int(np.count_nonzero(between <= limit.limit))
         told = (
             f"greatest tilt at postures {markdown.number(float(at.max()))}°, between them "
-            f"{markdown.number(float(between.max()))}°, limit {limit.limit:g}°; within it all the way: "
-            f"{markdown.share(kept, len(at))} solved runs"
+            f"{markdown.number(float(between.max()))}°, limit {limit.limit:g}°; within it all the "
+            f"way: {markdown.share(kept, len(at))} solved runs"
         )
         planned = len(at) if condition.done == condition.planned else 0
         verdict = claims.judge_all(why, kept, len(at), planned)
-        found.append(claim(f"{condition.label}: the grasped object is not tilted", "section 6", told, verdict, why))
+        found.append(
+            claim(
+                f"{condition.label}: the grasped object is not tilted",
+                "section 6",
+                told,
+                verdict,
+                why,
+            )
+        )
     return found
 
 
 def _redundant(results: Results, settings: ReportSettings) -> list[Claim]:
-    """Judge that the approach applies to highly redundant arms: that it finds a certified path for one."""
+    """Judge that the approach applies to highly redundant arms.
+
+    That it finds a certified path for one.
+    """
     why, texts, certified = not_judged(results), [], 0
     for c in results.main:
         joints = len(c.condition.scenario.q_start)  # type: ignore[attr-defined]
@@ -84,9 +102,9 @@ def _planning_time(condition: ConditionResults) -> list[Claim]:
         return []
     seconds, cycles = measures.usual_seconds(condition), measures.cycles(condition)
     told = (
-        f"here {1e3 * seconds.min():.2g} to {1e3 * seconds.max():.2g} ms of search on one core, {cycles.min():.0f} to "
-        f"{cycles.max():.0f} cycles; theirs: a Pentium III, and some 30 000 spheres to this model's "
-        f"{condition.prepared.problem.bodies.num_shapes}"
+        f"here {1e3 * seconds.min():.2g} to {1e3 * seconds.max():.2g} ms of search on one core, "
+        f"{cycles.min():.0f} to {cycles.max():.0f} cycles; theirs: a Pentium III, and some 30 000 "
+        f"spheres to this model's {condition.prepared.problem.bodies.num_shapes}"
     )
     text = f"{condition.label}: planning takes a couple of seconds up to a few minutes"
     return [Claim(text, "section 5", told, f"{claims.NOT_JUDGED} (another machine, another model)")]
@@ -107,5 +125,13 @@ def _stuck(results: Results, settings: ReportSettings) -> list[Claim]:
                 f"{measures.text(measures.reasons(c)['stagnation'], settings.confidence)}"
             )
             verdict = judge_greater(why, helped, stuck, settings.significance)
-            found.append(claim(f"{c.label}: the search gets stuck in a local minimum", "section 6", told, verdict, why))
+            found.append(
+                claim(
+                    f"{c.label}: the search gets stuck in a local minimum",
+                    "section 6",
+                    told,
+                    verdict,
+                    why,
+                )
+            )
     return found

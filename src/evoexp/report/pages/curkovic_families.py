@@ -30,7 +30,8 @@ class Measure(NamedTuple):
     Attributes:
         name: With unit where it has one.
         values: Of a condition, (done,).
-        converges: Whether it says how fast or how far a method converges; else it is about the motions found.
+        converges: Whether it says how fast or how far a method converges; else it is about the
+            motions found.
     """
 
     name: str
@@ -53,7 +54,10 @@ class Tested(NamedTuple):
 
 
 def families(results: Results) -> tuple[Family, ...]:
-    """Return what is compared: twins that differ in collision substeps; else all with the first of their Eq. 9."""
+    """Return what is compared: twins that differ in collision substeps.
+
+    Else all with the first of their Eq. 9.
+    """
     conditions = results.with_data
     fewest = min(_substeps(c) for c in conditions)
     finer = [c for c in conditions if _substeps(c) > fewest]
@@ -81,10 +85,18 @@ def tested(results: Results, settings: ReportSettings, threshold: float) -> tupl
     for measure in _measures(results, threshold):
         for family in families(results):
             rows = [
-                generic.compare_on_common_seeds(first, other, other.label, True, measure.values, settings)
+                generic.compare_on_common_seeds(
+                    first, other, other.label, True, measure.values, settings
+                )
                 for first, other in family.pairs
             ]
-            found.append(Tested(measure, family, tuple(claims.adjusted([row for row in rows if row is not None]))))
+            found.append(
+                Tested(
+                    measure,
+                    family,
+                    tuple(claims.adjusted([row for row in rows if row is not None])),
+                )
+            )
     return tuple(found)
 
 
@@ -99,11 +111,19 @@ def _measures(results: Results, threshold: float) -> tuple[Measure, ...]:
         Measure("best cost", generic.by_column("best_cost")),
         Measure(f"generations {to}", partial(measures.generations_to, threshold=threshold)),
     ]
-    sizes = [tuple(c.planner.ga.population_size for c in pair) for family in families(results) for pair in family.pairs]
+    sizes = [
+        tuple(c.planner.ga.population_size for c in pair)
+        for family in families(results)
+        for pair in family.pairs
+    ]
     if any(one != other for one, other in sizes):
-        found.append(Measure(f"evaluations {to}", partial(measures.evaluations_to, threshold=threshold)))
+        found.append(
+            Measure(f"evaluations {to}", partial(measures.evaluations_to, threshold=threshold))
+        )
     if len({_substeps(c) for c in results.with_data}) > 1 or curved(results):
-        found.append(Measure(f"solved motion {measures.REFUTED}", measures.refuted, converges=False))
+        found.append(
+            Measure(f"solved motion {measures.REFUTED}", measures.refuted, converges=False)
+        )
     return tuple(found)
 
 

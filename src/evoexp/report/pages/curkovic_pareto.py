@@ -17,9 +17,10 @@ from evoexp.report.settings import ReportSettings
 from evoexp.report.statistics import spread
 
 INTRODUCTION = (
-    "One population of paths per robot. An individual is on the front of its population if no other one is at least as "
-    "good in all of C1 (collisions with all paths of the other populations), C2 (end-effector's path), C3 (turns of "
-    "the links) and C4 (longest step of the end-effector less its shortest), and better in one."
+    "One population of paths per robot. An individual is on the front of its population if no "
+    "other one is at least as good in all of C1 (collisions with all paths of the other "
+    "populations), C2 (end-effector's path), C3 (turns of the links) and C4 (longest step of the "
+    "end-effector less its shortest), and better in one."
 )
 
 
@@ -39,7 +40,10 @@ def page(results: Results, settings: ReportSettings) -> Page:
         introduction=INTRODUCTION,
         quantities=(*(_quantity(results, p, of) for p, of in sizes), *base.quantities),
         checks=tuple(check for c in drawn for check in _checks(c, fronts[c.label])),
-        drawings=(*(_drawing(results, c, fronts[c.label]) for c in drawn), measures.convergence_drawing(results)),
+        drawings=(
+            *(_drawing(results, c, fronts[c.label]) for c in drawn),
+            measures.convergence_drawing(results),
+        ),
     )
 
 
@@ -54,36 +58,47 @@ def _size(front: FrontRow) -> int:
 
 def _sizes(fronts: dict[int, list[FrontRow]], population: int) -> FloatArray:
     """Return how many individuals of a population are on its front, (replicates,)."""
-    return np.array([_size(rows[population]) for rows in fronts.values() if population < len(rows)], dtype=np.float64)
+    return np.array(
+        [_size(rows[population]) for rows in fronts.values() if population < len(rows)],
+        dtype=np.float64,
+    )
 
 
 def _quantity(results: Results, population: int, sizes: dict[str, FloatArray]) -> Quantity:
     spreads = {c.label: spread(sizes.get(c.label, np.empty(0))) for c in results.with_data}
-    return Quantity(f"individuals on the front of robot {population + 1}'s population", "–", spreads)
+    return Quantity(
+        f"individuals on the front of robot {population + 1}'s population", "–", spreads
+    )
 
 
-def _checks(condition: ConditionResults, fronts: dict[int, list[FrontRow]]) -> list[tuple[str, str]]:
+def _checks(
+    condition: ConditionResults, fronts: dict[int, list[FrontRow]]
+) -> list[tuple[str, str]]:
     ga = condition.planner.ga
     sizes = np.array([_size(front) for rows in fronts.values() for front in rows])
     larger, single = (
-        markdown.share(int(np.count_nonzero(of)), len(sizes)) for of in (sizes > ga.num_hall_teams, sizes == 1)
+        markdown.share(int(np.count_nonzero(of)), len(sizes))
+        for of in (sizes > ga.num_hall_teams, sizes == 1)
     )
     bound, costs = measures.lower_bound(condition), markdown.spread(condition.spread("best_cost"))
     return [
         (
-            f"Fronts that are larger than the hall of fame may be ({ga.num_hall_teams} of {ga.population_size}), and "
-            "fronts of a single point",
+            f"Fronts that are larger than the hall of fame may be ({ga.num_hall_teams} of "
+            f"{ga.population_size}), and fronts of a single point",
             f"{larger} populations; {single}",
         ),
         (
-            "That there are individuals on a front in an early phase (section 3) says little: every population has a "
-            "front, a random one, too. What the early phase is worth: cost of the best collision-free team",
+            "That there are individuals on a front in an early phase (section 3) says little: "
+            "every population has a front, a random one, too. What the early phase is worth: "
+            "cost of the best collision-free team",
             f"{costs}; lower bound {markdown.number(bound)}",
         ),
     ]
 
 
-def _drawing(results: Results, condition: ConditionResults, fronts: dict[int, list[FrontRow]]) -> Drawing:
+def _drawing(
+    results: Results, condition: ConditionResults, fronts: dict[int, list[FrontRow]]
+) -> Drawing:
     best, several = condition.best_replicate, len(results.with_data) > 1
     generation = fronts[best][0].generation
     suffix = f"_{results.position(condition.label) + 1}" if several else ""
@@ -91,8 +106,9 @@ def _drawing(results: Results, condition: ConditionResults, fronts: dict[int, li
         f"fig_5_fronts{suffix}",
         f"Fig. 5: fronts at generation {generation}, criterion against criterion"
         + (f" ({condition.label})" if several else ""),
-        "The paper shows non-dominated individuals red, dominated ones blue. Here: both robots' populations of "
-        f"replicate {best} (lowest cost), all four criteria judged at once; so a front looks scattered in two of them.",
+        "The paper shows non-dominated individuals red, dominated ones blue. Here: both robots' "
+        f"populations of replicate {best} (lowest cost), all four criteria judged at once; so a "
+        "front looks scattered in two of them.",
         partial(pareto_fronts.fronts_table, fronts[best], best, condition.condition.length_unit),
         pareto_fronts.draw_fronts,
         (condition,),

@@ -1,4 +1,7 @@
-"""Curkovic et al. 2013: settings of a method side by side; the first of a family against each other one of it."""
+"""Curkovic et al. 2013: settings of a method side by side.
+
+The first of a family against each other one of it.
+"""
 
 from collections.abc import Sequence
 from functools import partial
@@ -15,12 +18,16 @@ from evoexp.report.results import Results
 from evoexp.report.settings import ReportSettings
 
 INTRODUCTION = (
-    "Each condition changes one part of a method; all share their seeds. The cost of a team is C2 + C3 + C4 "
-    "(end-effector paths, turns of the links, unevenness) summed over the robots, free of collision, lower is better. "
-    "Generations and evaluations are those until a team's cost is at or below a threshold; a run that never gets there "
-    "counts as infinite."
+    "Each condition changes one part of a method; all share their seeds. The cost of a team is "
+    "C2 + C3 + C4 (end-effector paths, turns of the links, unevenness) summed over the robots, "
+    "free of collision, lower is better. Generations and evaluations are those until a team's "
+    "cost is at or below a threshold; a run that never gets there counts as infinite."
 )
-SHORT = {measures.REFUTED: "collide in between", measures.LEAVES: "leave [0, π]", measures.TOO_FAST: "too fast (Eq. 2)"}
+SHORT = {
+    measures.REFUTED: "collide in between",
+    measures.LEAVES: "leave [0, π]",
+    measures.TOO_FAST: "too fast (Eq. 2)",
+}
 
 
 def page(results: Results, settings: ReportSettings) -> Page:
@@ -37,7 +44,11 @@ def page(results: Results, settings: ReportSettings) -> Page:
         quantities=_quantities(results, threshold),
         claims=curkovic_verdicts.of_sweep(results, settings, found),
         checks=_checks(results, bound),
-        comparisons=tuple((f"{one.measure.name}: {one.family.name} against …", one.rows) for one in found if one.rows),
+        comparisons=tuple(
+            (f"{one.measure.name}: {one.family.name} against …", one.rows)
+            for one in found
+            if one.rows
+        ),
         drawings=_drawings(results, settings, found, threshold),
     )
 
@@ -51,12 +62,20 @@ def _quantities(results: Results, threshold: float) -> tuple[Quantity, ...]:
 
 def _checks(results: Results, bound: float) -> tuple[tuple[str, str], ...]:
     names = [rate.defect for rate in measures.rates(results.with_data[0])]
-    defects = [(f"Solved motions that fail: {n}", measures.rates_text(results, k)) for k, n in enumerate(names)]
-    slowest = "; ".join(f"{c.label}: {markdown.number(float(c.column('cpu_s').max()))} s" for c in results.with_data)
+    defects = [
+        (f"Solved motions that fail: {n}", measures.rates_text(results, k))
+        for k, n in enumerate(names)
+    ]
+    slowest = "; ".join(
+        f"{c.label}: {markdown.number(float(c.column('cpu_s').max()))} s" for c in results.with_data
+    )
     return (
         *defects,
         ("CPU time of the slowest run (the paper accepts 10 s)", slowest),
-        ("Lower bound of a team's cost: straight end-effector paths, least turns of the links", markdown.number(bound)),
+        (
+            "Lower bound of a team's cost: straight end-effector paths, least turns of the links",
+            markdown.number(bound),
+        ),
     )
 
 
@@ -64,14 +83,18 @@ def _drawings(
     results: Results, settings: ReportSettings, found: Sequence[Tested], threshold: float
 ) -> tuple[Drawing, ...]:
     values = {one.measure.name: one.measure.values for one in found if one.measure.converges}
-    effects = {name: tuple(row for one in found if one.measure.name == name for row in one.rows) for name in values}
+    effects = {
+        name: tuple(row for one in found if one.measure.name == name for row in one.rows)
+        for name in values
+    }
     shown = results.with_data
     return (
         Drawing(
             "values",
             "Every condition",
-            "Boxes: median and quartiles of the runs that get there, whiskers to the last value within 1.5 "
-            "interquartile ranges, every replicate a point; dashed: median of the first condition, where it has one.",
+            "Boxes: median and quartiles of the runs that get there, whiskers to the last value "
+            "within 1.5 interquartile ranges, every replicate a point; dashed: median of the "
+            "first condition, where it has one.",
             partial(ablations.values_table, results, values),
             ablations.draw_values,
             shown,
@@ -79,8 +102,8 @@ def _drawings(
         Drawing(
             "effects",
             "How often the first condition of a family is better",
-            "Vargha and Delaney's A12 with its bootstrap interval: the share of pairs of runs in which the first one "
-            "is better than the other one; dashed: no difference.",
+            "Vargha and Delaney's A12 with its bootstrap interval: the share of pairs of runs in "
+            "which the first one is better than the other one; dashed: no difference.",
             partial(ablations.effects_table, effects, settings.significance),
             ablations.draw_effects,
             shown,
@@ -104,7 +127,14 @@ def _drawings(
 def _rates(results: Results, confidence: float) -> pd.DataFrame:
     """Return the table of defects; without curves only the first of them varies."""
     rows = [
-        (SHORT[rate.defect], position, c.label, rate.failing, rate.solved, *rate.interval(confidence))
+        (
+            SHORT[rate.defect],
+            position,
+            c.label,
+            rate.failing,
+            rate.solved,
+            *rate.interval(confidence),
+        )
         for position, c in enumerate(results.with_data)
         for rate in measures.rates(c)[: None if curkovic_families.curved(results) else 1]
     ]

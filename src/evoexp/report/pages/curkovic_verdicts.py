@@ -15,7 +15,9 @@ MUTATION = {"ga.mutation_rate", "ga.mutation_decay", "ga.mutation_direction"}
 READINGS = {"one_sided": "Eq. 9 as printed", "symmetric": "Eq. 9 read as symmetric"}
 
 
-def of_sweep(results: Results, settings: ReportSettings, found: Sequence[Tested]) -> tuple[Claim, ...]:
+def of_sweep(
+    results: Results, settings: ReportSettings, found: Sequence[Tested]
+) -> tuple[Claim, ...]:
     """Return the claims that a sweep can judge, told by what its conditions differ in."""
     judge: Callable[[Results, ReportSettings, Sequence[Tested]], list[Claim]]
     varied = _varied(results)
@@ -31,9 +33,14 @@ def of_sweep(results: Results, settings: ReportSettings, found: Sequence[Tested]
 
 
 def _varied(results: Results) -> set[str]:
-    """Return the settings of the planner in which conditions differ, those of its algorithm one by one."""
+    """Return the settings of the planner in which conditions differ.
+
+    Those of its algorithm one by one.
+    """
     given = [c.planner.canonical() for c in results.with_data]
-    flat = [{**{f"ga.{key}": value for key, value in one.pop("ga").items()}, **one} for one in given]
+    flat = [
+        {**{f"ga.{key}": value for key, value in one.pop("ga").items()}, **one} for one in given
+    ]
     return {key for key in flat[0] if any(one[key] != flat[0][key] for one in flat)}
 
 
@@ -44,9 +51,15 @@ def _hall(results: Results, settings: ReportSettings, found: Sequence[Tested]) -
         if ga.hall_frozen:
             text, source = "A hall of fame that never changes slows convergence", "section 3"
         elif ga.hall_depth == 0.0 and ga.num_elites:
-            text, source = f"It is the hall, not just elitism ({ga.num_elites} elites)", "our question"
+            text, source = (
+                f"It is the hall, not just elitism ({ga.num_elites} elites)",
+                "our question",
+            )
         elif ga.hall_depth == 0.0:
-            text, source = "A hall of fame speeds convergence up, against neither hall nor elites", "section 3"
+            text, source = (
+                "A hall of fame speeds convergence up, against neither hall nor elites",
+                "section 3",
+            )
         else:
             continue
         for one in found:
@@ -54,7 +67,11 @@ def _hall(results: Results, settings: ReportSettings, found: Sequence[Tested]) -
             told = verdicts.evidence(row, "better") if row else "nothing to compare"
             evidence = f"{one.family.name} against {c.label}: {told}"
             verdict = claims.judge_better(reason, row, settings.significance)
-            judged.append(verdicts.claim(f"{text}, judged by {one.measure.name}", source, evidence, verdict, reason))
+            judged.append(
+                verdicts.claim(
+                    f"{text}, judged by {one.measure.name}", source, evidence, verdict, reason
+                )
+            )
     return judged
 
 
@@ -66,11 +83,15 @@ def _depth(results: Results, settings: ReportSettings, found: Sequence[Tested]) 
         verdict = claims.judge_best(reason, one.rows, own <= min(medians), settings.significance)
         best, median = min(zip(others, medians, strict=True), key=lambda pair: pair[1])
         evidence = (
-            f"median {markdown.number(own)}; best of the others {best.label}: {markdown.number(median)}; "
-            f"{_who(first, one.rows, settings.significance)} (reproduced: best median, one other at least "
-            "significantly worse; contradicted: one significantly better)"
+            f"median {markdown.number(own)}; best of the others {best.label}: "
+            f"{markdown.number(median)}; {_who(first, one.rows, settings.significance)} "
+            "(reproduced: best median, one other at least significantly worse; contradicted: one "
+            "significantly better)"
         )
-        text = f"A hall of at most {first.label} of the population is the best, judged by {one.measure.name}"
+        text = (
+            f"A hall of at most {first.label} of the population is the best, judged by "
+            f"{one.measure.name}"
+        )
         judged.append(verdicts.claim(text, "section 3", evidence, verdict, reason))
     return judged
 
@@ -82,17 +103,29 @@ def _mutation(results: Results, settings: ReportSettings, found: Sequence[Tested
             continue
         first = one.family.pairs[0][0]
         verdict = claims.judge_better_than_all(reason, one.rows, settings.significance)
-        rule = "(reproduced: significantly better than each; contradicted: one significantly better)"
+        rule = (
+            "(reproduced: significantly better than each; contradicted: one significantly better)"
+        )
         evidence = f"{_who(first, one.rows, settings.significance)} {rule}"
         reading = READINGS[first.planner.ga.mutation_direction]
-        text = f"A rate that falls (Eq. 10) helps, against constant rates, judged by {one.measure.name}; {reading}"
+        text = (
+            "A rate that falls (Eq. 10) helps, against constant rates, judged by "
+            f"{one.measure.name}; {reading}"
+        )
         judged.append(verdicts.claim(text, "section 3, Eq. 10", evidence, verdict, reason))
     return judged
 
 
 def _who(first: ConditionResults, rows: Sequence[Comparison], significance: float) -> str:
-    """Say whom the first condition is better than, whom worse, and from whom it cannot be told apart."""
-    words = {1: "is significantly better than", -1: "is significantly worse than", 0: "cannot be told from"}
+    """Say whom the first condition is better than, whom worse.
+
+    And from whom it cannot be told apart.
+    """
+    words = {
+        1: "is significantly better than",
+        -1: "is significantly worse than",
+        0: "cannot be told from",
+    }
     parts = []
     for sign, word in words.items():
         named = [

@@ -1,4 +1,7 @@
-"""The page of whatever has no page of its own: results, convergence, and comparisons with the controls."""
+"""The page of whatever has no page of its own.
+
+Results, convergence, and comparisons with the controls.
+"""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -46,7 +49,9 @@ def quantities(results: Results) -> tuple[Quantity, ...]:
         quantity(results, "best cost", "–", by_column("best_cost")),
         quantity(results, first, "generation", by_column("first_feasible_generation")),
         quantity(results, "evaluations", "–", by_column("evaluations")),
-        quantity(results, "configurations judged for collision", "–", by_column("collision_queries")),
+        quantity(
+            results, "configurations judged for collision", "–", by_column("collision_queries")
+        ),
     )
 
 
@@ -68,8 +73,10 @@ def cost_drawing(results: Results) -> Drawing:
     return Drawing(
         stem="convergence",
         title="Convergence",
-        caption="Best cost so far (full) and average cost of the finite individuals of a generation (dashed): median "
-        "and quartiles over replicates; dash-dotted: references. Lower is better.",
+        caption="Best cost so far (full) and average cost of the finite individuals of a "
+        "generation "
+        "(dashed): median and quartiles over replicates; dash-dotted: references. Lower is "
+        "better.",
         table=partial(convergence.cost_table, results),
         draw=convergence.draw_cost,
         conditions=results.with_data,
@@ -92,7 +99,11 @@ def comparisons(
     found = []
     for first in results.evolved:
         for second in results.evolved:
-            if first.is_control or not second.is_control or not _beside(first.condition, second.condition):
+            if (
+                first.is_control
+                or not second.is_control
+                or not _beside(first.condition, second.condition)
+            ):
                 continue
             rows = [compare_on_common_seeds(first, second, *what, settings) for what in compared]
             kept = [row for row in rows if row is not None]
@@ -102,7 +113,10 @@ def comparisons(
 
 
 def _beside(first: Condition, control: Condition) -> bool:
-    """Whether a control wraps this very planner in the same scene: equal evaluations and common seeds."""
+    """Whether a control wraps this very planner in the same scene.
+
+    Equal evaluations and common seeds.
+    """
     return control._replace(planner=getattr(control.planner, WRAPPED)) == first
 
 
@@ -121,4 +135,6 @@ def compare_on_common_seeds(
     known = ~(np.isnan(x) | np.isnan(y))
     if not known.any():
         return None
-    return compare(quantity, x[known], y[known], lower_is_better, settings.confidence, settings.num_resamples)
+    return compare(
+        quantity, x[known], y[known], lower_is_better, settings.confidence, settings.num_resamples
+    )

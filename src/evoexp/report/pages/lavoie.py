@@ -1,4 +1,7 @@
-"""Lavoie & Boudreau 2001: arms of seven and ten joints reach into a box. Figs. 1–3, attempts, refuted motions."""
+"""Lavoie & Boudreau 2001: arms of seven and ten joints reach into a box. Figs.
+
+1–3, attempts, refuted motions.
+"""
 
 from functools import partial
 
@@ -19,12 +22,13 @@ from evoexp.report.results import ConditionResults, Results
 from evoexp.report.settings import ReportSettings
 
 INTRODUCTION = (
-    "A genetic algorithm searches the posture A at the end of the first sub-path (SP1, tip near the via point), a "
-    "second one the posture B at the end of the second (SP2, tip near the goal, inside the box); both are repeated "
-    "until both are successful, ten times at most. The cost is the objective of SP2 (Eq. 4): position error + 0.7 · "
-    "joint displacement, infinite in collision or outside the box; lower is better. A run has a solution if both "
-    "searches were successful: they stopped below their values, 6 and 2 (unless `planner.success` is `finite`); its "
-    "error is that of the tip at the end of SP2."
+    "A genetic algorithm searches the posture A at the end of the first sub-path (SP1, tip near "
+    "the via point), a second one the posture B at the end of the second (SP2, tip near the "
+    "goal, inside the box); both are repeated until both are successful, ten times at most. The "
+    "cost is the objective of SP2 (Eq. 4): position error + 0.7 · joint displacement, infinite "
+    "in collision or outside the box; lower is better. A run has a solution if both searches "
+    "were successful: they stopped below their values, 6 and 2 (unless `planner.success` is "
+    "`finite`); its error is that of the tip at the end of SP2."
 )
 
 
@@ -61,26 +65,38 @@ def quantities(results: Results) -> tuple[Quantity, ...]:
         row("CPU time of a run, exact verdict included", "s", column("cpu_s")),
         row("CPU time of its search", "s", measures.search_seconds),
         row("evaluations per second of search", "1/s", measures.evaluations_per_second),
-        row("tests of a link against an ellipse per second of search", "1/s", measures.tests_per_second),
+        row(
+            "tests of a link against an ellipse per second of search",
+            "1/s",
+            measures.tests_per_second,
+        ),
     )
 
 
-def _claims(results: Results, settings: ReportSettings, refuted: dict[str, Refuted]) -> tuple[Claim, ...]:
+def _claims(
+    results: Results, settings: ReportSettings, refuted: dict[str, Refuted]
+) -> tuple[Claim, ...]:
     found: list[Claim] = []
     for c in results.with_data:
         found += lavoie_verdicts.percentages(not_judged(results), c, settings)
     found += lavoie_verdicts.more_joints_are_better(results, settings)
     for c in results.with_data:
         found.append(lavoie_verdicts.no_start_needed(results, c))
-        found.append(lavoie_verdicts.free_of_collision(results, c, refuted[c.label].anywhere, settings))
+        found.append(
+            lavoie_verdicts.free_of_collision(results, c, refuted[c.label].anywhere, settings)
+        )
     return (*found, *lavoie_verdicts.judged_elsewhere())
 
 
-def _checks(results: Results, settings: ReportSettings, refuted: dict[str, Refuted]) -> tuple[tuple[str, str], ...]:
+def _checks(
+    results: Results, settings: ReportSettings, refuted: dict[str, Refuted]
+) -> tuple[tuple[str, str], ...]:
     level, shown = settings.confidence, results.with_data
 
     def line(what: str, of: dict[str, Proportion]) -> tuple[str, str]:
-        return what, "; ".join(f"{label}: {measures.text(found, level)}" for label, found in of.items())
+        return what, "; ".join(
+            f"{label}: {measures.text(found, level)}" for label, found in of.items()
+        )
 
     accepted = "Accepted motions that touch an obstacle between tested positions (exact verdict)"
     rows = [
@@ -97,8 +113,8 @@ def _checks(results: Results, settings: ReportSettings, refuted: dict[str, Refut
         (
             "Attempts of SP1 → SP2: mean, most",
             "; ".join(
-                f"{c.label}: {c.column('term_attempts').mean():.3f}, {c.column('term_attempts').max():.0f} of at most "
-                f"{c.planner.num_attempts}"
+                f"{c.label}: {c.column('term_attempts').mean():.3f}, "
+                f"{c.column('term_attempts').max():.0f} of at most {c.planner.num_attempts}"
                 for c in shown
             ),
         ),
@@ -107,26 +123,38 @@ def _checks(results: Results, settings: ReportSettings, refuted: dict[str, Refut
         ("Time of a run", TIME),
     ]
     literal = ((c, _literal_shift(c)) for c in shown)
-    rows += [(f"{c.label}: the printed shift of obstacles, read literally", text) for c, text in literal if text]
+    rows += [
+        (f"{c.label}: the printed shift of obstacles, read literally", text)
+        for c, text in literal
+        if text
+    ]
     return tuple(rows)
 
 
 AT_LEAST_TWO = (
-    "cannot come from a run that stopped below 2: the objective is at least the error. So P(error < 2) is the share of "
-    "runs with a solution, and the printed 99.8 % says that 2 of 1000 runs of the paper had none after ten attempts, "
-    "or counted as successful without stopping below 2: `evoexp run experiment=lavoie_success`"
+    "cannot come from a run that stopped below 2: the objective is at least the error. So "
+    "P(error < 2) is the share of runs with a solution, and the printed 99.8 % says that 2 of "
+    "1000 runs of the paper had none after ten attempts, or counted as successful without "
+    "stopping below 2: `evoexp run experiment=lavoie_success`"
 )
 
 
 OPERATORS = (
-    "are not named by the paper, and the percentages depend on them: `evoexp run experiment=lavoie_operators`; so "
-    "neither agreement nor disagreement with Fig. 3 says much of the paper's algorithm"
+    "are not named by the paper, and the percentages depend on them: `evoexp run "
+    "experiment=lavoie_operators`; so neither agreement nor disagreement with Fig. 3 says much "
+    "of the paper's algorithm"
 )
-TIME = "the paper prints its own (Pentium II, 400 MHz) inside Fig. 3 only; here: above, one core of this run's machine"
+TIME = (
+    "the paper prints its own (Pentium II, 400 MHz) inside Fig. 3 only; here: above, one core of "
+    "this run's machine"
+)
 
 
 def _literal_shift(condition: ConditionResults) -> str:
-    """Say what happens where the words vertically and horizontally are not swapped; empty where nothing is shifted."""
+    """Say what happens where the words vertically and horizontally are not swapped.
+
+    Empty where nothing is shifted.
+    """
     scenario = condition.condition.scenario
     dx, dy = scenario.obstacle_shift  # type: ignore[attr-defined]
     if dx == dy:
@@ -142,21 +170,31 @@ def _literal_shift(condition: ConditionResults) -> str:
 def _drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
     shown, level = results.with_data, f"{100 * settings.confidence:g} %"
     return (
-        _postures("fig_1_start", "Fig. 1: start postures", START, [Shown(c.label, c) for c in shown]),
+        _postures(
+            "fig_1_start", "Fig. 1: start postures", START, [Shown(c.label, c) for c in shown]
+        ),
         *_solutions(results),
         Drawing(
             "fig_3_error",
             "Fig. 3: probability of a position error below x",
-            f"Steps: share of all runs that end with a solution of a smaller error, with Wilson's {level} interval at "
-            "each x. Diamonds: the percentages that the paper prints, with the intervals of its own thousand runs.",
-            partial(error_distribution.distribution_table, results, measures.errors, _printed, settings.confidence),
+            "Steps: share of all runs that end with a solution of a smaller error, with Wilson's "
+            f"{level} interval at each x. Diamonds: the percentages that the paper prints, with "
+            "the intervals of its own thousand runs.",
+            partial(
+                error_distribution.distribution_table,
+                results,
+                measures.errors,
+                _printed,
+                settings.confidence,
+            ),
             error_distribution.draw_distribution,
             shown,
         ),
         Drawing(
             "attempts",
             "Attempts",
-            f"Share of runs that took so many attempts of SP1 → SP2, with Wilson's {level} interval; above: runs.",
+            f"Share of runs that took so many attempts of SP1 → SP2, with Wilson's {level} "
+            "interval; above: runs.",
             partial(attempts.attempts_table, results, settings.confidence),
             attempts.draw_attempts,
             shown,
@@ -165,22 +203,26 @@ def _drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]
 
 
 START = (
-    "The ellipses as they are tested, exactly; their places and sizes are read off the paper's Fig. 1. The tip must "
-    "end inside the box."
+    "The ellipses as they are tested, exactly; their places and sizes are read off the paper's "
+    "Fig. 1. The tip must end inside the box."
 )
 SOLUTIONS = (
-    "The paper shows one solution of the arm of seven joints. Here: per arm the run whose position error is the median "
-    "of all solved runs (the lower one of two); intermediate postures are tested positions (Eq. 3), the later the "
-    "stronger."
+    "The paper shows one solution of the arm of seven joints. Here: per arm the run whose "
+    "position error is the median of all solved runs (the lower one of two); intermediate "
+    "postures are tested positions (Eq. 3), the later the stronger."
 )
 THROUGH = (
-    "Per arm the accepted run of median position error among those that the exact verdict refutes: every tested "
-    "position is free, and the arm passes through an obstacle between two of them."
+    "Per arm the accepted run of median position error among those that the exact verdict "
+    "refutes: every tested position is free, and the arm passes through an obstacle between two "
+    "of them."
 )
 
 
 def _solutions(results: Results) -> list[Drawing]:
-    """Return the figures of solutions: the median one of each arm, and the median one of those that are refuted."""
+    """Return the figures of solutions.
+
+    The median one of each arm, and the median one of those that are refuted.
+    """
     found = []
     for stem, title, caption, only_refuted in (
         ("fig_2_solution", "Fig. 2: solutions", SOLUTIONS, False),
@@ -198,7 +240,9 @@ def _solutions(results: Results) -> list[Drawing]:
 
 def _postures(stem: str, title: str, caption: str, shown: list[Shown]) -> Drawing:
     table = partial(reaching.reaching_table, shown)
-    return Drawing(stem, title, caption, table, reaching.draw_reaching, tuple(one.condition for one in shown))
+    return Drawing(
+        stem, title, caption, table, reaching.draw_reaching, tuple(one.condition for one in shown)
+    )
 
 
 def _printed(condition: ConditionResults) -> list[error_distribution.Point]:
@@ -207,7 +251,10 @@ def _printed(condition: ConditionResults) -> list[error_distribution.Point]:
 
 
 def _median_replicate(condition: ConditionResults, rows: np.ndarray) -> int:
-    """Return the replicate of median position error (the lower one of two) among some rows (done,)."""
+    """Return the replicate of median position error (the lower one of two) among some rows.
+
+    Done,.
+    """
     candidates = np.flatnonzero(rows)
     ordered = candidates[np.argsort(measures.errors(condition)[candidates], kind="stable")]
     return int(condition.summaries.index[ordered[(len(ordered) - 1) // 2]])

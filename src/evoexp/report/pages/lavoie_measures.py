@@ -1,4 +1,7 @@
-"""What the pages on Lavoie & Boudreau 2001 measure alike: errors, effort, and motions that are refuted."""
+"""What the pages on Lavoie & Boudreau 2001 measure alike.
+
+Errors, effort, and motions that are refuted.
+"""
 
 from typing import NamedTuple
 
@@ -33,13 +36,20 @@ class Printed(NamedTuple):
         return Proportion(self.having, PRINTED_RUNS)
 
 
-PRINTED = (Printed(7, 1.0, 935), Printed(7, 2.0, 998), Printed(10, 1.0, 991), Printed(10, 2.0, 1000))
+PRINTED = (
+    Printed(7, 1.0, 935),
+    Printed(7, 2.0, 998),
+    Printed(10, 1.0, 991),
+    Printed(10, 2.0, 1000),
+)
 BOUNDS = (1.0, 2.0)  # those of the printed percentages
 
 
 def fits(results: Results) -> bool:
     """Whether there are results, and all of arms that go by a via point into a box."""
-    return bool(results.with_data) and all(hasattr(c.planner, "stop_cost_sp2") for c in results.with_data)
+    return bool(results.with_data) and all(
+        hasattr(c.planner, "stop_cost_sp2") for c in results.with_data
+    )
 
 
 def num_joints(condition: ConditionResults) -> int:
@@ -53,12 +63,18 @@ def solved(condition: ConditionResults) -> np.ndarray:
 
 
 def errors(condition: ConditionResults) -> FloatArray:
-    """Return the position error at the end of SP2 of each run, (done,) [length unit]; inf without a solution."""
+    """Return the position error at the end of SP2 of each run, (done,) [length unit].
+
+    Inf without a solution.
+    """
     return np.where(solved(condition), condition.column("term_position_error_sp2"), np.inf)
 
 
 def effort(condition: ConditionResults) -> FloatArray:
-    """Return the evaluations that each run took to its solution, (done,); inf without a solution."""
+    """Return the evaluations that each run took to its solution, (done,).
+
+    Inf without a solution.
+    """
     return np.where(solved(condition), condition.column("evaluations"), np.inf)
 
 
@@ -78,18 +94,24 @@ def evaluations_per_second(condition: ConditionResults) -> FloatArray:
 
 
 def tests_per_second(condition: ConditionResults) -> FloatArray:
-    """Return the tests of a link against an ellipse that each search asks for per second, (done,) [1/s].
+    """Return the tests of a link against an ellipse that each search asks for per second.
 
-    Chords are not counted, and kernels skip what cannot touch: it is what the algorithm would take without that.
+    (done,) [1/s].
+
+    Chords are not counted, and kernels skip what cannot touch: it is what the algorithm would take
+    without that.
     """
     pairs = num_joints(condition) * len(condition.condition.scenario.obstacles)  # type: ignore[attr-defined]
     return np.asarray(pairs * condition.column("collision_queries") / search_seconds(condition))
 
 
-def contacts(condition: ConditionResults, replicate: int, verdict: tuple[float, str]) -> list[tuple[float, str]]:
+def contacts(
+    condition: ConditionResults, replicate: int, verdict: tuple[float, str]
+) -> list[tuple[float, str]]:
     """Return the first contact (instant, bodies) on each sub-path that has one.
 
-    A verdict names the first contact of the whole motion only; where that is on SP1, SP2 is judged by itself.
+    A verdict names the first contact of the whole motion only; where that is on SP1, SP2 is judged
+    by itself.
 
     Args:
         condition: Whose replicate it is.
@@ -101,7 +123,11 @@ def contacts(condition: ConditionResults, replicate: int, verdict: tuple[float, 
     prepared = condition.prepared
     q = prepared.planner.motion(prepared.problem, condition.solutions[replicate]).q
     second = certificate(prepared.problem, Motion(np.ascontiguousarray(q[1:])))
-    return [verdict] if second.refuted_at is None else [verdict, (1.0 + second.refuted_at, second.refuted_pair)]
+    return (
+        [verdict]
+        if second.refuted_at is None
+        else [verdict, (1.0 + second.refuted_at, second.refuted_pair)]
+    )
 
 
 def touches(condition: ConditionResults) -> np.ndarray:

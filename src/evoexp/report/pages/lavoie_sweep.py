@@ -1,4 +1,7 @@
-"""Lavoie & Boudreau 2001: settings side by side; per arm the first condition against each other one."""
+"""Lavoie & Boudreau 2001: settings side by side.
+
+Per arm the first condition against each other one.
+"""
 
 from functools import partial
 from typing import NamedTuple
@@ -18,9 +21,10 @@ from evoexp.report.results import ConditionResults, Results
 from evoexp.report.settings import ReportSettings
 
 INTRODUCTION = (
-    "Each condition changes one part of the first one of its arm; all share their seeds. A run has a solution if both "
-    "searches were successful (`planner.success`); one without counts as an infinite error and infinite effort. "
-    "Searches differ in length and one follows the other, so there is no common axis to draw convergence on."
+    "Each condition changes one part of the first one of its arm; all share their seeds. A run "
+    "has a solution if both searches were successful (`planner.success`); one without counts as "
+    "an infinite error and infinite effort. Searches differ in length and one follows the other, "
+    "so there is no common axis to draw convergence on."
 )
 BOUND = 1.0  # x of P(position error < x) that the paper's percentages tell most by
 
@@ -34,7 +38,10 @@ class Measure(NamedTuple):
 
 
 class Tested(NamedTuple):
-    """Conditions of one arm compared with the first one in one quantity; p-values adjusted over the rows."""
+    """Conditions of one arm compared with the first one in one quantity.
+
+    P-values adjusted over the rows.
+    """
 
     measure: Measure
     first: ConditionResults
@@ -53,7 +60,11 @@ def page(results: Results, settings: ReportSettings) -> Page:
         quantities=lavoie.quantities(results),
         claims=lavoie_sweep_verdicts.of_sweep(results, settings, refuted),
         checks=_checks(results, settings, refuted),
-        comparisons=tuple((f"{one.measure.name}: {one.first.label} against …", one.rows) for one in found if one.rows),
+        comparisons=tuple(
+            (f"{one.measure.name}: {one.first.label} against …", one.rows)
+            for one in found
+            if one.rows
+        ),
         drawings=_drawings(results, settings, found, refuted),
     )
 
@@ -76,14 +87,22 @@ def tested(results: Results, settings: ReportSettings) -> tuple[Tested, ...]:
     for measure in compared:
         for first, *others in arms(results):
             rows = [
-                generic.compare_on_common_seeds(first, other, other.label, True, measure.values, settings)
+                generic.compare_on_common_seeds(
+                    first, other, other.label, True, measure.values, settings
+                )
                 for other in others
             ]
-            found.append(Tested(measure, first, tuple(claims.adjusted([row for row in rows if row is not None]))))
+            found.append(
+                Tested(
+                    measure, first, tuple(claims.adjusted([row for row in rows if row is not None]))
+                )
+            )
     return tuple(found)
 
 
-def _checks(results: Results, settings: ReportSettings, refuted: dict[str, Refuted]) -> tuple[tuple[str, str], ...]:
+def _checks(
+    results: Results, settings: ReportSettings, refuted: dict[str, Refuted]
+) -> tuple[tuple[str, str], ...]:
     """Return one row of shares per condition, and what agreement with Fig. 3 is worth."""
     rows = []
     for c in results.with_data:
@@ -95,7 +114,11 @@ def _checks(results: Results, settings: ReportSettings, refuted: dict[str, Refut
             "on SP1": found.sp1,
             "on SP2": found.sp2,
         }
-        texts = [f"{name}: {measures.text(p, settings.confidence)}" for name, p in told.items() if p.total]
+        texts = [
+            f"{name}: {measures.text(p, settings.confidence)}"
+            for name, p in told.items()
+            if p.total
+        ]
         if not c.is_control:
             texts.append(f"mean attempts: {c.column('term_attempts').mean():.2f}")
         rows.append((f"{c.label}: shares of runs", "; ".join(texts)))
@@ -103,24 +126,34 @@ def _checks(results: Results, settings: ReportSettings, refuted: dict[str, Refut
 
 
 def _weak_evidence(results: Results, settings: ReportSettings) -> list[tuple[str, str]]:
-    """Say how many settings agree with a printed percentage: the more do, the less it says about any of them."""
+    """Say how many settings agree with a printed percentage.
+
+    The more do, the less it says about any of them.
+    """
     found = []
     for own in arms(results):
-        printed = next((p for p in PRINTED if (p.joints, p.bound) == (measures.num_joints(own[0]), BOUND)), None)
+        printed = next(
+            (p for p in PRINTED if (p.joints, p.bound) == (measures.num_joints(own[0]), BOUND)),
+            None,
+        )
         if printed is None:
             continue
-        intervals = {c.label: newcombe(measures.below(c, BOUND), printed.proportion, settings.confidence) for c in own}
+        intervals = {
+            c.label: newcombe(measures.below(c, BOUND), printed.proportion, settings.confidence)
+            for c in own
+        }
         same = [label for label, (low, high) in intervals.items() if low <= 0.0 <= high]
         text = (
-            f"{len(same)} of {len(own)}{': ' if same else ''}{', '.join(same)} (0 within Newcombe's "
-            f"{100 * settings.confidence:g} % interval of the difference; at most {max(c.done for c in own)} runs "
-            "each). Agreement with Fig. 3 is weak evidence for a setting as long as others agree as well"
+            f"{len(same)} of {len(own)}{': ' if same else ''}{', '.join(same)} (0 within "
+            f"Newcombe's {100 * settings.confidence:g} % interval of the difference; at most "
+            f"{max(c.done for c in own)} runs each). Agreement with Fig. 3 is weak evidence for a "
+            "setting as long as others agree as well"
         )
         share = 100 * printed.proportion.share
         found.append(
             (
-                f"{own[0].label} and others: whose errors below {BOUND:g} cannot be told from the printed "
-                f"{share:.1f} %",
+                f"{own[0].label} and others: whose errors below {BOUND:g} cannot be told from the "
+                f"printed {share:.1f} %",
                 text,
             )
         )
@@ -133,7 +166,10 @@ def _paths_differ(results: Results) -> bool:
 
 
 def _drawings(
-    results: Results, settings: ReportSettings, found: tuple[Tested, ...], refuted: dict[str, Refuted]
+    results: Results,
+    settings: ReportSettings,
+    found: tuple[Tested, ...],
+    refuted: dict[str, Refuted],
 ) -> tuple[Drawing, ...]:
     shown, level = results.with_data, f"{100 * settings.confidence:g} %"
     values = {f"{one.measure.name} [{one.measure.unit}]": one.measure.values for one in found}
@@ -145,8 +181,9 @@ def _drawings(
         Drawing(
             "shares",
             "Shares of runs",
-            f"With Wilson's {level} interval, counts beside. Motions that touch an obstacle are counted among the "
-            "accepted ones. A dashed line: the percentage that the paper prints, where all conditions are of one arm.",
+            f"With Wilson's {level} interval, counts beside. Motions that touch an obstacle are "
+            "counted among the accepted ones. A dashed line: the percentage that the paper "
+            "prints, where all conditions are of one arm.",
             partial(_shares, results, refuted, settings.confidence),
             shares.draw_shares,
             shown,
@@ -154,9 +191,9 @@ def _drawings(
         Drawing(
             "values",
             "Every condition",
-            "Boxes: median and quartiles of the runs with a solution, whiskers to the last value within 1.5 "
-            "interquartile ranges; points: runs beyond, or all where there are few; dashed: median of the first "
-            "condition.",
+            "Boxes: median and quartiles of the runs with a solution, whiskers to the last value "
+            "within 1.5 interquartile ranges; points: runs beyond, or all where there are few; "
+            "dashed: median of the first condition.",
             partial(ablations.values_table, results, values),
             ablations.draw_values,
             shown,
@@ -164,8 +201,8 @@ def _drawings(
         Drawing(
             "effects",
             "How often the first condition of an arm is better",
-            "Vargha and Delaney's A12 with its bootstrap interval: the share of pairs of runs in which the first one "
-            "is better than the other one; dashed: no difference.",
+            "Vargha and Delaney's A12 with its bootstrap interval: the share of pairs of runs in "
+            "which the first one is better than the other one; dashed: no difference.",
             partial(ablations.effects_table, effects, settings.significance),
             ablations.draw_effects,
             shown,
@@ -177,8 +214,8 @@ def _drawings(
             Drawing(
                 "stopping",
                 "Precision against the stopping value",
-                "Medians with quartiles over all runs; one without a solution counts as infinite. To the right "
-                "searches stop at smaller values.",
+                "Medians with quartiles over all runs; one without a solution counts as "
+                "infinite. To the right searches stop at smaller values.",
                 partial(stopping.stopping_table, results, measures.errors, measures.effort),
                 stopping.draw_stopping,
                 shown,
@@ -197,10 +234,15 @@ def _shares(results: Results, refuted: dict[str, Refuted], confidence: float) ->
             told = {"touch an obstacle": found.anywhere, "on SP1": found.sp1, "on SP2": found.sp2}
         else:
             below = f"error below {BOUND:g}"
-            told = {below: measures.below(c, BOUND), "with a solution": Proportion(c.solved, c.done)}
+            told = {
+                below: measures.below(c, BOUND),
+                "with a solution": Proportion(c.solved, c.done),
+            }
             told["touch an obstacle"] = found.anywhere
         rows += [(name, position, c.label, proportion) for name, proportion in told.items()]
     if len(arms(results)) == 1:
         own = measures.num_joints(results.with_data[0])
-        references = {f"error below {p.bound:g}": p.proportion.share for p in PRINTED if p.joints == own}
+        references = {
+            f"error below {p.bound:g}": p.proportion.share for p in PRINTED if p.joints == own
+        }
     return shares.shares_table(rows, references, confidence)

@@ -1,4 +1,7 @@
-"""What sweeps over the settings of Lavoie & Boudreau 2001 say of their claims, and of our questions."""
+"""What sweeps over the settings of Lavoie & Boudreau 2001 say of their claims.
+
+And of our questions.
+"""
 
 import itertools
 from collections.abc import Callable
@@ -23,8 +26,13 @@ QUESTION = "our question"
 Group = list[ConditionResults]
 
 
-def of_sweep(results: Results, settings: ReportSettings, refuted: dict[str, Refuted]) -> tuple[Claim, ...]:
-    """Return the claims that the conditions can judge; none where they differ in nothing that a claim is about."""
+def of_sweep(
+    results: Results, settings: ReportSettings, refuted: dict[str, Refuted]
+) -> tuple[Claim, ...]:
+    """Return the claims that the conditions can judge.
+
+    None where they differ in nothing that a claim is about.
+    """
     return (
         *_success(results, settings),
         *_precision(results, settings),
@@ -68,7 +76,10 @@ def _precision(results: Results, settings: ReportSettings) -> list[Claim]:
     why, judged = not_judged(results), []
     for group in groups_but_for(results, "stop_cost_sp2"):
         own = sorted(group, key=lambda c: -float(c.planner.stop_cost_sp2))
-        rows = [_compared(small, large, measures.errors, settings) for large, small in itertools.pairwise(own)]
+        rows = [
+            _compared(small, large, measures.errors, settings)
+            for large, small in itertools.pairwise(own)
+        ]
         kept = claims.adjusted([row for row in rows if row is not None])
         medians = (f"{_median(c, measures.errors)} below {c.planner.stop_cost_sp2:g}" for c in own)
         told = f"median errors: {', '.join(medians)}; " + "; ".join(
@@ -94,12 +105,15 @@ def _generations(results: Results, settings: ReportSettings) -> list[Claim]:
         attempts = (f"{c.column('term_attempts').mean():.2f}" for c in (many, few))
         spent = (_median(c, measures.effort) for c in (many, few))
         told = (
-            f"runs with a solution: {measures.text(one, level)} with at most {many.planner.ga.num_generations} "
-            f"generations, {measures.text(two, level)} with {few.planner.ga.num_generations}; {_fisher(one, two)}; "
-            f"mean attempts {' and '.join(attempts)}, median evaluations {' and '.join(spent)}"
+            f"runs with a solution: {measures.text(one, level)} with at most "
+            f"{many.planner.ga.num_generations} generations, {measures.text(two, level)} with "
+            f"{few.planner.ga.num_generations}; {_fisher(one, two)}; mean attempts "
+            f"{' and '.join(attempts)}, median evaluations {' and '.join(spent)}"
         )
         text = f"More generations find more solutions where the search stops below {least:g}"
-        judged.append(claim(text, "section 6", told, judge_greater(why, one, two, settings.significance), why))
+        judged.append(
+            claim(text, "section 6", told, judge_greater(why, one, two, settings.significance), why)
+        )
     return judged
 
 
@@ -120,13 +134,16 @@ def _coding(results: Results, settings: ReportSettings) -> list[Claim]:
             told += f"; {evidence(row, word)}" if row else ""
             verdict = claims.judge_better(why, row, settings.significance)
             text = (
-                f"Real coding performs better than binary coding, judged by {what}: {real.label} against {binary.label}"
+                f"Real coding performs better than binary coding, judged by {what}: {real.label} "
+                f"against {binary.label}"
             )
             judged.append(claim(text, "section 2", told, verdict, why))
     return judged
 
 
-def _blindness(results: Results, settings: ReportSettings, refuted: dict[str, Refuted]) -> list[Claim]:
+def _blindness(
+    results: Results, settings: ReportSettings, refuted: dict[str, Refuted]
+) -> list[Claim]:
     """Judge that the scene is not trivial: an arm that ignores obstacles meets them."""
     why, judged = not_judged(results), []
     for group in groups_but_for(results, "collision", "blind"):
@@ -145,20 +162,30 @@ def _chance(results: Results, settings: ReportSettings) -> list[Claim]:
         for own in (c for c in results.with_data if not c.is_control and _wrapped_by(control, c)):
             one, two = (Proportion(c.solved, c.done) for c in (own, control))
             spent = (f"{c.spread('evaluations').median:.0f}" for c in (own, control))
-            told = f"runs with a solution: {_shares(one, two, settings)}; median evaluations {' against '.join(spent)}"
+            told = (
+                f"runs with a solution: {_shares(one, two, settings)}; median evaluations "
+                f"{' against '.join(spent)}"
+            )
             text = f"Evolution finds what chance does not: {own.label} against {control.label}"
             verdict = judge_greater(why, one, two, settings.significance)
             judged.append(claim(text, QUESTION, told, verdict, why))
     return judged
 
 
-def _positions(results: Results, settings: ReportSettings, refuted: dict[str, Refuted]) -> list[Claim]:
-    """Judge what swept chords, and more positions with chords, do to contacts between tested positions."""
+def _positions(
+    results: Results, settings: ReportSettings, refuted: dict[str, Refuted]
+) -> list[Claim]:
+    """Judge what swept chords, and more positions with chords.
+
+    Do to contacts between tested positions.
+    """
     why, pairs = not_judged(results), []
     counts = sorted({int(c.planner.collision.num_positions) for c in results.main})
     for group in groups_but_for(results, "collision", "swept"):
         if group[0].planner.collision.num_positions == counts[0]:
-            pairs.append(tuple(sorted(group, key=lambda c: str(c.planner.collision.swept), reverse=True)))
+            pairs.append(
+                tuple(sorted(group, key=lambda c: str(c.planner.collision.swept), reverse=True))
+            )
     for group in groups_but_for(results, "collision", "num_positions"):
         if group[0].planner.collision.swept == "chords":
             coarse, *finer = sorted(group, key=lambda c: int(c.planner.collision.num_positions))
@@ -176,7 +203,10 @@ def _positions(results: Results, settings: ReportSettings, refuted: dict[str, Re
         if fine.planner.collision.num_positions > counts[0]:
             told = f"refuted: {measures.text(two, settings.confidence)} (reproduced: none)"
             verdict = claims.judge_all(why, two.total - two.having, two.total, fine.solved)
-            text = f"M = {fine.planner.collision.num_positions} removes contacts altogether: {fine.label}"
+            text = (
+                f"M = {fine.planner.collision.num_positions} removes contacts altogether: "
+                f"{fine.label}"
+            )
             judged.append(claim(text, QUESTION, told, verdict, why))
     return judged
 
@@ -206,7 +236,10 @@ def _median(condition: ConditionResults, values: Callable[[ConditionResults], Fl
 
 
 def _shares(one: Proportion, two: Proportion, settings: ReportSettings) -> str:
-    return f"{' against '.join(measures.text(p, settings.confidence) for p in (one, two))}; {_fisher(one, two)}"
+    return (
+        f"{' against '.join(measures.text(p, settings.confidence) for p in (one, two))}; "
+        f"{_fisher(one, two)}"
+    )
 
 
 def _fisher(one: Proportion, two: Proportion) -> str:

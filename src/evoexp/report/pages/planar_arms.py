@@ -13,13 +13,14 @@ from evoexp.report.results import ConditionResults, Results
 from evoexp.report.settings import ReportSettings
 
 SNAPSHOTS = (
-    "Motion of the best replicate (lowest cost), stage by stage; links that cross on paper in one panel do so at "
-    "different instants unless both are drawn in the same shade."
+    "Motion of the best replicate (lowest cost), stage by stage; links that cross on paper in "
+    "one panel do so at different instants unless both are drawn in the same shade."
 )
 PATHS = "Paths of all replicates in the planes of the joint angles; angles are not wrapped."
 DISTANCES = (
-    "Least distance between two arms against the instant: a) of the centres of circles or spheres, b) of the bodies "
-    "themselves; at via-points (dots) and sampled between them (line); diamonds and crosses: the exact verdict."
+    "Least distance between two arms against the instant: a) of the centres of circles or "
+    "spheres, b) of the bodies themselves; at via-points (dots) and sampled between them (line); "
+    "diamonds and crosses: the exact verdict."
 )
 
 

@@ -1,4 +1,7 @@
-"""What the pages of sweeps and methods say alike of a claim: whether to judge it, by what numbers, and how it reads."""
+"""What the pages of sweeps and methods say alike of a claim.
+
+Whether to judge it, by what numbers, and how it reads.
+"""
 
 from evoexp.report import markdown
 from evoexp.report.claims import Claim, Comparison
@@ -14,7 +17,11 @@ def not_judged(results: Results) -> str:
     planned = planned_replicates(results.experiment)
     if any(c.planned < c.condition.num_replicates(planned) for c in results.conditions):
         return "fewer replicates than planned"
-    own = {row.condition_id for row in shipped() if (row.experiment, row.budget) == (results.experiment, "paper")}
+    own = {
+        row.condition_id
+        for row in shipped()
+        if (row.experiment, row.budget) == (results.experiment, "paper")
+    }
     seed = option(config_directory() / "config.yaml")["seed"].value  # another one is as good as any
     if any(c.condition._replace(seed=seed).id not in own for c in results.conditions):
         return "settings overridden"
@@ -29,12 +36,13 @@ def claim(text: str, source: str, evidence: str, verdict: str, reason: str) -> C
 def evidence(comparison: Comparison, better: str) -> str:
     """Return a comparison in words: "lower in 80 % of pairs of runs (…)".
 
-    Both tests are told, by which the verdict is and the other one: they differ where the runs that are better are more,
-    but those that are worse are worse by more.
+    Both tests are told, by which the verdict is and the other one: they differ where the runs that
+    are better are more, but those that are worse are worse by more.
     """
     low, high = comparison.better.interval
     return (
-        f"{better} in {100 * comparison.better.a12:.0f} % of pairs of runs (A12 {comparison.better.a12:.3f} "
-        f"[{low:.3f}, {high:.3f}]), p = {markdown.p_value(comparison.p_adjusted)} by seeds (signed rank), "
+        f"{better} in {100 * comparison.better.a12:.0f} % of pairs of runs (A12 "
+        f"{comparison.better.a12:.3f} [{low:.3f}, {high:.3f}]), p = "
+        f"{markdown.p_value(comparison.p_adjusted)} by seeds (signed rank), "
         f"{markdown.p_value(comparison.unpaired_adjusted)} unpaired (rank sum)"
     )

@@ -4,9 +4,9 @@ import functools
 import os
 import re
 
-from evoexp import expansions
 from evoexp.condition import Condition
-from evoexp.experiment import Experiment, options
+from evoexp.configuration import expansions
+from evoexp.configuration.experiment import Experiment, options
 
 
 @functools.cache

@@ -7,11 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from evoexp import attachments, compose
+from evoexp import attachments
 from evoexp.batch.jobs import Job, run_jobs
 from evoexp.batch.replicate import run_replicate
-from evoexp.batch.reproduce import reproduce_log
+from evoexp.batch.reproduction import reproduce_log
 from evoexp.condition import Condition
+from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory

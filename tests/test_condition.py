@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 
 from evoexp import condition
-from evoexp.condition import REGISTRY, Condition, component_class, revisions
+from evoexp.condition import Condition, revisions
 from evoexp.errors import EvoexpError, RevisionMismatch, SettingError, UnknownSetting
+from evoexp.registry import REGISTRY, component_class
 from evoexp.validation import Component
 from shipped_conditions import different_conditions, kinds_of_conditions, shipped_conditions
 
@@ -277,7 +278,7 @@ def test_an_installed_plug_in_registers_components(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, config: dict[str, Any]
 ) -> None:
     (tmp_path / "plug_in_of_a_test.py").write_text(
-        "from evoexp.evolution.settings import GeneticSettings\n"
+        "from evoexp.evolution.genetic_settings import GeneticSettings\n"
         "class Mine(GeneticSettings):\n    component = 'mine'\n"
         "class Impostor(GeneticSettings):\n    component = 'genetic'\n"
     )

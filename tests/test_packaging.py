@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from numba.core.caching import UserProvidedCacheLocator
 
-from evoexp import numerics
+from evoexp.numeric import elementary
 
 ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "src" / "evoexp"
@@ -90,7 +90,7 @@ def cache(installed: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     The sources are the same; numba files by path what it compiles. What is not there yet is
     compiled after all.
     """
-    compiled = Path(numerics.numba.config.CACHE_DIR)
+    compiled = Path(elementary.numba.config.CACHE_DIR)
     directory = tmp_path_factory.mktemp("cache")
     place = UserProvidedCacheLocator.get_suitable_cache_subpath
     for file in SOURCE.rglob("__init__.py"):

@@ -10,7 +10,7 @@ import pytest
 
 from evoexp import shipped
 from evoexp.batch.replicate import run_replicate
-from evoexp.batch.reproduce import fingerprint, same_fingerprint
+from evoexp.batch.reproduction import fingerprint, same_fingerprint
 from evoexp.cli import main
 from evoexp.condition import Condition
 from evoexp.shipped import Shipped

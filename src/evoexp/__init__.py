@@ -3,15 +3,16 @@
 import importlib
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
-    from evoexp.frames import Frames, load
+from evoexp.version import __version__
 
-__version__ = "0.1.0"
+if TYPE_CHECKING:
+    from evoexp.load import Frames, load
+
 __all__ = ["Frames", "__version__", "load"]
 
 
 def __getattr__(name: str) -> Any:
-    """Load what needs pandas only when it is asked for."""
+    """Import the module `load`, which needs pandas, only when it is asked for."""
     if name in ("load", "Frames"):
-        return getattr(importlib.import_module("evoexp.frames"), name)
+        return getattr(importlib.import_module("evoexp.load"), name)
     raise AttributeError(f"module 'evoexp' has no attribute '{name}'")

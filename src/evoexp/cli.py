@@ -11,8 +11,8 @@ import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
-from evoexp import __version__
 from evoexp.errors import EvoexpError, nearest
+from evoexp.version import __version__
 
 COMMANDS = {
     "run": "run an experiment: its missing replicates, then its report",

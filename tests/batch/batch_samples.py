@@ -4,7 +4,7 @@ from pathlib import Path
 
 from evoexp.batch.jobs import Outcome
 from evoexp.batch.runner import Batch
-from evoexp.batch.settings import RunnerSettings
+from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.condition import Condition
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory

@@ -7,8 +7,9 @@ import pytest
 from batch_samples import WORDS, digests, run
 from joblib.externals.loky import get_reusable_executor
 
-from evoexp import compose, condition
+from evoexp import condition
 from evoexp.condition import Condition
+from evoexp.configuration import compose
 
 HERE = Path(__file__).parent
 

@@ -17,7 +17,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from evoexp.planners.via_point_ga import Problem, ViaPointGa
+from evoexp.planners.via_point_ga.planner import Problem, ViaPointGa
 from evoexp.records import Generation
 
 HANG_S = 3600.0  # [s] until somebody ends the process

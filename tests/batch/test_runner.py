@@ -15,7 +15,6 @@ from batch_samples import WORDS, digests, new_batch, run
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoexp import compose
 from evoexp.batch import jobs, runner
 from evoexp.batch.jobs import Job, Outcome, run_jobs
 from evoexp.batch.replicate import run_replicate
@@ -23,6 +22,7 @@ from evoexp.batch.runner import MAX_BUNDLE, TASK_S, _Bundles, fan_out
 from evoexp.batch.workers import in_workers, loading
 from evoexp.cli import main
 from evoexp.condition import Condition
+from evoexp.configuration import compose
 from evoexp.errors import Busy, CorruptLog, SettingError
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
@@ -131,8 +131,8 @@ def test_kernels_are_compiled_once_for_conditions_that_differ_in_numbers(
     noted: set[str] = set()
     asked: list[bytes] = []
     from_json = Condition.from_json
-    monkeypatch.setattr(runner, "is_compiled", lambda kind: kind in noted)
-    monkeypatch.setattr(runner, "note_compiled", noted.add)
+    monkeypatch.setattr(runner, "is_compiled", lambda kind, modules: kind in noted)
+    monkeypatch.setattr(runner, "note_compiled", lambda kind, modules: noted.add(kind))
     monkeypatch.setattr(
         Condition, "from_json", lambda text: (asked.append(text), from_json(text))[1]
     )

@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from evoexp.collision.certifier import certify
+from evoexp.collision.certifier.verdict import certify
 from evoexp.collision.scene import Scene, geometry_scene, scene
 from evoexp.paths.motion import Motion
 from evoexp.robots.arms import Arms

@@ -14,8 +14,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from evoexp import compose
 from evoexp.condition import Condition
+from evoexp.configuration import compose
 from references import rana_numpy
 
 INDIVIDUALS, INSTANTS = 100, 20

@@ -5,9 +5,9 @@ The truth beside it.
 
 from typing import Any
 
-from evoexp import compose
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
+from evoexp.configuration import compose
 
 
 def condition(*words: str, label: str = "(a)") -> Condition:

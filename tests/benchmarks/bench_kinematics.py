@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from evoexp import compose
+from evoexp.configuration import compose
 from evoexp.robots.kinematics import forward_kinematics, kinematic_table
 
 SIZE = 2000

@@ -14,8 +14,13 @@ import coal
 import numpy as np
 import pytest
 
-from evoexp.collision.link_crossings import Arm, closed_form, count_crossings, update_crossings
-from evoexp.collision.link_envelopes import EnvelopedArm, count_collisions
+from evoexp.collision.models.link_crossings import (
+    Arm,
+    closed_form,
+    count_crossings,
+    update_crossings,
+)
+from evoexp.collision.models.link_envelopes import EnvelopedArm, count_collisions
 from references import link_crossings_numpy as plain
 
 INDIVIDUALS, CONFIGURATIONS = 100, 4

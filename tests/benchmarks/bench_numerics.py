@@ -11,7 +11,18 @@ import numba
 import numpy as np
 import pytest
 
-from evoexp.numerics import acos, asin, atan2, cos, exp, log, pow_int, sin, sincos, standard_normal
+from evoexp.numeric.elementary import (
+    acos,
+    asin,
+    atan2,
+    cos,
+    exp,
+    log,
+    pow_int,
+    sin,
+    sincos,
+    standard_normal,
+)
 
 SIZE = 4096
 rng = np.random.default_rng(0)

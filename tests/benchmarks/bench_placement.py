@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from evoexp import compose
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
+from evoexp.configuration import compose
 
 
 def condition(*words: str) -> Condition:

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from evoexp import compose
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
-from evoexp.planners.posture_stages import begin, scene_of
+from evoexp.configuration import compose
+from evoexp.planners.posture_es.phases import begin, scene_of
 from references import posture_es_python
 
 SIZE = 100

@@ -9,10 +9,10 @@ from typing import Any
 import numba
 import numpy as np
 
-from evoexp import compose
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
-from evoexp.planners.redundant_ga import Problem
+from evoexp.configuration import compose
+from evoexp.planners.redundant_ga.planner import Problem
 from evoexp.records import FloatArray
 
 NUM_PATHS = 800

@@ -14,8 +14,8 @@ import pandas as pd
 import pytest
 from mcap.reader import make_reader
 
-from evoexp import compose
 from evoexp.batch.replicate import run_replicate
+from evoexp.configuration import compose
 from evoexp.store.files import write_file, write_files
 from evoexp.store.log_reader import generation_columns, read_log, read_summary
 

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from evoexp import compose
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
+from evoexp.configuration import compose
 from evoexp.paths.redistribution import redistribute
 from evoexp.paths.relaxation import relax
 from evoexp.paths.workspace import prepare_redistribution

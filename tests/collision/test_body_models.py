@@ -3,7 +3,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from evoexp.collision.body_models import BodyCapsules, BodyModel, SphereSets
+from evoexp.collision.models.body_models import BodyCapsules, BodyModel, SphereSets
 from evoexp.collision.scene import obstacle_shapes
 from evoexp.errors import SettingError
 from evoexp.robots.assembly import Assembly

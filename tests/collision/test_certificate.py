@@ -1,4 +1,4 @@
-from evoexp.collision.certificate import Certificate, combined
+from evoexp.collision.certifier.certificate import Certificate, combined
 
 FREE = Certificate(True, True, 0.3, 2.0, "a – b", None, "", 10)
 

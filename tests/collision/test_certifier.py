@@ -11,8 +11,8 @@ import pinocchio as pin
 import pytest
 
 from collision.certifier_scenes import mesh
-from evoexp.collision.certifier import Limits, certify
-from evoexp.collision.certifier_coal import CoalDistance
+from evoexp.collision.certifier.coal_distances import CoalDistance
+from evoexp.collision.certifier.verdict import Limits, certify
 from evoexp.collision.scene import Scene, geometry_scene, scene
 from evoexp.paths.motion import Motion, cubic_motion
 from evoexp.robots.arms import Arms

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline
 
 from collision.certifier_scenes import random_motion, random_scene
-from evoexp.collision.certifier import Limits, _Judgement
-from evoexp.collision.certifier_sweep import (
+from evoexp.collision.certifier.convex_distance import CONVERGED
+from evoexp.collision.certifier.sweep import (
     Task,
     least_separation,
     move_to,
@@ -18,7 +18,7 @@ from evoexp.collision.certifier_sweep import (
     polish,
     work_space,
 )
-from evoexp.collision.convex_distance import CONVERGED
+from evoexp.collision.certifier.verdict import Limits, _Judgement
 from evoexp.collision.motion_bounds import approach_bounds
 from evoexp.collision.scene import geometry_scene
 from evoexp.paths.motion import Motion, cubic_motion, spline_motion

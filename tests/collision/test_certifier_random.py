@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from collision.certifier_scenes import SAMPLES, brute_force, random_motion, random_scene
-from evoexp.collision.certifier import certify
+from evoexp.collision.certifier.verdict import certify
 
 SCENES, BATCH = 200, 20
 

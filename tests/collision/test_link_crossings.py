@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evoexp.collision.link_crossings import (
+from evoexp.collision.models.link_crossings import (
     Arm,
     Crossings,
     closed_form,
@@ -18,7 +18,7 @@ from evoexp.collision.link_crossings import (
     path_configurations,
     update_crossings,
 )
-from evoexp.collision.segment_predicates import orientation, touching
+from evoexp.collision.models.segment_predicates import orientation, touching
 from references import link_crossings_numpy as plain
 
 SCENE_A = Arm((0.0, 0.0), (0.25, 0.25)), Arm((0.3, 0.0), (0.25, 0.25))

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from evoexp.collision.touching_spheres import SphereCollision, TouchingSpheres
+from evoexp.collision.models.touching_spheres import SphereCollision, TouchingSpheres
 from evoexp.robots.arms import Arms
 from evoexp.robots.assembly import Robot
 from evoexp.robots.planar_chain import PlanarChain

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from command_samples import SMALL, Evoexp
 
-from evoexp import compose, shipped
-from evoexp.collision.certificate import Certificate
+from evoexp import shipped
+from evoexp.collision.certifier.certificate import Certificate
 from evoexp.commands.evaluate import flatten
+from evoexp.configuration import compose
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.tables import read_summaries

@@ -10,9 +10,10 @@ from pathlib import Path
 import pytest
 from command_samples import SMALL, Evoexp
 
-from evoexp import compose, shipped
+from evoexp import shipped
 from evoexp.batch.replicate import run_replicate
-from evoexp.experiment import description, options
+from evoexp.configuration import compose
+from evoexp.configuration.experiment import description, options
 from evoexp.shipped import Shipped
 from evoexp.store.run_directory import RunDirectory, find_runs
 from evoexp.store.tables import read_summaries

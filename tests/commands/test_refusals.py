@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 from command_samples import SERIAL, Evoexp
 
-from evoexp import compose
 from evoexp.condition import Condition
-from evoexp.evolution.settings import GeneticSettings
-from evoexp.experiment import options
+from evoexp.configuration import compose
+from evoexp.configuration.experiment import options
+from evoexp.evolution.genetic_settings import GeneticSettings
 from evoexp.store.log import Log
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory, find_runs
@@ -105,7 +105,7 @@ OPTIONS = f"(options: {EXPERIMENTS})"
         # what a configuration may not name
         ("ga._target_=os.system", "ga._target_: must be a registered component, was 'os.system'"),
         (
-            "planner._target_=evoexp.planners.via_point_ga.ViaPointGa",
+            "planner._target_=evoexp.planners.via_point_ga.planner.ViaPointGa",
             "planner._target_: must be a registered component",
         ),
         (

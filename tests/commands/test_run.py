@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from command_samples import SERIAL, SMALL, Evoexp
 
-from evoexp import compose
+from evoexp.configuration import compose
 from evoexp.store.run_directory import RunDirectory, find_runs
 
 PLANAR = ("experiment=rana_planar", *SERIAL)

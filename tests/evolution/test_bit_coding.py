@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoexp.draws import Draws
 from evoexp.evolution.bit_coding import cross_strings, decode_strings, flip_strings
+from evoexp.numeric.random_stream import Draws
 
 BITS = st.integers(1, 52)
 GENES = 2

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evoexp.errors import SettingError
-from evoexp.evolution.coevolution_settings import CoevolutionSettings
+from evoexp.planners.coevolution.settings import CoevolutionSettings
 from evoexp.validation import build
 
 METHOD_V: dict[str, Any] = {

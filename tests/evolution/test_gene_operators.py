@@ -25,9 +25,9 @@ from evoexp.evolution.gene_mutation import (
     non_uniform_spread,
     num_mutation_uniforms,
 )
-from evoexp.evolution.operator_settings import BinaryGenetic, RealGenetic
 from evoexp.evolution.ranking import choose_by_tournament, rank_weights
 from evoexp.evolution.selection import spin_roulette
+from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic
 from evoexp.records import FloatArray
 
 LIMITS = np.array([[-1.0, 2.0], [0.0, 4.0], [-5.0, -3.0]])

@@ -6,10 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evoexp.errors import SettingError
+from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.evolution.crossover import site_crossover
+from evoexp.evolution.genetic_settings import GeneticSettings
 from evoexp.evolution.selection import elites, roulette
-from evoexp.evolution.settings import GeneticSettings
-from evoexp.evolution.statistics import cost_statistics
 
 ARMS = np.array([[0, 2], [2, 5]])
 

@@ -3,7 +3,7 @@ from typing import Any
 import pytest
 
 from evoexp.errors import SettingError
-from evoexp.evolution.strategy_settings import StrategySettings
+from evoexp.planners.posture_es.settings import StrategySettings
 
 SETTINGS: dict[str, Any] = {
     "num_parents": 5,

@@ -4,7 +4,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from evoexp.errors import SettingError
-from evoexp.numerics import DEGREE
+from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.posture_cost import (
     ANGLE,
     AXIAL,

@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evoexp.draws import used_up
+from evoexp.numeric.random_stream import used_up
 from evoexp.paths.grid_walks import erase_loops, walk, walk_each
 from paths.walked_worlds import POTENTIALS, SEEDS, SHAPES, World, as_path, nodes_of, without_loops
 

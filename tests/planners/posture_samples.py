@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from evoexp import compose
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
+from evoexp.configuration import compose
 from evoexp.records import FloatArray
 from evoexp.store.log_reader import LogContents, read_log
 

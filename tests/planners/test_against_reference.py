@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from evoexp import compose
 from evoexp.condition import Condition
+from evoexp.configuration import compose
 from references import rana_numpy
 
 ROUNDING = 1e-9  # [deg] measured: 7e-13

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from evoexp import compose
-from evoexp.collision.certificate import certificate
+from evoexp.collision.certifier.certificate import certificate
+from evoexp.configuration import compose
 from evoexp.errors import SettingError
-from evoexp.planners.coevolution import Coevolution, Evaluated, Problem
-from evoexp.report.pages.curkovic_measures import lower_bound
+from evoexp.papers.curkovic.measures import lower_bound
+from evoexp.planners.coevolution.planner import Coevolution, Evaluated, Problem
 
 SMALL = ("ga.population_size=12", "ga.num_generations=15", "ga.hall_depth=0.25")
 NO_HALL = ("ga=curkovic_1", "ga.population_size=12", "ga.num_generations=15")

@@ -7,12 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evoexp.collision.certificate import certificate
-from evoexp.collision.potential_fields import PotentialFields
+from evoexp.collision.certifier.certificate import certificate
+from evoexp.collision.models.potential_fields import PotentialFields
 from evoexp.errors import SettingError
 from evoexp.objectives.path_cost import PathCost
-from evoexp.planners import grid_kernels, grid_path_ga
-from evoexp.planners.random_search import RandomSearch
+from evoexp.planners.baselines.random_search import RandomSearch
+from evoexp.planners.grid_path_ga import kernels
+from evoexp.planners.grid_path_ga import planner as grid_planner
 from planners.grid_samples import FIELDS, faults, planner, robot, scenario, solvable
 
 SEEDS = st.integers(0, 2**32)
@@ -66,12 +67,12 @@ def test_exchange_without_loops_is_exchange_and_then_erasing_loops(
     )
     child = np.zeros(problem.fields.grid.num_nodes + 1, dtype=np.int32)
     for one, two in zip(paths[:-1], paths[1:], strict=True):
-        count = grid_kernels.coincident_sites(one, two, place, sites)
+        count = kernels.coincident_sites(one, two, place, sites)
         common = set(nodes_of(one)[1:-1]) & set(nodes_of(two)[1:-1])
         assert count == len(common)
         for i, j in sites[:, :count].T.tolist():
             assert one[i] == two[j]
-            grid_kernels.exchange_without_loops(one, two, i, j, sites[:, :count], child)
+            kernels.exchange_without_loops(one, two, i, j, sites[:, :count], child)
             assert nodes_of(child) == without_loops(nodes_of(one)[:i] + nodes_of(two)[j:])
 
 
@@ -93,7 +94,7 @@ def test_paths_without_a_common_node_are_crossed_where_they_are_near() -> None:
     scratch = (arrays[0], arrays[1], np.zeros((2, size + 1), dtype=np.int32), *arrays[2:])
     draws = rng(1).random(64), np.zeros(1, dtype=np.int64)
     for reach, crossed in ((0, False), (2, True)):
-        done = grid_kernels.cross(
+        done = kernels.cross(
             draws, problem.world, (table[0], table[1]), (True, reach), (table[2], table[3]), scratch
         )
         assert done is crossed
@@ -154,8 +155,8 @@ def test_generations_do_not_depend_on_how_numbers_and_they_are_made_in_blocks(
         ]
 
     expected = run()
-    monkeypatch.setattr(grid_path_ga, "BLOCK", block)
-    monkeypatch.setattr(grid_path_ga, "STRETCH", stretch)
+    monkeypatch.setattr(grid_planner, "BLOCK", block)
+    monkeypatch.setattr(grid_planner, "STRETCH", stretch)
     assert run() == expected
 
 

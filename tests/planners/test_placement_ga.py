@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from evoexp import compose
 from evoexp.batch.replicate import run_replicate
-from evoexp.collision.certificate import certificate
+from evoexp.collision.certifier.certificate import certificate
+from evoexp.configuration import compose
 from evoexp.errors import EvoexpError
-from evoexp.planners import placement_ga
-from evoexp.planners.placement_ga import Problem
+from evoexp.planners.placement_ga import planner as placement_planner
+from evoexp.planners.placement_ga.planner import Problem
 
 BASE = ("experiment=chen_placement",)
 
@@ -56,8 +56,8 @@ def test_generations_do_not_depend_on_how_numbers_and_they_are_made_in_blocks(
         ]
 
     expected = run()
-    monkeypatch.setattr(placement_ga, "BLOCK", block)
-    monkeypatch.setattr(placement_ga, "STRETCH", stretch)
+    monkeypatch.setattr(placement_planner, "BLOCK", block)
+    monkeypatch.setattr(placement_planner, "STRETCH", stretch)
     assert run() == expected
 
 

@@ -7,12 +7,12 @@ import pinocchio as pin
 import pytest
 from posture_samples import condition, log, postures, prepared, random_postures
 
-from evoexp.collision.certificate import certificate, combined, judged_part
+from evoexp.collision.certifier.certificate import certificate, combined, judged_part
 from evoexp.commands import evaluate
-from evoexp.numerics import DEGREE
+from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.posture_cost import UPRIGHT
-from evoexp.planners.posture_es import dense
-from evoexp.planners.posture_stages import judge, scene_of, spans
+from evoexp.planners.posture_es.phases import judge, scene_of, spans
+from evoexp.planners.posture_es.planner import dense
 from references import posture_es_python
 
 FREE = ("corsepius_ball", "collision=corsepius_capsules")

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from posture_samples import condition, prepared, random_postures
 
-from evoexp import compose
+from evoexp.configuration import compose
 from evoexp.errors import EvoexpError
-from evoexp.planners.posture_problem import reach
+from evoexp.planners.posture_es.problem import reach
 from evoexp.robots.poses import frame_poses
 
 BALL, PICK = "experiment=corsepius_ball", "experiment=corsepius_pick_and_place"

@@ -8,10 +8,10 @@ import math
 import numpy as np
 import pytest
 
-from evoexp import compose
-from evoexp.collision.certificate import certificate
+from evoexp.collision.certifier.certificate import certificate
+from evoexp.configuration import compose
 from evoexp.errors import SettingError
-from evoexp.planners.redundant_ga import Problem, RedundantGa
+from evoexp.planners.redundant_ga.planner import Problem, RedundantGa
 from evoexp.records import FloatArray
 
 SMALL = ("ga.population_size=60", "ga.num_generations=8", "planner.num_attempts=3")

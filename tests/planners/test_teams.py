@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from evoexp.planners.coevolution_kernels import drop_copies
-from evoexp.planners.teams import count_partnered
+from evoexp.planners.coevolution.kernels import drop_copies
+from evoexp.planners.coevolution.teams import count_partnered
 
 
 @pytest.mark.parametrize("robots", [2, 3])

@@ -6,10 +6,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from evoexp import compose
 from evoexp.batch.replicate import run_replicate
-from evoexp.collision.certificate import certificate
+from evoexp.collision.certifier.certificate import certificate
 from evoexp.condition import Condition
+from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.robots.floor_manipulator import FloorManipulator
 from evoexp.store.log_reader import read_log

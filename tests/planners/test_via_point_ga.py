@@ -6,10 +6,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from evoexp import compose
 from evoexp.condition import Condition
+from evoexp.configuration import compose
 from evoexp.errors import SettingError
-from evoexp.planners.via_point_ga import Problem, ViaPointGa
+from evoexp.planners.via_point_ga.planner import Problem, ViaPointGa
 from evoexp.robots.arms import Arms
 from evoexp.robots.serial_chain import SerialChain, SerialJoint
 from evoexp.scenarios.arm_motion import ArmMotion

@@ -4,8 +4,8 @@ import functools
 
 import numpy as np
 
-from evoexp import expansions
 from evoexp.condition import Condition
+from evoexp.configuration import expansions
 from evoexp.playback.recording import Heading, Recording, record
 from evoexp.playback.shapes import Outline
 

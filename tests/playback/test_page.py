@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from playback_samples import SAMPLES, recording, refuted
 
-from evoexp.playback.page import page
+from evoexp.playback.player_page import page
 from evoexp.playback.recording import Heading
 
 LARGEST = 2_000_000  # [B]

@@ -8,7 +8,7 @@ import pytest
 from chromium import CHROMIUM, PATIENCE, Browser
 from playback_samples import SAMPLES, recording, refuted
 
-from evoexp.playback.page import page
+from evoexp.playback.player_page import page
 
 pytestmark = [
     pytest.mark.browser,

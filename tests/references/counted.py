@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from evoexp.references.truth import Reference, Truth
+from evoexp.references.reference import Reference, Truth
 
 
 class Counted(Reference):

@@ -7,7 +7,7 @@ import functools
 from typing import Any
 
 from evoexp.condition import Condition
-from evoexp.references.truth import Truth
+from evoexp.references.reference import Truth
 from shipped_conditions import expanded
 
 LABELS = {

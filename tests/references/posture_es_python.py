@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from evoexp.planners.posture_kernels import COST
-from evoexp.planners.posture_stages import Problem, begin, judge
+from evoexp.planners.posture_es.kernels import COST
+from evoexp.planners.posture_es.phases import Problem, begin, judge
 
 
 def path(

@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from evoexp import compose, condition
+from evoexp import condition
 from evoexp.batch.replicate import run_replicate
-from evoexp.batch.reproduce import difference, farthest, fingerprint, same_fingerprint
+from evoexp.batch.reproduction import difference, farthest, fingerprint, same_fingerprint
 from evoexp.cli import main
+from evoexp.configuration import compose
 from evoexp.errors import EvoexpError, SettingError
 from evoexp.report.results import gather
 from evoexp.store.log_reader import array_names, read_array, read_log
@@ -172,7 +173,7 @@ def test_arrays_that_are_missing_differ() -> None:
 
 def test_references_run_first(tmp_path: Path) -> None:
     from evoexp.batch.runner import Batch
-    from evoexp.batch.settings import RunnerSettings
+    from evoexp.batch.runner_settings import RunnerSettings
 
     planner, truth = (compose.expand(w)[0].conditions[0].condition for w in (WORDS[:-1], WORDS))
     batch = Batch([(planner, 2, {}), (truth, 1, {})], RunnerSettings(num_workers=1), tmp_path)

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 from report_samples import REPORT, expand, store
 
+from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results, gather
-from evoexp.report.settings import ReportSettings
 
 
 @pytest.fixture(scope="session")

@@ -11,12 +11,12 @@ import pandas as pd
 import pytest
 from report_samples import REPORT, expand, store
 
-from evoexp import compose
+from evoexp.configuration import compose
 from evoexp.errors import NothingStored, UnknownOption
+from evoexp.papers.rana import page as rana_page
 from evoexp.report import build
-from evoexp.report.pages import rana
+from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results
-from evoexp.report.settings import ReportSettings
 from evoexp.store.run_directory import RunDirectory
 
 SCRIPT = """
@@ -300,20 +300,22 @@ def test_claims_are_judged_only_on_the_papers_own_settings(results: Results) -> 
     paper = compose.expand(["experiment=rana_planar"])[0]
     condition = results.conditions[0]._replace(condition=paper.conditions[0].condition, planned=20)
     judged = results._replace(budget="paper")
-    assert rana.not_judged(judged, condition) == ""
-    assert rana.not_judged(results, condition) == "budget smoke"
-    assert rana.not_judged(judged, condition._replace(planned=3)) == "3 of 20 replicates planned"
-    assert rana.not_judged(judged, results.conditions[0]._replace(planned=20)).startswith(
+    assert rana_page.not_judged(judged, condition) == ""
+    assert rana_page.not_judged(results, condition) == "budget smoke"
+    assert (
+        rana_page.not_judged(judged, condition._replace(planned=3)) == "3 of 20 replicates planned"
+    )
+    assert rana_page.not_judged(judged, results.conditions[0]._replace(planned=20)).startswith(
         "overridden: ga."
     )
 
 
 def test_redistribution_is_applied_to_solved_strings_only(results: Results) -> None:
     search = results.conditions[1]
-    count = rana.colliding_after(search, relaxed=False)
+    count = rana_page.colliding_after(search, relaxed=False)
     assert 0 <= count <= search.solved
     none = search.summaries.assign(solved=False)
-    assert rana.colliding_after(search._replace(summaries=none), relaxed=True) == 0
+    assert rana_page.colliding_after(search._replace(summaries=none), relaxed=True) == 0
 
 
 def test_drawing_leaves_matplotlib_as_it_was(page: Path) -> None:

@@ -4,7 +4,7 @@ import pytest
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from evoexp.report import motions, style
+from evoexp.report import motion_geometry, style
 from evoexp.report.figures import convergence, planar_models, planar_motion
 from evoexp.report.results import Results
 
@@ -116,9 +116,11 @@ def test_circles_show_the_least_distance(results: Results) -> None:
     table = planar_models.circles_table(condition)
     assert (table["element"] == "circle").sum() == 18
     row = table[table["element"] == "centres"].iloc[0]
-    q = motions.configurations(condition.prepared, condition.solutions[condition.best_replicate])
+    q = motion_geometry.configurations(
+        condition.prepared, condition.solutions[condition.best_replicate]
+    )
     assert row["distance"] == pytest.approx(
-        motions.centre_distances(condition.prepared.problem, q).min(), abs=1e-9
+        motion_geometry.centre_distances(condition.prepared.problem, q).min(), abs=1e-9
     )
     assert np.hypot(row["x_end"] - row["x"], row["y_end"] - row["y"]) == pytest.approx(
         row["distance"]

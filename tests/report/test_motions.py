@@ -4,7 +4,7 @@ from report_samples import expand
 
 from evoexp.condition import Prepared
 from evoexp.records import FloatArray
-from evoexp.report import motions
+from evoexp.report import motion_geometry
 from evoexp.report.results import Results
 from evoexp.scenarios.obstacles import (
     BoxObstacle,
@@ -54,7 +54,7 @@ def segment_distance(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray)
 
 def test_joints_are_where_trigonometry_puts_them(prepared: Prepared, q: FloatArray) -> None:
     arms = (by_hand(q[:2], (0.0, 0.0)), by_hand(q[2:], (0.0, 8.0)))
-    found = list(motions.joint_positions(prepared.problem.assembly, q))
+    found = list(motion_geometry.joint_positions(prepared.problem.assembly, q))
     assert [(arm, link) for arm, link, _, _ in found] == [(0, 0), (0, 1), (1, 0), (1, 1)]
     for arm, link, start, end in found:
         np.testing.assert_allclose(start[:, :2].T, arms[arm][link], atol=1e-12)
@@ -71,7 +71,7 @@ def test_link_distances_are_those_of_segments(prepared: Prepared, q: FloatArray)
     ]
     expected = np.min(pairs, axis=0)
     assert (expected == 0.0).any()
-    links = motions.LinkDistance(prepared.problem.assembly)
+    links = motion_geometry.LinkDistance(prepared.problem.assembly)
     np.testing.assert_allclose(links(q), expected, atol=1e-9)
     nearest = links.nearest(q[:, 0])
     assert nearest.distance == pytest.approx(expected[0], abs=1e-9)
@@ -84,16 +84,16 @@ def test_link_distances_are_those_of_segments(prepared: Prepared, q: FloatArray)
 
 
 def test_centre_distances_are_those_of_the_centres(prepared: Prepared, q: FloatArray) -> None:
-    found = motions.centre_distances(prepared.problem, q)
+    found = motion_geometry.centre_distances(prepared.problem, q)
     for k in range(20):
-        one, other = motions.sphere_centres(prepared.problem.collision, q[:, k])
+        one, other = motion_geometry.sphere_centres(prepared.problem.collision, q[:, k])
         assert one.shape == other.shape == (9, 3)
         least = np.linalg.norm(one[:, None] - other, axis=2).min()
         assert found[k] == pytest.approx(least, abs=1e-9)
 
 
 def test_a_dense_motion_passes_its_via_points(q: FloatArray) -> None:
-    times, between = motions.dense(q[:, :6], 8)
+    times, between = motion_geometry.dense(q[:, :6], 8)
     assert times.shape == (41,)
     assert between.shape == (4, 41)
     np.testing.assert_array_equal(between[:, ::8], q[:, :6])
@@ -102,8 +102,8 @@ def test_a_dense_motion_passes_its_via_points(q: FloatArray) -> None:
 
 
 def test_the_straight_line_collides(prepared: Prepared) -> None:
-    line = motions.straight_line(prepared)
-    q = motions.configurations(prepared, line)
+    line = motion_geometry.straight_line(prepared)
+    q = motion_geometry.configurations(prepared, line)
     np.testing.assert_allclose(q[:, 10], 0.5 * (prepared.problem.start + prepared.problem.goal))
     terms = prepared.planner.evaluate(prepared.problem, line)
     assert terms["collisions"] > 0
@@ -113,8 +113,8 @@ def test_the_straight_line_collides(prepared: Prepared) -> None:
 def test_distances_agree_with_the_recorded_terms(results: Results) -> None:
     condition = results.conditions[0]
     for replicate, solution in condition.solutions.items():
-        q = motions.configurations(condition.prepared, solution)
-        at = motions.centre_distances(condition.prepared.problem, q).min()
+        q = motion_geometry.configurations(condition.prepared, solution)
+        at = motion_geometry.centre_distances(condition.prepared.problem, q).min()
         term = condition.summaries.loc[replicate, "term_arm_distance_at_via_points"]
         assert at == pytest.approx(float(term), abs=1e-9)
 
@@ -135,7 +135,7 @@ def test_outlines_lie_on_the_surfaces_of_obstacles() -> None:
             EllipseObstacle(shape="ellipse", center=(1.0, 2.0), semi_axes=(3.0, 0.5), angle=60.0),
         )
     )
-    ball, box, capsule, tin, lying, wall, egg = motions.obstacle_outlines(table, 8.0)
+    ball, box, capsule, tin, lying, wall, egg = motion_geometry.obstacle_outlines(table, 8.0)
     np.testing.assert_allclose(np.linalg.norm(ball - [5.2, 4.0], axis=1), 0.4)
     np.testing.assert_allclose(np.linalg.norm(box - [-5.5, 4.0], axis=1), 0.4 * np.sqrt(2.0))
     first = np.degrees(np.arctan2(*(box[1] - box[0])[::-1]))

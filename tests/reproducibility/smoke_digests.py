@@ -71,7 +71,7 @@ def run_in_workers(jobs: list[tuple[bytes, int]], num_workers: int) -> dict[str,
 
 
 def compose(overrides: list[str]) -> list[str]:
-    from evoexp.compose import expand
+    from evoexp.configuration.compose import expand
 
     found = [
         labelled

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from evoexp import compose
 from evoexp.batch.replicate import run_replicate
-from evoexp.batch.reproduce import Comparison, reproduce_log
+from evoexp.batch.reproduction import Comparison, reproduce_log
 from evoexp.condition import Condition
+from evoexp.configuration import compose
 from evoexp.records import Generation
 
 LAST = 10  # generations of the smoke budget

@@ -15,7 +15,7 @@ from typing import Any
 import platformdirs
 import pytest
 
-from evoexp import compose
+from evoexp.configuration import compose
 
 HERE = Path(__file__).parent
 SMOKE = (

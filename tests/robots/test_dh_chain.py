@@ -2,7 +2,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from evoexp import compose
+from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.robots.dh_chain import DhChain, DhJoint
 from evoexp.robots.kinematics import forward_kinematics

@@ -12,11 +12,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from evoexp import compose
 from evoexp.attachments import PREFIX
 from evoexp.batch.replicate import run_replicate
-from evoexp.batch.reproduce import reproduce_log
+from evoexp.batch.reproduction import reproduce_log
 from evoexp.condition import Condition
+from evoexp.configuration import compose
 from evoexp.errors import EvoexpError
 from evoexp.robots.poses import frame_pose, local_pose
 from evoexp.store.log_reader import read_log

@@ -9,6 +9,6 @@ import pinocchio  # noqa: F401
 from joblib.externals.loky import process_executor  # noqa: F401
 
 from evoexp.batch import jobs  # noqa: F401
-from evoexp.evolution.statistics import cost_statistics
+from evoexp.evolution.cost_statistics import cost_statistics
 
 cost_statistics(np.zeros(1))

@@ -7,7 +7,7 @@ import hashlib
 import time
 
 from evoexp.attachments import SHA256
-from evoexp.collision.certificate import certificate
+from evoexp.collision.certifier.certificate import certificate
 from evoexp.condition import Condition
 from evoexp.records import Generation, ReplicateSummary
 from evoexp.store.log import Finished, Log

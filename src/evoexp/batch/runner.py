@@ -8,6 +8,7 @@ mark of completion, so an interrupted batch is resumed by asking for it again.
 
 import contextlib
 import itertools
+import json
 import re
 from collections import deque
 from collections.abc import Generator, Iterable, Iterator, Sequence
@@ -19,14 +20,15 @@ import numpy as np
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from evoexp.batch.jobs import Job, Outcome, load, run_jobs
-from evoexp.batch.settings import RunnerSettings
+from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.batch.workers import in_workers, loading, num_cores
-from evoexp.collision.certificate import certificate
+from evoexp.collision.certifier.certificate import certificate
 from evoexp.condition import Condition
 from evoexp.errors import CorruptLog
-from evoexp.kernel_cache import is_compiled, note_compiled
+from evoexp.numeric.kernel_cache import is_compiled, note_compiled
 from evoexp.paths.motion import Motion
 from evoexp.records import ReplicateSummary
+from evoexp.registry import component_modules
 from evoexp.store.manifest import manifest
 from evoexp.store.run_directory import RunDirectory, create_all, lock_all
 from evoexp.store.summaries import write_summary
@@ -229,29 +231,24 @@ def _run_alone(job: Job) -> Outcome:
 
 
 def _compile(config_jsons: Iterable[bytes]) -> None:
-    """Compile every kernel that some conditions need, once and here.
-
-    Unless they are in the cache.
-    """
+    """Compile every kernel that some conditions need, once and here, unless they are kept."""
     for text in config_jsons:
         kind = _NUMBER.sub("0", text.decode())  # another number needs no other kernel
-        if is_compiled(kind):
+        modules = set(component_modules(json.loads(text)))
+        if is_compiled(kind, modules):
             continue
-        with contextlib.suppress(
-            Exception
-        ):  # a planner that fails does so again in its replicate, and is noted there
+        # A planner that fails does so again in its replicate, and is noted there.
+        with contextlib.suppress(Exception):
             condition = Condition.from_json(text)
             planner, problem = condition.prepare()
-            if (
-                condition.is_reference
-            ):  # long, and what it compiles is mostly that of the planner beside it
+            # A reference takes long, and compiles mostly what the planner beside it compiles.
+            if condition.is_reference:
                 planner = planner.planner
             for generation in itertools.islice(planner.evolve(problem, condition.rng(0)), 2):
                 planner.evaluate(problem, generation.best)
                 motion = planner.motion(problem, generation.best)
                 certificate(problem, motion)
-                if (
-                    motion is not None
-                ):  # and one that touches nothing, whose closest approach is sought
+                # A motion that touches nothing as well: its closest approach is sought.
+                if motion is not None:
                     certificate(problem, Motion(np.repeat(motion.q[:1], 2, axis=0)))
-            note_compiled(kind)
+            note_compiled(kind, modules)

@@ -8,7 +8,8 @@ the two and not the other: what carries both moves neither against the other.
 
 import numpy as np
 
-from evoexp.numerics import inlined, kernel, sincos
+from evoexp.numeric.compilation import inlined, kernel
+from evoexp.numeric.elementary import sincos
 
 FRAME = 12
 """Numbers of a frame: nine of its rotation, row by row, three of its origin."""

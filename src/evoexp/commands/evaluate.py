@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from evoexp import expansions
-from evoexp.collision.certificate import PAIR, certificate
+from evoexp.collision.certifier.certificate import PAIR, certificate
 from evoexp.commands.arguments import add_experiment_arguments
 from evoexp.commands.console import add_columns, new_table, plain_console
+from evoexp.configuration import expansions
 from evoexp.errors import MotionFileError
 from evoexp.records import FloatArray
 

@@ -3,7 +3,13 @@
 import argparse
 import math
 
-from evoexp.commands.motions import add_motion_arguments, output_path, single, speed_limits, write
+from evoexp.commands.motion_files import (
+    add_motion_arguments,
+    output_path,
+    single,
+    speed_limits,
+    write,
+)
 from evoexp.errors import SettingError
 from evoexp.playback.trajectory import as_csv, as_json, trajectory
 

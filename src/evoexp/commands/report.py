@@ -9,11 +9,11 @@ from pathlib import Path
 
 from rich.console import Console
 
-from evoexp import expansions
 from evoexp.commands.arguments import add_experiment_arguments
 from evoexp.condition import Condition
+from evoexp.configuration import expansions
+from evoexp.configuration.experiment import Experiment, options
 from evoexp.errors import SettingError, UnknownOption
-from evoexp.experiment import Experiment, options
 from evoexp.report import build
 from evoexp.store.run_directory import outputs_root, resolve
 

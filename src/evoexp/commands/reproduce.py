@@ -9,12 +9,13 @@ import joblib
 from rich.console import Console
 from rich.text import Text
 
-from evoexp import expansions, shipped
+from evoexp import shipped
 from evoexp.batch.replicate import run_replicate
-from evoexp.batch.reproduce import Comparison, fingerprint, reproduce_log, same_fingerprint
+from evoexp.batch.reproduction import Comparison, fingerprint, reproduce_log, same_fingerprint
 from evoexp.batch.workers import in_workers, num_cores
 from evoexp.commands.console import add_columns, add_hash_column, new_table, plain_console
 from evoexp.commands.hashes import with_candidates
+from evoexp.configuration import expansions
 from evoexp.errors import AmbiguousHash, NothingStored, RevisionMismatch, UnknownHash
 from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
 

@@ -10,14 +10,14 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from evoexp import expansions
 from evoexp.batch.jobs import Outcome
 from evoexp.batch.runner import Batch
 from evoexp.commands.arguments import add_experiment_arguments
 from evoexp.commands.console import add_columns, add_hash_column, new_table, plain_console
 from evoexp.commands.progress import BatchProgress
+from evoexp.configuration import expansions
+from evoexp.configuration.experiment import Experiment
 from evoexp.errors import UnknownOption
-from evoexp.experiment import Experiment
 from evoexp.report.pages import PAGES
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_table as stored_summaries

@@ -10,10 +10,11 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from evoexp import expansions, shipped
+from evoexp import shipped
 from evoexp.commands.console import add_columns, new_table, plain_console
 from evoexp.commands.hashes import with_candidates
 from evoexp.condition import Condition
+from evoexp.configuration import expansions
 from evoexp.errors import AmbiguousHash, EvoexpError, UnknownHash
 from evoexp.store.log_reader import array_names, read_array
 from evoexp.store.run_directory import RunDirectory, outputs_root, resolve

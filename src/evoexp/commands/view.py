@@ -2,8 +2,8 @@
 
 import argparse
 
-from evoexp.commands.motions import add_motion_arguments, output_path, recordings, write
-from evoexp.playback.page import page
+from evoexp.commands.motion_files import add_motion_arguments, output_path, recordings, write
+from evoexp.playback.player_page import page
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

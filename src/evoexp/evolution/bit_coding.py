@@ -4,8 +4,9 @@ A gene of B bits is a number in [0, 2^B), its highest bit the first of its part 
 52.
 """
 
-from evoexp.draws import draw
-from evoexp.numerics import kernel, log
+from evoexp.numeric.compilation import kernel
+from evoexp.numeric.elementary import log
+from evoexp.numeric.random_stream import draw
 
 
 @kernel
@@ -73,7 +74,7 @@ def flip_strings(draws, strings, bits, count, rate):  # type: ignore[no-untyped-
     bit.
 
     Args:
-        draws: See `evoexp.draws`.
+        draws: See `evoexp.numeric.random_stream`.
         strings: (genes, ≥ count), changed.
         bits: Of a gene.
         count: Individuals.

@@ -3,7 +3,7 @@
 One-point crossover is in `crossover`.
 """
 
-from evoexp.numerics import kernel
+from evoexp.numeric.compilation import kernel
 
 CROSSOVERS = ("one_point", "uniform", "arithmetic", "blx_alpha")
 """Names of crossovers; kernels take their places in this list."""

@@ -1,6 +1,7 @@
 """Mutation of real genomes gene by gene (non-uniform, Gaussian, uniform reset), and of bits."""
 
-from evoexp.numerics import kernel, pow_int
+from evoexp.numeric.compilation import kernel
+from evoexp.numeric.elementary import pow_int
 
 MUTATIONS = ("non_uniform", "gaussian", "uniform_reset")
 SCOPES = ("gene", "individual")

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.numerics import kernel
+from evoexp.numeric.compilation import kernel
 from evoexp.records import FloatArray
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from evoexp.numerics import kernel
+from evoexp.numeric.compilation import kernel
 from evoexp.records import FloatArray
 
 

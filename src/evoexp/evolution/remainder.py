@@ -5,7 +5,7 @@ Parents as many times as expected, but for less than one copy.
 
 import numpy as np
 
-from evoexp.numerics import kernel
+from evoexp.numeric.compilation import kernel
 from evoexp.records import FloatArray
 
 

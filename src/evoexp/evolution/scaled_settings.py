@@ -4,7 +4,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from evoexp.evolution.settings import GeneticSettings
+from evoexp.evolution.genetic_settings import GeneticSettings
 
 
 class ScaledGenetic(GeneticSettings):

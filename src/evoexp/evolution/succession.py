@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from evoexp.numerics import kernel
+from evoexp.numeric.compilation import kernel
 from evoexp.records import FloatArray
 
 

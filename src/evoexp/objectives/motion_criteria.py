@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from evoexp.numerics import kernel
+from evoexp.numeric.compilation import kernel
 from evoexp.validation import Component, NonNegative
 
 

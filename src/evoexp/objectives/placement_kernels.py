@@ -7,7 +7,8 @@ ends at the target.
 
 import numpy as np
 
-from evoexp.numerics import DEGREE, asin, kernel, sincos
+from evoexp.numeric.compilation import kernel
+from evoexp.numeric.elementary import DEGREE, asin, sincos
 
 COST, TORQUE_NORM, TORQUE_MAX, OBSTACLE, MANIPULABILITY = range(5)
 CRITERIA = 5  # numbers that a population keeps of every individual: E, E1, E2, Σ E_obs, E_man

@@ -27,7 +27,8 @@ import numpy as np
 from pydantic import model_validator
 
 from evoexp.errors import SettingError, nearest
-from evoexp.numerics import DEGREE, acos, asin, kernel
+from evoexp.numeric.compilation import kernel
+from evoexp.numeric.elementary import DEGREE, acos, asin
 from evoexp.records import FloatArray
 from evoexp.validation import Component, Positive, Settings
 

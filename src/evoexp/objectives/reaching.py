@@ -7,7 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from evoexp.numerics import kernel, sincos
+from evoexp.numeric.compilation import kernel
+from evoexp.numeric.elementary import sincos
 from evoexp.robots.kinematics import U
 from evoexp.robots.planar_ends import LANES, block_ends, load_lanes
 from evoexp.validation import Component, NonNegative

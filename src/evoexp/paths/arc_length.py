@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from evoexp.numerics import kernel
+from evoexp.numeric.compilation import kernel
 from evoexp.paths.spline import square_speeds
 from evoexp.paths.workspace import R2, R3, R4, R5, R6, ROW, U1, U2, U3, U4
 

@@ -7,8 +7,8 @@ in the path if the path has it at its place; so nothing needs to be cleared betw
 
 import numpy as np
 
-from evoexp.draws import used_up
-from evoexp.numerics import borrowed, kernel
+from evoexp.numeric.compilation import borrowed, kernel
+from evoexp.numeric.random_stream import used_up
 
 
 @kernel

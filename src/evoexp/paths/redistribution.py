@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evoexp.numerics import borrowed, kernel
+from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.paths.arc_length import integrate_speed
 from evoexp.paths.layout import check_arm_slices, check_via_points, padded
 from evoexp.paths.spline import fit_spline

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evoexp.numerics import kernel
+from evoexp.numeric.compilation import kernel
 from evoexp.paths.layout import check_via_points, padded
 
 

@@ -8,7 +8,7 @@ On segment k, with u in [0, 1], a and m (a sixth of the second derivative) at bo
 
 from typing import Any
 
-from evoexp.numerics import kernel
+from evoexp.numeric.compilation import kernel
 from evoexp.paths.workspace import R2, R3, R4, ROW, U1, U2
 
 

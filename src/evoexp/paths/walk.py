@@ -5,7 +5,8 @@ Rana & Zalzala 1995, section 3.3.
 
 import numpy as np
 
-from evoexp.numerics import kernel, sincos
+from evoexp.numeric.compilation import kernel
+from evoexp.numeric.elementary import sincos
 from evoexp.records import FloatArray
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from evoexp.numerics import borrowed, kernel
+from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.paths.grid_walks import erase_loops
 from evoexp.records import FloatArray
 

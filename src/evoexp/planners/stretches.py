@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.draws import Draws
 from evoexp.evolution.scaled_settings import ScaledGenetic
+from evoexp.numeric.random_stream import Draws
 from evoexp.records import FloatArray, Generation
 
 # what kernels note of a generation: index of the best, mean and deviation of costs, how many are

@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from evoexp.collision.certificate import Certificate, Part, certificate
+from evoexp.collision.certifier.certificate import Certificate, Part, certificate
 from evoexp.collision.scene import Scene
 from evoexp.condition import Condition
 from evoexp.errors import EvoexpError
 from evoexp.paths.motion import Motion
+from evoexp.playback.body_poses import Frame, Poses, frames_of, points, poses, ticks
 from evoexp.playback.contacts import Clearance, clearance, parts_of
-from evoexp.playback.poses import Frame, Poses, frames_of, points, poses, ticks
 from evoexp.playback.shapes import Role, Shape, outline, pose
 from evoexp.playback.targets import Target, targets
 from evoexp.playback.timing import SpeedLimits, seconds_per_instant, velocities

@@ -14,9 +14,9 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from evoexp.errors import SettingError
-from evoexp.numerics import kernel
+from evoexp.numeric.compilation import kernel
 from evoexp.records import FloatArray
-from evoexp.references.truth import Reference, Truth
+from evoexp.references.reference import Reference, Truth
 from evoexp.validation import Count, Positive
 
 BLOCK = 16  # numbers of nodes whose walks are bounded together

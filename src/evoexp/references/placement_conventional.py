@@ -14,7 +14,7 @@ from evoexp.references.placement_model import Directions, directions_of
 from evoexp.references.placement_polish import End, descend
 from evoexp.references.placement_programme import Programme
 from evoexp.references.placement_subgradient import LANES, slide
-from evoexp.references.truth import Reference, Truth
+from evoexp.references.reference import Reference, Truth
 from evoexp.validation import Count, Positive
 
 R2 = np.array([0.7548776662466927, 0.5698402909980532])  # Roberts' sequence: fills a square evenly

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from evoexp.objectives.placement_kernels import CRITERIA
-from evoexp.references.truth import Reference, Truth
+from evoexp.references.reference import Reference, Truth
 
 
 class PlacementLandscape(Reference):

@@ -14,7 +14,7 @@ from evoexp.references.placement_model import TURN, directions_of
 from evoexp.references.placement_polish import descend, polish
 from evoexp.references.placement_programme import Programme
 from evoexp.references.placement_search import lowest
-from evoexp.references.truth import Reference, Truth
+from evoexp.references.reference import Reference, Truth
 from evoexp.validation import Count
 
 SAME = 1e-3  # [deg] two minima so close are one

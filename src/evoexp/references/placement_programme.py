@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from evoexp.numerics import kernel, sincos
+from evoexp.numeric.compilation import kernel
+from evoexp.numeric.elementary import sincos
 from evoexp.records import FloatArray
 from evoexp.references.placement_model import Directions
 

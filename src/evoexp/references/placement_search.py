@@ -7,7 +7,8 @@ Over directions, as all of this room: nothing is shared with the planner's own k
 
 import numpy as np
 
-from evoexp.numerics import asin, kernel, sin
+from evoexp.numeric.compilation import kernel
+from evoexp.numeric.elementary import asin, sin
 from evoexp.records import FloatArray
 from evoexp.references.placement_model import TURN, Directions
 from evoexp.references.placement_programme import MARGINS, measure

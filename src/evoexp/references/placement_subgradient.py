@@ -8,7 +8,8 @@ together, innermost in memory.
 
 import numpy as np
 
-from evoexp.numerics import kernel, sincos
+from evoexp.numeric.compilation import kernel
+from evoexp.numeric.elementary import sincos
 
 # [rad] of central differences; beside a kink the slope is that of the side where x is, or between
 # both

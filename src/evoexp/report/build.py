@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import evoexp
 from evoexp.condition import Condition
 from evoexp.report.index import render
 from evoexp.report.page import Drawing
 from evoexp.report.pages import page_of
+from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import gather
-from evoexp.report.settings import ReportSettings
 from evoexp.store.files import write_files
+from evoexp.version import __version__
 
 INDEX = "index.md"
 
@@ -97,9 +97,7 @@ def report(
 
 def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:
     """Return the files of one figure: pictures, data rows, sidecar."""
-    from evoexp.report.style import (
-        drawn,
-    )  # matplotlib; `evoexp run` loads this file before anything is drawn
+    from evoexp.report.style import drawn
 
     table = drawing.table()
     images = drawn(lambda: drawing.draw(table), settings.formats, settings.dpi)
@@ -107,7 +105,7 @@ def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:
     rows = table.to_csv(index=False, lineterminator="\n").encode()
     sidecar = {
         "figure": drawing.title,
-        "code_version": evoexp.__version__,
+        "code_version": __version__,
         "conditions": _provenance(drawing),
         "data": {"file": f"{drawing.stem}.csv", "rows": len(table), "sha256": _sha256(rows)},
         "files": {name: _sha256(content) for name, content in pictures.items()},

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from evoexp.records import FloatArray
+from evoexp.report.proportions import Proportion, fisher_exact
 from evoexp.report.statistics import (
     Effect,
     RankSum,
@@ -197,3 +198,27 @@ def adjusted(comparisons: list[Comparison]) -> list[Comparison]:
     unpaired = holm([comparison.unpaired.p_value for comparison in comparisons])
     found = zip(comparisons, paired, unpaired, strict=True)
     return [c._replace(p_adjusted=p, unpaired_adjusted=q) for c, p, q in found]
+
+
+def judge_greater(
+    not_judged: str,
+    one: Proportion,
+    two: Proportion,
+    significance: float,
+    p_adjusted: float | None = None,
+) -> str:
+    """Judge a claim that a proportion is greater than another one, by Fisher's exact test.
+
+    Args:
+        not_judged: Why it is not to be judged; empty: judge it.
+        one: Said to be greater.
+        two: Of other runs.
+        significance: Below this two-sided p-value a difference counts.
+        p_adjusted: That of the test where it is one of several; None: it stands alone.
+    """
+    if not_judged:
+        return NOT_JUDGED
+    p_value = fisher_exact(one, two) if p_adjusted is None else p_adjusted
+    if not one.total or not two.total or p_value >= significance:
+        return INCONCLUSIVE
+    return REPRODUCED if one.share > two.share else CONTRADICTED

@@ -10,7 +10,7 @@ import pinocchio as pin
 from pydantic import Field, model_validator
 
 from evoexp.errors import SettingError
-from evoexp.numerics import DEGREE, sincos
+from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Chain, Link, Tool
 from evoexp.robots.bodies import AnyBody, Point3, body_geometry, placed

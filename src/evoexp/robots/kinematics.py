@@ -17,7 +17,8 @@ import numpy as np
 import pinocchio as pin
 
 from evoexp.errors import EvoexpError
-from evoexp.numerics import kernel, sincos
+from evoexp.numeric.compilation import kernel
+from evoexp.numeric.elementary import sincos
 from evoexp.records import FloatArray
 
 BLOCK = 64

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from evoexp.errors import SettingError
-from evoexp.numerics import atan2, kernel, sincos
+from evoexp.numeric.compilation import kernel
+from evoexp.numeric.elementary import atan2, sincos
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.kinematics import U

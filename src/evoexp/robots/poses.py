@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from evoexp.numerics import kernel
+from evoexp.numeric.compilation import kernel
 from evoexp.records import FloatArray
 from evoexp.robots.kinematics import (
     BLOCK,

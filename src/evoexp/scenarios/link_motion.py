@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from evoexp.errors import SettingError
-from evoexp.numerics import DEGREE, acos, atan2
+from evoexp.numeric.elementary import DEGREE, acos, atan2
 from evoexp.records import FloatArray
 from evoexp.scenarios.obstacles import Obstacle
 from evoexp.validation import Component, NonNegative, Settings, Vector

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from evoexp.errors import SettingError
-from evoexp.numerics import DEGREE, sincos
+from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.records import FloatArray
 from evoexp.validation import Positive, Settings
 

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 
 from evoexp.report import style
 from evoexp.report.results import ConditionResults, Results
+from evoexp.report.rows import groups
 from evoexp.report.statistics import quantile
-from evoexp.report.tables import groups
 
 COLUMNS = ("best_cost", "mean_cost")
 NAMES = {"best_cost": "best so far", "mean_cost": "average"}

@@ -13,11 +13,11 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Arc, Circle
 from matplotlib.patheffects import withStroke
 
-from evoexp.numerics import DEGREE, sincos
+from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.records import FloatArray
-from evoexp.report import motions, style
+from evoexp.report import motion_geometry, style
 from evoexp.report.results import ConditionResults
-from evoexp.report.tables import groups, records, rounded
+from evoexp.report.rows import groups, records, rounded
 
 NUMBERED = 5  # every fifth via-point carries its number
 
@@ -32,7 +32,7 @@ def arms_table(condition: ConditionResults) -> pd.DataFrame:
     problem = condition.prepared.problem
     rows = []
     for posture, q in (("start", problem.start), ("goal", problem.goal)):
-        for arm, joint, start, end in motions.joint_positions(problem.assembly, q[:, None]):
+        for arm, joint, start, end in motion_geometry.joint_positions(problem.assembly, q[:, None]):
             angle = q[problem.arm_slices[arm, 0] + joint]
             x, y = (end - start)[0, :2]
             direction = np.degrees(np.arctan2(y, x))
@@ -139,19 +139,21 @@ def circles_table(condition: ConditionResults) -> pd.DataFrame:
         [length unit], safety_distance, instant, length_unit.
     """
     problem = condition.prepared.problem
-    q = motions.configurations(condition.prepared, condition.solutions[condition.best_replicate])
-    instant = int(np.argmin(motions.centre_distances(problem, q)))
+    q = motion_geometry.configurations(
+        condition.prepared, condition.solutions[condition.best_replicate]
+    )
+    instant = int(np.argmin(motion_geometry.centre_distances(problem, q)))
     at = q[:, instant]
     rows: list[tuple[object, ...]] = [
         ("link", arm, *start[0, :2], *end[0, :2], np.nan, np.nan)
-        for arm, _, start, end in motions.joint_positions(problem.assembly, at[:, None])
+        for arm, _, start, end in motion_geometry.joint_positions(problem.assembly, at[:, None])
     ]
-    centres = motions.sphere_centres(problem.collision, at)
+    centres = motion_geometry.sphere_centres(problem.collision, at)
     for arm, points in enumerate(centres):
         rows += [("circle", arm, *p[:2], *p[:2], problem.collision.radius, np.nan) for p in points]
     a, b = _closest(centres)
     rows.append(("centres", -1, *a[:2], *b[:2], np.nan, float(np.linalg.norm(a - b))))
-    nearest = motions.LinkDistance(problem.assembly).nearest(at)
+    nearest = motion_geometry.LinkDistance(problem.assembly).nearest(at)
     rows.append(
         ("bodies", -1, *nearest.points[0, :2], *nearest.points[1, :2], np.nan, nearest.distance)
     )

@@ -12,10 +12,10 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from evoexp.records import FloatArray
-from evoexp.report import motions, style
+from evoexp.report import motion_geometry, style
 from evoexp.report.figures.planar_models import draw_arm, path_table
 from evoexp.report.results import ConditionResults
-from evoexp.report.tables import groups, rounded
+from evoexp.report.rows import groups, rounded
 
 STAGES = 5  # panels that a motion is cut into; the sixth holds all of it
 CENTRES, LINKS = "circle centres", "links"
@@ -37,11 +37,13 @@ def snapshots_table(condition: ConditionResults) -> pd.DataFrame:
         its outline.
     """
     problem = condition.prepared.problem
-    q = motions.configurations(condition.prepared, condition.solutions[condition.best_replicate])
+    q = motion_geometry.configurations(
+        condition.prepared, condition.solutions[condition.best_replicate]
+    )
     last = q.shape[1] - 1
     cuts = np.unique(np.round(np.linspace(0, last, min(STAGES, last) + 1)).astype(np.int64))
     stages = [*itertools.pairwise(cuts), (0, last)]
-    links = list(motions.joint_positions(problem.assembly, q))
+    links = list(motion_geometry.joint_positions(problem.assembly, q))
     rows = []
     for stage, (first, stop) in enumerate(stages):
         for instant in range(first, stop + 1):
@@ -49,7 +51,9 @@ def snapshots_table(condition: ConditionResults) -> pd.DataFrame:
                 place = (*start[instant, :2], *end[instant, :2])
                 rows.append((stage, first, stop, instant, arm, link, *place))
     reach = 2.0 * max(float(np.abs(end - start).sum(axis=1).max()) for _, _, start, end in links)
-    for k, outline in enumerate(motions.obstacle_outlines(problem.collision.obstacles, reach)):
+    for k, outline in enumerate(
+        motion_geometry.obstacle_outlines(problem.collision.obstacles, reach)
+    ):
         rows += [(-1, 0, last, 0, -1, k, *a, *b) for a, b in itertools.pairwise(outline)]
     names = ["stage", "first", "last", "instant", "arm", "link", "x", "y", "x_end", "y_end"]
     return rounded(pd.DataFrame(rows, columns=names)).assign(
@@ -131,7 +135,7 @@ def paths_table(condition: ConditionResults) -> pd.DataFrame:
     for replicate, solution in condition.solutions.items():
         series = "best" if replicate == condition.best_replicate else "replicate"
         parts.append(path_table(condition, solution).assign(series=series, replicate=replicate))
-    straight = motions.straight_line(condition.prepared)
+    straight = motion_geometry.straight_line(condition.prepared)
     parts.append(path_table(condition, straight).assign(series=STRAIGHT, replicate=-1))
     return pd.concat(parts, ignore_index=True)
 
@@ -204,12 +208,17 @@ def sampled_distances(condition: ConditionResults, samples: int) -> pd.DataFrame
         and links: least distances of circle centres and of the links themselves [length unit].
     """
     prepared = condition.prepared
-    links = motions.LinkDistance(prepared.problem.assembly)
-    solutions = {-1: motions.straight_line(prepared), **condition.solutions}
+    links = motion_geometry.LinkDistance(prepared.problem.assembly)
+    solutions = {-1: motion_geometry.straight_line(prepared), **condition.solutions}
     parts = []
     for replicate, solution in solutions.items():
-        instants, q = motions.dense(motions.configurations(prepared, solution), samples)
-        distances = {"centres": motions.centre_distances(prepared.problem, q), "links": links(q)}
+        instants, q = motion_geometry.dense(
+            motion_geometry.configurations(prepared, solution), samples
+        )
+        distances = {
+            "centres": motion_geometry.centre_distances(prepared.problem, q),
+            "links": links(q),
+        }
         parts.append(pd.DataFrame({"replicate": replicate, "instant": instants, **distances}))
     return rounded(pd.concat(parts, ignore_index=True))
 

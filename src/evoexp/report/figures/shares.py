@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from evoexp.records import FloatArray
 from evoexp.report import style
 from evoexp.report.proportions import Proportion
-from evoexp.report.tables import groups
+from evoexp.report.rows import groups
 
 MARGIN = 0.08  # [-] of a panel's range, beyond the intervals
 

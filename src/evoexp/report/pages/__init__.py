@@ -4,32 +4,32 @@ import importlib
 from typing import TYPE_CHECKING, Any, cast
 
 from evoexp.errors import UnknownOption
-from evoexp.report.settings import ReportSettings
+from evoexp.report.report_settings import ReportSettings
 
 if TYPE_CHECKING:  # pandas: `evoexp run` asks for the names of the pages before anything else
     from evoexp.report.page import Page
     from evoexp.report.results import Results
 
 PAGES = {
-    "chen_fields": "evoexp.report.pages.chen_fields:page",
-    "chen_lingering": "evoexp.report.pages.chen_lingering:page",
-    "chen_mission": "evoexp.report.pages.chen_mission:page",
-    "chen_path": "evoexp.report.pages.chen_path:page",
-    "chen_landscapes": "evoexp.report.pages.chen_landscapes:page",
-    "chen_placement": "evoexp.report.pages.chen_placement:page",
-    "corsepius": "evoexp.report.pages.corsepius:page",
-    "corsepius_population": "evoexp.report.pages.corsepius_population:page",
-    "corsepius_sweep": "evoexp.report.pages.corsepius_sweep:page",
-    "curkovic": "evoexp.report.pages.curkovic:page",
-    "curkovic_motion": "evoexp.report.pages.curkovic_motion:page",
-    "curkovic_pareto": "evoexp.report.pages.curkovic_pareto:page",
-    "curkovic_sweep": "evoexp.report.pages.curkovic_sweep:page",
-    "ablations": "evoexp.report.pages.ablations:page",
+    "chen_fields": "evoexp.papers.chen.fields_page:page",
+    "chen_lingering": "evoexp.papers.chen.lingering_page:page",
+    "chen_mission": "evoexp.papers.chen.mission_page:page",
+    "chen_path": "evoexp.papers.chen.path_page:page",
+    "chen_landscapes": "evoexp.papers.chen.landscapes_page:page",
+    "chen_placement": "evoexp.papers.chen.placement_page:page",
+    "corsepius": "evoexp.papers.corsepius.page:page",
+    "corsepius_population": "evoexp.papers.corsepius.population_page:page",
+    "corsepius_sweep": "evoexp.papers.corsepius.sweep_page:page",
+    "curkovic": "evoexp.papers.curkovic.page:page",
+    "curkovic_motion": "evoexp.papers.curkovic.motion_page:page",
+    "curkovic_pareto": "evoexp.papers.curkovic.pareto_page:page",
+    "curkovic_sweep": "evoexp.papers.curkovic.sweep_page:page",
+    "ablations": "evoexp.papers.rana.operators_page:page",
     "generic": "evoexp.report.pages.generic:page",
-    "lavoie": "evoexp.report.pages.lavoie:page",
-    "lavoie_sweep": "evoexp.report.pages.lavoie_sweep:page",
+    "lavoie": "evoexp.papers.lavoie.page:page",
+    "lavoie_sweep": "evoexp.papers.lavoie.sweep_page:page",
     "planar_arms": "evoexp.report.pages.planar_arms:page",
-    "rana": "evoexp.report.pages.rana:page",
+    "rana": "evoexp.papers.rana.page:page",
 }
 """Name, as `report.figures` gives it → `module:function`."""
 

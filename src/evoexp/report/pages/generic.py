@@ -13,8 +13,8 @@ from evoexp.records import FloatArray
 from evoexp.report.claims import Comparison, adjusted, compare
 from evoexp.report.figures import convergence
 from evoexp.report.page import Drawing, Page, Quantity
+from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import WRAPPED, ConditionResults, Results
-from evoexp.report.settings import ReportSettings
 from evoexp.report.statistics import spread
 from evoexp.store.messages import TERM
 

@@ -9,8 +9,8 @@ import pandas as pd
 from evoexp.report.figures import planar_motion
 from evoexp.report.page import Drawing, Page
 from evoexp.report.pages import generic
+from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
-from evoexp.report.settings import ReportSettings
 
 SNAPSHOTS = (
     "Motion of the best replicate (lowest cost), stage by stage; links that cross on paper in "

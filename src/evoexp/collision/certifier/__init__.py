@@ -1,0 +1,1 @@
+"""The exact certifier: verdicts on whole continuous motions."""

@@ -1,0 +1,381 @@
+"""The exact certifier: judges a motion continuously, on exact bodies.
+
+A compiled sweep (`certifier_sweep`) bounds the distances of all pairs over the whole motion. It
+leaves the instants that matter, the first contact or the least clearances, and intervals that its
+own shapes cannot settle; coal settles both, and every distance in a verdict is coal's, at
+Pinocchio's placements.
+"""
+
+from collections.abc import Callable
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from evoexp.collision.certifier.coal_distances import (
+    CoalDistance,
+    LeafGoals,
+    QueryLimit,
+    first_contact,
+    search_interval,
+    walk_down,
+)
+from evoexp.collision.certifier.sweep import (
+    Goal,
+    Sweep,
+    Task,
+    approach_weights,
+    polish,
+    sweep_motion,
+    work_space,
+)
+from evoexp.collision.motion_bounds import approach_bounds, moved_by_one
+from evoexp.collision.scene import Scene
+from evoexp.paths.motion import Motion
+from evoexp.records import FloatArray
+
+Status = Literal["certified", "refuted", "undecided"]
+
+ROUNDING = 1e-12
+"""[-] of the scene's size: error of the sweep's own distances."""
+
+SAME = 1e-4  # [segments] a local minimum so close is the same one
+
+MAX_POLISHED = 8  # pairs whose local minimum is sought, those with the least distances
+
+
+class Verdict(NamedTuple):
+    """What the certifier says of a motion.
+
+    T is in instants: 2.5 is half way from instant 2 to instant 3.
+
+    Attributes:
+        status: "certified": no two bodies touch, ever; "refuted": two do; "undecided": a limit was
+            used up.
+        margin_status: The same of "the clearance is never less than the security margin".
+        clearance: Least distance over the motion [length unit]; 0 where bodies touch, inf without
+            pairs.
+        clearance_at: Its t; NaN without pairs.
+        clearance_pair: Names of its two bodies; None without pairs.
+        refuted_at: t of the first contact; NaN if there is none.
+        refuted_pair: Names of its two bodies.
+        proven: Lower bound of the clearance over the whole motion.
+        queries: Distances that coal was asked for.
+        intervals: Intervals that the sweep judged.
+        duration_s: Time taken [s]; NaN if no clock was given.
+    """
+
+    status: Status
+    margin_status: Status
+    clearance: float
+    clearance_at: float
+    clearance_pair: tuple[str, str] | None
+    refuted_at: float
+    refuted_pair: tuple[str, str] | None
+    proven: float
+    queries: int
+    intervals: int
+    duration_s: float
+
+
+class Limits(NamedTuple):
+    """When the certifier gives up.
+
+    Attributes:
+        queries: Of coal.
+        intervals: Of the sweep.
+    """
+
+    queries: int = 100_000
+    intervals: int = 2_000_000
+
+
+DEFAULT_LIMITS = Limits()
+
+
+def certify(
+    scene: Scene,
+    motion: Motion,
+    security_margin: float = 0.0,
+    *,
+    contact_tolerance: float | None = None,
+    resolution: float = 1e-3,
+    limits: Limits = DEFAULT_LIMITS,
+    clock: Callable[[], float] | None = None,
+) -> Verdict:
+    """Judge a motion.
+
+    Args:
+        scene: The bodies; read only.
+        motion: Its q in the units of the model: radians, lengths.
+        security_margin: Clearance that is asked for [length unit].
+        contact_tolerance: A distance at or below it is contact [length unit]; None:
+            `Scene.tolerances`.
+        resolution: The clearance is proven up to this part of it [-].
+        limits: When to give up.
+        clock: Returns seconds, for `duration_s`.
+
+    Raises:
+        ValueError: If the motion does not fit the model, or a number makes no sense.
+    """
+    begin = clock() if clock is not None else np.nan
+    _check(scene, motion, security_margin, contact_tolerance, resolution)
+    tolerances = (
+        scene.tolerances
+        if contact_tolerance is None
+        else np.full(len(scene.pairs), contact_tolerance)
+    )
+    verdict = _Judgement(scene, motion, security_margin, tolerances, resolution, limits).verdict()
+    return verdict._replace(duration_s=(clock() if clock is not None else np.nan) - begin)
+
+
+class _Candidate(NamedTuple):
+    """A distance that coal saw."""
+
+    distance: float
+    t: float
+    pair: int
+
+
+class _Judgement:
+    """One motion being judged."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        motion: Motion,
+        margin: float,
+        tolerances: FloatArray,
+        resolution: float,
+        limits: Limits,
+    ) -> None:
+        self.scene, self.motion, self.margin, self.resolution, self.limits = (
+            scene,
+            motion,
+            margin,
+            resolution,
+            limits,
+        )
+        self.tolerances = tolerances
+        self.coal = CoalDistance(scene, motion, limits.queries)
+        self.floor = 1e-6 * scene.size
+        self.intervals, self.looked = 0, False
+        self.best = _Candidate(np.inf, np.nan, -1)
+        polynomials = motion.polynomials
+        if motion.num_segments == 0:
+            polynomials = np.zeros((1, 4, motion.q.shape[1]))
+            polynomials[0, 0] = motion.q[0]
+        bodies, table = tuple(scene.bodies), tuple(scene.table[:6])
+        weights = approach_weights(table, bodies, scene.pairs, motion.greatest)
+        self.task = Task(
+            table,
+            bodies,
+            scene.pairs,
+            scene.bodies.exact[scene.pairs].all(axis=1),
+            np.ascontiguousarray(polynomials),
+            motion.coefficients is None,
+            float(motion.num_segments),
+            weights,
+            moved_by_one(table, bodies[0], scene.pairs),
+        )
+        self.work = work_space(self.task)
+
+    def verdict(self) -> Verdict:
+        """Return the verdict, without its duration."""
+        if len(self.scene.pairs) == 0:
+            none = np.inf, np.nan, None, np.nan, None
+            return Verdict("certified", "certified", *none, np.inf, 0, 0, np.nan)
+        try:
+            contact, bound = self._search(self.resolution, self.tolerances, self.tolerances)
+            if contact is not None:
+                return self._refuted(contact)
+            self._polish()
+            proven = min(bound, self.best.distance)
+            status: Status = "certified" if proven > -np.inf else "undecided"
+            return self._free(status, self._judge_margin(status, proven), proven)
+        except QueryLimit:
+            return self._free("undecided", "refuted" if self._too_close() else "undecided", -np.inf)
+
+    def _refuted(self, contact: _Candidate) -> Verdict:
+        names = self.scene.pair_names(contact.pair)
+        at = float(contact.t)
+        where = 0.0, at, names, at, names
+        return Verdict("refuted", "refuted", *where, 0.0, self.coal.queries, self.intervals, np.nan)
+
+    def _free(self, status: Status, margin_status: Status, proven: float) -> Verdict:
+        pair = self.scene.pair_names(self.best.pair) if self.best.pair >= 0 else None
+        where = float(self.best.distance), float(self.best.t), pair, np.nan, None
+        return Verdict(
+            status, margin_status, *where, float(proven), self.coal.queries, self.intervals, np.nan
+        )
+
+    def _too_close(self) -> bool:
+        return (
+            self.best.pair >= 0
+            and self.best.distance < self.margin - self.tolerances[self.best.pair]
+        )
+
+    def _judge_margin(self, status: Status, proven: float) -> Status:
+        """Compare with the margin; look closer where the clearance is not proven far enough."""
+        if self._too_close():
+            return "refuted"
+        if status == "undecided" or proven >= self.margin:
+            return status
+        goal = np.full(len(self.tolerances), self.margin)
+        low, bound = self._search(np.inf, goal, self.margin - self.tolerances)
+        if low is not None:
+            if self.task.exact[low.pair]:
+                self._polish_from(np.array([low.pair]), np.array([low.t]))
+            self._note(low)
+            return "refuted"
+        return "certified" if bound > -np.inf else "undecided"
+
+    def _search(
+        self, resolution: float, goal: FloatArray, level: FloatArray
+    ) -> tuple[_Candidate | None, float]:
+        """Return the first distance at or below its level as coal sees it, and what is proven.
+
+        −inf: a limit.
+        """
+        refine = resolution < np.inf
+        rounding = ROUNDING * self.scene.size
+        wanted = Goal(
+            goal, level, self.tolerances, np.inf, resolution, self.floor, rounding, True, refine, 0
+        )
+        self._look_at_meshes(wanted)
+        while True:
+            known, left = self.best.distance, self.limits.intervals - self.intervals
+            instants = not (self.looked and refine)
+            found = sweep_motion(
+                self.task,
+                wanted._replace(known=known, max_nodes=left, instants=instants),
+                self.work,
+            )
+            self.looked = True
+            self.intervals += found.nodes
+            contact = None
+            if found.first < np.inf:
+                t = first_contact(
+                    self.coal,
+                    found.first_pair,
+                    min(found.first, self.task.last),
+                    level[found.first_pair],
+                )
+                if t is None:  # coal does not see it: let coal judge this pair alone
+                    self.task.exact[found.first_pair] = self.looked = False
+                    continue
+                contact = _Candidate(level[found.first_pair], t, found.first_pair)
+            self.sweep = found
+            earlier, proven = self._search_leaves(found, contact, resolution, goal, level)
+            return earlier, proven if found.done else -np.inf
+
+    def _look_at_meshes(self, goal: Goal) -> None:
+        """Ask coal for pairs whose shapes the sweep does not know exactly.
+
+        Where their hulls are closest.
+        """
+        if self.task.exact.all() or self.best.pair >= 0:
+            return
+        found = sweep_motion(self.task, goal, self.work)
+        pairs = np.flatnonzero(~self.task.exact)
+        for pair in pairs[np.argsort(found.pair_least[pairs], kind="stable")][:MAX_POLISHED]:
+            t = found.pair_least_at[pair]
+            self._note(_Candidate(self.coal(pair, t), t, int(pair)))
+
+    def _search_leaves(
+        self,
+        found: Sweep,
+        contact: _Candidate | None,
+        resolution: float,
+        goal: FloatArray,
+        level: FloatArray,
+    ) -> tuple[_Candidate | None, float]:
+        """Have coal settle the leaves, from left to right up to the first contact."""
+        proven = found.proven
+        for pair, begin, end in found.leaves[np.argsort(found.leaves[:, 1], kind="stable")]:
+            if contact is not None and begin >= contact.t:
+                break
+            p, segment = int(pair), min(int(begin), len(self.task.coefficients) - 1)
+            speeds, scratch = (
+                np.empty((2, len(self.scene.pairs))),
+                np.empty(len(self.task.table[0])),
+            )
+            piece = self.task.coefficients[segment]
+            approach_bounds(
+                self.task.table,
+                piece,
+                begin - segment,
+                end - segment,
+                self.task.weights,
+                speeds,
+                scratch,
+            )
+            known = min(self.best.distance, found.least)
+            goals = LeafGoals(goal[p], level[p], self.tolerances[p], known, resolution, self.floor)
+            end = min(end, float(self.motion.num_segments))
+            leaf = search_interval(self.coal, p, (begin, end), speeds[0, p], goals)
+            self._note(_Candidate(leaf.least, leaf.at, p))
+            proven = min(proven, leaf.proven)
+            if leaf.first < np.inf and (contact is None or leaf.first < contact.t):
+                contact = _Candidate(level[p], leaf.first, p)
+        return contact, proven
+
+    def _polish(self) -> None:
+        """Walk down to local minima of the pairs that came closest."""
+        least = self.sweep.pair_least
+        worth = least <= self.sweep.least + max(self.resolution * self.sweep.least, self.floor)
+        pairs = np.flatnonzero(worth & self.task.exact)
+        pairs = pairs[np.argsort(least[pairs], kind="stable")][:MAX_POLISHED]
+        self._polish_from(pairs, self.sweep.pair_least_at[pairs])
+        if self.best.pair >= 0 and not self.task.exact[self.best.pair]:
+            distance, t = self.best.distance, self.best.t
+            t, distance = walk_down(self.coal, self.best.pair, t, 1e-3)
+            self._note(_Candidate(distance, t, self.best.pair))
+
+    def _polish_from(self, pairs: np.ndarray, begins: FloatArray) -> None:
+        """Ask coal for the least of some pairs' local minima; of equal ones, the first."""
+        t = np.minimum(
+            begins, self.task.last
+        )  # a motion of one instant is swept as a segment without movement
+        seen = (pairs == self.best.pair) & (np.abs(t - self.best.t) < SAME)
+        pairs, t = pairs[~seen], t[~seen]
+        if len(pairs) > 0:
+            distances = np.empty(len(pairs))
+            polish(self.task, self.work, pairs, t, distances)
+            tied = distances <= distances.min() + ROUNDING * self.scene.size
+            first = np.argmin(np.where(tied & (t <= t[tied].min() + SAME), distances, np.inf))
+            at, pair = float(t[first]), int(pairs[first])
+            self._note(_Candidate(self.coal(pair, at), at, pair))
+
+    def _note(self, seen: _Candidate) -> None:
+        if seen.distance < self.best.distance:
+            self.best = seen
+
+
+def _check(
+    scene: Scene,
+    motion: Motion,
+    security_margin: float,
+    contact_tolerance: float | None,
+    resolution: float,
+) -> None:
+    """Raise ValueError for what cannot be judged."""
+    nq = scene.model.nq
+    if motion.q.ndim != 2 or motion.q.shape[0] == 0 or motion.q.shape[1] != nq:
+        raise ValueError(f"motion: q must have shape (instants, {nq}), was {motion.q.shape}")
+    if motion.coefficients is not None and motion.coefficients.shape != (
+        motion.num_segments,
+        4,
+        nq,
+    ):
+        must = (motion.num_segments, 4, nq)
+        raise ValueError(
+            f"motion: coefficients must have shape {must}, was {motion.coefficients.shape}"
+        )
+    if not np.isfinite(motion.polynomials).all() or not np.isfinite(motion.q).all():
+        raise ValueError("motion: q must be finite, was not")
+    if not 0.0 <= security_margin < np.inf:
+        raise ValueError(f"security_margin must be at least 0, was {security_margin}")
+    if contact_tolerance is not None and not 0.0 < contact_tolerance < np.inf:
+        raise ValueError(f"contact_tolerance must be above 0, was {contact_tolerance}")
+    if not 0.0 < resolution < np.inf:
+        raise ValueError(f"resolution must be above 0, was {resolution}")

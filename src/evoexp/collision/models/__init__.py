@@ -1,0 +1,1 @@
+"""Collision models of the planners: the papers' own."""

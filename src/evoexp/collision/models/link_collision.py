@@ -1,0 +1,163 @@
+"""The collision model of Curkovic et al.
+
+2013 on a robot: links as lines, or as envelopes, among static obstacles.
+"""
+
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from evoexp.collision.models.link_crossings import (
+    Arm,
+    Crossings,
+    count_crossings,
+    path_configurations,
+)
+from evoexp.collision.models.link_envelopes import EnvelopedArm, count_collisions
+from evoexp.collision.models.link_obstacles import (
+    PlanarObstacles,
+    count_enveloped_obstacle_collisions,
+    count_obstacle_collisions,
+    planar_obstacles,
+)
+from evoexp.errors import SettingError
+from evoexp.records import FloatArray
+from evoexp.robots.assembly import Assembly
+from evoexp.scenarios.obstacles import obstacle_table
+from evoexp.validation import Component, Count, NonNegative
+
+
+class LinkCrossings(Component):
+    """Robots of two links in the plane, which collide where lines of them meet (Eqs. 4, 5, 11, 12).
+
+    Attributes:
+        collision_substeps: Configurations tested per segment of a path; 1: the encoded ones only,
+            as in the paper.
+        half_width: Of the envelope: distance of a link's two boundary lines from it [length unit];
+            0: the link itself.
+        tcp_radius: Of a circle around the tool centre point [length unit]; 0: none.
+    """
+
+    component: ClassVar[str] = "link_crossings"
+
+    collision_substeps: Count
+    half_width: NonNegative
+    tcp_radius: NonNegative
+
+    def bind(self, assembly: Assembly, obstacles: tuple[Any, ...]) -> "LinkCollision":
+        """Return the model of some robots among obstacles.
+
+        Raises:
+            SettingError: If a robot is no planar arm of two links, or an obstacle no figure of the
+                plane.
+        """
+        arms = tuple(_arm(assembly, first) for first, _ in _pairs_of_joints(assembly))
+        try:
+            flat = planar_obstacles(obstacle_table(obstacles))
+        except ValueError as error:
+            raise SettingError(
+                "scenario.obstacles", f"figures of the plane ({error})", len(obstacles)
+            ) from None
+        return LinkCollision(arms, flat, self.collision_substeps, self.half_width, self.tcp_radius)
+
+
+class LinkCollision(NamedTuple):
+    """Planar robots of two links, and what stands around them.
+
+    Attributes:
+        arms: Base and link lengths of every robot.
+        obstacles: What stands still.
+        substeps: Configurations tested per segment.
+        half_width: Of the envelopes.
+        tcp_radius: Of the circles around the tool centre points.
+    """
+
+    arms: tuple[Arm, ...]
+    obstacles: PlanarObstacles
+    substeps: int
+    half_width: float
+    tcp_radius: float
+
+    @property
+    def enveloped(self) -> bool:
+        """Whether robots are more than their lines."""
+        return self.half_width > 0.0 or self.tcp_radius > 0.0
+
+    def outlines(self, robot: int, path: FloatArray, points: FloatArray) -> FloatArray:
+        """Return what is tested of a population's paths, (configurations, 4 | 8, N).
+
+        Args:
+            robot: Whose population.
+            path: (K + 2, 2, N) link angles [rad], start and goal included, which are the same for
+                all.
+            points: (K + 2, 4, N) of the robot's `Arm.points` at these angles.
+        """
+        if self.substeps > 1:
+            q = path_configurations(path[1:-1], path[0, :, 0], path[-1, :, 0], self.substeps)
+            return self.of_configurations(robot, q)
+        return self._enveloped(robot).outlines(path[1:-1]) if self.enveloped else points[1:-1]
+
+    def of_configurations(self, robot: int, q: FloatArray) -> FloatArray:
+        """Return the same of configurations (K, 2, N) as they are."""
+        return self._enveloped(robot).outlines(q) if self.enveloped else self.arms[robot].points(q)
+
+    def contact(self, posture: FloatArray) -> str:
+        """Return what touches what at link angles (robots, 2) [rad]; empty if nothing does."""
+        lines = [
+            self.of_configurations(r, np.ascontiguousarray(angles.reshape(1, 2, 1)))
+            for r, angles in enumerate(posture)
+        ]
+        for r, own in enumerate(lines):
+            if self.with_obstacles(r, own)[0]:
+                return f"robot {r + 1} touches an obstacle"
+            for s in range(r + 1, len(lines)):
+                if self.between(r, own, s, lines[s]).counts[0, 0]:
+                    return f"robots {r + 1} and {s + 1} touch"
+        return ""
+
+    def between(self, one: int, first: FloatArray, two: int, second: FloatArray) -> Crossings:
+        """Count colliding configurations for every pair of individuals of two populations."""
+        if self.enveloped:
+            return count_collisions(self._enveloped(one), first, self._enveloped(two), second)
+        return count_crossings(self.arms[one], first, self.arms[two], second)
+
+    def with_obstacles(self, robot: int, lines: FloatArray) -> np.ndarray:
+        """Count configurations in an obstacle for every individual of a population, (N,)."""
+        if not len(self.obstacles.kind):
+            return np.zeros(lines.shape[2], dtype=np.int64)
+        if self.enveloped:
+            return count_enveloped_obstacle_collisions(
+                self._enveloped(robot), lines, self.obstacles
+            )
+        return count_obstacle_collisions(self.arms[robot], lines, self.obstacles)
+
+    def _enveloped(self, robot: int) -> EnvelopedArm:
+        return EnvelopedArm(self.arms[robot], self.half_width, self.tcp_radius)
+
+
+def _pairs_of_joints(assembly: Assembly) -> list[tuple[int, int]]:
+    """Return first and one-past-last joint of every robot.
+
+    Which must have two and turn in the plane.
+    """
+    slices = [(int(first), int(stop)) for first, stop in assembly.arm_slices]
+    flat = assembly.table.planar and all(stop - first == 2 for first, stop in slices)
+    links = [link for link in assembly.links if not link.is_tool]
+    straight = flat and all(not link.start.any() and not link.end[1:].any() for link in links)
+    turned = [bool(assembly.table.turned[k]) for k in range(len(assembly.table.parent))]
+    if not straight or any(turned):
+        must = "planar arms of two links with base_angle 0"
+        raise SettingError(
+            "robot", must, ", ".join(f"{stop - first} joints" for first, stop in slices)
+        )
+    return slices
+
+
+def _arm(assembly: Assembly, first: int) -> Arm:
+    base = assembly.table.translation[first]
+    lengths = [
+        float(link.end[0])
+        for link in assembly.links
+        if link.joint - 1 in (first, first + 1) and not link.is_tool
+    ]
+    return Arm((float(base[0]), float(base[1])), (lengths[0], lengths[1]))

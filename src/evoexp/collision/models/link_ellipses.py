@@ -1,0 +1,191 @@
+"""The collision model of Lavoie & Boudreau 2001.
+
+A planar arm's links as lines among ellipses, along a whole path.
+"""
+
+from typing import ClassVar, Literal, NamedTuple
+
+import numpy as np
+
+from evoexp.collision.models.ellipse_kernels import first_contact, paths_collide
+from evoexp.errors import SettingError
+from evoexp.records import FloatArray
+from evoexp.robots.assembly import Assembly
+from evoexp.robots.planar_ends import PlanarArm, planar_arm
+from evoexp.scenarios.obstacles import ELLIPSE, ObstacleTable
+from evoexp.validation import Component, Count
+
+NUM_FIRST = 1  # positions tested before chords are swept, so that few blocks go all the way
+
+
+class LinkEllipses(Component):
+    """Positions and chords along a straight joint-space path, tested exactly; contact is collision.
+
+    Attributes:
+        num_positions: M of Eq. 3: equally spaced positions that are tested, the end included, the
+            start not.
+        swept: Whether the chord of every link end from one position to the next must be free, too.
+        blind: Whether obstacles are ignored (a control: its solutions must collide).
+    """
+
+    component: ClassVar[str] = "link_ellipses"
+
+    num_positions: Count
+    swept: Literal["none", "chords"]
+    blind: bool = False
+
+    def bind(self, assembly: Assembly, obstacles: ObstacleTable) -> "EllipseCollision":
+        """Return the model of an arm among obstacles.
+
+        Raises:
+            SettingError: If the robot is no single planar arm of thin links, or an obstacle no
+                ellipse in its plane.
+        """
+        arm = planar_arm(assembly)
+        if thick := [link.radius for link in assembly.links if link.radius > 0.0]:
+            raise SettingError(
+                "robot.link_radius", "0: this collision model knows links as lines", thick[0]
+            )
+        for k, (kind, center) in enumerate(zip(obstacles.kind, obstacles.center, strict=True)):
+            if kind != ELLIPSE or center[2] != 0.0:
+                raise SettingError(
+                    f"scenario.obstacles[{k}].shape", "an ellipse in the plane z = 0", int(kind)
+                )
+        seen = 0 if self.blind else len(obstacles.kind)
+        rows = list(zip(*obstacles[1:], strict=True))[:seen]
+        maps = np.array([_to_unit_circle(*row) for row in rows]).reshape(-1, 5)
+        reached = np.array([_first_link(arm, *row) for row in rows], dtype=np.int64)
+        return EllipseCollision(
+            arm, (maps, reached), self.num_positions, self.swept == "chords", obstacles
+        )
+
+
+class Contact(NamedTuple):
+    """Where a path first touches.
+
+    Attributes:
+        position: j of Eq. 3.
+        obstacle: Counted from 1.
+        link: Link, or link end if it was swept, counted from 1.
+        swept: Whether it is the chord of a link end, between position j − 1 and j, that touches.
+    """
+
+    position: int
+    obstacle: int
+    link: int
+    swept: bool
+
+
+class EllipseCollision(NamedTuple):
+    """An arm among ellipses.
+
+    Attributes:
+        arm: Link lengths and base.
+        ellipses: See `ellipse_kernels.paths_collide`.
+        num_positions: M.
+        chords: Whether chords are swept.
+        obstacles: The obstacle table.
+    """
+
+    arm: PlanarArm
+    ellipses: tuple[FloatArray, np.ndarray]
+    num_positions: int
+    chords: bool
+    obstacles: ObstacleTable
+
+    @property
+    def path(self) -> tuple[int, np.ndarray, bool]:
+        """M; the positions tested first, the end, then halves, quarters, ….
+
+        Whether all follow, with chords swept.
+        """
+        first = _spread(self.num_positions)
+        return self.num_positions, first[:NUM_FIRST] if self.chords else first, self.chords
+
+    @property
+    def queries(self) -> int:
+        """Configurations that judging one path asks for; none if there is nothing to meet."""
+        return self.num_positions if len(self.ellipses[0]) else 0
+
+    def collide(self, starts: FloatArray, ends: FloatArray) -> np.ndarray:
+        """Return which paths collide, (individuals,).
+
+        Args:
+            starts: (N, individuals) relative joint angles [rad].
+            ends: (N, individuals).
+
+        Raises:
+            ValueError: If their shapes are others.
+        """
+        num = len(self.arm[0])
+        if starts.shape != ends.shape or starts.ndim != 2 or len(starts) != num:
+            raise ValueError(
+                f"starts and ends must be ({num}, individuals), were {starts.shape} and "
+                f"{ends.shape}"
+            )
+        lanes = np.arange(starts.shape[1])
+        hit = np.zeros(len(lanes), dtype=np.bool_)
+        starts, ends = (np.ascontiguousarray(q, dtype=np.float64) for q in (starts, ends))
+        paths_collide(starts, ends, lanes, len(lanes), self.arm, self.ellipses, self.path, hit)
+        return hit
+
+    def contact(self, start: FloatArray, end: FloatArray) -> Contact | None:
+        """Return the first contact of one path between postures (N,) [rad].
+
+        None if there is none.
+        """
+        start, end = (np.ascontiguousarray(q, dtype=np.float64) for q in (start, end))
+        position, obstacle, link, swept = first_contact(
+            start, end, self.arm, self.ellipses, self.num_positions, self.chords
+        )
+        return None if position < 0 else Contact(position, obstacle + 1, link, bool(swept))
+
+
+def _to_unit_circle(
+    center: FloatArray, rotation: FloatArray, size: FloatArray
+) -> tuple[float, ...]:
+    """Return a, b, c, d, e of (x, y) → (a x + b y + c, d y + e).
+
+    Which maps an ellipse to the unit circle.
+
+    The Cholesky factor of R diag(1/a², 1/b²) Rᵀ; d follows from its determinant, without
+    cancellation.
+    """
+    (cosine, sine), one, two = (rotation[0], rotation[3]), 1.0 / size[0], 1.0 / size[1]
+    a = float(np.sqrt(cosine * one * cosine * one + sine * two * sine * two))
+    b, d = float(cosine * sine * (one * one - two * two) / a), float(one * two / a)
+    return a, b, float(-(a * center[0] + b * center[1])), d, float(-d * center[1])
+
+
+def _first_link(arm: PlanarArm, center: FloatArray, rotation: FloatArray, size: FloatArray) -> int:
+    """Return the first link (1, 2, …) whose end can reach an ellipse's bounding box.
+
+    N + 2 if none does.
+    """
+    lengths, base_x, base_y = arm[:3]
+    c, s = rotation[0], rotation[3]
+    half = np.array(
+        [
+            np.sqrt((c * size[0]) ** 2 + (s * size[1]) ** 2),
+            np.sqrt((s * size[0]) ** 2 + (c * size[1]) ** 2),
+        ]
+    )
+    off = np.maximum(np.abs(center[:2] - (base_x, base_y)) - half, 0.0)
+    nearest = float(np.sqrt(np.sum(off * off))) * (1.0 - 1e-9)
+    within = np.flatnonzero(np.cumsum(lengths) >= nearest)
+    return int(within[0]) + 1 if len(within) else len(lengths) + 2
+
+
+def _spread(num_positions: int) -> np.ndarray:
+    """Return 1 … M so that every next one is far from those before.
+
+    M, the middle, the quarters, ….
+    """
+    order, parts = [num_positions], 2
+    while len(order) < num_positions:
+        for k in range(1, parts, 2):
+            position = max(1, round(k * num_positions / parts))
+            if position not in order:
+                order.append(position)
+        parts *= 2
+    return np.array(order, dtype=np.int64)

@@ -1,0 +1,172 @@
+"""Collisions of planar arms of two links with envelopes around them.
+
+Whole populations against each other.
+
+Curkovic, Jerbic & Stipancic 2013, section 4: each link is a set of two boundary lines, parallel to
+it, and a circle of variable radius lies around the tool centre point (Fig. 11). Two arms collide in
+a configuration if a boundary line of one has a point in common with a boundary line of the other,
+or a circle of one is nearer to a boundary line of the other than its radius, or to its circle than
+both radii. Boundary lines have no ends across: an arm may lie between another's two lines
+unnoticed, as in the paper. Without width and radius this is `link_crossings`.
+
+The lines are decided exactly, as given by `EnvelopedArm.boundaries`; distances in double precision.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evoexp.collision.models import link_envelope_kernels as kernels
+from evoexp.collision.models.link_crossings import (
+    Arm,
+    Crossings,
+    IntArray,
+    changed_members,
+    checked,
+    checked_pair,
+    everyone,
+    no_crossings,
+)
+from evoexp.records import FloatArray
+
+
+class EnvelopedArm(NamedTuple):
+    """A planar arm of two links, and what surrounds it.
+
+    Attributes:
+        arm: The arm.
+        half_width: Distance of both boundary lines from their link [length unit of the scene].
+        tcp_radius: Of the circle around the tip [length unit of the scene]; 0: no circle.
+    """
+
+    arm: Arm
+    half_width: float
+    tcp_radius: float
+
+    def outlines(self, q: FloatArray) -> FloatArray:
+        """Return elbow x, y, tip x, y [length unit of the scene].
+
+        And the links' unit directions x, y, x, y.
+
+        Args:
+            q: (K, 2, N) angles of the links from +x [rad].
+
+        Returns:
+            (K, 8, N).
+
+        Raises:
+            ValueError: If q has another shape.
+        """
+        q = checked("q", q, 2)
+        out = np.empty((q.shape[0], 8, q.shape[2]))
+        base_x, base_y = self.arm.base
+        kernels.outlines(q, float(base_x), float(base_y), tuple(map(float, self.arm.lengths)), out)
+        return out
+
+    def boundaries(self, outlines: FloatArray) -> FloatArray:
+        """Return the boundary lines: right and left of the first link.
+
+        Right and left of the second.
+
+        Args:
+            outlines: (K, 8, N).
+
+        Returns:
+            (4, 4, K, N): of each line its ends' x, y, x, y [length unit of the scene].
+        """
+        outlines = checked("outlines", outlines, 8)
+        base = np.zeros(outlines[:, 0].shape)
+        ends = [
+            base + self.arm.base[0],
+            base + self.arm.base[1],
+            *(outlines[:, row] for row in range(4)),
+        ]
+        lines = []
+        for link in (0, 1):
+            c, s = outlines[:, 4 + 2 * link], outlines[:, 5 + 2 * link]
+            for side in (-1.0, 1.0):
+                x, y = -(side * self.half_width * s), side * self.half_width * c
+                first, second = ends[2 * link : 2 * link + 2], ends[2 * link + 2 : 2 * link + 4]
+                lines.append([first[0] + x, first[1] + y, second[0] + x, second[1] + y])
+        return np.array(lines)
+
+
+def count_collisions(
+    one: EnvelopedArm, outlines_1: FloatArray, two: EnvelopedArm, outlines_2: FloatArray
+) -> Crossings:
+    """Count the configurations in which arms collide, for every pair of individuals.
+
+    Args:
+        one: Arm of population 1.
+        outlines_1: (K, 8, N1) from `EnvelopedArm.outlines`.
+        two: Arm of population 2.
+        outlines_2: (K, 8, N2), the same configurations.
+
+    Raises:
+        ValueError: If the shapes do not fit, there are more than 32767 configurations, something is
+            not finite, or a half width or radius is negative.
+    """
+    outlines_1, outlines_2 = checked_pair("outlines", outlines_1, outlines_2, 8)
+    found = no_crossings(outlines_1.shape[2], outlines_2.shape[2])
+    _update(found, one, outlines_1, two, outlines_2, *everyone(found))
+    return found
+
+
+def update_collisions(
+    crossings: Crossings,
+    one: EnvelopedArm,
+    outlines_1: FloatArray,
+    two: EnvelopedArm,
+    outlines_2: FloatArray,
+    changed_1: NDArray[np.bool_],
+    changed_2: NDArray[np.bool_],
+) -> None:
+    """Count anew, in place, the pairs of which at least one individual changed.
+
+    See `update_crossings`.
+
+    Args:
+        crossings: Of the outlines before, altered.
+        one: Arm of population 1.
+        outlines_1: (K, 8, N1) now.
+        two: Arm of population 2.
+        outlines_2: (K, 8, N2) now.
+        changed_1: (N1,) true where an individual of population 1 has another outline than before.
+        changed_2: (N2,) the same of population 2.
+
+    Raises:
+        ValueError: As `count_collisions`; nothing is altered then.
+    """
+    outlines_1, outlines_2 = checked_pair("outlines", outlines_1, outlines_2, 8)
+    members = changed_members(
+        crossings, outlines_1.shape[2], outlines_2.shape[2], changed_1, changed_2
+    )
+    _update(crossings, one, outlines_1, two, outlines_2, *members)
+
+
+def _update(
+    found: Crossings,
+    one: EnvelopedArm,
+    outlines_1: FloatArray,
+    two: EnvelopedArm,
+    outlines_2: FloatArray,
+    *members: IntArray,
+) -> None:
+    rows, others, columns = members
+    arms = []
+    for name, enveloped in (("one", one), ("two", two)):
+        (base, lengths), half_width, radius = enveloped
+        if not np.isfinite([*base, *lengths, half_width, radius]).all():
+            raise ValueError(f"{name} must be finite, was {enveloped}")
+        if half_width < 0.0 or radius < 0.0:
+            raise ValueError(
+                f"{name}: half_width and tcp_radius must be at least 0, were {half_width} and "
+                f"{radius}"
+            )
+        arms.append(
+            (tuple(map(float, base)), tuple(map(float, lengths)), float(half_width), float(radius))
+        )
+    if not (np.isfinite(outlines_1).all() and np.isfinite(outlines_2).all()):
+        raise ValueError("outlines must be finite")
+    kernels.collisions(arms[0], outlines_1, rows, others, arms[1], outlines_2, columns, *found)

@@ -1,0 +1,251 @@
+"""Robots as spheres and capsules, among obstacles of all kinds: the kernels in three dimensions.
+
+Any Pinocchio model whose joints have one coordinate, any number of arms; the kernels are in
+`primitive_kernels`. A body is all shapes that move with one joint, or what is told apart of them.
+Angles are radians here, as in Pinocchio.
+"""
+
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import coal
+import numpy as np
+
+from evoexp.collision.models.primitive_kernels import BETWEEN, SELF, primitive_clearances
+from evoexp.collision.models.primitive_tables import (
+    PackedObstacles,
+    PackedShapes,
+    Pairs,
+    Shapes,
+    Units,
+    num_spheres,
+    pack_obstacles,
+    pack_shapes,
+)
+from evoexp.records import FloatArray
+from evoexp.robots.kinematics import KinematicTable, kinematic_table
+from evoexp.scenarios.obstacles import ObstacleTable
+
+
+class Clearances(NamedTuple):
+    """Least clearances of a batch.
+
+    Negative where shapes overlap, +inf where there is nothing to meet.
+
+    Attributes:
+        to_obstacles: (configurations,) least distance of the robot's shapes to obstacles [length
+            unit].
+        between_arms: (configurations,) least distance of shapes of two arms.
+        to_self: (configurations,) least distance of shapes of one arm.
+    """
+
+    to_obstacles: FloatArray
+    between_arms: FloatArray
+    to_self: FloatArray
+
+    @property
+    def least(self) -> FloatArray:
+        """Smallest of the three; a configuration collides where it is negative."""
+        return np.minimum(np.minimum(self.to_obstacles, self.between_arms), self.to_self)
+
+
+def shapes_of_geometry(geometry: Any) -> Shapes:
+    """Return the shapes of a `pin.GeometryModel` that holds coal spheres and capsules.
+
+    Raises:
+        ValueError: If an object has another shape.
+    """
+    joint, start, end, radius = [], [], [], []
+    for one in geometry.geometryObjects:
+        half = one.geometry.halfLength if isinstance(one.geometry, coal.Capsule) else 0.0
+        if not isinstance(one.geometry, coal.Sphere | coal.Capsule):
+            kind = type(one.geometry).__name__
+            raise ValueError(
+                f"geometry: object '{one.name}' must be a coal.Sphere or a coal.Capsule, is a "
+                f"{kind}"
+            )
+        center, along = one.placement.translation, half * one.placement.rotation[:, 2]
+        joint.append(int(one.parentJoint))
+        start.append(center - along)
+        end.append(center + along)
+        radius.append(float(one.geometry.radius))
+    return Shapes(np.array(joint, dtype=np.int64), np.array(start), np.array(end), np.array(radius))
+
+
+def default_pairs(model: Any, joints: Iterable[int]) -> tuple[tuple[int, int], ...]:
+    """Return all pairs of different joints of which neither is the other's parent."""
+    own = sorted({int(joint) for joint in joints})
+    apart = ((a, b) for k, a in enumerate(own) for b in own[k + 1 :])
+    return tuple((a, b) for a, b in apart if model.parents[b] != a and model.parents[a] != b)
+
+
+def arms_of_joints(model: Any) -> tuple[int, ...]:
+    """Return which arm each joint belongs to, the world included as −1.
+
+    The trees that start at the world, counted.
+    """
+    arms, count = [-1], 0
+    for joint in range(1, model.njoints):
+        root = model.parents[joint] == 0
+        arms.append(count if root else arms[model.parents[joint]])
+        count += root
+    return tuple(arms)
+
+
+class PrimitiveCollision(NamedTuple):
+    """Spheres and capsules on one robot, the obstacles around it, and what is checked against what.
+
+    Attributes:
+        table: The kinematic table of the model.
+        joints: (bodies,) the Pinocchio joint of each body.
+        units: Bodies, then their parts, as the kernels read them.
+        shapes: Of the units.
+        obstacles: The obstacles, and which body is checked against which.
+        pairs: (pairs, 3) two units, and the row of the result that they count for.
+        tables: All this as the kernel `primitive_clearances` reads it: plain tuples of arrays.
+    """
+
+    table: KinematicTable
+    joints: np.ndarray
+    units: Units
+    shapes: PackedShapes
+    obstacles: PackedObstacles
+    pairs: np.ndarray
+    tables: tuple[Any, ...]
+
+    @classmethod
+    def build(
+        cls,
+        model: Any,
+        shapes: Shapes,
+        obstacles: ObstacleTable,
+        pairs: Pairs | None = None,
+        ignored: Pairs = (),
+        arms: Sequence[int] | None = None,
+    ) -> "PrimitiveCollision":
+        """Return the collision model of a robot among obstacles, ready for batches.
+
+        Args:
+            model: `pin.Model` whose joints have one coordinate each.
+            shapes: Its spheres and capsules; those of the world (a pedestal) are checked against
+                bodies only.
+            obstacles: The obstacle table.
+            pairs: Bodies that are checked against each other, by their numbers (the joints', unless
+                shapes have others); `default_pairs` if not given.
+            ignored: Pairs (body, obstacle) that are not checked: the floor that the first link
+                stands on.
+            arms: Which arm each joint of the model belongs to, the world included; `arms_of_joints`
+                if not given. Negative numbers belong to every arm.
+
+        Raises:
+            UnsupportedJoint: If a joint has not exactly one coordinate.
+            ValueError: If shapes, pairs or arms do not fit the model.
+        """
+        shapes, table = shapes.checked(model), kinematic_table(model)
+        numbers, first = np.unique(shapes.labels, return_index=True)
+        joints = shapes.joint[first]
+        units, packed, parts = pack_shapes(table, shapes, numbers, joints)
+        chosen = (
+            default_pairs(model, joints)
+            if pairs is None
+            else tuple((int(a), int(b)) for a, b in pairs)
+        )
+        arm = arms_of_joints(model) if arms is None else tuple(arms)
+        if len(arm) != model.njoints:
+            raise ValueError(
+                f"arms must have one number per joint of the model, {model.njoints}, had {len(arm)}"
+            )
+        around, units.whole[: len(joints), 5:] = pack_obstacles(
+            obstacles, numbers, joints, tuple(ignored)
+        )
+        rows = _pair_table(numbers, chosen, [arm[joint] for joint in joints], parts, units, packed)
+        tables = (table[:6], tuple(units), tuple(packed), tuple(around), rows)
+        return cls(table, joints, units, packed, around, rows, tables)
+
+    @classmethod
+    def from_geometry(
+        cls,
+        model: Any,
+        geometry: Any,
+        obstacles: ObstacleTable,
+        pairs: Pairs | None = None,
+        ignored: Pairs = (),
+        arms: Sequence[int] | None = None,
+    ) -> "PrimitiveCollision":
+        """Return the same for a `pin.GeometryModel` that holds coal spheres and capsules.
+
+        See `build`.
+        """
+        return cls.build(model, shapes_of_geometry(geometry), obstacles, pairs, ignored, arms)
+
+    def clearance(self, q: FloatArray, limit: float = np.inf) -> Clearances:
+        """Return the clearances of a batch of configurations.
+
+        They are exact, but for a capsule whose axis enters a box or a cylinder: there some value ≤
+        −radius stands.
+
+        Args:
+            q: (nq, configurations) [rad], lengths for prismatic joints. NaN where q holds NaN.
+            limit: Above it nothing is asked: a clearance is exact where it is less, elsewhere it is
+                the limit.
+
+        Raises:
+            ValueError: If q has another number of rows than the model has coordinates, or the limit
+                is NaN.
+        """
+        if np.isnan(limit):
+            raise ValueError("limit must be a number, was nan")
+        out = self._rows(q)
+        primitive_clearances(*self.tables, float(limit), False, *out)
+        return Clearances(*out[1])
+
+    def collides(self, q: FloatArray) -> np.ndarray:
+        """Return which configurations collide, (configurations,).
+
+        The sign of `clearance`, for less; true for NaN.
+
+        Raises:
+            ValueError: If q has another number of rows than the model has coordinates.
+        """
+        out = self._rows(q)
+        primitive_clearances(*self.tables, 0.0, True, *out)
+        return np.asarray(~(out[1][0] >= 0.0))  # all rows say the same
+
+    def _rows(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+        num_joints = len(self.table.parent)
+        q = np.ascontiguousarray(q, dtype=np.float64)
+        if q.ndim != 2 or q.shape[0] != num_joints:
+            raise ValueError(f"q must have shape ({num_joints}, configurations), was {q.shape}")
+        return q, np.empty((3, q.shape[1]))
+
+
+def _pair_table(
+    numbers: np.ndarray,
+    pairs: tuple[tuple[int, int], ...],
+    arms: Sequence[int],
+    parts: list[list[int]],
+    units: Units,
+    shapes: PackedShapes,
+) -> np.ndarray:
+    """Return all pairs of parts of the bodies that are paired.
+
+    The part with more spheres stays in its frame.
+    """
+    body = {int(number): k for k, number in enumerate(numbers)}
+    rows: list[tuple[int, int, int]] = []
+    for one, two in pairs:
+        if one not in body or two not in body or one == two:
+            raise ValueError(
+                f"pairs must hold two different joints of {numbers.tolist()} each, was {(one, two)}"
+            )
+        arm, other = arms[body[one]], arms[body[two]]
+        between = arm != other and arm >= 0 and other >= 0
+        for a in parts[body[one]]:
+            for b in parts[body[two]]:
+                more, fewer = (
+                    (a, b)
+                    if num_spheres(units, shapes, a) >= num_spheres(units, shapes, b)
+                    else (b, a)
+                )
+                rows.append((more, fewer, BETWEEN if between else SELF))
+    return np.array(rows, dtype=np.int64).reshape(-1, 3)

@@ -1,0 +1,226 @@
+"""Links as strings of touching circles or spheres (Rana & Zalzala 1995, Fig. 3).
+
+Any number of arms, in the plane or in space, among static obstacles; the kernels are in
+`sphere_kernels`.
+"""
+
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from evoexp.collision.models.sphere_kernels import clearances
+from evoexp.errors import SettingError
+from evoexp.records import FloatArray
+from evoexp.robots.assembly import Assembly, sphere_geometry
+from evoexp.scenarios.obstacles import ObstacleTable, obstacle_table
+from evoexp.validation import Component, Count, Positive
+
+
+class TouchingSpheres(Component):
+    """The collision model of Rana & Zalzala.
+
+    Spheres on every link that moves (section 4.1 leaves out the columns).
+
+    Attributes:
+        spheres_per_link: Centres at equal distances from joint to joint, both ends included.
+        sphere_radius: Of every sphere [length unit]; two arms collide when centres are closer than
+            the sum of radii.
+        collision_substeps: Configurations tested per segment of a path; 1: the via-points only, as
+            in the paper.
+    """
+
+    component: ClassVar[str] = "touching_spheres"
+
+    spheres_per_link: Count
+    sphere_radius: Positive
+    collision_substeps: Count
+
+    def bind(self, assembly: Assembly, obstacles: tuple[Any, ...]) -> "SphereCollision":
+        """Return the model of a robot among obstacles, ready for batches.
+
+        Raises:
+            SettingError: If an obstacle is an ellipse, or a robot has a tool.
+        """
+        if any(link.is_tool for link in assembly.links):
+            raise SettingError(
+                "robot",
+                "without tools: circles of one size cannot show them",
+                "tool_radius above 0",
+            )
+        spheres = [
+            sphere
+            for link in assembly.links
+            if link.joint > 0
+            for sphere in self._of_link(assembly, link)
+        ]
+        kept = _without_repetitions(spheres)
+        joint = np.array([sphere.joint - 1 for sphere in kept], dtype=np.int64)
+        local = np.array([assembly.table.local(sphere.joint, sphere.center) for sphere in kept])
+        arms = np.array([sphere.arm for sphere in kept])
+        links = np.cumsum(np.diff(joint, prepend=joint[0]) != 0)
+        link_arms = np.array([arms[np.argmax(links == k)] for k in range(links[-1] + 1)])
+        return SphereCollision(
+            assembly,
+            joint,
+            local,
+            _ranges(arms, assembly.num_arms),
+            _bounds(
+                joint, local, _ranges(links, links[-1] + 1), _ranges(link_arms, assembly.num_arms)
+            ),
+            self.sphere_radius,
+            obstacle_table(obstacles).without_ellipses(),
+            sphere_geometry(
+                assembly,
+                np.array([sphere.center for sphere in kept]),
+                np.array([sphere.joint for sphere in kept]),
+                np.full(len(kept), self.sphere_radius),
+            ),
+        )
+
+    def _of_link(self, assembly: Assembly, link: Any) -> list["_Sphere"]:
+        fractions = (
+            np.linspace(0.0, 1.0, self.spheres_per_link)
+            if self.spheres_per_link > 1
+            else np.array([0.5])
+        )
+        centers = [link.start + f * (link.end - link.start) for f in fractions]
+        return [_Sphere(link.arm, link.joint, center, assembly) for center in centers]
+
+
+class _Sphere(NamedTuple):
+    arm: int
+    joint: int
+    center: FloatArray
+    assembly: Assembly
+
+    def repeats(self, other: "_Sphere") -> bool:
+        """Whether it is the end of the other's link, at the joint that both share.
+
+        The same point for every q.
+        """
+        model = self.assembly.model
+        if self.arm != other.arm or model.parents[self.joint] != other.joint or self.center.any():
+            return False
+        return bool(np.array_equal(model.jointPlacements[self.joint].translation, other.center))
+
+
+class _Bounds(NamedTuple):
+    """A ball around the centres of every link's spheres.
+
+    Attributes:
+        joint: (links,) index into the kinematic table.
+        local: (links, 3) in the table's frames.
+        radius: (links,) greatest distance of a centre.
+        spheres: (links, 2) first and one-past-last sphere of each link.
+        arm_links: (arms, 2) first and one-past-last link of each arm.
+    """
+
+    joint: np.ndarray
+    local: FloatArray
+    radius: FloatArray
+    spheres: np.ndarray
+    arm_links: np.ndarray
+
+
+def _bounds(
+    joint: np.ndarray, local: FloatArray, spheres: np.ndarray, arm_links: np.ndarray
+) -> _Bounds:
+    middle = np.array([0.5 * (local[a:b].min(axis=0) + local[a:b].max(axis=0)) for a, b in spheres])
+    squares = [
+        ((local[a:b] - center) ** 2).sum(axis=1).max()
+        for (a, b), center in zip(spheres, middle, strict=True)
+    ]
+    return _Bounds(joint[spheres[:, 0]], middle, np.sqrt(squares), spheres, arm_links)
+
+
+def _ranges(owners: np.ndarray, count: int) -> np.ndarray:
+    """Return (count, 2): where each owner's run begins and ends in a sorted list of owners."""
+    return np.array(
+        [
+            [np.searchsorted(owners, k), np.searchsorted(owners, k, side="right")]
+            for k in range(count)
+        ]
+    )
+
+
+def _without_repetitions(spheres: list[_Sphere]) -> list[_Sphere]:
+    return [s for k, s in enumerate(spheres) if not any(s.repeats(other) for other in spheres[:k])]
+
+
+class Clearance(NamedTuple):
+    """Least clearances of a batch.
+
+    Negative where spheres overlap, +inf where there is nothing to meet.
+
+    Attributes:
+        between_arms: (configurations,) least centre distance of spheres of two arms, less both
+            radii.
+        to_obstacles: (configurations,) least distance of a centre to an obstacle's surface, less
+            the radius.
+    """
+
+    between_arms: FloatArray
+    to_obstacles: FloatArray
+
+    @property
+    def least(self) -> FloatArray:
+        """Smaller of the two; a configuration collides where it is negative."""
+        return np.minimum(self.between_arms, self.to_obstacles)
+
+
+class SphereCollision(NamedTuple):
+    """Touching spheres on one robot, and the obstacles around it.
+
+    Attributes:
+        assembly: The robot.
+        sphere_joint: (spheres,) index into the kinematic table, arm by arm.
+        sphere_local: (spheres, 3) centres in the table's frames.
+        arm_spheres: (arms, 2) first and one-past-last sphere of each arm.
+        bounds: Balls around the spheres of each link.
+        radius: Of every sphere.
+        obstacles: The obstacle table.
+        geometry: The same spheres as a `pin.GeometryModel` of coal spheres.
+    """
+
+    assembly: Assembly
+    sphere_joint: np.ndarray
+    sphere_local: FloatArray
+    arm_spheres: np.ndarray
+    bounds: _Bounds
+    radius: float
+    obstacles: ObstacleTable
+    geometry: Any
+
+    def clearance(self, q: FloatArray, limit: float = np.inf) -> Clearance:
+        """Return the clearances of a batch of configurations.
+
+        Args:
+            q: (nq, configurations) [deg].
+            limit: Above it nothing is asked: a clearance is exact where it is less, elsewhere some
+                value not below it. With 0 the signs are right, and what is far apart is skipped.
+
+        Raises:
+            ValueError: If q has another number of rows than the robot has joints.
+        """
+        table = self.assembly.table
+        q = np.ascontiguousarray(q, dtype=np.float64)
+        if q.ndim != 2 or q.shape[0] != len(table.parent):
+            raise ValueError(
+                f"q must have shape ({len(table.parent)}, configurations), was {q.shape}"
+            )
+        out = np.empty((2, q.shape[1]))
+        clearances(self.tables, limit, q, out)
+        return Clearance(out[0], out[1])
+
+    @property
+    def tables(self) -> tuple[Any, ...]:
+        """What the kernel `clearances` reads, as plain tuples of arrays."""
+        table = self.assembly.table
+        spheres = (self.sphere_joint, self.sphere_local, self.radius)
+        return (
+            table[:6],
+            None if table.planar else True,
+            spheres,
+            tuple(self.bounds),
+            tuple(self.obstacles),
+        )

@@ -1,0 +1,216 @@
+"""Which motions a command is about: stored replicates, logs, or a motion of the user's own."""
+
+import argparse
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+from evoexp import shipped
+from evoexp.commands.evaluate import flatten, motion_file, read_motion, shape_text
+from evoexp.commands.hashes import with_candidates
+from evoexp.configuration import expansions
+from evoexp.errors import (
+    EvoexpError,
+    MotionFileError,
+    NothingStored,
+    RevisionMismatch,
+    SettingError,
+    UnknownHash,
+)
+from evoexp.playback.recording import Heading, Recording, record
+from evoexp.playback.stored import CHOICES, chosen_log, stored_recording
+from evoexp.playback.timing import SpeedLimits
+from evoexp.store.files import write_file
+from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
+
+FOLDER = "motions"  # of the outputs
+MANY = 4  # motions on one page
+
+
+def add_motion_arguments(parser: argparse.ArgumentParser, ending: str) -> None:
+    """Declare what chooses motions, how fast they are, and where they go."""
+    parser.add_argument(
+        "what",
+        nargs="+",
+        metavar="HASH | LOG.mcap | MOTION KEY=VALUE",
+        help="any unique prefix of a run's hash, or a replicate's log; or a motion file (.json, "
+        ".npy) in the planner's documented shape, as for evaluate, with an experiment",
+    )
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--replicate", type=int, metavar="K", help="this replicate of the run")
+    for name, text in zip(
+        CHOICES,
+        ("of least cost (the default)", "of greatest cost", "first refuted one"),
+        strict=True,
+    ):
+        which.add_argument(
+            f"--{name}",
+            dest="choice",
+            action="store_const",
+            const=name,
+            help=f"the replicate: {text}",
+        )
+    parser.add_argument(
+        "--only", default="", metavar="LABEL", help="of an experiment's conditions, this one"
+    )
+    parser.add_argument(
+        "--turn-speed", type=float, default=45.0, metavar="DEG/S", help="limit of joints that turn"
+    )
+    parser.add_argument(
+        "--slide-speed", type=float, metavar="UNIT/S", help="limit of joints that slide"
+    )
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar=f"FILE{ending}", help="by default in outputs/motions/"
+    )
+
+
+def recordings(arguments: argparse.Namespace) -> list[Recording]:
+    """Return the motions that the arguments choose, in their order.
+
+    Raises:
+        EvoexpError: One line says what is wrong.
+    """
+    words: list[str] = arguments.what
+    limits = speed_limits(arguments)
+    if any("=" in word for word in words):
+        return _own(words, arguments.only, limits)
+    if len(words) > MANY:
+        raise MotionFileError(f"motions: at most {MANY} go together, got {len(words)}")
+    runs = [_run(word) for word in words]
+    titles = _titles([run for run in runs if isinstance(run, RunDirectory)])
+    return [
+        stored_recording(run, run.name, limits)
+        if isinstance(run, Path)
+        else _stored(run, titles, arguments, limits)
+        for run in runs
+    ]
+
+
+def single(arguments: argparse.Namespace) -> Recording:
+    """Return the one motion that the arguments choose.
+
+    Raises:
+        MotionFileError: If it is not one.
+    """
+    found = recordings(arguments)
+    if len(found) != 1:
+        raise MotionFileError(f"motion: one at a time, got {len(found)}; choose with --only LABEL")
+    return found[0]
+
+
+def output_path(arguments: argparse.Namespace, found: list[Recording], ending: str) -> Path:
+    """Return where the file goes."""
+    if arguments.output is not None:
+        return Path(arguments.output)
+    files = [
+        word
+        for word in arguments.what
+        if "=" not in word and any("=" in other for other in arguments.what)
+    ]
+    names = (
+        [f"{r.condition_id[:12]}-{r.heading.replicate:04d}" for r in found]
+        if not files
+        else [Path(files[0]).stem]
+    )
+    return outputs_root() / FOLDER / ("+".join(names) + ending)
+
+
+def write(path: Path, content: bytes) -> None:
+    """Write a file whole or not at all, and say where it is and how large."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_file(path, content)
+    size = len(content) / 1000
+    print(f"{path}  ({f'{size / 1000:.2f} MB' if size >= 1000 else f'{size:.0f} kB'})")
+
+
+def speed_limits(arguments: argparse.Namespace) -> SpeedLimits:
+    """Return the joints' limits.
+
+    Raises:
+        SettingError: If one is not above 0.
+    """
+    for name in ("turn_speed", "slide_speed"):
+        value = getattr(arguments, name)
+        if value is not None and not 0.0 < value < math.inf:
+            raise SettingError(f"--{name.replace('_', '-')}", "greater than 0", value)
+    return SpeedLimits(math.radians(arguments.turn_speed), arguments.slide_speed)
+
+
+def _run(word: str) -> RunDirectory | Path:
+    """Return the run that a hash names, or the path of a log."""
+    path = Path(word)
+    if path.suffix == ".mcap" or path.is_file():
+        return path
+    try:
+        return resolve(outputs_root(), word)
+    except UnknownHash as error:
+        raise _not_here(word, error) from None
+
+
+def _stored(
+    run: RunDirectory, titles: Mapping[str, str], arguments: argparse.Namespace, limits: SpeedLimits
+) -> Recording:
+    choice = (
+        arguments.replicate if arguments.replicate is not None else arguments.choice or CHOICES[0]
+    )
+    try:
+        return stored_recording(chosen_log(run, choice), titles[run.condition_id], limits)
+    except RevisionMismatch as error:
+        known = run.manifest().get("command", "evoexp run experiment=…")
+        raise RevisionMismatch(
+            f"run {run.hash12}: {error}; run it anew with what is installed: {known}"
+        ) from None
+
+
+def _not_here(word: str, error: UnknownHash) -> EvoexpError:
+    found = shipped.find(word)
+    if len(found) == 1:
+        return NothingStored(
+            f"condition {found[0].condition_id[:12]}: not run here; run it: {found[0].command}"
+        )
+    return with_candidates(error, outputs_root())
+
+
+def _titles(runs: list[RunDirectory]) -> dict[str, str]:
+    """Return what to call runs: an experiment that has all of them, and their labels in it.
+
+    Else what they ran as.
+    """
+    names: dict[str, dict[str, str]] = {run.condition_id: {} for run in runs}
+    for row in shipped.shipped() if len(names) > 1 else ():
+        if row.condition_id in names:
+            names[row.condition_id].setdefault(row.experiment, row.label)
+    common = set.intersection(*(set(labels) for labels in names.values())) if names else set()
+    if common:
+        first = next(name for name in next(iter(names.values())) if name in common)
+        return {
+            condition_id: f"{first} · {labels[first]}" for condition_id, labels in names.items()
+        }
+    found = {}
+    for run in runs:
+        manifest = run.manifest()
+        words = [str(manifest[name]) for name in ("experiment", "label") if manifest.get(name)]
+        found[run.condition_id] = " · ".join(dict.fromkeys(words)) or run.hash12
+    return found
+
+
+def _own(words: list[str], only: str, limits: SpeedLimits) -> list[Recording]:
+    """Return a motion of the user's own in every condition that it fits."""
+    overrides, path = motion_file(words)
+    values = read_motion(path)
+    found: list[Recording] = []
+    misfits: list[str] = []
+    for experiment in expansions.expand(overrides, only=(only,) if only else ()):
+        for label, condition in experiment.conditions:
+            planner, problem = condition.prepare()
+            shape = planner.shape(problem)
+            solution = flatten(values, shape)
+            if solution is None:
+                misfits.append(f"{label}: {shape_text(shape)}")
+            elif len(found) < MANY:
+                found.append(record(condition, solution, Heading(f"{path.name} · {label}"), limits))
+    if not found:
+        raise MotionFileError(
+            f"{path}: must be {'; '.join(dict.fromkeys(misfits))} (start and goal included)"
+        )
+    return found

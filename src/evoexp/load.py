@@ -1,0 +1,105 @@
+"""The Python door: stored results as pandas frames."""
+
+import re
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import NamedTuple
+
+import pandas as pd
+
+from evoexp.configuration import expansions
+from evoexp.configuration.experiment import options
+from evoexp.errors import NothingStored, UnknownHash, UnknownOption
+from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
+from evoexp.store.tables import read_generations, read_summaries
+
+
+class Frames(NamedTuple):
+    """Results of one or several conditions.
+
+    Attributes:
+        generations: One row per generation of every finished replicate, columns of
+            `evoexp.records.GenerationRow`.
+        summaries: One row per replicate, done or failed, columns of
+            `evoexp.records.ReplicateSummary`.
+    """
+
+    generations: pd.DataFrame
+    summaries: pd.DataFrame
+
+
+def load(
+    what: str,
+    *overrides: str,
+    budget: str = "paper",
+    multirun: bool = False,
+    outputs: Path | str | None = None,
+) -> Frames:
+    """Load results: `evoexp.load("rana_planar")`, `evoexp.load("9a95c3")`.
+
+    Args:
+        what: Name of an experiment, or any unique prefix of a run's hash.
+        overrides: Of the experiment, as on the command line.
+        budget: Of the experiment.
+        multirun: Whether overrides with commas are swept over.
+        outputs: Root of the outputs; by default `EVOEXP_OUTPUTS` or `outputs`.
+
+    Returns:
+        Frames whose column `label` names the condition as the figures do; a hash is its own label.
+
+    Raises:
+        UnknownOption: If `what` is neither.
+        UnknownHash: If it is a hash of nothing that is stored.
+        AmbiguousHash: If several runs begin with it.
+        NothingStored: If nothing of it has been run.
+    """
+    root = Path(outputs) if outputs is not None else outputs_root()
+    if what in options("experiment"):
+        experiments = expansions.expand(
+            [f"experiment={what}", f"budget={budget}", *overrides], multirun=multirun
+        )
+        labels = [(c.label, c.condition.id) for e in experiments for c in e.conditions]
+        runs = [
+            RunDirectory(root, condition_id)
+            for condition_id in dict.fromkeys(key for _, key in labels)
+        ]
+        runs = [run for run in runs if run.completed() or run.failed()]
+        if not runs:
+            raise NothingStored(
+                f"{what}: nothing stored in {root}; run it: evoexp run experiment={what}"
+            )
+    else:
+        run = _run(root, what)
+        runs, labels = [run], [(run.hash12, run.condition_id)]
+    return Frames(
+        _labelled(read_generations(runs), labels), _labelled(read_summaries(runs), labels)
+    )
+
+
+def _run(outputs: Path, what: str) -> RunDirectory:
+    try:
+        return resolve(outputs, what)
+    except UnknownHash:
+        if re.fullmatch("[0-9a-fA-F]{1,64}", what):
+            raise
+        raise UnknownOption("experiment or hash", what, options("experiment")) from None
+
+
+def _labelled(frame: pd.DataFrame, labels: list[tuple[str, str]]) -> pd.DataFrame:
+    """Add the label in front; labels that share a condition have its rows each."""
+    parts = [
+        frame[frame["condition"] == condition_id].assign(label=label)
+        for label, condition_id in labels
+    ]
+    whole = pd.concat(parts, ignore_index=True)
+    return whole[["label", *frame.columns]]
+
+
+class _CallableModule(ModuleType):
+    """`evoexp.load` names this module once it is imported: calling it calls the function."""
+
+    __call__ = staticmethod(load)
+
+
+sys.modules[__name__].__class__ = _CallableModule

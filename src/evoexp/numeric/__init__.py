@@ -1,0 +1,1 @@
+"""Bit-reproducible numbers: compilation, elementary functions, random stream, kernel cache."""

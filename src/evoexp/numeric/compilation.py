@@ -1,0 +1,79 @@
+"""How kernels are compiled: the options that every kernel shares, and arrays without counts.
+
+The options keep results bit-identical: no fastmath, no contraction, no reassociation.
+"""
+
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
+import numba
+from numba.core import cgutils, types
+from numba.extending import intrinsic
+
+from evoexp.numeric.kernel_cache import use_content_cache
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+use_content_cache()
+
+
+def kernel(function: Any) -> Any:
+    """Compile with the options that keep results bit-identical.
+
+    No fastmath, no contraction, no reassociation.
+    """
+    return numba.njit(
+        cache=True, fastmath=False, error_model="numpy", nogil=True, boundscheck=False
+    )(function)
+
+
+def inlined(function: Function) -> Function:
+    """Compile like `kernel`, and have LLVM inline every call.
+
+    A loop around a true call stays scalar.
+    """
+    options: dict[str, Any] = {
+        "error_model": "numpy",
+        "nogil": True,
+        "boundscheck": False,
+        "forceinline": True,
+    }
+    compiled: Function = numba.njit(cache=True, fastmath=False, **options)(function)
+    return compiled
+
+
+def _borrow(typing_context: Any, value: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return _without_owner(context, builder, value, arguments[0])
+
+    return value(value), generate
+
+
+def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+    if isinstance(kind, types.Array):
+        array = context.make_array(kind)(context, builder, value)
+        array.meminfo = cgutils.get_null_value(array.meminfo.type)
+        array.parent = cgutils.get_null_value(array.parent.type)
+        return array._getvalue()
+    if isinstance(kind, types.NumPyRandomGeneratorType):
+        generator = cgutils.create_struct_proxy(kind)(context, builder, value)
+        generator.meminfo = cgutils.get_null_value(generator.meminfo.type)
+        return generator._getvalue()
+    if isinstance(kind, types.BaseTuple):
+        items: Any = kind
+        for k, item in enumerate(items):
+            part = _without_owner(context, builder, item, builder.extract_value(value, k))
+            value = builder.insert_value(value, part, k)
+    return value
+
+
+borrowed: Callable[[Any], Any] = cast(Any, intrinsic(_borrow))
+"""Return arrays, generators, or tuples of them to any depth, as views that own nothing.
+
+No counting of references.
+
+numba counts a reference, atomically, wherever an array is read out of a tuple or handed on, and
+wherever a number is drawn; in a kernel that takes dozens of arrays and calls small `inlined`
+functions that is most of the time. For arguments only: their caller keeps them alive, while an
+array born in a kernel is freed where its name is last used.
+"""

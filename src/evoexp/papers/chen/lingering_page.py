@@ -1,0 +1,129 @@
+"""What the mean of Eq. 3 of Chen & Zalzala 1995 rewards.
+
+Paths that stay in safe places, with loops and without.
+"""
+
+from functools import partial
+
+import numpy as np
+
+from evoexp.papers.chen import path_measures as measures
+from evoexp.papers.chen import path_page
+from evoexp.papers.chen.figures import grid_paths, lingering
+from evoexp.papers.chen.figures.grid_paths import EXACT, MEDIAN, Line, Panel
+from evoexp.papers.chen.path_measures import Group
+from evoexp.report import markdown
+from evoexp.report.page import Drawing, Page
+from evoexp.report.pages import generic
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results import Results
+
+INTRODUCTION = (
+    "The unsafeness of a path is the mean over its nodes (Eq. 3): every further step in a safe "
+    "place lowers it. Where nodes may be passed again, the best path waits there; the cost of "
+    "its length alone ends it. The paper does not say whether nodes may be passed again; "
+    "everywhere else loops are erased. For paths with revisits the best walk is exact (dynamic "
+    "programming over the number of nodes); without them it is a bound."
+)
+
+
+def page(results: Results, settings: ReportSettings) -> Page:
+    """Return the page; the generic one where planners are others."""
+    if not measures.fits(results):
+        return generic.page(results, settings)
+    groups = measures.group_list(results)
+    return Page(
+        title=f"Chen & Zalzala 1995: {results.experiment or 'stored runs'}",
+        introduction=INTRODUCTION,
+        quantities=path_page.quantities(results, groups),
+        checks=tuple(_checks(groups)),
+        drawings=_drawings(groups),
+    )
+
+
+def _checks(groups: tuple[Group, ...]) -> list[tuple[str, str]]:
+    """Return how far paths that may pass nodes again do, and what the best ones are."""
+    rows = []
+    for free in (group for group in groups if group.revisits):
+        simple = next((g for g in groups if g.weights == free.weights and not g.revisits), None)
+        repeats = [_repeated(path) for path in measures.paths(free.main).values()]
+        told = (
+            f"{markdown.share(int(np.count_nonzero(repeats)), len(repeats))} runs pass nodes "
+            f"again, median {np.median(repeats):.0f} repeated nodes; median length "
+            f"{_length(free):.0f} cells"
+        )
+        rows.append(
+            (
+                f"{free.name}: lingering",
+                told + (f", {_length(simple):.0f} without revisits" if simple else ""),
+            )
+        )
+    return rows + [
+        (f"{group.name}: best path known", _truth(group))
+        for group in groups
+        if group.truth is not None
+    ]
+
+
+def _truth(group: Group) -> str:
+    assert group.truth is not None
+    best = measures.paths(group.truth)[0]
+    length, unsafeness, exact = (
+        float(group.truth.column(f"term_{name}")[0])
+        for name in ("distance", "unsafeness", "bound_is_reached")
+    )
+    return (
+        f"cost {group.optimum:.4g}: length {length:.4g}, mean unsafeness {unsafeness:.3g}, "
+        f"{len(best)} nodes, {_repeated(best)} of them passed before; "
+        f"{'exact' if exact else f'no path is below {group.bound:.4g}'}"
+    )
+
+
+def _length(group: Group) -> float:
+    return float(np.median(group.main.column("term_distance")))
+
+
+def _repeated(path: np.ndarray) -> int:
+    """Return how many nodes of a path were passed before."""
+    return len(path) - len(np.unique(path, axis=0))
+
+
+def _drawings(groups: tuple[Group, ...]) -> tuple[Drawing, ...]:
+    shown = tuple(c for group in groups for c in (*group.conditions, group.truth) if c is not None)
+    drawings = [
+        Drawing(
+            "paths",
+            "Paths with and without revisits",
+            "Run of median cost of the genetic algorithm, and the best path known. Lines that go "
+            "back and forth lie on each other: the next figure counts nodes.",
+            partial(grid_paths.paths_table, [_panel(group) for group in groups]),
+            grid_paths.draw_paths,
+            shown,
+        ),
+        Drawing(
+            "lingering",
+            "How many nodes lie in places of which unsafeness",
+            "Nodes of the best solution of every run: mean number per unsafeness of the node, "
+            "counted as often as they are passed.",
+            partial(
+                lingering.places_table,
+                [(group.name, group.main, _unsafeness(group)) for group in groups],
+            ),
+            lingering.draw_places,
+            tuple(group.main for group in groups),
+        ),
+    ]
+    return tuple(drawings)
+
+
+def _unsafeness(group: Group) -> np.ndarray:
+    fields = group.main.prepared.problem.fields
+    return np.asarray(fields.grid.inner(fields.unsafeness))
+
+
+def _panel(group: Group) -> Panel:
+    c, own = group.main, measures.paths(group.main)
+    lines = [Line(MEDIAN, own[measures.median_replicate(c)])]
+    if group.truth is not None:
+        lines.append(Line(EXACT, measures.paths(group.truth)[0]))
+    return Panel(group.name, c.condition.length_unit, measures.boxes(c), lines)

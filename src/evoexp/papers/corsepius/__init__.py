@@ -1,0 +1,1 @@
+"""Corsépius 2001: postures as individuals."""

@@ -1,0 +1,1 @@
+"""Curkovic, Jerbic & Stipancic 2013: co-evolution, methods I-VIII."""

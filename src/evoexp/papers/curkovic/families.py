@@ -1,0 +1,136 @@
+"""Which conditions of a sweep are compared with which, in what, and what the tests say."""
+
+from functools import partial
+from typing import Any, NamedTuple
+
+from evoexp.papers.curkovic import measures
+from evoexp.report import claims, markdown
+from evoexp.report.claims import Comparison
+from evoexp.report.pages import generic
+from evoexp.report.pages.generic import Values
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results import ConditionResults, Results
+
+
+class Family(NamedTuple):
+    """Conditions that are compared with each other.
+
+    Attributes:
+        name: Of what comes first in the comparisons.
+        pairs: (first, other).
+    """
+
+    name: str
+    pairs: tuple[tuple[ConditionResults, ConditionResults], ...]
+
+
+class Measure(NamedTuple):
+    """A quantity that conditions are compared in; lower is better.
+
+    Attributes:
+        name: With unit where it has one.
+        values: Of a condition, (done,).
+        converges: Whether it says how fast or how far a method converges; else it is about the
+            motions found.
+    """
+
+    name: str
+    values: Values
+    converges: bool = True
+
+
+class Tested(NamedTuple):
+    """A family compared in one quantity; p-values are adjusted over the rows.
+
+    Attributes:
+        measure: In what.
+        family: Whom.
+        rows: One per pair, each named by its other condition; without those that share no seed.
+    """
+
+    measure: Measure
+    family: Family
+    rows: tuple[Comparison, ...]
+
+
+def families(results: Results) -> tuple[Family, ...]:
+    """Return what is compared: twins that differ in collision substeps.
+
+    Else all with the first of their Eq. 9.
+    """
+    conditions = results.with_data
+    fewest = min(_substeps(c) for c in conditions)
+    finer = [c for c in conditions if _substeps(c) > fewest]
+    if finer:
+        firsts = {_without_substeps(c): c for c in reversed(conditions) if _substeps(c) == fewest}
+        pairs = ((firsts.get(_without_substeps(c)), c) for c in finer)
+        twins = tuple((first, c) for first, c in pairs if first is not None)
+        return (Family("each method, tested at its configurations only,", twins),)
+    found = []
+    for reading in dict.fromkeys(c.planner.ga.mutation_direction for c in conditions):
+        first, *others = (c for c in conditions if c.planner.ga.mutation_direction == reading)
+        found.append(Family(first.label, tuple((first, other) for other in others)))
+    return tuple(found)
+
+
+def tested(results: Results, settings: ReportSettings, threshold: float) -> tuple[Tested, ...]:
+    """Return all comparisons of a sweep.
+
+    Args:
+        results: Of the sweep.
+        settings: Levels and resamples.
+        threshold: Cost that "generations to a team" means.
+    """
+    found = []
+    for measure in _measures(results, threshold):
+        for family in families(results):
+            rows = [
+                generic.compare_on_common_seeds(
+                    first, other, other.label, True, measure.values, settings
+                )
+                for first, other in family.pairs
+            ]
+            found.append(
+                Tested(
+                    measure,
+                    family,
+                    tuple(claims.adjusted([row for row in rows if row is not None])),
+                )
+            )
+    return tuple(found)
+
+
+def curved(results: Results) -> bool:
+    """Whether any motion is executed as a curve."""
+    return any(c.planner.interpolation == "cubic" for c in results.with_data)
+
+
+def _measures(results: Results, threshold: float) -> tuple[Measure, ...]:
+    to = f"to a team of cost ≤ {markdown.number(threshold)}"
+    found = [
+        Measure("best cost", generic.by_column("best_cost")),
+        Measure(f"generations {to}", partial(measures.generations_to, threshold=threshold)),
+    ]
+    sizes = [
+        tuple(c.planner.ga.population_size for c in pair)
+        for family in families(results)
+        for pair in family.pairs
+    ]
+    if any(one != other for one, other in sizes):
+        found.append(
+            Measure(f"evaluations {to}", partial(measures.evaluations_to, threshold=threshold))
+        )
+    if len({_substeps(c) for c in results.with_data}) > 1 or curved(results):
+        found.append(
+            Measure(f"solved motion {measures.REFUTED}", measures.refuted, converges=False)
+        )
+    return tuple(found)
+
+
+def _substeps(condition: ConditionResults) -> int:
+    return int(condition.planner.collision.collision_substeps)
+
+
+def _without_substeps(condition: ConditionResults) -> str:
+    planner: dict[str, Any] = condition.planner.canonical()
+    return repr(planner | {"collision": planner["collision"] | {"collision_substeps": None}})

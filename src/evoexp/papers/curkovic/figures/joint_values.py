@@ -1,0 +1,117 @@
+"""Link angles of a motion against time, and how fast the links turn (Curkovic et al. 2013, Fig.
+
+9 and Eq. 2).
+"""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from evoexp.papers.curkovic import link_motions
+from evoexp.report import style
+from evoexp.report.results import ConditionResults
+from evoexp.report.rows import groups, rounded
+
+SAMPLES = 40  # per segment
+HALF_TURN = 180.0  # [deg]
+KINDS: tuple[Any, ...] = ("-", (0, (4, 1.5)))  # of first and second links
+
+
+def joints_table(condition: ConditionResults) -> pd.DataFrame:
+    """Return link angles and their speeds along the best replicate's motion.
+
+    Returns:
+        Columns robot, link, instant, at_configuration, angle_deg, turn_deg (per sampling step, to
+        the right of the instant), limit_deg (of Eq. 2).
+    """
+    prepared = condition.prepared
+    motion = link_motions.executed(prepared, condition.solutions[condition.best_replicate])
+    found, limits = link_motions.sampled(motion, SAMPLES), link_motions.speed_limits(prepared)
+    parts = []
+    for robot, own in enumerate(limits):
+        for link, limit in enumerate(own):
+            columns = {"robot": robot, "link": link, "instant": found.instants}
+            columns |= {
+                "angle_deg": found.links[:, robot, link],
+                "turn_deg": np.abs(found.speeds[:, robot, link]),
+            }
+            parts.append(pd.DataFrame(columns).assign(limit_deg=limit))
+    table = rounded(pd.concat(parts, ignore_index=True))
+    table.insert(3, "at_configuration", table["instant"] == table["instant"].round())
+    return table
+
+
+def draw_joints(table: pd.DataFrame) -> Figure:
+    """Draw link angles in their range.
+
+    And beside them the turn per sampling step with its limit.
+    """
+    robots = sorted(table["robot"].unique())
+    figure = style.figure(1.9 * len(robots) + 1.0)
+    panels = figure.subplots(len(robots), 2, sharex=True, squeeze=False)
+    for (angles, turns), robot in zip(panels, robots, strict=True):
+        _robot(angles, turns, table[table["robot"] == robot], style.arm_colour(int(robot)))
+        angles.set_ylabel(f"robot {robot + 1}: link angle [deg]")
+        turns.set_ylabel("turn per step [deg]")
+    panels[0, 0].set_title("a  link angles from +x")
+    panels[0, 1].set_title("b  turns per sampling step")
+    for axes in panels[-1]:
+        axes.set_xlabel("sampling step (whole numbers: configurations)")
+        axes.set_xlim(-0.05, table["instant"].max() + 0.05)
+    grey = style.NEUTRAL
+    handles = [
+        *(Line2D([], [], color=grey, linestyle=KINDS[k], label=f"link {k + 1}") for k in range(2)),
+        Line2D(
+            [],
+            [],
+            color=grey,
+            marker="o",
+            mec="white",
+            linestyle="none",
+            ms=5,
+            label="configurations",
+        ),
+        Line2D([], [], color=style.FORBIDDEN, linewidth=0.9, label="range [0, 180°]"),
+        Line2D(
+            [],
+            [],
+            color=style.FORBIDDEN,
+            linewidth=1.2,
+            linestyle=":",
+            label="limit of a link, Eq. 2",
+        ),
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    return figure
+
+
+def _robot(angles: Axes, turns: Axes, table: pd.DataFrame, colour: str) -> None:
+    low, high = float(table["angle_deg"].min()), float(table["angle_deg"].max())
+    for edge in (0.0, HALF_TURN):
+        angles.axhline(edge, color=style.FORBIDDEN, linewidth=0.9, zorder=1)
+    angles.set_ylim(min(0.0, low) - 10.0, max(HALF_TURN, high) + 10.0)
+    angles.set_yticks([0, 60, 120, 180])
+    for link, rows in groups(table, "link"):
+        kind = KINDS[int(link)]
+        angles.plot(rows["instant"], rows["angle_deg"], color=colour, linestyle=kind)
+        turns.plot(rows["instant"], rows["turn_deg"], color=colour, linestyle=kind)
+        at = rows[rows["at_configuration"]]
+        angles.plot(
+            at["instant"],
+            at["angle_deg"],
+            "o",
+            color=colour,
+            mec="white",
+            markersize=5,
+            clip_on=False,
+        )
+        limit = float(rows["limit_deg"].iloc[0])
+        turns.axhline(limit, color=style.FORBIDDEN, linewidth=1.2, linestyle=":")
+        beside: dict[str, Any] = {"xycoords": turns.get_yaxis_transform(), "fontsize": 6.5}
+        beside["va"] = "top" if link == 0 else "bottom"  # the limits may be close
+        turns.annotate(f"link {int(link) + 1}: {limit:.1f}°", (1.01, limit), **beside)
+    turns.set_ylim(bottom=0.0)

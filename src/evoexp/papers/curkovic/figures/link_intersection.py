@@ -1,0 +1,165 @@
+"""The intersection test of two links at one configuration (Curkovic et al. 2013, Fig. 7, Eqs.
+
+11 and 12).
+"""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from matplotlib.patches import Arc
+
+from evoexp.collision.models.link_crossings import closed_form
+from evoexp.numeric.elementary import DEGREE
+from evoexp.report import style
+from evoexp.report.results import ConditionResults
+from evoexp.report.rows import records, rounded
+
+SAMPLES = 200  # configurations per segment of the straight line among which one is chosen
+TOP_LINKS = 3  # of the four pairs of links that `closed_form` tells apart
+VECTORS = ("a", "b", "c", "d")  # of the paper: links of robot 1, then of robot 2
+
+
+def intersection_table(condition: ConditionResults) -> pd.DataFrame:
+    """Return links and intersection of two robots that go straight, where their top links cross.
+
+    Returns:
+        Columns element (a, b, c, d: link vectors; base: from base to base; point: P), x, y, x_end,
+        y_end [length unit], angle_deg (of a link from +x), mu, nu (where P lies on b and on d),
+        instant, crossing, length_unit.
+    """
+    prepared = condition.prepared
+    problem = prepared.problem
+    one, two = problem.collision.arms
+    steps = np.linspace(0.0, 1.0, SAMPLES + 1)[:, None, None]
+    links = (1.0 - steps) * problem.start + steps * problem.goal  # (samples, robots, 2)
+    found = closed_form(one, links[:, 0].T, two, links[:, 1].T)
+    mu, nu = found.mu[TOP_LINKS], found.nu[TOP_LINKS]
+    off = np.nan_to_num(np.maximum(np.abs(mu - 0.5), np.abs(nu - 0.5)), nan=np.inf)
+    k = int(np.argmin(off))
+    rows: list[tuple[Any, ...]] = []
+    for robot, arm in enumerate((one, two)):
+        elbow_x, elbow_y, tip_x, tip_y = arm.points(links[k, robot].reshape(1, 2, 1))[0, :, 0]
+        angles = links[k, robot] / DEGREE
+        rows.append((VECTORS[2 * robot], *arm.base, elbow_x, elbow_y, angles[0]))
+        rows.append((VECTORS[2 * robot + 1], elbow_x, elbow_y, tip_x, tip_y, angles[1]))
+    _, x, y, x_end, y_end, _ = rows[1]
+    at = (x + mu[k] * (x_end - x), y + mu[k] * (y_end - y))
+    rows += [("base", *one.base, *two.base, np.nan), ("point", *at, *at, np.nan)]
+    table = rounded(
+        pd.DataFrame(rows, columns=["element", "x", "y", "x_end", "y_end", "angle_deg"])
+    )
+    return table.assign(
+        mu=round(float(mu[k]), 9),
+        nu=round(float(nu[k]), 9),
+        share=float(steps[k, 0, 0]),
+        crossing=bool(found.crossing[TOP_LINKS, k]),
+        length_unit=condition.condition.length_unit,
+    )
+
+
+def draw_intersection(table: pd.DataFrame) -> Figure:
+    """Draw the links as the paper's vectors, their angles.
+
+    The bases' distance and the intersection.
+    """
+    figure = style.figure(4.3, 5.4)
+    axes = figure.subplots()
+    style.operational_axes(axes, table["length_unit"].iloc[0])
+    rows = {row.element: row for row in records(table)}
+    size = max(
+        float(np.hypot(rows[v].x_end - rows[v].x, rows[v].y_end - rows[v].y)) for v in VECTORS
+    )
+    for k, name in enumerate(VECTORS):
+        _vector(axes, rows[name], style.arm_colour(k // 2), k + 1, size)
+    base, point = rows["base"], rows["point"]
+    axes.annotate(
+        "",
+        (base.x_end, base.y_end),
+        (base.x, base.y),
+        arrowprops={"arrowstyle": "<->", "shrinkB": 0},
+    )
+    text: dict[str, Any] = {"textcoords": "offset points", "ha": "center"}
+    axes.annotate(
+        "d·i", (0.5 * (base.x + base.x_end), 0.5 * (base.y + base.y_end)), xytext=(0, -12), **text
+    )
+    for robot, (name, mark) in enumerate((("b", "O₁"), ("d", "O₂"))):
+        row = rows[name]
+        axes.plot(
+            row.x,
+            row.y,
+            "o",
+            color="white",
+            markeredgecolor=style.arm_colour(robot),
+            markersize=6,
+            zorder=4,
+        )
+        axes.annotate(mark, (row.x, row.y), xytext=(-11 if robot == 0 else 11, 4), **text)
+    axes.plot(
+        point.x,
+        point.y,
+        "X",
+        color=style.FORBIDDEN,
+        markeredgecolor="white",
+        markersize=9,
+        zorder=6,
+    )
+    axes.annotate(
+        "P", (point.x, point.y), xytext=(0, 9), color=style.FORBIDDEN, weight="bold", **text
+    )
+    first = rows["a"]
+    word = "the links cross" if first.crossing else "the links do not cross"
+    axes.set_title(f"μ = {first.mu:.3f}, ν = {first.nu:.3f}: {word}")
+    axes.margins(0.12)
+    figure.supxlabel("O₁P = μ b,  O₂P = ν d;  they cross where both lie in [0, 1]", fontsize=8)
+    return figure
+
+
+def _vector(axes: Any, row: Any, colour: str, number: int, size: float) -> None:
+    """Draw one link as a vector with its name and its angle from +x."""
+    arrow = {"arrowstyle": "-|>", "color": colour, "linewidth": 2.2, "shrinkA": 0, "shrinkB": 0}
+    axes.annotate("", (row.x_end, row.y_end), (row.x, row.y), arrowprops=arrow)
+    axes.plot(
+        [row.x, row.x_end], [row.y, row.y_end], color=colour, linewidth=0.1
+    )  # for the limits of the axes
+    away = np.array([-(row.y_end - row.y), row.x_end - row.x]) / size * 10.0
+    middle = 0.5 * (row.x + row.x_end), 0.5 * (row.y + row.y_end)
+    look: dict[str, Any] = {
+        "textcoords": "offset points",
+        "ha": "center",
+        "va": "center",
+        "color": colour,
+    }
+    axes.annotate(row.element, middle, xytext=tuple(away), weight="bold", **look)
+    radius = 0.2 * size
+    axes.plot(
+        [row.x, row.x + 1.5 * radius],
+        [row.y, row.y],
+        ":",
+        color=style.FAINT,
+        linewidth=0.9,
+        zorder=1,
+    )
+    axes.add_patch(
+        Arc(
+            (row.x, row.y),
+            2 * radius,
+            2 * radius,
+            theta1=0.0,
+            theta2=row.angle_deg,
+            color=colour,
+            lw=0.9,
+        )
+    )
+    half = np.radians(0.5 * row.angle_deg)
+    place = row.x + 1.45 * radius * np.cos(half), row.y + 1.45 * radius * np.sin(half)
+    subscript = str(number).translate(style.SUBSCRIPTS)
+    axes.annotate(
+        f"φ{subscript} = {row.angle_deg:.0f}°",
+        place,
+        ha="left",
+        va="center",
+        color=colour,
+        fontsize=7,
+    )

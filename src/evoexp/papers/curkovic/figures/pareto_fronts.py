@@ -1,0 +1,108 @@
+"""Pareto fronts of populations, criterion against criterion (Curkovic et al. 2013, Fig. 5)."""
+
+from collections.abc import Sequence
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from evoexp.evolution.pareto import pareto_front
+from evoexp.records import FrontRow
+from evoexp.report import style
+from evoexp.report.rows import groups, rounded
+
+CRITERIA = ("c1", "c2", "c3", "c4")
+MARKERS = ("o", "^", "s", "D")  # of populations
+FRONT, DOMINATED = (
+    style.ARM_COLOURS[1],
+    style.ARM_COLOURS[0],
+)  # red and blue, as the paper draws them
+
+
+def fronts_table(fronts: Sequence[FrontRow], replicate: int, length_unit: str) -> pd.DataFrame:
+    """Return what every individual of every population is worth.
+
+    Args:
+        fronts: One record per population, of one generation of a replicate.
+        replicate: Which.
+        length_unit: Of C2 and C4.
+
+    Returns:
+        Columns replicate, generation, population, individual, c1 [collisions], c2 [length unit], c3
+        [rad], c4 [length unit], non_dominated (in its own population), length_unit.
+    """
+    parts = []
+    for front in fronts:
+        columns: dict[str, Any] = {"generation": front.generation, "population": front.population}
+        columns |= {"individual": np.arange(len(front.criteria))}
+        columns |= dict(zip(CRITERIA, front.criteria.T, strict=True))
+        parts.append(
+            pd.DataFrame(
+                columns | {"non_dominated": pareto_front(np.ascontiguousarray(front.criteria.T))}
+            )
+        )
+    return rounded(pd.concat(parts, ignore_index=True)).assign(
+        replicate=replicate, length_unit=length_unit
+    )
+
+
+def draw_fronts(table: pd.DataFrame) -> Figure:
+    """Draw all pairs of criteria, populations by marker.
+
+    Non-dominated individuals above the others.
+    """
+    unit = table["length_unit"].iloc[0]
+    names = dict(
+        zip(
+            CRITERIA,
+            (
+                "C₁ [collisions]",
+                f"C₂ path [{unit}]",
+                "C₃ rotation [rad]",
+                f"C₄ unevenness [{unit}]",
+            ),
+            strict=True,
+        )
+    )
+    figure = style.figure(4.9)
+    panels = figure.subplots(2, 3)
+    for axes, (x, y) in zip(panels.ravel(), combinations(CRITERIA, 2), strict=True):
+        for (front, population), rows in groups(table, ["non_dominated", "population"]):
+            look = (
+                {"color": FRONT, "alpha": 0.85, "zorder": 3}
+                if front
+                else {"color": DOMINATED, "alpha": 0.45}
+            )
+            marker = MARKERS[int(population) % len(MARKERS)]
+            axes.plot(
+                rows[x], rows[y], marker, markersize=3.6 if front else 3.2, mec="none", **look
+            )
+        axes.set_xlabel(names[x])
+        axes.set_ylabel(names[y])
+        axes.yaxis.set_major_locator(style.few_ticks())
+        if x == CRITERIA[0]:
+            axes.set_xscale("symlog", linthresh=1.0)  # most have no collision, a few have many
+            axes.set_xlim(left=-0.2)
+        else:
+            axes.xaxis.set_major_locator(style.few_ticks())
+    handles = [
+        Line2D(
+            [],
+            [],
+            color=colour,
+            marker=MARKERS[int(population) % len(MARKERS)],
+            linestyle="none",
+            ms=4,
+            label=text,
+        )
+        for population, rows in groups(table, "population")
+        for colour, text in (
+            (FRONT, f"robot {population + 1}: {int(rows['non_dominated'].sum())} non-dominated"),
+            (DOMINATED, f"robot {population + 1}: {int((~rows['non_dominated']).sum())} dominated"),
+        )
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    return figure

@@ -1,0 +1,310 @@
+"""Motions of robots in their plane, drawn as trails (Curkovic et al. 2013, Figs. 8, 10 and 11)."""
+
+import itertools
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle
+from matplotlib.patheffects import withStroke
+
+from evoexp.condition import Prepared
+from evoexp.papers.curkovic import link_motions
+from evoexp.report import body_contacts, motion_geometry, style
+from evoexp.report.figures.planar_models import draw_arm
+from evoexp.report.results import ConditionResults
+from evoexp.report.rows import groups, records, rounded
+from evoexp.scenarios.obstacles import obstacle_table
+
+POSTURES = 4  # per segment: a stroboscope
+POINTS = 20  # of an end-effector's path, per segment
+POSTURE, CONFIGURATION, PATH, CONTACT, OBSTACLE = (
+    "posture",
+    "configuration",
+    "path",
+    "contact",
+    "obstacle",
+)
+LINK = ["robot", "link", "instant", "x", "y", "x_end", "y_end", "radius"]
+TOOL = 2  # number of a robot's third link, which is the body around its end-effector
+DASHES: Any = (0, (2, 1))
+
+
+def motion_table(condition: ConditionResults) -> pd.DataFrame:
+    """Return the trail of the best replicate's motion.
+
+    And end-effector paths and contacts of all replicates.
+
+    Returns:
+        Columns element (posture, configuration: links of the best replicate; path: between points
+        of an end-effector; contact: first contact of bodies; obstacle: edges of its outline),
+        replicate, robot, link, instant, x, y, x_end, y_end, radius (half of a link's thickness)
+        [length unit], best, length_unit.
+    """
+    prepared, best = condition.prepared, condition.best_replicate
+    parts = [_obstacles(condition)]
+    for replicate, solution in condition.solutions.items():
+        motion = link_motions.executed(prepared, solution)
+        parts.append(
+            _path(prepared, link_motions.sampled(motion, POINTS)).assign(replicate=replicate)
+        )
+        if replicate == best:
+            for element, samples in ((POSTURE, POSTURES), (CONFIGURATION, 1)):
+                parts.append(
+                    _links(prepared, link_motions.sampled(motion, samples)).assign(element=element)
+                )
+    parts.append(_contacts(condition))
+    table = rounded(pd.concat(parts, ignore_index=True)).assign(
+        best=best, length_unit=condition.condition.length_unit
+    )
+    return table[["element", "replicate", *LINK, "best", "length_unit"]]
+
+
+def draw_motion(table: pd.DataFrame) -> Figure:
+    """Draw the best replicate's motion as a trail of postures.
+
+    And beside it the paths of all replicates.
+    """
+    (left, right), (low, high) = _limits(table)
+    figure = style.figure(min(4.6, 3.3 * (high - low) / (right - left)) + 1.0)
+    trail, paths = figure.subplots(1, 2, sharex=True, sharey=True)
+    best, unit = table["best"].iloc[0], table["length_unit"].iloc[0]
+    path, contacts = table[table["element"] == PATH], table[table["element"] == CONTACT]
+    for axes in (trail, paths):
+        for _, outline in groups(table[table["element"] == OBSTACLE], "link"):
+            axes.fill(outline["x"], outline["y"], color=style.FAINT, linewidth=0)
+        style.operational_axes(axes, unit)
+    _trail(trail, table)
+    for (robot, replicate), rows in groups(path, ["robot", "replicate"]):
+        colour = style.arm_colour(int(robot))
+        if replicate == best:
+            trail.plot(rows["x_end"], rows["y_end"], ".", color=colour, markersize=2.6, zorder=4)
+        paths.plot(rows["x_end"], rows["y_end"], color=colour, linewidth=0.8, alpha=0.5)
+        for axes in (trail, paths):
+            _ends(axes, rows)
+    for axes, rows in ((trail, contacts[contacts["replicate"] == best]), (paths, contacts)):
+        axes.plot(
+            rows["x"], rows["y"], "X", color=style.FORBIDDEN, mec="white", markersize=8, zorder=7
+        )
+    trail.set_title(f"a  motion of replicate {best}")
+    paths.set_title(f"b  end-effectors, all replicates (n = {path['replicate'].nunique()})")
+    trail.set_xlim(left, right)
+    trail.set_ylim(low, high)
+    figure.legend(handles=_legend(table, len(contacts)), loc="outside lower center", ncols=4)
+    return figure
+
+
+def tools_table(conditions: Sequence[ConditionResults]) -> pd.DataFrame:
+    """Return the end-effector paths of conditions that differ in the end-effector's radius.
+
+    Returns:
+        Columns condition, position, tcp_radius, collision_substeps, robot, instant, x, y, x_end,
+        y_end [length unit], at_configuration, length_unit; of each condition's best replicate.
+    """
+    parts = []
+    for position, c in enumerate(conditions):
+        motion = link_motions.executed(c.prepared, c.solutions[c.best_replicate])
+        path, collision = (
+            _path(c.prepared, link_motions.sampled(motion, POINTS)),
+            c.planner.collision,
+        )
+        given = {"condition": c.label, "position": position, "tcp_radius": collision.tcp_radius}
+        path = path.assign(**given, collision_substeps=collision.collision_substeps)
+        parts.append(path.assign(at_configuration=path["instant"] == path["instant"].round()))
+    table = rounded(pd.concat(parts, ignore_index=True)).assign(
+        length_unit=conditions[0].condition.length_unit
+    )
+    return table.drop(columns=["element", "link", "radius"])
+
+
+def draw_tools(table: pd.DataFrame) -> Figure:
+    """Draw the paths with a circle of the radius at every configuration.
+
+    One panel per number of collision substeps.
+    """
+    radii, tests = (
+        sorted(table["tcp_radius"].unique()),
+        sorted(table["collision_substeps"].unique(), reverse=True),
+    )
+    unit = table["length_unit"].iloc[0]
+    x, y = (table[f"{name}_end"].to_numpy() for name in "xy")
+    figure = style.figure(min(4.6, 3.6 * float(np.ptp(y) / np.ptp(x))) + 1.1)
+    panels = figure.subplots(1, len(tests), sharex=True, sharey=True, squeeze=False)[0]
+    for axes, substeps in zip(panels, tests, strict=True):
+        style.operational_axes(axes, unit)
+        for (radius, _), rows in groups(
+            table[table["collision_substeps"] == substeps], ["tcp_radius", "robot"]
+        ):
+            colour = style.condition_colour(radii.index(radius))
+            axes.plot(rows["x_end"], rows["y_end"], color=colour)
+            for row in records(rows[rows["at_configuration"]]):
+                axes.add_patch(
+                    Circle(
+                        (row.x_end, row.y_end),
+                        radius,
+                        fill=False,
+                        edgecolor=colour,
+                        lw=0.7,
+                        alpha=0.7,
+                    )
+                )
+            _ends(axes, rows)
+        for robot, rows in groups(table, "robot"):
+            text: dict[str, Any] = {
+                "xytext": (0, -13),
+                "textcoords": "offset points",
+                "fontsize": 7.5,
+                "ha": "center",
+            }
+            halo = [withStroke(linewidth=2.0, foreground="white")]
+            start = (rows["x_end"].iloc[0], rows["y_end"].iloc[0])
+            axes.annotate(f"robot {int(robot) + 1}", start, zorder=7, path_effects=halo, **text)
+        axes.set_title(
+            "tested at the configurations" if substeps == 1 else f"tested at {substeps} substeps"
+        )
+        axes.margins(0.1)
+    handles = [
+        Line2D([], [], color=style.condition_colour(k), label=f"radius {radius:g} {unit}")
+        for k, radius in enumerate(radii)
+    ]
+    figure.legend(
+        handles=[*handles, *_end_handles()], loc="outside lower center", ncols=len(radii) + 2
+    )
+    return figure
+
+
+def _links(prepared: Prepared, sampled: link_motions.Sampled) -> pd.DataFrame:
+    """Return the links of all robots at every sample."""
+    assembly = prepared.problem.assembly
+    rows = []
+    for item, (robot, link, start, end) in zip(
+        assembly.links, motion_geometry.joint_positions(assembly, sampled.q), strict=True
+    ):
+        for k, instant in enumerate(sampled.instants):
+            rows.append((robot, link, instant, *start[k, :2], *end[k, :2], item.radius))
+    return pd.DataFrame(rows, columns=LINK).assign(replicate=-1)
+
+
+def _path(prepared: Prepared, sampled: link_motions.Sampled) -> pd.DataFrame:
+    """Return the end-effectors at every sample, each row from the one before."""
+    links = _links(prepared, sampled)
+    tips = links[links["link"] == 1].drop(columns=["x", "y"])
+    before = tips.groupby("robot")[["x_end", "y_end"]].shift().fillna(tips[["x_end", "y_end"]])
+    return tips.assign(element=PATH, x=before["x_end"], y=before["y_end"])
+
+
+def _contacts(condition: ConditionResults) -> pd.DataFrame:
+    """Return where bodies first touch in the motions that the exact verdict refutes."""
+    rows = []
+    for replicate, (instant, pair) in body_contacts.refuted(condition).items():
+        x, y = body_contacts.contact(
+            condition.prepared, condition.solutions[replicate], instant, pair
+        )
+        rows.append((CONTACT, replicate, -1, -1, instant, x, y, x, y, 0.0))
+    return pd.DataFrame(rows, columns=["element", "replicate", *LINK])
+
+
+def _obstacles(condition: ConditionResults) -> pd.DataFrame:
+    """Return the outlines of what stands around."""
+    table = obstacle_table(condition.condition.scenario.obstacles)  # type: ignore[attr-defined]
+    rows: list[tuple[Any, ...]] = []
+    for k, outline in enumerate(motion_geometry.obstacle_outlines(table)):
+        rows += [(OBSTACLE, -1, -1, k, 0.0, *a, *b, 0.0) for a, b in itertools.pairwise(outline)]
+    return pd.DataFrame(rows, columns=["element", "replicate", *LINK])
+
+
+def _trail(axes: Axes, table: pd.DataFrame) -> None:
+    """Draw postures, and at configurations the boundaries of thick links and tools."""
+    postures, at = table[table["element"] == POSTURE], table[table["element"] == CONFIGURATION]
+    last = postures["instant"].max()
+    for (robot, instant), rows in groups(postures, ["robot", "instant"]):
+        links = rows[rows["link"] < TOOL]
+        if instant in (0.0, last):
+            draw_arm(axes, int(robot), links, dashed=instant == 0.0)
+        else:
+            x, y = ([*links[name], links[f"{name}_end"].iloc[-1]] for name in "xy")
+            axes.plot(x, y, color=style.arm_colour(int(robot)), linewidth=0.9, alpha=0.3, zorder=2)
+        axes.plot(
+            links["x"].iloc[0], links["y"].iloc[0], "s", color=style.NEUTRAL, markersize=6, zorder=2
+        )
+    for row in records(at[at["radius"] > 0.0]):
+        look: dict[str, Any] = {
+            "color": style.arm_colour(row.robot),
+            "linewidth": 0.6,
+            "alpha": 0.6,
+            "zorder": 2,
+        }
+        if row.link == TOOL:
+            axes.add_patch(Circle((row.x, row.y), row.radius, fill=False, **look))
+            continue
+        along = np.array([row.x_end - row.x, row.y_end - row.y])
+        x, y = row.radius * np.array([-along[1], along[0]]) / float(np.hypot(*along))
+        for side in (-1.0, 1.0):
+            axes.plot(
+                [row.x + side * x, row.x_end + side * x],
+                [row.y + side * y, row.y_end + side * y],
+                **look,
+            )
+
+
+def _ends(axes: Axes, path: pd.DataFrame) -> None:
+    """Mark start and goal of an end-effector: circle and cross, as the paper does."""
+    (x, y), (x_end, y_end) = path[["x_end", "y_end"]].to_numpy()[[0, -1]]
+    axes.plot(x, y, "o", color="white", markeredgecolor=style.NEUTRAL, markersize=6, zorder=6)
+    axes.plot(x_end, y_end, "x", color=style.NEUTRAL, markersize=7, markeredgewidth=1.8, zorder=6)
+
+
+def _limits(table: pd.DataFrame) -> tuple[tuple[float, float], tuple[float, float]]:
+    found = []
+    for name in "xy":
+        values = table[[name, f"{name}_end"]].to_numpy()
+        pad = 0.05 * float(np.ptp(values)) + float(table["radius"].max())
+        found.append((float(values.min()) - pad, float(values.max()) + pad))
+    return found[0], found[1]
+
+
+def _end_handles() -> list[Line2D]:
+    grey = style.NEUTRAL
+    return [
+        Line2D(
+            [],
+            [],
+            linestyle="none",
+            marker="o",
+            mec=grey,
+            mfc="white",
+            ms=6,
+            label="start of an end-effector",
+        ),
+        Line2D([], [], linestyle="none", marker="x", color=grey, ms=7, mew=1.8, label="its goal"),
+    ]
+
+
+def _legend(table: pd.DataFrame, contacts: int) -> list[Line2D]:
+    grey = style.NEUTRAL
+    handles = [
+        Line2D([], [], color=style.arm_colour(k), linewidth=3, label=f"robot {k + 1}")
+        for k in sorted(table.loc[table["element"] == PATH, "robot"].unique())
+    ]
+    handles.append(Line2D([], [], color=grey, linewidth=2, linestyle=DASHES, label="start posture"))
+    handles.append(Line2D([], [], color=grey, linewidth=3, marker="o", ms=4, label="goal posture"))
+    handles += _end_handles()
+    if contacts:
+        text = f"first contact of bodies (refuted: {contacts})"
+        handles.append(
+            Line2D(
+                [],
+                [],
+                linestyle="none",
+                marker="X",
+                color=style.FORBIDDEN,
+                mec="white",
+                ms=8,
+                label=text,
+            )
+        )
+    return handles

@@ -1,0 +1,115 @@
+"""Curkovic et al. 2013, Fig. 5: Pareto fronts of the populations in an early generation."""
+
+from functools import partial
+
+import numpy as np
+
+from evoexp.evolution.pareto import pareto_front
+from evoexp.papers.curkovic import measures
+from evoexp.papers.curkovic.figures import pareto_fronts
+from evoexp.papers.curkovic.fronts import read_fronts
+from evoexp.records import FloatArray, FrontRow
+from evoexp.report import markdown
+from evoexp.report.page import Drawing, Page, Quantity
+from evoexp.report.pages import generic
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results import ConditionResults, Results
+from evoexp.report.statistics import spread
+
+INTRODUCTION = (
+    "One population of paths per robot. An individual is on the front of its population if no "
+    "other one is at least as good in all of C1 (collisions with all paths of the other "
+    "populations), C2 (end-effector's path), C3 (turns of the links) and C4 (longest step of the "
+    "end-effector less its shortest), and better in one."
+)
+
+
+def page(results: Results, settings: ReportSettings) -> Page:
+    """Return the page; the generic one where no log holds a front."""
+    base = generic.page(results, settings)
+    if not measures.fits(results):
+        return base
+    fronts = {c.label: _fronts(results, c) for c in results.with_data}
+    drawn = [c for c in results.with_data if fronts[c.label].get(c.best_replicate)]
+    if not drawn:
+        return base
+    populations = range(max(len(rows) for c in drawn for rows in fronts[c.label].values()))
+    sizes = [(p, {c.label: _sizes(fronts[c.label], p) for c in drawn}) for p in populations]
+    return base._replace(
+        title=f"Curkovic et al. 2013: {results.experiment or 'stored runs'}",
+        introduction=INTRODUCTION,
+        quantities=(*(_quantity(results, p, of) for p, of in sizes), *base.quantities),
+        checks=tuple(check for c in drawn for check in _checks(c, fronts[c.label])),
+        drawings=(
+            *(_drawing(results, c, fronts[c.label]) for c in drawn),
+            measures.convergence_drawing(results),
+        ),
+    )
+
+
+def _fronts(results: Results, condition: ConditionResults) -> dict[int, list[FrontRow]]:
+    """Return the fronts of every finished replicate."""
+    return {int(k): read_fronts(results, condition, int(k)) for k in condition.summaries.index}
+
+
+def _size(front: FrontRow) -> int:
+    return int(pareto_front(np.ascontiguousarray(front.criteria.T)).sum())
+
+
+def _sizes(fronts: dict[int, list[FrontRow]], population: int) -> FloatArray:
+    """Return how many individuals of a population are on its front, (replicates,)."""
+    return np.array(
+        [_size(rows[population]) for rows in fronts.values() if population < len(rows)],
+        dtype=np.float64,
+    )
+
+
+def _quantity(results: Results, population: int, sizes: dict[str, FloatArray]) -> Quantity:
+    spreads = {c.label: spread(sizes.get(c.label, np.empty(0))) for c in results.with_data}
+    return Quantity(
+        f"individuals on the front of robot {population + 1}'s population", "–", spreads
+    )
+
+
+def _checks(
+    condition: ConditionResults, fronts: dict[int, list[FrontRow]]
+) -> list[tuple[str, str]]:
+    ga = condition.planner.ga
+    sizes = np.array([_size(front) for rows in fronts.values() for front in rows])
+    larger, single = (
+        markdown.share(int(np.count_nonzero(of)), len(sizes))
+        for of in (sizes > ga.num_hall_teams, sizes == 1)
+    )
+    bound, costs = measures.lower_bound(condition), markdown.spread(condition.spread("best_cost"))
+    return [
+        (
+            f"Fronts that are larger than the hall of fame may be ({ga.num_hall_teams} of "
+            f"{ga.population_size}), and fronts of a single point",
+            f"{larger} populations; {single}",
+        ),
+        (
+            "That there are individuals on a front in an early phase (section 3) says little: "
+            "every population has a front, a random one, too. What the early phase is worth: "
+            "cost of the best collision-free team",
+            f"{costs}; lower bound {markdown.number(bound)}",
+        ),
+    ]
+
+
+def _drawing(
+    results: Results, condition: ConditionResults, fronts: dict[int, list[FrontRow]]
+) -> Drawing:
+    best, several = condition.best_replicate, len(results.with_data) > 1
+    generation = fronts[best][0].generation
+    suffix = f"_{results.position(condition.label) + 1}" if several else ""
+    return Drawing(
+        f"fig_5_fronts{suffix}",
+        f"Fig. 5: fronts at generation {generation}, criterion against criterion"
+        + (f" ({condition.label})" if several else ""),
+        "The paper shows non-dominated individuals red, dominated ones blue. Here: both robots' "
+        f"populations of replicate {best} (lowest cost), all four criteria judged at once; so a "
+        "front looks scattered in two of them.",
+        partial(pareto_fronts.fronts_table, fronts[best], best, condition.condition.length_unit),
+        pareto_fronts.draw_fronts,
+        (condition,),
+    )

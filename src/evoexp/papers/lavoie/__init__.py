@@ -1,0 +1,1 @@
+"""Lavoie & Boudreau 2001: redundant arms among ellipses."""

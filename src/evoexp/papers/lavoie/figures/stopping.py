@@ -1,0 +1,90 @@
+"""Precision against the value at which a search stops (Lavoie & Boudreau 2001, section 6)."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from evoexp.records import FloatArray
+from evoexp.report import style
+from evoexp.report.results import ConditionResults, Results
+from evoexp.report.rows import groups
+from evoexp.report.statistics import spread
+
+Values = Callable[[ConditionResults], FloatArray]
+
+ERROR, EFFORT = "position error", "evaluations"
+BESIDE = 0.012  # [-] of the axis by which series are set apart
+
+
+def stopping_table(results: Results, errors: Values, effort: Values) -> pd.DataFrame:
+    """Return precision and effort of every condition by its stopping value and its generations.
+
+    Args:
+        results: With data.
+        errors: Position errors of a condition, (done,); inf: no solution.
+        effort: Evaluations to its solutions, (done,); inf: no solution.
+
+    Returns:
+        Columns quantity (position error, evaluations), num_generations, stop_cost, condition,
+        median, lower, upper (quartiles over all runs), solved, done, length_unit.
+    """
+    rows: list[tuple[object, ...]] = []
+    for name, values in ((ERROR, errors), (EFFORT, effort)):
+        for c in results.with_data:
+            found = spread(values(c))
+            given = name, c.planner.ga.num_generations, c.planner.stop_cost_sp2, c.label
+            rows.append((*given, found.median, found.lower, found.upper, c.solved, c.done))
+    names = [
+        "quantity",
+        "num_generations",
+        "stop_cost",
+        "condition",
+        "median",
+        "lower",
+        "upper",
+        "solved",
+        "done",
+    ]
+    return pd.DataFrame(rows, columns=names).assign(
+        length_unit=results.with_data[0].condition.length_unit
+    )
+
+
+def draw_stopping(table: pd.DataFrame) -> Figure:
+    """Draw medians with quartiles of error and effort against the stopping value.
+
+    One series per generations.
+    """
+    figure = style.figure(3.2)
+    panels = figure.subplots(1, 2, sharex=True)
+    series = sorted(table["num_generations"].unique())
+    apart = BESIDE * float(np.ptp(table["stop_cost"]) or 1.0)
+    labels = {
+        ERROR: f"position error [{table['length_unit'].iloc[0]}]",
+        EFFORT: "evaluations to a solution [-]",
+    }
+    for axes, (quantity, label) in zip(panels, labels.items(), strict=True):
+        own = table[table["quantity"] == quantity].replace(np.inf, np.nan)
+        for k, (generations, rows) in enumerate(groups(own, "num_generations")):
+            rows = rows.sort_values("stop_cost")
+            x = rows["stop_cost"] + apart * (2 * k - len(series) + 1)
+            solved, done = rows["solved"].sum(), rows["done"].sum()
+            name = (
+                f"at most {int(generations)} generations ({solved} of {done} runs with a solution)"
+            )
+            axes.vlines(
+                x, rows["lower"], rows["upper"], color=style.condition_colour(k), linewidth=1.2
+            )
+            look = {"color": style.condition_colour(k), "markersize": 4.5, "linewidth": 1.0}
+            axes.plot(x, rows["median"], "o-", label=name, **look)
+        axes.set_ylim(bottom=0.0)
+        axes.set_ylabel(label)
+        axes.set_xlabel("stopping value of SP2 (objective) [-]")
+        axes.set_xticks(sorted(table["stop_cost"].unique()))
+    panels[0].set_title("a  precision")
+    panels[1].set_title("b  effort")
+    panels[0].invert_xaxis()
+    style.legend_below(figure, panels[0], 2)
+    return figure

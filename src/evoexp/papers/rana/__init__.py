@@ -1,0 +1,1 @@
+"""Rana & Zalzala 1995: two arms as strings of via-points."""

@@ -1,0 +1,281 @@
+"""Drawings of arms in space: their bodies and spheres, two arms with their named points.
+
+Motions stage by stage.
+"""
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from evoexp.numeric.elementary import DEGREE, sincos
+from evoexp.records import FloatArray
+from evoexp.report import motion_geometry, style
+from evoexp.report.results import ConditionResults
+from evoexp.report.rows import groups, records, rounded
+
+STAGES = 5  # panels that a motion is cut into; the sixth holds all of it
+POINT_NAMES = ("p", "q")  # of the arms, as in the paper's Fig. 9
+LINK = ["arm", "link", "x", "y", "z", "x_end", "y_end", "z_end"]
+
+
+def links_table(condition: ConditionResults, q: FloatArray) -> pd.DataFrame:
+    """Return all links at every instant of a motion.
+
+    Args:
+        condition: Whose robot it is.
+        q: (nq, instants) [deg].
+
+    Returns:
+        Columns instant, arm, link, x, y, z, x_end, y_end, z_end [length unit], length_unit.
+    """
+    rows = [
+        (instant, arm, link, *start[instant], *end[instant])
+        for arm, link, start, end in motion_geometry.joint_positions(
+            condition.prepared.problem.assembly, q
+        )
+        for instant in range(q.shape[1])
+    ]
+    return rounded(pd.DataFrame(rows, columns=["instant", *LINK])).assign(
+        length_unit=condition.condition.length_unit
+    )
+
+
+def arm_table(condition: ConditionResults) -> pd.DataFrame:
+    """Return links and spheres of the first arm at its start.
+
+    Returns:
+        Columns of `links_table`, element (link, sphere) and radius; a sphere stands at x, y, z.
+    """
+    problem = condition.prepared.problem
+    links = links_table(condition, problem.start[:, None])
+    spheres = motion_geometry.sphere_centres(problem.collision, problem.start)[0]
+    first = links[links["arm"] == 0].assign(element="link", radius=np.nan)
+    rows = [(0, 0, -1, *centre, *centre) for centre in spheres]
+    added = rounded(pd.DataFrame(rows, columns=["instant", *LINK]))
+    added = added.assign(
+        element="sphere", radius=problem.collision.radius, length_unit=first["length_unit"].iloc[0]
+    )
+    return pd.concat([first, added], ignore_index=True)
+
+
+def draw_arm(table: pd.DataFrame) -> Figure:
+    """Draw the arm as touching spheres and as line segments with the paper's point names."""
+    figure = style.figure(3.9)
+    links, spheres = table[table["element"] == "link"], table[table["element"] == "sphere"]
+    for k, title in enumerate(
+        ("a  touching spheres of the collision model", "b  line segments: the links themselves")
+    ):
+        axes = _space(figure, (1, 2, k + 1), [links, spheres], table["length_unit"].iloc[0])
+        axes.set_title(title)
+        _arm(axes, 0, links, width=1.2 if k == 0 else 2.6)
+        if k == 0:
+            for row in records(spheres):
+                axes.plot_surface(
+                    *_ball(row), color=style.arm_colour(0), alpha=0.25, linewidth=0, shade=True
+                )
+        else:
+            _name_points(axes, 0, links)
+    return figure
+
+
+def two_arms_table(condition: ConditionResults) -> pd.DataFrame:
+    """Return links of all arms at start (instant 0) and goal (instant 1).
+
+    And how far each reaches around its shoulder.
+
+    Returns:
+        Columns of `links_table` and reach [length unit].
+    """
+    problem = condition.prepared.problem
+    table = links_table(condition, np.column_stack([problem.start, problem.goal]))
+    lengths = np.sqrt(sum((table[f"{axis}_end"] - table[axis]) ** 2 for axis in "xyz"))
+    moving = np.array([link.joint > 0 for link in problem.assembly.links])
+    own = moving[table["link"].to_numpy() + _offsets(problem.assembly)[table["arm"].to_numpy()]]
+    counted = table.assign(reach=np.where(own, lengths, 0.0))
+    reach = counted[counted["instant"] == 0].groupby("arm")["reach"].sum()
+    return table.assign(reach=table["arm"].map(reach).round(9))
+
+
+def draw_two_arms(table: pd.DataFrame) -> Figure:
+    """Draw the arms at start and goal, and the part of the workspace that they share.
+
+    Seen from above.
+    """
+    figure = style.figure(4.3)
+    unit = table["length_unit"].iloc[0]
+    axes = _space(figure, (1, 2, 1), [table], unit)
+    axes.set_title("a  start (full) and goal (dashed)")
+    above = figure.add_subplot(1, 2, 2)
+    above.set_title("b  from above, with each arm's reach")
+    for (arm, instant), rows in groups(table, ["arm", "instant"]):
+        _arm(axes, arm, rows, dashed=instant == 1)
+        x, y = [rows["x"].iloc[0], *rows["x_end"]], [rows["y"].iloc[0], *rows["y_end"]]
+        above.plot(
+            x,
+            y,
+            color=style.arm_colour(arm),
+            linestyle=(0, (2, 1)) if instant else "-",
+            marker="o",
+            ms=3,
+        )
+        if instant == 0:
+            _name_points(axes, arm, rows)
+            above.plot(x[0], y[0], "s", color=style.NEUTRAL, markersize=7)
+            turn = np.linspace(0.0, 360.0, 121)
+            circle = np.array([sincos(DEGREE * angle) for angle in turn]) * rows["reach"].iloc[0]
+            above.fill(
+                x[0] + circle[:, 1],
+                y[0] + circle[:, 0],
+                color=style.arm_colour(arm),
+                alpha=0.12,
+                linewidth=0,
+            )
+    style.operational_axes(above, unit)
+    _legend(
+        figure, table, [Line2D([], [], color=style.NEUTRAL, linestyle=(0, (2, 1)), label="goal")]
+    )
+    return figure
+
+
+def snapshots_table(condition: ConditionResults) -> pd.DataFrame:
+    """Return all links at every instant of the best replicate's motion.
+
+    With the stage it belongs to.
+
+    Returns:
+        Columns of `links_table`, stage, first, last (instants of the stage); an instant between two
+        stages belongs to both; the last stage holds all.
+    """
+    q = motion_geometry.configurations(
+        condition.prepared, condition.solutions[condition.best_replicate]
+    )
+    table, last = links_table(condition, q), q.shape[1] - 1
+    cuts = np.unique(np.round(np.linspace(0, last, min(STAGES, last) + 1)).astype(np.int64))
+    parts = [
+        table[table["instant"].between(first, stop)].assign(stage=stage, first=first, last=stop)
+        for stage, (first, stop) in enumerate([*itertools.pairwise(cuts), (0, last)])
+    ]
+    return pd.concat(parts, ignore_index=True)
+
+
+def draw_snapshots(table: pd.DataFrame) -> Figure:
+    """Draw the motion stage by stage, older instants fainter, and all of it in the last panel."""
+    stages = sorted(table["stage"].unique())
+    lines = -(-len(stages) // 3)
+    figure = style.figure(2.1 * lines + 0.4)
+    for k, stage in enumerate(stages):
+        axes = _space(figure, (lines, 3, k + 1), [table], table["length_unit"].iloc[0], zoom=1.08)
+        rows = table[table["stage"] == stage]
+        first, last = rows["first"].iloc[0], rows["last"].iloc[0]
+        axes.set_title(
+            f"instants {first}–{last}" if k < len(stages) - 1 else f"all instants {first}–{last}"
+        )
+        for (arm, instant), links in groups(rows, ["arm", "instant"]):
+            newest = instant == last
+            shade = 1.0 if newest else 0.15 + 0.45 * (instant - first) / max(1, last - first)
+            _arm(axes, arm, links, width=2.4 if newest else 0.9, alpha=shade, joints=newest)
+        for arm, links in groups(rows[rows["link"] == rows["link"].max()], "arm"):
+            axes.plot(
+                links["x_end"],
+                links["y_end"],
+                links["z_end"],
+                ":",
+                color=style.arm_colour(arm),
+                linewidth=1.0,
+            )
+    dots = Line2D(
+        [], [], color=style.NEUTRAL, linewidth=1.0, linestyle=":", label="trace of the tip"
+    )
+    _legend(figure, table, [dots])
+    return figure
+
+
+def _offsets(assembly: Any) -> np.ndarray:
+    """Return, per arm, the place of its first link among all links."""
+    arms = [link.arm for link in assembly.links]
+    return np.array([arms.index(arm) for arm in range(assembly.num_arms)])
+
+
+def _space(
+    figure: Figure,
+    place: tuple[int, int, int],
+    tables: list[pd.DataFrame],
+    unit: str,
+    *,
+    zoom: float = 1.0,
+) -> Any:
+    """Return axes in space with equal scales that hold all links of the tables."""
+    axes: Any = figure.add_subplot(*place, projection="3d")
+    box = []
+    for name in "xyz":
+        values = np.concatenate(
+            [table[column].to_numpy() for table in tables for column in (name, f"{name}_end")]
+        )
+        low, high = float(values.min()), float(values.max())
+        pad = 0.05 + 0.5 * max(0.0, 0.5 - (high - low))
+        getattr(axes, f"set_{name}lim")(low - pad, high + pad)
+        box.append(high - low + 2.0 * pad)
+        getattr(axes, f"set_{name}label")(f"{name} [{unit}]", labelpad=-7, fontsize=7)
+    axes.set_box_aspect(box, zoom=zoom)
+    axes.patch.set_visible(False)  # else it hides the labels of the panel beside it
+    axes.tick_params(labelsize=6, pad=-2)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_major_locator(style.few_ticks())
+    axes.view_init(elev=24.0, azim=-35.0)
+    return axes
+
+
+def _arm(
+    axes: Any,
+    arm: int,
+    rows: pd.DataFrame,
+    *,
+    width: float = 2.4,
+    alpha: float = 1.0,
+    dashed: bool = False,
+    joints: bool = True,
+) -> None:
+    """Draw an arm's links, given by rows in order."""
+    points = [[rows[name].iloc[0], *rows[f"{name}_end"]] for name in "xyz"]
+    kind: Any = (0, (2, 1)) if dashed else "-"
+    axes.plot(*points, linestyle=kind, color=style.arm_colour(arm), linewidth=width, alpha=alpha)
+    if joints:
+        axes.plot(
+            *points,
+            "o",
+            color="white",
+            markeredgecolor=style.arm_colour(arm),
+            markersize=3.2,
+            alpha=alpha,
+        )
+        base = [values[:1] for values in points]
+        axes.plot(*base, "s", color=style.NEUTRAL, markersize=5)
+
+
+def _name_points(axes: Any, arm: int, rows: pd.DataFrame) -> None:
+    name = POINT_NAMES[arm] if arm < len(POINT_NAMES) else f"r{arm}"
+    points = np.vstack(
+        [rows[["x", "y", "z"]].to_numpy()[:1], rows[["x_end", "y_end", "z_end"]].to_numpy()]
+    )
+    for k, (x, y, z) in enumerate(points):
+        text = f"{name}{str(k).translate(style.SUBSCRIPTS)}"
+        axes.text(x, y, z + 0.09, text, color=style.arm_colour(arm), fontsize=8)
+
+
+def _ball(row: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return a sphere as a grid for a surface."""
+    around, up = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 17), np.linspace(0.0, np.pi, 9))
+    x, y, z = np.cos(around) * np.sin(up), np.sin(around) * np.sin(up), np.cos(up)
+    return row.x + row.radius * x, row.y + row.radius * y, row.z + row.radius * z
+
+
+def _legend(figure: Figure, table: pd.DataFrame, more: list[Line2D]) -> None:
+    arms = [
+        Line2D([], [], color=style.arm_colour(arm), linewidth=2.4, label=f"arm {arm + 1}")
+        for arm in sorted(table["arm"].unique())
+    ]
+    figure.legend(handles=[*arms, *more], loc="outside lower center", ncols=len(arms) + len(more))

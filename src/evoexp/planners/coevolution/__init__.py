@@ -1,0 +1,1 @@
+"""Co-evolving populations, one per robot (Curkovic, Jerbic & Stipancic 2013)."""

@@ -1,0 +1,97 @@
+"""How long a chromosome must be for the speed of the end-effector (Curkovic et al. 2013, Eqs.
+
+2 and 3).
+"""
+
+import math
+from collections.abc import Sequence
+
+from evoexp.numeric.elementary import DEGREE
+from evoexp.records import FloatArray
+from evoexp.validation import Positive, Settings
+
+PRINTED_STEPS = (
+    11.5,
+    23.0,
+)  # [deg] section 2: the "angles calculated", for l1 = l2 = 0.25 m, 5 m/s, 0.01 s
+# [-] section 2: the "resulting chromosome length", from boundary to boundary of the half-plane
+PRINTED_LENGTH = 32
+HALF_TURN = 180.0  # [deg]
+
+
+class SpeedLimit(Settings):
+    """How fast the end-effector may be, and how often it is told where to go.
+
+    Attributes:
+        tcp_speed: V_max, greatest speed of the tool centre point [length unit/s].
+        sampling_time: T, between two configurations [s].
+    """
+
+    tcp_speed: Positive
+    sampling_time: Positive
+
+    def greatest_steps(self, lengths: Sequence[float]) -> tuple[float, float]:
+        """Return how far either link may turn from one configuration to the next, alone (Eq.
+
+        2) [deg].
+
+        Args:
+            lengths: Of the two links [length unit].
+        """
+        travel = self.tcp_speed * self.sampling_time
+        return travel / (lengths[0] + lengths[1]) / DEGREE, travel / lengths[1] / DEGREE
+
+
+def needed_length(turn: float, greatest_step: float) -> int:
+    """Return the chromosome's length for a turn of a link (Eq.
+
+    3), two genes per configuration: the next even number.
+
+    Args:
+        turn: From the start to the goal [deg].
+        greatest_step: Δφ1,max of Eq. 2 [deg].
+    """
+    genes = math.ceil(
+        2.0 * turn / greatest_step * (1.0 - 1e-12)
+    )  # 1e-12: a whole number of steps stays whole
+    return max(2, genes + genes % 2)
+
+
+def length_notes(
+    limit: SpeedLimit,
+    lengths: Sequence[Sequence[float]],
+    start: FloatArray,
+    goal: FloatArray,
+    chromosome_length: int,
+) -> list[str]:
+    """Return what Eqs. 2 and 3 ask for, what the paper prints, and what this chromosome violates.
+
+    Line by line.
+
+    Args:
+        limit: Of the speed.
+        lengths: (robots, 2) of the links [length unit].
+        start: (robots, 2) link angles [rad].
+        goal: (robots, 2) [rad].
+        chromosome_length: L.
+    """
+    notes = []
+    segments = chromosome_length // 2 + 1
+    for r, links in enumerate(lengths):
+        first, second = limit.greatest_steps(links)
+        turn = float(abs(goal[r] - start[r]).max()) / DEGREE
+        asked, worst, step = (
+            needed_length(turn, first),
+            needed_length(HALF_TURN, first),
+            turn / segments,
+        )
+        verdict = f"violates it {step / first:.3g} times over" if step > first else "is within it"
+        notes += [
+            f"robot {r + 1}: Eq. 2 allows steps of {first:.2f} and {second:.2f} deg "
+            f"(printed: {PRINTED_STEPS[0]:g} and {PRINTED_STEPS[1]:g})",
+            f"robot {r + 1}: Eq. 3 asks for L = {asked} here ({turn:g} deg), for L = {worst} over "
+            f"{HALF_TURN:g} deg (printed: {PRINTED_LENGTH})",
+            f"robot {r + 1}: L = {chromosome_length} (K = {segments - 1}) takes steps of "
+            f"{step:.2f} deg at best, which {verdict}",
+        ]
+    return notes

@@ -1,0 +1,372 @@
+"""Co-evolving populations, one per robot (Curkovic, Jerbic & Stipancic 2013).
+
+An individual is a path of one robot: K configurations of two absolute link angles between start and
+goal, which are given. What it is worth depends on all individuals of the other robots' populations.
+The answer is a team: one individual of every population, free of collision with each other. Nothing
+here knows how many robots there are.
+
+A population is an array (robots, 2 K, individuals) [rad]: the angles of configuration 1, of
+configuration 2, …. A solution is flat: robot by robot, configuration by configuration, link by link
+(robots × (K + 2) × 2) [deg], start and goal included.
+"""
+
+from collections.abc import Iterator
+from itertools import combinations
+from typing import ClassVar, Literal, NamedTuple, Self
+
+import numpy as np
+from pydantic import model_validator
+
+from evoexp.collision.models.link_collision import LinkCollision, LinkCrossings
+from evoexp.collision.scene import Scene, scene
+from evoexp.errors import SettingError
+from evoexp.evolution.cost_statistics import cost_statistics
+from evoexp.evolution.crossover import num_single_point_uniforms
+from evoexp.evolution.hall_of_fame import Hall, best_team
+from evoexp.evolution.mutation import decayed_rate, num_allele_uniforms
+from evoexp.numeric.elementary import DEGREE
+from evoexp.objectives.motion_criteria import MotionCriteria
+from evoexp.paths.motion import Motion, clamped_cubic, joint_ranges, top_speeds
+from evoexp.planners.coevolution.chromosome_length import SpeedLimit, length_notes
+from evoexp.planners.coevolution.kernels import breed, measure, renew
+from evoexp.planners.coevolution.settings import CoevolutionSettings
+from evoexp.planners.coevolution.teams import Evaluated, Judgement
+from evoexp.records import FloatArray, Generation
+from evoexp.robots.assembly import Assembly, Robot
+from evoexp.scenarios.link_motion import LinkMotion
+from evoexp.validation import Component, Count
+
+HALF_TURN = DEGREE * 180.0  # genes live in [0, π)
+
+
+class Problem(NamedTuple):
+    """What `prepare` made of robots and scenario.
+
+    Attributes:
+        assembly: The robots, built.
+        collision: The paper's collision model on them.
+        start: (robots, 2) absolute link angles [rad].
+        goal: (robots, 2) [rad].
+        moving: (robots,) false for robots that stand still.
+        scene: The bodies themselves, for the exact verdict on a motion.
+        security_margin: Clearance that the task requires [length unit].
+    """
+
+    assembly: Assembly
+    collision: LinkCollision
+    start: FloatArray
+    goal: FloatArray
+    moving: np.ndarray
+    scene: Scene
+    security_margin: float
+
+
+class Coevolution(Component):
+    """The co-evolutionary algorithm of Curkovic et al., sections 2 and 3.
+
+    Methods I–VIII are settings of it.
+
+    Attributes:
+        chromosome_length: L, even: two link angles for each of K = L/2 configurations between start
+            and goal [-].
+        interpolation: What is executed between configurations: straight lines in the joint angles,
+            or a cubic spline that starts and ends at rest (Fig. 9). The verdict judges that; the
+            search looks at the configurations.
+        speed_limit: Of the end-effector (Eqs. 2, 3); no part of the search.
+        ga: Populations, generations, rates, hall of fame.
+        objective: Weights of C1 … C4.
+        collision: Links as lines, or their envelopes.
+    """
+
+    component: ClassVar[str] = "coevolution"
+
+    chromosome_length: Count
+    interpolation: Literal["linear", "cubic"]
+    speed_limit: SpeedLimit
+    ga: CoevolutionSettings
+    objective: MotionCriteria
+    collision: LinkCrossings
+
+    @model_validator(mode="after")
+    def _genes_come_in_pairs(self) -> Self:
+        if self.chromosome_length < 2 or self.chromosome_length % 2:
+            must = "even and at least 2: two link angles per configuration"
+            raise SettingError("chromosome_length", must, self.chromosome_length)
+        return self
+
+    @property
+    def num_configurations(self) -> int:
+        """K, the configurations between start and goal."""
+        return self.chromosome_length // 2
+
+    def prepare(self, robot: Robot, scenario: LinkMotion) -> Problem:
+        """Build the robots and check that start and goal fit them and are free of collision.
+
+        Raises:
+            SettingError: If they are not.
+        """
+        assembly = robot.build()
+        collision = self.collision.bind(assembly, scenario.obstacles)
+        if len(collision.arms) < 2:
+            raise SettingError(
+                "robot", "two robots or more, which evolve together", len(collision.arms)
+            )
+        bases, lengths = (np.array([arm[k] for arm in collision.arms]) for k in range(2))
+        start, goal = (DEGREE * ends for ends in scenario.ends(bases, lengths))
+        moving = np.array([r not in scenario.stationary for r in range(len(collision.arms))])
+        bodies = scene(assembly, scenario.obstacles)
+        problem = Problem(
+            assembly, collision, start, goal, moving, bodies, scenario.security_margin
+        )
+        for name, posture in (("q_start", start), ("q_goal", goal)):
+            if contact := collision.contact(posture):
+                relative = np.stack([posture[:, 0], posture[:, 1] - posture[:, 0]], axis=1).ravel()
+                closest = " and ".join(bodies.nearest_pair(relative))
+                given = (posture / DEGREE).round(9).tolist()
+                raise SettingError(
+                    f"scenario.{name}", f"free of collision ({contact}: {closest})", given
+                )
+        return problem
+
+    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
+        """Yield the initial populations, then one generation after the other (Fig. 2)."""
+        ga, record = self.ga, _Record(self, problem)
+        populations = self.sample(problem, rng, ga.population_size)
+        hall, waiting = Hall.empty(len(problem.start)), 0
+        found = self.evaluated(problem, populations)
+        yield record.generation(0, populations, found)
+        for index in range(1, ga.num_generations + 1):
+            hall = self._renewed(populations, found, hall)
+            waiting = 0 if record.feasible else waiting + 1
+            if ga.restart_after is not None and waiting >= ga.restart_after:
+                # "If no convergence has occurred, …, the algorithm generates new populations"
+                # (section 3).
+                populations, waiting = self.sample(problem, rng, ga.population_size), 0
+                hall = Hall.empty(len(problem.start))
+            else:
+                populations = self._bred(rng, problem, populations, found, hall, index)
+                hall = hall.moved(ga.population_size - hall.num_teams)
+            found = self.evaluated(problem, populations)
+            yield record.generation(index, populations, found)
+
+    def _renewed(self, populations: FloatArray, found: Evaluated, hall: Hall) -> Hall:
+        """Return the hall of fame: members of the Pareto fronts with their best collaborators."""
+        depth = self.ga.num_hall_teams
+        if not depth:
+            return hall
+        teams, ages = (
+            np.empty((depth, len(populations)), dtype=np.int64),
+            np.empty(depth, dtype=np.int64),
+        )
+        teams[: hall.num_teams], ages[: hall.num_teams] = hall.teams, hall.ages
+        collisions, costs = np.empty(depth, dtype=np.int64), np.empty(depth)
+        rules = self.ga.hall_memory or 0, self.ga.hall_frozen
+        found_keys = found.criteria, found.collisions, found.teamable
+        held = renew(
+            populations, *found_keys, rules, teams, ages, hall.num_teams, (collisions, costs)
+        )
+        return Hall(teams[:held], ages[:held], collisions[:held], costs[:held])
+
+    def _bred(
+        self,
+        rng: np.random.Generator,
+        problem: Problem,
+        populations: FloatArray,
+        found: Evaluated,
+        hall: Hall,
+        index: int,
+    ) -> FloatArray:
+        """Return the next populations.
+
+        Offspring, then elites, then the members of the hall, unchanged.
+        """
+        ga, bred = self.ga, np.empty_like(populations)
+        rate = decayed_rate(ga.mutation_rate, ga.mutation_decay, index, ga.num_generations)
+        count = ga.population_size - ga.num_elites - hall.num_teams
+        numbers = count + num_single_point_uniforms(count // 2) + num_allele_uniforms(count)
+        uniforms = rng.random((int(np.count_nonzero(problem.moving)), numbers))
+        mutation = rate, DEGREE * ga.mutation_step, HALF_TURN, ga.mutation_direction == "symmetric"
+        settings = ga.num_elites, ga.selection == "inverse", ga.crossover_rate, *mutation
+        breed(uniforms, populations, found.costs, problem.moving, hall.teams, settings, bred)
+        return bred
+
+    def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
+        """Return populations of uniform genes, (robots, 2 K, count).
+
+        Robots that stand still keep their posture.
+        """
+        genes = HALF_TURN * rng.random((len(problem.start), 2 * self.num_configurations, count))
+        for robot in np.flatnonzero(~problem.moving):
+            genes[robot] = np.tile(problem.start[robot], self.num_configurations)[:, None]
+        return genes
+
+    def evaluated(self, problem: Problem, populations: FloatArray) -> Evaluated:
+        """Evaluate populations (robots, 2 K, individuals).
+
+        Everybody against everybody of the other robots (Eq. 4).
+        """
+        collision, robots, count = problem.collision, len(populations), populations.shape[2]
+        criteria, own = np.empty((robots, 4, count)), np.empty((robots, count))
+        paths, points = (
+            np.empty((robots, self.num_configurations + 2, rows, count)) for rows in (2, 4)
+        )
+        arms, weights = (
+            np.array([(*arm.base, *arm.lengths) for arm in collision.arms]),
+            self.objective.own_weights,
+        )
+        measure(
+            populations, problem.start, problem.goal, arms, weights, paths, points, criteria, own
+        )
+        lines = [collision.outlines(r, paths[r], points[r]) for r in range(robots)]
+        blocked = np.array([collision.with_obstacles(r, lines[r]) for r in range(robots)])
+        hits, sums = [], blocked * count  # an obstacle is in the way whoever the collaborator is
+        for a, b in combinations(range(robots), 2):
+            crossings = collision.between(a, lines[a], b, lines[b])
+            hits.append(crossings.counts)
+            sums[a] += crossings.sums_1
+            sums[b] += crossings.sums_2
+        criteria[:, 0] = sums
+        pairs = hits[0][np.newaxis] if len(hits) == 1 else np.array(hits)
+        return Evaluated(
+            self.objective.collision_weight * sums + own, criteria, own, pairs, blocked
+        )
+
+    def cost(self, problem: Problem, population: FloatArray) -> Judgement:
+        """Judge the individuals of the first robot, each by its cheapest collision-free team."""
+        found = self.evaluated(problem, population)
+        count, costs = population.shape[2], np.empty(population.shape[2])
+        for i in range(count):
+            costs[i] = found.cost_of(found.team_of(i))
+        return Judgement(costs, found, self.queries(problem, count))
+
+    def queries(self, problem: Problem, count: int) -> int:
+        """Return the configurations that evaluating populations of `count` asks for."""
+        robots, substeps = len(problem.start), self.collision.collision_substeps
+        tested = (self.num_configurations + 1) * substeps - 1
+        return robots * (robots - 1) // 2 * count * count * tested
+
+    def solution(self, problem: Problem, population: FloatArray, individual: int) -> FloatArray:
+        """Return the team of an individual of the first robot as a flat solution."""
+        return self.team_solution(
+            problem, population, self.evaluated(problem, population).team_of(individual)
+        )
+
+    def team_solution(
+        self, problem: Problem, population: FloatArray, team: np.ndarray
+    ) -> FloatArray:
+        """Return one individual of every population as a flat solution."""
+        parts = []
+        for r, individual in enumerate(team):
+            path = [problem.start[r], population[r, :, individual], problem.goal[r]]
+            parts.append(np.concatenate(path) / DEGREE)
+        return np.concatenate(parts)
+
+    def motion(self, problem: Problem, solution: FloatArray) -> Motion:
+        """Return the joint-space motion of a solution.
+
+        From configuration to configuration in equal times.
+        """
+        absolute = self._curve(problem, solution).q
+        relative = absolute.reshape(len(absolute), -1, 2).copy()
+        relative[:, :, 1] -= relative[:, :, 0]  # the models' joints turn against the link before
+        return self._interpolated(relative.reshape(absolute.shape))
+
+    def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
+        """Return the criteria of every robot of one team.
+
+        And what the executed curve asks of its joints.
+
+        Returns:
+            C1 … C4 (C1 against the team's other robots only), how far the curve leaves the range
+            [0, π] of link angles, and the largest turn of a link per sampling step, at the curve's
+            fastest instant.
+
+        Raises:
+            ValueError: If the solution has another size than robots × (K + 2) × 2.
+        """
+        paths = DEGREE * self._paths(problem, solution)
+        ends = problem._replace(start=paths[:, 0], goal=paths[:, -1])
+        genes = np.ascontiguousarray(paths[:, 1:-1].reshape(len(paths), -1, 1))
+        terms = self.evaluated(ends, genes).terms_of(np.zeros(len(paths), dtype=np.int64))
+        curve = self._curve(problem, solution)
+        least, greatest = (joint_ranges(curve)[:, k].reshape(-1, 2) / DEGREE for k in range(2))
+        turns = top_speeds(curve).reshape(-1, 2) / DEGREE
+        for r in range(len(turns)):
+            beyond = max(0.0, -float(least[r].min()), float(greatest[r].max()) - HALF_TURN / DEGREE)
+            terms[f"out_of_range_robot_{r + 1}_deg"] = beyond
+            terms[f"fastest_turn_robot_{r + 1}_deg"] = float(turns[r].max())
+        return terms
+
+    def notes(self, problem: Problem) -> list[str]:
+        """Return what Eqs. 2 and 3 say of the chromosome's length, line by line."""
+        lengths = [arm.lengths for arm in problem.collision.arms]
+        return length_notes(
+            self.speed_limit, lengths, problem.start, problem.goal, self.chromosome_length
+        )
+
+    def shape(self, problem: Problem) -> tuple[tuple[int, int], ...]:
+        """Return the documented shape of a solution: per robot, (K + 2, 2)."""
+        return ((self.num_configurations + 2, 2),) * len(problem.start)
+
+    def _paths(self, problem: Problem, solution: FloatArray) -> FloatArray:
+        shape = (len(problem.start), self.num_configurations + 2, 2)
+        if solution.shape != (int(np.prod(shape)),):
+            raise ValueError(f"a solution has {int(np.prod(shape))} values, was {solution.shape}")
+        return solution.reshape(shape)
+
+    def _curve(self, problem: Problem, solution: FloatArray) -> Motion:
+        """Return what is executed, in absolute link angles [rad]."""
+        paths = DEGREE * self._paths(problem, solution)
+        return self._interpolated(paths.transpose(1, 0, 2).reshape(paths.shape[1], -1))
+
+    def _interpolated(self, q: FloatArray) -> Motion:
+        q = np.ascontiguousarray(q)
+        return clamped_cubic(q) if self.interpolation == "cubic" else Motion(q)
+
+
+class _Record:
+    """The best team so far, and the records of generations that carry it."""
+
+    def __init__(self, planner: Coevolution, problem: Problem) -> None:
+        self.planner, self.problem = planner, problem
+        self.cost, self.solution = np.inf, np.empty(0)
+        self.terms: dict[str, float] = {}
+        self.evaluations = self.queries = 0
+
+    @property
+    def feasible(self) -> bool:
+        """Whether a collision-free team was found."""
+        return bool(np.isfinite(self.cost))
+
+    def generation(self, index: int, populations: FloatArray, found: Evaluated) -> Generation:
+        """Update the best team and return the generation's record."""
+        planner, (robots, _, count) = self.planner, populations.shape
+        self.evaluations += robots * count
+        self.queries += planner.queries(self.problem, count)
+        best = best_team(found.collisions, found.teamable)
+        if best.cost < self.cost or index == 0:
+            self.cost = best.cost
+            team = (
+                best.individuals
+                if best.found
+                else np.array([int(np.argmin(costs)) for costs in found.costs])
+            )
+            self.solution = planner.team_solution(self.problem, populations, team)
+            self.terms = found.terms_of(team)
+        statistics = cost_statistics(found.costs.ravel())
+        return Generation(
+            index=index,
+            best=self.solution,
+            best_cost=self.cost,
+            best_cost_in_generation=best.cost,
+            mean_cost=statistics.mean,
+            std_cost=statistics.std,
+            num_feasible=found.num_feasible,
+            evaluations=self.evaluations,
+            collision_queries=self.queries,
+            solved=self.feasible,
+            terms=self.terms,
+            costs=found.costs,
+            population=populations,
+            criteria=found.criteria if index == planner.ga.num_generations else None,
+        )

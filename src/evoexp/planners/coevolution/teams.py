@@ -1,0 +1,139 @@
+"""Populations evaluated all against all, and the teams in them (Curkovic et al. 2013, Eqs. 4–8).
+
+A team is one individual of every population: its paths are executed together. What individuals are
+worth on their own and how often they collide stands in `Evaluated`; everything else here reads it.
+"""
+
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from evoexp.evolution.hall_of_fame import best_team, pair_index
+from evoexp.numeric.compilation import kernel
+from evoexp.records import FloatArray
+
+
+class Evaluated(NamedTuple):
+    """Populations evaluated all against all.
+
+    Attributes:
+        costs: (robots, individuals) C1 + C2 + C3 + C4, weighted.
+        criteria: (robots, 4, individuals) C1 … C4.
+        own: (robots, individuals) C2 + C3 + C4, weighted.
+        collisions: (pairs of robots, individuals, individuals) colliding configurations.
+        blocked: (robots, individuals) configurations that collide with obstacles.
+    """
+
+    costs: FloatArray
+    criteria: FloatArray
+    own: FloatArray
+    collisions: np.ndarray
+    blocked: np.ndarray
+
+    @property
+    def teamable(self) -> FloatArray:
+        """(robots, individuals) own cost; inf for those that collide with an obstacle."""
+        return np.where(self.blocked > 0, np.inf, self.own) if self.blocked.any() else self.own
+
+    @property
+    def num_feasible(self) -> int:
+        """Individuals of the first robot with a collision-free partner in every population."""
+        return int(count_partnered(self.collisions, self.blocked))
+
+    def team_of(self, individual: int) -> np.ndarray:
+        """Return the cheapest collision-free team with an individual of the first robot.
+
+        Else one that collides little.
+
+        Returns:
+            (robots,) index of the member in each population.
+        """
+        own = self.teamable.copy()
+        alone = own[0, individual]
+        own[0] = np.inf
+        own[0, individual] = alone
+        best = best_team(self.collisions, own)
+        if best.found:
+            return best.individuals
+        team = np.zeros(len(own), dtype=np.int64)
+        team[0] = individual
+        for other in range(1, len(own)):
+            team[other] = int(np.argmin(self.collisions[other - 1, individual]))
+        return team
+
+    def cost_of(self, team: np.ndarray) -> float:
+        """Return the summed own cost of a team (robots,); inf if it collides."""
+        if self.collisions_of(team) > 0:
+            return np.inf
+        return float(sum(self.own[r, i] for r, i in enumerate(team)))
+
+    def collisions_of(self, team: np.ndarray) -> int:
+        """Return the colliding configurations within a team (robots,) and with obstacles."""
+        pairs = enumerate(combinations(range(len(team)), 2))
+        hits = sum(int(self.collisions[pair, team[a], team[b]]) for pair, (a, b) in pairs)
+        return hits + sum(int(self.blocked[r, i]) for r, i in enumerate(team))
+
+    def terms_of(self, team: np.ndarray) -> dict[str, float]:
+        """Return C1 … C4 of every robot of a team (robots,) by name.
+
+        C1 against the team's other robots only.
+        """
+        met = [int(self.blocked[r, i]) for r, i in enumerate(team)]
+        for pair, (a, b) in enumerate(combinations(range(len(team)), 2)):
+            hits = int(self.collisions[pair, team[a], team[b]])
+            met[a] += hits
+            met[b] += hits
+        terms = {
+            "team_cost": float(sum(self.own[r, i] for r, i in enumerate(team))),
+            "team_collisions": float(self.collisions_of(team)),
+        }
+        for r, individual in enumerate(team):
+            _, path, rotation, evenness = self.criteria[r, :, individual]
+            terms[f"collisions_robot_{r + 1}"] = float(met[r])
+            terms[f"tip_path_robot_{r + 1}"] = float(path)
+            terms[f"rotation_robot_{r + 1}_rad"] = float(rotation)
+            terms[f"tip_unevenness_robot_{r + 1}"] = float(evenness)
+        return terms
+
+
+class Judgement(NamedTuple):
+    """Individuals of the first robot, each with its cheapest collision-free team.
+
+    Attributes:
+        cost: (individuals,) own costs of that team summed; inf if there is none.
+        evaluated: The populations.
+        collision_queries: Configurations judged for it.
+    """
+
+    cost: FloatArray
+    evaluated: Evaluated
+    collision_queries: int
+
+    @property
+    def feasible(self) -> np.ndarray:
+        """(individuals,) whether each has a collision-free team."""
+        return np.isfinite(self.cost)
+
+    def named_terms(self, individual: int) -> dict[str, float]:
+        """Return the criteria of an individual's team by name."""
+        return self.evaluated.terms_of(self.evaluated.team_of(individual))
+
+
+@kernel
+def count_partnered(collisions, blocked):  # type: ignore[no-untyped-def]
+    """The kernel of `Evaluated.num_feasible`."""
+    count = 0
+    for i in range(blocked.shape[1]):
+        partnered = blocked[0, i] == 0
+        for other in range(1, len(blocked)):
+            row, usable, found = (
+                collisions[pair_index(len(blocked), 0, other), i],
+                blocked[other],
+                False,
+            )
+            for j in range(blocked.shape[1]):
+                found |= (row[j] == 0) & (usable[j] == 0)
+            partnered &= found
+        count += 1 if partnered else 0
+    return count

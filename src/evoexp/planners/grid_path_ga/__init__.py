@@ -1,0 +1,1 @@
+"""Paths on grids (Chen & Zalzala 1995, section 2)."""

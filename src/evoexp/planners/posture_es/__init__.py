@@ -1,0 +1,1 @@
+"""Postures as individuals (Corsépius 2001)."""

@@ -1,0 +1,316 @@
+"""Postures as individuals: an evolution strategy whose winner's ancestry is the path.
+
+Corsépius 2001.
+
+An individual is one posture. The search begins with the momentary posture alone; every cycle
+generates offspring by random steps within a local scope of the parents (Fig. 2), rates them in
+configuration and in work space at once, and selects the best as the next parents. When an
+individual meets the goal, the path is its line of ancestors, from the start on: nobody plans it,
+and inverse kinematics is solved on the way. A task may have several phases, each a search of its
+own that begins at the posture where the last one ended.
+
+A population is an array (nq, individuals) [rad]. A solution is flat: the ancestry, postures × nq
+[rad], from the start to the best so far, through all phases.
+
+What "best so far" means: the individual of the lowest cost in its phase; once one meets the goal,
+that one (of several the cheapest), whose cost need not be the lowest. Costs of different phases are
+worth nothing to each other: while a phase before the last is searched, the plan's cost is inf and
+the phase's own stands in the term `cost`. Individuals that collide or pass a hard limit are rated,
+but are never parents; means and deviations are over the others.
+"""
+
+from collections.abc import Iterator
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic import BeforeValidator, Field
+
+from evoexp.collision.models.body_models import CollisionModel
+from evoexp.evolution.cost_statistics import cost_statistics
+from evoexp.numeric.elementary import DEGREE
+from evoexp.objectives.posture_cost import COLUMNS, PARALLEL, TERMS, UPRIGHT, PostureCost
+from evoexp.paths.motion import Motion
+from evoexp.planners.posture_es import problem as posture_problem
+from evoexp.planners.posture_es.cycles import Ancestry, Search
+from evoexp.planners.posture_es.kernels import COST
+from evoexp.planners.posture_es.phases import Problem, Span, begin, finish, judge, spans
+from evoexp.planners.posture_es.settings import StrategySettings
+from evoexp.records import FloatArray, Generation
+from evoexp.robots.assembly import Robot
+from evoexp.scenarios.posture_task import PostureTask
+from evoexp.validation import Component, NonNegativeCount, Positive
+
+DENSE = 50  # configurations per step at which tilts of the continuous motion are sampled
+OVERSIZED = 1.0 + 1e-9  # steps beyond the scope by more than rounding
+
+
+class Judgement:
+    """Postures judged by the first phase."""
+
+    def __init__(
+        self, rows: FloatArray, feasible: np.ndarray, met: np.ndarray, chosen: tuple[int, ...]
+    ) -> None:
+        self.cost = np.where(feasible, rows[COST], np.inf)
+        self.rows, self.feasible, self.collision_queries = rows, met, rows.shape[1]
+        self._chosen = chosen
+
+    def named_terms(self, individual: int) -> dict[str, float]:
+        """Return the terms of one posture by name."""
+        return named(self.rows[:, individual], self._chosen)
+
+
+def _one_or_several(value: Any) -> Any:
+    """Return one number as a tuple of one."""
+    return (value,) if isinstance(value, int | float) and not isinstance(value, bool) else value
+
+
+class PostureEs(Component):
+    """The evolution strategy of Corsépius, section 4.
+
+    Attributes:
+        scope: How far a joint may step at most: one number for all joints, or one per joint [rad],
+            lengths for sliding joints.
+        edge_check: Configurations tested between a parent and its child; 0: postures only, as in
+            the paper.
+        ga: Parents, offspring, selection, mutation, when to stop.
+        objective: Terms of the cost.
+        collision: What stands for the bodies.
+    """
+
+    component: ClassVar[str] = "posture_es"
+
+    scope: Annotated[tuple[Positive, ...], Field(min_length=1), BeforeValidator(_one_or_several)]
+    edge_check: NonNegativeCount
+    ga: StrategySettings
+    objective: PostureCost
+    collision: CollisionModel
+
+    def prepare(self, robot: Robot, scenario: PostureTask) -> Problem:
+        """Build the robot and check the task against it.
+
+        Raises:
+            SettingError: If they do not fit each other: see `posture_problem`.
+        """
+        return posture_problem.prepare(robot, scenario, self.scope, self.objective, self.collision)
+
+    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
+        """Yield the start and then every cycle, phase by phase; their indices go on counting."""
+        record = _Record(self, problem)
+        ancestry = Ancestry(len(problem.start))
+        node = int(ancestry.add(problem.start[None], -1)[0])
+        situation = problem.first_situation
+        for index in range(len(problem.phases)):
+            stage = begin(problem, index, ancestry.postures[node], situation)
+            search = Search(self.ga, problem, stage.judging, self.edge_check, ancestry, node)
+            last = index == len(problem.phases) - 1
+            while True:
+                reason = search.stop_reason
+                ends = bool(reason) and (last or reason != "goal")
+                yield record.generation(search, index, reason if ends else "")
+                if reason:
+                    break
+                search.advance(rng)
+            if not search.won:
+                return
+            node = search.best
+            situation = finish(problem, stage, ancestry.postures[node])
+
+    def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
+        """Return postures uniform within the joint limits, (nq, count)."""
+        low, high = problem.limits.T
+        return np.asarray(low[:, None] + (high - low)[:, None] * rng.random((len(low), count)))
+
+    def cost(self, problem: Problem, population: FloatArray) -> Judgement:
+        """Judge postures (nq, individuals) by the first phase: what random search draws."""
+        stage = begin(problem, 0, problem.start, problem.first_situation)
+        return Judgement(*judge(stage, population), self.chosen)
+
+    @property
+    def chosen(self) -> tuple[int, ...]:
+        """Indices of the terms that are recorded: those that the objective gives a weight."""
+        return tuple(k for k, name in enumerate(TERMS) if name in self.objective.chosen)
+
+    def solution(self, problem: Problem, population: FloatArray, individual: int) -> FloatArray:
+        """Return a posture as a flat solution: straight from the start."""
+        return np.concatenate([problem.start, population[:, individual]])
+
+    def motion(self, problem: Problem, solution: FloatArray) -> Motion:
+        """Return the motion of a solution.
+
+        From posture to posture in equal times, straight in joint space.
+        """
+        return Motion(np.ascontiguousarray(self._postures(problem, solution)))
+
+    def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
+        """Return the terms of the last posture in its phase, and what the whole path is like.
+
+        `phase_1_end` and so on are the postures at which phases end, counted from 0; −1: not
+        reached.
+
+        Raises:
+            ValueError: If the solution is no list of postures.
+        """
+        postures = self._postures(problem, solution)
+        found = spans(problem, postures)
+        terms = named(found[-1].judged.rows[:, -1], self.chosen) | path_terms(
+            postures, problem.scope
+        )
+        for k in range(len(problem.phases) if len(problem.phases) > 1 else 0):
+            terms[f"phase_{k + 1}_end"] = (
+                float(found[k].last) if k < len(found) and found[k].reached else -1.0
+            )
+        return (
+            terms
+            | {"infeasible_postures": float(sum(np.sum(~s.judged.feasible) for s in found))}
+            | self._tilts(found, postures)
+        )
+
+    def listing(self, problem: Problem, solution: FloatArray) -> tuple[list[str], list[list[Any]]]:
+        """Return names and rows of a table, one row per posture.
+
+        Its phase, terms, cost, step from the one before.
+        """
+        postures = self._postures(problem, solution)
+        names = [
+            "posture",
+            "phase",
+            *(COLUMNS[k] for k in self.chosen),
+            "cost",
+            "goal",
+            "step_rad",
+            "step_scopes",
+        ]
+        rows: list[list[Any]] = []
+        for span in spans(problem, postures):
+            for n in range(0 if span.first == 0 else 1, span.last - span.first + 1):
+                at, judged = span.first + n, span.judged
+                step = np.abs(postures[at] - postures[at - 1]) if at else np.zeros_like(postures[0])
+                values = [float(judged.rows[k, n]) for k in (*self.chosen, COST)]
+                steps = [float(step.max()), float((step / problem.scope).max())]
+                rows.append([at, span.stage.phase.name, *values, bool(judged.met[n]), *steps])
+        return names, rows
+
+    def shape(self, problem: Problem) -> tuple[Any, ...]:
+        """Return the documented shape of a solution: any number of postures × nq."""
+        return ..., (len(problem.start),)
+
+    def notes(self, problem: Problem) -> tuple[str, ...]:
+        """Return what the collision model is, and which pairs of bodies it does not test."""
+        return posture_problem.notes(problem)
+
+    def _tilts(self, found: list[Span], postures: FloatArray) -> dict[str, float]:
+        """Return the greatest tilts at postures and on the motion between them.
+
+        Where a phase limits them.
+        """
+        terms = {}
+        for term, limit in (
+            (UPRIGHT, self.objective.upright),
+            (PARALLEL, self.objective.keep_parallel),
+        ):
+            if limit is None:
+                continue
+            at, between = [0.0], [0.0]
+            for span in found:
+                if span.stage.judging[4][term] > 0.0:
+                    at.append(float(span.judged.rows[term].max()))
+                    between.append(
+                        float(
+                            judge(span.stage, dense(postures[span.first : span.last + 1]))
+                            .rows[term]
+                            .max()
+                        )
+                    )
+            terms[f"greatest_{TERMS[term]}_deg"] = max(at) / DEGREE
+            terms[f"greatest_{TERMS[term]}_between_deg"] = max(between) / DEGREE
+        return terms
+
+    def _postures(self, problem: Problem, solution: FloatArray) -> FloatArray:
+        num = len(problem.start)
+        if solution.ndim != 1 or len(solution) == 0 or len(solution) % num:
+            raise ValueError(f"a solution has a multiple of {num} values, was {solution.shape}")
+        return solution.reshape(-1, num)
+
+
+class _Record:
+    """The records of generations: what was evaluated so far, and the best so far."""
+
+    def __init__(self, planner: PostureEs, problem: Problem) -> None:
+        self.planner, self.problem = planner, problem
+        self.index, self.evaluations, self.queries, self.cycles = -1, 0, 0, 0
+        self._node, self._solution, self._path = -1, np.empty(0), {"": 0.0}
+
+    def generation(self, search: Search, phase: int, stop_reason: str) -> Generation:
+        """Return the record of the cycle that a search has done last.
+
+        Or of the posture that it begins with.
+        """
+        memory, problem, planner = search.memory, self.problem, self.planner
+        count = memory.offspring.shape[1]
+        self.index += 1
+        self.evaluations += count
+        self.queries += count * (1 + (planner.edge_check if search.cycles else 0))
+        self.cycles += min(search.cycles, 1)
+        if search.best != self._node:
+            postures = search.ancestry.path(search.best)
+            self._node, self._solution, self._path = (
+                search.best,
+                postures.ravel(),
+                path_terms(postures, problem.scope),
+            )
+        last = phase == len(problem.phases) - 1
+        costs = memory.rows[COST]
+        summary = cost_statistics(np.where(memory.feasible, costs, np.inf))
+        statistics = {
+            "phase": phase + 1.0,
+            "cycles": float(self.cycles),
+            "idle_cycles": float(search.idle),
+        }
+        several = len(problem.phases) > 1
+        return Generation(
+            index=self.index,
+            best=self._solution,
+            best_cost=search.least_cost if last else np.inf,
+            best_cost_in_generation=float(costs.min()) if last else np.inf,
+            mean_cost=summary.mean,
+            std_cost=summary.std,
+            num_feasible=int(np.count_nonzero(memory.feasible)),
+            evaluations=self.evaluations,
+            collision_queries=self.queries,
+            solved=search.won and last,
+            terms=named(search.best_row, planner.chosen) | self._path | statistics,
+            costs=costs[None, :] if several else costs,
+            population=memory.offspring,
+            stop_reason=stop_reason,
+        )
+
+
+def named(row: FloatArray, chosen: tuple[int, ...]) -> dict[str, float]:
+    """Return some terms of a posture (ROWS,) by name, and its cost."""
+    return {COLUMNS[k]: float(row[k]) for k in chosen} | {"cost": float(row[COST])}
+
+
+def path_terms(postures: FloatArray, scope: FloatArray) -> dict[str, float]:
+    """Return what a path (postures, nq) is like.
+
+    Steps in units of the scope, and how many are larger than it.
+    """
+    steps = np.abs(np.diff(postures, axis=0)) / scope
+    longest = steps.max(axis=1) if len(steps) else np.zeros(0)
+    return {
+        "postures": float(len(postures)),
+        "longest_step_scopes": float(longest.max()) if len(steps) else 0.0,
+        "oversized_steps": float(np.count_nonzero(longest > OVERSIZED)),
+    }
+
+
+def dense(postures: FloatArray) -> FloatArray:
+    """Return configurations along the straight motion through postures (postures, nq).
+
+    (nq, configurations).
+    """
+    shares = np.arange(DENSE) / DENSE
+    between = postures[:-1, None, :] + shares[:, None] * np.diff(postures, axis=0)[:, None, :]
+    return np.ascontiguousarray(
+        np.concatenate([between.reshape(-1, postures.shape[1]), postures[-1:]]).T
+    )

@@ -1,0 +1,316 @@
+"""What a posture search is asked: robot, task and objective, checked against each other."""
+
+import functools
+
+import numpy as np
+import pinocchio as pin
+
+from evoexp.collision.models.body_covers import Cover
+from evoexp.collision.models.body_models import BodyModel, CollisionModel
+from evoexp.collision.scene import obstacle_shapes
+from evoexp.errors import SettingError, nearest
+from evoexp.numeric.elementary import DEGREE
+from evoexp.objectives.posture_cost import ANGLE, AXIAL, HEADING, TERMS, PostureCost
+from evoexp.planners.posture_es.phases import Problem, begin, judge, scene_of
+from evoexp.records import FloatArray
+from evoexp.robots.assembly import Assembly, Robot
+from evoexp.robots.poses import local_pose
+from evoexp.scenarios.obstacles import CAPSULE, CYLINDER, ObstacleTable, obstacle_table
+from evoexp.scenarios.posture_task import (
+    Phase,
+    PointGoal,
+    PoseGoal,
+    PostureTask,
+    ShiftGoal,
+    SurfaceGoal,
+)
+
+
+def prepare(
+    robot: Robot,
+    task: PostureTask,
+    scope: tuple[float, ...],
+    objective: PostureCost,
+    collision: CollisionModel,
+) -> Problem:
+    """Return the problem of a task.
+
+    Raises:
+        SettingError: If a joint has no limits, the start or the scope does not fit the robot, the
+            start collides, a goal is out of reach, a contact names nothing, or a goal and the terms
+            that rate it contradict each other.
+    """
+    assembly = _built(robot)
+    if assembly.num_arms != 1:
+        raise SettingError("robot", "one arm", f"{assembly.num_arms} arms")
+    limits = _limits(assembly)
+    start = _start(task, assembly, limits)
+    obstacles = obstacle_table(task.obstacles).without_ellipses()
+    bodies = _bodies(robot, collision)
+    tool = assembly.tools[0]
+    for k, name in enumerate(task.names):
+        if name in bodies.names:
+            raise SettingError(
+                f"scenario.obstacles[{k}].name", "a name that no body of the robot has", name
+            )
+    phases = task.all_phases
+    problem = Problem(
+        assembly,
+        bodies,
+        task,
+        phases,
+        _weights(task, objective, obstacles),
+        objective,
+        obstacles,
+        _covers(task, obstacles, collision),
+        start,
+        limits,
+        _scope(scope, len(start)),
+        (tool.joint - 1, local_pose(assembly.table, tool.joint, tool.rotation, tool.position)),
+        None,
+        task.security_margin,
+        {},
+    )
+    _check_contacts(task, (*bodies.names, *task.names))
+    if task.check_reach:
+        _check_reach(problem)
+    stage = begin(problem, 0, start, problem.first_situation)
+    problem = problem._replace(scene=scene_of(problem, stage))
+    if not judge(stage, start[:, None]).feasible[0]:
+        raise _infeasible(problem, start)
+    return problem
+
+
+@functools.lru_cache(maxsize=16)
+def _built(robot: Robot) -> Assembly:
+    return robot.build()
+
+
+@functools.lru_cache(maxsize=16)
+def _bodies(robot: Robot, collision: CollisionModel) -> BodyModel:
+    """Return a robot's bodies, kept.
+
+    Finding those that never touch takes longer than preparing all else.
+    """
+    return collision.bind(_built(robot))
+
+
+def notes(problem: Problem) -> tuple[str, ...]:
+    """Return what the collision model is, and which pairs of bodies it does not test."""
+    bodies, names, unit = problem.bodies, problem.bodies.names, problem.task.length_unit
+    lines = [
+        f"{len(names)} bodies covered by {bodies.num_shapes} spheres and capsules, "
+        f"which reach at most {bodies.inflation:.3g} {unit} beyond them"
+    ]
+    for what, pairs in (("always touch", bodies.always), ("never touch", bodies.never)):
+        if pairs:
+            lines.append(
+                f"{what}, not tested: " + ", ".join(f"{names[a]} with {names[b]}" for a, b in pairs)
+            )
+    return tuple(lines)
+
+
+def _limits(assembly: Assembly) -> FloatArray:
+    model = assembly.model
+    limits = np.column_stack([model.lowerPositionLimit, model.upperPositionLimit])
+    for joint in range(1, model.njoints):
+        low, high = limits[model.idx_qs[joint]]
+        if not (abs(low) < 1e6 and abs(high) < 1e6 and low < high):
+            must = "given for every joint: postures are drawn between them, and margins rated"
+            raise SettingError("robot.joint_limits", must, f"none for joint '{model.names[joint]}'")
+    return limits
+
+
+def _units(assembly: Assembly) -> FloatArray:
+    """Return (nq,) what turns the scenario's values into those of the model.
+
+    Degrees, lengths of sliding joints.
+    """
+    units = np.full(assembly.model.nq, DEGREE)
+    units[assembly.table.index_q[assembly.table.prismatic]] = 1.0
+    return units
+
+
+def _start(task: PostureTask, assembly: Assembly, limits: FloatArray) -> FloatArray:
+    if len(task.q_start) != assembly.model.nq:
+        raise SettingError(
+            "scenario.q_start", f"one value per joint ({assembly.model.nq})", len(task.q_start)
+        )
+    units = _units(assembly)
+    start = np.array(task.q_start) * units
+    for k, (value, (least, greatest)) in enumerate(zip(start, limits, strict=True)):
+        if not least <= value <= greatest:
+            must = f"within the joint's limits, {least / units[k]:g} to {greatest / units[k]:g}"
+            raise SettingError(f"scenario.q_start[{k}]", must, task.q_start[k])
+    return start
+
+
+def _scope(scope: tuple[float, ...], nq: int) -> FloatArray:
+    given = scope * nq if len(scope) == 1 else scope
+    if len(given) != nq:
+        raise SettingError("planner.scope", f"one number, or one per joint ({nq})", list(given))
+    return np.array(given, dtype=np.float64)
+
+
+def _weights(task: PostureTask, objective: PostureCost, obstacles: ObstacleTable) -> FloatArray:
+    """Return the weights of every phase, (phases, terms)."""
+    rows = []
+    for k, phase in enumerate(task.all_phases):
+        subgoal = k < len(task.subgoals)
+        field = f"scenario.phases[{k - len(task.subgoals)}].terms"
+        on_the_way = tuple(
+            name
+            for name in objective.chosen
+            if name in ("goal_distance", "limit_margin", "collision")
+        )
+        weights = objective.weights(on_the_way if subgoal else phase.terms, field)
+        if not subgoal:
+            _check_terms(phase, weights, task, obstacles, field)
+        rows.append(weights)
+    return np.array(rows)
+
+
+def _check_terms(
+    phase: Phase, weights: FloatArray, task: PostureTask, obstacles: ObstacleTable, field: str
+) -> None:
+    """Refuse terms that the goal of a phase gives no meaning, or that contradict it."""
+    goal, where = phase.goal, field.removesuffix("terms") + "goal"
+    if weights[0] == 0.0:
+        raise SettingError(
+            field, "terms with goal_distance: every goal is a place", list(phase.terms)
+        )
+    if weights[ANGLE] > 0.0 and not isinstance(goal, PoseGoal | ShiftGoal):
+        raise SettingError(
+            where,
+            f"a pose, since goal_angle rates its orientation (or {field} without it)",
+            goal.kind,
+        )
+    if isinstance(goal, PoseGoal) and weights[ANGLE] == 0.0:
+        raise SettingError(where, "a point, since no goal_angle rates its orientation", "pose")
+    for term in (AXIAL, HEADING):
+        if weights[term] > 0.0 and not isinstance(goal, SurfaceGoal):
+            must = (
+                f"the surface of an object, since {TERMS[term]} rates the way to it (or {field} "
+                "without it)"
+            )
+            raise SettingError(where, must, goal.kind)
+    if isinstance(goal, SurfaceGoal):
+        kind = obstacles.kind[task.names.index(goal.object)]
+        shape = task.obstacles[task.names.index(goal.object)].shape
+        if shape == "half_space":
+            raise SettingError(
+                f"{where}.object", "a sphere, box, capsule or cylinder", "half_space"
+            )
+        if weights[AXIAL] > 0.0 and kind not in (CYLINDER, CAPSULE):
+            raise SettingError(
+                f"{where}.object",
+                "a cylinder or capsule, since axial_approach rates its axis",
+                shape,
+            )
+
+
+def _covers(
+    task: PostureTask, obstacles: ObstacleTable, collision: CollisionModel
+) -> dict[int, Cover]:
+    """Return covers of the objects that are taken hold of, in their own frames."""
+    taken = {task.names.index(phase.object) for phase in task.phases if phase.then == "attach"}
+    shapes = obstacle_shapes(obstacles)
+    return {
+        k: collision.cover(
+            pin.GeometryObject(task.names[k], 0, 0, pin.SE3.Identity(), shapes[k][0])
+        )
+        for k in taken
+    }
+
+
+def _check_contacts(task: PostureTask, names: tuple[str, ...]) -> None:
+    for k, phase in enumerate(task.phases):
+        for c, pair in enumerate(phase.contacts):
+            for name in pair:
+                if name not in names:
+                    must = f"names of bodies or obstacles ({', '.join(names)})"
+                    raise SettingError(
+                        f"scenario.phases[{k}].contacts[{c}]", must, name, nearest(name, names)
+                    )
+
+
+def reach(assembly: Assembly, limits: FloatArray) -> tuple[FloatArray, float]:
+    """Return a point (3,) that stands still, and how far from it the tool can be at most.
+
+    All links stretched out.
+
+    The point lies on the axis of the first joint, where the second one stands if that is on this
+    axis, too.
+    """
+    table, tool = assembly.table, assembly.tools[0]
+    joint, far = tool.joint - 1, float(np.sqrt(np.sum(tool.position * tool.position)))
+    while table.parent[joint] >= 0:
+        before = int(table.parent[joint])
+        (x, y, z), slide = table.translation[joint], _stroke(assembly, limits, joint)
+        if table.parent[before] < 0 and not table.prismatic[before] and x == 0.0 and y == 0.0:
+            return table.translation[before] + z * table.rotation[before][[2, 5, 8]], far + slide
+        far += float(np.sqrt(x * x + y * y + z * z)) + slide
+        joint = before
+    return table.translation[joint], far + _stroke(assembly, limits, joint)
+
+
+def _stroke(assembly: Assembly, limits: FloatArray, joint: int) -> float:
+    """Return how far a joint of the table slides at most; 0 if it turns."""
+    table = assembly.table
+    return float(np.abs(limits[table.index_q[joint]]).max()) if table.prismatic[joint] else 0.0
+
+
+def _check_reach(problem: Problem) -> None:
+    """Refuse goals that the stretched arm cannot reach while it holds nothing.
+
+    In the scene as it begins.
+    """
+    task = problem.task
+    center, far = reach(problem.assembly, problem.limits)
+    held, ways = False, len(task.subgoals)
+    for k, phase in enumerate(problem.phases):
+        goal, point, size = phase.goal, None, 0.0
+        field = f"scenario.subgoals[{k}]" if k < ways else f"scenario.phases[{k - ways}].goal.point"
+        if isinstance(goal, PointGoal | PoseGoal) and not held:
+            point = np.array(goal.point)
+        elif isinstance(goal, SurfaceGoal):
+            index = task.names.index(goal.object)
+            point, field = (
+                problem.obstacles.center[index],
+                f"scenario.phases[{k - ways}].goal.object",
+            )
+            size = float(
+                np.sum(problem.obstacles.size[index])
+            )  # no point of it is farther from its middle
+        if point is not None:
+            away = float(np.sqrt(np.sum((point - center) ** 2))) - size
+            if away - task.position_tolerance > far:
+                where = ", ".join(f"{value:g}" for value in center)
+                must = f"within reach, {far:.4g} {task.length_unit} from ({where})"
+                raise SettingError(
+                    field, f"{must} (check_reach=false searches it anyway)", f"{away:.4g} away"
+                )
+        held = {"attach": True, "detach": False}.get(phase.then, held)
+
+
+def _infeasible(problem: Problem, start: FloatArray) -> SettingError:
+    """Say why a start cannot be."""
+    scene, given = problem.scene, list(problem.task.q_start)
+    assert scene is not None
+    data = scene.model.createData()
+    placements = scene.geometry.createData()
+    pin.computeDistances(scene.model, data, scene.geometry, placements, start)
+    distances = np.array([result.min_distance for result in placements.distanceResults])
+    stage = begin(problem, 0, start, problem.first_situation)
+    if judge(stage, start[:, None]).rows[TERMS.index("collision"), 0] == 0.0:
+        return SettingError(
+            "scenario.q_start", "within the hard limits of upright and keep_parallel", given
+        )
+    one, two = scene.pair_names(int(np.argmin(distances)))
+    least, unit = float(distances.min()), problem.task.length_unit
+    how = (
+        "touch each other"
+        if least <= 0.0
+        else f"are {least:.3g} {unit} apart, less than their covers need"
+    )
+    return SettingError("scenario.q_start", f"free of collision ({one} and {two} {how})", given)

@@ -1,0 +1,1 @@
+"""Redundant planar arms among ellipses (Lavoie & Boudreau 2001)."""

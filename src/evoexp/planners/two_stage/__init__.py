@@ -1,0 +1,1 @@
+"""Two planners, one after the other (Chen & Zalzala 1995)."""

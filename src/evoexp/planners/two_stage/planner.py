@@ -1,0 +1,200 @@
+"""A mission in two stages: where to dock and in which posture, then a safe path there.
+
+Chen & Zalzala 1995.
+
+The first stage is the placement search of section 3, the second the path search of section 2, whose
+goal is the node nearest to the docking place that the first one chose. What they find is one
+motion: along the path from node to node, to the docking place itself, then from the travel posture
+to the one that was found.
+
+A solution is flat: θ1, θ2 [deg], then the coordinates of the path's nodes. Its cost is E (Eq. 14) +
+C (Eq. 1). While the first stage is at work there is no path, and the cost is inf; the costs of its
+individuals are their E.
+"""
+
+from collections.abc import Generator, Iterator
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from evoexp.collision.scene import Scene, scene
+from evoexp.errors import SettingError
+from evoexp.numeric.elementary import DEGREE
+from evoexp.paths.motion import Motion
+from evoexp.planners.grid_path_ga.planner import GridPathGa
+from evoexp.planners.placement_ga.planner import PlacementGa
+from evoexp.records import FloatArray
+from evoexp.records import Generation as Record
+from evoexp.robots.floor_manipulator import NUM_JOINTS, FloorManipulator
+from evoexp.scenarios.mission import Mission
+from evoexp.validation import Component
+
+ANGLES = 2
+POSTURE = ("theta_1_deg", "theta_2_deg", "theta_3_deg", "platform_x", "torque_norm", "torque_max")
+PATH = ("distance", "unsafeness", "num_nodes")
+
+
+class Problem(NamedTuple):
+    """What `prepare` made of robot and scenario.
+
+    Attributes:
+        robot: The description; parts of it solve the stages.
+        scenario: The mission.
+        placement: Problem of the first stage.
+        path: Problem of the second one, with the goal of the grid.
+        scene: All bodies, for the exact verdict on the motion.
+        security_margin: Clearance that the task requires [length unit].
+    """
+
+    robot: FloorManipulator
+    scenario: Mission
+    placement: Any
+    path: Any
+    scene: Scene
+    security_margin: float
+
+
+class TwoStage(Component):
+    """The placement search, then the path search.
+
+    Attributes:
+        placement: The planner of the first stage.
+        path: The planner of the second one.
+    """
+
+    component: ClassVar[str] = "two_stage"
+
+    placement: PlacementGa
+    path: GridPathGa
+
+    def prepare(self, robot: FloorManipulator, scenario: Mission) -> Problem:
+        """Prepare both stages.
+
+        Raises:
+            SettingError: If one of them cannot be solved, or the grid is not of a floor.
+        """
+        if len(scenario.grid.size) != 2:
+            raise SettingError(
+                "scenario.grid.size", "of a floor, two numbers", list(scenario.grid.size)
+            )
+        placement = self.placement.prepare(robot.arm(), scenario.docking)
+        path = self.path.prepare(robot.platform(), scenario.grid)
+        bodies = scene(robot.build(), scenario.grid.bodies(), self_pairs=True)
+        return Problem(robot, scenario, placement, path, bodies, scenario.grid.security_margin)
+
+    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Record]:
+        """Yield the generations of both stages; their indices go on counting."""
+        docked = yield from self._place(problem, rng)
+        yield from self._drive(problem, rng, docked)
+
+    def _place(self, problem: Problem, rng: np.random.Generator) -> Generator[Record, None, Record]:
+        """Search the docking posture; return the last generation."""
+        start = problem.scenario.grid.start
+        last: Record | None = None
+        terms, cost, best = {}, None, np.empty(0)
+        for last in self.placement.evolve(problem.placement, rng):
+            if last.best_cost != cost:
+                terms = (
+                    self._posture_terms(problem, last.best)
+                    | dict.fromkeys(PATH, 0.0)
+                    | {"sub_path": 1.0}
+                )
+                cost, best = last.best_cost, np.concatenate([last.best, start])
+            yield last._replace(
+                best=best,
+                best_cost=np.inf,
+                best_cost_in_generation=np.inf,
+                solved=False,
+                terms=terms,
+                costs=last.costs[None, :],
+            )
+        assert last is not None, "a planner yields its initial population at least"
+        return last
+
+    def _drive(
+        self, problem: Problem, rng: np.random.Generator, docked: Record
+    ) -> Iterator[Record]:
+        """Search the path to the docking place that was found."""
+        posture = self._posture_terms(problem, docked.best) | {"sub_path": 2.0}
+        terms, path, best = posture, np.empty(0), np.empty(0)
+        for found in self.path.evolve(self._path_problem(problem, docked.best), rng):
+            if found.best is not path:
+                path, best = found.best, np.concatenate([docked.best, found.best])
+                terms = posture | {name: found.terms[name] for name in PATH}
+            yield found._replace(
+                index=docked.index + 1 + found.index,
+                best=best,
+                best_cost=docked.best_cost + found.best_cost,
+                best_cost_in_generation=docked.best_cost + found.best_cost_in_generation,
+                evaluations=docked.evaluations + found.evaluations,
+                solved=docked.solved and found.solved,
+                terms=terms,
+                costs=found.costs[None, :],
+            )
+
+    def _path_problem(self, problem: Problem, angles: FloatArray) -> Any:
+        """Return the problem of the second stage.
+
+        As prepared, or with the node nearest to another docking place.
+        """
+        grid = problem.scenario.grid
+        node = tuple(int(np.floor(value + 0.5)) for value in self.docking_place(problem, angles))
+        if node == grid.goal:
+            return problem.path
+        return self.path.prepare(
+            problem.robot.platform(), type(grid)(**(dict(grid) | {"goal": node}))
+        )
+
+    def docking_place(self, problem: Problem, angles: FloatArray) -> FloatArray:
+        """Return where on the floor (2,) the platform stands in a posture (θ1.
+
+        Θ2) [length unit].
+        """
+        x, y = problem.scenario.task_origin
+        return np.array([x + self.placement.evaluate(problem.placement, angles)["platform_x"], y])
+
+    def _posture_terms(self, problem: Problem, angles: FloatArray) -> dict[str, float]:
+        terms = self.placement.evaluate(problem.placement, angles)
+        named = {name: float(terms[name]) for name in POSTURE}
+        return named | {"posture_cost": float(terms["cost"])}
+
+    def motion(self, problem: Problem, solution: FloatArray) -> Motion | None:
+        """Return the whole motion, (nodes + 2, 5) in equal times.
+
+        None if the posture is infeasible.
+        """
+        angles, nodes = self._parts(solution)
+        posture = self.placement.motion(problem.placement, angles)
+        if posture is None:
+            return None
+        place = np.vstack([nodes, *[self.docking_place(problem, angles)] * 2])
+        q = np.empty((len(place), NUM_JOINTS))
+        q[:, :2], q[:, 2:] = place, DEGREE * np.array(problem.scenario.travel_posture)
+        q[-1, 2:] = posture.q[0, 1:]
+        return Motion(q)
+
+    def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
+        """Return the terms of posture and path, the last leg from node to docking place.
+
+        And the cost of both.
+
+        Raises:
+            SettingError: If there is no path, or it leaves the grid.
+        """
+        angles, nodes = self._parts(solution)
+        path = self.path.evaluate(self._path_problem(problem, angles), nodes.ravel())
+        posture = self._posture_terms(problem, angles)
+        leg = self.docking_place(problem, angles) - nodes[-1]
+        both = {"last_leg": float(np.sqrt((leg * leg).sum())), "path_cost": path.pop("cost")}
+        return posture | path | both | {"cost": posture["posture_cost"] + both["path_cost"]}
+
+    def shape(self, problem: Problem) -> tuple[Any, ...]:
+        """Return the documented shape of a solution.
+
+        Θ1 and θ2, then any number of nodes, in pairs.
+        """
+        return (..., (ANGLES,))
+
+    def _parts(self, solution: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return θ1 and θ2, and the nodes (nodes, 2)."""
+        return solution[:ANGLES], solution[ANGLES:].reshape(-1, 2)

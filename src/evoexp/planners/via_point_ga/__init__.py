@@ -1,0 +1,1 @@
+"""Strings of via-points (Rana & Zalzala 1995)."""

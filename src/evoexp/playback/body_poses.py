@@ -1,0 +1,129 @@
+"""Where frames are along a motion, at Pinocchio's placements."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from evoexp.collision.certifier.certificate import Part
+from evoexp.paths.motion import Motion
+from evoexp.playback.contacts import part_at
+from evoexp.playback.shapes import pose
+from evoexp.records import FloatArray
+
+MIN_TICKS, MAX_TICKS = 240, 600  # of a whole motion
+TURN = np.radians(2.0)  # [rad] of a joint between two ticks, where there may be so many
+SLIDE = 0.01  # [-] of the scene's size, of a sliding joint
+
+Place = tuple[int, Any]
+"""A joint of the model, and a placement in it."""
+
+
+class Frame(NamedTuple):
+    """What moves bodies: a joint's frame, or that of an object that is carried.
+
+    Attributes:
+        name: Unique.
+        parent: Index of the frame that it moves with; −1: the world.
+    """
+
+    name: str
+    parent: int
+
+
+class Poses(NamedTuple):
+    """Frames over time.
+
+    Attributes:
+        world: (ticks, frames, 7) position, quaternion x, y, z, w in the world.
+        local: The same in the parent's frame.
+    """
+
+    world: FloatArray
+    local: FloatArray
+
+
+def ticks(motion: Motion, prismatic: np.ndarray, size: float) -> FloatArray:
+    """Return the instants at which a motion is shown, (ticks,), its first and last among them.
+
+    Args:
+        motion: The motion; every instant is shown, unless there are more than `MAX_TICKS`.
+        prismatic: (nq,) which coordinates are lengths.
+        size: Of the scene [length unit].
+    """
+    segments = motion.num_segments
+    if segments == 0:
+        return np.zeros(1)
+    if segments >= MAX_TICKS:
+        return np.unique(np.round(np.linspace(0.0, segments, MAX_TICKS)))
+    steps = np.where(prismatic, SLIDE * size, TURN)
+    wanted = np.array([np.ceil((motion.speed_bound(k) / steps).max()) for k in range(segments)])
+    wanted = np.maximum(wanted, np.ceil(MIN_TICKS / segments))
+    if wanted.sum() > MAX_TICKS:
+        wanted = np.maximum(np.floor(wanted * (MAX_TICKS / wanted.sum())), 1.0)
+    pieces = [k + np.arange(count) / count for k, count in enumerate(wanted.astype(int))]
+    return np.concatenate([*pieces, [float(segments)]])
+
+
+def frames_of(model: Any, carried: list[str]) -> tuple[Frame, ...]:
+    """Return the frames: all joints of a model, then objects that are carried.
+
+    Which know the world only.
+    """
+    joints = [Frame(model.names[k], int(model.parents[k]) - 1) for k in range(1, model.njoints)]
+    return (*joints, *(Frame(f"object {name}", -1) for name in carried))
+
+
+def poses(
+    model: Any, motion: Motion, times: FloatArray, parts: list[Part], carried: list[str]
+) -> Poses:
+    """Return where all frames are.
+
+    Args:
+        model: The `pin.Model`.
+        motion: The motion.
+        times: (ticks,) [instants].
+        parts: Pieces of the motion, which say where objects are.
+        carried: Names of bodies that get frames of their own.
+    """
+    data, count = model.createData(), model.njoints - 1 + len(carried)
+    world, local = np.empty((2, len(times), count, 7))
+    places = {id(part): [_place(part, name) for name in carried] for part in parts}
+    for k, t in enumerate(times):
+        pin.forwardKinematics(model, data, motion.at(float(t)))
+        for joint in range(1, model.njoints):
+            world[k, joint - 1], local[k, joint - 1] = pose(data.oMi[joint]), pose(data.liMi[joint])
+        for c, (joint, placement) in enumerate(places[id(part_at(parts, t))]):
+            world[k, model.njoints - 1 + c] = local[k, model.njoints - 1 + c] = pose(
+                data.oMi[joint] * placement
+            )
+    return Poses(_continuous(world), _continuous(local))
+
+
+def points(world: FloatArray, frame: int, point: FloatArray) -> FloatArray:
+    """Return where a frame's point is over time, (ticks, 3).
+
+    Args:
+        world: (ticks, frames, 7).
+        frame: Its index; −1: the world.
+        point: (3,) in the frame.
+    """
+    if frame < 0:
+        return np.tile(point, (len(world), 1))
+    x, y, z, w = world[:, frame, 3:].T
+    vector, rows = np.stack([x, y, z], axis=1), np.tile(point, (len(world), 1))
+    twice = 2.0 * np.cross(vector, rows)
+    return np.asarray(world[:, frame, :3] + rows + w[:, None] * twice + np.cross(vector, twice))
+
+
+def _place(part: Part, name: str) -> Place:
+    _, joint, placement = part.scene.shapes[part.scene.names.index(name)]
+    return joint, placement
+
+
+def _continuous(rows: FloatArray) -> FloatArray:
+    """Give quaternions, of which q and −q are one rotation, the sign of the tick before."""
+    signs = np.sign((rows[1:, :, 3:] * rows[:-1, :, 3:]).sum(axis=-1))
+    flips = np.cumprod(np.where(signs < 0.0, -1.0, 1.0), axis=0)
+    rows[1:, :, 3:] *= flips[:, :, None]
+    return rows

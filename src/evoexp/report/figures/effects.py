@@ -1,0 +1,152 @@
+"""Ablations: one quantity of every condition side by side.
+
+And how much better the first condition is.
+"""
+
+import textwrap
+from collections.abc import Callable, Mapping
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from matplotlib.ticker import EngFormatter
+
+from evoexp.records import FloatArray
+from evoexp.report import style
+from evoexp.report.claims import Comparison
+from evoexp.report.figures.boxes import draw_box
+from evoexp.report.results import ConditionResults, Results
+from evoexp.report.rows import groups
+from evoexp.report.statistics import quantile
+
+WRAPPED = 24  # characters of a name in a panel, per line
+THOUSANDS = 10_000  # from here on numbers along an axis are written with k and M
+Values = Callable[[ConditionResults], FloatArray]
+
+
+def values_table(results: Results, quantities: Mapping[str, Values]) -> pd.DataFrame:
+    """Return quantities of every finished replicate.
+
+    Args:
+        results: With data.
+        quantities: Name with unit → its values of a condition, (done,); inf: never.
+
+    Returns:
+        Columns quantity, position, condition, replicate, value, failed (replicates of the
+        condition).
+    """
+    parts = []
+    for name, values in quantities.items():
+        for position, c in enumerate(results.with_data):
+            given = {"quantity": name, "position": position, "condition": c.label}
+            parts.append(
+                pd.DataFrame(
+                    given | {"replicate": c.summaries.index, "value": values(c), "failed": c.failed}
+                )
+            )
+    return pd.concat(parts, ignore_index=True)
+
+
+def draw_values(table: pd.DataFrame) -> Figure:
+    """Draw Tukey's boxes with every replicate's point, the first condition on top."""
+    quantities = list(dict.fromkeys(table["quantity"]))
+    labels = dict(zip(table["position"], table["condition"], strict=True))
+    figure = style.figure(0.32 * len(labels) + 1.1)
+    panels = figure.subplots(1, len(quantities), sharey=True, squeeze=False)[0]
+    for axes, quantity in zip(panels, quantities, strict=True):
+        rows = table[table["quantity"] == quantity]
+        for position, own in groups(rows, "position"):
+            draw_box(axes, position, own["value"].to_numpy(), style.condition_colour(position))
+            never = int(np.isinf(own["value"]).sum())
+            if never:
+                place = (1.01, position)
+                axes.annotate(
+                    f"{never} never",
+                    place,
+                    xycoords=axes.get_yaxis_transform(),
+                    fontsize=6.5,
+                    va="center",
+                )
+        middle = quantile(rows.loc[rows["position"] == 0, "value"].to_numpy(), 0.5)
+        if np.isfinite(middle):
+            axes.axvline(middle, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
+        axes.set_xlabel(textwrap.fill(quantity, WRAPPED))
+        axes.margins(x=0.06)
+        axes.xaxis.set_major_locator(style.few_ticks())
+        if axes.get_xlim()[1] >= THOUSANDS:
+            axes.xaxis.set_major_formatter(EngFormatter())  # 200 k
+    counts = (
+        table[table["quantity"] == quantities[0]]
+        .groupby("position")
+        .agg(n=("value", "size"), failed=("failed", "max"))
+    )
+    names = [
+        f"{labels[k]}  (n = {n}{f', {failed} failed' if failed else ''})"
+        for k, n, failed in counts.itertuples()
+    ]
+    panels[0].set_yticks(list(counts.index), names)
+    panels[0].set_ylim(len(labels) - 0.4, -0.6)
+    return figure
+
+
+def effects_table(
+    comparisons: dict[str, tuple[Comparison, ...]], significance: float
+) -> pd.DataFrame:
+    """Return how often the first condition is better.
+
+    Args:
+        comparisons: Name of a quantity → the first condition against each other one.
+        significance: Below this adjusted p-value a difference counts.
+
+    Returns:
+        Columns quantity, condition (the other one), a12, lower, upper, p_adjusted, seeds,
+        significance.
+    """
+    rows = [
+        (quantity, c.quantity, c.better.a12, *c.better.interval, c.p_adjusted, c.num_seeds)
+        for quantity, found in comparisons.items()
+        for c in found
+    ]
+    return pd.DataFrame(
+        rows, columns=["quantity", "condition", "a12", "lower", "upper", "p_adjusted", "seeds"]
+    ).assign(significance=significance)
+
+
+def draw_effects(table: pd.DataFrame) -> Figure:
+    """Draw A12 with its interval, one row per other condition, one panel per quantity."""
+    quantities = list(dict.fromkeys(table["quantity"]))
+    labels = list(dict.fromkeys(table["condition"]))
+    figure = style.figure(0.3 * len(labels) + 1.2)
+    panels = figure.subplots(1, len(quantities), sharey=True, squeeze=False)[0]
+    for axes, quantity in zip(panels, quantities, strict=True):
+        rows = table[table["quantity"] == quantity]
+        y = np.array([labels.index(label) for label in rows["condition"]])
+        a12, low, high = (rows[name].to_numpy(np.float64) for name in ("a12", "lower", "upper"))
+        axes.axvline(0.5, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
+        axes.hlines(y, low, high, color=style.ARM_COLOURS[0], linewidth=1.4)
+        level = float(rows["significance"].iloc[0])
+        clear = rows["p_adjusted"].to_numpy(np.float64) < level
+        axes.plot(
+            a12[clear],
+            y[clear],
+            "o",
+            color=style.ARM_COLOURS[0],
+            markersize=5,
+            label=f"adjusted p < {level:g}",
+        )
+        axes.plot(
+            a12[~clear],
+            y[~clear],
+            "o",
+            color=style.ARM_COLOURS[0],
+            mfc="white",
+            markersize=5,
+            label=f"adjusted p ≥ {level:g}",
+        )
+        axes.set_xlim(-0.03, 1.03)
+        axes.set_title(textwrap.fill(quantity, WRAPPED))
+        axes.set_xlabel("A12: the first condition is better")
+    panels[0].set_yticks(range(len(labels)), [f"against {label}" for label in labels])
+    panels[0].set_ylim(len(labels) - 0.5, -0.5)
+    style.legend_below(figure, panels[0], 2)
+    return figure

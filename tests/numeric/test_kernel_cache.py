@@ -1,0 +1,92 @@
+"""Where compiled kernels are kept: by content, not by place or time."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from evoexp.numeric import kernel_cache
+
+
+def test_words_are_no_part_of_a_module_and_code_is() -> None:
+    code = b"import evoexp.records\ndef f(x):\n    return x + 1\n"
+    worded = b"""'''About f.'''
+import evoexp.records  # types
+
+
+def f(x: int) -> int:
+    # one more
+    '''Add one.'''
+    return x + 1
+"""
+    plain = kernel_cache.parse(code, "evoexp")
+    assert kernel_cache.parse(worded, "evoexp") == plain
+    assert plain.imports == ("evoexp.records",)
+    assert kernel_cache.parse(code.replace(b"+ 1", b"+ 2"), "evoexp").digest != plain.digest
+
+
+def test_a_module_is_known_by_all_code_that_it_imports(monkeypatch: pytest.MonkeyPatch) -> None:
+    reached = kernel_cache._reached("evoexp.planners.via_point_ga.planner")
+    assert {
+        "evoexp.collision.models.sphere_kernels",
+        "evoexp.numeric.elementary",
+        "evoexp.planners.via_point_ga.kernels",
+    } <= reached
+    assert "evoexp.planners.coevolution.kernels" not in reached
+    before = kernel_cache.module_key.__wrapped__("evoexp.paths.spline")
+    other = kernel_cache.Source("changed", ())
+    source_of = kernel_cache._source_of
+    monkeypatch.setattr(
+        kernel_cache,
+        "_source_of",
+        lambda name: other if name == "evoexp.numeric.compilation" else source_of(name),
+    )
+    assert kernel_cache.module_key.__wrapped__("evoexp.paths.spline") != before
+
+
+def test_kernels_are_kept_by_content_not_by_place(tmp_path: Path) -> None:
+    """Two copies of one guest package share what one of them compiled; edited code does not."""
+    code = "from evoexp.numeric.compilation import kernel\n@kernel\ndef f(x):\n    return x + 1.0\n"
+    call = "import guest; guest.f(1.0); print(sum(guest.f.stats.cache_hits.values()))"
+
+    def hits(place: str, text: str) -> int:
+        (tmp_path / place).mkdir(exist_ok=True)
+        (tmp_path / place / "guest.py").write_text(text)
+        paths = [str(tmp_path / place), str(Path(kernel_cache.__file__).parents[2])]
+        environment = os.environ | {
+            "PYTHONPATH": os.pathsep.join(paths),
+            "EVOEXP_CACHE": str(tmp_path / "cache"),
+        }
+        command = [sys.executable, "-c", call]
+        return int(subprocess.check_output(command, env=environment, text=True))
+
+    assert hits("one", code) == 0
+    assert hits("two", "# moved down\n\n" + code) == 1
+    assert hits("one", code.replace("1.0", "2.0")) == 0
+
+
+def test_what_is_compiled_is_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("EVOEXP_CACHE", str(tmp_path / "cache"))
+    modules = ("evoexp.paths.spline",)
+    assert not kernel_cache.is_compiled("a planner", modules)
+    kernel_cache.note_compiled("a planner", modules)
+    assert kernel_cache.is_compiled("a planner", modules)
+    assert not kernel_cache.is_compiled("another", modules)
+    assert not kernel_cache.is_compiled("a planner", ("evoexp.paths.walk",))
+    monkeypatch.setattr(kernel_cache, "cache_root", lambda: tmp_path / "cache" / "compiled" / "no")
+    monkeypatch.setattr(kernel_cache, "_note", lambda *_: Path("/dev/null/no"))
+    kernel_cache.note_compiled("a planner", modules)  # cannot be written: no error
+
+
+def test_old_states_go_but_recent_and_used_ones_stay(tmp_path: Path) -> None:
+    states = [tmp_path / f"{age:016x}" for age in range(8)]
+    for age, state in enumerate(states):
+        (state / "evoexp_0").mkdir(parents=True)
+        os.utime(state, (1e9 - age, 1e9 - age))
+    os.utime(states[6])
+    kernel_cache._remove_old(states[7])  # used just now: the newest
+    kept = {path.name for path in tmp_path.iterdir()}
+    assert kept == {states[i].name for i in (7, 6, 0, 1)}
+    kernel_cache._remove_old(tmp_path / "file" / "nothing")  # silent where nothing is there

@@ -1,0 +1,45 @@
+"""Uniform numbers in blocks: the same numbers in the same order, wherever blocks end."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from evoexp.numeric.random_stream import Draws, draw, draw_index, draw_many, used_up
+
+
+def rng() -> np.random.Generator:
+    return np.random.Generator(np.random.PCG64(3))
+
+
+@given(st.integers(1, 9), st.lists(st.integers(1, 12), min_size=1, max_size=20))
+def test_blocks_end_anywhere(least: int, wanted: list[int]) -> None:
+    draws, source, found = Draws(least), rng(), []
+    for count in wanted:
+        while True:
+            before = int(draws.block[1][0])
+            numbers = [draw(draws.block), *draw_many(draws.block, count)]
+            if not used_up(draws.block):
+                break
+            draws.block[1][0] = before
+            draws.extend(source)
+        found += numbers
+    assert found == rng().random(len(found)).tolist()
+
+
+def test_behind_its_end_a_block_gives_zeros_and_says_so() -> None:
+    draws = Draws(2)
+    assert not used_up(draws.block)
+    assert draw(draws.block) == 0.0
+    assert used_up(draws.block)
+    draws.block[1][0] = 0
+    draws.extend(rng())
+    assert len(draw_many(draws.block, 3)) == 0
+    assert used_up(draws.block)
+
+
+def test_indices_stay_below_their_count() -> None:
+    block = (
+        np.array([0.0, 0.5, np.nextafter(1.0, 0.0), np.nextafter(1.0, 0.0)]),
+        np.zeros(1, dtype=np.int64),
+    )
+    assert [draw_index(block, count) for count in (3, 3, 3, 2**53)] == [0, 1, 2, 2**53 - 1]

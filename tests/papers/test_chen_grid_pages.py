@@ -1,0 +1,121 @@
+"""Pages of the grid paths: routes, printed grids, and what the pages say of small runs."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from report_samples import figure_stems, page_settings, smoke_report, smoke_results
+
+from evoexp.papers.chen import path_measures
+from evoexp.papers.chen.printed_grids import MISSING, SURPLUS, WRONG, compare
+from evoexp.papers.chen.routes import inside_points, routes, signature
+from evoexp.report.pages import page_of
+
+CENTRES = inside_points([(2, 2, 3, 3), (6, 2, 7, 3)])
+ABOVE = np.array([[0, 2], [1, 4], [4, 5], [9, 2]], dtype=float)
+BELOW = np.array([[0, 2], [1, 1], [8, 1], [9, 2]], dtype=float)
+BETWEEN = np.array([[0, 2], [1, 4], [4, 4], [5, 1], [9, 2]], dtype=float)
+
+
+def test_signatures_tell_the_sides_that_are_passed() -> None:
+    assert signature(ABOVE, CENTRES) == (1, 1)
+    assert signature(BELOW, CENTRES) == (0, 0)
+    assert signature(BETWEEN, CENTRES) == (1, 0)
+
+
+@given(st.integers(0, 2**32))
+def test_a_path_that_goes_there_and_back_passes_nothing(seed: int) -> None:
+    path = np.random.default_rng(seed).integers(0, 10, (8, 2)).astype(float)
+    assert set(signature(np.vstack([path, path[::-1]]), CENTRES)) == {0}
+
+
+def test_routes_are_named_by_frequency() -> None:
+    found = routes({1: BELOW, 2: ABOVE, 3: BETWEEN, 4: ABOVE + 0.0}, CENTRES)
+    assert [(route.name, route.members) for route in found] == [
+        ("A", (2, 4)),
+        ("B", (1,)),
+        ("C", (3,)),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("printed", "slips"),
+    [
+        ("1 2 3 4", []),
+        ("1 9 3 4", [(1, WRONG)]),
+        ("1 3 4", [(1, MISSING)]),
+        ("1 5 2 3 4", [(1, SURPLUS)]),
+        ("1 3 4 4", [(1, MISSING), (4, SURPLUS)]),
+    ],
+)
+def test_rows_are_aligned_by_the_fewest_slips(printed: str, slips: list[tuple[int, str]]) -> None:
+    table = compare("a", [["1", "2", "3", "4"]], [printed.split()])
+    assert sorted(set(table.loc[table["slip"] != SURPLUS, "column"])) == [0, 1, 2, 3]
+    found = table[table["slip"] != ""]
+    assert [(int(r.column), r.slip) for r in found.itertuples(index=False)] == slips
+
+
+@pytest.fixture(scope="module")
+def outputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("chen_grid")
+
+
+def test_the_page_of_fig_2_has_its_figures_and_judges_nothing_below_its_budget(
+    outputs: Path,
+) -> None:
+    directory = smoke_report(outputs, "chen_path")
+    assert figure_stems(directory) == {"fig_2_costs", "fig_2_paths", "routes", "gaps"}
+    text = (directory / "index.md").read_text()
+    assert text.count("**not judged (budget smoke)**") == 10
+    assert "(b) and (c) are nearly the same problem" in text
+    assert "only λ/ε matters: 100 and 167 cells; the best path known is the same one" in text
+    assert "(a): routes taken" in text
+
+
+def test_no_gap_is_below_the_bound_and_groups_are_the_weightings(outputs: Path) -> None:
+    results = smoke_results(outputs, "chen_path")
+    groups = path_measures.group_list(results)
+    assert [(group.name, group.weights) for group in groups] == [
+        ("(a)", (1, 0)),
+        ("(b)", (0.1, 10)),
+        ("(c)", (0.12, 20)),
+    ]
+    for group in groups:
+        assert group.bound <= group.optimum
+        assert [c.is_control for c in group.conditions] == [False, False, True]
+        for c in group.conditions:
+            assert (c.column("best_cost") >= group.bound - 1e-9).all()
+    assert path_measures.shortest(groups) == pytest.approx(39.62741699796952)
+
+
+def test_the_page_of_lingering_counts_repeated_nodes(outputs: Path) -> None:
+    directory = smoke_report(outputs, "chen_lingering")
+    assert figure_stems(directory) == {"paths", "lingering"}
+    text = (directory / "index.md").read_text()
+    assert "(b), revisits: lingering | 2 of 2 runs pass nodes again" in text
+    assert "100 nodes, 50 of them passed before; exact" in text
+
+
+def test_the_page_of_fig_1_names_every_slip(outputs: Path) -> None:
+    directory = smoke_report(outputs, "chen_fields")
+    assert figure_stems(directory) == {"fig_1_fields", "fields_16_16", "fields_32_32"}
+    text = (directory / "index.md").read_text()
+    assert "255 of 256 nodes as printed" in text
+    assert "row 9 from the top, column 13: 17 for 13" in text
+    assert "row 6 from the top, column 5: 9 is left out" in text
+
+
+@pytest.mark.parametrize("figures", ["chen_path", "chen_lingering", "chen_fields"])
+def test_other_planners_get_the_generic_page(outputs: Path, figures: str) -> None:
+    results = smoke_results(outputs, "rana_planar", "ga.population_size=8", "ga.num_generations=1")
+    assert page_of(results, page_settings("rana_planar", figures)).claims == ()
+
+
+def test_the_page_of_the_mission_shows_path_posture_and_verdict(outputs: Path) -> None:
+    directory = smoke_report(outputs, "chen_mission")
+    assert figure_stems(directory) == {"mission"}
+    text = (directory / "index.md").read_text()
+    assert "2 of 2 (34–100 %) free of contact over the whole motion; 0 touch" in text
+    assert "from the last node to the docking place" in text

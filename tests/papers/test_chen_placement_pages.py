@@ -1,0 +1,107 @@
+"""The pages on Chen & Zalzala's docking postures: tables, claims and figures from small runs."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from report_samples import figure_stems, page_settings, smoke_report, smoke_results
+
+from evoexp.papers.chen import cases as case_results
+from evoexp.papers.chen import placement_claims
+from evoexp.papers.chen.cases import Case
+from evoexp.papers.chen.figures import landscapes, placements
+from evoexp.report import claims
+
+
+@pytest.fixture(scope="module")
+def outputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("chen")
+
+
+@pytest.fixture(scope="module")
+def cases(outputs: Path) -> list[Case]:
+    return case_results.cases(smoke_results(outputs, "chen_placement"))
+
+
+def test_conditions_are_told_apart(cases: list[Case]) -> None:
+    assert [case.name for case in cases] == list(case_results.PRINTED)
+    for case in cases:
+        assert case.landscape is None
+        assert all(c is not None for c in case[1:6])
+        assert list(case.evolved) == ["GA", "GA, elitism", "random search"]
+        assert ("Newton-type, smooth form" in case.ends()) == (case.name == "minimax torque")
+        assert case.optimum is not None
+        assert case.optimum.planned == 1
+
+
+def test_the_page(outputs: Path) -> None:
+    directory = smoke_report(outputs, "chen_placement")
+    assert figure_stems(directory) == {"fig_3_to_8_postures", "fig_4_to_8_fitness", "gaps"}
+    text = (directory / "index.md").read_text()
+    assert (
+        "| criterion | paper | exact optimum | GA | GA, elitism | random search | conventional, "
+        "by start |" in text
+    )
+    assert "E = 0.897735 at its angles | E = 0.897527" in text
+    assert "at the exact optimum 1.917 (E = 5.452" in text
+    assert "reproduced" not in text.split("## Claims")[1].split("## Known")[0]
+    assert "placement_optimum, revision 1" in text
+
+
+def test_the_landscapes(outputs: Path) -> None:
+    directory = smoke_report(outputs, "chen_landscapes")
+    assert figure_stems(directory) == {"fig_9_landscapes"}
+    table = pd.read_csv(directory / "fig_9_landscapes.csv")
+    assert set(table["element"]) == {*landscapes.LOOKS, landscapes.GRID}
+    grid = table[table["element"] == landscapes.GRID]
+    least = grid.groupby("case")["cost"].min()
+    best = table[table["element"] == landscapes.OPTIMUM].groupby("case")["cost"].min()
+    assert (best <= least).all()
+
+
+def test_postures_end_at_the_target(cases: list[Case]) -> None:
+    table = placements.postures_table(cases)
+    tips = table[(table["element"] == "link") & (table["size"] == 3.0)]
+    np.testing.assert_allclose(
+        tips[["x_end", "y_end"]].to_numpy(), [[5.0, 1.4]] * len(tips), atol=1e-9
+    )
+    assert set(table["posture"]) == {"", *placements.POSTURES}
+    assert len(table[table["element"] == "obstacle"]) == 2
+
+
+def test_gaps_are_those_of_the_summaries(cases: list[Case]) -> None:
+    table = placements.gaps_table(cases)
+    assert (table["gap"] >= 0.0).all()
+    own = table[(table["case"] == "minimax torque") & (table["method"] == "GA")]
+    assert cases[1].plain is not None
+    np.testing.assert_allclose(
+        own["gap"], cases[1].plain.column("best_cost") / cases[1].least - 1.0, atol=1e-12
+    )
+
+
+def test_verdicts_where_they_are_judged(
+    outputs: Path, cases: list[Case], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(placement_claims, "not_judged", lambda _: "")
+    settings = page_settings("chen_placement")
+    found = placement_claims.of_cases(smoke_results(outputs, "chen_placement"), cases, settings)
+    verdict = {one.text: one.verdict for one in found}
+    assert (
+        verdict["least torque norm: the best posture has a torque norm of 1.73"]
+        == claims.REPRODUCED
+    )
+    assert (
+        verdict["obstacle and link 2: the best posture has a torque norm of 2.08"]
+        == claims.CONTRADICTED
+    )
+    assert (
+        verdict["obstacle and platform: the best posture has a torque norm of 3.01"]
+        == claims.REPRODUCED
+    )
+    angles = [text for text in verdict if "is at or near the optimum" in text]
+    assert len(angles) == 2
+    assert {verdict[text] for text in angles} == {claims.REPRODUCED}
+    assert (
+        verdict["manipulability and torque: the Newton-type method gets stuck"] == claims.REPRODUCED
+    )

@@ -1,0 +1,200 @@
+"""The rules by which claims of Corsépius 2001 are judged.
+
+On made-up runs of the shipped conditions.
+"""
+
+import functools
+from collections.abc import Callable
+
+import numpy as np
+import pandas as pd
+import pytest
+from report_samples import REPORT
+
+from evoexp.configuration.experiment import Experiment
+from evoexp.papers.corsepius import claims as task_claims
+from evoexp.papers.corsepius import measures
+from evoexp.papers.corsepius import population_claims as verdicts
+from evoexp.report.claims import CONTRADICTED, INCONCLUSIVE, NOT_JUDGED, REPRODUCED, Claim
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results import ConditionResults, Results, StoredLogs
+from shipped_conditions import expanded
+
+SETTINGS = ReportSettings(**REPORT, figures="corsepius")  # type: ignore[arg-type]
+NO_LOGS = StoredLogs(None, (), None)  # type: ignore[arg-type]
+RUNS = 40
+Effort = Callable[
+    [str, float], tuple[float, int]
+]  # task, size → cycles of every run, runs that meet the goal
+
+
+@functools.cache
+def conditions_of(name: str) -> Experiment:
+    return expanded(name, "paper")
+
+
+def made_up(name: str, rows: Callable[[str], dict[str, object]]) -> Results:
+    """Return results in which the runs of every condition have these columns."""
+    experiment, found = conditions_of(name), []
+    for label, condition in experiment.conditions:
+        table = pd.DataFrame({"stop_reason": ["goal"] * RUNS} | rows(label))
+        found.append(ConditionResults(label, condition, RUNS, table, {}, NO_LOGS, {}))
+    return Results(experiment.name, experiment.budget, tuple(found))
+
+
+def study(effort: Effort) -> dict[str, Claim]:
+    def rows(label: str) -> dict[str, object]:
+        task, size = label.split(", λ = ")
+        cycles, having = effort(task, float(size))
+        spread = 1.0 + 0.01 * (np.arange(RUNS) % 5)
+        evaluations = cycles * spread * float(size)
+        return {
+            "solved": np.arange(RUNS) < having,
+            "certified": pd.array([True] * RUNS, dtype="boolean"),
+            "clearance": np.ones(RUNS),
+            "certified_margin": pd.array([True] * RUNS, dtype="boolean"),
+            "term_cycles": cycles * spread,
+            "evaluations": evaluations,
+            "cpu_s": 1e-6 * evaluations,
+            "certificate_s": np.zeros(RUNS),
+        }
+
+    found = measures.tasks(made_up("corsepius_population", rows), "num_offspring")
+    compared = {metric: verdicts.ratios(found, metric, SETTINGS) for metric in verdicts.METRICS}
+    return {claim.text: claim for claim in verdicts.of_study("", found, compared, SETTINGS)}
+
+
+def verdict(claims: dict[str, Claim], text: str) -> str:
+    return next(claim.verdict for name, claim in claims.items() if name.startswith(text))
+
+
+def test_equal_evaluations_per_cycle_make_larger_populations_slower() -> None:
+    """Where cycles do not depend on the size, evaluations go with it."""
+    claims = study(lambda task, size: (20.0, RUNS))
+    assert (
+        verdict(claims, "Larger populations do not plan faster, on any task: evaluations")
+        == REPRODUCED
+    )
+    assert (
+        verdict(claims, "Larger populations do not plan faster, on any task: cycles")
+        == INCONCLUSIVE
+    )
+    assert (
+        verdict(claims, "Smaller populations increase planning times over-proportionally: cycles")
+        == CONTRADICTED
+    )
+    assert verdict(claims, "Smaller populations reduce convergence") == INCONCLUSIVE
+    assert verdict(claims, "100 individuals are reasonable: cycles") == REPRODUCED
+    assert (
+        verdict(claims, "100 individuals are reasonable: evaluations") == CONTRADICTED
+    )  # ten take a tenth
+
+
+def test_one_task_that_large_populations_plan_faster_contradicts() -> None:
+    claims = study(lambda task, size: (20.0 if task != "pose" else 4e5 / size**2, RUNS))
+    assert (
+        verdict(claims, "Larger populations do not plan faster, on any task: evaluations")
+        == CONTRADICTED
+    )
+    assert (
+        verdict(claims, "Larger populations do not necessarily plan faster: evaluations")
+        == REPRODUCED
+    )
+    text = next(
+        c.evidence
+        for n, c in claims.items()
+        if n.startswith("Larger populations do not plan faster, on any")
+    )
+    assert "pose × 0.25 (200)" in text
+
+
+def test_steep_costs_of_small_populations_are_over_proportional() -> None:
+    claims = study(
+        lambda task, size: (20.0 * max(1.0, (100.0 / size) ** 2), RUNS if size >= 100 else 5)
+    )
+    for metric in verdicts.METRICS:
+        text = f"Smaller populations increase planning times over-proportionally: {metric}"
+        assert verdict(claims, text) == REPRODUCED
+    assert verdict(claims, "Smaller populations reduce convergence") == REPRODUCED
+
+
+def test_failures_count_in_the_expected_effort() -> None:
+    claims = study(lambda task, size: (20.0, RUNS if size == 100 else RUNS // 2))
+    found = claims["Larger populations do not plan faster, on any task: cycles"]
+    assert found.verdict == REPRODUCED, "the same cycles, half of them in vain"
+    assert "ball × 2 (200)" in found.evidence
+
+
+def test_what_100_never_solves_and_more_do_contradicts_it() -> None:
+    claims = study(lambda task, size: (20.0, RUNS if task != "narrow gate" or size > 100 else 0))
+    assert verdict(claims, "100 individuals are reasonable: cycles") == CONTRADICTED
+    assert (
+        verdict(claims, "Larger populations do not plan faster, on any task: cycles")
+        == CONTRADICTED
+    )
+
+
+def test_nothing_solved_says_nothing() -> None:
+    claims = study(lambda task, size: (20.0, 0))
+    assert {claim.verdict for claim in claims.values()} <= {INCONCLUSIVE, CONTRADICTED}
+    assert verdict(claims, "100 individuals are reasonable: cycles") == INCONCLUSIVE
+    assert verdict(claims, "Smaller populations reduce convergence") == INCONCLUSIVE
+
+
+def task_rows(having: dict[str, int], free: int = RUNS) -> Callable[[str], dict[str, object]]:
+    def rows(label: str) -> dict[str, object]:
+        solved = np.arange(RUNS) < having.get(label, RUNS)
+        return {
+            "solved": solved,
+            "certified": pd.array(np.arange(RUNS) < free, dtype="boolean"),
+            "clearance": np.ones(RUNS),
+            "certified_margin": pd.array([True] * RUNS, dtype="boolean"),
+            "stop_reason": np.where(solved, "goal", "stagnation"),
+            "term_greatest_upright_deg": np.full(RUNS, 9.5),
+            "term_greatest_upright_between_deg": np.where(np.arange(RUNS) < free, 9.6, 10.1),
+        }
+
+    return rows
+
+
+def judged(
+    name: str, rows: Callable[[str], dict[str, object]], monkeypatch: pytest.MonkeyPatch
+) -> dict[str, str]:
+    monkeypatch.setattr(task_claims, "not_judged", lambda results: "")
+    return {c.text: c.verdict for c in task_claims.of_tasks(made_up(name, rows), SETTINGS)}
+
+
+def test_a_wall_that_a_subgoal_opens_is_a_local_minimum(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = "wall: the search gets stuck in a local minimum"
+    assert judged("corsepius_wall", task_rows({"wall": 0}), monkeypatch)[text] == REPRODUCED
+    assert judged("corsepius_wall", task_rows({}), monkeypatch)[text] == INCONCLUSIVE
+    assert (
+        judged("corsepius_wall", task_rows({"with a sub-goal": 0}), monkeypatch)[text]
+        == CONTRADICTED
+    )
+
+
+def test_one_tilted_or_touching_path_contradicts(monkeypatch: pytest.MonkeyPatch) -> None:
+    name = "corsepius_pick_and_place"
+    for free, expected in ((RUNS, REPRODUCED), (RUNS - 1, CONTRADICTED)):
+        found = judged(name, task_rows({}, free), monkeypatch)
+        assert found[f"{name}: paths avoid obstacles"] == expected
+        assert found[f"{name}: the grasped object is not tilted"] == expected
+
+
+def test_one_certified_path_is_enough_for_redundant_arms(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = "The approach works for highly redundant arms"
+    labels = [label for label, _ in conditions_of("corsepius_gate_narrow").conditions]
+    nobody = dict.fromkeys(labels, 0)
+    assert judged("corsepius_gate_narrow", task_rows(nobody), monkeypatch)[text] == CONTRADICTED
+    assert (
+        judged("corsepius_gate_narrow", task_rows(nobody | {labels[0]: 1}), monkeypatch)[text]
+        == REPRODUCED
+    )
+    assert text not in judged("corsepius_pick_and_place", task_rows({}), monkeypatch)
+
+
+def test_below_the_papers_budget_nothing_is_judged() -> None:
+    results = made_up("corsepius_wall", task_rows({"wall": 0}))._replace(budget="smoke")
+    for claim in task_claims.of_tasks(results, SETTINGS):
+        assert claim.verdict.startswith(NOT_JUDGED)

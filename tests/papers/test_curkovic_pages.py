@@ -1,0 +1,291 @@
+"""The pages on Curkovic et al. 2013: what they hold, and the tables behind their figures."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from report_samples import figure_stems, page_settings, smoke_report, smoke_results
+
+from evoexp.configuration import compose
+from evoexp.papers.curkovic import claims as sweep_claims
+from evoexp.papers.curkovic import families, link_motions, measures, motion_page
+from evoexp.papers.curkovic.figures import link_intersection, pareto_fronts, robot_motions
+from evoexp.papers.curkovic.fronts import read_fronts
+from evoexp.report import claims, judging, style
+from evoexp.report.page import Page
+from evoexp.report.pages import page_of
+from evoexp.report.results import ConditionResults
+
+
+@pytest.fixture(scope="module")
+def outputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("curkovic")
+
+
+def page(outputs: Path, name: str, figures: str | None = None) -> Page:
+    return page_of(smoke_results(outputs, name), page_settings(name, figures))
+
+
+def drawing(found: Page, stem: str) -> pd.DataFrame:
+    """Draw one figure of a page; return its table."""
+    (one,) = (drawing for drawing in found.drawings if drawing.stem == stem)
+    table = one.table()
+    assert len(style.drawn(lambda: one.draw(table), ("svg",), 60)["svg"]) > 1000
+    return table
+
+
+def test_fronts_are_what_no_other_individual_dominates(outputs: Path) -> None:
+    directory = smoke_report(outputs, "curkovic_pareto")
+    table = pd.read_csv(directory / "fig_5_fronts.csv")
+    assert len(table) == 2 * 100
+    for _, rows in table.groupby("population"):
+        values = rows[list(pareto_fronts.CRITERIA)].to_numpy()
+        dominated = [
+            any((other <= own).all() and (other < own).any() for other in values) for own in values
+        ]
+        assert list(~np.array(dominated)) == list(rows["non_dominated"])
+    results = smoke_results(outputs, "curkovic_pareto")
+    fronts = read_fronts(results, results.conditions[0], 1)
+    assert [(front.generation, front.population) for front in fronts] == [(10, 0), (10, 1)]
+    text = (directory / "index.md").read_text()
+    assert "individuals on the front of robot 2's population" in text
+    assert "larger than the hall of fame may be (15 of 100)" in text
+
+
+def test_motions_of_two_robots_are_figures_7_to_9(outputs: Path) -> None:
+    directory = smoke_report(outputs, "curkovic_motion")
+    names = {
+        f"fig_{k}_{what}_{c}"
+        for k, what in ((8, "motion"), (9, "joints"))
+        for c in ("1_straight", "2_cubic_spline")
+    }
+    assert figure_stems(directory) == names | {"fig_7_intersection", "distances", "convergence"}
+    text = (directory / "index.md").read_text()
+    assert "Eq. 2 allows steps of 5.73 and 11.46 deg (printed: 11.5 and 23)" in text
+    assert "executed curve leaves [0, π] | straight: 0 of 2; cubic spline:" in text
+    assert "a link is faster than Eq. 2 allows | straight: 2 of 2; cubic spline: 2 of 2" in text
+    assert text.count("not judged (budget smoke)") == 4
+    joints = pd.read_csv(directory / "fig_9_joints_2_cubic_spline.csv")
+    ends = joints[joints["instant"] == 0.0]
+    assert list(ends["angle_deg"]) == [150.0, 60.0, 150.0, 180.0]
+    assert (ends["turn_deg"] == 0.0).all()  # the spline starts at rest
+    assert list(ends["limit_deg"].round(2)) == [5.73, 11.46] * 2
+
+
+def test_the_intersection_lies_on_both_vectors(outputs: Path) -> None:
+    condition = smoke_results(outputs, "curkovic_motion").conditions[0]
+    table = link_intersection.intersection_table(condition).set_index("element")
+    point = table.loc["point", ["x", "y"]].to_numpy(float)
+    for vector, share in (("b", "mu"), ("d", "nu")):
+        start, end = (
+            table.loc[vector, ["x", "y"]].to_numpy(float),
+            table.loc[vector, ["x_end", "y_end"]].to_numpy(float),
+        )
+        np.testing.assert_allclose(point, start + table[share].iloc[0] * (end - start), atol=1e-8)
+        assert 0.0 <= table[share].iloc[0] <= 1.0
+    assert table["crossing"].all()
+    along = table.loc["a", ["x_end", "y_end"]].to_numpy(float)
+    angle = np.radians(table.loc["a", "angle_deg"])
+    np.testing.assert_allclose(along, 0.25 * np.array([np.cos(angle), np.sin(angle)]), atol=1e-9)
+
+
+def test_a_trail_begins_at_the_start_and_ends_at_the_goal(outputs: Path) -> None:
+    condition = smoke_results(outputs, "curkovic_motion").conditions[0]
+    table = robot_motions.motion_table(condition)
+    path = table[(table["element"] == "path") & (table["replicate"] == condition.best_replicate)]
+    problem = condition.prepared.problem
+    for robot, rows in path.groupby("robot"):
+        for row, q in ((rows.iloc[0], problem.start[robot]), (rows.iloc[-1], problem.goal[robot])):
+            tip = np.array(problem.collision.arms[robot].base) + 0.25 * np.array(
+                [np.cos(q).sum(), np.sin(q).sum()]
+            )
+            assert (row["x_end"], row["y_end"]) == pytest.approx(tuple(tip), abs=1e-9)
+    assert (table["element"] == "contact").sum() == condition.verdicts.refuted
+    postures = table[table["element"] == "posture"]
+    assert len(postures) == 2 * 2 * (5 * robot_motions.POSTURES + 1)
+
+
+@pytest.mark.parametrize(
+    ("name", "robots", "stem"),
+    [("curkovic_stationary", 2, "fig_10_motion"), ("curkovic_three", 3, "motion")],
+)
+def test_other_scenes_are_drawn_and_claimed(
+    outputs: Path, name: str, robots: int, stem: str
+) -> None:
+    found = page(outputs, name)
+    assert "fig_7_intersection" not in {drawing.stem for drawing in found.drawings}
+    assert (
+        sum("by the exact verdict on the whole motion" in claim.text for claim in found.claims) == 2
+    )
+    table = drawing(found, f"{stem}_2_5_substeps")
+    assert set(table.loc[table["element"] == "path", "robot"]) == set(range(robots))
+    assert (table["element"] == "obstacle").any() == (robots == 2)
+    assert set(drawing(found, "joints_1_configurations_only")["robot"]) == set(range(robots))
+    distances = drawing(found, "distances")
+    assert sorted(distances["replicate"].unique()) == [-1, 0, 1]
+    for (position, replicate), rows in distances[distances["replicate"] >= 0].groupby(
+        ["position", "replicate"]
+    ):
+        exact = smoke_results(outputs, name).conditions[position].column("clearance")[replicate]
+        assert rows["distance"].min() >= exact - 1e-6  # sampled
+
+
+def test_three_radii_are_figure_11(outputs: Path) -> None:
+    found = page(outputs, "curkovic_safety")
+    table = drawing(found, "fig_11_safety")
+    assert sorted(table["tcp_radius"].unique()) == [0.01, 0.025, 0.04]
+    assert sorted(table["collision_substeps"].unique()) == [1, 5]
+    assert table.groupby(["condition", "robot"])["at_configuration"].sum().eq(6).all()
+    assert (
+        sum(
+            claim.text.startswith("A larger radius forces the robots further apart")
+            for claim in found.claims
+        )
+        == 2
+    )
+    sticking = "radius 0.01 m; radius 0.01 m, configurations only"
+    assert [finding for what, finding in found.checks if "sticks out" in what] == [sticking]
+    trail = drawing(found, "motion_3_radius_0_04_m")
+    radii = trail[trail["element"] == "configuration"].groupby("link")["radius"].unique()
+    assert [list(values) for values in radii] == [[0.02], [0.02], [0.04]]
+    condition = smoke_results(outputs, "curkovic_safety").conditions[0]
+    lines = motion_page.tool_distance(condition)
+    assert (lines >= condition.column("clearance")).all()  # bodies are thicker than lines
+
+
+def test_a_hall_is_judged_against_what_replaces_it(outputs: Path) -> None:
+    found = page(outputs, "curkovic_hall")
+    assert len(found.claims) == 6
+    assert {claim.source for claim in found.claims} == {"section 3", "our question"}
+    assert sum("frozen hall" in claim.evidence for claim in found.claims) == 2
+    assert [heading for heading, _ in found.comparisons if "best cost" in heading] == [
+        "best cost: hall against …"
+    ]
+    assert {claim.verdict for claim in found.claims} == {"not judged (budget smoke)"}
+
+
+def test_the_depth_of_the_hall_is_judged_once_per_measure(outputs: Path) -> None:
+    found = page(outputs, "curkovic_hall_depth")
+    assert len(found.claims) == 2
+    assert all(len(rows) == 7 for _, rows in found.comparisons)
+    assert all(
+        claim.text.startswith("A hall of at most 15 % of the population is the best")
+        for claim in found.claims
+    )
+
+
+def test_mutation_rates_are_compared_within_a_reading(outputs: Path) -> None:
+    results = smoke_results(outputs, "curkovic_mutation")
+    one, two = families.families(results)
+    assert [other.label for _, other in one.pairs] == [
+        f"constant {rate}" for rate in ("0.1", "0.3", "0.6", "1")
+    ]
+    assert {first.label for first, _ in two.pairs} == {"Eq. 10, symmetric"}
+    assert all(other.label.endswith("symmetric") for _, other in two.pairs)
+    tested = families.tested(results, page_settings("curkovic_mutation"), 12.0)
+    judged = sweep_claims.of_sweep(results, page_settings("curkovic_mutation"), tested)
+    assert [claim.text.rsplit("; ", 1)[1] for claim in judged] == [
+        "Eq. 9 as printed",
+        "Eq. 9 read as symmetric",
+    ] * 2
+
+
+def test_verdicts_follow_the_rows_of_a_sweep(
+    outputs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    results = smoke_results(outputs, "curkovic_mutation")
+    monkeypatch.setattr(sweep_claims, "not_judged", lambda results: "")
+    low, high = np.arange(12.0), np.arange(12.0) + 20.0
+    settings, found = page_settings("curkovic_mutation"), []
+    for first, second in ((low, high), (high, low), (low, low)):
+        rows = tuple(
+            claims.compare(f"constant {k}", first, second, True, 0.95, 50) for k in range(3)
+        )
+        tested = [one._replace(rows=rows) for one in families.tested(results, settings, 12.0)[:1]]
+        (judged,) = sweep_claims.of_sweep(results, settings, tested)
+        found.append(judged.verdict)
+        assert "constant 2 (A12" in judged.evidence
+    assert found == [claims.REPRODUCED, claims.CONTRADICTED, claims.INCONCLUSIVE]
+
+
+def test_what_is_tested_between_configurations_is_paired_with_its_twin(outputs: Path) -> None:
+    results = smoke_results(outputs, "curkovic_stationary")
+    (twins,) = families.families(results)
+    assert [(a.label, b.label) for a, b in twins.pairs] == [("configurations only", "5 substeps")]
+    found = page(outputs, "curkovic_stationary", "curkovic_sweep")
+    assert found.claims == ()
+    assert any(
+        heading.startswith("solved motion collides between") for heading, _ in found.comparisons
+    )
+    both = results._replace(conditions=results.conditions[::-1])  # whatever comes first
+    assert families.families(both)[0].pairs[0][1].label == "5 substeps"
+
+
+def test_curves_show_three_defects(outputs: Path) -> None:
+    found = page(outputs, "curkovic_motion", "curkovic_sweep")
+    table = drawing(found, "defects")
+    assert list(table["defect"].unique()) == [
+        "collide in between",
+        "leave [0, π]",
+        "too fast (Eq. 2)",
+    ]
+    assert (table["lower"] <= table["share"]).all()
+    assert (table["share"] <= table["upper"]).all()
+    assert (table["failing"] <= table["solved"]).all()
+    values = drawing(found, "values")
+    assert set(values["condition"]) == {"straight", "cubic spline"}
+    assert len(drawing(found, "effects")) == 2
+
+
+def test_effort_to_a_threshold_counts_runs_that_never_get_there(outputs: Path) -> None:
+    condition = smoke_results(outputs, "curkovic_hall").conditions[0]
+    costs = condition.generations.pivot(index="replicate", columns="index", values="best_cost")
+    threshold = float(costs[10].mean())  # one of the two replicates gets there
+    reached = (costs <= threshold).to_numpy()
+    expected = np.where(reached.any(axis=1), reached.argmax(axis=1), np.inf)
+    np.testing.assert_array_equal(measures.generations_to(condition, threshold), expected)
+    evaluations = measures.evaluations_to(condition, threshold)
+    np.testing.assert_array_equal(evaluations, 200.0 * (expected + 1.0))
+    spent = (
+        np.where(np.isfinite(evaluations), evaluations, 2200.0).sum()
+        / np.isfinite(evaluations).sum()
+    )
+    assert measures.expected_evaluations(condition, threshold) == spent
+    assert measures.expected_evaluations(condition, 0.0) == np.inf
+    assert measures.lower_bound(condition) <= costs.to_numpy().min()
+
+
+def test_claims_are_judged_only_on_the_papers_own_settings(outputs: Path) -> None:
+    found = smoke_results(outputs, "curkovic_pareto")
+    (paper,) = compose.expand(["experiment=curkovic_pareto"])[0].conditions
+    judged = found.conditions[0]._replace(condition=paper.condition, planned=20)
+
+    def reason(condition: ConditionResults, budget: str = "paper") -> str:
+        return judging.not_judged(found._replace(budget=budget, conditions=(condition,)))
+
+    assert reason(judged) == ""
+    assert reason(judged._replace(condition=paper.condition._replace(seed=5))) == ""
+    assert reason(judged, "quick") == "budget quick"
+    assert reason(judged._replace(planned=3)) == "fewer replicates than planned"
+    assert reason(found.conditions[0]._replace(planned=20)) == "settings overridden"
+
+
+def test_rates_are_counted_among_solved_motions(outputs: Path) -> None:
+    condition = smoke_results(outputs, "curkovic_motion").conditions[1]
+    refuted, leaves, fast = measures.rates(condition)
+    assert (refuted.failing, refuted.solved) == (
+        condition.verdicts.solved_refuted,
+        condition.solved,
+    )
+    far = [
+        link_motions.sampled(link_motions.executed(condition.prepared, solution), 500).links
+        for solution in condition.solutions.values()
+    ]
+    assert leaves.failing == sum(bool((q < -1e-6).any() or (q > 180.0 + 1e-6).any()) for q in far)
+    assert fast.failing == sum(times > 1.0 for times in measures.times_over_limit(condition))
+    assert (
+        refuted.interval(0.95).low
+        <= refuted.failing / refuted.solved
+        <= refuted.interval(0.95).high
+    )

@@ -1,0 +1,241 @@
+"""The pages on Lavoie & Boudreau 2001: what they hold, and the tables behind their figures."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from report_samples import (
+    REPORT,
+    figure_stems,
+    page_settings,
+    smoke_experiment,
+    smoke_report,
+    smoke_results,
+)
+
+from evoexp.collision.certifier.certificate import certificate
+from evoexp.numeric.elementary import DEGREE
+from evoexp.papers.lavoie import measures
+from evoexp.papers.lavoie.figures import attempts, error_distribution, reaching_motions
+from evoexp.papers.lavoie.figures.reaching_motions import Shown
+from evoexp.paths.motion import Motion
+from evoexp.report import body_contacts, motion_geometry, style
+from evoexp.report.figures import shares
+from evoexp.report.pages import page_of
+from evoexp.report.proportions import Proportion
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results import ConditionResults, Results
+
+
+@pytest.fixture(scope="module")
+def outputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("lavoie")
+
+
+def blind(outputs: Path) -> ConditionResults:
+    """Return runs of arms that ignore obstacles and are content with any solution.
+
+    Most of them touch.
+    """
+    return smoke_results(
+        outputs, "lavoie_7dof", "collision.blind=true", "planner.success=finite"
+    ).conditions[0]
+
+
+def test_the_page_has_the_papers_figures_and_judges_nothing_below_its_budget(outputs: Path) -> None:
+    directory = smoke_report(outputs, "lavoie")
+    assert {"fig_1_start", "fig_2_solution", "fig_3_error", "attempts"} <= figure_stems(directory)
+    text = (directory / "index.md").read_text()
+    assert text.count("**not judged (budget smoke)**") == 10
+    assert text.count("**not judged**") == 2  # those that need a sweep
+    assert (
+        "(-15, -5) instead of (-5, -15) is refused: scenario.q_start: must be free of collision "
+        "(link" in text
+    )
+    assert "tests of a link against an ellipse per second of search" in text
+    assert "convergence" not in figure_stems(directory)
+
+
+def test_one_arm_has_a_page_of_its_own(outputs: Path) -> None:
+    directory = smoke_report(outputs, "lavoie_10dof")
+    text = (directory / "index.md").read_text()
+    assert "a position error below 1 in 99.1 % of runs" in text
+    assert "93.5 %" not in text
+    assert "does better than that of seven" not in text
+
+
+def test_no_generation_is_read(outputs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reports of thousands of runs live on summaries and solutions."""
+
+    def refuse(*_: object) -> None:
+        raise AssertionError("generations were read")
+
+    results = smoke_results(outputs, "lavoie")
+    monkeypatch.setattr("evoexp.report.results.read_generations", refuse)
+    for drawing in page_of(results, page_settings("lavoie")).drawings:
+        drawing.table()
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("lavoie_stopping", {"shares", "values", "effects", "stopping"}),
+        ("lavoie_coding", {"shares", "values", "effects"}),
+        ("lavoie_controls", {"shares", "values", "effects"}),
+    ],
+)
+def test_sweeps_have_figures_and_a_row_of_shares_per_condition(
+    outputs: Path, name: str, expected: set[str]
+) -> None:
+    directory = smoke_report(outputs, name)
+    assert figure_stems(directory) == expected
+    text = (directory / "index.md").read_text()
+    for label, _ in smoke_experiment(name).conditions:
+        assert f"| {label}: shares of runs |" in text
+    table = pd.read_csv(directory / "shares.csv")
+    quantities = ["touch an obstacle", "on SP1", "on SP2"]
+    if name != "lavoie_controls":
+        quantities = ["error below 1", "with a solution", "touch an obstacle"]
+    assert list(dict.fromkeys(table["quantity"])) == quantities
+    assert ("weak evidence" in text) == (name != "lavoie_controls")
+
+
+def test_a_sweep_of_one_condition_is_the_page_itself(outputs: Path) -> None:
+    results = smoke_results(outputs, "lavoie")
+    alone = results._replace(conditions=results.conditions[:1])
+    found = page_of(alone, page_settings("lavoie", "lavoie_sweep"))
+    assert "fig_3_error" in {drawing.stem for drawing in found.drawings}
+
+
+def test_other_planners_get_the_generic_page(results: Results) -> None:
+    for name in ("lavoie", "lavoie_sweep"):
+        found = page_of(results, ReportSettings(**REPORT | {"figures": name}))  # type: ignore[arg-type]
+        assert [drawing.stem for drawing in found.drawings] == ["convergence"]
+
+
+def test_arms_stand_as_the_paper_prints(outputs: Path) -> None:
+    results = smoke_results(outputs, "lavoie")
+    table = reaching_motions.reaching_table([Shown(c.label, c) for c in results.conditions])
+    links = table[table["element"] == reaching_motions.LINK]
+    lengths = np.hypot(links["x_end"] - links["x"], links["y_end"] - links["y"])
+    np.testing.assert_allclose(lengths[:7], [10, 10, 10, 4, 4, 3, 2], atol=1e-9)
+    np.testing.assert_allclose(lengths[7:], [6, 6, 6, 6, 6, 6, 2, 2, 2, 2], atol=1e-9)
+    assert (links["sub_path"] == 0).all()
+    ellipses = table[table["element"] == reaching_motions.ELLIPSE]
+    np.testing.assert_allclose(
+        ellipses.iloc[5:, 7:9] - ellipses.iloc[:5, 7:9].to_numpy(), [[-5.0, -15.0]] * 5
+    )
+    assert list(ellipses["angle_deg"]) == [0.0, 90.0, 0.0, 90.0, 90.0] * 2
+    box = table[table["element"] == reaching_motions.BOX].iloc[0]
+    assert tuple(box[["x", "x_end", "y", "y_end"]]) == (16.0, 23.0, 2.0, 11.0)
+    targets = table[table["element"] == reaching_motions.TARGET]
+    assert [tuple(row) for row in targets[["x", "y"]].to_numpy()] == [
+        (15, 5),
+        (18, 8.5),
+        (10, -10),
+        (13, -6.5),
+    ]
+    assert (
+        len(style.drawn(lambda: reaching_motions.draw_reaching(table), ("svg",), 60)["svg"]) > 1000
+    )
+
+
+def test_solutions_show_tested_positions_and_contacts(outputs: Path) -> None:
+    condition = blind(outputs)
+    replicate, verdict = next(iter(body_contacts.refuted(condition).items()))
+    found = measures.contacts(condition, replicate, verdict)
+    table = reaching_motions.reaching_table([Shown("7-DOF", condition, replicate, found)])
+    links = table[table["element"] == reaching_motions.LINK]
+    instants = sorted(links["instant"].unique())
+    np.testing.assert_allclose(instants, np.arange(21) / 10)  # M = 10 positions of each sub-path
+    tips = links[links["link"] == 6].set_index("instant")
+    q = condition.solutions[replicate].reshape(3, 7)
+    for instant, posture in ((1.0, q[1]), (2.0, q[2])):
+        *_, (_, _, _, end) = motion_geometry.joint_positions(
+            condition.prepared.problem.assembly, posture[:, None] / DEGREE
+        )
+        np.testing.assert_allclose(
+            tips.loc[instant, ["x_end", "y_end"]].to_numpy(float), end[0, :2], atol=1e-9
+        )
+    contact = table[table["element"] == reaching_motions.CONTACT]
+    assert list(contact["instant"]) == pytest.approx([instant for instant, _ in found])
+    touching = table[table["element"] == reaching_motions.TOUCHING]
+    assert sorted(touching["instant"].unique()) == pytest.approx(sorted(contact["instant"]))
+    for row in contact.itertuples():  # a contact lies on a link of the posture in contact
+        own = touching[touching["instant"] == row.instant][["x", "y", "x_end", "y_end"]].to_numpy()
+        assert min(_to_segment(np.array([row.x, row.y]), line) for line in own) < 1e-4
+    assert (
+        len(style.drawn(lambda: reaching_motions.draw_reaching(table), ("svg",), 60)["svg"]) > 1000
+    )
+
+
+def _to_segment(point: np.ndarray, line: np.ndarray) -> float:
+    start, along = line[:2], line[2:] - line[:2]
+    share = np.clip((point - start) @ along / (along @ along), 0.0, 1.0)
+    return float(np.linalg.norm(point - start - share * along))
+
+
+def test_either_sub_path_is_judged_by_itself(outputs: Path) -> None:
+    condition = blind(outputs)
+    prepared = condition.prepared
+    expected = []
+    for replicate in condition.summaries.index:
+        q = prepared.planner.motion(prepared.problem, condition.solutions[replicate]).q
+        parts = (Motion(np.ascontiguousarray(q[k : k + 2])) for k in range(2))
+        expected.append([certificate(prepared.problem, part).certified is False for part in parts])
+    assert np.array(expected).any()
+    np.testing.assert_array_equal(measures.refuted_paths(condition), expected)
+    found = measures.refuted(condition)
+    solved = measures.solved(condition)
+    assert found.anywhere == Proportion(
+        int(np.array(expected)[solved].any(axis=1).sum()), int(solved.sum())
+    )
+    assert found.sp2.having == np.array(expected)[solved, 1].sum()
+
+
+def test_the_distribution_counts_smaller_errors_only(outputs: Path) -> None:
+    results = smoke_results(outputs, "lavoie_7dof")
+    errors = np.array([0.5, 0.25, np.inf, 0.25])
+    printed = [(1.0, Proportion(935, 1000))]
+    table = error_distribution.distribution_table(
+        results, lambda _: errors, lambda _: printed, 0.95
+    )
+    steps = table[table["series"] == error_distribution.FOUND]
+    assert list(steps["error"]) == [0.0, 0.25, 0.5]
+    assert list(steps["having"]) == [0, 2, 3]  # the run without a solution is in no step
+    assert (steps["total"] == 4).all()
+    assert list(steps["share"]) == [0.0, 0.5, 0.75]
+    point = table[table["series"] == error_distribution.PRINTED].iloc[0]
+    assert (point["error"], point["share"]) == (1.0, 0.935)
+    assert point["lower"] < 0.935 < point["upper"]
+    figure = error_distribution.draw_distribution(table)
+    words = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+    assert words == ["lavoie_7dof (n = 4)", "printed, lavoie_7dof (their n = 1000)"]
+    line = next(line for line in figure.axes[0].get_lines() if len(line.get_xdata()) == 4)
+    assert np.asarray(line.get_ydata())[-1] == 0.75, "the curve goes on to the right end"
+
+
+def test_attempts_add_up_to_all_runs(outputs: Path) -> None:
+    results = smoke_results(outputs, "lavoie")
+    table = attempts.attempts_table(results, 0.95)
+    assert list(table["attempts"]) == [*range(1, 11)] * 2
+    assert list(table.groupby("position")["having"].sum()) == [2, 2]
+    means = table.groupby("position")["mean"].first()
+    assert list(means) == [c.column("term_attempts").mean() for c in results.conditions]
+
+
+def test_shares_mark_what_is_printed_and_survive_nothing() -> None:
+    rows = [
+        ("error below 1", 0, "a", Proportion(3, 4)),
+        ("error below 1", 1, "b", Proportion(0, 0)),
+    ]
+    table = shares.shares_table(rows, {"error below 1": 0.935}, 0.95)
+    assert list(table["printed"]) == [0.935, 0.935]
+    figure = shares.draw_shares(table)
+    (axes,) = figure.axes
+    assert [text.get_text().strip() for text in axes.texts] == ["3/4", "0/0"]
+    low, high = axes.get_xlim()
+    assert low < 100 * table["lower"].iloc[0] < 93.5 < high
+    empty = shares.shares_table([("x", 0, "a", Proportion(0, 0))], {}, 0.95)
+    assert len(style.drawn(lambda: shares.draw_shares(empty), ("svg",), 60)["svg"]) > 1000

@@ -1,0 +1,257 @@
+"""The rules by which claims of Lavoie & Boudreau 2001 are judged.
+
+On made-up runs of the shipped conditions.
+"""
+
+import functools
+
+import numpy as np
+import pandas as pd
+import pytest
+from report_samples import REPORT
+
+from evoexp.configuration import expansions
+from evoexp.configuration.experiment import Experiment
+from evoexp.papers.lavoie import claims, measures, sweep_claims
+from evoexp.papers.lavoie.measures import Refuted
+from evoexp.report.claims import CONTRADICTED, INCONCLUSIVE, NOT_JUDGED, REPRODUCED, Claim
+from evoexp.report.judging import not_judged
+from evoexp.report.proportions import Proportion
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results import ConditionResults, Results, StoredLogs
+
+SETTINGS = ReportSettings(**REPORT, figures="lavoie")  # type: ignore[arg-type]
+NO_LOGS = StoredLogs(None, (), None)  # type: ignore[arg-type]
+
+
+@functools.cache
+def conditions_of(*words: str) -> Experiment:
+    return expansions.expand([f"experiment={words[0]}", *words[1:]])[0]
+
+
+def made_up(errors: dict[str, np.ndarray], *words: str) -> Results:
+    """Return results in which the runs of every condition, by label, have these errors.
+
+    NaN: no solution.
+    """
+    experiment, found = conditions_of(*words), []
+    for label, condition in experiment.conditions:
+        values = errors[label]
+        solved = ~np.isnan(values)
+        columns = {
+            "solved": solved,
+            "certified": pd.array([True] * len(values), dtype="boolean"),
+            "evaluations": np.full(len(values), 1000),
+            "term_position_error_sp2": np.where(solved, values, 0.5),
+            "term_attempts": np.ones(len(values)),
+        }
+        rows = pd.DataFrame(columns)
+        found.append(ConditionResults(label, condition, len(rows), rows, {}, NO_LOGS, {}))
+    return Results(experiment.name, experiment.budget, tuple(found))
+
+
+def below_one(count: int, runs: int = 1000) -> np.ndarray:
+    return np.where(np.arange(runs) < count, 0.5, 1.5)
+
+
+@pytest.mark.parametrize(
+    ("one", "two", "verdict"),
+    [
+        (Proportion(935, 1000), Proportion(935, 1000), REPRODUCED),
+        (Proportion(950, 1000), Proportion(935, 1000), REPRODUCED),  # within two samples' spread
+        (Proportion(964, 1000), Proportion(935, 1000), CONTRADICTED),
+        (Proportion(900, 1000), Proportion(935, 1000), CONTRADICTED),
+        (Proportion(96, 100), Proportion(935, 1000), REPRODUCED),  # few runs say little
+        (Proportion(0, 0), Proportion(935, 1000), INCONCLUSIVE),
+    ],
+)
+def test_a_printed_percentage_is_a_sample_too(
+    one: Proportion, two: Proportion, verdict: str
+) -> None:
+    assert claims.judge_equal("", one, two, 0.95) == verdict
+    assert claims.judge_equal("budget smoke", one, two, 0.95) == NOT_JUDGED
+
+
+@pytest.mark.parametrize(
+    ("one", "two", "verdict"),
+    [
+        (Proportion(999, 1000), Proportion(964, 1000), REPRODUCED),
+        (Proportion(964, 1000), Proportion(999, 1000), CONTRADICTED),
+        (Proportion(1000, 1000), Proportion(998, 1000), INCONCLUSIVE),
+        (Proportion(0, 0), Proportion(1, 1), INCONCLUSIVE),
+    ],
+)
+def test_one_proportion_is_greater(one: Proportion, two: Proportion, verdict: str) -> None:
+    assert claims.judge_greater("", one, two, 0.05) == verdict
+    assert claims.judge_greater("budget smoke", one, two, 0.05) == NOT_JUDGED
+    assert claims.judge_greater("", one, two, 0.05, p_adjusted=0.06) == INCONCLUSIVE
+
+
+def test_printed_percentages_say_the_numbers_and_the_rule() -> None:
+    results = made_up({"7-DOF": below_one(964), "10-DOF": below_one(991)}, "lavoie")
+    (seven, _), (ten, _) = (claims.percentages("", c, SETTINGS) for c in results.conditions)
+    assert (seven.verdict, ten.verdict) == (CONTRADICTED, REPRODUCED)
+    assert seven.text == "7-DOF: a position error below 1 in 93.5 % of runs"
+    assert "964 of 1000 = 96.4 % [95.1, 97.4]; the printed one lies outside" in seven.evidence
+    assert (
+        "its own thousand runs give [91.8, 94.9]; ours − printed +2.9 [+1.0, +4.9] points"
+        in seven.evidence
+    )
+    assert "0 within the 95 % interval of the difference by Newcombe" in seven.evidence
+    assert "lies within, its own thousand runs give" in ten.evidence
+
+
+def test_a_run_without_a_solution_has_no_error_below_anything() -> None:
+    errors = below_one(1000)
+    errors[:3] = np.nan
+    results = made_up({"7-DOF": errors, "10-DOF": below_one(1000)}, "lavoie")
+    seven = results.conditions[0]
+    assert measures.below(seven, 2.0) == Proportion(997, 1000)
+    assert np.isinf(measures.effort(seven)[:3]).all()
+    assert claims.no_start_needed(results, seven).verdict == CONTRADICTED
+    assert claims.no_start_needed(results, results.conditions[1]).verdict == REPRODUCED
+
+
+def test_the_longer_arm_is_compared_with_the_shorter_one() -> None:
+    results = made_up({"7-DOF": below_one(964), "10-DOF": below_one(999)}, "lavoie")
+    below_1, below_2 = claims.more_joints_are_better(results, SETTINGS)
+    assert (below_1.verdict, below_2.verdict) == (REPRODUCED, INCONCLUSIVE)
+    assert "Fisher's exact p = 4.1e−10" in below_1.evidence
+    alone = results._replace(conditions=results.conditions[:1])
+    assert claims.more_joints_are_better(alone, SETTINGS) == []
+
+
+def test_motions_in_contact_contradict() -> None:
+    results = made_up({"7-DOF": below_one(1000), "10-DOF": below_one(1000)}, "lavoie")
+    seven, ten = results.conditions
+    certified = seven.summaries["certified"].copy()
+    certified[:115] = False
+    seven = seven._replace(summaries=seven.summaries.assign(certified=certified))
+    found = claims.free_of_collision(results, seven, Proportion(115, 1000), SETTINGS)
+    assert found.verdict == CONTRADICTED
+    assert "885 of 1000 certified; refuted 115 of 1000 = 11.5 % [9.7, 13.6]" in found.evidence
+    assert (
+        claims.free_of_collision(results, ten, Proportion(0, 1000), SETTINGS).verdict == REPRODUCED
+    )
+
+
+def test_what_is_overridden_or_too_few_is_not_judged() -> None:
+    errors = {"7-DOF": below_one(935), "10-DOF": below_one(991)}
+    few = made_up({label: values[:50] for label, values in errors.items()}, "lavoie")
+    other = made_up(errors, "lavoie", "planner.success=finite")
+    for results, why in ((few, "fewer replicates than planned"), (other, "settings overridden")):
+        for claim in (
+            *claims.percentages(not_judged(results), results.conditions[0], SETTINGS),
+            *claims.more_joints_are_better(results, SETTINGS),
+            claims.no_start_needed(results, results.conditions[0]),
+        ):
+            assert claim.verdict == f"{NOT_JUDGED} ({why})"
+
+
+def sweep(results: Results, in_contact: dict[str, int] | None = None) -> list[Claim]:
+    """Return the claims of a sweep; some accepted runs of each condition, by label, in contact."""
+    counts = in_contact or {}
+    refuted = {
+        c.label: Refuted(
+            Proportion(counts.get(c.label, 0), c.solved), *[Proportion(0, c.solved)] * 2
+        )
+        for c in results.conditions
+    }
+    return list(sweep_claims.of_sweep(results, SETTINGS, refuted))
+
+
+def test_smaller_stopping_values_are_judged_step_by_step() -> None:
+    labels = {
+        (stop, most): f"stop below {stop}, at most {most}"
+        for stop in ("2.0", "1.5", "1.0")
+        for most in (100, 300)
+    }
+    spread = np.linspace(0.0, 0.1, 100)
+    errors = {label: float(stop) / 4.0 + spread for (stop, _), label in labels.items()}
+    errors[labels["1.0", 300]] = errors[labels["1.5", 300]]  # the last step brings nothing
+    few = errors[labels["1.0", 100]].copy()
+    few[:30] = np.nan
+    errors[labels["1.0", 100]] = few
+    first, second, more = sweep(made_up(errors, "lavoie_stopping"))
+    assert (first.verdict, second.verdict, more.verdict) == (INCONCLUSIVE, INCONCLUSIVE, REPRODUCED)
+    assert "at most 100 generations" in first.text
+    assert "median errors: 0.55 below 2, 0.425 below 1.5, 0.3303 below 1" in first.evidence
+    assert "70 of 100" in more.evidence
+    errors[labels["1.0", 100]] = 0.25 + spread
+    assert sweep(made_up(errors, "lavoie_stopping"))[0].verdict == REPRODUCED
+
+
+def test_codings_are_compared_arm_by_arm() -> None:
+    values = np.linspace(0.1, 0.5, 200)
+    errors = {
+        "real": values,
+        "binary": values + 0.2,
+        "10-DOF, real": values + 0.2,
+        "10-DOF, binary": values,
+    }
+    found = {claim.text: claim.verdict for claim in sweep(made_up(errors, "lavoie_coding"))}
+    start = "Real coding performs better than binary coding, judged by"
+    assert found == {
+        f"{start} position error: real against binary": REPRODUCED,
+        f"{start} evaluations to a solution: real against binary": INCONCLUSIVE,
+        f"{start} position error: 10-DOF, real against 10-DOF, binary": CONTRADICTED,
+        f"{start} evaluations to a solution: 10-DOF, real against 10-DOF, binary": INCONCLUSIVE,
+    }
+
+
+def test_controls_stand_beside_their_own_arm() -> None:
+    labels = [label for label, _ in conditions_of("lavoie_controls").conditions]
+    errors = {label: np.full(200, np.nan if "random" in label else 0.3) for label in labels}
+    found = sweep(
+        made_up(errors, "lavoie_controls"), {"7-DOF, blind": 186, "10-DOF, blind": 3, "7-DOF": 20}
+    )
+    assert [(claim.text.split(": ")[1], claim.verdict) for claim in found] == [
+        ("7-DOF, blind against 7-DOF", REPRODUCED),
+        ("10-DOF, blind against 10-DOF", INCONCLUSIVE),
+        ("7-DOF against 7-DOF, random search", REPRODUCED),
+        ("10-DOF against 10-DOF, random search", REPRODUCED),
+    ]
+
+
+def test_positions_and_chords_are_judged_with_adjusted_p_values() -> None:
+    labels = [label for label, _ in conditions_of("lavoie_sweeps_positions").conditions]
+    results = made_up({label: np.full(200, 0.3) for label in labels}, "lavoie_sweeps_positions")
+    contacts = {"7-DOF, M = 10, none": 72, "7-DOF, M = 10, chords": 20, "7-DOF, M = 50, chords": 9}
+    found = {claim.text: claim for claim in sweep(results, contacts)}
+    fewer = "Fewer accepted motions touch an obstacle"
+    assert (
+        found[f"{fewer}: 7-DOF, M = 10, chords against 7-DOF, M = 10, none"].verdict == REPRODUCED
+    )
+    middle = found[f"{fewer}: 7-DOF, M = 50, chords against 7-DOF, M = 10, chords"]
+    assert middle.verdict == INCONCLUSIVE  # 0.053 alone
+    assert (
+        found[f"{fewer}: 7-DOF, M = 100, chords against 7-DOF, M = 10, chords"].verdict
+        == REPRODUCED
+    )
+    assert (
+        found["M = 50 removes contacts altogether: 7-DOF, M = 50, chords"].verdict == CONTRADICTED
+    )
+    assert found["M = 50 removes contacts altogether: 10-DOF, M = 50, chords"].verdict == REPRODUCED
+    assert len(found) == 10
+
+
+def test_printed_percentages_are_judged_by_either_reading_of_a_success() -> None:
+    errors = {
+        "7-DOF, below its value": below_one(964),
+        "7-DOF, any finite cost": below_one(953),
+        "10-DOF, below its value": below_one(999),
+        "10-DOF, any finite cost": below_one(982),
+    }
+    found = sweep(made_up(errors, "lavoie_success"))
+    below_1 = {
+        claim.text.split(":")[0]: claim.verdict for claim in found if "below 1 " in claim.text
+    }
+    assert below_1 == {label: CONTRADICTED if "value" in label else REPRODUCED for label in errors}
+    assert len(found) == 8
+
+
+def test_operators_judge_nothing() -> None:
+    labels = [label for label, _ in conditions_of("lavoie_operators").conditions]
+    assert (
+        sweep(made_up({label: below_one(195, 200) for label in labels}, "lavoie_operators")) == []
+    )

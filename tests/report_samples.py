@@ -1,0 +1,79 @@
+"""Small experiments to report on."""
+
+import functools
+from pathlib import Path
+
+from evoexp.batch.replicate import run_replicate
+from evoexp.configuration import expansions
+from evoexp.configuration.experiment import Experiment
+from evoexp.report import build
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results import Results, gather
+from evoexp.store.manifest import manifest
+from evoexp.store.run_directory import RunDirectory
+
+SMALL = ("budget=smoke", "ga.population_size=12", "ga.num_generations=4", "num_replicates=2")
+REPORT = {
+    "formats": ("svg", "png"),
+    "dpi": 60,
+    "confidence": 0.95,
+    "significance": 0.05,
+    "num_resamples": 200,
+    "samples_per_segment": 10,
+    "threshold_ratio": 1.25,
+}
+
+
+def expand(name: str, *overrides: str) -> Experiment:
+    """Return an experiment, small."""
+    words = {word.split("=")[0]: word for word in (*SMALL, *overrides)}
+    return expansions.expand([f"experiment={name}", *words.values()])[0]
+
+
+def store(outputs: Path, experiment: Experiment) -> None:
+    """Run and store every replicate of an experiment."""
+    for label, condition in experiment.conditions:
+        run = RunDirectory(outputs, condition.id)
+        run.create(
+            condition.to_json(), manifest(condition.id) | {"label": label}, condition.files()
+        )
+        for replicate in range(condition.num_replicates(experiment.num_replicates)):
+            run.write_log(replicate, run_replicate(condition, replicate).content)
+
+
+@functools.cache
+def smoke_experiment(name: str, *overrides: str) -> Experiment:
+    """Return an experiment with two replicates of ten generations.
+
+    Composing it is most of the work.
+    """
+    return expansions.expand([f"experiment={name}", "budget=smoke", *overrides])[0]
+
+
+@functools.cache
+def smoke_results(outputs: Path, name: str, *overrides: str) -> Results:
+    """Return what two replicates of every condition gave."""
+    experiment = smoke_experiment(name, *overrides)
+    store(outputs, experiment)
+    return gather(
+        outputs, experiment.conditions, experiment.num_replicates, name, experiment.budget, ""
+    )
+
+
+def page_settings(name: str, figures: str | None = None) -> ReportSettings:
+    """Return settings for an experiment's own page, or another one."""
+    pages = {"formats": ("svg",), "figures": figures or smoke_experiment(name).report.figures}
+    return ReportSettings(**REPORT | pages)  # type: ignore[arg-type]
+
+
+def smoke_report(outputs: Path, name: str) -> Path:
+    """Return the directory of a whole report."""
+    smoke_results(outputs, name)
+    experiment = smoke_experiment(name)
+    request = build.Request(experiment.report_name, name, experiment.budget, experiment.conditions)
+    return build.report(request, page_settings(name), outputs, experiment.num_replicates).parent
+
+
+def figure_stems(directory: Path) -> set[str]:
+    """Return the names of a report's figures."""
+    return {path.stem for path in directory.glob("*.svg")}

@@ -5,14 +5,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from report_samples import (
-    REPORT,
-    figure_stems,
-    page_settings,
-    smoke_experiment,
-    smoke_report,
-    smoke_results,
-)
 
 from evoexp.collision.certifier.certificate import certificate
 from evoexp.numeric.elementary import DEGREE
@@ -26,6 +18,14 @@ from evoexp.report.pages import page_of
 from evoexp.report.proportions import Proportion
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
+from report_samples import (
+    REPORT,
+    figure_stems,
+    page_settings,
+    smoke_experiment,
+    smoke_report,
+    smoke_results,
+)
 
 
 @pytest.fixture(scope="module")

@@ -4,8 +4,8 @@ import pinocchio as pin
 import pytest
 from playback_samples import SAMPLES, condition, half_extent, matrix, recording, refuted
 
-from evoexp.collision.certifier.certificate import Part, certificate
-from evoexp.collision.scene import geometry_scene
+from evoexp.collision.certifier.certificate import certificate
+from evoexp.collision.scene import Part, geometry_scene
 from evoexp.paths.motion import Motion, clamped_cubic
 from evoexp.playback.body_poses import MAX_TICKS, ticks
 from evoexp.playback.contacts import at_instant, clearance, parts_of, remainder

@@ -71,6 +71,20 @@ class Scene(NamedTuple):
         return self.pair_names(int(np.argmin(distances)))
 
 
+class Part(NamedTuple):
+    """A piece of a motion that has bodies of its own: a phase in which something is held, say.
+
+    Attributes:
+        scene: The bodies.
+        first: Instant at which it begins.
+        last: At which it ends.
+    """
+
+    scene: Scene
+    first: int
+    last: int
+
+
 def scene(
     assembly: Assembly, obstacles: ObstacleTable | tuple[Any, ...] = (), self_pairs: bool = False
 ) -> Scene:

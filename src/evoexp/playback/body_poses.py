@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from evoexp.collision.certifier.certificate import Part
+from evoexp.collision.scene import Part
 from evoexp.paths.motion import Motion
 from evoexp.playback.contacts import part_at
 from evoexp.playback.shapes import pose

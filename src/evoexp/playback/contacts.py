@@ -4,10 +4,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.certifier.certificate import PAIR, Part
+from evoexp.collision.certifier.certificate import PAIR
 from evoexp.collision.certifier.coal_distances import CoalDistance
 from evoexp.collision.certifier.verdict import certify
-from evoexp.collision.scene import Scene
+from evoexp.collision.scene import Part, Scene
 from evoexp.paths.motion import Motion
 from evoexp.records import FloatArray
 

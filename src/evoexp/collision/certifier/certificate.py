@@ -4,7 +4,7 @@ import math
 from typing import Any, NamedTuple
 
 from evoexp.collision.certifier.verdict import certify
-from evoexp.collision.scene import Scene
+from evoexp.collision.scene import Part, Scene
 from evoexp.paths.motion import Motion
 
 PAIR = " – "
@@ -34,20 +34,6 @@ class Certificate(NamedTuple):
     refuted_at: float | None = None
     refuted_pair: str = ""
     certificate_queries: int = 0
-
-
-class Part(NamedTuple):
-    """A piece of a motion that has bodies of its own: a phase in which something is held, say.
-
-    Attributes:
-        scene: The bodies.
-        first: Instant at which it begins.
-        last: At which it ends.
-    """
-
-    scene: Scene
-    first: int
-    last: int
 
 
 def certificate(problem: Any, motion: Motion | None) -> Certificate:

@@ -12,10 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from evoexp.collision.certifier.certificate import Part
 from evoexp.collision.models.body_covers import Cover
 from evoexp.collision.models.body_models import BodyModel, Carried
-from evoexp.collision.scene import Scene, geometry_scene, obstacle_shapes
+from evoexp.collision.scene import Part, Scene, geometry_scene, obstacle_shapes
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.posture_cost import DISTANCE, PostureCost
 from evoexp.paths.motion import Motion

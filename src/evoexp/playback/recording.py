@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from evoexp.collision.certifier.certificate import Certificate
-from evoexp.collision.scene import Part, Scene, certificate
+from evoexp.collision.certifier.certificate import Certificate, certificate
+from evoexp.collision.scene import Part, Scene
 from evoexp.condition import Condition
 from evoexp.errors import EvoexpError
 from evoexp.paths.motion import Motion

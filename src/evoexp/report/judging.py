@@ -1,13 +1,86 @@
-"""What the pages of sweeps and methods say alike of a claim.
+"""Makes the claims of a page: whether they are judged at all, their evidence, their verdicts."""
 
-Whether to judge it, by what numbers, and how it reads.
-"""
+from collections.abc import Sequence
+from typing import NamedTuple
 
-from evoexp.report import markdown
+from evoexp.report import claims, markdown
 from evoexp.report.claims import Claim, Comparison
 from evoexp.report.parameters import option, planned_replicates
+from evoexp.report.proportions import Proportion
+from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results
 from evoexp.shipped import config_directory, shipped
+
+
+class Judge(NamedTuple):
+    """Makes claims with verdicts; where nothing is judged, each claim names the reason instead.
+
+    Attributes:
+        reason: Why nothing is judged ("budget smoke"); empty: claims are judged.
+        significance: Below this adjusted p-value a difference counts.
+    """
+
+    reason: str
+    significance: float
+
+    def claim(self, text: str, source: str, evidence: str, verdict: str) -> Claim:
+        """Make a claim whose verdict the caller has found."""
+        return claim(
+            text, source, evidence, claims.NOT_JUDGED if self.reason else verdict, self.reason
+        )
+
+    def every(
+        self, text: str, source: str, evidence: str, holds: int, done: int, planned: int
+    ) -> Claim:
+        """Make a claim about every run; see `claims.judge_all`."""
+        verdict = claims.judge_all(self.reason, holds, done, planned)
+        return self.claim(text, source, evidence, verdict)
+
+    def majority(self, text: str, source: str, evidence: str, holds: int, done: int) -> Claim:
+        """Make a claim that is reproduced if it holds in more than half of the runs."""
+        verdict = claims.REPRODUCED if holds > done / 2 else claims.CONTRADICTED
+        return self.claim(text, source, evidence, verdict)
+
+    def better(
+        self, text: str, source: str, row: Comparison | None, word: str, told: str = "{}"
+    ) -> Claim:
+        """Make a claim that the first condition of a comparison is better than the second.
+
+        Args:
+            text: The claim.
+            source: Where the paper makes it.
+            row: The comparison; None where the two share no seed.
+            word: Of the one that is better: "lower", "earlier".
+            told: The evidence; its {} stands for the comparison in words.
+        """
+        verdict = claims.judge_better(self.reason, row, self.significance)
+        words = evidence(row, word) if row else "nothing to compare"
+        return self.claim(text, source, told.replace("{}", words), verdict)
+
+    def better_than_all(
+        self, text: str, source: str, evidence: str, rows: Sequence[Comparison]
+    ) -> Claim:
+        """Make a claim that one condition is better than each of several others."""
+        verdict = claims.judge_better_than_all(self.reason, rows, self.significance)
+        return self.claim(text, source, evidence, verdict)
+
+    def greater(
+        self,
+        text: str,
+        source: str,
+        evidence: str,
+        one: Proportion,
+        two: Proportion,
+        p_adjusted: float | None = None,
+    ) -> Claim:
+        """Make a claim that proportion `one` is greater than `two`; see `claims.judge_greater`."""
+        verdict = claims.judge_greater(self.reason, one, two, self.significance, p_adjusted)
+        return self.claim(text, source, evidence, verdict)
+
+
+def judge(results: Results, settings: ReportSettings) -> Judge:
+    """Return the judge of an experiment's claims."""
+    return Judge(not_judged(results), settings.significance)
 
 
 def not_judged(results: Results) -> str:
@@ -36,8 +109,8 @@ def claim(text: str, source: str, evidence: str, verdict: str, reason: str) -> C
 def evidence(comparison: Comparison, better: str) -> str:
     """Return a comparison in words: "lower in 80 % of pairs of runs (…)".
 
-    Both tests are told, by which the verdict is and the other one: they differ where the runs that
-    are better are more, but those that are worse are worse by more.
+    It gives the p-values of both tests, first that of the test which the verdict follows. The two
+    differ where more runs are better, but those that are worse are worse by more.
     """
     low, high = comparison.better.interval
     return (

@@ -4,12 +4,14 @@ No pyplot, no global state left behind.
 """
 
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import matplotlib as mpl
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 ARM_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")  # Okabe & Ito 2008
@@ -138,3 +140,18 @@ def legend_below(figure: Figure, axes: Axes, columns: int) -> None:
     """Put the legend of some axes under the whole figure."""
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=columns)
+
+
+def key(label: str, **look: Any) -> Line2D:
+    """Return an entry of a legend: a line or marker that is drawn nowhere else."""
+    return Line2D([], [], label=label, **look)
+
+
+def arm_keys(arms: Iterable[int], name: str = "arm", **look: Any) -> list[Line2D]:
+    """Return entries of a legend for arms, counted from 0: "arm 1" in the arm's colour, …."""
+    return [key(f"{name} {int(k) + 1}", color=arm_colour(int(k)), **look) for k in arms]
+
+
+def keys_below(figure: Figure, keys: Sequence[Artist], columns: int | None = None) -> None:
+    """Put a legend of given entries under the whole figure, in one line if no columns are given."""
+    figure.legend(handles=keys, loc="outside lower center", ncols=columns or len(keys))

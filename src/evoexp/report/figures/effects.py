@@ -4,7 +4,7 @@ And how much better the first condition is.
 """
 
 import textwrap
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -90,7 +90,7 @@ def draw_values(table: pd.DataFrame) -> Figure:
 
 
 def effects_table(
-    comparisons: dict[str, tuple[Comparison, ...]], significance: float
+    comparisons: Mapping[str, Sequence[Comparison]], significance: float
 ) -> pd.DataFrame:
     """Return how often the first condition is better.
 

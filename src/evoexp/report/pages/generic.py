@@ -3,7 +3,7 @@
 Results, convergence, and comparisons with the controls.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 
 import numpy as np
@@ -118,6 +118,33 @@ def _beside(first: Condition, control: Condition) -> bool:
     Equal evaluations and common seeds.
     """
     return control._replace(planner=getattr(control.planner, WRAPPED)) == first
+
+
+def compared(
+    pairs: Iterable[tuple[ConditionResults, ConditionResults]],
+    values: Values,
+    settings: ReportSettings,
+    *,
+    lower_is_better: bool = True,
+    named: Callable[[ConditionResults, ConditionResults], str] = lambda first, second: second.label,
+) -> tuple[Comparison, ...]:
+    """Compare pairs of conditions in one quantity on their common seeds.
+
+    Args:
+        pairs: (first, second); pairs without a common seed are left out.
+        values: The quantity of a condition, (done,).
+        settings: Levels and resamples.
+        lower_is_better: Which of two values is better.
+        named: Gives the name of a pair's row; by default the label of the second condition.
+
+    Returns:
+        One comparison per pair, p-values adjusted over the pairs.
+    """
+    rows = [
+        compare_on_common_seeds(a, b, named(a, b), lower_is_better, values, settings)
+        for a, b in pairs
+    ]
+    return tuple(adjusted([row for row in rows if row is not None]))
 
 
 def compare_on_common_seeds(

@@ -6,12 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from evoexp.collision.certifier.certificate import certificate
 from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.lavoie import measures
 from evoexp.papers.lavoie.figures import attempts, error_distribution, reaching_motions
 from evoexp.papers.lavoie.figures.reaching_motions import Shown
 from evoexp.paths.motion import Motion
+from evoexp.planners.planner import judge_motion
 from evoexp.report import body_contacts, motion_geometry, style
 from evoexp.report.figures import shares
 from evoexp.report.pages import page_of
@@ -183,7 +183,12 @@ def test_either_sub_path_is_judged_by_itself(outputs: Path) -> None:
     for replicate in condition.summaries.index:
         q = prepared.planner.motion(prepared.problem, condition.solutions[replicate]).q
         parts = (Motion(np.ascontiguousarray(q[k : k + 2])) for k in range(2))
-        expected.append([certificate(prepared.problem, part).certified is False for part in parts])
+        expected.append(
+            [
+                judge_motion(prepared.planner, prepared.problem, part).certified is False
+                for part in parts
+            ]
+        )
     assert np.array(expected).any()
     np.testing.assert_array_equal(measures.refuted_paths(condition), expected)
     found = measures.refuted(condition)

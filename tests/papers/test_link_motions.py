@@ -76,11 +76,11 @@ def test_distances_of_bodies_are_those_of_links(one: Prepared, solution: FloatAr
 
 
 def test_a_contact_lies_on_both_bodies() -> None:
-    from evoexp.collision.certifier.certificate import certificate
+    from evoexp.planners.planner import judge_motion
 
     one = prepared("linear")
     line = link_motions.straight(one)
-    found = certificate(one.problem, one.planner.motion(one.problem, line))
+    found = judge_motion(one.planner, one.problem, one.planner.motion(one.problem, line))
     assert found.certified is False
     assert found.refuted_at is not None
     x, y = body_contacts.contact(one, line, found.refuted_at, found.refuted_pair)

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from evoexp.collision.certifier.certificate import certificate
 from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.papers.curkovic.measures import lower_bound
 from evoexp.planners.coevolution.planner import Coevolution, Evaluated, Problem
+from evoexp.planners.planner import judge_motion
 
 SMALL = ("ga.population_size=12", "ga.num_generations=15", "ga.hall_depth=0.25")
 NO_HALL = ("ga=curkovic_1", "ga.population_size=12", "ga.num_generations=15")
@@ -304,5 +304,5 @@ def test_thick_links_and_tools_are_judged_by_their_bodies() -> None:
     radii = [shape.radius for shape, _, _ in problem.scene.shapes]
     assert radii == [0.02, 0.02, 0.04] * 2
     *_, last = planner.evolve(problem, np.random.default_rng(0))
-    verdict = certificate(problem, planner.motion(problem, last.best))
+    verdict = judge_motion(planner, problem, planner.motion(problem, last.best))
     assert verdict.certified is not None

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evoexp.collision.certifier.certificate import certificate
 from evoexp.collision.models.potential_fields import PotentialFields
 from evoexp.errors import SettingError
 from evoexp.objectives.path_cost import PathCost
 from evoexp.planners.baselines.random_search import RandomSearch
 from evoexp.planners.grid_path_ga import kernels
 from evoexp.planners.grid_path_ga import planner as grid_planner
+from evoexp.planners.planner import judge_motion
 from planners.grid_samples import FIELDS, faults, planner, robot, scenario, solvable
 
 SEEDS = st.integers(0, 2**32)
@@ -193,11 +193,11 @@ def test_permitted_moves_past_corners_are_certified() -> None:
     problem = own.prepare(robot(), scenario(blocked, obstacles=((1, 2, 2, 2),)))
     past = np.array([[0, 0], [1, 1], [2, 1], [3, 2], [3, 3]], dtype=float)
     assert own.evaluate(problem, past.ravel())["forbidden_moves"] == 0.0
-    verdict = certificate(problem, own.motion(problem, past.ravel()))
+    verdict = judge_motion(own, problem, own.motion(problem, past.ravel()))
     assert verdict.certified
     assert verdict.clearance == pytest.approx(np.sqrt(0.5) - 0.4, abs=0.02)
     through = np.array([[0, 2], [3, 2], [3, 3]], dtype=float)
-    assert certificate(problem, own.motion(problem, through.ravel())).certified is False
+    assert judge_motion(own, problem, own.motion(problem, through.ravel())).certified is False
 
 
 def test_evaluate_says_what_is_wrong_with_a_path() -> None:

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from evoexp.batch.replicate import run_replicate
-from evoexp.collision.certifier.certificate import certificate
 from evoexp.configuration import compose
 from evoexp.errors import EvoexpError
 from evoexp.planners.placement_ga import planner as placement_planner
 from evoexp.planners.placement_ga.planner import Problem
+from evoexp.planners.planner import judge_motion
 
 BASE = ("experiment=chen_placement",)
 
@@ -97,10 +97,10 @@ def test_postures_are_judged_by_their_bodies() -> None:
     planner, problem = prepared("scenario=chen_docking_link", "objective=chen_obstacle_link")
     motion = planner.motion(problem, np.array([68.96, 41.74]))  # type: ignore[attr-defined]
     assert motion.q.shape == (2, 4)
-    verdict = certificate(problem, motion)
+    verdict = judge_motion(planner, problem, motion)
     assert verdict.certified is False
     assert "obstacle_1" in verdict.refuted_pair
-    free = certificate(problem, planner.motion(problem, np.array([110.46, -36.09])))  # type: ignore[attr-defined]
+    free = judge_motion(planner, problem, planner.motion(problem, np.array([110.46, -36.09])))  # type: ignore[attr-defined]
     assert free.certified is True
     assert planner.motion(problem, np.array([0.0, -90.0])) is None  # type: ignore[attr-defined]
 

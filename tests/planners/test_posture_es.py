@@ -7,10 +7,11 @@ import pinocchio as pin
 import pytest
 from posture_samples import condition, log, postures, prepared, random_postures
 
-from evoexp.collision.certifier.certificate import certificate, combined, judged_part
+from evoexp.collision.certifier.certificate import combined, judged_part
 from evoexp.commands import evaluate
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.posture_cost import UPRIGHT
+from evoexp.planners.planner import judge_motion
 from evoexp.planners.posture_es.phases import judge, scene_of, spans
 from evoexp.planners.posture_es.planner import dense
 from references import posture_es_python
@@ -242,10 +243,10 @@ def test_every_phase_is_certified_with_its_own_bodies(carried: int) -> None:
     motion = planner.motion(
         problem, log("corsepius_pick_and_place", replicate=carried).solutions[-1].values
     )
-    parts = problem.parts(motion)
+    parts = planner.parts(problem, motion)
     assert [part.first for part in parts[1:]] == [part.last for part in parts[:-1]]
     each = [judged_part(part, motion, 0.0) for part in parts]
-    together = certificate(problem, motion)
+    together = judge_motion(planner, problem, motion)
     assert together == combined(each)
     assert together.certified is all(one.certified for one in each)
     assert together.clearance == min(one.clearance for one in each)

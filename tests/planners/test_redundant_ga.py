@@ -8,9 +8,9 @@ import math
 import numpy as np
 import pytest
 
-from evoexp.collision.certifier.certificate import certificate
 from evoexp.configuration import compose
 from evoexp.errors import SettingError
+from evoexp.planners.planner import judge_motion
 from evoexp.planners.redundant_ga.planner import Problem, RedundantGa
 from evoexp.records import FloatArray
 
@@ -215,7 +215,8 @@ def test_blind_arms_are_refuted_and_seeing_ones_mostly_not() -> None:
         found = []
         for seed in range(6):
             *_, last = planner.evolve(problem, np.random.default_rng(seed))
-            found.append(certificate(problem, planner.motion(problem, last.best)).certified)
+            motion = planner.motion(problem, last.best)
+            found.append(judge_motion(planner, problem, motion).certified)
             assert last.solved
         verdicts[blind] = found
     assert verdicts["true"].count(False) >= 4

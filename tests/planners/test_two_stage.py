@@ -7,10 +7,10 @@ import pinocchio as pin
 import pytest
 
 from evoexp.batch.replicate import run_replicate
-from evoexp.collision.certifier.certificate import certificate
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import SettingError
+from evoexp.planners.planner import judge_motion
 from evoexp.robots.floor_manipulator import FloorManipulator
 from evoexp.store.log_reader import read_log
 
@@ -62,10 +62,10 @@ def test_cost_and_terms_are_those_of_the_stages(found: tuple[Any, Any, np.ndarra
 
 def test_the_whole_motion_is_certified(found: tuple[Any, Any, np.ndarray]) -> None:
     planner, problem, solution = found
-    verdict = certificate(problem, planner.motion(problem, solution))
+    verdict = judge_motion(planner, problem, planner.motion(problem, solution))
     assert verdict.certified
     through = np.concatenate([solution[:2], [2.0, 6.0, 30.0, 27.0]])  # straight across
-    assert certificate(problem, planner.motion(problem, through)).certified is False
+    assert judge_motion(planner, problem, planner.motion(problem, through)).certified is False
 
 
 def test_another_docking_place_has_another_goal(

@@ -4,11 +4,11 @@ import pinocchio as pin
 import pytest
 from playback_samples import SAMPLES, condition, half_extent, matrix, recording, refuted
 
-from evoexp.collision.certifier.certificate import certificate
 from evoexp.collision.scene import Part, geometry_scene
 from evoexp.paths.motion import Motion, clamped_cubic
+from evoexp.planners.planner import judge_motion
 from evoexp.playback.body_poses import MAX_TICKS, ticks
-from evoexp.playback.contacts import at_instant, clearance, parts_of, remainder
+from evoexp.playback.contacts import at_instant, clearance, remainder
 from evoexp.playback.recording import Recording
 from evoexp.playback.shapes import outline
 from evoexp.playback.timing import SpeedLimits, seconds_per_instant, velocities
@@ -41,8 +41,8 @@ def test_composed_transforms_are_those_of_pinocchio(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_coal_shape_is_drawn_once_and_of_the_same_size(name: str) -> None:
-    shown, (_, problem) = recording(name), condition(name).prepare()
-    scene = parts_of(problem, shown.motion)[0].scene
+    shown, (planner, problem) = recording(name), condition(name).prepare()
+    scene = planner.parts(problem, shown.motion)[0].scene
     assert [shape.name for shape in shown.shapes] == list(scene.names)
     assert len(set(scene.names)) == len(scene.names) == scene.geometry.ngeoms
     for shape, item in zip(shown.shapes, scene.geometry.geometryObjects, strict=True):
@@ -110,8 +110,8 @@ def test_a_certified_motion_has_no_contact_and_its_curve_stays_above_the_verdict
 
 
 def test_distances_are_those_of_pinocchio(shown: Recording) -> None:
-    _, problem = condition(shown.heading.title).prepare()
-    parts = parts_of(problem, shown.motion)
+    planner, problem = condition(shown.heading.title).prepare()
+    parts = planner.parts(problem, shown.motion)
     for k in range(0, len(shown.times), 40):
         t = float(shown.times[k])
         scene = next((part for part in parts if t < part.last), parts[-1]).scene
@@ -170,8 +170,8 @@ def test_a_carried_object_goes_with_the_tool_while_it_is_held_and_stands_otherwi
     shown = recording("pick and place")
     (bottle,) = (shape for shape in shown.shapes if shape.role == "object")
     assert shown.frames[bottle.frame].name == "object bottle"
-    _, problem = condition("pick and place").prepare()
-    parts = parts_of(problem, shown.motion)
+    planner, problem = condition("pick and place").prepare()
+    parts = planner.parts(problem, shown.motion)
     held = [part for part in parts if part.scene.shapes[part.scene.names.index("bottle")][1] > 0]
     free = [part for part in parts if part not in held]
     assert held and free
@@ -229,5 +229,5 @@ def test_a_motion_that_stands_still_takes_its_time() -> None:
 
 
 def test_its_verdict_is_the_one_that_logs_have(shown: Recording) -> None:
-    _, problem = condition(shown.heading.title).prepare()
-    assert repr(certificate(problem, shown.motion)) == repr(shown.verdict)
+    planner, problem = condition(shown.heading.title).prepare()
+    assert repr(judge_motion(planner, problem, shown.motion)) == repr(shown.verdict)

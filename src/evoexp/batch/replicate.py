@@ -7,8 +7,8 @@ import hashlib
 import time
 
 from evoexp.attachments import SHA256
-from evoexp.collision.certifier.certificate import certificate
 from evoexp.condition import Condition
+from evoexp.planners.planner import judge_motion
 from evoexp.records import Generation, ReplicateSummary
 from evoexp.store.log import Finished, Log
 from evoexp.store.manifest import environment
@@ -40,7 +40,7 @@ def run_replicate(condition: Condition, index: int, config_json: bytes | None = 
             first_feasible = last.index
     assert last is not None, "a planner yields its initial population at least"
     evolved = time.process_time()
-    verdict = certificate(problem, planner.motion(problem, last.best))
+    verdict = judge_motion(planner, problem, planner.motion(problem, last.best))
     certified = time.process_time()
     summary = ReplicateSummary(
         condition=condition_id,

@@ -22,11 +22,11 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 from evoexp.batch.jobs import Job, Outcome, load, run_jobs
 from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.batch.workers import in_workers, loading, num_cores
-from evoexp.collision.certifier.certificate import certificate
 from evoexp.condition import Condition
 from evoexp.errors import CorruptLog
 from evoexp.numeric.kernel_cache import is_compiled, note_compiled
 from evoexp.paths.motion import Motion
+from evoexp.planners.planner import judge_motion
 from evoexp.records import ReplicateSummary
 from evoexp.registry import component_modules
 from evoexp.store.manifest import manifest
@@ -247,8 +247,8 @@ def _compile(config_jsons: Iterable[bytes]) -> None:
             for generation in itertools.islice(planner.evolve(problem, condition.rng(0)), 2):
                 planner.evaluate(problem, generation.best)
                 motion = planner.motion(problem, generation.best)
-                certificate(problem, motion)
+                judge_motion(planner, problem, motion)
                 # A motion that touches nothing as well: its closest approach is sought.
                 if motion is not None:
-                    certificate(problem, Motion(np.repeat(motion.q[:1], 2, axis=0)))
+                    judge_motion(planner, problem, Motion(np.repeat(motion.q[:1], 2, axis=0)))
             note_compiled(kind, modules)

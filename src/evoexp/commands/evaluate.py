@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from evoexp.collision.certifier.certificate import PAIR, certificate
+from evoexp.collision.certifier.certificate import PAIR
 from evoexp.commands.arguments import add_experiment_arguments
 from evoexp.commands.console import add_columns, new_table, plain_console
 from evoexp.configuration import expansions
 from evoexp.errors import MotionFileError
+from evoexp.planners.planner import judge_motion
 from evoexp.records import FloatArray
 
 HEAD = (
@@ -57,11 +58,11 @@ def main(arguments: argparse.Namespace) -> int:
             if solution is None:
                 misfits.append(f"{label}: {shape_text(shape)}")
                 continue
-            verdict = certificate(problem, planner.motion(problem, solution))._asdict()
+            verdict = judge_motion(planner, problem, planner.motion(problem, solution))._asdict()
             head = dict(zip(HEAD, (label, condition.id, condition.length_unit), strict=True))
             rows.append(head | planner.evaluate(problem, solution) | verdict)
-            if hasattr(planner, "listing"):
-                listings.append((label, *planner.listing(problem, solution)))
+            if listing := planner.listing(problem, solution):
+                listings.append((label, *listing))
     if not rows:
         given = " and ".join(map(str, _shape_of(values)))
         included = (

@@ -86,7 +86,7 @@ def _print_notes(console: Console, config_json: bytes) -> None:
     ) as error:  # stored by another revision of the code: the run can be shown all the same
         console.print(f"notes: {error}", soft_wrap=True)
         return
-    for note in planner.notes(problem) if hasattr(planner, "notes") else ():
+    for note in planner.notes(problem):
         console.print(f"note: {note}", soft_wrap=True)
 
 

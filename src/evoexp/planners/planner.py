@@ -1,15 +1,17 @@
-"""The planner's protocol: every obligation of a planner, and the one keeper of what it found.
+"""The planner's protocol, its usual answers, and the one keeper of the best solution so far.
 
 A planner is a component whose fields are its settings. It never logs, draws, sleeps, reads the
-clock or a file; its randomness is an argument. `PlannerDefaults` answers what most planners need
-not answer for themselves; everything else a planner writes itself. `evoexp.testing` checks it all.
+clock or a file; its randomness is an argument. `PlannerDefaults` answers what most planners answer
+alike; everything else a planner writes itself. `evoexp.testing` checks every obligation.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar, Literal, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
+from numpy.typing import NDArray
 
+from evoexp.collision.certifier.certificate import Certificate, certificate
 from evoexp.collision.scene import Part, Scene
 from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.paths.motion import Motion
@@ -20,7 +22,7 @@ Shape = tuple[Any, ...]  # of a solution: one tuple per part; a leading ... stan
 
 
 class Judgement(Protocol):
-    """A population, judged."""
+    """A judged population."""
 
     @property
     def cost(self) -> FloatArray:
@@ -32,7 +34,7 @@ class Judgement(Protocol):
 
     @property
     def collision_queries(self) -> int:
-        """Configurations that were asked for, whatever the kernels skipped."""
+        """Configurations that the algorithm asks for, also those that the kernels skip."""
 
     def named_terms(self, individual: int) -> dict[str, float]:
         """Return the paper's own terms of one individual."""
@@ -42,8 +44,8 @@ class Listing(NamedTuple):
     """A table with one row per configuration of a solution.
 
     Attributes:
-        names: Of its columns.
-        rows: Their values.
+        names: Names of the columns.
+        rows: Values, row by row.
     """
 
     names: list[str]
@@ -52,13 +54,13 @@ class Listing(NamedTuple):
 
 @runtime_checkable
 class Planner(Protocol):
-    """All that a planner offers; `problem` is whatever its own `prepare` returned.
+    """All obligations of a planner; `problem` is the value that its own `prepare` returned.
 
     Attributes:
         component: The registered name; a guest's begins with the name of its distribution.
         revision: Raised whenever the same settings give other results than before.
         reproducibility: `bits`: the same seed gives the same bits on every machine; `environment`:
-            on machines with the same libraries and processor only (`reproduce` then compares
+            only on machines with the same libraries and processor (`reproduce` then compares
             numbers, to 1e-9, where the environment differs).
         is_reference: Whether it is a truth that needs no seed, and so has one replicate.
     """
@@ -71,7 +73,7 @@ class Planner(Protocol):
     def prepare(self, robot: Any, scenario: Any) -> Any:
         """Build the robot, check the scenario against it, return the problem.
 
-        The types of both parameters say which robots and scenarios are taken.
+        The annotations of both parameters name the types of robots and scenarios that fit.
 
         Raises:
             SettingError: If robot, scenario and settings contradict each other.
@@ -80,8 +82,15 @@ class Planner(Protocol):
     def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield the initial population, then one `Generation` per generation."""
 
+    @property
+    def num_generations(self) -> int:
+        """Generations after the initial one, at most."""
+
+    def num_evaluations(self, index: int) -> int:
+        """Return how many individuals generation `index` (0: the initial one) evaluates."""
+
     def sample(self, problem: Any, rng: np.random.Generator, count: int) -> FloatArray:
-        """Return `count` individuals as the initial population draws them, individuals last."""
+        """Draw `count` individuals as the initial population is drawn, individuals last."""
 
     def cost(self, problem: Any, population: FloatArray) -> Judgement:
         """Judge a population as `sample` returns it."""
@@ -89,17 +98,13 @@ class Planner(Protocol):
     def improve(
         self, problem: Any, population: FloatArray, rng: np.random.Generator
     ) -> FloatArray | None:
-        """Return a population after one pass of the planner's local operator, evolution left out.
+        """Return a population after one pass of the planner's local operator, without evolution.
 
-        Controls repeat it at equal evaluations; None: the planner has no such operator.
+        Controls repeat it at equal evaluations. `population` itself stays as it is.
+
+        Returns:
+            Like `sample`; None if the planner has no such operator.
         """
-
-    def num_evaluations(self, index: int) -> int:
-        """Return how many individuals generation `index` (0: the initial one) evaluates."""
-
-    @property
-    def num_generations(self) -> int:
-        """Generations after the initial one, at most."""
 
     def solution(self, problem: Any, population: FloatArray, individual: int) -> FloatArray:
         """Return one individual of a population as a flat solution."""
@@ -108,13 +113,16 @@ class Planner(Protocol):
         """Return the joint-space motion of a solution; None where the answer is no motion."""
 
     def parts(self, problem: Any, motion: Motion) -> Sequence[Part]:
-        """Return the pieces of a motion, each with the bodies that the exact verdict judges.
+        """Return the pieces of a motion in the order of time, each with its exact bodies.
 
-        Of most problems the whole motion is one; empty where there is nothing to judge by.
+        Most motions are one piece; without pieces there is nothing to judge by.
         """
 
+    def security_margin(self, problem: Any) -> float:
+        """Return the clearance that the task requires [length unit of the scene]."""
+
     def evaluate(self, problem: Any, solution: FloatArray) -> dict[str, float]:
-        """Return the named terms of a solution, `evoexp evaluate` prints them.
+        """Return the named terms of a solution, as `evoexp evaluate` prints them.
 
         Raises:
             ValueError: If the solution has not the documented shape.
@@ -124,21 +132,38 @@ class Planner(Protocol):
         """Return the documented shape of a solution, part by part."""
 
     def listing(self, problem: Any, solution: FloatArray) -> Listing | None:
-        """Return a table with one row per configuration; None: there is none."""
+        """Return a table with one row per configuration; None if the planner has none."""
 
     def notes(self, problem: Any) -> Sequence[str]:
         """Return remarks on settings and problem, one per line, for `show` and the report."""
 
 
-class PlannerDefaults:
-    """Answers of a planner that has nothing special to answer; to be inherited beside `Component`.
+class _Budgeted(Protocol):
+    """A planner with a field `ga`, as most have."""
 
-    The problem then has the attributes `scene` (a `Scene`, or None) and the planner a field `ga`
-    with `population_size`, `num_offspring` and `num_generations`.
+    @property
+    def ga(self) -> Any:
+        """Has `population_size`, `num_offspring` and `num_generations`."""
+
+
+class PlannerDefaults:
+    """The usual answers of a planner, to be inherited before `Component`.
+
+    They need a problem with the attributes `scene` (a `Scene`, or None) and `security_margin`, and
+    a planner with a field `ga` that has `population_size`, `num_offspring` and `num_generations`.
     """
 
     reproducibility: ClassVar[Reproducibility] = "bits"
     is_reference: ClassVar[bool] = False
+
+    @property
+    def num_generations(self: _Budgeted) -> int:
+        """The generations of `ga`."""
+        return int(self.ga.num_generations)
+
+    def num_evaluations(self: _Budgeted, index: int) -> int:
+        """Return the population's size at first, then the number of offspring."""
+        return int(self.ga.num_offspring if index else self.ga.population_size)
 
     def improve(
         self, problem: Any, population: FloatArray, rng: np.random.Generator
@@ -146,21 +171,14 @@ class PlannerDefaults:
         """Return None: there is no local operator."""
         return None
 
-    def num_evaluations(self, index: int) -> int:
-        """Return the size of the population at first, then the number of offspring."""
-        ga: Any = getattr(self, "ga")  # noqa: B009  # a field of the planner
-        return int(ga.num_offspring if index else ga.population_size)
-
-    @property
-    def num_generations(self) -> int:
-        """Return the generations of the planner's `ga`."""
-        ga: Any = getattr(self, "ga")  # noqa: B009
-        return int(ga.num_generations)
-
     def parts(self, problem: Any, motion: Motion) -> Sequence[Part]:
-        """Return the whole motion with the problem's scene."""
+        """Return the whole motion with the problem's scene, or nothing without a scene."""
         bodies: Scene | None = problem.scene
         return () if bodies is None else (Part(bodies, 0, motion.num_segments),)
+
+    def security_margin(self, problem: Any) -> float:
+        """Return the problem's margin."""
+        return float(problem.security_margin)
 
     def listing(self, problem: Any, solution: FloatArray) -> Listing | None:
         """Return None: there is no table."""
@@ -169,6 +187,13 @@ class PlannerDefaults:
     def notes(self, problem: Any) -> Sequence[str]:
         """Return no remarks."""
         return ()
+
+
+def judge_motion(planner: Planner, problem: Any, motion: Motion | None) -> Certificate:
+    """Judge a planner's motion by the exact bodies; without a motion the certificate is empty."""
+    if motion is None:
+        return Certificate()
+    return certificate(planner.parts(problem, motion), motion, planner.security_margin(problem))
 
 
 class Candidate(NamedTuple):
@@ -189,64 +214,75 @@ class Keeper:
     """Keeps the best solution so far and the counts, and makes the records of generations.
 
     Attributes:
-        index: Of the last generation recorded; −1 before the first.
+        index: Index of the last recorded generation; −1 before the first.
         cost: Least cost so far.
         best: The solution of that cost.
-        evaluations: Asked for by the algorithm so far.
+        evaluations: Evaluations so far.
         collision_queries: Configurations asked for so far.
     """
 
+    __slots__ = ("best", "collision_queries", "cost", "evaluations", "index")
+
     def __init__(self) -> None:
-        """Begin with nothing found."""
         self.index, self.cost = -1, np.inf
         self.best = Candidate(np.empty(0), {}, False)
         self.evaluations = self.collision_queries = 0
 
-    def offer(self, cost: float, candidate: Callable[[], Candidate]) -> None:
-        """Take over a candidate if it is strictly better, or the first one; else do not make it."""
-        if cost < self.cost or not self.best.solution.size:
-            self.cost, self.best = cost, candidate()
+    def improves(self, cost: float) -> bool:
+        """Return whether a cost is to be kept: a lower one, or the first of all."""
+        return cost < self.cost or self.index < 0
+
+    def keep(self, cost: float, best: Candidate) -> None:
+        """Keep a solution and its cost as the best so far."""
+        self.cost, self.best = cost, best
 
     def record(
         self,
         statistics: CostStatistics,
         costs: FloatArray,
-        population: FloatArray,
+        population: NDArray[Any],
         *,
+        lowest: float,
         num_feasible: int,
         evaluations: int,
         collision_queries: int,
-        **fields: Any,
+        criteria: FloatArray | None = None,
+        stop_reason: str = "",
+        arrays: Mapping[str, NDArray[Any]] | None = None,
     ) -> Generation:
-        """Return the record of the next generation.
+        """Count a generation and return its record.
 
         Args:
-            statistics: Of its costs.
+            statistics: Mean and deviation of its costs.
             costs: (individuals,); see `Generation`.
             population: Any shape.
+            lowest: Its lowest cost; where the best is a team, the lowest of a team.
             num_feasible: Individuals that the planner's own model accepts.
-            evaluations: That this generation took.
-            collision_queries: That this generation took.
-            fields: Of `Generation`, that are not what the keeper would say.
+            evaluations: Evaluations of this generation.
+            collision_queries: Configurations that this generation asked for.
+            criteria: See `Generation`.
+            stop_reason: See `Generation`.
+            arrays: See `Generation`.
         """
         self.index += 1
         self.evaluations += evaluations
         self.collision_queries += collision_queries
-        told: dict[str, Any] = {
-            "best": self.best.solution,
-            "best_cost": self.cost,
-            "best_cost_in_generation": float(costs[statistics.best]) if costs.ndim == 1 else np.nan,
-            "solved": self.best.solved,
-            "terms": self.best.terms,
-        }
-        return Generation(
-            index=self.index,
-            mean_cost=statistics.mean,
-            std_cost=statistics.std,
-            num_feasible=num_feasible,
-            evaluations=self.evaluations,
-            collision_queries=self.collision_queries,
-            costs=costs,
-            population=population,
-            **(told | fields),
+        solution, terms, solved = self.best
+        return Generation(  # by position: half the time
+            self.index,
+            solution,
+            self.cost,
+            lowest,
+            statistics.mean,
+            statistics.std,
+            num_feasible,
+            self.evaluations,
+            self.collision_queries,
+            solved,
+            terms,
+            costs,
+            population,
+            criteria,
+            stop_reason,
+            arrays,
         )

@@ -1,6 +1,6 @@
 """How far the bodies are apart over a motion, and every stretch of it in which they touch."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -45,16 +45,6 @@ class Clearance(NamedTuple):
     contacts: tuple[Contact, ...]
 
 
-def parts_of(problem: Any, motion: Motion) -> list[Part]:
-    """Return the pieces of a motion that have bodies of their own.
-
-    Of most problems the whole motion is one.
-    """
-    if hasattr(problem, "parts"):
-        return list(problem.parts(motion))
-    return [Part(problem.scene, 0, motion.num_segments)]
-
-
 def part_at(parts: list[Part], t: float) -> Part:
     """Return the piece that an instant lies in; where one ends, the next one has begun."""
     return next((part for part in parts if t < part.last), parts[-1])
@@ -64,7 +54,7 @@ def clearance(parts: list[Part], motion: Motion, times: FloatArray) -> Clearance
     """Return distances at ticks, and all contacts.
 
     Args:
-        parts: From `parts_of`.
+        parts: Pieces of the motion, from `Planner.parts`.
         motion: The motion.
         times: (ticks,) from 0 to the end [instants].
     """

@@ -15,7 +15,7 @@ from evoexp.condition import Condition
 from evoexp.errors import EvoexpError
 from evoexp.paths.motion import Motion
 from evoexp.playback.body_poses import Frame, Poses, frames_of, points, poses, ticks
-from evoexp.playback.contacts import Clearance, clearance, parts_of
+from evoexp.playback.contacts import Clearance, clearance
 from evoexp.playback.shapes import Role, Shape, outline, pose
 from evoexp.playback.targets import Target, targets
 from evoexp.playback.timing import SpeedLimits, seconds_per_instant, velocities
@@ -138,14 +138,16 @@ def record(
     """
     planner, problem = condition.prepare()
     motion = planner.motion(problem, solution)
-    if motion is None or getattr(problem, "scene", None) is None:
+    parts = [] if motion is None else list(planner.parts(problem, motion))
+    if motion is None or not parts:
         raise NoMotion(
             f"{heading.title}: the answer of '{type(planner).component}' is no motion here: "
             "nothing to watch"
         )
     robot = condition.robot
     assert isinstance(robot, Robot)
-    assembly, parts = robot.build(), parts_of(problem, motion)
+    assembly = robot.build()
+    margin = planner.security_margin(problem)
     model, size = parts[0].scene.model, parts[0].scene.size
     prismatic = np.zeros(model.nq, dtype=bool)
     prismatic[assembly.table.index_q[assembly.table.prismatic]] = True
@@ -176,8 +178,8 @@ def record(
         traces=np.array([points(where.world, *tool) for tool in _tools(assembly)]),
         targets=places,
         clearance=clearance(parts, motion, times),
-        margin=float(problem.security_margin),
-        verdict=certificate(problem, motion),
+        margin=margin,
+        verdict=certificate(parts, motion, margin),
         view=_view(shapes, where.world, places),
     )
 

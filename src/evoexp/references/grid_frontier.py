@@ -15,6 +15,7 @@ import numpy as np
 
 from evoexp.errors import SettingError
 from evoexp.numeric.compilation import kernel
+from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.records import FloatArray
 from evoexp.references.reference import Reference, Truth
 from evoexp.validation import Count, Positive
@@ -50,6 +51,7 @@ class GridFrontier(Reference):
     """The frontier scan, and the bound by walks.
 
     Attributes:
+        planner: The path search whose grid and cost it shares.
         num_weights: Values of μ, from `least_weight` to `greatest_weight` by equal ratios, after
             the very smallest.
         least_weight: Of μ [cell].
@@ -60,6 +62,7 @@ class GridFrontier(Reference):
 
     component: ClassVar[str] = "grid_frontier"
 
+    planner: GridPathGa
     num_weights: Count
     least_weight: Positive
     greatest_weight: Positive

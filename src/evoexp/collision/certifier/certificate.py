@@ -1,10 +1,11 @@
 """The exact verdict on a motion, as replicates record it."""
 
 import math
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 from evoexp.collision.certifier.verdict import certify
-from evoexp.collision.scene import Part, Scene
+from evoexp.collision.scene import Part
 from evoexp.paths.motion import Motion
 
 PAIR = " – "
@@ -36,72 +37,54 @@ class Certificate(NamedTuple):
     certificate_queries: int = 0
 
 
-def certificate(problem: Any, motion: Motion | None) -> Certificate:
-    """Judge a motion by the bodies of a planner's problem.
+def certificate(parts: Sequence[Part], motion: Motion, security_margin: float) -> Certificate:
+    """Judge a motion piece by piece; without pieces there is nothing to judge by.
 
     Args:
-        problem: With its `scene` and `security_margin`; without them there is nothing to judge by.
-            A problem whose bodies change on the way has `parts(motion)`, too: each is judged by its
-            own bodies.
-        motion: None where the planner's answer is no motion.
+        parts: Pieces of the motion in the order of time, each with its own bodies.
+        motion: The whole motion; instants are counted from its beginning.
+        security_margin: Clearance that the task requires [length unit of the scenes].
     """
-    scene = getattr(problem, "scene", None)
-    if scene is None or motion is None:
-        return Certificate()
-    if not hasattr(problem, "parts"):
-        return _judged(scene, motion, problem.security_margin)
-    return combined(
-        [judged_part(part, motion, problem.security_margin) for part in problem.parts(motion)]
-    )
+    judged = [judged_part(part, motion, security_margin) for part in parts]
+    return combined(judged) if judged else Certificate()
 
 
 def judged_part(part: Part, motion: Motion, security_margin: float) -> Certificate:
-    """Judge a piece of a motion of straight segments by its own bodies.
-
-    Instants are those of the whole motion.
-    """
-    found = _judged(part.scene, Motion(motion.q[part.first : part.last + 1]), security_margin)
-    at, touched = found.clearance_at, found.refuted_at
-    return found._replace(
-        clearance_at=None if at is None else at + part.first,
-        refuted_at=None if touched is None else touched + part.first,
-    )
-
-
-def combined(parts: list[Certificate]) -> Certificate:
-    """Return the verdict on a motion from those on its pieces.
-
-    The first contact, the least clearance.
-    """
-    touched = [part for part in parts if part.refuted_at is not None]
-    queries = sum(part.certificate_queries for part in parts)
-    if touched:
-        return min(touched, key=lambda part: float(part.refuted_at or 0.0))._replace(
-            certificate_queries=queries
-        )
-    closest = min(parts, key=lambda part: part.clearance)
-    answers = {
-        "certified": [part.certified for part in parts],
-        "margin": [part.certified_margin for part in parts],
-    }
-    certified, margin = (
-        False if False in given else None if None in given else True for given in answers.values()
-    )
-    return closest._replace(
-        certified=certified, certified_margin=margin, certificate_queries=queries
-    )
-
-
-def _judged(scene: Scene, motion: Motion, security_margin: float) -> Certificate:
-    verdict = certify(scene, motion, security_margin)
+    """Judge one piece of a motion by its own bodies; instants are those of the whole motion."""
+    first, last = part.first, part.last
+    cubics = motion.coefficients
+    piece = Motion(motion.q[first : last + 1], None if cubics is None else cubics[first:last])
+    verdict = certify(part.scene, piece, security_margin)
     touching = verdict.status == "refuted"
     return Certificate(
         certified=_ANSWER[verdict.status],
         certified_margin=_ANSWER[verdict.margin_status],
         clearance=float(verdict.clearance),
-        clearance_at=float(verdict.clearance_at) if verdict.clearance_pair else None,
+        clearance_at=first + float(verdict.clearance_at) if verdict.clearance_pair else None,
         clearance_pair=PAIR.join(verdict.clearance_pair or ()),
-        refuted_at=float(verdict.refuted_at) if touching else None,
+        refuted_at=first + float(verdict.refuted_at) if touching else None,
         refuted_pair=PAIR.join(verdict.refuted_pair or ()),
         certificate_queries=verdict.queries,
     )
+
+
+def combined(parts: Sequence[Certificate]) -> Certificate:
+    """Return the verdict on a motion from those on its pieces.
+
+    It has the first contact, or else the least clearance.
+    """
+    queries = sum(part.certificate_queries for part in parts)
+    touched = [part for part in parts if part.refuted_at is not None]
+    if touched:
+        first = min(touched, key=lambda part: float(part.refuted_at or 0.0))
+        return first._replace(certificate_queries=queries)
+    return min(parts, key=lambda part: part.clearance)._replace(
+        certified=_all([part.certified for part in parts]),
+        certified_margin=_all([part.certified_margin for part in parts]),
+        certificate_queries=queries,
+    )
+
+
+def _all(answers: Sequence[bool | None]) -> bool | None:
+    """Return whether all answers are yes; None if one is undecided and none is no."""
+    return False if False in answers else None if None in answers else True

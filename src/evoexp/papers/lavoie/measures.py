@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.certifier.certificate import certificate
 from evoexp.paths.motion import Motion
+from evoexp.planners.planner import judge_motion
 from evoexp.records import FloatArray
 from evoexp.report import body_contacts, markdown
 from evoexp.report.proportions import Proportion
@@ -122,7 +122,7 @@ def contacts(
         return [verdict]
     prepared = condition.prepared
     q = prepared.planner.motion(prepared.problem, condition.solutions[replicate]).q
-    second = certificate(prepared.problem, Motion(np.ascontiguousarray(q[1:])))
+    second = judge_motion(prepared.planner, prepared.problem, Motion(np.ascontiguousarray(q[1:])))
     return (
         [verdict]
         if second.refuted_at is None

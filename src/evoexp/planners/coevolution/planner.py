@@ -31,6 +31,7 @@ from evoexp.planners.coevolution.chromosome_length import SpeedLimit, length_not
 from evoexp.planners.coevolution.kernels import breed, measure, renew
 from evoexp.planners.coevolution.settings import CoevolutionSettings
 from evoexp.planners.coevolution.teams import Evaluated, Judgement
+from evoexp.planners.planner import PlannerDefaults
 from evoexp.records import FloatArray, Generation
 from evoexp.robots.assembly import Assembly, Robot
 from evoexp.scenarios.link_motion import LinkMotion
@@ -61,7 +62,7 @@ class Problem(NamedTuple):
     security_margin: float
 
 
-class Coevolution(Component):
+class Coevolution(PlannerDefaults, Component):
     """The co-evolutionary algorithm of Curkovic et al., sections 2 and 3.
 
     Methods I–VIII are settings of it.

@@ -29,6 +29,7 @@ from evoexp.paths.motion import Motion
 from evoexp.paths.walkers import LANES, WORDS, Walkers, choice_table
 from evoexp.planners.grid_path_ga import kernels
 from evoexp.planners.grid_path_ga.kernels import COST, DISTANCE, RESULTS, UNSAFENESS
+from evoexp.planners.planner import PlannerDefaults
 from evoexp.planners.stretches import Found, Stretches
 from evoexp.records import FloatArray, Generation
 from evoexp.robots.floor_platform import FloorPlatform
@@ -96,7 +97,7 @@ class Judgement(NamedTuple):
         return named_terms(self.results[:, individual], self.num_nodes[individual])
 
 
-class GridPathGa(Component):
+class GridPathGa(PlannerDefaults, Component):
     """The algorithm of Chen & Zalzala, section 2.3.
 
     Attributes:

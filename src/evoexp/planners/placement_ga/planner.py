@@ -23,6 +23,7 @@ from evoexp.objectives.placement_kernels import PLATFORM, THETA_3, TORQUE
 from evoexp.paths.motion import Motion
 from evoexp.planners.placement_ga import kernels
 from evoexp.planners.placement_ga.kernels import GENES, ROWS
+from evoexp.planners.planner import PlannerDefaults
 from evoexp.planners.stretches import Found, Stretches
 from evoexp.records import FloatArray, Generation
 from evoexp.robots.assembly import Assembly
@@ -74,7 +75,7 @@ class Judgement(NamedTuple):
         return dict(zip(NAMES, self.terms[:, individual].tolist(), strict=True))
 
 
-class PlacementGa(Component):
+class PlacementGa(PlannerDefaults, Component):
     """The algorithm of Chen & Zalzala, section 3.2.
 
     Attributes:

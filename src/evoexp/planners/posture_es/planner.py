@@ -26,10 +26,12 @@ import numpy as np
 from pydantic import BeforeValidator, Field
 
 from evoexp.collision.models.body_models import CollisionModel
+from evoexp.collision.scene import Part
 from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.posture_cost import COLUMNS, PARALLEL, TERMS, UPRIGHT, PostureCost
 from evoexp.paths.motion import Motion
+from evoexp.planners.planner import Listing, PlannerDefaults
 from evoexp.planners.posture_es import problem as posture_problem
 from evoexp.planners.posture_es.cycles import Ancestry, Search
 from evoexp.planners.posture_es.kernels import COST
@@ -64,7 +66,7 @@ def _one_or_several(value: Any) -> Any:
     return (value,) if isinstance(value, int | float) and not isinstance(value, bool) else value
 
 
-class PostureEs(Component):
+class PostureEs(PlannerDefaults, Component):
     """The evolution strategy of Corsépius, section 4.
 
     Attributes:
@@ -165,7 +167,7 @@ class PostureEs(Component):
             | self._tilts(found, postures)
         )
 
-    def listing(self, problem: Problem, solution: FloatArray) -> tuple[list[str], list[list[Any]]]:
+    def listing(self, problem: Problem, solution: FloatArray) -> Listing:
         """Return names and rows of a table, one row per posture.
 
         Its phase, terms, cost, step from the one before.
@@ -188,7 +190,11 @@ class PostureEs(Component):
                 values = [float(judged.rows[k, n]) for k in (*self.chosen, COST)]
                 steps = [float(step.max()), float((step / problem.scope).max())]
                 rows.append([at, span.stage.phase.name, *values, bool(judged.met[n]), *steps])
-        return names, rows
+        return Listing(names, rows)
+
+    def parts(self, problem: Problem, motion: Motion) -> list[Part]:
+        """Return the motion phase by phase: what is held changes the bodies."""
+        return problem.parts(motion)
 
     def shape(self, problem: Problem) -> tuple[Any, ...]:
         """Return the documented shape of a solution: any number of postures × nq."""

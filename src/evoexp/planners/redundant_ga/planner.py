@@ -26,6 +26,7 @@ from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
 from evoexp.objectives.reaching import Reaching
 from evoexp.paths.motion import Motion
+from evoexp.planners.planner import PlannerDefaults
 from evoexp.planners.redundant_ga import kernels
 from evoexp.planners.redundant_ga.kernels import RESULTS
 from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic, SelectiveSettings
@@ -93,7 +94,7 @@ class Judgement(NamedTuple):
         return named_terms(self.terms[:, :, individual])
 
 
-class RedundantGa(Component):
+class RedundantGa(PlannerDefaults, Component):
     """The algorithm of Lavoie & Boudreau, sections 3 to 5.
 
     Attributes:

@@ -23,6 +23,7 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion
 from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.planners.placement_ga.planner import PlacementGa
+from evoexp.planners.planner import PlannerDefaults
 from evoexp.records import FloatArray
 from evoexp.records import Generation as Record
 from evoexp.robots.floor_manipulator import NUM_JOINTS, FloorManipulator
@@ -54,7 +55,7 @@ class Problem(NamedTuple):
     security_margin: float
 
 
-class TwoStage(Component):
+class TwoStage(PlannerDefaults, Component):
     """The placement search, then the path search.
 
     Attributes:

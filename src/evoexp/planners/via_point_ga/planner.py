@@ -27,6 +27,7 @@ from evoexp.paths.interpolation import interpolate_linear
 from evoexp.paths.motion import Motion
 from evoexp.paths.walk import num_uniforms, walk
 from evoexp.paths.workspace import Redistribution, prepare_redistribution
+from evoexp.planners.planner import PlannerDefaults
 from evoexp.planners.via_point_ga import kernels
 from evoexp.records import FloatArray, Generation
 from evoexp.robots.assembly import Assembly, Robot
@@ -96,7 +97,7 @@ class Judgement(NamedTuple):
         return named | {"collisions": float(collisions[individual])}
 
 
-class ViaPointGa(Component):
+class ViaPointGa(PlannerDefaults, Component):
     """The evolutionary algorithm of Rana & Zalzala, sections 3 and 4.
 
     Attributes:

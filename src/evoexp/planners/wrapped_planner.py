@@ -1,0 +1,83 @@
+"""A planner that stands beside another one and shares its problem: a control, or a reference."""
+
+from collections.abc import Iterator, Sequence
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import GetPydanticSchema
+
+from evoexp.collision.scene import Part
+from evoexp.paths.motion import Motion
+from evoexp.planners.planner import Judgement, Listing, Planner, PlannerDefaults, Shape
+from evoexp.records import FloatArray, Generation
+from evoexp.validation import Component
+
+# `Condition` checks that it is one, and names it as the user typed it
+AnyPlanner = Annotated[Planner, GetPydanticSchema(lambda _, handler: handler(Any))]
+
+
+class WrappedPlanner(PlannerDefaults, Component):
+    """Answers as the wrapped planner does, except in `evolve`, which a subclass writes.
+
+    Attributes:
+        planner: The planner that it stands beside.
+    """
+
+    planner: AnyPlanner
+
+    def prepare(self, robot: Any, scenario: Any) -> Any:
+        """Prepare the wrapped planner's problem."""
+        return self.planner.prepare(robot, scenario)
+
+    def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Generation]:
+        """Yield the generations of the control or reference."""
+        raise NotImplementedError
+
+    @property
+    def num_generations(self) -> int:
+        """Generations of the wrapped planner."""
+        return self.planner.num_generations
+
+    def num_evaluations(self, index: int) -> int:
+        """Return the wrapped planner's evaluations of a generation."""
+        return self.planner.num_evaluations(index)
+
+    def sample(self, problem: Any, rng: np.random.Generator, count: int) -> FloatArray:
+        """Sample as the wrapped planner does."""
+        return self.planner.sample(problem, rng, count)
+
+    def cost(self, problem: Any, population: FloatArray) -> Judgement:
+        """Judge as the wrapped planner does."""
+        return self.planner.cost(problem, population)
+
+    def solution(self, problem: Any, population: FloatArray, individual: int) -> FloatArray:
+        """Return an individual as the wrapped planner does."""
+        return self.planner.solution(problem, population, individual)
+
+    def motion(self, problem: Any, solution: FloatArray) -> Motion | None:
+        """Return the wrapped planner's motion of a solution."""
+        return self.planner.motion(problem, solution)
+
+    def parts(self, problem: Any, motion: Motion) -> Sequence[Part]:
+        """Return the wrapped planner's pieces of a motion."""
+        return self.planner.parts(problem, motion)
+
+    def security_margin(self, problem: Any) -> float:
+        """Return the wrapped planner's margin."""
+        return self.planner.security_margin(problem)
+
+    def evaluate(self, problem: Any, solution: FloatArray) -> dict[str, float]:
+        """Return the wrapped planner's terms of a solution."""
+        return self.planner.evaluate(problem, solution)
+
+    def shape(self, problem: Any) -> Shape:
+        """Return the wrapped planner's shape of a solution."""
+        return self.planner.shape(problem)
+
+    def listing(self, problem: Any, solution: FloatArray) -> Listing | None:
+        """Return the wrapped planner's table of a solution."""
+        return self.planner.listing(problem, solution)
+
+    def notes(self, problem: Any) -> Sequence[str]:
+        """Return the wrapped planner's remarks."""
+        return self.planner.notes(problem)

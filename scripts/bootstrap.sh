@@ -1,17 +1,29 @@
-# Sourced by the scripts beside it: makes sure that .venv holds exactly what requirements.lock says, then sets PYTHON.
+# Sourced by the scripts beside it: makes sure that .venv holds exactly what the locks say, then sets PYTHON.
 #
-# Rebuilt when the lock, the project's metadata or the checkout's place change; with uv where it is installed (several
-# times faster), with pip otherwise. Nothing but Python >= 3.11 is needed beforehand.
+# A script that needs more than evoexp itself sets lock=requirements-test.lock first. The environment is built anew when
+# a lock or the checkout's place changes; where only the project's own metadata changed (entry points, say), evoexp alone
+# is installed again. With uv where it is installed (several times faster), with pip otherwise. Nothing but
+# Python >= 3.11 is needed beforehand.
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd -P)
 venv="$root/.venv"
 PYTHON="$venv/bin/python"
+lock=${lock:-requirements.lock}
 
-# Written last, so that an environment with it is complete. Settings of tools, the end of pyproject.toml, have no part.
-fingerprint=$({ echo "$root" && cat "$root/requirements.lock" && sed '/^\[tool/,$d' "$root/pyproject.toml"; } | cksum)
+# One mark per lock and one for evoexp itself, each written when it is installed: an interrupted step is done again.
+marks="$venv/.installed"
+mark_of() {
+  case $1 in
+    evoexp) { echo "$root" && sed '/^\[tool/,$d' "$root/pyproject.toml"; } | cksum ;;  # settings of tools have no part
+    *) { echo "$root" && cat "$root/$1"; } | cksum ;;
+  esac
+}
+is_installed() { [ "$(cat "$marks/$1" 2>/dev/null)" = "$(mark_of "$1")" ]; }
+was_installed() { [ -e "$marks/$1" ]; }
+note_installed() { mark_of "$1" >"$marks/$1"; }
 
 is_complete() {
-  [ -x "$PYTHON" ] && [ "$(cat "$venv/.fingerprint" 2>/dev/null)" = "$fingerprint" ]
+  [ -x "$PYTHON" ] && is_installed requirements.lock && is_installed "$lock" && is_installed evoexp
 }
 
 find_python() {  # never that of a virtual environment: it might be the one that is rebuilt
@@ -26,30 +38,50 @@ find_python() {  # never that of a virtual environment: it might be the one that
   return 1
 }
 
-install() {
-  local base tool
+choose_tool() {
+  if command -v uv >/dev/null 2>&1; then
+    # Bytecode ahead of use only where Python may not write it on first use; every start would take seconds longer.
+    tool=(uv pip install --quiet ${PYTHONDONTWRITEBYTECODE:+--compile-bytecode} --python "$PYTHON")
+  else
+    tool=("$PYTHON" -m pip install --quiet --disable-pip-version-check)
+  fi
+}
+
+create() {
+  local base
   base=$(find_python) || return
-  exec 9<"$root/requirements.lock" || return
-  "$base" -c 'import fcntl; fcntl.flock(9, fcntl.LOCK_EX)' || return  # one process at a time; freed when it ends
-  is_complete && return
-  rm -f "$venv/.fingerprint"
   rm -rf "$venv"
   if command -v uv >/dev/null 2>&1; then
     echo "evoexp: creating $venv with uv (once, about a minute)" >&2
     uv venv --quiet --python "$base" "$venv" || return
-    # Bytecode ahead of use only where Python may not write it on first use; every start would take seconds longer.
-    tool=(uv pip install --quiet ${PYTHONDONTWRITEBYTECODE:+--compile-bytecode} --python "$PYTHON")
   else
     echo "evoexp: creating $venv with pip (once, some minutes; uv is faster)" >&2
     "$base" -m venv "$venv" || return
-    tool=("$PYTHON" -m pip install --quiet --disable-pip-version-check)
   fi
+  mkdir -p "$marks"
+}
+
+install_lock() {  # $1: name of the lock
   # The build tools first: one dependency exists only as a source archive, and its build must not fetch others.
-  awk '/^[^ ]/ { wanted = /^(packaging|setuptools|wheel)==/ } wanted' "$root/requirements.lock" >"$venv/build.lock" &&
+  awk '/^[^ ]/ { wanted = /^(packaging|setuptools|wheel)==/ } wanted' "$root/$1" >"$venv/build.lock" &&
     "${tool[@]}" --require-hashes --no-deps -r "$venv/build.lock" &&
-    "${tool[@]}" --require-hashes --no-build-isolation -r "$root/requirements.lock" &&
-    "${tool[@]}" --no-deps --no-build-isolation -e "$root" &&
-    printf '%s' "$fingerprint" >"$venv/.fingerprint"
+    "${tool[@]}" --require-hashes --no-build-isolation -r "$root/$1" &&
+    note_installed "$1"
+}
+
+install() {
+  local tool one
+  exec 9<"$root/requirements.lock" || return
+  "$(find_python)" -c 'import fcntl; fcntl.flock(9, fcntl.LOCK_EX)' || return  # one process at a time; freed at its end
+  is_complete && return
+  for one in requirements.lock requirements-test.lock; do  # a lock that changed: what it no longer names shall go
+    if was_installed "$one" && ! is_installed "$one"; then rm -rf "$marks"; fi
+  done
+  { [ -x "$PYTHON" ] && [ -d "$marks" ]; } || create || return
+  choose_tool
+  is_installed requirements.lock || install_lock requirements.lock || return
+  is_installed "$lock" || install_lock "$lock" || return
+  is_installed evoexp || { "${tool[@]}" --no-deps --no-build-isolation -e "$root" && note_installed evoexp; }
 }
 
 if ! is_complete; then

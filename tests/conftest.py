@@ -19,9 +19,7 @@ settings.register_profile(
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Declare the two options that run more than the examples."""
     parser.addoption("--all", action="store_true", help="run the tests marked matrix, too")
-    parser.addoption(
-        "--exhaustive", action="store_true", help="run all tests, with larger counts"
-    )
+    parser.addoption("--exhaustive", action="store_true", help="run all tests, with larger counts")
 
 
 def pytest_configure(config: pytest.Config) -> None:

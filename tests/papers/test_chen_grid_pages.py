@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from report_samples import figure_stems, page_settings, smoke_report, smoke_results
 
 from evoexp.papers.chen import path_measures
 from evoexp.papers.chen.printed_grids import MISSING, SURPLUS, WRONG, compare
 from evoexp.papers.chen.routes import inside_points, routes, signature
 from evoexp.report.pages import page_of
+from report_samples import figure_stems, page_settings, smoke_report, smoke_results
 
 CENTRES = inside_points([(2, 2, 3, 3), (6, 2, 7, 3)])
 ABOVE = np.array([[0, 2], [1, 4], [4, 5], [9, 2]], dtype=float)

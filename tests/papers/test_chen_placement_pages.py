@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from report_samples import figure_stems, page_settings, smoke_report, smoke_results
 
 from evoexp.papers.chen import cases as case_results
 from evoexp.papers.chen import placement_claims
 from evoexp.papers.chen.cases import Case
 from evoexp.papers.chen.figures import landscapes, placements
 from evoexp.report import claims
+from report_samples import figure_stems, page_settings, smoke_report, smoke_results
 
 
 @pytest.fixture(scope="module")

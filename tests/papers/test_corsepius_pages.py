@@ -7,15 +7,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from report_samples import (
-    REPORT,
-    figure_stems,
-    page_settings,
-    smoke_experiment,
-    smoke_report,
-    smoke_results,
-    store,
-)
 
 from evoexp.configuration import expansions
 from evoexp.numeric.elementary import DEGREE
@@ -36,6 +27,15 @@ from evoexp.report.pages import page_of
 from evoexp.report.proportions import Proportion
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results, gather
+from report_samples import (
+    REPORT,
+    figure_stems,
+    page_settings,
+    smoke_experiment,
+    smoke_report,
+    smoke_results,
+    store,
+)
 
 FEW = 3  # replicates
 

@@ -9,7 +9,6 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 import pytest
-from report_samples import REPORT
 
 from evoexp.configuration.experiment import Experiment
 from evoexp.papers.corsepius import claims as task_claims
@@ -18,6 +17,7 @@ from evoexp.papers.corsepius import population_claims as verdicts
 from evoexp.report.claims import CONTRADICTED, INCONCLUSIVE, NOT_JUDGED, REPRODUCED, Claim
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results, StoredLogs
+from report_samples import REPORT
 from shipped_conditions import expanded
 
 SETTINGS = ReportSettings(**REPORT, figures="corsepius")  # type: ignore[arg-type]

@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from report_samples import figure_stems, page_settings, smoke_report, smoke_results
 
 from evoexp.configuration import compose
 from evoexp.papers.curkovic import claims as sweep_claims
@@ -16,6 +15,7 @@ from evoexp.report import claims, judging, style
 from evoexp.report.page import Page
 from evoexp.report.pages import page_of
 from evoexp.report.results import ConditionResults
+from report_samples import figure_stems, page_settings, smoke_report, smoke_results
 
 
 @pytest.fixture(scope="module")

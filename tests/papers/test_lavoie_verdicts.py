@@ -8,7 +8,6 @@ import functools
 import numpy as np
 import pandas as pd
 import pytest
-from report_samples import REPORT
 
 from evoexp.configuration import expansions
 from evoexp.configuration.experiment import Experiment
@@ -19,6 +18,7 @@ from evoexp.report.judging import not_judged
 from evoexp.report.proportions import Proportion
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results, StoredLogs
+from report_samples import REPORT
 
 SETTINGS = ReportSettings(**REPORT, figures="lavoie")  # type: ignore[arg-type]
 NO_LOGS = StoredLogs(None, (), None)  # type: ignore[arg-type]

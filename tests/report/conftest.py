@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import pytest
-from report_samples import REPORT, expand, store
 
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results, gather
+from report_samples import REPORT, expand, store
 
 
 @pytest.fixture(scope="session")

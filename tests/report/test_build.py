@@ -9,7 +9,6 @@ from pathlib import Path
 import matplotlib as mpl
 import pandas as pd
 import pytest
-from report_samples import REPORT, expand, store
 
 from evoexp.configuration import compose
 from evoexp.errors import NothingStored, UnknownOption
@@ -18,6 +17,7 @@ from evoexp.report import build
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results
 from evoexp.store.run_directory import RunDirectory
+from report_samples import REPORT, expand, store
 
 SCRIPT = """
 import sys

@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-from report_samples import expand
 
 from evoexp.condition import Prepared
 from evoexp.records import FloatArray
@@ -15,6 +14,7 @@ from evoexp.scenarios.obstacles import (
     SphereObstacle,
     obstacle_table,
 )
+from report_samples import expand
 
 
 @pytest.fixture(scope="module")

@@ -1,13 +1,13 @@
 from pathlib import Path
 
 import pytest
-from report_samples import expand
 
 from evoexp.configuration import compose, expansions
 from evoexp.configuration.experiment import options
 from evoexp.report import parameters
 from evoexp.report.parameters import Parameter, option, overridden
 from evoexp.report.results import ConditionResults, Results
+from report_samples import expand
 
 
 def of(

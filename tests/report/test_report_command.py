@@ -3,9 +3,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from report_samples import SMALL, expand
 
 from evoexp import cli
+from report_samples import SMALL, expand
 
 
 @pytest.fixture(autouse=True)

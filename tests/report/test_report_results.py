@@ -3,7 +3,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from report_samples import expand, store
 
 from evoexp.condition import Condition
 from evoexp.errors import NothingStored
@@ -11,6 +10,7 @@ from evoexp.report import results as results_module
 from evoexp.report.results import Results, gather
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
+from report_samples import expand, store
 
 
 def gathered(outputs: Path, count: int | None, *overrides: str) -> Results:

@@ -10,36 +10,36 @@ import numba
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 
-from evoexp.numeric.kernel_cache import use_content_cache
+from evoexp.numeric.kernel_cache import SharedCache, use_content_cache
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 use_content_cache()
 
 
-def kernel(function: Any) -> Any:
-    """Compile with the options that keep results bit-identical.
+_OPTIONS: dict[str, Any] = {
+    "fastmath": False,  # nor contraction, nor reassociation: the same bits on every machine
+    "error_model": "numpy",
+    "nogil": True,
+    "boundscheck": False,
+}
 
-    No fastmath, no contraction, no reassociation.
-    """
-    return numba.njit(
-        cache=True, fastmath=False, error_model="numpy", nogil=True, boundscheck=False
-    )(function)
+
+def kernel(function: Any) -> Any:
+    """Compile a function with the options that keep results bit-identical, once for all time."""
+    return _kept(numba.njit(**_OPTIONS)(function))
 
 
 def inlined(function: Function) -> Function:
-    """Compile like `kernel`, and have LLVM inline every call.
-
-    A loop around a true call stays scalar.
-    """
-    options: dict[str, Any] = {
-        "error_model": "numpy",
-        "nogil": True,
-        "boundscheck": False,
-        "forceinline": True,
-    }
-    compiled: Function = numba.njit(cache=True, fastmath=False, **options)(function)
+    """Compile like `kernel`, and have LLVM inline every call: a loop around a call stays scalar."""
+    compiled: Function = _kept(numba.njit(forceinline=True, **_OPTIONS)(function))
     return compiled
+
+
+def _kept(dispatcher: Any) -> Any:
+    """Have a kernel's machine code kept, and compiled by one process at a time."""
+    dispatcher._cache = SharedCache(dispatcher.py_func)
+    return dispatcher
 
 
 def _borrow(typing_context: Any, value: Any) -> Any:

@@ -26,10 +26,12 @@ import llvmlite
 import llvmlite.binding
 import numba
 import platformdirs
+from filelock import BaseFileLock, FileLock, Timeout
 from numba.core import caching
 
 NUM_KEPT_CACHES = 4  # [-] states of a module whose compiled kernels are kept
 KEPT_S = 86_400.0  # [s] and any that was used so lately
+WAIT_S = 120.0  # [s] for another process that compiles the same kernel; then it is compiled here
 CERTIFIER = "evoexp.collision.certifier.certificate"  # judges the motions of every planner
 
 _PACKAGE = "evoexp"
@@ -81,6 +83,43 @@ class ContentLocator(caching._CacheLocator):
     def get_disambiguator(self) -> str:
         """Return nothing: numba's index tells apart what has one qualified name by its code."""
         return ""
+
+
+class SharedCache(caching.FunctionCache):
+    """A kernel's cache that lets one process compile while all others wait for its result."""
+
+    def __init__(self, function: Any) -> None:
+        """Open the cache; nothing is locked."""
+        super().__init__(function)
+        self._held: BaseFileLock | None = None
+
+    def load_overload(self, signature: Any, target_context: Any) -> Any:
+        """Return the compiled kernel; None, and hold the lock, where it is to be compiled here."""
+        self._release()  # held still where a compilation failed
+        found = super().load_overload(signature, target_context)
+        if found is not None:
+            return found
+        with contextlib.suppress(OSError, Timeout):
+            Path(self._cache_path).mkdir(parents=True, exist_ok=True)
+            lock = FileLock(f"{self._cache_path}/{self._impl.filename_base}.lock")
+            lock.acquire(timeout=WAIT_S, poll_interval=0.02)
+            self._held = lock
+            found = super().load_overload(signature, target_context)
+            if found is not None:
+                self._release()
+        return found
+
+    def save_overload(self, signature: Any, data: Any) -> None:
+        """Keep a kernel that was compiled, and let those go on that wait for it."""
+        try:
+            super().save_overload(signature, data)
+        finally:
+            self._release()
+
+    def _release(self) -> None:
+        if self._held is not None:
+            self._held.release()
+            self._held = None
 
 
 def use_content_cache() -> None:

@@ -6,7 +6,8 @@ import re
 
 from evoexp.condition import Condition
 from evoexp.configuration import expansions
-from evoexp.configuration.experiment import Experiment, options
+from evoexp.configuration.experiment import Experiment
+from evoexp.configuration.search_path import options
 
 
 @functools.cache

@@ -9,11 +9,18 @@ from typing import Any
 
 import pytest
 
-from evoexp import condition
+from evoexp import registry
 from evoexp.condition import Condition, revisions
-from evoexp.errors import EvoexpError, RevisionMismatch, SettingError, UnknownSetting
-from evoexp.registry import REGISTRY, component_class
+from evoexp.errors import (
+    EvoexpError,
+    RegistrationError,
+    RevisionMismatch,
+    SettingError,
+    UnknownSetting,
+)
+from evoexp.registry import component_class
 from evoexp.validation import Component
+from guests import on_path, write_distribution
 from shipped_conditions import different_conditions, kinds_of_conditions, shipped_conditions
 
 Path_ = tuple[str | int, ...]
@@ -267,35 +274,68 @@ def test_replicates_have_streams_of_their_own_that_conditions_share() -> None:
 # The registry
 
 
-@pytest.mark.parametrize("name", REGISTRY)
+@pytest.mark.parametrize("name", registry.names(registry.COMPONENTS))
 def test_registered_names_are_the_components_own(name: str) -> None:
     kind = component_class(name)
     assert issubclass(kind, Component)
     assert kind.component == name
 
 
-def test_an_installed_plug_in_registers_components(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, config: dict[str, Any]
-) -> None:
-    (tmp_path / "plug_in_of_a_test.py").write_text(
+@pytest.fixture
+def guest(tmp_path: Path) -> Iterator[Path]:
+    """Have two components of a guest's module on the path, which nobody registers yet."""
+    (tmp_path / "guest_module.py").write_text(
         "from evoexp.evolution.genetic_settings import GeneticSettings\n"
-        "class Mine(GeneticSettings):\n    component = 'mine'\n"
-        "class Impostor(GeneticSettings):\n    component = 'genetic'\n"
+        "class Mine(GeneticSettings):\n    component = 'my_plug_in'\n"
     )
-    information = tmp_path / "plug_in-1.0.dist-info"
-    information.mkdir()
-    (information / "METADATA").write_text("Metadata-Version: 2.1\nName: plug-in\nVersion: 1.0\n")
-    points = "mine = plug_in_of_a_test:Mine\ngenetic = plug_in_of_a_test:Impostor\n"
-    (information / "entry_points.txt").write_text(f"[evoexp.components]\n{points}")
-    monkeypatch.syspath_prepend(str(tmp_path))
-    condition._registry.cache_clear()
-    try:
-        assert importlib.metadata.entry_points(group="evoexp.components", name="mine")
-        config["planner"]["ga"]["_target_"] = "mine"
-        mine = Condition.from_config(config)
-        assert type(mine.planner.ga).__name__ == "Mine"  # type: ignore[attr-defined]
-        assert component_class("genetic").__name__ == "GeneticSettings", (
-            "a plug-in cannot replace evoexp's own"
-        )
-    finally:
-        condition._registry.cache_clear()
+    with on_path(tmp_path):
+        yield tmp_path
+
+
+def test_an_installed_package_registers_components(guest: Path, config: dict[str, Any]) -> None:
+    names = dict.fromkeys(("my_plug_in", "my_plug_in_too"), "guest_module:Mine")
+    write_distribution(guest, "My.plug-in", components=names)
+    registry.clear()
+    config["planner"]["ga"]["_target_"] = "my_plug_in"
+    mine = Condition.from_config(config)
+    assert type(mine.planner.ga).__name__ == "Mine"  # type: ignore[attr-defined]
+    assert registry.guests(mine.to_json()) == {"my_plug_in": "My.plug-in 1.0"}
+    assert component_class("my_plug_in_too") is type(mine.planner.ga)  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("mine", "mine: plug-in 1.0 must register names that begin with its own, 'plug_in' or 'pl"),
+        ("plug_inn", "plug_inn: plug-in 1.0 must register names that begin with its own"),
+        ("genetic", "genetic: registered by evoexp 0.1.0 and plug-in 1.0; uninstall all but one"),
+        ("plug_in_lost", "plug_in_lost: plug-in 1.0 registers guest_module:Lost, which cannot be"),
+        ("plug_in_gone", "plug_in_gone: plug-in 1.0 registers no_such_module:A, which cannot be"),
+    ],
+)
+def test_a_package_that_registers_wrongly_is_named(guest: Path, name: str, message: str) -> None:
+    targets = {"plug_in_lost": "guest_module:Lost", "plug_in_gone": "no_such_module:A"}
+    write_distribution(guest, "plug-in", components={name: targets.get(name, "guest_module:Mine")})
+    registry.clear()
+    with pytest.raises(RegistrationError) as caught:
+        component_class(name)
+    assert str(caught.value).startswith(message)
+    assert component_class("arms").component == "arms"  # other names are as good as before
+
+
+def test_two_guests_of_one_name_are_both_named(guest: Path) -> None:
+    write_distribution(guest, "plug", "2.0", components={"plug_in": "guest_module:Mine"})
+    write_distribution(guest, "plug-in", "1.0", components={"plug_in": "guest_module:Mine"})
+    registry.clear()
+    with pytest.raises(RegistrationError, match="registered by plug 2.0 and plug-in 1.0"):
+        component_class("plug_in")
+
+
+def test_without_its_metadata_evoexp_says_that_it_is_not_installed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(importlib.metadata, "distributions", lambda: iter(()))
+    registry.clear()
+    with pytest.raises(RegistrationError, match="evoexp: is not installed"):
+        component_class("arms")
+    registry.clear()

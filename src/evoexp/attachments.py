@@ -9,7 +9,7 @@ configuration of a stored run.
 """
 
 import hashlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -67,30 +67,30 @@ def keep_all(contents: Iterable[bytes]) -> None:
         keep(content)
 
 
-def with_files(value: Any, shipped: Path, field: str = "") -> Any:
+def with_files(value: Any, folders: Sequence[Path], field: str = "") -> Any:
     """Return plain data with the content's hash in the place of every `{file: path}`.
 
     The contents are kept.
 
     Args:
         value: Any nesting of mappings, lists and scalars.
-        shipped: Where paths are looked for that are not there from the current directory.
+        folders: Where paths are looked for that are not there from the current directory.
         field: Dotted path of the value, for errors.
 
     Raises:
         SettingError: If a file cannot be read.
     """
     if isinstance(value, list):
-        return [with_files(item, shipped, f"{field}[{k}]") for k, item in enumerate(value)]
+        return [with_files(item, folders, f"{field}[{k}]") for k, item in enumerate(value)]
     if not isinstance(value, dict):
         return value
     if set(value) != {FILE}:
         return {
-            key: with_files(item, shipped, f"{field}.{key}" if field else str(key))
+            key: with_files(item, folders, f"{field}.{key}" if field else str(key))
             for key, item in value.items()
         }
     try:
-        return {SHA256: read(str(value[FILE]), shipped)}
+        return {SHA256: read(str(value[FILE]), folders)}
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise SettingError(
@@ -98,14 +98,15 @@ def with_files(value: Any, shipped: Path, field: str = "") -> Any:
         ) from None
 
 
-def read(path: str, shipped: Path) -> str:
+def read(path: str, folders: Sequence[Path]) -> str:
     """Read a file as a configuration gives it and keep its content; return the SHA-256.
 
     Raises:
-        OSError: If it cannot be read, neither from the current directory nor from `shipped`.
+        OSError: If it cannot be read, neither from the current directory nor from a folder.
     """
-    here = Path(path)
-    sha256 = keep((here if here.exists() else shipped / here).read_bytes())
+    places = [Path(path), *(folder / path for folder in folders)]
+    found = next((place for place in places if place.exists()), Path(path))
+    sha256 = keep(found.read_bytes())
     _origins.setdefault(sha256, set()).add(path)
     return sha256
 

@@ -87,7 +87,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     module.add_arguments(command)
     try:
-        return int(module.main(command.parse_intermixed_args(words[1:])))
+        given = command.parse_intermixed_args(words[1:])
+        if not getattr(given, "config_dir", ()):
+            return int(module.main(given))
+        from evoexp.configuration.search_path import searched_first
+
+        with searched_first(given.config_dir):
+            return int(module.main(given))
     except EvoexpError as error:
         print(f"evoexp: {' '.join(str(error).split())}", file=sys.stderr)
         return 2

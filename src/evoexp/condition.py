@@ -3,6 +3,7 @@
 import functools
 import hashlib
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, get_type_hints
 
@@ -16,7 +17,7 @@ from evoexp.validation import TARGET, Component, build
 PARTS = ("robot", "scenario", "planner")
 
 
-def read_files(config: Any, shipped: Path) -> Any:
+def read_files(config: Any, folders: Sequence[Path]) -> Any:
     """Return plain data with the contents' hashes in the place of paths; the contents are kept.
 
     Besides `{file: path}` (see `attachments.with_files`), components may have files of their own:
@@ -25,9 +26,9 @@ def read_files(config: Any, shipped: Path) -> Any:
 
     Args:
         config: Any nesting of mappings, lists and scalars.
-        shipped: Where paths are looked for that are not there from the current directory.
+        folders: Where paths are looked for that are not there from the current directory.
     """
-    return with_files(_component_files(config, ""), shipped)
+    return with_files(_component_files(config, ""), folders)
 
 
 def _component_files(value: Any, field: str) -> Any:

@@ -13,24 +13,19 @@ class EvoexpError(Exception):
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Return `; did you mean 'x'?` for the closest known name.
-
-    Or an empty string where none is close.
-    """
+    """Return `; did you mean 'x'?` for the closest known name, an empty string if none is close."""
     matches = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6)
     return f"; did you mean '{matches[0]}'?" if matches else ""
 
 
 class SettingError(EvoexpError):
-    """A setting that cannot be: names the field, what it must be, what it was.
-
-    And the nearest valid name.
+    """A setting that is refused: the field, the values it may have, the value given, a near name.
 
     Attributes:
         field: Dotted path of the setting, as one would type it (`ga.population_size`).
-        must: What the setting must be.
-        was: The value given, as text.
-        hint: What was perhaps meant.
+        must: The values that the setting may have, to be read after "must be".
+        was: The value given.
+        hint: A question after a name that was perhaps meant, or empty.
     """
 
     def __init__(self, field: str, must: str, was: object, hint: str = "") -> None:
@@ -55,10 +50,7 @@ class UnknownSetting(EvoexpError):
 
 
 class UnknownOption(EvoexpError):
-    """A name that is not among the options of its kind (experiment, robot, planner, …).
-
-    Lists them.
-    """
+    """A name that is no option of its kind (experiment, robot, planner, …); lists the options."""
 
     def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
         self.kind = kind
@@ -68,6 +60,23 @@ class UnknownOption(EvoexpError):
             f"{kind}: no option '{name}'{nearest(name, self.known)} (options: "
             f"{', '.join(self.known) or 'none'})"
         )
+
+
+class RegistrationError(EvoexpError):
+    """An installed package that registers a name wrongly; the message names the package."""
+
+
+class MissingDistribution(EvoexpError):
+    """Stored results need packages that are not installed.
+
+    Attributes:
+        packages: Distribution and version of each, `my-planner 0.3`.
+    """
+
+    def __init__(self, packages: Iterable[str]) -> None:
+        self.packages = sorted(packages)
+        verb = "is" if len(self.packages) == 1 else "are"
+        super().__init__(f"needs {' and '.join(self.packages)}, which {verb} not installed")
 
 
 class UnknownHash(EvoexpError):
@@ -83,7 +92,7 @@ class AmbiguousHash(EvoexpError):
 
 
 class CorruptLog(EvoexpError):
-    """A log that is cut, altered, or not one of evoexp's."""
+    """A log that is cut or altered, or that evoexp did not write."""
 
 
 class Busy(EvoexpError):

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import pandas as pd
 
 from evoexp.configuration import expansions
-from evoexp.configuration.experiment import options
+from evoexp.configuration.search_path import options
 from evoexp.errors import NothingStored, UnknownHash, UnknownOption
 from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
 from evoexp.store.tables import read_generations, read_summaries

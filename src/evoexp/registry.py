@@ -1,69 +1,135 @@
-"""The registry: the names that a configuration may use for components.
+"""The registry: the names that installed packages, evoexp among them, give to what they bring.
+
+A package declares entry points in its metadata. Three groups are read:
+
+- `evoexp.components`: name → `module:class`, the components that a configuration may name;
+- `evoexp.pages`: name → `module:function`, the pages that `report.figures` may name;
+- `evoexp.conf`: any name → `package:folder`, a folder of options (see `configuration.search_path`).
 
 A configuration is data; it can name registered components only, also when it comes out of somebody
-else's log.
+else's log. A component or page of another package than evoexp has a name that begins with the
+package's: the distribution `my-planner` may register `my_planner` and `my_planner_…`.
 """
 
 import functools
 import importlib
 import importlib.metadata
+import json
+import re
 from collections.abc import Iterator
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
-from evoexp.errors import SettingError, nearest
+from evoexp.errors import MissingDistribution, RegistrationError, SettingError, nearest
 from evoexp.validation import TARGET, Component
 
-REGISTRY = {
-    "arms": "evoexp.robots.arms:Arms",
-    "mobile_arm": "evoexp.robots.mobile_arm:MobileArm",
-    "planar_chain": "evoexp.robots.planar_chain:PlanarChain",
-    "serial_chain": "evoexp.robots.serial_chain:SerialChain",
-    "urdf": "evoexp.robots.urdf:Urdf",
-    "dh_chain": "evoexp.robots.dh_chain:DhChain",
-    "floor_platform": "evoexp.robots.floor_platform:FloorPlatform",
-    "floor_manipulator": "evoexp.robots.floor_manipulator:FloorManipulator",
-    "mission": "evoexp.scenarios.mission:Mission",
-    "grid_motion": "evoexp.scenarios.grid_motion:GridMotion",
-    "link_motion": "evoexp.scenarios.link_motion:LinkMotion",
-    "pick_and_place": "evoexp.scenarios.pick_and_place:PickAndPlace",
-    "docking": "evoexp.scenarios.docking:Docking",
-    "arm_motion": "evoexp.scenarios.arm_motion:ArmMotion",
-    "posture_task": "evoexp.scenarios.posture_task:PostureTask",
-    "via_point_ga": "evoexp.planners.via_point_ga.planner:ViaPointGa",
-    "coevolution": "evoexp.planners.coevolution.planner:Coevolution",
-    "redundant_ga": "evoexp.planners.redundant_ga.planner:RedundantGa",
-    "posture_es": "evoexp.planners.posture_es.planner:PostureEs",
-    "two_stage": "evoexp.planners.two_stage.planner:TwoStage",
-    "grid_path_ga": "evoexp.planners.grid_path_ga.planner:GridPathGa",
-    "grid_frontier": "evoexp.references.grid_frontier:GridFrontier",
-    "placement_ga": "evoexp.planners.placement_ga.planner:PlacementGa",
-    "random_search": "evoexp.planners.baselines.random_search:RandomSearch",
-    "placement_optimum": "evoexp.references.placement_optimum:PlacementOptimum",
-    "placement_conventional": "evoexp.references.placement_conventional:PlacementConventional",
-    "placement_landscape": "evoexp.references.placement_landscape:PlacementLandscape",
-    "genetic": "evoexp.evolution.genetic_settings:GeneticSettings",
-    "coevolutionary": "evoexp.planners.coevolution.settings:CoevolutionSettings",
-    "real_genetic": "evoexp.planners.redundant_ga.settings:RealGenetic",
-    "binary_genetic": "evoexp.planners.redundant_ga.settings:BinaryGenetic",
-    "strategy": "evoexp.planners.posture_es.settings:StrategySettings",
-    "scaled_genetic": "evoexp.evolution.scaled_settings:ScaledGenetic",
-    "motion_criteria": "evoexp.objectives.motion_criteria:MotionCriteria",
-    "path_cost": "evoexp.objectives.path_cost:PathCost",
-    "potential_fields": "evoexp.collision.models.potential_fields:PotentialFields",
-    "string_fitness": "evoexp.objectives.string_fitness:StringFitness",
-    "placement_criteria": "evoexp.objectives.placement_criteria:PlacementCriteria",
-    "reaching": "evoexp.objectives.reaching:Reaching",
-    "posture_cost": "evoexp.objectives.posture_cost:PostureCost",
-    "link_ellipses": "evoexp.collision.models.link_ellipses:LinkEllipses",
-    "link_crossings": "evoexp.collision.models.link_collision:LinkCrossings",
-    "sphere_sets": "evoexp.collision.models.body_models:SphereSets",
-    "body_capsules": "evoexp.collision.models.body_models:BodyCapsules",
-    "touching_spheres": "evoexp.collision.models.touching_spheres:TouchingSpheres",
-}
-"""Registered name → `module:class`.
+COMPONENTS, PAGES, CONF = "evoexp.components", "evoexp.pages", "evoexp.conf"
+OWN = "evoexp"  # the distribution whose names are free
 
-Installed plug-ins add to it through the entry-point group `evoexp.components`.
-"""
+
+class Registration(NamedTuple):
+    """A name that an installed distribution registers.
+
+    Attributes:
+        name: Of a component, a page or a folder.
+        target: `module:attribute`.
+        distribution: As its metadata spell it, `my-planner`.
+        version: Of the distribution.
+    """
+
+    name: str
+    target: str
+    distribution: str
+    version: str
+
+    @property
+    def is_own(self) -> bool:
+        """Whether evoexp itself registers it."""
+        return self.distribution == OWN
+
+    @property
+    def package(self) -> str:
+        """Distribution and version, `my-planner 0.3`."""
+        return f"{self.distribution} {self.version}"
+
+    @property
+    def module(self) -> str:
+        """Module that the name's class or function is in."""
+        return self.target.partition(":")[0]
+
+    def load(self) -> Any:
+        """Import and return the class or function.
+
+        Raises:
+            RegistrationError: If it cannot be imported.
+        """
+        module, _, attribute = self.target.partition(":")
+        try:
+            return getattr(importlib.import_module(module), attribute)
+        except (ImportError, AttributeError) as error:
+            raise RegistrationError(
+                f"{self.name}: {self.package} registers {self.target}, which cannot be imported "
+                f"({error})"
+            ) from error
+
+
+def registrations(group: str) -> tuple[Registration, ...]:
+    """Return all registrations of an entry-point group, in alphabetical order.
+
+    Raises:
+        RegistrationError: If evoexp itself registers nothing, because it is not installed.
+    """
+    return _registrations()[group]
+
+
+@functools.cache
+def _registrations() -> dict[str, tuple[Registration, ...]]:
+    """Read the metadata of all installed distributions, once per process."""
+    found: dict[str, list[Registration]] = {COMPONENTS: [], PAGES: [], CONF: []}
+    seen = set()
+    for distribution in importlib.metadata.distributions():
+        points = [point for point in distribution.entry_points if point.group in found]
+        if points and (name := distribution.metadata["Name"]) not in seen:  # the first on the path
+            seen.add(name)
+            for point in points:
+                target = point.value.replace(" ", "")
+                found[point.group].append(
+                    Registration(point.name, target, name, distribution.version)
+                )
+    if OWN not in seen:
+        raise RegistrationError("evoexp: is not installed (in its checkout: pip install -e .)")
+    return {group: tuple(sorted(each)) for group, each in found.items()}
+
+
+def clear() -> None:
+    """Forget the metadata that were read, so that they are read again."""
+    _registrations.cache_clear()
+    guests.cache_clear()
+
+
+def names(group: str) -> list[str]:
+    """Return all names of a group, in alphabetical order."""
+    return sorted({registration.name for registration in registrations(group)})
+
+
+def registered(group: str, name: str) -> Registration | None:
+    """Return the registration of a name; None if nobody registers it.
+
+    Raises:
+        RegistrationError: If two distributions register the name, or a guest's name does not begin
+            with the name of its distribution.
+    """
+    found = [each for each in registrations(group) if each.name == name]
+    if len(found) > 1:
+        packages = " and ".join(each.package for each in found)
+        raise RegistrationError(f"{name}: registered by {packages}; uninstall all but one of them")
+    if found and not found[0].is_own:
+        prefix = re.sub(r"[-_.]+", "_", found[0].distribution).lower()
+        if name != prefix and not name.startswith(f"{prefix}_"):
+            raise RegistrationError(
+                f"{name}: {found[0].package} must register names that begin with its own, "
+                f"'{prefix}' or '{prefix}_{name}'"
+            )
+    return found[0] if found else None
 
 
 def component_class(name: str, field: str = TARGET) -> type[Component]:
@@ -71,32 +137,54 @@ def component_class(name: str, field: str = TARGET) -> type[Component]:
 
     Raises:
         SettingError: If the name is not registered; a configuration cannot name other code.
+        RegistrationError: If its package registered it wrongly.
     """
-    path = _registry().get(name)
-    if path is None:
+    registration = registered(COMPONENTS, name)
+    if registration is None:
         must = "a registered component"
-        raise SettingError(f"{field}.{TARGET}", must, name, nearest(name, _registry()))
-    module, _, attribute = path.partition(":")
-    return cast(type[Component], getattr(importlib.import_module(module), attribute))
+        raise SettingError(f"{field}.{TARGET}", must, name, nearest(name, names(COMPONENTS)))
+    return cast(type[Component], registration.load())
 
 
-@functools.cache
-def _registry() -> dict[str, str]:
-    plugins = {
-        point.name: point.value
-        for point in importlib.metadata.entry_points(group="evoexp.components")
-    }
-    return plugins | REGISTRY
+def component_names(config: Any) -> Iterator[str]:
+    """Yield the names of all components in plain configuration data."""
+    if isinstance(config, dict):
+        if TARGET in config:
+            yield str(config[TARGET])
+        config = list(config.values())
+    if isinstance(config, list):
+        for value in config:
+            yield from component_names(value)
 
 
 def component_modules(config: Any) -> Iterator[str]:
-    """Yield the modules of all components that plain configuration data names."""
-    if isinstance(config, dict):
-        path = _registry().get(str(config.get(TARGET)))
-        if path is not None:
-            yield path.partition(":")[0]
-        for value in config.values():
-            yield from component_modules(value)
-    elif isinstance(config, list):
-        for value in config:
-            yield from component_modules(value)
+    """Yield the modules of all registered components that plain configuration data names."""
+    for name in component_names(config):
+        registration = registered(COMPONENTS, name)
+        if registration is not None:
+            yield registration.module
+
+
+@functools.lru_cache(maxsize=64)
+def guests(config_json: bytes) -> dict[str, str]:
+    """Return component → `distribution version` of a condition's components that are not evoexp's.
+
+    Args:
+        config_json: The condition's canonical form.
+    """
+    found = (registered(COMPONENTS, name) for name in component_names(json.loads(config_json)))
+    return {each.name: each.package for each in found if each is not None and not each.is_own}
+
+
+def require(components: dict[str, str]) -> None:
+    """Check that components which a log recorded are registered here.
+
+    Args:
+        components: As `guests` returned them when the log was written.
+
+    Raises:
+        MissingDistribution: If one is not; names its distribution.
+    """
+    known = names(COMPONENTS)
+    if missing := sorted({package for name, package in components.items() if name not in known}):
+        raise MissingDistribution(missing)

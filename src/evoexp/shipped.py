@@ -1,4 +1,4 @@
-"""What is shipped beside the code: `conf`, and a table of hashes and digests.
+"""The files shipped beside the code: the options in `conf`, and a table of hashes and digests.
 
 The table has the hash of every shipped condition and the digest of its first replicate. It finds a
 shipped condition by its hash on a machine that never ran it, gives `reproduce` something to compare
@@ -13,16 +13,38 @@ from importlib import resources
 from pathlib import Path
 from typing import NamedTuple
 
+ORIGIN = "evoexp"  # of shipped options
+
+
+class Option(NamedTuple):
+    """A file that a configuration chooses: one option of a group.
+
+    Attributes:
+        group: Such as `ga`.
+        name: Of the option in its group.
+        origin: The folder that it was found in, as typed; the package that brings it, as
+            `my-planner 0.3`; or `evoexp`. Of an experiment that is a file: its path, as typed.
+        path: Of the file, absolute.
+    """
+
+    group: str
+    name: str
+    origin: str
+    path: str
+
+    @property
+    def source(self) -> str:
+        """Where the option stands, as tables name it: `conf/ga/rana_planar.yaml`."""
+        inner = f"{self.group}/{self.name}.yaml"
+        if self.origin == ORIGIN:
+            return f"conf/{inner}"
+        return self.origin if self.origin.endswith((".yaml", ".yml")) else f"{self.origin}: {inner}"
+
 
 def config_directory() -> Path:
     """Return the shipped `conf`: in the wheel inside the package, in a checkout beside `src`."""
     inside = Path(__file__).parent / "conf"
     return inside if inside.is_dir() else Path(__file__).parents[2] / "conf"
-
-
-def file_directory() -> Path:
-    """Return where files lie that shipped configurations refer to: beside the scenarios."""
-    return config_directory() / "scenario"
 
 
 class Shipped(NamedTuple):
@@ -57,9 +79,9 @@ def shipped() -> tuple[Shipped, ...]:
 
 
 def find(prefix: str) -> list[Shipped]:
-    """Return the shipped conditions whose hash begins with a prefix, each hash once.
+    """Return the shipped conditions whose hash begins with a prefix.
 
-    In its smallest experiment.
+    Each hash occurs once, in the smallest experiment that has it.
     """
     sizes = Counter((row.experiment, row.budget) for row in shipped())
     rows = sorted(shipped(), key=lambda row: -sizes[row.experiment, row.budget])

@@ -7,9 +7,9 @@ import pytest
 from batch_samples import WORDS, digests, run
 from joblib.externals.loky import get_reusable_executor
 
-from evoexp import condition
 from evoexp.condition import Condition
 from evoexp.configuration import compose
+from guests import on_path, write_distribution
 
 HERE = Path(__file__).parent
 
@@ -18,23 +18,15 @@ HERE = Path(__file__).parent
 def plug_in(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a directory that, on the path, is an installed plug-in."""
     directory = tmp_path_factory.mktemp("plug_in")
-    information = directory / "faulty-1.0.dist-info"
-    information.mkdir()
-    (information / "METADATA").write_text("Metadata-Version: 2.1\nName: faulty\nVersion: 1.0\n")
-    (information / "entry_points.txt").write_text(
-        "[evoexp.components]\nfaulty = faulty_planner:Faulty\n"
-    )
+    write_distribution(directory, "faulty", components={"faulty": "faulty_planner:Faulty"})
     return directory
 
 
 @pytest.fixture(autouse=True)
-def installed(plug_in: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def installed(plug_in: Path) -> Iterator[None]:
     """Install it in this process and in the workers that it starts."""
-    monkeypatch.syspath_prepend(str(plug_in))
-    monkeypatch.syspath_prepend(str(HERE))
-    condition._registry.cache_clear()
-    yield
-    condition._registry.cache_clear()
+    with on_path(plug_in, HERE):
+        yield
 
 
 @pytest.fixture

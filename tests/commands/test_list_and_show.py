@@ -13,7 +13,7 @@ from command_samples import SMALL, Evoexp
 from evoexp import shipped
 from evoexp.batch.replicate import run_replicate
 from evoexp.configuration import compose
-from evoexp.configuration.experiment import description, options
+from evoexp.configuration.search_path import description, options
 from evoexp.shipped import Shipped
 from evoexp.store.run_directory import RunDirectory, find_runs
 from evoexp.store.tables import read_summaries

@@ -13,7 +13,7 @@ from command_samples import SERIAL, Evoexp
 
 from evoexp.condition import Condition
 from evoexp.configuration import compose
-from evoexp.configuration.experiment import options
+from evoexp.configuration.search_path import options
 from evoexp.evolution.genetic_settings import GeneticSettings
 from evoexp.store.log import Log
 from evoexp.store.log_reader import read_log

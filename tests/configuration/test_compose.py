@@ -18,7 +18,8 @@ from omegaconf import DictConfig
 from evoexp import shipped
 from evoexp.configuration import compose
 from evoexp.configuration.compose import expand
-from evoexp.configuration.experiment import Experiment, description, options
+from evoexp.configuration.experiment import Experiment
+from evoexp.configuration.search_path import description, options
 from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting
 from shipped_conditions import expanded, kinds_of_conditions
 

@@ -12,6 +12,7 @@ import pytest
 from evoexp import attachments, shipped
 from evoexp.configuration import compose, expansions
 from evoexp.configuration.experiment import Experiment
+from evoexp.configuration.search_path import file_directories
 from evoexp.errors import EvoexpError
 
 WORDS = ["experiment=rana_planar", "budget=smoke"]
@@ -23,14 +24,13 @@ ROBOT = [
     "objective=corsepius_reach",
 ]
 ROBOT += ["collision=corsepius_spheres"]
-SIX_R = Path(__file__).parent / "robots" / "data" / "ur5_like" / "ur5_like.urdf"
+SIX_R = Path(__file__).parents[1] / "robots" / "data" / "ur5_like" / "ur5_like.urdf"
 
 
 @pytest.fixture
 def composed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], int]:
     """Have a cache of this test's own; return how often something was composed."""
     monkeypatch.setenv("EVOEXP_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(expansions.importlib.metadata, "entry_points", lambda group: ())
     calls: list[object] = []
     expand = compose.expand
 
@@ -115,9 +115,7 @@ def test_files_are_read_again(
     shadow = (
         tmp_path / "chen_fig_1.txt"
     )  # what lies in the current directory comes before what is shipped
-    shadow.write_text(
-        (shipped.file_directory() / "chen_fig_1.txt").read_text().replace("*", ".", 1)
-    )
+    shadow.write_text((file_directories()[-1] / "chen_fig_1.txt").read_text().replace("*", ".", 1))
     other = expansions.expand(words)
     assert other[0].conditions[0].condition.id != condition.id
     shadow.unlink()

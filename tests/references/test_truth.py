@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from evoexp import condition
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.reproduction import difference, farthest, fingerprint, same_fingerprint
 from evoexp.cli import main
@@ -15,6 +14,7 @@ from evoexp.errors import EvoexpError, SettingError
 from evoexp.report.results import gather
 from evoexp.store.log_reader import array_names, read_array, read_log
 from evoexp.store.run_directory import RunDirectory
+from guests import on_path, write_distribution
 
 EXPERIMENT = (
     "experiment=rana_obstacles",
@@ -26,12 +26,13 @@ WORDS = (*EXPERIMENT, "planner.num_new_trajectories=1", "+reference._target_=cou
 
 
 @pytest.fixture(autouse=True)
-def registered(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def registered(tmp_path: Path) -> Iterator[None]:
     """Have a reference of our own among the registered components."""
-    monkeypatch.setitem(condition.REGISTRY, "counted", "references.counted:Counted")
-    condition._registry.cache_clear()
-    yield
-    condition._registry.cache_clear()
+    write_distribution(
+        tmp_path / "guest", "counted", components={"counted": "references.counted:Counted"}
+    )
+    with on_path(tmp_path / "guest"):
+        yield
 
 
 @pytest.fixture

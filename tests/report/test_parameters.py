@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from evoexp.configuration import compose, expansions
-from evoexp.configuration.experiment import options
+from evoexp.configuration.search_path import options
 from evoexp.report import parameters
 from evoexp.report.parameters import Parameter, option, overridden
 from evoexp.report.results import ConditionResults, Results

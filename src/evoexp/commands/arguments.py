@@ -5,7 +5,8 @@ import re
 
 
 def add_experiment_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what chooses conditions: overrides, `-m`, `--only`."""
+    """Add the arguments that choose conditions: overrides, `-m`, `--only`, `--config-dir`."""
+    add_config_dir_argument(parser)
     parser.add_argument(
         "overrides",
         nargs="*",
@@ -21,6 +22,17 @@ def add_experiment_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--only", type=_labels, default=(), metavar="LABEL,...", help="only these conditions"
+    )
+
+
+def add_config_dir_argument(parser: argparse.ArgumentParser) -> None:
+    """Add `--config-dir DIR`, which may be repeated; `cli.main` has the folders searched first."""
+    parser.add_argument(
+        "--config-dir",
+        action="append",
+        default=[],
+        metavar="DIR",
+        help="a folder of options that is searched before all others (may be repeated)",
     )
 
 

@@ -9,7 +9,7 @@ from rich.text import Text
 from evoexp import shipped
 from evoexp.commands.console import add_columns, add_hash_column, new_table, plain_console
 from evoexp.commands.hashes import stored_runs
-from evoexp.configuration.experiment import description, options
+from evoexp.configuration.search_path import description, options
 from evoexp.errors import EvoexpError
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.tables import read_summaries

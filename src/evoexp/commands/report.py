@@ -12,7 +12,8 @@ from rich.console import Console
 from evoexp.commands.arguments import add_experiment_arguments
 from evoexp.condition import Condition
 from evoexp.configuration import expansions
-from evoexp.configuration.experiment import Experiment, options
+from evoexp.configuration.experiment import Experiment
+from evoexp.configuration.search_path import options
 from evoexp.errors import SettingError, UnknownOption
 from evoexp.report import build
 from evoexp.store.run_directory import outputs_root, resolve

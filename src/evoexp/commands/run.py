@@ -17,8 +17,7 @@ from evoexp.commands.console import add_columns, add_hash_column, new_table, pla
 from evoexp.commands.progress import BatchProgress
 from evoexp.configuration import expansions
 from evoexp.configuration.experiment import Experiment
-from evoexp.errors import UnknownOption
-from evoexp.report.pages import PAGES
+from evoexp.report.pages import page_registration
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_table as stored_summaries
 
@@ -36,8 +35,7 @@ def main(arguments: argparse.Namespace) -> int:
         arguments.overrides, multirun=arguments.multirun, only=arguments.only
     )
     for experiment in experiments:
-        if (figures := experiment.report.figures) not in (None, *PAGES):
-            raise UnknownOption("report.figures", str(figures), PAGES)
+        page_registration(experiment.report)  # refuses an unknown page before anything is run
     command = _command(arguments)
     wanted = [
         (

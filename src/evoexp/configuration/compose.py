@@ -8,6 +8,8 @@ import copy
 import difflib
 import itertools
 import re
+import shutil
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, TypeVar
 
@@ -22,7 +24,8 @@ from pydantic import ValidationError
 from evoexp import shipped
 from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.condition import PARTS, Condition, read_files
-from evoexp.configuration.experiment import Experiment, Labelled, options
+from evoexp.configuration.experiment import Experiment, Labelled
+from evoexp.configuration.search_path import file_directories, folders, groups, options
 from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting, nearest
 from evoexp.registry import component_class
 from evoexp.report.report_settings import ReportSettings
@@ -86,8 +89,20 @@ def expand(
     )
     if len(set(names)) < len(names):
         raise SettingError("experiment", "names that differ", ",".join(map(str, names)))
-    with hydra.initialize_config_dir(str(shipped.config_directory().resolve()), version_base="1.3"):
-        return [_expand_one(name, parsed, only) for name in names]
+    with tempfile.TemporaryDirectory() as root:
+        # Of a user's folders only the options count: the root configuration is always the shipped.
+        shutil.copy(shipped.config_directory() / "config.yaml", root)
+        with hydra.initialize_config_dir(root, version_base="1.3"):
+            return [_expand_one(name, parsed, only) for name in names]
+
+
+def _hydra(options: Sequence[str]) -> DictConfig:
+    """Have Hydra compose a choice of options from all folders of the search path."""
+    quoted = (
+        "'file://" + str(folder.path).replace("\\", "\\\\").replace("'", "\\'") + "'"
+        for folder in folders()
+    )
+    return hydra.compose("config", overrides=[*options, f"hydra.searchpath=[{','.join(quoted)}]"])
 
 
 _NOT_IDENTITY = ("experiment", "budget", "num_replicates", "runner", "report")
@@ -167,9 +182,7 @@ def _condition(config: DictConfig, budget: Budget) -> Condition:
     _cap_generations(config, budget)
     raw = str(OmegaConf.to_container(config.planner, resolve=False))
     try:
-        plain: Any = read_files(
-            OmegaConf.to_container(config, resolve=True), shipped.file_directory()
-        )
+        plain: Any = read_files(OmegaConf.to_container(config, resolve=True), file_directories())
     except OmegaConfBaseException as error:
         if absent := [group for group in PLANNER_PARTS if f"key '{group}' not found" in str(error)]:
             raise SettingError(
@@ -281,9 +294,9 @@ class _Composed:
 
     def __call__(self, overrides: Mapping[str, str]) -> DictConfig:
         try:
-            groups = _groups()
-            options = [text for key, text in sorted(overrides.items()) if key in groups]
-            values = [text for key, text in sorted(overrides.items()) if key not in groups]
+            known = groups()
+            options = [text for key, text in sorted(overrides.items()) if key in known]
+            values = [text for key, text in sorted(overrides.items()) if key not in known]
             parsed = OverridesParser.create().parse_overrides(values)
             if all(value.type is OverrideType.CHANGE for value in parsed):
                 config = copy.deepcopy(self._chosen(options))
@@ -297,7 +310,7 @@ class _Composed:
     def _chosen(self, options: list[str]) -> DictConfig:
         key = tuple(options)
         if key not in self._of_options:
-            self._of_options[key] = hydra.compose("config", overrides=options)
+            self._of_options[key] = _hydra(options)
         return self._of_options[key]
 
 
@@ -305,7 +318,7 @@ def _compose(overrides: Mapping[str, str]) -> DictConfig:
     try:
         # In the order of the keys, so that the order in which they were typed does not matter (a.b
         # comes before a.b.c).
-        return hydra.compose("config", overrides=[overrides[key] for key in sorted(overrides)])
+        return _hydra([overrides[key] for key in sorted(overrides)])
     except _NOT_COMPOSABLE as error:
         raise _said_in_one_line(error, overrides) from None
 
@@ -336,11 +349,9 @@ def _said_in_one_line(error: Exception, overrides: Mapping[str, str]) -> EvoexpE
 
 def _unknown(field: str, overrides: Mapping[str, str]) -> EvoexpError:
     """Name the first part of an unknown key that does not exist, and what stands there instead."""
-    if (group := field.split("=")[0]) in _groups():
+    if (group := field.split("=")[0]) in groups():
         return SettingError(group, "an option that is chosen, to be deleted", overrides.get(group))
-    node: Any = hydra.compose(
-        "config", overrides=[text for key, text in overrides.items() if key in _groups()]
-    )
+    node: Any = _hydra([text for key, text in overrides.items() if key in groups()])
     parts = field.split(".")
     for k, part in enumerate(parts):
         if isinstance(node, DictConfig) and part in node:
@@ -390,7 +401,7 @@ def _parse(overrides: Sequence[str]) -> dict[str, Override]:
         _check_key(override, text)
         if key in parsed and parsed[key].input_line != text:
             raise SettingError(key, "given once", f"{parsed[key].input_line} {text}")
-        if key in _groups() and not override.is_delete():
+        if key in groups() and not override.is_delete():
             _check_options(override)
         parsed[key] = override
     return parsed
@@ -409,7 +420,7 @@ def _check_key(override: Override, text: str) -> None:
         )
     if key == "budget.name":
         raise SettingError("budget.name", "left as it is: claims are judged by it", text)
-    roots = [*_groups(), "seed", "num_replicates"]
+    roots = [*groups(), "seed", "num_replicates"]
     if (override.is_add() or override.is_force_add()) and _root(key) not in roots:
         raise UnknownSetting(key, roots)
     if override.is_delete() and key in roots and key not in _OPTIONAL:
@@ -448,10 +459,6 @@ def _choices(override: Override) -> list[str]:
     return list(override.sweep_string_iterator())
 
 
-def _groups() -> list[str]:
-    return [path.name for path in shipped.config_directory().iterdir() if path.is_dir()]
-
-
 def _root(key: str) -> str:
     return re.split("[./]", key)[0]
 
@@ -464,7 +471,7 @@ def _text(override: Override, value: str) -> str:
     """Return an override with one value as Hydra takes it: `~group` for `group=null`."""
     if override.is_delete():
         return str(override.input_line)
-    if override.key_or_group in _groups() and value == "null":
+    if override.key_or_group in groups() and value == "null":
         return f"~{override.key_or_group}"
     return f"{override.get_key_element()}={value}"
 

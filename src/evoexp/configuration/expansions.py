@@ -24,7 +24,9 @@ from evoexp import attachments, shipped
 from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.condition import Condition
 from evoexp.configuration.experiment import Experiment, Labelled
+from evoexp.configuration.search_path import file_directories, folders
 from evoexp.numeric.kernel_cache import cache_root
+from evoexp.registry import COMPONENTS, registrations
 from evoexp.report.report_settings import ReportSettings
 
 NUM_KEPT = 200  # [-] expansions, the newest ones
@@ -66,14 +68,17 @@ def _files(experiments: Sequence[Experiment]) -> list[tuple[str, str]] | None:
 
 def _path(asked: list[Any]) -> Path | None:
     """Return where an expansion is kept; None where it may not be."""
-    if any("${" in word for word in asked[0]) or importlib.metadata.entry_points(
-        group="evoexp.components"
-    ):
+    components = registrations(COMPONENTS)
+    if any("${" in word for word in asked[0]) or not all(each.is_own for each in components):
         return None
     versions = [importlib.metadata.version(name) for name in _COMPOSERS]
     digest = hashlib.sha256(orjson.dumps([asked, versions, pydantic.VERSION]))
-    conf, code = shipped.config_directory(), Path(__file__).parent
-    for root, pattern in ((conf, "*/*"), (conf, "*.yaml"), (code, "**/*.py")):
+    code = (Path(__file__).parents[1], "**/*.py")
+    for root, pattern in (
+        (shipped.config_directory(), "*.yaml"),
+        *((f.path, "*/*") for f in folders()),
+        code,
+    ):
         for path in sorted(path for path in root.glob(pattern) if path.is_file()):
             content = path.read_bytes()
             digest.update(
@@ -95,8 +100,7 @@ def _read(path: Path) -> list[Experiment] | None:
     kept = orjson.loads(text)
     try:
         if any(
-            attachments.read(file, shipped.file_directory()) != sha256
-            for file, sha256 in kept["files"]
+            attachments.read(file, file_directories()) != sha256 for file, sha256 in kept["files"]
         ):
             return None
     except OSError:

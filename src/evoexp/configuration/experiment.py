@@ -1,9 +1,8 @@
-"""What an experiment is, and which ones there are."""
+"""An experiment: the labelled conditions that one call asks for."""
 
 import hashlib
 from typing import NamedTuple
 
-from evoexp import shipped
 from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.condition import Condition
 from evoexp.report.report_settings import ReportSettings
@@ -17,7 +16,7 @@ class Labelled(NamedTuple):
 
 
 class Experiment(NamedTuple):
-    """What one call asks for.
+    """The conditions that one call asks for, and how they are run and reported.
 
     Attributes:
         name: Of the experiment file; "custom" without one.
@@ -46,16 +45,3 @@ class Experiment(NamedTuple):
             return name
         text = "\n".join(f"{label}\t{condition.id}" for label, condition in self.conditions)
         return f"{name}+{hashlib.sha256(text.encode()).hexdigest()[:8]}"
-
-
-def options(group: str) -> list[str]:
-    """Return the names of a group's shipped options."""
-    return sorted(path.stem for path in (shipped.config_directory() / group).glob("*.yaml"))
-
-
-def description(experiment: str) -> str:
-    """Return the line of an experiment file that says what it is: its third."""
-    lines = (
-        (shipped.config_directory() / "experiment" / f"{experiment}.yaml").read_text().splitlines()
-    )
-    return lines[2].removeprefix("# ")

@@ -1,0 +1,159 @@
+"""The search path: the folders that options are read from, in order.
+
+First the folders given by `--config-dir`, then those of the variable `EVOEXP_CONFIG_DIR`, then
+those that installed packages declare as entry points of `evoexp.conf`, and last the shipped `conf`.
+A folder has a sub-folder per group and in it a file per option: `ga/mine.yaml`. The first folder
+that has an option wins. An experiment may also be the path of a file that lies anywhere.
+
+A package declares a folder as `name = "package:folder"`: the folder lies in the package, or beside
+the `src` that the package is in; dots in `folder` lead into sub-folders, and without `:folder` it
+is the package's own.
+"""
+
+import contextlib
+import importlib.util
+import os
+from collections.abc import Iterable, Iterator
+from contextvars import ContextVar
+from pathlib import Path
+from typing import NamedTuple
+
+from evoexp import shipped
+from evoexp.errors import RegistrationError, SettingError, UnknownOption
+from evoexp.registry import CONF, Registration, registrations
+from evoexp.shipped import Option
+
+VARIABLE, ARGUMENT = "EVOEXP_CONFIG_DIR", "--config-dir"
+EXPERIMENT = "experiment"
+SUFFIXES = (".yaml", ".yml")  # of an experiment that is given as a file
+
+_given: ContextVar[tuple[str, ...]] = ContextVar("_given", default=())
+
+
+class Folder(NamedTuple):
+    """A folder of options.
+
+    Attributes:
+        path: Absolute.
+        origin: As it is shown: the folder as it was typed, `my-planner 0.3`, or `evoexp`.
+    """
+
+    path: Path
+    origin: str
+
+
+@contextlib.contextmanager
+def searched_first(directories: Iterable[str]) -> Iterator[None]:
+    """Search some folders before all others, for as long as the context lasts.
+
+    Args:
+        directories: As typed after `--config-dir`, the first one to be searched first.
+
+    Raises:
+        SettingError: If one is no folder.
+    """
+    token = _given.set(tuple(directories))
+    try:
+        folders()
+        yield
+    finally:
+        _given.reset(token)
+
+
+def folders() -> list[Folder]:
+    """Return all folders in the order in which they are searched.
+
+    Raises:
+        SettingError: If a folder that was typed is none.
+        RegistrationError: If a package declares a folder that it does not have.
+    """
+    typed = [(ARGUMENT, directory) for directory in _given.get()]
+    variable = os.environ.get(VARIABLE, "").split(os.pathsep)
+    found = []
+    for name, directory in [*typed, *((VARIABLE, entry) for entry in variable if entry)]:
+        if not Path(directory).is_dir():
+            raise SettingError(name, "a folder", directory)
+        found.append(Folder(Path(directory).resolve(), directory))
+    for each in sorted(registrations(CONF), key=lambda each: (each.is_own, each)):
+        if each.is_own:
+            found.append(Folder(shipped.config_directory().resolve(), shipped.ORIGIN))
+        else:
+            found.append(Folder(_declared(each), each.package))
+    return found
+
+
+def _declared(registration: Registration) -> Path:
+    """Return the folder that a package declares, without importing the package."""
+    package, _, inner = registration.target.partition(":")
+    with contextlib.suppress(ImportError, ValueError):
+        spec = importlib.util.find_spec(package)
+        for location in (spec and spec.submodule_search_locations) or ():
+            for root in (Path(location), Path(location).parents[1]):
+                if (root / inner.replace(".", "/")).is_dir():
+                    return (root / inner.replace(".", "/")).resolve()
+    raise RegistrationError(
+        f"{registration.name}: {registration.package} declares the folder "
+        f"{registration.target}, which is not there"
+    )
+
+
+def groups() -> list[str]:
+    """Return the groups that a configuration chooses options of, in alphabetical order."""
+    return sorted(path.name for path in shipped.config_directory().iterdir() if path.is_dir())
+
+
+def options(group: str) -> list[str]:
+    """Return the names of a group's options in all folders, in alphabetical order."""
+    return sorted(
+        {path.stem for folder in folders() for path in (folder.path / group).glob("*.yaml")}
+    )
+
+
+def find(group: str, name: str) -> Option:
+    """Return an option: its file and where it comes from.
+
+    Args:
+        group: `ga`, say.
+        name: Of the option; of an experiment its file, too.
+
+    Raises:
+        UnknownOption: If there is none of this name; lists those that there are.
+    """
+    if group == EXPERIMENT and is_file(name):
+        if not Path(name).is_file():
+            raise SettingError(EXPERIMENT, "the path of a file, or the name of an experiment", name)
+        return Option(group, Path(name).stem, name, str(Path(name).resolve()))
+    for folder in folders():
+        path = folder.path / group / f"{name}.yaml"
+        if path.is_file():
+            return Option(group, name, folder.origin, str(path))
+    raise UnknownOption(group, name, options(group))
+
+
+def is_file(experiment: str) -> bool:
+    """Return whether an experiment is given as the path of a file."""
+    return experiment.endswith(SUFFIXES)
+
+
+def origin(group: str, name: str) -> str:
+    """Return where an option comes from: a folder as typed, a package with its version, evoexp."""
+    return find(group, name).origin
+
+
+def description(experiment: str) -> str:
+    """Return the line of an experiment file that says what the experiment is.
+
+    It is the first comment that neither names Hydra's package nor the command that runs the file.
+    """
+    for line in Path(find(EXPERIMENT, experiment).path).read_text(encoding="utf-8").splitlines():
+        words = line.removeprefix("#").strip()
+        if not line.startswith("#"):
+            break
+        if not words.startswith(("@package", "evoexp run")):
+            return words
+    return ""
+
+
+def file_directories() -> list[Path]:
+    """Return the folders where files lie that options refer to: beside the scenarios."""
+    return [folder.path / "scenario" for folder in folders()]

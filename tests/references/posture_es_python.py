@@ -1,63 +1,165 @@
-"""The evolution strategy on postures, slow and obvious.
+"""The evolution strategy on postures, slow and obvious: individuals are lists of postures.
 
-Individuals are lists, everybody remembers the whole line.
+Everybody remembers the whole line of ancestors, the start first. Postures are judged by the phase,
+which has tests of its own; numbers are drawn as the planner does.
 """
 
-from typing import Any
+from collections.abc import Iterator
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from evoexp.numeric.elementary import standard_normal
 from evoexp.planners.posture_es.kernels import COST
-from evoexp.planners.posture_es.phases import Problem, begin, judge
+from evoexp.planners.posture_es.phases import Problem, begin, finish, judge
+
+FAULTS = ("no selection", "best of generation", "half scope", "no mutation", "no crossover")
+
+
+class Cycle(NamedTuple):
+    """One generation of a phase.
+
+    Attributes:
+        postures: (nq, individuals) as they were generated.
+        costs: (individuals,).
+        feasible: (individuals,).
+        best: The line of the best so far.
+        best_cost: Least cost so far.
+        evaluations: Since the start.
+        reason: Why the phase ends here; nothing if it goes on.
+    """
+
+    postures: Any
+    costs: Any
+    feasible: Any
+    best: list[Any]
+    best_cost: float
+    evaluations: int
+    reason: str
+
+
+class _Numbers:
+    """Numbers of one cycle: all uniform ones are drawn first, then all normal ones."""
+
+    def __init__(self, rng: np.random.Generator, uniforms: int, normals: int) -> None:
+        self._uniforms = iter(rng.random(uniforms))
+        self._normals = iter(standard_normal(rng, normals) if normals else ())
+
+    def uniforms(self, count: int) -> Any:
+        return np.array([next(self._uniforms) for _ in range(count)])
+
+    def normals(self, count: int) -> Any:
+        return np.array([next(self._normals) for _ in range(count)])
+
+
+def cycles(
+    problem: Problem, planner: Any, rng: np.random.Generator, fault: str = ""
+) -> Iterator[Cycle]:
+    """Yield all generations of all phases; `fault`, one of `FAULTS`, is made on purpose."""
+    line, evaluations, situation = [problem.start], 0, problem.first_situation
+    for index in range(len(problem.phases)):
+        stage = begin(problem, index, line[-1], situation)
+        for cycle in _phase(problem, planner, rng, stage, line, evaluations, fault):
+            yield cycle
+        if cycle.reason != "goal":
+            return
+        line, evaluations = cycle.best, cycle.evaluations
+        situation = finish(problem, stage, line[-1])
+
+
+def _phase(
+    problem: Problem, planner: Any, rng: np.random.Generator, stage: Any, line: list[Any],
+    evaluations: int, fault: str,
+) -> Iterator[Cycle]:  # fmt: skip
+    ga, nq = planner.ga, len(problem.scope)
+    judged = judge(stage, line[-1][:, None])
+    best, best_cost, idle, evaluations = line, float(judged.rows[COST, 0]), 0, evaluations + 1
+    parents = [(best_cost, line)]
+    reason = "goal" if judged.met[0] else "cap" if ga.num_generations == 0 else ""
+    first = line[-1][:, None], judged.rows[COST], judged.feasible
+    yield Cycle(*first, best, best_cost, evaluations, reason)
+    for cycle in range(1, ga.num_generations + 1):
+        if reason:
+            return
+        bred = ga.initial_size if cycle == 1 else ga.num_offspring
+        per_child = 2 + nq if ga.crossover_rate > 0.0 else 0
+        gaussian, ranked = ga.mutation == "gaussian", ga.parent_choice == "gaussian"
+        numbers = _Numbers(
+            rng,
+            bred * (per_child + (0 if gaussian else nq)) + ga.num_immigrants * nq,
+            bred * ((nq if gaussian else 0) + ranked),
+        )
+        children = [_bred(problem, ga, numbers, parents, n, fault) for n in range(bred)]
+        children += [_immigrant(problem, numbers, parents) for _ in range(ga.num_immigrants)]
+        postures = np.array([child[-1] for child in children]).T
+        judged = judge(stage, postures)
+        feasible = judged.feasible.copy()
+        for k in range(planner.edge_check):  # between parent and child
+            share = (k + 1.0) / (planner.edge_check + 1.0)
+            between = [child[-2] + share * (child[-1] - child[-2]) for child in children]
+            feasible &= judge(stage, np.array(between).T).feasible
+        costs, evaluations = judged.rows[COST], evaluations + len(children)
+        usable = [(float(costs[n]), n) for n in range(len(children)) if feasible[n]]
+        met = [(cost, n) for cost, n in usable if judged.met[n]]
+        idle = 0 if usable and min(usable)[0] < best_cost else idle + 1
+        if met or idle == 0:
+            best = children[min(met or usable)[1]]
+        if idle == 0:
+            best_cost = min(usable)[0]
+        reason = "goal" if met else "stagnation" if idle >= ga.patience else ""
+        reason = reason or ("cap" if cycle == ga.num_generations else "")
+        yield Cycle(postures, costs, feasible, best, best_cost, evaluations, reason)
+        members = [(cost, children[n]) for cost, n in usable]
+        members += parents if ga.selection == "plus" else []
+        if fault != "no selection":
+            members = sorted(
+                members, key=lambda member: member[0]
+            )  # stable: the first among equals
+        parents = members[: ga.num_parents] or parents
+
+
+def _bred(
+    problem: Problem, ga: Any, numbers: _Numbers, parents: list[Any], n: int, fault: str
+) -> list[Any]:
+    """Return a child of the n-th choice of a parent: perhaps crossed, then mutated."""
+    nq, number = len(problem.scope), n % len(parents)
+    if ga.parent_choice == "gaussian":
+        drawn = abs(numbers.normals(1)[0]) * ga.parent_std * len(parents)
+        number = min(int(drawn), len(parents) - 1)
+    line = parents[number][1]
+    child = line[-1].copy()
+    if ga.crossover_rate > 0.0:
+        (decision, place), taken = numbers.uniforms(2), numbers.uniforms(nq) < 0.5
+        if decision < ga.crossover_rate and fault != "no crossover":
+            child = np.where(taken, parents[int(place * len(parents))][1][-1], child)
+    scope = problem.scope * {"half scope": 0.5, "no mutation": 0.0}.get(fault, 1.0)
+    gaussian = ga.mutation == "gaussian"
+    step = ga.mutation_std * numbers.normals(nq) if gaussian else 2.0 * numbers.uniforms(nq) - 1.0
+    child = np.clip(child + scope * step, *problem.limits.T)
+    return [*(_nearest(problem, parents, child) if ga.crossover_rate > 0.0 else line), child]
+
+
+def _immigrant(problem: Problem, numbers: _Numbers, parents: list[Any]) -> list[Any]:
+    """Return somebody from anywhere, as a child of the nearest parent."""
+    low, high = problem.limits.T
+    child = low + (high - low) * numbers.uniforms(len(low))
+    return [*_nearest(problem, parents, child), child]
+
+
+def _nearest(problem: Problem, parents: list[Any], child: Any) -> list[Any]:
+    steps = [float((np.abs(child - line[-1]) / problem.scope).max()) for _, line in parents]
+    line: list[Any] = parents[int(np.argmin(steps))][1]
+    return line
 
 
 def path(
-    problem: Problem, ga: Any, rng: np.random.Generator, mutant: str = ""
+    problem: Problem, planner: Any, rng: np.random.Generator, fault: str = ""
 ) -> tuple[Any, int, str]:
-    """Search the first phase; return postures, evaluations, and why it ended.
-
-    Args:
-        problem: The problem.
-        ga: Settings, with comma selection, uniform mutation, equal shares and no immigrants.
-        rng: Drawn from as the planner does.
-        mutant: An error to make: `no_selection`, `best_of_generation`, `half_scope`.
-    """
-    stage = begin(problem, 0, problem.start, problem.first_situation)
-    scope = problem.scope * (0.5 if mutant == "half_scope" else 1.0)
-    first = judge(stage, problem.start[:, None])
-    parents, best, best_cost = [[problem.start]], [problem.start], float(first.rows[COST, 0])
-    generations = [problem.start]
-    evaluations = 1
-    idle = 0
-    for cycle in range(ga.num_generations):
-        count = ga.num_offspring if cycle else ga.initial_size
-        uniforms = rng.random((count, len(scope)))
-        children = []
-        for n in range(count):
-            line = parents[n % len(parents)]
-            child = np.clip(
-                line[-1] + scope * (2.0 * uniforms[n] - 1.0),
-                problem.limits[:, 0],
-                problem.limits[:, 1],
-            )
-            children.append([*line, child])
-        judged = judge(stage, np.array([line[-1] for line in children]).T)
-        evaluations += count
-        cost = [
-            float(c) if ok else np.inf
-            for c, ok in zip(judged.rows[COST], judged.feasible, strict=True)
+    """Search all phases; return postures, evaluations, and why the search ended."""
+    found = list(cycles(problem, planner, rng, fault))
+    if fault == "best of generation":
+        best = [
+            one.postures[:, np.argmin(np.where(one.feasible, one.costs, np.inf))] for one in found
         ]
-        ranked = sorted((n for n in range(count) if cost[n] < np.inf), key=lambda n: (cost[n], n))
-        generations.append(children[ranked[0]][-1])
-        met = [n for n in ranked if judged.met[n]]
-        idle = 0 if cost[ranked[0]] < best_cost else idle + 1
-        if met or cost[ranked[0]] < best_cost:
-            best = children[met[0] if met else ranked[0]]
-            best_cost = min(best_cost, cost[ranked[0]])
-        if met:
-            return (generations if mutant == "best_of_generation" else best), evaluations, "goal"
-        if idle >= ga.patience:
-            return best, evaluations, "stagnation"
-        chosen = range(ga.num_parents) if mutant == "no_selection" else ranked[: ga.num_parents]
-        parents = [children[n] for n in chosen]
-    return best, evaluations, "cap"
+        return best, found[-1].evaluations, found[-1].reason
+    return found[-1].best, found[-1].evaluations, found[-1].reason

@@ -1,0 +1,125 @@
+"""The compiled planners of Chen & Zalzala against the same algorithms in plain Python.
+
+Both take the same uniform numbers, so paths and strings of bits are equal, and costs differ by
+rounding alone.
+"""
+
+import functools
+from typing import Any
+
+import numpy as np
+import pytest
+
+from evoexp.configuration import compose
+from planners.grid_samples import planner, robot, scenario, solvable
+from references import chen_python
+
+ROUNDING = 1e-12  # relative, of costs
+
+
+def same_paths(own: Any, problem: Any, seed: int, fault: str = "") -> bool:
+    """Return whether all generations have the same paths, at the same costs."""
+    rng = np.random.default_rng(seed)
+    size = own.ga.population_size
+    first = [row[1 : row[0] + 1].tolist() for row in own.sample(problem, rng, size)]
+    expected = chen_python.evolve_paths(own, problem, first, rng, fault)
+    best = np.inf
+    for generation, (paths, costs) in zip(
+        own.evolve(problem, np.random.default_rng(seed)), expected, strict=True
+    ):
+        if [row[1 : row[0] + 1].tolist() for row in generation.population] != paths:
+            return False
+        best = min(best, *costs)
+        np.testing.assert_allclose(generation.costs, costs, rtol=ROUNDING)
+        found = [generation.best_cost, generation.best_cost_in_generation, generation.mean_cost]
+        assert found == pytest.approx([best, min(costs), np.mean(costs)], rel=ROUNDING)
+        assert generation.std_cost == pytest.approx(np.std(costs), rel=1e-9, abs=1e-12)
+        assert own.evaluate(problem, generation.best)["cost"] == pytest.approx(best, rel=ROUNDING)
+    return True
+
+
+@pytest.mark.parametrize(
+    ("shape", "share", "changes"),
+    [
+        ((12, 12), 0.3, {}),
+        ((12, 12), 0.3, {"revisits": True, "mutation_rate": 0.8}),
+        ((4, 4), 0.1, {"revisits": True, "mutation_rate": 1.0, "crossover_rate": 1.0}),
+        ((4, 4, 4), 0.3, {"num_elites": 0, "population_size": 15}),
+        ((16, 16), 0.35, {"crossover_reach": 0, "num_elites": 3, "scaling_multiple": 1.3}),
+        ((16, 9), 0.2, {"weights": (1.0, 0.02), "population_size": 1, "num_elites": 0}),
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("seed", range(3))
+def test_generations_of_paths_are_the_same(
+    shape: tuple[int, ...], share: float, changes: dict[str, Any], seed: int
+) -> None:
+    own = planner(**({"population_size": 20, "num_generations": 30} | changes))
+    assert same_paths(own, solvable(shape, share, seed, own), seed)
+
+
+def test_paths_that_are_near_but_do_not_meet_are_crossed_the_same() -> None:
+    """Two ways around a block, three nodes wide: few paths have a node in common."""
+    blocked = np.zeros((9, 5), dtype=bool)
+    blocked[2:7, 1:4:2] = blocked[2:7, 2] = True
+    own = planner(crossover_reach=4, crossover_rate=1.0, num_generations=30)
+    problem = own.prepare(robot(), scenario(blocked))
+    assert all(same_paths(own, problem, seed) for seed in range(4))
+
+
+@pytest.mark.parametrize("fault", chen_python.FAULTS)
+def test_a_fault_among_paths_would_be_noticed(fault: str) -> None:
+    own = planner(num_elites=2)
+    assert not same_paths(own, solvable((12, 12), 0.3, 1, own), 1, fault)
+
+
+@functools.cache
+def prepared(*words: str) -> tuple[Any, Any]:
+    given = compose.expand(["experiment=chen_placement", *words], only=["A torque norm"])
+    return given[0].conditions[0].condition.prepare()
+
+
+def same_postures(planner: Any, problem: Any, seed: int, fault: str = "") -> bool:
+    """Return whether all generations have the same strings, at the same costs."""
+    rng = np.random.default_rng(seed)
+    expected = chen_python.evolve_postures(planner, problem, rng, fault)
+    bits, best = planner.bits_per_gene, np.inf
+    for generation, (strings, costs, num_feasible) in zip(
+        planner.evolve(problem, np.random.default_rng(seed)), expected, strict=True
+    ):
+        if ["".join(f"{n:0{bits}b}" for n in pair) for pair in generation.population.T] != strings:
+            return False
+        best = min(best, *costs)
+        np.testing.assert_allclose(generation.costs, costs, rtol=1e-9)
+        assert generation.num_feasible == num_feasible
+        found = [generation.best_cost, generation.best_cost_in_generation, generation.mean_cost]
+        assert found == pytest.approx([best, min(costs), np.mean(costs)], rel=1e-9)
+        assert planner.evaluate(problem, generation.best)["cost"] == generation.best_cost
+    return True
+
+
+@pytest.mark.parametrize(
+    ("words", "changes"),
+    [
+        ((), {}),
+        (("objective=chen_minimax",), {"num_elites": 2, "mutation_rate": 0.1}),
+        (("scenario=chen_docking_link", "objective=chen_obstacle_link"), {"population_size": 31}),
+        (("planner.coding=gray",), {"crossover_rate": 1.0, "mutation_rate": 0.0}),
+        (("planner.bits_per_gene=5",), {"mutation_rate": 1.0, "scaling_multiple": 1.5}),
+    ],
+    ids=str,
+)
+@pytest.mark.parametrize("seed", range(2))
+def test_generations_of_postures_are_the_same(
+    words: tuple[str, ...], changes: dict[str, Any], seed: int
+) -> None:
+    planner, problem = prepared(*words)
+    ga = planner.ga.model_copy(update={"num_generations": 30} | changes)
+    assert same_postures(planner.model_copy(update={"ga": ga}), problem, seed)
+
+
+@pytest.mark.parametrize("fault", chen_python.FAULTS)
+def test_a_fault_among_postures_would_be_noticed(fault: str) -> None:
+    planner, problem = prepared()
+    ga = planner.ga.model_copy(update={"num_generations": 8, "num_elites": 2})
+    assert not same_postures(planner.model_copy(update={"ga": ga}), problem, 0, fault)

@@ -1,0 +1,111 @@
+"""The compiled planner of Lavoie & Boudreau against the same algorithm in plain numpy.
+
+Both take the same uniform numbers and so the same discrete decisions: who is drawn, cut, mutated,
+who collides. Then they differ by rounding alone; were one decision to flip, postures would differ
+by tenths.
+"""
+
+import functools
+import itertools
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from evoexp.condition import Condition
+from evoexp.configuration import compose
+from references import lavoie_numpy
+
+ROUNDING = 1e-11  # [rad], [cost]
+GA: dict[str, Any] = {"population_size": 60, "num_generations": 25, "num_elites": 2}
+PLANNER = {"num_attempts": 2, "stop_cost_sp1": 3.0, "stop_cost_sp2": 0.5}
+
+
+@functools.cache
+def composed(*words: str) -> Condition:
+    return compose.expand(words)[0].conditions[0].condition
+
+
+def condition(
+    *words: str, collision: dict[str, Any] | None = None, **changes: Any
+) -> SimpleNamespace:
+    """Return a small condition; the changes are settings of the planner or of its `ga`."""
+    given: Any = composed(*(words or ("experiment=lavoie_7dof",)))
+    own = {
+        name: value for name, value in changes.items() if name in type(given.planner).model_fields
+    }
+    ga = given.planner.ga.model_copy(update=GA | {k: v for k, v in changes.items() if k not in own})
+    own["collision"] = given.planner.collision.model_copy(update=collision or {})
+    planner = given.planner.model_copy(update=PLANNER | own | {"ga": ga})
+    return SimpleNamespace(robot=given.robot, scenario=given.scenario, planner=planner)
+
+
+def largest_difference(given: Any, seed: int, fault: str = "") -> tuple[float, set[int]]:
+    """Return the largest difference of genomes and costs, and the sub-paths that were searched.
+
+    It is inf where the runs differ in length, or one finds infeasible whom the other does not.
+    """
+    planner = given.planner
+    ours = planner.evolve(planner.prepare(given.robot, given.scenario), np.random.default_rng(seed))
+    theirs = lavoie_numpy.evolve(given, np.random.default_rng(seed), fault)
+    largest, searched, count = 0.0, set(), 0
+    for found, expected in itertools.zip_longest(ours, theirs):
+        if found is None or expected is None:
+            return np.inf, searched
+        finite, count = np.isfinite(expected.costs), count + 1
+        same_search = (found.terms["attempts"], found.terms["sub_path"]) == expected[:2]
+        if not same_search or not np.array_equal(np.isfinite(found.costs[0]), finite):
+            return np.inf, searched
+        assert found.num_feasible == np.count_nonzero(finite)
+        searched.add(expected.sub_path)
+        best = (found.best_cost, expected.best_cost) if np.isfinite(expected.best_cost) else (0, 0)
+        for one, two in [
+            (found.population, expected.genomes),
+            (found.costs[0][finite], expected.costs[finite]),
+            (found.best, expected.best),
+            best,
+        ]:
+            largest = max(largest, float(np.abs(np.subtract(one, two)).max(initial=0.0)))
+    assert count > 25
+    return largest, searched
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"selection": "roulette", "crossover": "uniform"},
+        {"selection": "rank", "crossover": "arithmetic", "crossover_rate": 0.8},
+        {"crossover": "blx_alpha", "mutation": "gaussian", "tournament_size": 3},
+        {"mutation": "uniform_reset", "mutation_scope": "individual", "population_size": 31},
+        {"mutation_scope": "individual", "collision": {"swept": "none", "num_positions": 4}},
+        {"success": "finite", "num_attempts": 3},
+    ],
+    ids=str,
+)
+def test_generations_agree_to_rounding(changes: dict[str, Any]) -> None:
+    difference, searched = largest_difference(condition(**changes), 0)
+    assert difference < ROUNDING
+    assert 1 in searched
+
+
+def test_generations_of_bits_agree_to_rounding() -> None:
+    binary = condition("experiment=lavoie_7dof", "ga=lavoie_binary", num_elites=0)
+    assert largest_difference(binary, 0)[0] < ROUNDING
+
+
+def test_both_sub_paths_and_the_arm_of_ten_joints_agree() -> None:
+    given = condition("experiment=lavoie_10dof", population_size=150, stop_cost_sp1=6.0)
+    difference, searched = largest_difference(given, 1)
+    assert difference < ROUNDING
+    assert searched == {1, 2}
+
+
+@pytest.mark.parametrize(
+    ("fault", "selection"),
+    [(fault, "tournament") for fault in lavoie_numpy.FAULTS]
+    + [("uniform selection", "roulette"), ("uniform selection", "rank")],
+)
+def test_a_fault_would_be_noticed(fault: str, selection: str) -> None:
+    assert largest_difference(condition(selection=selection), 0, fault)[0] > 1e3 * ROUNDING

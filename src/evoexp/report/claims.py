@@ -79,6 +79,11 @@ class Comparison(NamedTuple):
         return 1 if self.better.a12 > 0.5 else -1
 
 
+def judged(holds: bool | None) -> str:
+    """Return the verdict on a claim that holds, or does not; None: nobody can say."""
+    return {True: REPRODUCED, False: CONTRADICTED, None: INCONCLUSIVE}[holds]
+
+
 def judge_all(not_judged: str, holds: int, done: int, planned: int) -> str:
     """Judge a claim about every run.
 

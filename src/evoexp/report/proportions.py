@@ -27,6 +27,15 @@ class Proportion(NamedTuple):
         """Return Wilson's score interval."""
         return wilson(self.having, self.total, confidence)
 
+    def with_interval(self, confidence: float, decimals: int) -> str:
+        """Return the proportion and its interval in words: "964 of 1000 = 96.4 % [95.1, 97.4]"."""
+        if not self.total:
+            return "0 of 0"
+        share, low, high = (
+            f"{100 * value:.{decimals}f}" for value in (self.share, *self.interval(confidence))
+        )
+        return f"{self.having} of {self.total} = {share} % [{low}, {high}]"
+
 
 def newcombe(one: Proportion, two: Proportion, confidence: float) -> Interval:
     """Return an interval of the difference `one` − `two` (Newcombe 1998, method 10.

@@ -3,7 +3,7 @@
 import functools
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from evoexp.condition import Condition, Prepared
 from evoexp.errors import NothingStored
+from evoexp.paths.motion import Motion
 from evoexp.records import FloatArray
 from evoexp.report.statistics import Spread, spread
 from evoexp.store.log_reader import read_array, read_log, read_solution
@@ -18,6 +19,7 @@ from evoexp.store.messages import TERM
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.tables import read_generations, read_summaries
 
+Kind = TypeVar("Kind")
 WRAPPED = (
     "planner"  # the field of a control (random search) that holds the planner it stands beside
 )
@@ -172,6 +174,34 @@ class ConditionResults(NamedTuple):
     def prepared(self) -> Prepared:
         """Planner and problem, to judge solutions with."""
         return self.condition.prepare()
+
+    def problem(self, kind: type[Kind]) -> Kind:
+        """Return the problem that the planner prepared, of the public type that a page expects.
+
+        Raises:
+            TypeError: If another planner was run.
+        """
+        found = self.prepared.problem
+        if not isinstance(found, kind):
+            raise TypeError(f"{self.label}: a {kind.__qualname__} is expected, was {type(found)}")
+        return found
+
+    def evaluate(self, solution: FloatArray) -> dict[str, float]:
+        """Return the named terms of a solution, as the planner's `evaluate` tells them."""
+        planner, problem = self.prepared
+        return dict(planner.evaluate(problem, solution))
+
+    def motion(self, replicate: int) -> Motion:
+        """Return the motion of a replicate's best solution.
+
+        Raises:
+            TypeError: If the planner's answer is no motion.
+        """
+        planner, problem = self.prepared
+        found = planner.motion(problem, self.solutions[replicate])
+        if not isinstance(found, Motion):
+            raise TypeError(f"{self.label}: its solutions are no motions")
+        return found
 
     @property
     def planner(self) -> Any:

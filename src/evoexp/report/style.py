@@ -100,6 +100,12 @@ def figure(height: float, width: float = WIDTH) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
+def row_of_panels(height: float, count: int, *, sharey: bool = False) -> tuple[Figure, list[Axes]]:
+    """Return a figure of some height [inch] over the whole page, and its panels side by side."""
+    found = figure(height)
+    return found, list(found.subplots(1, count, squeeze=False, sharey=sharey)[0])
+
+
 def arm_colour(arm: int) -> str:
     """Return the colour of an arm, counted from 0."""
     return ARM_COLOURS[arm % len(ARM_COLOURS)]
@@ -155,3 +161,12 @@ def arm_keys(arms: Iterable[int], name: str = "arm", **look: Any) -> list[Line2D
 def keys_below(figure: Figure, keys: Sequence[Artist], columns: int | None = None) -> None:
     """Put a legend of given entries under the whole figure, in one line if no columns are given."""
     figure.legend(handles=keys, loc="outside lower center", ncols=columns or len(keys))
+
+
+def legend_of_all(figure: Figure, panels: Iterable[Axes], columns: int) -> None:
+    """Put one legend of the labels of all panels under the whole figure, each label once."""
+    handles: dict[str, Any] = {}
+    for axes in panels:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            handles.setdefault(label, handle)
+    figure.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=columns)

@@ -8,16 +8,17 @@ import pytest
 
 from collision.certifier_scenes import SAMPLES, brute_force, random_motion, random_scene
 from evoexp.collision.certifier.verdict import certify
+from matrix import first
 
 SCENES, BATCH = 200, 20
 
 COAL_ERROR = 1e-6  # of distances of curved bodies, far above what was seen
 
 
-@pytest.mark.parametrize("first", range(0, SCENES, BATCH))
-def test_brute_force_never_contradicts(first: int) -> None:
+@pytest.mark.parametrize("first_scene", first(2, range(0, SCENES, BATCH)))
+def test_brute_force_never_contradicts(first_scene: int) -> None:
     statuses = []
-    for seed in range(first, first + BATCH):
+    for seed in range(first_scene, first_scene + BATCH):
         rng = np.random.default_rng(seed)
         scene = random_scene(rng)
         motion = random_motion(rng, scene.model.nq)

@@ -345,6 +345,7 @@ def digest() -> str:
     ).hexdigest()
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(("cpu", "optimisation"), [("haswell", "3"), ("generic", "0")])
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="names of x86 processors")
 def test_other_processors_and_optimisation_levels_give_the_same_bits(

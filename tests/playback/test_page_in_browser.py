@@ -12,6 +12,7 @@ from evoexp.playback.player_page import page
 
 pytestmark = [
     pytest.mark.browser,
+    pytest.mark.matrix,
     pytest.mark.skipif(
         CHROMIUM is None, reason="needs chromium on PATH (Debian: apt-get install chromium)"
     ),

@@ -195,7 +195,7 @@ def test_verdicts_follow_the_rows_of_a_sweep(
     outputs: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     results = smoke_results(outputs, "curkovic_mutation")
-    monkeypatch.setattr(sweep_claims, "not_judged", lambda results: "")
+    monkeypatch.setattr(judging, "not_judged", lambda results: "")
     low, high = np.arange(12.0), np.arange(12.0) + 20.0
     settings, found = page_settings("curkovic_mutation"), []
     for first, second in ((low, high), (high, low), (low, low)):

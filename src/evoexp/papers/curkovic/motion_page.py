@@ -34,10 +34,10 @@ KEPT = "least distance of an end-effector from another robot's links"
 
 
 def page(results: Results, settings: ReportSettings) -> Page:
-    """Return the page; the generic one where planners are others."""
-    base = generic.page(results, settings)
+    """Build the page of motions, or the generic page if another planner was run."""
     if not measures.fits(results):
-        return base
+        return generic.page(results, settings)
+    base = generic.basis(results, settings)
     unit = results.with_data[0].condition.length_unit
     row = partial(generic.quantity, results)
     tools = _tools(results, settings)

@@ -29,7 +29,7 @@ INTRODUCTION = (
 
 
 def page(results: Results, settings: ReportSettings) -> Page:
-    """Return the page; the generic one where planners are others."""
+    """Build the page of methods, or the generic page if another planner was run."""
     if not measures.fits(results):
         return generic.page(results, settings)
     first = results.with_data[0]

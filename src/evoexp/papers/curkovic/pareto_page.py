@@ -25,14 +25,14 @@ INTRODUCTION = (
 
 
 def page(results: Results, settings: ReportSettings) -> Page:
-    """Return the page; the generic one where no log holds a front."""
-    base = generic.page(results, settings)
+    """Build the page of fronts, or the generic page if no log holds a front."""
     if not measures.fits(results):
-        return base
+        return generic.page(results, settings)
     fronts = {c.label: _fronts(results, c) for c in results.with_data}
     drawn = [c for c in results.with_data if fronts[c.label].get(c.best_replicate)]
     if not drawn:
-        return base
+        return generic.page(results, settings)
+    base = generic.basis(results, settings)
     populations = range(max(len(rows) for c in drawn for rows in fronts[c.label].values()))
     sizes = [(p, {c.label: _sizes(fronts[c.label], p) for c in drawn}) for p in populations]
     return base._replace(

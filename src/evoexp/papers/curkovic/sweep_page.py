@@ -32,14 +32,13 @@ SHORT = {
 
 
 def page(results: Results, settings: ReportSettings) -> Page:
-    """Return the page; the generic one where there is nothing to compare."""
-    base = generic.page(results, settings)
+    """Build the page of a sweep, or the generic page if there is nothing to compare."""
     if not measures.fits(results) or len(results.with_data) < 2:
-        return base
+        return generic.page(results, settings)
     bound = measures.lower_bound(results.with_data[0])
     threshold = settings.threshold_ratio * bound
     found = families.tested(results, settings, threshold)
-    return base._replace(
+    return generic.basis(results, settings)._replace(
         title=f"Curkovic et al. 2013: {results.experiment or 'stored runs'}",
         introduction=INTRODUCTION,
         quantities=_quantities(results, threshold),

@@ -32,9 +32,9 @@ PARTS = ("no redistribution", "no relaxation (δ = 0)", "neither")  # what the c
 
 def page(results: Results, settings: ReportSettings) -> Page:
     """Return the page."""
-    base = generic.page(results, settings)
     if len(results.with_data) < 2:
-        return base
+        return generic.page(results, settings)
+    base = generic.basis(results, settings)
     unit = results.with_data[0].condition.length_unit or "–"
     tables = {
         name: _against_first(results, settings, column, lower)

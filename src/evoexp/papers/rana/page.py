@@ -41,7 +41,7 @@ INTRODUCTION = (
 
 
 def page(results: Results, settings: ReportSettings) -> Page:
-    """Return the page; the generic one where a robot is not what these figures draw."""
+    """Build the page of the paper, or the generic page if its figures cannot draw a robot."""
     if not results.with_data or not all(_fits(condition) for condition in results.with_data):
         return generic.page(results, settings)
     comparisons = generic.comparisons(results, settings, COMPARED)

@@ -1,28 +1,55 @@
-"""The page of whatever has no page of its own.
+"""The page of any experiment: results, convergence, all conditions compared with each other."""
 
-Results, convergence, and comparisons with the controls.
-"""
-
-from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 
-import numpy as np
-
-from evoexp.condition import Condition
-from evoexp.records import FloatArray
-from evoexp.report.claims import Comparison, adjusted, compare
+from evoexp.report import pairwise, sweep_figures
+from evoexp.report.comparisons import Values as Values
+from evoexp.report.comparisons import by_column as by_column
+from evoexp.report.comparisons import compare_on_common_seeds as compare_on_common_seeds
+from evoexp.report.comparisons import compared as compared
+from evoexp.report.comparisons import comparisons as comparisons
 from evoexp.report.figures import convergence
 from evoexp.report.page import Drawing, Page, Quantity
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import WRAPPED, ConditionResults, Results
+from evoexp.report.results import Results
 from evoexp.report.statistics import spread
 from evoexp.store.messages import TERM
 
-Values = Callable[[ConditionResults], FloatArray]
+FEW = 4  # conditions whose average costs can be drawn beside the best ones
+SCENES = (
+    "The conditions differ in robot or scenario: their costs are compared as numbers, whatever "
+    "they measure."
+)
 
 
 def page(results: Results, settings: ReportSettings) -> Page:
-    """Return the page."""
+    """Build the page of any experiment, whatever its planners are.
+
+    All conditions are compared with each other in best cost, effort and shares of runs; see
+    `pairwise`.
+    """
+    base = basis(results, settings)
+    if not results.with_data:
+        return base
+    scenes = {(c.condition.robot, c.condition.scenario) for c in results.with_data}
+    drawn = [cost_drawing(results)] if len(results.evolved) <= FEW else [best_drawing(results)]
+    boxes = {one.name: one.values for one in pairwise.differing(results)}
+    if boxes:
+        drawn.append(sweep_figures.values_drawing(results, boxes))
+    return base._replace(
+        introduction=SCENES if len(scenes) > 1 else "",
+        quantities=(
+            *base.quantities,
+            quantity(results, "CPU time of the search", "s", pairwise.searching_seconds),
+        ),
+        tables=pairwise.share_tables(results, settings),
+        comparisons=pairwise.comparisons(results, settings),
+        drawings=(*drawn, *pairwise.matrix_drawing(results, settings)),
+    )
+
+
+def basis(results: Results, settings: ReportSettings) -> Page:
+    """Build the beginning of a paper's page: quantities, controls and convergence."""
     return Page(
         title=results.experiment or "stored runs",
         introduction="",
@@ -32,18 +59,13 @@ def page(results: Results, settings: ReportSettings) -> Page:
     )
 
 
-def by_column(name: str) -> Values:
-    """Return the function that gives a condition's column of this name."""
-    return lambda condition: condition.column(name)
-
-
 def quantity(results: Results, name: str, unit: str, values: Values) -> Quantity:
     """Return a row of the table of results."""
     return Quantity(name, unit, {c.label: spread(values(c)) for c in results.with_data})
 
 
 def quantities(results: Results) -> tuple[Quantity, ...]:
-    """Return what every planner records."""
+    """Return the rows of the quantities that every planner records."""
     first = "first generation with a feasible individual (over the runs that have one)"
     return (
         quantity(results, "best cost", "–", by_column("best_cost")),
@@ -56,7 +78,7 @@ def quantities(results: Results) -> tuple[Quantity, ...]:
 
 
 def term_quantities(results: Results) -> tuple[Quantity, ...]:
-    """Return the planner's own terms of the best solutions."""
+    """Return the rows of the planner's own terms, those of the best solutions."""
     rows = []
     for term in results.terms:
         name, unit = term.replace("_", " "), "–"
@@ -83,85 +105,18 @@ def cost_drawing(results: Results) -> Drawing:
     )
 
 
-def comparisons(
-    results: Results, settings: ReportSettings, compared: Sequence[tuple[str, bool, Values]]
-) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
-    """Compare every condition with the controls that stand beside it, on their common seeds.
+def best_drawing(results: Results, more: str = "") -> Drawing:
+    """Return the figure of the best costs only, where averages would hide them.
 
     Args:
-        results: Of the experiment.
-        settings: Levels and resamples.
-        compared: (quantity, whether lower is better, its values).
-
-    Returns:
-        (heading, one comparison per quantity), p-values adjusted over the quantities.
+        results: Whose conditions are drawn.
+        more: Is added to the caption.
     """
-    found = []
-    for first in results.evolved:
-        for second in results.evolved:
-            if (
-                first.is_control
-                or not second.is_control
-                or not _beside(first.condition, second.condition)
-            ):
-                continue
-            rows = [compare_on_common_seeds(first, second, *what, settings) for what in compared]
-            kept = [row for row in rows if row is not None]
-            if kept:
-                found.append((f"{first.label} against {second.label}", tuple(adjusted(kept))))
-    return tuple(found)
-
-
-def _beside(first: Condition, control: Condition) -> bool:
-    """Whether a control wraps this very planner in the same scene.
-
-    Equal evaluations and common seeds.
-    """
-    return control._replace(planner=getattr(control.planner, WRAPPED)) == first
-
-
-def compared(
-    pairs: Iterable[tuple[ConditionResults, ConditionResults]],
-    values: Values,
-    settings: ReportSettings,
-    *,
-    lower_is_better: bool = True,
-    named: Callable[[ConditionResults, ConditionResults], str] = lambda first, second: second.label,
-) -> tuple[Comparison, ...]:
-    """Compare pairs of conditions in one quantity on their common seeds.
-
-    Args:
-        pairs: (first, second); pairs without a common seed are left out.
-        values: The quantity of a condition, (done,).
-        settings: Levels and resamples.
-        lower_is_better: Which of two values is better.
-        named: Gives the name of a pair's row; by default the label of the second condition.
-
-    Returns:
-        One comparison per pair, p-values adjusted over the pairs.
-    """
-    rows = [
-        compare_on_common_seeds(a, b, named(a, b), lower_is_better, values, settings)
-        for a, b in pairs
-    ]
-    return tuple(adjusted([row for row in rows if row is not None]))
-
-
-def compare_on_common_seeds(
-    first: ConditionResults,
-    second: ConditionResults,
-    quantity: str,
-    lower_is_better: bool,
-    values: Values,
-    settings: ReportSettings,
-) -> Comparison | None:
-    """Compare one quantity over the replicates that both have; None where there is none."""
-    common = first.summaries.index.intersection(second.summaries.index)
-    x = values(first)[first.summaries.index.get_indexer(common)]
-    y = values(second)[second.summaries.index.get_indexer(common)]
-    known = ~(np.isnan(x) | np.isnan(y))
-    if not known.any():
-        return None
-    return compare(
-        quantity, x[known], y[known], lower_is_better, settings.confidence, settings.num_resamples
+    return Drawing(
+        "convergence",
+        "Convergence",
+        f"Median of the best cost so far over replicates. Lower is better.{more}",
+        partial(convergence.cost_table, results),
+        convergence.draw_best,
+        results.with_data,
     )

@@ -26,7 +26,7 @@ DISTANCES = (
 
 def page(results: Results, settings: ReportSettings) -> Page:
     """Return the page; without the drawings of what is not planar."""
-    base = generic.page(results, settings)
+    base = generic.basis(results, settings)
     drawings = list(base.drawings)
     for condition, suffix in suffixed(results):
         if not drawable(condition):

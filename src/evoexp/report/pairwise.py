@@ -1,0 +1,173 @@
+"""All conditions of an experiment against each other: quantities, and shares of runs."""
+
+import itertools
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from evoexp.records import FloatArray
+from evoexp.report import markdown
+from evoexp.report.claims import Comparison
+from evoexp.report.claims import adjusted as adjusted_rows
+from evoexp.report.comparisons import Values, by_column, compared
+from evoexp.report.figures import matrix
+from evoexp.report.page import Drawing, Table
+from evoexp.report.proportions import Proportion, fisher_exact, newcombe
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results import ConditionResults, Results
+from evoexp.report.statistics import holm
+
+MOST = 6  # conditions of which every pair is tabled; of more, the first against each other one
+
+Pair = tuple[ConditionResults, ConditionResults]
+
+
+class Effort(NamedTuple):
+    """A quantity that every planner records; lower is better."""
+
+    name: str
+    values: Values
+
+
+def searching_seconds(condition: ConditionResults) -> FloatArray:
+    """Return the CPU time of each run's search, the exact verdict left out, (done,) [s]."""
+    return condition.column("cpu_s") - np.nan_to_num(condition.column("certificate_s"))
+
+
+def solved(condition: ConditionResults) -> Proportion:
+    """Return how many finished runs have a solution that the planner's own model accepts."""
+    return Proportion(condition.solved, condition.done)
+
+
+def certified(condition: ConditionResults) -> Proportion:
+    """Return how many of the motions that the exact verdict judged are certified."""
+    return Proportion(condition.verdicts.certified, condition.verdicts.judged)
+
+
+def keeping_margin(condition: ConditionResults) -> Proportion:
+    """Return how many of the judged motions are certified to keep the security margin."""
+    return Proportion(condition.verdicts.with_margin, condition.verdicts.judged)
+
+
+EFFORTS = (
+    Effort("best cost", by_column("best_cost")),
+    Effort("evaluations", by_column("evaluations")),
+    Effort("collision queries", by_column("collision_queries")),
+    Effort("CPU time, search [s]", searching_seconds),
+)
+SHARES: dict[str, Callable[[ConditionResults], Proportion]] = {
+    "solved": solved,
+    "certified": certified,
+    "margin certified": keeping_margin,
+}
+
+
+def differing(results: Results) -> list[Effort]:
+    """Return the quantities that are not the same in every run."""
+    return [
+        one
+        for one in EFFORTS
+        if len(np.unique(np.concatenate([one.values(c) for c in results.evolved]))) > 1
+    ]
+
+
+def pairs(results: Results) -> list[Pair]:
+    """Return the pairs that tables hold; references have no seeds and stand aside."""
+    first, *others = results.evolved
+    if len(others) < MOST:
+        return list(itertools.combinations(results.evolved, 2))
+    return [(first, other) for other in others]
+
+
+def comparisons(
+    results: Results, settings: ReportSettings
+) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
+    """Compare conditions in every quantity in which they differ.
+
+    Returns:
+        (heading, one comparison per pair), p-values adjusted within each quantity.
+    """
+    of = "pairs of conditions"
+    if len(results.evolved) > MOST:
+        of = f"{results.evolved[0].label} against each other condition"
+    found = (
+        (f"{one.name}: {of}", compared(pairs(results), one.values, settings, named=_named))
+        for one in differing(results)
+    )
+    return tuple((heading, rows) for heading, rows in found if rows)
+
+
+def share_tables(results: Results, settings: ReportSettings) -> tuple[Table, ...]:
+    """Return shares of runs with intervals, and how far they differ from each other."""
+    level = f"{100 * settings.confidence:g} %"
+    rows = [
+        (c.label, *(of(c).with_interval(settings.confidence, 0) for of in SHARES.values()))
+        for c in results.with_data
+    ]
+    note = f"In brackets Wilson's {level} interval; certified shares are of the motions judged."
+    own = Table("Shares of runs", ("condition", *SHARES), tuple(rows), note)
+    between = [
+        row for name, of in SHARES.items() for row in _differences(results, settings, name, of)
+    ]
+    if not between:
+        return (own,)
+    headers = ("share", "conditions", "difference [points]", "Fisher p", "adjusted")
+    note = (
+        f"Difference: first minus second, in brackets Newcombe's {level} interval. Fisher's exact "
+        "test, two-sided; adjusted: Holm over the pairs, share by share. A share that is the same "
+        "in all conditions is left out."
+    )
+    return own, Table("Shares of runs compared", headers, tuple(between), note)
+
+
+def _differences(
+    results: Results,
+    settings: ReportSettings,
+    name: str,
+    of: Callable[[ConditionResults], Proportion],
+) -> list[tuple[object, ...]]:
+    """Return one row per pair; none where the share is the same in all conditions."""
+    found = [(a, b, of(a), of(b)) for a, b in pairs(results) if of(a).total and of(b).total]
+    if len({p.share for _, _, *both in found for p in both}) < 2:
+        return []
+    p_values = [fisher_exact(one, two) for _, _, one, two in found]
+    rows: list[tuple[object, ...]] = []
+    for (a, b, one, two), p, adjusted in zip(found, p_values, holm(p_values), strict=True):
+        between = (one.share - two.share, *newcombe(one, two, settings.confidence))
+        difference, low, high = (f"{100 * x + 0.0:.0f}" for x in between)
+        points = f"{difference} [{low}, {high}]".replace("-", "−")
+        tests = markdown.p_value(p), markdown.p_value(adjusted)
+        rows.append((name, _named(a, b), points, *tests))
+    return rows
+
+
+def matrix_drawing(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
+    """Return the matrix of effect sizes in the best cost, of three conditions or more."""
+    best = EFFORTS[0]
+    if len(results.evolved) < 3 or best not in differing(results):
+        return ()
+    every = [
+        (pair, rows)
+        for pair in itertools.combinations(results.evolved, 2)
+        if (rows := compared([pair], best.values, settings))
+    ]
+    tested = adjusted_rows([row for _, rows in every for row in rows])
+    labels = [(a.label, b.label) for (a, b), _ in every]
+    return (
+        Drawing(
+            "matrix",
+            "How often one condition is better than another one",
+            "Vargha and Delaney's A12 of the best cost: the share of pairs of runs in which the "
+            "condition of the row has the lower cost, ties count half. Bold: Wilcoxon's "
+            "signed-rank test on common seeds, adjusted by Holm over all pairs.",
+            partial(matrix.matrix_table, labels, tested, settings.significance),
+            matrix.draw_matrix,
+            results.evolved,
+        ),
+    )
+
+
+def _named(first: ConditionResults, second: ConditionResults) -> str:
+    return f"{first.label} against {second.label}"

@@ -1,0 +1,86 @@
+"""All conditions against each other: which pairs, which tests, which tables."""
+
+import numpy as np
+import pytest
+
+from evoexp.report import pairwise
+from evoexp.report.figures import matrix
+from evoexp.report.pages import generic
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results import ConditionResults, Results
+from evoexp.report.statistics import holm
+
+
+def shifted(condition: ConditionResults, number: int) -> ConditionResults:
+    """Return a condition whose costs are higher by a number, under another name."""
+    rows = condition.summaries
+    costs = rows["best_cost"] + number * (1.0 + 0.1 * np.arange(len(rows)))
+    return condition._replace(label=f"+{number}", summaries=rows.assign(best_cost=costs))
+
+
+def copies(results: Results, count: int) -> Results:
+    """Return results of some conditions that differ in their costs alone."""
+    first = results.conditions[0]
+    return results._replace(conditions=tuple(shifted(first, k) for k in range(count)))
+
+
+@pytest.mark.parametrize(("count", "rows"), [(4, 6), (6, 15), (7, 6)])
+def test_every_pair_is_compared_and_of_many_conditions_the_first_with_each(
+    results: Results, settings: ReportSettings, count: int, rows: int
+) -> None:
+    found = copies(results, count)
+    (_, costs), *_ = pairwise.comparisons(found, settings)
+    assert len(costs) == rows
+    assert len({row.quantity for row in costs}) == rows
+    assert [row.p_adjusted for row in costs] == holm([row.test.p_value for row in costs])
+    assert all(row.better.a12 > 0.5 for row in costs)  # the first of a pair costs less
+
+
+def test_a_quantity_that_never_differs_is_left_out(results: Results) -> None:
+    same = results._replace(conditions=results.conditions[:1] * 2)
+    names = {one.name for one in pairwise.differing(same)}
+    assert "evaluations" not in names
+    assert "best cost" in names  # of two seeds
+
+
+def test_shares_that_differ_are_tested_pair_by_pair(
+    results: Results, settings: ReportSettings
+) -> None:
+    first = results.conditions[0]
+    some = first._replace(label="all", summaries=first.summaries.assign(solved=True))
+    none = first._replace(label="none", summaries=first.summaries.assign(solved=False))
+    own, between = pairwise.share_tables(results._replace(conditions=(some, none)), settings)
+    assert [row[:2] for row in own.rows] == [
+        ("all", "2 of 2 = 100 % [34, 100]"),
+        ("none", "0 of 2 = 0 % [0, 66]"),
+    ]
+    (row,) = (row for row in between.rows if row[0] == "solved")
+    assert row[1:3] == ("all against none", "100 [7, 100]")
+    assert float(str(row[3])) == pytest.approx(1.0 / 3.0, abs=0.01)  # 2 of 6 tables
+    (alone,) = pairwise.share_tables(results._replace(conditions=(some,)), settings)
+    assert len(alone.rows) == 1
+
+
+def test_the_matrix_shows_each_pair_from_both_sides(
+    results: Results, settings: ReportSettings
+) -> None:
+    (drawing,) = pairwise.matrix_drawing(copies(results, 3), settings)
+    table = drawing.table().set_index(["condition", "other"])
+    assert len(table) == 6
+    for (a, b), row in table.iterrows():
+        assert row["a12"] == pytest.approx(1.0 - table.loc[(b, a), "a12"])
+        assert row["lower"] <= row["a12"] <= row["upper"]
+    assert table.loc[("+0", "+2"), "a12"] > 0.5
+    words = [text.get_text() for text in matrix.draw_matrix(table.reset_index()).axes[0].texts]
+    assert len(words) == 6
+    assert not pairwise.matrix_drawing(copies(results, 2), settings)
+
+
+def test_the_generic_page_holds_all_of_it(results: Results, settings: ReportSettings) -> None:
+    page = generic.page(copies(results, 4), settings)
+    headings = [heading for heading, _ in page.comparisons]
+    quantities = ("best cost", "CPU time, search [s]")  # all took as many evaluations
+    assert headings == [f"{name}: pairs of conditions" for name in quantities]
+    assert [drawing.stem for drawing in page.drawings] == ["convergence", "values", "matrix"]
+    assert page.tables[0].headers == ("condition", "solved", "certified", "margin certified")
+    assert {"best cost", "CPU time of the search"} <= {q.name for q in page.quantities}

@@ -13,6 +13,7 @@ from evoexp.planners.via_point_ga.planner import Problem, ViaPointGa
 from evoexp.robots.arms import Arms
 from evoexp.robots.serial_chain import SerialChain, SerialJoint
 from evoexp.scenarios.arm_motion import ArmMotion
+from references import rana_numpy
 
 
 def condition(*overrides: str, experiment: str = "rana_planar") -> Condition:
@@ -292,3 +293,33 @@ def test_a_solution_of_another_size_is_refused() -> None:
     planner, problem = prepared()
     with pytest.raises(ValueError, match="a solution has 84 values"):
         planner.evaluate(problem, np.zeros(83))
+
+
+@pytest.mark.parametrize("redistribution", [True, False])
+def test_improving_is_one_pass_of_redistribution_and_relaxation(redistribution: bool) -> None:
+    """Against the slow version, by rounding where nothing measures an arc length."""
+    given = condition(f"planner.redistribution={str(redistribution).lower()}")
+    planner, problem = given.prepare()
+    rng = np.random.default_rng(4)
+    population = planner.sample(problem, rng, 13)
+    before = population.copy()
+    improved = planner.improve(problem, population, rng)
+    assert np.array_equal(population, before)
+    assert improved.shape == population.shape
+    arms = np.array([before[a:b] for a, b in problem.arm_slices]).transpose(3, 0, 2, 1)
+    slow = rana_numpy.smooth(rana_numpy.from_condition(given, chords_per_segment=512), arms)
+    found = np.array([improved[a:b] for a, b in problem.arm_slices]).transpose(3, 0, 2, 1)
+    assert np.abs(found - slow).max() < (0.5 if redistribution else 1e-9)  # [deg]
+    assert np.abs(found - arms).max() > 1.0
+
+
+def test_repeated_improvement_shortens_and_evens_strings() -> None:
+    planner, problem = prepared()
+    rng = np.random.default_rng(5)
+    population = planner.sample(problem, rng, 20)
+    first = planner.cost(problem, population).terms
+    for _ in range(20):
+        population = planner.improve(problem, population, rng)
+    last = planner.cost(problem, population).terms
+    assert np.all(last.lengths[:, :20] < first.lengths[:, :20])
+    assert np.all(last.unevenness[:, :20].mean(axis=1) < first.unevenness[:, :20].mean(axis=1))

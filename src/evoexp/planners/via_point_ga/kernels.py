@@ -1,9 +1,10 @@
 """One generation of strings of via-points, compiled (Rana & Zalzala 1995, section 3.4).
 
 A whole generation is one call: between kernels, Python's own work would cost half as much as
-theirs. Populations are arrays (nq, N + 1, individuals), padded to whole vectors; settings travel as
-plain tuples, which `via_point_ga` makes.
+theirs. Populations are arrays (nq, N + 1, individuals), padded to whole vectors.
 """
+
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,46 +14,146 @@ from evoexp.evolution.crossover import cross_at_sites
 from evoexp.evolution.selection import choose_elites, shuffle_head, spin_roulette
 from evoexp.evolution.succession import succeed_rows
 from evoexp.numeric.compilation import kernel
-from evoexp.objectives.string_fitness import count_collisions, fill_wheel, weigh
+from evoexp.objectives.string_fitness import StringTerms, count_collisions, fill_wheel, weigh
 from evoexp.paths.interpolation import interpolate
 from evoexp.paths.lengths import measure_paths
 from evoexp.paths.redistribution import redistribute_arms
 from evoexp.paths.relaxation import relax_points
 from evoexp.paths.walk import walk_strings
+from evoexp.records import FloatArray, IntArray
+
+
+class Counts(NamedTuple):
+    """Sizes of a generation.
+
+    Attributes:
+        offspring: Individuals that are new.
+        pair_uniforms: Uniform numbers that cross-over takes.
+        new: Offspring that may be replaced by new trajectories.
+    """
+
+    offspring: int
+    pair_uniforms: int
+    new: int
+
+
+class Breeding(NamedTuple):
+    """Settings of section 3.4 (a), (b) and (d).
+
+    Attributes:
+        fitness_offset: C_max of Eq. 7.
+        crossover_rate: Probability that a pair is crossed.
+        crossover_distance: Parents are crossed only where they are closer than this [deg].
+        mutation_rate: Probability that a slot gets a new trajectory.
+        walk_step: Step of a new trajectory, in units of its straight distance over N.
+        max_turn: Its largest turn away from the goal [rad].
+        start: (nq,) [deg].
+        goal: (nq,) [deg].
+    """
+
+    fitness_offset: float
+    crossover_rate: float
+    crossover_distance: float
+    mutation_rate: float
+    walk_step: float
+    max_turn: float
+    start: FloatArray
+    goal: FloatArray
+
+
+class Smoothing(NamedTuple):
+    """Settings and scratch of section 3.4 (c).
+
+    Attributes:
+        redistribution: Whether to redistribute.
+        samples: Of the arc length per segment.
+        pivots: Factor of the spline's system; see `Redistribution`.
+        floats: Scratch.
+        integers: Scratch.
+        relaxation_step: delta of Eqs. 8, 9.
+    """
+
+    redistribution: bool
+    samples: int
+    pivots: FloatArray
+    floats: FloatArray
+    integers: np.ndarray
+    relaxation_step: float
+
+
+class Judging(NamedTuple):
+    """Settings of Eqs. 2–7.
+
+    Attributes:
+        substeps: Configurations tested per segment.
+        weights: k1, k2, k3 of Eq. 7.
+        tables: Of the collision model; see `clearances`.
+    """
+
+    substeps: int
+    weights: tuple[float, float, float]
+    tables: Any
+
+
+class Memory(NamedTuple):
+    """Arrays that a generation reads and rewrites.
+
+    Attributes:
+        population: Strings; offspring first, then the elites.
+        costs: (individuals,) of the population.
+        collisions: (individuals,) of the population.
+        offspring: Strings.
+        terms: Fields of `StringTerms`, of the offspring.
+        elites: Places of the elites, best first.
+    """
+
+    population: FloatArray
+    costs: FloatArray
+    collisions: FloatArray
+    offspring: FloatArray
+    terms: tuple[FloatArray, ...]
+    elites: IntArray
 
 
 @kernel
-def advance(uniforms, draws, arm_slices, breeding, smoothing, judging, memory):  # type: ignore[no-untyped-def]
+def advance(
+    uniforms: FloatArray, arm_slices: IntArray, settings: tuple[Any, ...], arrays: tuple[Any, ...]
+) -> tuple[int, float, float, int]:
     """Replace a population by the next one.
 
+    `settings` and `arrays` are nested plain tuples: numba takes 2 µs to read a named one.
+
     Args:
-        uniforms: Random numbers of the whole generation, as many as `draws` and the new
-            trajectories take.
-        draws: How many offspring, numbers for cross-over, and new trajectories there are.
+        uniforms: Random numbers of the whole generation, in the order in which they are used.
         arm_slices: (arms, 2) rows of each arm.
-        breeding: See `breed`.
-        smoothing: See `smooth`.
-        judging: See `judge`.
-        memory: population, its costs and collisions; offspring, their terms; places of the elites.
+        settings: Fields of `Counts`, of `Breeding`, of `Smoothing` and of `Judging`.
+        arrays: Fields of `Memory`.
 
     Returns:
         Index of the best, mean and standard deviation of the finite costs, number of collision-free
         individuals.
     """
-    population, costs, collisions, offspring, terms, elites = memory
-    count = draws[0]
-    choose_elites(costs, elites)
-    # (a) Reproduction, (b) cross-over, and (d) mutation before (c): a new trajectory, too, is
-    # redistributed and relaxed once.
-    breed(uniforms, draws, arm_slices, breeding, population, costs, offspring)
-    # (c) Redistribution and relaxation.
-    smooth(offspring, count, arm_slices, smoothing)
+    counts, breeding = Counts(*settings[0]), Breeding(*settings[1])
+    smoothing, judging = Smoothing(*settings[2]), Judging(*settings[3])
+    memory = Memory(*arrays)
+    population, costs, offspring = memory.population, memory.costs, memory.offspring
+    collisions, terms = memory.collisions, StringTerms(*memory.terms)
+    # elites: the lowest costs
+    choose_elites(costs, memory.elites)
+    # (a) reproduction, (b) cross-over, and (d) mutation before (c): a new trajectory, too, is
+    # redistributed and relaxed once
+    breed(uniforms, counts, arm_slices, breeding, population, costs, offspring)
+    # (c) redistribution and relaxation
+    smooth(offspring, counts.offspring, arm_slices, smoothing)
+    # Eqs. 2–7
     judge(offspring, arm_slices, judging, terms)
-    # The elites stand behind the offspring, untouched and not evaluated again.
+    # succession: the elites stand behind the offspring, untouched and not evaluated again
+    count, elites = counts.offspring, memory.elites
     rows = population.shape[0] * population.shape[1]
     succeed_rows(population.reshape((rows, -1)), offspring.reshape((rows, -1)), count, elites)
-    succeed_rows(costs.reshape((1, -1)), terms[3].reshape((1, -1)), count, elites)
-    succeed_rows(collisions.reshape((1, -1)), terms[2].reshape((1, -1)), count, elites)
+    succeed_rows(costs.reshape((1, -1)), terms.cost.reshape((1, -1)), count, elites)
+    succeed_rows(collisions.reshape((1, -1)), terms.collisions.reshape((1, -1)), count, elites)
+    # numbers for the record
     feasible = 0
     for k in range(len(collisions)):
         feasible += collisions[k] == 0.0
@@ -61,93 +162,104 @@ def advance(uniforms, draws, arm_slices, breeding, smoothing, judging, memory): 
 
 
 @kernel
-def breed(uniforms, draws, arm_slices, breeding, population, costs, offspring):  # type: ignore[no-untyped-def]
+def breed(
+    uniforms: FloatArray,
+    counts: Counts,
+    arm_slices: IntArray,
+    breeding: Breeding,
+    population: FloatArray,
+    costs: FloatArray,
+    offspring: FloatArray,
+) -> None:
     """Write offspring: reproduced, crossed and mutated (section 3.4 a, b, d).
 
     Args:
         uniforms: See `advance`.
-        draws: See `advance`.
+        counts: Sizes.
         arm_slices: See `advance`.
-        breeding: C_max, rate and distance of cross-over, rate of mutation, step and turn of a walk,
-            start, goal.
+        breeding: Settings.
         population: The parents' generation.
-        costs: (individuals,) theirs.
+        costs: (individuals,) of the parents.
         offspring: Written.
     """
-    (
-        fitness_offset,
-        crossover_rate,
-        crossover_distance,
-        mutation_rate,
-        walk_step,
-        max_turn,
-        start,
-        goal,
-    ) = breeding
-    count, pairs, new = draws
-    # (a) Weighted roulette wheel; neighbours in the order drawn are the random pairs of (b).
+    count, new = counts.offspring, counts.new
+    # (a) weighted roulette wheel; neighbours in the order drawn are the random pairs of (b)
     wheel, parents = np.empty(len(costs)), np.empty(count, dtype=np.int64)
-    fill_wheel(fitness_offset, costs, wheel)
+    fill_wheel(breeding.fitness_offset, costs, wheel)
     spin_roulette(wheel, uniforms[:count], parents)
-    # (b) One site per arm, at the same index in both parents.
-    sites = uniforms[count : count + pairs]
+    # (b) one site per arm, at the same index in both parents
+    first = count + counts.pair_uniforms
     cross_at_sites(
-        sites, population, parents, arm_slices, crossover_rate, crossover_distance, offspring
+        uniforms[count:first],
+        population,
+        parents,
+        arm_slices,
+        breeding.crossover_rate,
+        breeding.crossover_distance,
+        offspring,
     )
-    # (d) New trajectories in distinct places, each with the mutation's probability.
-    slots, first = np.arange(count), count + pairs
+    # (d) new trajectories in distinct places, each with the mutation's probability
+    slots = np.arange(count)
     shuffle_head(uniforms[first : first + new], slots)
     walks = uniforms[first + 2 * new :].reshape((new, -1)) if new else np.empty((0, 0))
     for k in range(new):
-        if uniforms[first + new + k] < mutation_rate:
+        if uniforms[first + new + k] < breeding.mutation_rate:
             walk_strings(
                 offspring,
                 slots[k : k + 1],
                 walks[k : k + 1],
-                start,
-                goal,
+                breeding.start,
+                breeding.goal,
                 arm_slices,
-                walk_step,
-                max_turn,
+                breeding.walk_step,
+                breeding.max_turn,
             )
 
 
 @kernel
-def smooth(strings, count, arm_slices, smoothing):  # type: ignore[no-untyped-def]
+def smooth(strings: FloatArray, count: int, arm_slices: IntArray, smoothing: Smoothing) -> None:
     """Redistribute and relax the first `count` strings (section 3.4 c).
 
     Args:
         strings: (nq, N + 1, ≥ count), changed.
-        count: Of strings.
+        count: Number of strings.
         arm_slices: See `advance`.
-        smoothing: Whether to redistribute, its samples per segment, pivots and scratch; delta of
-            the relaxation.
+        smoothing: Settings and scratch.
     """
-    redistribution, samples, pivots, floats, integers, delta = smoothing
     lanes = -(-count // 8) * 8  # whole vectors
-    if redistribution and count > 0 and strings.shape[1] > 2:
-        redistribute_arms(strings, arm_slices, lanes, samples, pivots, floats, integers)
-    if delta > 0.0 and count > 0:
-        relax_points(strings, delta, lanes)
+    if smoothing.redistribution and count > 0 and strings.shape[1] > 2:
+        redistribute_arms(
+            strings,
+            arm_slices,
+            lanes,
+            smoothing.samples,
+            smoothing.pivots,
+            smoothing.floats,
+            smoothing.integers,
+        )
+    if smoothing.relaxation_step > 0.0 and count > 0:
+        relax_points(strings, smoothing.relaxation_step, lanes)
 
 
 @kernel
-def judge(strings, arm_slices, judging, terms):  # type: ignore[no-untyped-def]
+def judge(strings: FloatArray, arm_slices: IntArray, judging: Judging, terms: StringTerms) -> None:
     """Eqs. 2–7 for all strings; the instants 1 … N are the configurations that may collide.
 
     Args:
         strings: (nq, N + 1, individuals).
         arm_slices: See `advance`.
-        judging: Substeps per segment, weights of Eq. 7, tables of the collision model.
-        terms: Written: lengths, unevenness, collisions, cost.
+        judging: Settings.
+        terms: Written.
     """
-    substeps, weights, tables = judging
-    lengths, unevenness, collisions, cost = terms
-    nq, num_points, lanes = strings.shape
-    measure_paths(strings, arm_slices, lengths, unevenness)
+    substeps, (nq, num_points, lanes) = judging.substeps, strings.shape
+    # Eqs. 2–5: lengths, and how uneven the distances of via-points are
+    measure_paths(strings, arm_slices, terms.lengths, terms.unevenness)
+    # Eq. 6: clearances at the instants and at the substeps before them
     between = np.empty((nq, (num_points - 1) * substeps, lanes))
     interpolate(strings, substeps, between)
     clearance = np.empty((2, (num_points - 1) * substeps * lanes))
-    clearances(tables, 0.0, between.reshape((nq, -1)), clearance)
-    count_collisions(clearance.reshape((2, num_points - 1, substeps, lanes)), collisions)
-    weigh(weights, lengths, unevenness, collisions, cost)
+    clearances(judging.tables, 0.0, between.reshape((nq, -1)), clearance)
+    by_instant = clearance.reshape((2, num_points - 1, substeps, lanes))
+    count_collisions(by_instant, terms.collisions)
+    # Eq. 7
+    weigh(judging.weights, terms.lengths, terms.unevenness, terms.collisions, terms.cost)

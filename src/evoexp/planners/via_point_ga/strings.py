@@ -1,0 +1,189 @@
+"""Populations of strings of via-points: the problem they solve, and the steps they go through."""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from evoexp.collision.models.touching_spheres import SphereCollision
+from evoexp.collision.scene import Scene
+from evoexp.evolution import crossover
+from evoexp.evolution.cost_statistics import CostStatistics
+from evoexp.numeric.elementary import DEGREE
+from evoexp.objectives.string_fitness import StringTerms
+from evoexp.paths.walk import num_uniforms, walk
+from evoexp.paths.workspace import Redistribution
+from evoexp.planners.via_point_ga import kernels
+from evoexp.records import BoolArray, FloatArray, IntArray
+from evoexp.robots.assembly import Assembly
+
+if TYPE_CHECKING:
+    from evoexp.planners.via_point_ga.planner import ViaPointGa
+
+LANES = 8  # individuals are padded to whole vectors
+
+
+class Problem(NamedTuple):
+    """A robot and its scenario, prepared.
+
+    Attributes:
+        assembly: The robot, built.
+        collision: The paper's collision model on it.
+        start: (nq,) [deg].
+        goal: (nq,) [deg].
+        spline: Factor and memory of the redistribution; for one thread at a time.
+        scene: The bodies themselves, for the exact verdict on a motion.
+        security_margin: Clearance that the task requires [length unit].
+    """
+
+    assembly: Assembly
+    collision: SphereCollision
+    start: FloatArray
+    goal: FloatArray
+    spline: Redistribution
+    scene: Scene
+    security_margin: float
+
+    @property
+    def arm_slices(self) -> IntArray:
+        """(arms, 2) rows of each arm."""
+        return self.assembly.arm_slices
+
+
+class Judgement(NamedTuple):
+    """A judged population.
+
+    Attributes:
+        cost: (individuals,) lower is better.
+        terms: Terms of Eq. 7.
+        collision_queries: Configurations judged for it.
+    """
+
+    cost: FloatArray
+    terms: StringTerms
+    collision_queries: int
+
+    @property
+    def feasible(self) -> BoolArray:
+        """(individuals,) whether each is free of collision at every instant tested."""
+        return np.asarray(self.terms.collisions[: len(self.cost)] == 0.0)
+
+    def named_terms(self, individual: int) -> dict[str, float]:
+        """Return the terms of one individual by name: C1 … of Eqs. 2–6."""
+        lengths, unevenness, collisions, _ = self.terms
+        named = {f"length_arm_{a + 1}_deg": float(row[individual]) for a, row in enumerate(lengths)}
+        for a, row in enumerate(unevenness):
+            named[f"unevenness_arm_{a + 1}_deg"] = float(row[individual])
+        return named | {"collisions": float(collisions[individual])}
+
+
+class JudgedGeneration(NamedTuple):
+    """A generation as it is recorded.
+
+    Attributes:
+        judged: The individuals that it evaluated: they come first in its population.
+        statistics: Of the costs of the whole population.
+        num_feasible: Individuals of the whole population that are free of collision.
+    """
+
+    judged: Judgement
+    statistics: CostStatistics
+    num_feasible: int
+
+
+class Strings:
+    """The population-wide steps of one planner on one problem."""
+
+    def __init__(self, planner: "ViaPointGa", problem: Problem) -> None:
+        self.planner, self.problem, ga, spline = planner, problem, planner.ga, problem.spline
+        self.num_arms, max_turn = len(problem.arm_slices), DEGREE * planner.max_turn
+        self.num_uniforms = num_uniforms(problem.arm_slices, planner.num_via_points)
+        pair_uniforms = crossover.num_uniforms(self.num_arms, ga.num_offspring // 2)
+        self.counts = kernels.Counts(ga.num_offspring, pair_uniforms, planner.num_new_trajectories)
+        self.breeding = kernels.Breeding(
+            fitness_offset=planner.objective.fitness_offset,
+            crossover_rate=ga.crossover_rate,
+            crossover_distance=planner.crossover_distance,
+            mutation_rate=ga.mutation_rate,
+            walk_step=planner.walk_step,
+            max_turn=max_turn,
+            start=problem.start,
+            goal=problem.goal,
+        )
+        self.smoothing = kernels.Smoothing(
+            redistribution=planner.redistribution,
+            samples=spline.samples_per_segment,
+            pivots=spline.pivots,
+            floats=spline.floats,
+            integers=spline.integers,
+            relaxation_step=planner.relaxation_step,
+        )
+        self.judging = kernels.Judging(
+            substeps=planner.collision.collision_substeps,
+            weights=planner.objective.weights,
+            tables=problem.collision.tables,
+        )
+
+    def padded(self, strings: FloatArray) -> FloatArray:
+        """Return a copy of strings (nq, N + 1, count), padded to whole vectors by zeros."""
+        count = strings.shape[2]
+        copy = self.empty(count)
+        copy[:, :, :count] = strings
+        return copy
+
+    def empty(self, count: int) -> FloatArray:
+        """Return memory for strings, padded to whole vectors and holding zeros."""
+        lanes = max(LANES, -(-count // LANES) * LANES)
+        return np.zeros((len(self.problem.start), self.planner.num_via_points + 1, lanes))
+
+    def drawn(self, rng: np.random.Generator, count: int) -> FloatArray:
+        """Return new random walks from start to goal (section 3.3), smoothed and padded."""
+        problem, strings = self.problem, self.empty(count)
+        uniforms, lanes = rng.random((count, self.num_uniforms)), np.arange(count)
+        step, max_turn = self.breeding.walk_step, self.breeding.max_turn
+        ends = problem.start, problem.goal
+        walk(strings, lanes, uniforms, *ends, problem.arm_slices, step, max_turn)
+        self.smooth(strings, count)
+        return strings
+
+    def smooth(self, strings: FloatArray, count: int) -> None:
+        """Redistribute and relax the first `count` strings."""
+        kernels.smooth(strings, count, self.problem.arm_slices, self.smoothing)
+
+    def judge(self, strings: FloatArray, count: int) -> Judgement:
+        """Judge the first `count` strings; the arrays of terms keep the padding."""
+        judged = self._unjudged(strings, count)
+        kernels.judge(strings, self.problem.arm_slices, self.judging, judged.terms)
+        return judged
+
+    def generations(
+        self, rng: np.random.Generator, population: FloatArray, costs: FloatArray, hits: FloatArray
+    ) -> Iterator[JudgedGeneration]:
+        """Replace a population by the next one (section 3.4) at every step, without end.
+
+        Args:
+            rng: Source of all random numbers.
+            population: Padded strings, replaced.
+            costs: (individuals,) of the population, replaced.
+            hits: (individuals,) colliding instants of the population, replaced.
+        """
+        ga, counts = self.planner.ga, self.counts
+        offspring = self.empty(ga.num_offspring)
+        judged, elites = self._unjudged(offspring, ga.num_offspring), np.empty(ga.num_elites, int)
+        memory = kernels.Memory(population, costs, hits, offspring, tuple(judged.terms), elites)
+        named = self.counts, self.breeding, self.smoothing, self.judging
+        settings, arrays = tuple(tuple(each) for each in named), tuple(memory)
+        num_drawn = sum(counts) + counts.new * (1 + self.num_uniforms)
+        while True:
+            uniforms = rng.random(num_drawn)
+            *statistics, num_feasible = kernels.advance(
+                uniforms, self.problem.arm_slices, settings, arrays
+            )
+            yield JudgedGeneration(judged, CostStatistics(*statistics), num_feasible)
+
+    def _unjudged(self, strings: FloatArray, count: int) -> Judgement:
+        """Return memory for a judgement."""
+        lengths, unevenness = np.empty((2, self.num_arms, strings.shape[2]))
+        terms = StringTerms(lengths, unevenness, np.empty(strings.shape[2]), np.empty(count))
+        tested = self.planner.num_via_points * self.judging.substeps
+        return Judgement(terms.cost, terms, tested * count)

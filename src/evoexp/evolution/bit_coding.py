@@ -1,23 +1,25 @@
 """Individuals as strings of bits, one whole number per gene: decoding, crossover, mutation.
 
-A gene of B bits is a number in [0, 2^B), its highest bit the first of its part of the string; B ≤
-52.
+A gene of B ≤ 52 bits is a number in [0, 2^B); its highest bit comes first in the string.
 """
 
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import log
 from evoexp.numeric.random_stream import draw
+from evoexp.records import FloatArray, IntArray
 
 
 @kernel
-def decode_strings(strings, bits, gray, limits, out):  # type: ignore[no-untyped-def]
+def decode_strings(
+    strings: IntArray, bits: int, gray: bool, limits: FloatArray, out: FloatArray
+) -> None:
     """Decode numbers n of B bits: l + (h − l) n / (2^B − 1).
 
     Args:
         strings: (genes, individuals).
         bits: B.
-        gray: Whether they are reflected Gray codes: then every bit of n is the parity of all Gray
-            bits above and its own.
+        gray: Whether they are reflected Gray codes: every bit of n is then the parity of its own
+            Gray bit and all above it.
         limits: (genes, 2) l and h of each gene.
         out: (genes, ≥ individuals), written.
     """
@@ -33,13 +35,19 @@ def decode_strings(strings, bits, gray, limits, out):  # type: ignore[no-untyped
 
 
 @kernel
-def cross_strings(uniforms, strings, bits, parents, rate, out):  # type: ignore[no-untyped-def]
-    """Cut pairs of parents at one site and exchange what follows.
-
-    Chen & Zalzala 1995, section 3.2.
+def cross_strings(
+    uniforms: FloatArray,
+    strings: IntArray,
+    bits: int,
+    parents: IntArray,
+    rate: float,
+    out: IntArray,
+) -> None:
+    """Cut pairs of parents at one site and exchange their tails (Chen & Zalzala 1995, section 3.2).
 
     Parents 2k and 2k + 1 form a pair; an odd last one stays alone. A pair is cut with probability
-    `rate`, before one of the bits 1 … all − 1, each equally likely. What is not cut is copied.
+    `rate`, before one of the bits 1 … all − 1, each equally likely. A pair that is not cut is
+    copied.
 
     Args:
         uniforms: (2 × pairs,): decision, site.
@@ -50,9 +58,11 @@ def cross_strings(uniforms, strings, bits, parents, rate, out):  # type: ignore[
         out: (genes, ≥ offspring), written.
     """
     genes, count = len(strings), len(parents)
+    # copies of the parents
     for gene in range(genes):
         for k in range(count):
             out[gene, k] = strings[gene, parents[k]]
+    # pairs exchange the bits behind their site, gene by gene
     last = genes * bits - 1
     for pair in range(count // 2):
         first, second = 2 * pair, 2 * pair + 1
@@ -66,12 +76,12 @@ def cross_strings(uniforms, strings, bits, parents, rate, out):  # type: ignore[
 
 
 @kernel
-def flip_strings(draws, strings, bits, count, rate):  # type: ignore[no-untyped-def]
+def flip_strings(draws: tuple[FloatArray, IntArray], strings: IntArray, bits: int, count: int, rate: float) -> None:
     """Flip every bit with probability p, in place (Holland 1975).
 
-    Most bits stay: how many do before the next one is flipped is geometrically distributed, ⌊ln(1 −
-    u) / ln(1 − p)⌋ (Devroye 1986, section X.2), which takes a number per flipped bit and not per
-    bit.
+    The number of bits that stay before the next flipped one is geometrically distributed, ⌊ln(1 −
+    u) / ln(1 − p)⌋ (Devroye 1986, section X.2); so a uniform number is taken per flipped bit
+    instead of per bit.
 
     Args:
         draws: See `evoexp.numeric.random_stream`.

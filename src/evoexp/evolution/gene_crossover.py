@@ -4,6 +4,7 @@ One-point crossover is in `crossover`.
 """
 
 from evoexp.numeric.compilation import kernel
+from evoexp.records import FloatArray, IntArray
 
 CROSSOVERS = ("one_point", "uniform", "arithmetic", "blx_alpha")
 """Names of crossovers; kernels take their places in this list."""
@@ -12,16 +13,22 @@ ONE_POINT, UNIFORM, ARITHMETIC, BLX_ALPHA = range(4)
 
 
 def num_gene_uniforms(num_genes: int, num_pairs: int) -> int:
-    """Return how many uniform numbers `cross_genes` takes, whatever the kind.
-
-    Per pair a decision, per gene two.
-    """
+    """Return the number of uniform numbers that `cross_genes` takes, whatever the kind."""
     return num_pairs * (1 + 2 * num_genes)
 
 
 @kernel
-def cross_genes(kind, uniforms, genomes, parents, rate, alpha, limits, out):  # type: ignore[no-untyped-def]
-    """Cross pairs of parents x, y with probability `rate`; what is not crossed is copied.
+def cross_genes(
+    kind: int,
+    uniforms: FloatArray,
+    genomes: FloatArray,
+    parents: IntArray,
+    rate: float,
+    alpha: float,
+    limits: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Cross pairs of parents x, y with probability `rate`; other pairs are copied.
 
     Parents 2k and 2k + 1 form a pair; an odd last one stays alone.
 
@@ -34,7 +41,7 @@ def cross_genes(kind, uniforms, genomes, parents, rate, alpha, limits, out):  # 
 
     Args:
         kind: UNIFORM, ARITHMETIC or BLX_ALPHA.
-        uniforms: As many as `num_gene_uniforms`; per pair: a decision, then two per gene.
+        uniforms: (`num_gene_uniforms`,) per pair: a decision, then two per gene.
         genomes: (genes, individuals, padding allowed).
         parents: (offspring,) indices of individuals.
         rate: Probability in [0, 1].
@@ -43,9 +50,11 @@ def cross_genes(kind, uniforms, genomes, parents, rate, alpha, limits, out):  # 
         out: (genes, ≥ offspring), written: the offspring.
     """
     num_genes, num_offspring = len(genomes), len(parents)
+    # copies of the parents
     for gene in range(num_genes):
         for k in range(num_offspring):
             out[gene, k] = genomes[gene, parents[k]]
+    # pairs that are crossed, gene by gene
     for pair in range(num_offspring // 2):
         draw = uniforms[pair * (1 + 2 * num_genes) :]
         one, two = 2 * pair, 2 * pair + 1

@@ -2,27 +2,36 @@
 
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import pow_int
+from evoexp.records import FloatArray
 
 MUTATIONS = ("non_uniform", "gaussian", "uniform_reset")
 SCOPES = ("gene", "individual")
-"""Names of mutations and of what they choose; kernels take their places in these lists."""
+"""Names of mutations and of their scopes; kernels take their places in these lists."""
 
 NON_UNIFORM, GAUSSIAN, UNIFORM_RESET = range(3)
 GENE, INDIVIDUAL = range(2)
 
 
 def num_mutation_uniforms(num_genes: int, count: int, scope: int) -> int:
-    """Return how many uniform numbers `mutate_genes` takes.
+    """Return the number of uniform numbers that `mutate_genes` takes.
 
-    One per gene, or per individual a decision, a gene and an amount.
+    They are one per gene, or per individual a decision, a gene and an amount.
     """
     return num_genes * count if scope == GENE else 3 * count
 
 
 @kernel
-def mutate_genes(  # type: ignore[no-untyped-def]
-    kind, scope, uniforms, normals, genomes, count, rate, spread, limits
-):
+def mutate_genes(
+    kind: int,
+    scope: int,
+    uniforms: FloatArray,
+    normals: FloatArray,
+    genomes: FloatArray,
+    count: int,
+    rate: float,
+    spread: float,
+    limits: FloatArray,
+) -> None:
     """Mutate genes x in place, within their limits [l, h].
 
     With w a uniform number in [0, 1) and z a normal deviate:
@@ -36,12 +45,12 @@ def mutate_genes(  # type: ignore[no-untyped-def]
     Args:
         kind: NON_UNIFORM, GAUSSIAN or UNIFORM_RESET.
         scope: GENE: every gene is mutated with probability `rate`; INDIVIDUAL: every individual is,
-            in one gene. A gene's number decides; where it is below the rate, their ratio is the
-            amount, uniform again.
-        uniforms: As many as `num_mutation_uniforms`.
+            in one gene. With GENE, one number decides and, divided by the rate, is the amount:
+            below the rate the ratio is uniform again.
+        uniforms: (`num_mutation_uniforms`,) in [0, 1).
         normals: (genes, ≥ count) normal deviates, read by the Gaussian kind only.
         genomes: (genes, ≥ count), changed.
-        count: Individuals; what lies behind them is left alone.
+        count: Individuals; columns behind them are left alone.
         rate: Probability in [0, 1].
         spread: s above.
         limits: (genes, 2) least and greatest value of each gene.
@@ -72,7 +81,9 @@ def mutate_genes(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _mutant(kind, x, w, z, spread, low, high):  # type: ignore[no-untyped-def]
+def _mutant(
+    kind: int, x: float, w: float, z: float, spread: float, low: float, high: float
+) -> float:
     if kind == NON_UNIFORM:
         mutant = (
             x + (high - x) * (2.0 * w) * spread
@@ -87,7 +98,7 @@ def _mutant(kind, x, w, z, spread, low, high):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def non_uniform_spread(generation, num_generations, power):  # type: ignore[no-untyped-def]
+def non_uniform_spread(generation: int, num_generations: int, power: int) -> float:
     """Return s = (1 − t/T)^b of non-uniform mutation (Michalewicz 1992).
 
     Args:
@@ -99,7 +110,7 @@ def non_uniform_spread(generation, num_generations, power):  # type: ignore[no-u
 
 
 @kernel
-def flip_bits(uniforms, bits, count, rate):  # type: ignore[no-untyped-def]
+def flip_bits(uniforms: FloatArray, bits: FloatArray, count: int, rate: float) -> None:
     """Flip every bit (0.0 or 1.0) with probability `rate`, in place (Holland 1975).
 
     Args:
@@ -115,7 +126,7 @@ def flip_bits(uniforms, bits, count, rate):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def decode_bits(bits, count, limits, out):  # type: ignore[no-untyped-def]
+def decode_bits(bits: FloatArray, count: int, limits: FloatArray, out: FloatArray) -> None:
     """Decode plain binary numbers n of B bits, the highest first: l + (h − l) n / (2^B − 1).
 
     Args:

@@ -3,16 +3,18 @@
 import numpy as np
 
 from evoexp.numeric.compilation import kernel
+from evoexp.records import FloatArray, IntArray
 
 
 @kernel
-def choose_by_tournament(uniforms, costs, size, parents):  # type: ignore[no-untyped-def]
+def choose_by_tournament(
+    uniforms: FloatArray, costs: FloatArray, size: int, parents: IntArray
+) -> None:
     """Draw parents as winners of tournaments (Goldberg & Deb 1991).
 
-    The lowest cost of `size` drawn with replacement.
-
-    Among equal costs, infinite ones included, the one drawn first wins; so a population without one
-    feasible member is sampled uniformly.
+    The lowest cost among `size` contestants, drawn with replacement, wins; among equal costs,
+    infinite ones included, the contestant drawn first. So a population without one feasible member
+    is sampled uniformly.
 
     Args:
         uniforms: (parents × size) in [0, 1).
@@ -30,7 +32,7 @@ def choose_by_tournament(uniforms, costs, size, parents):  # type: ignore[no-unt
 
 
 @kernel
-def rank_weights(costs, pressure, out):  # type: ignore[no-untyped-def]
+def rank_weights(costs: FloatArray, pressure: float, out: FloatArray) -> None:
     """Weigh individuals linearly by their rank for the roulette wheel (Baker 1985).
 
     With r = 0 for the highest of P costs and P − 1 for the lowest, the weight 2 − s + 2 (s − 1) r /
@@ -43,6 +45,7 @@ def rank_weights(costs, pressure, out):  # type: ignore[no-untyped-def]
         out: (individuals,), written.
     """
     num = len(costs)
+    # from the highest cost to the lowest; equal costs share a rank
     order = np.argsort(-costs, kind="mergesort")  # stable: the same on every machine
     first = 0
     while first < num:

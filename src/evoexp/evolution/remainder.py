@@ -1,36 +1,28 @@
-"""Stochastic remainder sampling without replacement.
-
-Parents as many times as expected, but for less than one copy.
-"""
+"""Stochastic remainder sampling: everyone is a parent as often as expected, rounded up or down."""
 
 import numpy as np
 
 from evoexp.numeric.compilation import kernel
-from evoexp.records import FloatArray
+from evoexp.records import FloatArray, IntArray
 
 
 @kernel
-def num_remainder_uniforms(num, count):  # type: ignore[no-untyped-def]
-    """Return how many uniform numbers it takes to choose `count` parents out of `num` individuals.
-
-    For kernels, too.
-    """
+def num_remainder_uniforms(num: int, count: int) -> int:
+    """Return the number of uniform numbers that choosing `count` of `num` individuals takes."""
     return num + 1 + count
 
 
-def stochastic_remainder(rng: np.random.Generator, expected: FloatArray) -> np.ndarray:
-    """Choose parents by stochastic remainder sampling without replacement.
+def stochastic_remainder(rng: np.random.Generator, expected: FloatArray) -> IntArray:
+    """Choose parents without replacement (Chen & Zalzala 1995, sections 2.3 and 3.2).
 
-    Chen & Zalzala 1995, sections 2.3 and 3.2.
-
-    Everyone becomes a parent as often as the whole part of its expected number says. For the places
-    left, the remainders are scanned once, in random order: they are added up, and whoever brings
-    the sum past u, u + 1, u + 2, … gets one of the places, u being one uniform number. So nobody
-    gets more than one, and everybody gets one with exactly the probability of its remainder.
+    Every individual first becomes a parent as often as the whole part of its expected number says.
+    For the places left, the remainders are added up once, in random order; an individual that
+    brings the sum past u, u + 1, u + 2, … gets a place, where u is one uniform number. So an
+    individual gets at most one of these places, with exactly the probability of its remainder.
 
     Goldberg's scan, which tosses a coin per remainder until the places are full, is biased: in the
-    order of indices against those that come late, and in any order against small remainders (of 0.9
-    and 0.1 the second one gets the place with probability 0.06).
+    order of indices against individuals that come late, and in any order against small remainders
+    (of 0.9 and 0.1 the second one gets the place with probability 0.06).
 
     Args:
         rng: Source of `num_remainder_uniforms` uniform numbers.
@@ -59,7 +51,9 @@ def stochastic_remainder(rng: np.random.Generator, expected: FloatArray) -> np.n
 
 
 @kernel
-def choose_by_remainders(uniforms, expected, order, parents):  # type: ignore[no-untyped-def]
+def choose_by_remainders(
+    uniforms: FloatArray, expected: FloatArray, order: IntArray, parents: IntArray
+) -> None:
     """The kernel of `stochastic_remainder`, for other kernels.
 
     Args:
@@ -70,6 +64,7 @@ def choose_by_remainders(uniforms, expected, order, parents):  # type: ignore[no
         parents: (parents,) written.
     """
     num, count, filled = len(expected), len(parents), 0
+    # whole parts
     for k in range(num):
         order[k] = k
         # A number that should be whole may be rounded down; a thousandth of 1e-9 is no remainder.
@@ -77,11 +72,13 @@ def choose_by_remainders(uniforms, expected, order, parents):  # type: ignore[no
             if filled < count:
                 parents[filled] = k
                 filled += 1
+    # a random order of the individuals (Fisher–Yates), and the sum of the remainders
     total = 0.0
     for k in range(num):
         other = k + min(int(uniforms[k] * (num - k)), num - k - 1)
         order[k], order[other] = order[other], order[k]
         total += _remainder(expected[order[k]])
+    # the places left, by one scan
     scale = (count - filled) / total if total > 0.0 else 0.0  # 1 but for rounding
     pointer, scanned = uniforms[num], 0.0
     for k in range(num):
@@ -92,7 +89,8 @@ def choose_by_remainders(uniforms, expected, order, parents):  # type: ignore[no
             order[k] = -1
             filled += 1
             pointer += 1.0
-    for k in range(num):  # a place that rounding left
+    # places that rounding left
+    for k in range(num):
         if (
             filled < count
             and order[k] >= 0
@@ -100,12 +98,13 @@ def choose_by_remainders(uniforms, expected, order, parents):  # type: ignore[no
         ):
             parents[filled] = order[k]
             filled += 1
+    # parents in random order
     for k in range(count):
         other = k + min(int(uniforms[num + 1 + k] * (count - k)), count - k - 1)
         parents[k], parents[other] = parents[other], parents[k]
 
 
 @kernel
-def _remainder(expected):  # type: ignore[no-untyped-def]
+def _remainder(expected: float) -> float:
     """Return the part of a number that is not whole, 0 below 1e-12."""
     return max(expected - int(expected + 1e-12), 0.0)

@@ -7,32 +7,30 @@ from evoexp.records import FloatArray
 
 
 def scale_linearly(costs: FloatArray, count: int, multiple: float = 2.0) -> FloatArray:
-    """Return the numbers of copies that linear scaling expects (Goldberg 1989.
+    """Return the expected numbers of copies by linear scaling (Chen & Zalzala 1995, Eqs. 5, 16).
 
-    Chen & Zalzala 1995, Eqs. 5 and 16).
-
-    The paper scales a fitness f = C_m − C to f' = a f + b, whose mean is that of f and whose
-    maximum is `multiple` times the mean; what becomes negative is 0. An individual then expects f'
-    / mean(f') copies:
+    The paper, after Goldberg (1989), scales a fitness f = C_m − C to f' = a f + b, whose mean is
+    that of f and whose maximum is `multiple` times the mean; negative values are set to 0. An
+    individual then expects f' / mean(f') copies:
 
         f' / mean(f) = 1 + (multiple − 1) (mean(C) − C) / (mean(C) − min(C)),
 
-    which does not depend on C_m (nor on the unit of the costs), so C_m is no setting. After the
-    negative ones were set to 0 the mean is above the wanted one, and all are divided by it: the
-    best then expects fewer than `multiple`.
+    which does not depend on C_m (nor on the unit of the costs), so C_m is no setting. Setting
+    negative values to 0 raises the mean, and all values are divided by it: the best then expects
+    fewer than `multiple`.
 
     Args:
-        costs: (individuals,) lower is better; those that are not finite expect no copy and have no
-            say in the mean.
+        costs: (individuals,) lower is better; an individual whose cost is not finite expects no
+            copy and is left out of the mean.
         count: Number of parents.
         multiple: Copies that the best one expects if there is a parent per individual, > 1 [-].
 
     Returns:
-        (individuals,) ≥ 0; their sum is `count` but for rounding. Equal finite costs expect equally
-        many, and without any finite cost all do.
+        (individuals,) ≥ 0; their sum is `count` but for rounding. Individuals of equal finite cost
+        expect equally many copies; without any finite cost all individuals do.
 
     Raises:
-        ValueError: If an argument cannot be.
+        ValueError: If an argument is out of range.
     """
     if costs.ndim != 1 or len(costs) == 0:
         raise ValueError(f"costs must have shape (individuals,), at least one, was {costs.shape}")
@@ -44,8 +42,9 @@ def scale_linearly(costs: FloatArray, count: int, multiple: float = 2.0) -> Floa
 
 
 @kernel
-def scale_costs(costs, count, multiple, expected):  # type: ignore[no-untyped-def]
+def scale_costs(costs: FloatArray, count: int, multiple: float, expected: FloatArray) -> None:
     """The kernel of `scale_linearly`, for other kernels; `expected` (individuals,) is written."""
+    # mean and least of the finite costs
     num, finite, total, least = len(costs), 0, 0.0, np.inf
     for k in range(num):
         if np.isfinite(costs[k]):
@@ -54,6 +53,7 @@ def scale_costs(costs, count, multiple, expected):  # type: ignore[no-untyped-de
             least = min(least, costs[k])
     mean = total / max(finite, 1)
     spread = mean - least
+    # copies in units of the mean, none below 0
     total = 0.0
     for k in range(num):
         if finite == 0:
@@ -66,5 +66,6 @@ def scale_costs(costs, count, multiple, expected):  # type: ignore[no-untyped-de
             copies = 1.0
         expected[k] = copies
         total += copies
+    # as many in all as parents are wanted
     for k in range(num):
         expected[k] = expected[k] * (count / total)

@@ -5,11 +5,11 @@ import math
 import numpy as np
 
 from evoexp.numeric.compilation import kernel
-from evoexp.records import FloatArray
+from evoexp.records import FloatArray, IntArray
 
 
 def succeed(
-    population: FloatArray, offspring: FloatArray, num_offspring: int, elites: np.ndarray
+    population: FloatArray, offspring: FloatArray, num_offspring: int, elites: IntArray
 ) -> None:
     """Put the elites of a population behind the offspring, in place.
 
@@ -17,7 +17,7 @@ def succeed(
         population: (…, individuals, padding allowed), replaced: the offspring, then the elites in
             the order given.
         offspring: (…, offspring, padding allowed).
-        num_offspring: How many offspring there are.
+        num_offspring: Number of offspring.
         elites: (elites,) indices into the population.
 
     Raises:
@@ -37,7 +37,9 @@ def succeed(
 
 
 @kernel
-def succeed_rows(population, offspring, num_offspring, elites):  # type: ignore[no-untyped-def]
+def succeed_rows(
+    population: FloatArray, offspring: FloatArray, num_offspring: int, elites: IntArray
+) -> None:
     """The kernel of `succeed`, for other kernels; populations as (rows, individuals)."""
     kept = np.empty(len(elites))
     for row in range(len(population)):

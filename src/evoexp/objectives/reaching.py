@@ -1,7 +1,4 @@
-"""The objective of Lavoie & Boudreau 2001 without its collisions.
-
-How far the tip is off, how much the joints turn.
-"""
+"""The objective of Lavoie & Boudreau 2001 without its collisions: position error and turning."""
 
 from typing import ClassVar
 
@@ -10,7 +7,8 @@ import numpy as np
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import sincos
 from evoexp.robots.kinematics import U
-from evoexp.robots.planar_ends import LANES, block_ends, load_lanes
+from evoexp.records import FloatArray, IntArray
+from evoexp.robots.planar_ends import LANES, PlanarArm, block_ends, load_lanes
 from evoexp.validation import Component, NonNegative
 
 
@@ -34,18 +32,26 @@ class Reaching(Component):
 
 
 @kernel
-def measure_reach(  # type: ignore[no-untyped-def]
-    starts, ends, lanes, count, arm, target, box, weights, cost, error, displacement
-):
-    """Write Eqs. 1, 2 and 4 of some individuals, inf where the tip ends outside the box.
-
-    Collisions are not looked at.
+def measure_reach(
+    starts: FloatArray,
+    ends: FloatArray,
+    lanes: IntArray,
+    count: int,
+    arm: PlanarArm,
+    target: FloatArray,
+    box: FloatArray,
+    weights: tuple[float, float],
+    cost: FloatArray,
+    error: FloatArray,
+    displacement: FloatArray,
+) -> None:
+    """Write Eqs. 1, 2 and 4 of some individuals without collisions; inf if the tip is outside.
 
     Args:
         starts: (N, individuals) relative joint angles [rad].
         ends: (N, individuals).
-        lanes: (≥ count + LANES) indices of the individuals; those behind `count` are overwritten.
-        count: How many.
+        lanes: (≥ count + LANES) indices of the individuals; entries behind `count` are overwritten.
+        count: Number of individuals.
         arm: See `planar_ends.block_ends`.
         target: Desired place of the tip (x, y).
         box: Least and greatest x, least and greatest y; a tip on its edge is inside.
@@ -59,14 +65,17 @@ def measure_reach(  # type: ignore[no-untyped-def]
     x, y = np.empty(rows + LANES), np.empty(rows + LANES)
     value, off, turned = np.empty(LANES), np.empty(LANES), np.empty(LANES)
     for first in range(0, count, LANES):
+        # tips of a block
         load_lanes(starts, lanes, first, count, begin)
         load_lanes(ends, lanes, first, count, end)
         block_ends(begin, end, arm, 1, 1, value, off, turned, x, y)
+        # displacement (Eq. 2)
         turned[:] = 0.0
         for k in range(len(starts)):
             for n in range(LANES):
                 turn = begin[U(k) * U(LANES) + U(n)] - end[U(k) * U(LANES) + U(n)]
                 turned[n] += turn * turn
+        # position error (Eq. 1), cost (Eq. 4)
         for n in range(LANES):
             tip_x, tip_y = x[U(rows) + U(n)], y[U(rows) + U(n)]
             off_x, off_y = tip_x - target[0], tip_y - target[1]
@@ -86,20 +95,26 @@ def measure_reach(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def measure_reach_from(  # type: ignore[no-untyped-def]
-    start, ends, count, arm, target, box, weights, cost, error, displacement
-):
-    """Measure as `measure_reach` does, bit for bit.
+def measure_reach_from(
+    start: FloatArray,
+    ends: FloatArray,
+    count: int,
+    arm: PlanarArm,
+    target: FloatArray,
+    box: FloatArray,
+    weights: tuple[float, float],
+    cost: FloatArray,
+    error: FloatArray,
+    displacement: FloatArray,
+) -> None:
+    """Measure a whole table of individuals from one start, bit for bit as `measure_reach` does.
 
-    A whole table of individuals on the way from one start.
-
-    Nothing is gathered, and of the arm only the tip is known: joint after joint, all individuals at
-    once.
+    Nothing is gathered, and only the tip is computed: joint after joint, all individuals at once.
 
     Args:
         start: (N,) [rad].
         ends: (N, ≥ count).
-        count: How many.
+        count: Number of individuals.
         arm: See `planar_ends.block_ends`.
         target: As of `measure_reach`, and so are `box` and `weights`.
         box: See there.
@@ -113,6 +128,7 @@ def measure_reach_from(  # type: ignore[no-untyped-def]
     tip_x, tip_y, turned = cost, error, displacement  # sums, until the last joint
     for n in range(count):
         angle[n], tip_x[n], tip_y[n], turned[n] = base_angle, base_x, base_y, 0.0
+    # links one after the other
     for k in range(len(start)):
         row, begin, length = ends[k], start[k], lengths[k]
         for n in range(count):
@@ -122,6 +138,7 @@ def measure_reach_from(  # type: ignore[no-untyped-def]
             tip_y[n] += length * s
             turned[n] += turn * turn
             angle[n] = direction
+    # errors and costs in place of the sums
     for n in range(count):
         x, y = tip_x[n], tip_y[n]
         off_x, off_y = x - target[0], y - target[1]

@@ -8,12 +8,11 @@ until both are successful, up to `num_attempts` times.
 A population is an array (joints, individuals) [rad] of end postures of one sub-path, or (joints ×
 bits, individuals). A solution is flat: three postures (start, A, B) × joints [rad].
 
-What "best so far" means: only the second search has whole plans, each worth the objective of SP2
-(Eq. 4). The best so far is the plan of the lowest one over all generations and attempts; a
-successful attempt has found it, since whatever came before was no success. Until there is a plan of
-finite cost its place is taken by the best posture A of any attempt so far, as a plan that stays
-there, at the cost inf. In generations of SP1 the best cost is inf, too: there is no plan; the costs
-of the individuals are their objective of SP1.
+The best so far is a whole plan. Only the second search has plans; a plan costs its objective of SP2
+(Eq. 4), and the plan of the lowest cost over all generations and attempts is the best so far. Until
+there is a plan of finite cost, the best posture A of any attempt so far takes its place, as a plan
+that stays there, at the cost inf. The individuals of SP1 cost their objective of SP1; the best plan
+in a generation of SP1 costs inf.
 """
 
 from collections.abc import Generator, Iterator
@@ -26,12 +25,12 @@ from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
 from evoexp.objectives.reaching import Reaching
 from evoexp.paths.motion import Motion
-from evoexp.planners.planner import PlannerDefaults
+from evoexp.planners.planner import Candidate, Keeper, PlannerDefaults
 from evoexp.planners.redundant_ga import kernels
-from evoexp.planners.redundant_ga.kernels import RESULTS
+from evoexp.planners.redundant_ga.kernels import RESULTS, Judging
 from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic, SelectiveSettings
-from evoexp.planners.redundant_ga.sub_path import Found, Search
-from evoexp.records import FloatArray, Generation
+from evoexp.planners.redundant_ga.sub_path import BestEnd, Search
+from evoexp.records import BoolArray, FloatArray, Generation
 from evoexp.robots.assembly import Assembly, Robot
 from evoexp.robots.planar_ends import LANES
 from evoexp.scenarios.pick_and_place import PickAndPlace
@@ -42,11 +41,12 @@ TERMS = (
     ("position_error", ""),
     ("joint_displacement", "_rad"),
 )  # of each sub-path, with unit
+CONTACT = ("position", "obstacle", "link", "swept")  # the fields of `link_ellipses.Contact`
 ANYWHERE = np.array([-np.inf, np.inf, -np.inf, np.inf])  # the box of SP1
 
 
 class Problem(NamedTuple):
-    """What `prepare` made of robot and scenario.
+    """Robot and scenario, prepared for the search.
 
     Attributes:
         assembly: The robot, built.
@@ -70,22 +70,22 @@ class Problem(NamedTuple):
 
 
 class Judgement(NamedTuple):
-    """Whole plans judged.
+    """Judged plans.
 
     Attributes:
         cost: (individuals,) objective of SP2; inf where SP1 is not successful.
         accepted: (individuals,) whether both sub-paths are successful.
         terms: Of every sub-path cost, position error and joint displacement, (2, 3, individuals).
-        collision_queries: Configurations judged for it.
+        collision_queries: Configurations judged.
     """
 
     cost: FloatArray
-    accepted: np.ndarray
+    accepted: BoolArray
     terms: FloatArray
     collision_queries: int
 
     @property
-    def feasible(self) -> np.ndarray:
+    def feasible(self) -> BoolArray:
         """(individuals,) whether the paper's own rules accept each plan."""
         return self.accepted
 
@@ -96,6 +96,8 @@ class Judgement(NamedTuple):
 
 class RedundantGa(PlannerDefaults, Component):
     """The algorithm of Lavoie & Boudreau, sections 3 to 5.
+
+    Controls take the generations and evaluations of one search, those of `ga`.
 
     Attributes:
         num_attempts: How often SP1 and SP2 are searched at most.
@@ -150,17 +152,14 @@ class RedundantGa(PlannerDefaults, Component):
         )
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
-        """Yield the generations of all searches, one after the other.
-
-        Their indices go on counting.
-        """
-        record = _Record(self, problem)
+        """Yield the generations of all searches; their indices go on counting."""
+        plans = _Plans(self, problem)
         for _ in range(self.num_attempts):
-            record.attempts += 1
-            via = yield from self._search(problem, rng, record, 0, problem.start)
+            plans.attempts += 1
+            via = yield from self._search(problem, rng, plans, 0, problem.start)
             if self.successful(0, via.cost):
-                record.via = via
-                goal = yield from self._search(problem, rng, record, 1, via.posture)
+                plans.via = via
+                goal = yield from self._search(problem, rng, plans, 1, via.posture)
                 if self.successful(1, goal.cost):
                     return
 
@@ -168,22 +167,19 @@ class RedundantGa(PlannerDefaults, Component):
         self,
         problem: Problem,
         rng: np.random.Generator,
-        record: "_Record",
+        plans: "_Plans",
         path: int,
         start: FloatArray,
-    ) -> Generator[Generation, None, Found]:
-        """Search the end of one sub-path (0: SP1, 1: SP2).
-
-        Yield its generations, return the best end.
-        """
+    ) -> Generator[Generation, None, BestEnd]:
+        """Search the end of one sub-path (0: SP1, 1: SP2); yield generations, return the best."""
         search = Search(self.ga, problem.joint_limits, self._judging(problem, path), start)
         search.begin(rng)
-        yield record.generation(search, path, self.ga.population_size)
+        yield plans.record(search, path, self.ga.population_size)
         for index in range(self.ga.num_generations):
             if search.best.cost < self._stop_costs[path]:
                 break
             search.advance(rng, index)
-            yield record.generation(search, path, self.ga.num_offspring)
+            yield plans.record(search, path, self.ga.num_offspring)
         return search.best
 
     @property
@@ -205,8 +201,8 @@ class RedundantGa(PlannerDefaults, Component):
     def cost(self, problem: Problem, population: FloatArray) -> Judgement:
         """Judge pairs of postures A and B (2, joints, individuals): what random search draws.
 
-        A pair costs what its SP2 does if its SP1 is successful, so it is judged as a finished plan
-        of the algorithm is. It is one evaluation of random search and takes two of the objective.
+        A pair costs as much as its SP2 if its SP1 is successful, else inf, like a finished plan of
+        the algorithm. It is one evaluation of random search and takes two of the objective.
         """
         starts = np.broadcast_to(problem.start[:, None], population.shape[1:])
         terms = np.array(
@@ -227,15 +223,15 @@ class RedundantGa(PlannerDefaults, Component):
         kernels.judge(starts, ends, lanes, count, self._judging(problem, path), results, hit)
         return results
 
-    def _judging(self, problem: Problem, path: int) -> tuple[Any, ...]:
-        """Return what the kernels judge a sub-path by; see `kernels.judge`."""
+    def _judging(self, problem: Problem, path: int) -> Judging:
+        """Return collision model and objective of a sub-path."""
         collision = problem.collision
-        where = problem.targets[path], problem.boxes[path]
-        return (
-            tuple(collision.arm),
+        return Judging(
+            collision.arm,
             collision.ellipses,
             collision.path,
-            *where,
+            problem.targets[path],
+            problem.boxes[path],
             self.objective.weights,
         )
 
@@ -248,9 +244,9 @@ class RedundantGa(PlannerDefaults, Component):
         return Motion(np.ascontiguousarray(self._postures(problem, solution)))
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
-        """Return the terms of both sub-paths, and where each first touches (counted from 1.
+        """Return the terms of both sub-paths, and the first contact of each.
 
-        0: it does not).
+        Positions, links and obstacles are counted from 1; 0: the sub-path is free.
 
         Raises:
             ValueError: If the solution has another size than 3 × joints.
@@ -258,27 +254,15 @@ class RedundantGa(PlannerDefaults, Component):
         postures = self._postures(problem, solution)
         named = named_terms(self.judge_plan(problem, solution))
         for k in range(2):
-            found = problem.collision.contact(*postures[k : k + 2])
-            position, obstacle, link, swept = found or (0, 0, 0, False)
-            named |= {
-                f"contact_position_sp{k + 1}": float(position),
-                f"contact_link_sp{k + 1}": float(link),
-            }
-            named |= {
-                f"contact_obstacle_sp{k + 1}": float(obstacle),
-                f"contact_swept_sp{k + 1}": float(swept),
-            }
+            contact = problem.collision.contact(*postures[k : k + 2]) or (0, 0, 0, False)
+            for name, value in zip(CONTACT, contact, strict=True):
+                named[f"contact_{name}_sp{k + 1}"] = float(value)
         return named
 
     def judge_plan(self, problem: Problem, solution: FloatArray) -> FloatArray:
-        """Return cost, position error and joint displacement of both sub-paths of a solution,.
-
-        2, 3.
-        """
-        postures = self._postures(problem, solution)
-        return np.array(
-            [self._judge(problem, k, *postures[k : k + 2, :, None])[:, 0] for k in range(2)]
-        )
+        """Return cost, position error and joint displacement of both sub-paths, (2, 3)."""
+        ends = self._postures(problem, solution)[:, :, None]
+        return np.array([self._judge(problem, k, *ends[k : k + 2])[:, 0] for k in range(2)])
 
     def shape(self, problem: Problem) -> tuple[tuple[int], ...]:
         """Return the documented shape of a solution: three postures of (joints,)."""
@@ -291,63 +275,54 @@ class RedundantGa(PlannerDefaults, Component):
         return solution.reshape(3, num)
 
 
-class _Record:
-    """The best plan so far, and the records of generations that carry it."""
+class _Plans:
+    """The best plan so far, and the records of generations.
+
+    Attributes:
+        attempts: Attempts so far.
+        via: The posture A that SP2 starts from.
+    """
 
     def __init__(self, planner: RedundantGa, problem: Problem) -> None:
-        self.planner, self.problem = planner, problem
-        self.attempts, self.index = 0, -1
-        self.via = Found(np.inf, problem.start, np.empty(0))  # the posture A that SP2 starts from
-        self.cost, self.via_cost = (
-            np.inf,
-            np.inf,
-        )  # of the best plan, and of SP1 where there is none
-        self.solution: FloatArray | None = None
-        self.terms: dict[str, float] = {}
-        self.evaluations = self.queries = 0
+        self._planner, self._problem, self._keeper = planner, problem, Keeper()
+        self.attempts, self.via = 0, BestEnd(np.inf, problem.start, np.empty(0))
+        self._via_cost = np.inf  # of the posture A that takes the place of a plan
 
-    def generation(self, search: Search, path: int, count: int) -> Generation:
-        """Update the best plan by a population of which `count` are new.
-
-        And return the generation's record.
-        """
-        best, summary = search.best, search.summary
-        self.index += 1
-        self.evaluations += count
-        self.queries += count * self.problem.collision.queries
+    def record(self, search: Search, path: int, count: int) -> Generation:
+        """Improve the best plan by a population of which `count` are new; return its record."""
+        best, keeper = search.best, self._keeper
         if path == 0:
             self._improve_via(best)
-        elif best.cost < self.cost:
-            self.cost, self.solution = best.cost, self._plan(self.via.posture, best.posture)
-            self.terms = named_terms(np.array([self.via.terms, best.terms]))
-        assert self.solution is not None, "SP1 is searched first"
-        return Generation(
-            index=self.index,
-            best=self.solution,
-            best_cost=self.cost,
-            best_cost_in_generation=np.inf if path == 0 else best.cost,
-            mean_cost=summary.mean,
-            std_cost=summary.std,
-            num_feasible=summary.num_finite,
-            evaluations=self.evaluations,
-            collision_queries=self.queries,
-            solved=bool(self.planner.successful(1, self.cost)),
-            terms=self.terms | {"attempts": float(self.attempts), "sub_path": path + 1.0},
-            costs=search.costs[None, :],
-            population=search.genomes,
+        elif best.cost < keeper.cost:
+            terms = named_terms(np.array([self.via.terms, best.terms]))
+            self._keep(best.cost, self.via.posture, best.posture, terms)
+        found = keeper.record(
+            search.statistics,
+            search.costs[None, :],
+            search.genomes,
+            lowest=np.inf if path == 0 else best.cost,
+            num_feasible=search.num_finite,
+            evaluations=count,
+            collision_queries=count * self._problem.collision.queries,
         )
+        counted = {"attempts": float(self.attempts), "sub_path": path + 1.0}
+        return found._replace(terms=found.terms | counted)
 
-    def _improve_via(self, best: Found) -> None:
-        """While there is no plan of finite cost.
+    def _improve_via(self, best: BestEnd) -> None:
+        """Without a plan of finite cost, keep the best posture A as a plan that stays there."""
+        keeper = self._keeper
+        if keeper.index < 0 or (keeper.cost == np.inf and best.cost < self._via_cost):
+            self._via_cost = best.cost
+            plan = np.concatenate([self._problem.start, best.posture, best.posture])
+            terms = named_terms(self._planner.judge_plan(self._problem, plan))
+            self._keep(np.inf, best.posture, best.posture, terms)
 
-        Keep the best posture A as a plan that stays there.
-        """
-        if self.solution is None or (self.cost == np.inf and best.cost < self.via_cost):
-            self.via_cost, self.solution = best.cost, self._plan(best.posture, best.posture)
-            self.terms = named_terms(self.planner.judge_plan(self.problem, self.solution))
-
-    def _plan(self, via: FloatArray, goal: FloatArray) -> FloatArray:
-        return np.concatenate([self.problem.start, via, goal])
+    def _keep(
+        self, cost: float, via: FloatArray, goal: FloatArray, terms: dict[str, float]
+    ) -> None:
+        plan = np.concatenate([self._problem.start, via, goal])
+        solved = bool(self._planner.successful(1, cost))
+        self._keeper.keep(cost, Candidate(plan, terms, solved))
 
 
 def named_terms(terms: FloatArray) -> dict[str, float]:

@@ -1,12 +1,10 @@
-"""One genetic search for the end posture of a sub-path (Lavoie & Boudreau 2001).
+"""One genetic search for the end posture of a sub-path (Lavoie & Boudreau 2001)."""
 
-Its memory, its calls of kernels.
-"""
-
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.evolution.crossover import num_single_point_uniforms
 from evoexp.evolution.gene_crossover import CROSSOVERS, ONE_POINT, num_gene_uniforms
 from evoexp.evolution.gene_mutation import (
@@ -21,15 +19,16 @@ from evoexp.evolution.gene_mutation import (
 )
 from evoexp.numeric.elementary import standard_normal
 from evoexp.planners.redundant_ga import kernels
-from evoexp.planners.redundant_ga.kernels import RESULTS
+from evoexp.planners.redundant_ga.kernels import RESULTS, Breeding, Draws, Judging, Memory
 from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic, SelectiveSettings
 from evoexp.records import FloatArray
 from evoexp.robots.planar_ends import LANES
 
 SELECTIONS = ("tournament", "roulette", "rank")  # in the order of the kernels' numbers
+_NO_NORMALS = np.empty((0, 0))
 
 
-class Found(NamedTuple):
+class BestEnd(NamedTuple):
     """The best individual of a population.
 
     Attributes:
@@ -43,15 +42,6 @@ class Found(NamedTuple):
     terms: FloatArray
 
 
-class Summary(NamedTuple):
-    """What a generation's costs say."""
-
-    best: int
-    mean: float
-    std: float
-    num_finite: int
-
-
 class Search:
     """One run of the genetic algorithm over the ends of one sub-path.
 
@@ -59,121 +49,110 @@ class Search:
         genomes: (genes, individuals) of the population; a view.
         costs: (individuals,) a view.
         best: A copy of the best individual; elites keep it the best so far.
-        summary: Of the costs.
+        statistics: Mean and deviation of the costs.
+        num_finite: Number of finite costs.
     """
 
+    best: BestEnd
+    statistics: CostStatistics
+    num_finite: int
+
     def __init__(
-        self, ga: SelectiveSettings, limits: FloatArray, judging: tuple[Any, ...], start: FloatArray
+        self, ga: SelectiveSettings, limits: FloatArray, judging: Judging, start: FloatArray
     ) -> None:
         """Take the settings, and memory for a population.
 
         Args:
             ga: Settings of a real or a binary genetic algorithm.
             limits: (joints, 2) of the joint angles [rad].
-            judging: See `kernels.judge`.
+            judging: Collision model and objective.
             start: (joints,) where the sub-path starts [rad].
         """
         joints, size, count = len(start), ga.population_size, ga.num_offspring
-        self._ga, self._limits, self._judging = ga, limits, judging
-        self._binary = isinstance(ga, BinaryGenetic)
-        self._num_genes = joints * ga.bits_per_gene if isinstance(ga, BinaryGenetic) else joints
-        first = self._num_genes if self._binary else 0
-        table, offspring = (
-            np.empty((first + joints + RESULTS, size)),
-            np.empty((first + joints + RESULTS, count)),
+        self._ga, self._judging, self._breeding = ga, judging, _breeding(ga, limits)
+        first = self._breeding.num_genes if self._breeding.binary else 0
+        rows = first + joints + RESULTS
+        self._memory = Memory(
+            np.empty((rows, size)),
+            np.empty((rows, count)),
+            np.empty(count, dtype=np.int64),
+            np.empty(ga.num_elites, dtype=np.int64),
+            np.arange(size + LANES),
+            np.zeros(size, dtype=np.bool_),
         )
-        parents, elites = np.empty(count, dtype=np.int64), np.empty(ga.num_elites, dtype=np.int64)
-        self._lanes, self._hit = np.arange(size + LANES), np.zeros(size, dtype=np.bool_)
-        self._memory = (table, offspring, parents, elites, self._lanes, self._hit)
+        table = self._memory.population
         self._starts = np.repeat(start[:, None], size, axis=1)
-        self.genomes, self._angles, self._results = (
-            table[: self._num_genes],
-            table[first:-RESULTS],
-            table[-RESULTS:],
-        )
-        self.costs = self._results[0]
-        self._count, self._mutation = count, _mutation(ga)
-        selecting = (SELECTIONS.index(ga.selection), ga.tournament_size, ga.rank_pressure)
-        crossing = _crossing(ga)
-        self._breeding = (self._num_genes, self._binary, selecting, crossing)
-        self._stops = self._places(crossing[0])
-        self.best, self.summary = Found(np.inf, start, np.empty(0)), Summary(0, np.nan, np.nan, 0)
+        self._angles, self._results = table[first:-RESULTS], table[-RESULTS:]
+        self.genomes, self.costs = table[: self._breeding.num_genes], self._results[0]
+        self._stops = self._places()
 
-    def _places(self, crossover: int) -> tuple[int, int, int]:
-        """Return where a generation's uniform numbers for crossover and for mutation begin.
-
-        And how many there are.
-        """
-        ga, count, num_genes = self._ga, self._count, self._num_genes
-        pairs = count // 2
-        chosen = count * (ga.tournament_size if ga.selection == "tournament" else 1)
-        crossed = (
-            num_single_point_uniforms(pairs)
-            if crossover == ONE_POINT
-            else num_gene_uniforms(num_genes, pairs)
+    def _places(self) -> list[int]:
+        """Return where the uniform numbers for choice, crossover and mutation end."""
+        ga, breeding, count = self._ga, self._breeding, self._ga.num_offspring
+        pairs, genes = count // 2, breeding.num_genes
+        one_point, scope = breeding.crossover == ONE_POINT, breeding.mutation_scope
+        numbers = (
+            count * (ga.tournament_size if ga.selection == "tournament" else 1),
+            num_single_point_uniforms(pairs) if one_point else num_gene_uniforms(genes, pairs),
+            num_mutation_uniforms(genes, count, scope),
         )
-        mutated = (
-            num_genes * count
-            if self._binary
-            else num_mutation_uniforms(num_genes, count, self._mutation[1])
-        )
-        return chosen, chosen + crossed, chosen + crossed + mutated
+        return [int(stop) for stop in np.cumsum(numbers)]
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw the initial population, uniform within the limits, and judge it."""
-        size = len(self.costs)
-        if self._binary:
+        size, limits = len(self.costs), self._breeding.limits
+        if self._breeding.binary:
             self.genomes[:] = np.floor(2.0 * rng.random(self.genomes.shape))
-            decode_bits(self.genomes, size, self._limits, self._angles)
+            decode_bits(self.genomes, size, limits, self._angles)
         else:
-            low, high = self._limits.T
+            low, high = limits.T
             self._angles[:] = low[:, None] + (high - low)[:, None] * rng.random(self._angles.shape)
-        judged = (self._judging, self._results, self._hit)
-        kernels.judge(self._starts, self._angles, self._lanes, size, *judged)
-        self._summarise(kernels.summary(self.costs))
+        lanes, judged = self._memory.lanes, (self._judging, self._results, self._memory.hit)
+        kernels.judge(self._starts, self._angles, lanes, size, *judged)
+        self._take(kernels.summary(self.costs))
 
     def advance(self, rng: np.random.Generator, index: int) -> None:
         """Replace the population of generation `index` by the next one."""
-        crossing, mutating, end = self._stops
-        uniforms = rng.random(end)
-        kind, scope, rate, spread = self._mutation
-        if kind == NON_UNIFORM and isinstance(self._ga, RealGenetic):
-            spread = float(
-                non_uniform_spread(index, self._ga.num_generations, self._ga.mutation_power)
+        ga, breeding = self._ga, self._breeding
+        chosen, crossed, end = self._stops
+        uniforms, normals, spread = rng.random(end), _NO_NORMALS, 0.0
+        if isinstance(ga, RealGenetic) and breeding.mutation == NON_UNIFORM:
+            spread = float(non_uniform_spread(index, ga.num_generations, ga.mutation_power))
+        elif isinstance(ga, RealGenetic) and breeding.mutation == GAUSSIAN:
+            normals, spread = (
+                standard_normal(rng, (breeding.num_genes, ga.num_offspring)),
+                ga.mutation_std,
             )
-        normals = (
-            standard_normal(rng, (self._num_genes, self._count))
-            if kind == GAUSSIAN
-            else _NO_NORMALS
+        draws = Draws(uniforms[:chosen], uniforms[chosen:crossed], uniforms[crossed:], normals)
+        self._take(
+            kernels.advance(draws, spread, breeding, self._judging, self._starts, self._memory)
         )
-        draws = (uniforms[:crossing], uniforms[crossing:mutating], uniforms[mutating:], normals)
-        breeding = (*self._breeding, (kind, scope, rate, spread), self._limits)
-        found = kernels.advance(draws, breeding, self._judging, self._starts, self._memory)
-        self._summarise(found)
 
-    def _summarise(self, found: tuple[int, float, float, int]) -> None:
-        self.summary = Summary(*found)
-        terms = self._results[:, self.summary.best].copy()
-        self.best = Found(float(terms[0]), self._angles[:, self.summary.best].copy(), terms)
+    def _take(self, summary: tuple[int, float, float, int]) -> None:
+        """Take over the summary of a generation."""
+        self.statistics, self.num_finite = CostStatistics(*summary[:3]), summary[3]
+        terms = self._results[:, summary[0]].copy()
+        self.best = BestEnd(float(terms[0]), self._angles[:, summary[0]].copy(), terms)
 
 
-_NO_NORMALS = np.empty((0, 0))
-
-
-def _crossing(ga: SelectiveSettings) -> tuple[int, float, float]:
-    """Return crossover, its rate, α."""
-    if not isinstance(ga, RealGenetic):
-        return ONE_POINT, ga.crossover_rate, 0.0
-    return CROSSOVERS.index(ga.crossover), ga.crossover_rate, ga.blend_alpha
-
-
-def _mutation(ga: SelectiveSettings) -> tuple[int, int, float, float]:
-    """Return mutation, its scope, its rate, its spread."""
-    if not isinstance(ga, RealGenetic):
-        return NON_UNIFORM, GENE, ga.mutation_rate, 0.0
-    return (
-        MUTATIONS.index(ga.mutation),
-        SCOPES.index(ga.mutation_scope),
-        ga.mutation_rate,
-        ga.mutation_std,
+def _breeding(ga: SelectiveSettings, limits: FloatArray) -> Breeding:
+    """Return the settings of the operators as the kernels take them."""
+    binary = isinstance(ga, BinaryGenetic)
+    crossover, alpha, mutation, scope = ONE_POINT, 0.0, NON_UNIFORM, GENE
+    if isinstance(ga, RealGenetic):
+        crossover, alpha = CROSSOVERS.index(ga.crossover), ga.blend_alpha
+        mutation, scope = MUTATIONS.index(ga.mutation), SCOPES.index(ga.mutation_scope)
+    return Breeding(
+        num_genes=len(limits) * (ga.bits_per_gene if isinstance(ga, BinaryGenetic) else 1),
+        binary=binary,
+        selection=SELECTIONS.index(ga.selection),
+        tournament_size=ga.tournament_size,
+        rank_pressure=ga.rank_pressure,
+        crossover=crossover,
+        crossover_rate=ga.crossover_rate,
+        blend_alpha=alpha,
+        mutation=mutation,
+        mutation_scope=scope,
+        mutation_rate=ga.mutation_rate,
+        limits=limits,
     )

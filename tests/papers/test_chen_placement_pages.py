@@ -83,9 +83,9 @@ def test_gaps_are_those_of_the_summaries(cases: list[Case]) -> None:
 def test_verdicts_where_they_are_judged(
     outputs: Path, cases: list[Case], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(placement_claims, "not_judged", lambda _: "")
+    monkeypatch.setattr(placement_claims.judging, "not_judged", lambda _: "")
     settings = page_settings("chen_placement")
-    found = placement_claims.of_cases(smoke_results(outputs, "chen_placement"), cases, settings)
+    found = placement_claims.judge_cases(smoke_results(outputs, "chen_placement"), cases, settings)
     verdict = {one.text: one.verdict for one in found}
     assert (
         verdict["least torque norm: the best posture has a torque norm of 1.73"]

@@ -1,32 +1,32 @@
-"""Chen & Zalzala 1995, section 4.2.
+"""The five criteria of Chen & Zalzala 1995, section 4.2: their conditions and printed postures."""
 
-Which conditions belong to one criterion, and what the paper prints of it.
-"""
-
+import contextlib
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from evoexp.planners.placement_ga.planner import PlacementGa
 from evoexp.records import FloatArray
 from evoexp.report.proportions import Proportion
 from evoexp.report.results import ConditionResults, Results
+from evoexp.report.run_measures import counted, grouped
 
 METHODS = {
     "newton": "Newton-type",
     "bounded": "Newton-type, smooth form",
     "subgradient": "subgradient",
-}
-CLOSE = (0.001, 0.01)  # [-] gaps to the optimum that shares are told of
+}  # as the reference records them → as the page names them
+CLOSE = (0.001, 0.01)  # [-] gaps to the optimum; shares of runs within them are given
 
 
-class Printed(NamedTuple):
-    """What the paper prints of one criterion.
+class PrintedPosture(NamedTuple):
+    """The numbers that the paper prints of the best posture by one criterion.
 
     Attributes:
-        figure: Where.
-        term: Which number of a posture it is.
-        value: The number; NaN: only angles are printed.
-        angles: θ1, θ2 [deg]; None: not printed.
+        figure: The paper's figure.
+        term: Name of the printed number, as the planner's `evaluate` names it.
+        value: The number; NaN if only angles are printed.
+        angles: θ1, θ2 [deg]; None if they are not printed.
     """
 
     figure: str
@@ -36,23 +36,23 @@ class Printed(NamedTuple):
 
 
 PRINTED = {
-    "least torque norm": Printed("Fig. 4", "torque_norm", 1.73),
-    "minimax torque": Printed("Fig. 5", "torque_max", 0.90, (68.96, 41.74)),
-    "obstacle and link 2": Printed("Fig. 6", "torque_norm", 2.08),
-    "obstacle and platform": Printed("Fig. 7", "torque_norm", 3.01),
-    "manipulability and torque": Printed("Fig. 8", "cost", np.nan, (114.24, -36.93)),
+    "least torque norm": PrintedPosture("Fig. 4", "torque_norm", 1.73),
+    "minimax torque": PrintedPosture("Fig. 5", "torque_max", 0.90, (68.96, 41.74)),
+    "obstacle and link 2": PrintedPosture("Fig. 6", "torque_norm", 2.08),
+    "obstacle and platform": PrintedPosture("Fig. 7", "torque_norm", 3.01),
+    "manipulability and torque": PrintedPosture("Fig. 8", "cost", np.nan, (114.24, -36.93)),
 }
 
 
 class Case(NamedTuple):
-    """The conditions of one criterion; None: there is none with data.
+    """The conditions of one criterion; None where a condition is absent or has no data.
 
     Attributes:
-        name: Of the criterion, a key of PRINTED; else the label of the search.
+        name: The criterion, a key of PRINTED; else the label of the first condition.
         plain: The genetic algorithm without elitism.
-        elitist: With elitism.
+        elitist: The genetic algorithm with elitism.
         search: Random search at equal evaluations.
-        optimum: The exact one.
+        optimum: The exact optimum.
         conventional: Local methods from many starts.
         landscape: E over θ1 and θ2.
     """
@@ -66,70 +66,88 @@ class Case(NamedTuple):
     landscape: ConditionResults | None = None
 
     @property
+    def conditions(self) -> tuple[ConditionResults, ...]:
+        """All conditions that are there; they share robot, task and criterion."""
+        return tuple(c for c in self[1:] if isinstance(c, ConditionResults))
+
+    @property
     def evolved(self) -> dict[str, ConditionResults]:
-        """What was run with many seeds, by a name for figures."""
+        """The conditions that were run with many seeds, by their names in figures."""
         named = {"GA": self.plain, "GA, elitism": self.elitist, "random search": self.search}
         return {name: c for name, c in named.items() if c is not None}
 
     @property
-    def any(self) -> ConditionResults:
-        """Any of them: they share robot, task and criterion."""
-        return next(c for c in self[1:] if isinstance(c, ConditionResults))
-
-    @property
-    def printed(self) -> Printed | None:
-        """What the paper prints of it."""
+    def printed(self) -> PrintedPosture | None:
+        """The numbers that the paper prints."""
         return PRINTED.get(self.name)
 
     @property
     def least(self) -> float:
-        """E of the exact optimum; NaN where it was not computed."""
+        """E of the exact optimum; NaN if it was not computed."""
         return float(self.optimum.column("best_cost")[0]) if self.optimum is not None else np.nan
 
+    @property
+    def optimal_angles(self) -> FloatArray | None:
+        """θ1, θ2 [deg] of the exact optimum; None if it was not computed."""
+        return (
+            self.optimum.solutions[self.optimum.best_replicate]
+            if self.optimum is not None
+            else None
+        )
+
+    @property
+    def printed_angles(self) -> FloatArray | None:
+        """θ1, θ2 [deg] that the paper prints; None if it prints none."""
+        angles = self.printed.angles if self.printed is not None else None
+        return None if angles is None else np.array(angles)
+
+    @property
+    def minima(self) -> FloatArray:
+        """All local minima, (minima, 3): θ1, θ2 [deg], E, the least first."""
+        return self.optimum.array("minima") if self.optimum is not None else np.empty((0, 3))
+
     def gaps(self, costs: FloatArray) -> FloatArray:
-        """Return by how much costs are above the optimum, in units of it."""
+        """Return by how much costs are above the optimum, as multiples of it [-]."""
         return costs / self.least - 1.0
 
     def within(self, costs: FloatArray, close: float) -> Proportion:
-        """Return how many costs are within a gap of the optimum."""
-        return Proportion(int(np.count_nonzero(self.gaps(costs) <= close)), len(costs))
+        """Count the costs within a gap [-] of the optimum."""
+        return counted(self.gaps(costs) <= close)
 
     def measured(self, angles: Any) -> dict[str, float]:
-        """Return everything about the posture θ1, θ2 [deg]."""
-        planner, problem = self.any.prepared
-        return dict(planner.evaluate(problem, np.asarray(angles, dtype=np.float64)))
+        """Return the named terms of the posture θ1, θ2 [deg]; see `PlacementGa.evaluate`."""
+        return self.conditions[0].evaluate(np.asarray(angles, dtype=np.float64))
 
     def ends(self) -> dict[str, FloatArray]:
-        """Return where conventional methods ended, (starts, 3).
+        """Return the postures at which local methods end, (starts, 3): θ1, θ2 [deg], E.
 
-        Θ1, θ2 [deg], E, by the method's name.
+        They are given by the method's name; methods that were not run are left out.
         """
-        if self.conventional is None:
-            return {}
-        found = {}
+        found: dict[str, FloatArray] = {}
         for key, name in METHODS.items():
-            try:
-                found[name] = self.conventional.array(key)
-            except KeyError:
-                continue
+            with contextlib.suppress(KeyError):
+                if self.conventional is not None:
+                    found[name] = self.conventional.array(key)
         return found
 
 
 def cases(results: Results) -> list[Case]:
     """Return the criteria in the order of the experiment, each with its conditions."""
-    found: dict[Any, dict[str, ConditionResults]] = {}
-    for c in results.with_data:
-        key = c.condition.robot, c.condition.scenario, c.planner.objective
-        found.setdefault(key, {}).setdefault(_role(c), c)
-    return [Case(_name(next(iter(own.values()))), **own) for own in found.values()]
+    groups = grouped(
+        results.with_data,
+        lambda c: (c.condition.robot, c.condition.scenario, c.planner.objective),
+    )
+    return [Case(_name(own[0]), **{_role(c): c for c in reversed(own)}) for own in groups]
 
 
 def fits(results: Results) -> bool:
-    """Whether all planners are placement searches."""
-    return all(c.planner.component == "placement_ga" for c in results.with_data)
+    """Whether there are results, and all planners are placement searches."""
+    found = results.with_data
+    return bool(found) and all(isinstance(c.planner, PlacementGa) for c in found)
 
 
 def _role(condition: ConditionResults) -> str:
+    """Return the attribute of `Case` that a condition belongs to."""
     if condition.is_reference:
         return condition.condition.planner.component.removeprefix("placement_")
     if condition.is_control:
@@ -138,18 +156,15 @@ def _role(condition: ConditionResults) -> str:
 
 
 def _name(condition: ConditionResults) -> str:
-    objective = condition.planner.objective
-    weights = (
-        objective.torque_norm_weight,
-        objective.torque_max_weight,
-        objective.manipulability_weight,
-    )
-    links = [one.link for one in objective.avoidances]
-    names = {
-        (True, False, False, ()): "least torque norm",
-        (False, True, False, ()): "minimax torque",
-        (True, False, False, (2,)): "obstacle and link 2",
-        (True, False, False, (0,)): "obstacle and platform",
-        (True, False, True, ()): "manipulability and torque",
+    """Return the criterion's name, told by its weights and the links that avoid obstacles."""
+    cost = condition.planner.objective
+    weights = cost.torque_norm_weight, cost.torque_max_weight, cost.manipulability_weight
+    names: dict[Any, str] = {
+        (True, False, False): "least torque norm",
+        (False, True, False): "minimax torque",
+        (True, False, False, 2): "obstacle and link 2",
+        (True, False, False, 0): "obstacle and platform",
+        (True, False, True): "manipulability and torque",
     }
-    return names.get((*map(bool, weights), tuple(links)), condition.label)  # type: ignore[arg-type]
+    links = (one.link for one in cost.avoidances)
+    return names.get((*map(bool, weights), *links), condition.label)

@@ -1,7 +1,4 @@
-"""Chen & Zalzala 1995, Fig. 1.
-
-Two numerical potential fields, every node's number, and the slips of the print.
-"""
+"""Chen & Zalzala 1995, Fig. 1: two numerical potential fields, and the slips of their print."""
 
 from functools import partial
 
@@ -10,16 +7,24 @@ import pandas as pd
 
 from evoexp.papers.chen.figures import field_grids
 from evoexp.papers.chen.printed_grids import MISSING, SURPLUS, WRONG, compare, printed, rows_of
-from evoexp.report import claims
+from evoexp.planners.grid_path_ga.planner import GridPathGa
+from evoexp.report import claims, judging
 from evoexp.report.claims import Claim
-from evoexp.report.judging import claim, not_judged
+from evoexp.report.judging import Judge
 from evoexp.report.page import Drawing, Page
 from evoexp.report.pages import generic
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
+from evoexp.report.rows import groups, records
 
 PRINT = "chen_fig_1.txt"
 NAMES = ("(a) potential toward the goal", "(b) potential of obstacles")
+PLACE = "row {0.row} from the top, column {0.column}"
+SLIPS = {
+    WRONG: PLACE + ": {0.printed} for {0.computed}",
+    MISSING: PLACE + ": {0.computed} is left out",
+    SURPLUS: PLACE + ": a {0.printed} too many before it",
+}
 INTRODUCTION = (
     "Wave fronts over a grid (section 2.1): from the goal, whose potential is 0, and from "
     "obstacles and the boundary, which is a ring of nodes outside the grid. The potential of "
@@ -29,20 +34,20 @@ INTRODUCTION = (
 
 
 def page(results: Results, settings: ReportSettings) -> Page:
-    """Return the page; the generic one where nothing has potential fields."""
-    shown = [
-        c
-        for c in results.with_data
-        if c.is_reference and hasattr(c.planner.collision, "goal_potentials")
-    ]
+    """Build the page of the potential fields, or the generic page if there are none."""
+    shown = [c for c in results.references if isinstance(c.planner, GridPathGa)]
     if not shown:
         return generic.page(results, settings)
-    of_print = [c for c in shown if _fields(c)[0].shape == (16, 16)]
-    tables = {c.label: _compared(c) for c in of_print}
+    tables = {c.label: _compared(c) for c in shown if _fields(c)[0].shape == (16, 16)}
+    of_print = [c for c in shown if c.label in tables]
     return Page(
         title=f"Chen & Zalzala 1995: {results.experiment or 'stored runs'}",
         introduction=INTRODUCTION,
-        claims=tuple(one for table in tables.values() for one in _claims(results, table)),
+        claims=tuple(
+            one
+            for table in tables.values()
+            for one in _claims(judging.judge(results, settings), table)
+        ),
         checks=tuple(row for table in tables.values() for row in _slips(table)),
         drawings=(*(_numbers(c, tables[c.label]) for c in of_print), *(_map(c) for c in shown)),
     )
@@ -53,71 +58,45 @@ def _fields(condition: ConditionResults) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _compared(condition: ConditionResults) -> pd.DataFrame:
-    """Return all nodes of both fields beside the printed ones."""
+    """Return all nodes of both fields beside the printed ones; see `printed_grids.compare`."""
     goal, unsafeness = _fields(condition)
     blocked, edge = np.isnan(goal), f"{condition.planner.collision.obstacle_potentials[0]:g}"
     computed = rows_of(goal, blocked), rows_of(unsafeness, blocked, edge)
-    given = printed(PRINT)
-    return pd.concat(
-        [
-            compare(name, *both)
-            for name, both in zip(NAMES, zip(computed, given, strict=True), strict=True)
-        ],
-        ignore_index=True,
-    )
+    parts = map(compare, NAMES, computed, printed(PRINT))
+    return pd.concat(parts, ignore_index=True)
 
 
-def _claims(results: Results, table: pd.DataFrame) -> list[Claim]:
-    why, found = not_judged(results), []
-    for name, of in zip(NAMES, (table[table["field"] == n] for n in NAMES), strict=True):
-        cells = of[of["slip"] != SURPLUS]
-        same = int((cells["slip"] == "").sum())
+def _claims(judge: Judge, table: pd.DataFrame) -> list[Claim]:
+    """Judge that each field is printed as the wave front computes it."""
+    found = []
+    for name, own in groups(table, "field"):
+        total = int((own["slip"] != SURPLUS).sum())
+        same, wrong, missing, surplus = (
+            int((own["slip"] == slip).sum()) for slip in ("", WRONG, MISSING, SURPLUS)
+        )
         told = (
-            f"{same} of {len(cells)} nodes as printed; {_count(of, WRONG)} with another number, "
-            f"{_count(of, MISSING)} left out, {_count(of, SURPLUS)} tokens too many (reproduced: "
-            "every node that is printed, but for single slips of the print: at most one in a "
-            "hundred)"
+            f"{same} of {total} nodes as printed; {wrong} with another number, {missing} left "
+            f"out, {surplus} tokens too many (reproduced: every node that is printed, but for "
+            "single slips of the print: at most one in a hundred)"
         )
-        verdict = claims.REPRODUCED if same >= 0.99 * len(cells) else claims.CONTRADICTED
-        found.append(
-            claim(
-                f"The wave front gives Fig. 1{name}",
-                "Fig. 1",
-                told,
-                claims.NOT_JUDGED if why else verdict,
-                why,
-            )
-        )
+        verdict = claims.judged(same >= 0.99 * total)
+        found.append(judge.claim(f"The wave front gives Fig. 1{name}", "Fig. 1", told, verdict))
     return found
 
 
-def _count(table: pd.DataFrame, slip: str) -> int:
-    return int((table["slip"] == slip).sum())
-
-
 def _slips(table: pd.DataFrame) -> list[tuple[str, str]]:
-    rows = []
-    for name in NAMES:
-        own = table[(table["field"] == name) & (table["slip"] != "")]
-        texts = []
-        for row, column, computed, given, slip in own[
-            ["row", "column", "computed", "printed", "slip"]
-        ].itertuples(index=False):
-            place = f"row {row} from the top, column {column}"
-            texts.append(
-                {
-                    WRONG: f"{place}: {given} for {computed}",
-                    MISSING: f"{place}: {computed} is left out",
-                    SURPLUS: f"{place}: a {given} too many before it",
-                }[slip]
+    """Return a row of checks per field: its slips in words."""
+    return [
+        (
+            f"Slips of the print, Fig. 1{name} (counted from 0)",
+            "; ".join(
+                SLIPS[row.slip].format(row).replace("*", "\\*")
+                for row in records(own[own["slip"] != ""])
             )
-        rows.append(
-            (
-                f"Slips of the print, Fig. 1{name} (counted from 0)",
-                "; ".join(texts).replace("*", "\\*") or "none",
-            )
+            or "none",
         )
-    return rows
+        for name, own in groups(table, "field")
+    ]
 
 
 def _numbers(condition: ConditionResults, table: pd.DataFrame) -> Drawing:
@@ -145,11 +124,12 @@ def _map(condition: ConditionResults) -> Drawing:
 
 
 def _map_table(condition: ConditionResults) -> pd.DataFrame:
+    """Return both fields node by node: columns field, x, y, value (NaN: an obstacle)."""
     goal, unsafeness = _fields(condition)
-    x, y = np.indices(goal.shape)
+    x, y = (axis.ravel() for axis in np.indices(goal.shape))
     closed = np.where(np.isnan(goal), np.nan, unsafeness)
     parts = [
-        pd.DataFrame({"field": name, "x": x.ravel(), "y": y.ravel(), "value": values.ravel()})
+        pd.DataFrame({"field": name, "x": x, "y": y, "value": values.ravel()})
         for name, values in zip(NAMES, (goal, closed), strict=True)
     ]
     return pd.concat(parts, ignore_index=True)

@@ -1,7 +1,4 @@
-"""What the mean of Eq. 3 of Chen & Zalzala 1995 rewards.
-
-Paths that stay in safe places, with loops and without.
-"""
+"""Paths that the mean of Eq. 3 of Chen & Zalzala 1995 rewards: they linger in safe places."""
 
 from functools import partial
 
@@ -12,6 +9,7 @@ from evoexp.papers.chen import path_page
 from evoexp.papers.chen.figures import grid_paths, lingering
 from evoexp.papers.chen.figures.grid_paths import EXACT, MEDIAN, Line, Panel
 from evoexp.papers.chen.path_measures import Group
+from evoexp.planners.grid_path_ga.planner import Problem
 from evoexp.report import markdown
 from evoexp.report.page import Drawing, Page
 from evoexp.report.pages import generic
@@ -28,7 +26,7 @@ INTRODUCTION = (
 
 
 def page(results: Results, settings: ReportSettings) -> Page:
-    """Return the page; the generic one where planners are others."""
+    """Build the page of lingering paths, or the generic page if another planner was run."""
     if not measures.fits(results):
         return generic.page(results, settings)
     groups = measures.group_list(results)
@@ -42,32 +40,26 @@ def page(results: Results, settings: ReportSettings) -> Page:
 
 
 def _checks(groups: tuple[Group, ...]) -> list[tuple[str, str]]:
-    """Return how far paths that may pass nodes again do, and what the best ones are."""
+    """Return rows on repeated nodes where they are permitted, then on the best paths known."""
     rows = []
     for free in (group for group in groups if group.revisits):
-        simple = next((g for g in groups if g.weights == free.weights and not g.revisits), None)
+        simple = [_length(g) for g in groups if g.weights == free.weights and not g.revisits][:1]
         repeats = [_repeated(path) for path in measures.paths(free.main).values()]
         told = (
             f"{markdown.share(int(np.count_nonzero(repeats)), len(repeats))} runs pass nodes "
             f"again, median {np.median(repeats):.0f} repeated nodes; median length "
             f"{_length(free):.0f} cells"
         )
-        rows.append(
-            (
-                f"{free.name}: lingering",
-                told + (f", {_length(simple):.0f} without revisits" if simple else ""),
-            )
-        )
-    return rows + [
-        (f"{group.name}: best path known", _truth(group))
-        for group in groups
-        if group.truth is not None
-    ]
+        told += "".join(f", {length:.0f} without revisits" for length in simple)
+        rows.append((f"{free.name}: lingering", told))
+    known = (group for group in groups if group.truth is not None)
+    return rows + [(f"{group.name}: best path known", _best_known(group)) for group in known]
 
 
-def _truth(group: Group) -> str:
+def _best_known(group: Group) -> str:
+    """Describe the best path that the reference knows."""
     assert group.truth is not None
-    best = measures.paths(group.truth)[0]
+    (best,) = group.best_path
     length, unsafeness, exact = (
         float(group.truth.column(f"term_{name}")[0])
         for name in ("distance", "unsafeness", "bound_is_reached")
@@ -84,13 +76,13 @@ def _length(group: Group) -> float:
 
 
 def _repeated(path: np.ndarray) -> int:
-    """Return how many nodes of a path were passed before."""
+    """Count the nodes of a path that were passed before."""
     return len(path) - len(np.unique(path, axis=0))
 
 
 def _drawings(groups: tuple[Group, ...]) -> tuple[Drawing, ...]:
-    shown = tuple(c for group in groups for c in (*group.conditions, group.truth) if c is not None)
-    drawings = [
+    places = [(group.name, group.main, _unsafeness(group)) for group in groups]
+    return (
         Drawing(
             "paths",
             "Paths with and without revisits",
@@ -98,32 +90,28 @@ def _drawings(groups: tuple[Group, ...]) -> tuple[Drawing, ...]:
             "back and forth lie on each other: the next figure counts nodes.",
             partial(grid_paths.paths_table, [_panel(group) for group in groups]),
             grid_paths.draw_paths,
-            shown,
+            tuple(c for group in groups for c in group.all),
         ),
         Drawing(
             "lingering",
             "How many nodes lie in places of which unsafeness",
             "Nodes of the best solution of every run: mean number per unsafeness of the node, "
             "counted as often as they are passed.",
-            partial(
-                lingering.places_table,
-                [(group.name, group.main, _unsafeness(group)) for group in groups],
-            ),
+            partial(lingering.places_table, places),
             lingering.draw_places,
             tuple(group.main for group in groups),
         ),
-    ]
-    return tuple(drawings)
+    )
 
 
 def _unsafeness(group: Group) -> np.ndarray:
-    fields = group.main.prepared.problem.fields
+    """Return the unsafeness of every node, (along x, along y)."""
+    fields = group.main.problem(Problem).fields
     return np.asarray(fields.grid.inner(fields.unsafeness))
 
 
 def _panel(group: Group) -> Panel:
-    c, own = group.main, measures.paths(group.main)
-    lines = [Line(MEDIAN, own[measures.median_replicate(c)])]
-    if group.truth is not None:
-        lines.append(Line(EXACT, measures.paths(group.truth)[0]))
+    c = group.main
+    lines = [Line(MEDIAN, measures.paths(c)[measures.median_replicate(c)])]
+    lines += [Line(EXACT, path) for path in group.best_path]
     return Panel(group.name, c.condition.length_unit, measures.boxes(c), lines)

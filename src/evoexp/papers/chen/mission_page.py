@@ -1,7 +1,4 @@
-"""What the title of Chen & Zalzala 1995 promises.
-
-A safe path and a docking configuration, as one motion.
-"""
+"""The title of Chen & Zalzala 1995 kept: a safe path and a docking posture as one motion."""
 
 from functools import partial
 from typing import Any
@@ -11,9 +8,10 @@ import pinocchio as pin
 
 from evoexp.papers.chen import path_measures as measures
 from evoexp.papers.chen.figures import missions
-from evoexp.papers.chen.figures.missions import DOCKED, TRAVEL, Shown
+from evoexp.papers.chen.figures.missions import DOCKED, TRAVEL, Mission
+from evoexp.planners.two_stage.planner import Problem, TwoStage
 from evoexp.records import FloatArray
-from evoexp.report import markdown
+from evoexp.report import markdown, run_measures
 from evoexp.report.page import Drawing, Page
 from evoexp.report.pages import generic
 from evoexp.report.proportions import Proportion
@@ -31,10 +29,22 @@ INTRODUCTION = (
 
 
 def page(results: Results, settings: ReportSettings) -> Page:
-    """Return the page; the generic one where planners are others."""
-    if not results.with_data or not all(hasattr(c.planner, "placement") for c in results.with_data):
+    """Build the page of the missions, or the generic page if another planner was run."""
+    found = results.with_data
+    if not found or not all(isinstance(c.planner, TwoStage) for c in found):
         return generic.page(results, settings)
     row, column = partial(generic.quantity, results), generic.by_column
+    clearance = "clearance of the bodies over the whole motion (exact)"
+    drawing = Drawing(
+        "mission",
+        "Path and docking posture",
+        "Per condition the run of median cost. Left: the floor, obstacles from centre to centre "
+        "of their outermost nodes. Right: the platform at its docking place, the arm as it "
+        "drives and as it docks, the force that acts.",
+        partial(missions.missions_table, [_mission(c) for c in found]),
+        missions.draw_missions,
+        found,
+    )
     return Page(
         title=f"Chen & Zalzala 1995: {results.experiment or 'stored runs'}",
         introduction=INTRODUCTION,
@@ -47,98 +57,73 @@ def page(results: Results, settings: ReportSettings) -> Page:
             row("torque norm, squared", "–", column("term_torque_norm")),
             row("greatest torque", "–", column("term_torque_max")),
             row("from the last node to the docking place", "unit", column("term_last_leg")),
-            row(
-                "clearance of the bodies over the whole motion (exact)", "unit", column("clearance")
-            ),
+            row(clearance, "unit", column("clearance")),
             row("evaluations", "–", column("evaluations")),
             row("CPU time of a run, exact verdict included", "s", column("cpu_s")),
-            row("CPU time of its searches", "s", measures.search_seconds),
+            row("CPU time of its searches", "s", run_measures.search_seconds),
         ),
-        checks=_checks(results, settings),
-        drawings=(_drawing(results),),
+        checks=tuple(row for c in found for row in _checks(c, settings)),
+        drawings=(drawing,),
     )
 
 
-def _checks(results: Results, settings: ReportSettings) -> tuple[tuple[str, str], ...]:
-    rows = []
-    for c in results.with_data:
-        found = c.verdicts
-        share = markdown.percent(
-            Proportion(found.certified, found.judged).interval(settings.confidence)
-        )
-        told = (
-            f"{markdown.share(found.certified, found.judged)} ({share}) free of contact over the "
-            "whole motion"
-        )
-        nearest = c.summaries["clearance_pair"].value_counts()
-        told += (
-            f"; {found.refuted} touch, {found.undecided} undecided; closest most often: "
-            f"{nearest.index[0]}"
-        )
-        rows.append((f"{c.label}: exact verdicts", told))
-        places = np.round(c.column("term_platform_x"), 3)
-        spread = (
-            f"between {places.min():g} and {places.max():g}, "
-            f"{np.count_nonzero(places < _target(c)[0])} of {c.done}"
-        )
-        rows.append(
-            (f"{c.label}: docking places X_p", f"{spread} on the near side of the end-effector")
-        )
-    return tuple(rows)
-
-
-def _target(condition: ConditionResults) -> FloatArray:
-    return np.array(condition.condition.scenario.docking.target)  # type: ignore[attr-defined]
-
-
-def _drawing(results: Results) -> Drawing:
-    shown = [_shown(c) for c in results.with_data]
-    return Drawing(
-        "mission",
-        "Path and docking posture",
-        "Per condition the run of median cost. Left: the floor, obstacles from centre to centre "
-        "of their outermost nodes. Right: the platform at its docking place, the arm as it "
-        "drives and as it docks, the force that acts.",
-        partial(missions.missions_table, shown),
-        missions.draw_missions,
-        results.with_data,
+def _checks(condition: ConditionResults, settings: ReportSettings) -> tuple[tuple[str, str], ...]:
+    """Return the rows on a condition's exact verdicts and on its docking places."""
+    label, found, scenario = condition.label, condition.verdicts, _scenario(condition)
+    free = Proportion(found.certified, found.judged)
+    nearest = condition.summaries["clearance_pair"].value_counts()
+    places = np.round(condition.column("term_platform_x"), 3)
+    near = np.count_nonzero(places < scenario.docking.target[0])
+    verdicts = (
+        f"{markdown.share(*free)} ({markdown.percent(free.interval(settings.confidence))}) free "
+        f"of contact over the whole motion; {found.refuted} touch, {found.undecided} undecided; "
+        f"closest most often: {nearest.index[0]}"
     )
+    spread = (
+        f"between {places.min():g} and {places.max():g}, {near} of {condition.done} on the near "
+        "side of the end-effector"
+    )
+    return (f"{label}: exact verdicts", verdicts), (f"{label}: docking places X_p", spread)
 
 
-def _shown(condition: ConditionResults) -> Shown:
-    replicate, prepared = measures.median_replicate(condition), condition.prepared
-    scenario: Any = condition.condition.scenario
+def _scenario(condition: ConditionResults) -> Any:
+    """Return a mission's scenario: its grid, docking and origin."""
+    return condition.condition.scenario
+
+
+def _mission(condition: ConditionResults) -> Mission:
+    """Return the run of median cost, as it is drawn."""
+    replicate = measures.median_replicate(condition)
+    scenario, model = _scenario(condition), condition.problem(Problem).scene.model
     robot: Any = condition.condition.robot
-    q, model = (
-        prepared.planner.motion(prepared.problem, condition.solutions[replicate]).q,
-        prepared.problem.scene.model,
-    )
+    q, verdict = condition.motion(replicate).q, condition.summaries.loc[replicate]
     (x, _), (reach, above) = scenario.task_origin, scenario.docking.target
-    postures = {
-        name: _joints(model, own, robot.link_lengths[-1])
-        for name, own in ((TRAVEL, q[-2]), (DOCKED, q[-1]))
-    }
-    verdict = condition.summaries.loc[replicate]
     word = "certified" if verdict["certified"] else "not certified"
-    return Shown(
-        f"{condition.label}, run {replicate}, {word}, clearance {verdict['clearance']:.3g}",
-        condition.condition.length_unit,
-        list(scenario.grid.obstacles),
-        q[:-1, :2],
-        postures,
-        (robot.body_radius, robot.body_height),
-        np.array([x + reach, robot.body_height + above]),
-        scenario.docking.force,
+    return Mission(
+        title=f"{condition.label}, run {replicate}, {word}, clearance {verdict['clearance']:.3g}",
+        unit=condition.condition.length_unit,
+        boxes=list(scenario.grid.obstacles),
+        path=q[:-1, :2],
+        postures={
+            name: _joints(model, own, robot.link_lengths[-1])
+            for name, own in ((TRAVEL, q[-2]), (DOCKED, q[-1]))
+        },
+        body=(robot.body_radius, robot.body_height),
+        target=np.array([x + reach, robot.body_height + above]),
+        force=scenario.docking.force,
     )
 
 
 def _joints(model: pin.Model, q: FloatArray, last: float) -> FloatArray:
-    """Return the arm's joints and its end (4, 2): x, and height.
+    """Return the arm's joints and its end, (4, 2): x, and height.
 
-    `last` is the length of its last link.
+    Args:
+        model: Platform and arm.
+        q: (nq,) configuration.
+        last: Length of the last link.
     """
     data = model.createData()
     pin.forwardKinematics(model, data, q)
     points = [data.oMi[k].translation for k in range(3, model.njoints)]
     points.append(data.oMi[model.njoints - 1].act(np.array([last, 0.0, 0.0])))
-    return np.array([[point[0], point[2]] for point in points])
+    return np.array(points)[:, [0, 2]]

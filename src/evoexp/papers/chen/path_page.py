@@ -11,7 +11,7 @@ from evoexp.papers.chen.figures import grid_costs, grid_paths
 from evoexp.papers.chen.figures.grid_paths import EXACT, FAINT, MEDIAN, Line, Panel
 from evoexp.papers.chen.path_measures import Group
 from evoexp.papers.chen.routes import Route
-from evoexp.report import claims, markdown
+from evoexp.report import markdown, run_measures
 from evoexp.report.claims import Comparison
 from evoexp.report.page import Drawing, Page, Quantity
 from evoexp.report.pages import generic
@@ -28,10 +28,22 @@ INTRODUCTION = (
     "nodes, exact); where that walk lingers, the truth of paths without loops lies between the "
     "two."
 )
+CHECKS = (
+    (
+        "Lingering in safe nodes, which the mean of Eq. 3 rewards",
+        "`evoexp run experiment=chen_lingering`",
+    ),
+    (
+        "Where the obstacles of Fig. 2 are",
+        "is read off the printed map; the platform is a cylinder of an assumed radius, "
+        "obstacles are boxes between the centres of their outermost nodes: every permitted "
+        "move is free, past corners, too",
+    ),
+)
 
 
 def page(results: Results, settings: ReportSettings) -> Page:
-    """Return the page; the generic one where planners are others."""
+    """Build the page of the grid paths, or the generic page if another planner was run."""
     if not measures.fits(results):
         return generic.page(results, settings)
     groups = measures.group_list(results)
@@ -40,7 +52,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
         title=f"Chen & Zalzala 1995: {results.experiment or 'stored runs'}",
         introduction=INTRODUCTION,
         quantities=quantities(results, groups),
-        claims=path_claims.of_paths(results, settings, groups),
+        claims=path_claims.judge_paths(results, settings, groups),
         checks=checks(groups, settings, found),
         comparisons=comparisons(groups, settings),
         drawings=drawings(groups, found),
@@ -50,16 +62,11 @@ def page(results: Results, settings: ReportSettings) -> Page:
 def quantities(results: Results, groups: tuple[Group, ...]) -> tuple[Quantity, ...]:
     """Return the rows of the table of results."""
     row, column = partial(generic.quantity, results), generic.by_column
-    truth = {
-        c.label: group
-        for group in groups
-        for c in (*group.conditions, group.truth)
-        if c is not None
-    }
+    group_of = {c.label: group for group in groups for c in group.all}
     above = "cost above the best path known (below 0: better than it)"
 
-    def gap(optimum: str) -> Values:
-        return lambda c: measures.gaps(c, getattr(truth[c.label], optimum))
+    def gap(truth: str) -> Values:
+        return lambda c: measures.gaps(c, getattr(group_of[c.label], truth))
 
     return (
         row("cost C", "–", column("best_cost")),
@@ -71,112 +78,101 @@ def quantities(results: Results, groups: tuple[Group, ...]) -> tuple[Quantity, .
         row("clearance of the platform over the whole motion (exact)", "unit", column("clearance")),
         row("evaluations", "–", column("evaluations")),
         row("CPU time of a run, exact verdict included", "s", column("cpu_s")),
-        row("CPU time of its search", "s", measures.search_seconds),
-        row("evaluations per second of search", "1/s", measures.evaluations_per_second),
+        row("CPU time of its search", "s", run_measures.search_seconds),
+        row("evaluations per second of search", "1/s", run_measures.evaluations_per_second),
     )
 
 
 def checks(
     groups: tuple[Group, ...], settings: ReportSettings, found: list[Route]
 ) -> tuple[tuple[str, str], ...]:
-    """Return what is found of the gaps, the weightings, the routes."""
-    rows: list[tuple[str, str]] = []
-    for group in groups:
-        if group.truth is not None:
-            texts = [_gap_text(c, group, settings) for c in group.conditions]
-            rows.append((f"{group.name}: {_truth_text(group)}", "; ".join(texts)))
-    rows += _same_problem(groups)
-    for group in groups:
-        own = measures.routes_of(group.main, found)
-        text = ", ".join(f"{name} {len(members)}" for name, members in own.items())
-        rows.append(
-            (f"{group.name}: routes taken (sides of the obstacles passed), runs each", text)
-        )
-    rows.append(
+    """Return the rows on gaps, on weightings that are nearly the same, and on routes."""
+    gaps = [
         (
-            "Lingering in safe nodes, which the mean of Eq. 3 rewards",
-            "`evoexp run experiment=chen_lingering`",
+            f"{group.name}: {_truth_text(group)}",
+            "; ".join(_gap_text(c, group, settings) for c in group.conditions),
         )
-    )
-    rows.append(
-        (
-            "Where the obstacles of Fig. 2 are",
-            "is read off the printed map; the platform is a cylinder of an assumed radius, "
-            "obstacles are boxes between the centres of their outermost nodes: every permitted "
-            "move is free, past corners, too",
-        )
-    )
-    return tuple(rows)
+        for group in groups
+        if group.truth is not None
+    ]
+    routes = []
+    for group in groups:
+        taken = measures.routes_of(group.main, found)
+        text = ", ".join(f"{name} {len(members)}" for name, members in taken.items())
+        what = f"{group.name}: routes taken (sides of the obstacles passed), runs each"
+        routes.append((what, text))
+    return (*gaps, *_same_problem(groups), *routes, *CHECKS)
 
 
 def _gap_text(condition: ConditionResults, group: Group, settings: ReportSettings) -> str:
+    """Describe how far a condition's runs end above the best path known."""
     median = float(np.median(measures.gaps(condition, group.optimum)))
-    level, shares = settings.confidence, []
+    shares = []
     for bound in (0.0, 0.01, 0.05):
         found = measures.within(condition, group.optimum, bound)
         name = "at it or below" if bound == 0.0 else f"within {100 * bound:g} %"
-        shares.append(
-            f"{name} {markdown.share(found.having, found.total)} "
-            f"({markdown.percent(found.interval(level))})"
-        )
+        interval = markdown.percent(found.interval(settings.confidence))
+        shares.append(f"{name} {markdown.share(*found)} ({interval})")
     return f"{condition.label}: median {median:+.1f} %, {', '.join(shares)}".replace("-", "−")
 
 
 def _truth_text(group: Group) -> str:
+    """Describe the best path that the reference knows."""
     assert group.truth is not None
-    length, unsafeness, nodes = (
-        group.truth.column(f"term_{n}")[0] for n in ("distance", "unsafeness", "num_nodes")
+    length, unsafeness, nodes, exact = (
+        group.truth.column(f"term_{name}")[0]
+        for name in ("distance", "unsafeness", "num_nodes", "bound_is_reached")
     )
-    told = (
+    return (
         f"best path known costs {group.optimum:.4g} (D {length:.4g}, S {unsafeness:.3g}, "
-        f"{nodes:.0f} nodes)"
+        f"{nodes:.0f} nodes), "
+        f"{'exact' if exact else f'no path costs less than {group.bound:.4g}'}; gaps of runs to it"
     )
-    exact = (
-        "exact"
-        if group.truth.column("term_bound_is_reached")[0]
-        else f"no path costs less than {group.bound:.4g}"
-    )
-    return f"{told}, {exact}; gaps of runs to it"
 
 
 def _same_problem(groups: tuple[Group, ...]) -> list[tuple[str, str]]:
-    """Say of neighbouring weightings with λ > 0 how far apart they are as problems."""
+    """Return a row per two neighbouring weightings with λ > 0: how near they are as problems."""
     rows = []
     for one, two in pairwise(groups):
         if one.truth is None or two.truth is None or 0.0 in (*one.weights, *two.weights):
             continue
         ratios = [lam / epsilon for epsilon, lam in (one.weights, two.weights)]
         same = np.array_equal(one.truth.solutions[0], two.truth.solutions[0])
-        rows.append(
-            (
-                f"{one.name} and {two.name} are nearly the same problem",
-                f"only λ/ε matters: {ratios[0]:.0f} and {ratios[1]:.0f} cells; the best path "
-                f"known is {'the same one' if same else 'another one'}",
-            )
+        text = (
+            f"only λ/ε matters: {ratios[0]:.0f} and {ratios[1]:.0f} cells; the best path "
+            f"known is {'the same one' if same else 'another one'}"
         )
+        rows.append((f"{one.name} and {two.name} are nearly the same problem", text))
     return rows
 
 
 def comparisons(
     groups: tuple[Group, ...], settings: ReportSettings
 ) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
-    """Return the first condition of each weighting against its others."""
-    found, values = [], generic.by_column("best_cost")
-    for group in groups:
-        rows = [
-            generic.compare_on_common_seeds(group.main, other, other.label, True, values, settings)
-            for other in group.conditions[1:]
-        ]
-        adjusted = tuple(claims.adjusted([row for row in rows if row is not None]))
-        if adjusted:
-            found.append((f"cost: {group.main.label} against …", adjusted))
-    return tuple(found)
+    """Compare the costs of the first condition of each weighting with those of its others."""
+    values = generic.by_column("best_cost")
+    found = (
+        (
+            f"cost: {group.main.label} against …",
+            generic.compared([(group.main, c) for c in group.conditions[1:]], values, settings),
+        )
+        for group in groups
+    )
+    return tuple((heading, rows) for heading, rows in found if rows)
 
 
 def drawings(groups: tuple[Group, ...], found: list[Route]) -> tuple[Drawing, ...]:
     """Return the figures."""
-    shown = tuple(c for group in groups for c in (*group.conditions, group.truth) if c is not None)
-    main = tuple(group.main for group in groups)
+    shown = tuple(c for group in groups for c in group.all)
+    gaps = Drawing(
+        "gaps",
+        "Gaps to the best path known",
+        "Share of runs that end at most so far above it. Random walks may be so far off that the "
+        "curve starts late.",
+        partial(grid_costs.gaps_table, groups),
+        grid_costs.draw_gaps,
+        shown,
+    )
     return (
         Drawing(
             "fig_2_costs",
@@ -205,43 +201,33 @@ def drawings(groups: tuple[Group, ...], found: list[Route]) -> tuple[Drawing, ..
             "panels.",
             partial(grid_paths.paths_table, [_route_panel(group, found) for group in groups]),
             grid_paths.draw_routes,
-            main,
+            tuple(group.main for group in groups),
         ),
-        *([_gaps(groups, shown)] if all(group.truth is not None for group in groups) else []),
-    )
-
-
-def _gaps(groups: tuple[Group, ...], shown: tuple[ConditionResults, ...]) -> Drawing:
-    return Drawing(
-        "gaps",
-        "Gaps to the best path known",
-        "Share of runs that end at most so far above it. Random walks may be so far off that the "
-        "curve starts late.",
-        partial(grid_costs.gaps_table, groups),
-        grid_costs.draw_gaps,
-        shown,
+        *([gaps] if all(group.truth is not None for group in groups) else []),
     )
 
 
 def _panel(group: Group) -> Panel:
-    c = group.main
-    own = measures.paths(c)
-    lines = [Line(FAINT, path) for path in own.values()]
-    lines.append(Line(MEDIAN, own[measures.median_replicate(c)]))
-    if group.truth is not None:
-        lines.append(Line(EXACT, measures.paths(group.truth)[0]))
-    return Panel(_title(group), c.condition.length_unit, measures.boxes(c), lines)
+    """Return the panel of all runs of a weighting."""
+    c, own = group.main, measures.paths(group.main)
+    lines = [
+        *(Line(FAINT, path) for path in own.values()),
+        Line(MEDIAN, own[measures.median_replicate(c)]),
+        *(Line(EXACT, path) for path in group.best_path),
+    ]
+    return Panel(group.title, c.condition.length_unit, measures.boxes(c), lines)
 
 
 def _route_panel(group: Group, found: list[Route]) -> Panel:
-    c = group.main
-    own, lines = measures.paths(c), []
-    for name, members in measures.routes_of(c, found).items():
-        share = len(members) / c.done
-        path = own[measures.median_replicate(c, members)]
-        lines.append(Line(name, path, share, f"{name}: {len(members)} of {c.done}"))
-    return Panel(_title(group), c.condition.length_unit, measures.boxes(c), lines)
-
-
-def _title(group: Group) -> str:
-    return f"{group.name}  ε = {group.weights[0]:g}, λ = {group.weights[1]:g}"
+    """Return the panel of one path per route."""
+    c, own = group.main, measures.paths(group.main)
+    lines = [
+        Line(
+            name,
+            own[measures.median_replicate(c, members)],
+            len(members) / c.done,
+            f"{name}: {len(members)} of {c.done}",
+        )
+        for name, members in measures.routes_of(c, found).items()
+    ]
+    return Panel(group.title, c.condition.length_unit, measures.boxes(c), lines)

@@ -1,7 +1,4 @@
-"""Chen & Zalzala 1995, Figs. 3–8.
-
-Docking postures by five criteria, beside exact optima and other methods.
-"""
+"""Chen & Zalzala 1995, Figs. 3–8: docking postures by five criteria, exact optima, controls."""
 
 from functools import partial
 
@@ -26,53 +23,64 @@ INTRODUCTION = (
     "feasible starts spread evenly. Without an obstacle everything has a mirror image of the "
     "same cost."
 )
-TABLE = (
+RESULTS = (
+    "criterion",
+    "paper",
+    "exact optimum",
+    "GA",
+    "GA, elitism",
+    "random search",
+    "conventional, by start",
+)
+NOTE = (
     "Paper: what it prints of its best posture; where it prints angles, E at these. GA and "
     "random search: median [quartiles] of the best E of a run; in brackets shares of runs (for "
     "conventional methods: of starts) within 0.1 % and 1 % of the optimum."
 )
+POSTURES = (
+    "criterion",
+    "posture",
+    "θ1, θ2, θ3 [deg]",
+    "X_p",
+    "τ1, τ2, τ3",
+    "E1",
+    "E2",
+    "Σ γ E_obs",
+    "E_man",
+    "E",
+)
 
 
 def page(results: Results, settings: ReportSettings) -> Page:
-    """Return the page; the generic one where planners are others."""
-    if not results.with_data or not cases.fits(results):
+    """Build the page of the placements, or the generic page if another planner was run."""
+    if not cases.fits(results):
         return generic.page(results, settings)
     found = cases.cases(results)
     exact = [case for case in found if case.optimum is not None]
+    postures = tuple(row for case in found for row in _posture_rows(case))
     return Page(
         title=f"Chen & Zalzala 1995: {results.experiment or 'stored runs'}",
         introduction=INTRODUCTION,
-        tables=(_beside(found), _postures(found)),
-        claims=placement_claims.of_cases(results, exact, settings),
-        checks=_checks(found),
+        tables=(
+            Table("Results", RESULTS, tuple(map(_result_row, found)), NOTE),
+            Table("Postures", POSTURES, postures),
+        ),
+        claims=placement_claims.judge_cases(results, exact, settings),
+        checks=tuple(row for case in found for row in _checks(case)),
         drawings=_drawings(found),
     )
 
 
-def _beside(cases: list[Case]) -> Table:
-    """Return the table paper | exact optimum | GA | random search | conventional."""
-    rows = []
-    for case in cases:
-        methods = [
-            "; ".join(f"{name} {_shares(case, ends[:, 2])}" for name, ends in case.ends().items())
-            or "–"
-        ]
-        runs = [_run(case, c) for c in (case.plain, case.elitist, case.search)]
-        least = f"E = {case.least:.6g}" if case.optimum is not None else "–"
-        rows.append((case.name, _paper(case), least, *runs, *methods))
-    headers = (
-        "criterion",
-        "paper",
-        "exact optimum",
-        "GA",
-        "GA, elitism",
-        "random search",
-        "conventional, by start",
-    )
-    return Table("Results", headers, tuple(rows), TABLE)
+def _result_row(case: Case) -> tuple[str, ...]:
+    """Return a criterion's row: paper, exact optimum, GA, random search, conventional methods."""
+    methods = (f"{name} {_shares(case, ends[:, 2])}" for name, ends in case.ends().items())
+    least = f"E = {case.least:.6g}" if case.optimum is not None else "–"
+    runs = (_run(case, c) for c in (case.plain, case.elitist, case.search))
+    return (case.name, _paper(case), least, *runs, "; ".join(methods) or "–")
 
 
 def _paper(case: Case) -> str:
+    """Return the printed number, and E at the printed angles."""
     if case.printed is None:
         return "–"
     told = []
@@ -84,6 +92,7 @@ def _paper(case: Case) -> str:
 
 
 def _run(case: Case, condition: ConditionResults | None) -> str:
+    """Return the spread of the best E of a condition's runs, and shares near the optimum."""
     if condition is None:
         return "–"
     costs = condition.column("best_cost")
@@ -91,119 +100,97 @@ def _run(case: Case, condition: ConditionResults | None) -> str:
 
 
 def _shares(case: Case, costs: np.ndarray) -> str:
+    """Return the shares of costs near the optimum; empty if it is not known."""
     if np.isnan(case.least):
         return ""
-    shares = [f"{100 * case.within(costs, close).share:.0f} %" for close in CLOSE]
+    shares = (f"{100 * case.within(costs, close).share:.0f} %" for close in CLOSE)
     return f"({', '.join(shares)})"
 
 
-def _postures(cases: list[Case]) -> Table:
-    """Return the numbers of the exact optima and of the paper's angles."""
+def _posture_rows(case: Case) -> list[tuple[str, ...]]:
+    """Return the numbers of the exact optimum and of the paper's angles."""
     rows = []
-    for case in cases:
-        shown = {}
-        if case.optimum is not None:
-            shown["exact optimum"] = case.optimum.solutions[case.optimum.best_replicate]
-        if case.printed is not None and case.printed.angles is not None:
-            shown["paper's angles"] = np.array(case.printed.angles)
-        for name, angles in shown.items():
-            found = case.measured(angles)
-            degrees = ", ".join(f"{found[f'theta_{k}_deg']:.2f}" for k in (1, 2, 3))
-            torques = ", ".join(f"{found[f'torque_{k}']:.3f}" for k in (1, 2, 3))
-            terms = [
+    shown = {"exact optimum": case.optimal_angles, "paper's angles": case.printed_angles}
+    for name, angles in shown.items():
+        if angles is None:
+            continue
+        found = case.measured(angles)
+        row = (
+            case.name,
+            name,
+            ", ".join(f"{found[f'theta_{k}_deg']:.2f}" for k in (1, 2, 3)),
+            f"{found['platform_x']:.4f}",
+            ", ".join(f"{found[f'torque_{k}']:.3f}" for k in (1, 2, 3)),
+            *(
                 f"{found[term]:.4g}"
                 for term in ("torque_norm", "torque_max", "obstacle", "manipulability")
-            ]
-            row = (
-                case.name,
-                name,
-                degrees,
-                f"{found['platform_x']:.4f}",
-                torques,
-                *terms,
-                f"{found['cost']:.6g}",
-            )
-            rows.append(tuple(cell.replace("-", "−") for cell in row))
-    headers = (
-        "criterion",
-        "posture",
-        "θ1, θ2, θ3 [deg]",
-        "X_p",
-        "τ1, τ2, τ3",
-        "E1",
-        "E2",
-        "Σ γ E_obs",
-        "E_man",
-        "E",
-    )
-    return Table("Postures", headers, tuple(rows))
+            ),
+            f"{found['cost']:.6g}",
+        )
+        rows.append(tuple(cell.replace("-", "−") for cell in row))
+    return rows
 
 
-def _checks(cases: list[Case]) -> tuple[tuple[str, str], ...]:
+def _checks(case: Case) -> list[tuple[str, str]]:
+    """Return the rows on local minima and on exact bodies."""
     rows = []
-    for case in cases:
-        if case.optimum is not None:
-            minima = case.optimum.array("minima")[:, 2]
-            rows.append(
-                (f"{case.name}: local minima", ", ".join(f"{value:.4g}" for value in minima))
+    if case.optimum is not None:
+        values = ", ".join(f"{value:.4g}" for value in case.minima[:, 2])
+        touching = case.optimum.summaries["certified"].eq(False).any()
+        clearance = markdown.number(float(case.optimum.column("clearance")[0]))
+        column = "refuted_pair" if touching else "clearance_pair"
+        pair = str(case.optimum.summaries[column].iloc[0])
+        named = pair.replace("arm_1_link_", "link ").replace("obstacle_1", "obstacle")
+        told = "touches" if touching else f"is free, clearance {clearance}"
+        rows = [
+            (f"{case.name}: local minima", values),
+            (f"{case.name}: bodies at the exact optimum", f"{told} ({named})"),
+        ]
+    if case.conditions[0].planner.objective.avoidances:
+        rows += [
+            (
+                f"{case.name}: {name}, exact bodies",
+                f"{c.verdicts.refuted} of {c.verdicts.judged} best postures touch",
             )
-            touching = case.optimum.summaries["certified"].eq(False).any()
-            clearance = float(case.optimum.column("clearance")[0])
-            pair = str(
-                case.optimum.summaries["refuted_pair" if touching else "clearance_pair"].iloc[0]
-            )
-            told = "touches" if touching else f"is free, clearance {markdown.number(clearance)}"
-            rows.append((f"{case.name}: bodies at the exact optimum", f"{told} ({_named(pair)})"))
-        for name, c in case.evolved.items():
-            verdicts = c.verdicts
-            told = f"{verdicts.refuted} of {verdicts.judged} best postures touch"
-            if case.any.planner.objective.avoidances:
-                rows.append((f"{case.name}: {name}, exact bodies", told))
-    return tuple(rows)
-
-
-def _named(pair: str) -> str:
-    """Return the names of two bodies as the paper has them."""
-    return pair.replace("arm_1_link_", "link ").replace("obstacle_1", "obstacle")
+            for name, c in case.evolved.items()
+        ]
+    return rows
 
 
 def _drawings(cases: list[Case]) -> tuple[Drawing, ...]:
+    """Return the figures: postures, and where optima are known, fitness and gaps."""
     exact = [case for case in cases if case.optimum is not None and case.evolved]
-    shown = tuple(c for case in cases for c in case[1:] if isinstance(c, ConditionResults))
-    found = [
-        Drawing(
-            "fig_3_to_8_postures",
-            "Figs. 3–8: postures",
-            "Thick: the exact optimum; thin: the best run of the genetic algorithm, with elitism "
-            "where it was run; where the paper prints angles, its posture. Where two differ, "
-            "they are often mirror images. The platform's size and the obstacle of Fig. 7 are "
-            "assumed.",
-            partial(placements.postures_table, cases),
-            placements.draw_postures,
-            shown,
-        )
-    ]
-    if exact:
-        fitness = Drawing(
-            "fig_4_to_8_fitness",
-            "Figs. 4–8: the best of a run against generations",
-            "Median and quartiles over runs of the best so far, at equal evaluations; "
-            "dash-dotted: the exact optimum. For the least torque norm the paper draws the "
-            "torque norm itself (lower is better), else the fitness f = 250 − E (higher is "
-            "better).",
-            partial(placements.fitness_table, exact),
-            placements.draw_fitness,
-            shown,
-        )
-        gaps = Drawing(
-            "gaps",
-            "Gaps to the exact optimum",
-            "Share of runs, or of starts of a conventional method (dashed), that end closer to "
-            "the optimum than x; dotted: 0.1 % and 1 %. What is below 1e-6 is drawn there; "
-            "plateaus on the right are local minima.",
-            partial(placements.gaps_table, exact),
-            placements.draw_gaps,
-            shown,
-        )
-        found += [fitness, gaps]
-    return tuple(found)
+    shown = tuple(c for case in cases for c in case.conditions)
+    postures = Drawing(
+        "fig_3_to_8_postures",
+        "Figs. 3–8: postures",
+        "Thick: the exact optimum; thin: the best run of the genetic algorithm, with elitism "
+        "where it was run; where the paper prints angles, its posture. Where two differ, "
+        "they are often mirror images. The platform's size and the obstacle of Fig. 7 are "
+        "assumed.",
+        partial(placements.postures_table, cases),
+        placements.draw_postures,
+        shown,
+    )
+    fitness = Drawing(
+        "fig_4_to_8_fitness",
+        "Figs. 4–8: the best of a run against generations",
+        "Median and quartiles over runs of the best so far, at equal evaluations; "
+        "dash-dotted: the exact optimum. For the least torque norm the paper draws the "
+        "torque norm itself (lower is better), else the fitness f = 250 − E (higher is "
+        "better).",
+        partial(placements.fitness_table, exact),
+        placements.draw_fitness,
+        shown,
+    )
+    gaps = Drawing(
+        "gaps",
+        "Gaps to the exact optimum",
+        "Share of runs, or of starts of a conventional method (dashed), that end closer to "
+        "the optimum than x; dotted: 0.1 % and 1 %. What is below 1e-6 is drawn there; "
+        "plateaus on the right are local minima.",
+        partial(placements.gaps_table, exact),
+        placements.draw_gaps,
+        shown,
+    )
+    return (postures, fitness, gaps) if exact else (postures,)

@@ -1,9 +1,7 @@
-"""Grids of numbers as a paper prints them, beside those that are computed.
-
-Rows that were set wrongly are aligned.
+"""Grids of numbers as a paper prints them, compared node by node with computed ones.
 
 A printed row may have a number too many or one too few. Rows are aligned by the fewest such slips;
-what is left over is a wrong number, a number too many, or one that is missing.
+the remaining differences are wrong numbers, surplus numbers and missing numbers.
 """
 
 import difflib
@@ -23,12 +21,11 @@ WRONG, MISSING, SURPLUS = "wrong", "missing", "surplus"
 def printed(name: str) -> list[list[list[str]]]:
     """Return the grids of an asset, each a list of rows of words.
 
-    Empty lines stand between grids, `;` is a comment.
+    Empty lines stand between grids; lines that begin with `;` are comments.
     """
-    lines = (
-        resources.files("evoexp").joinpath("assets", name).read_text(encoding="utf-8").splitlines()
-    )
-    blocks = "\n".join(line for line in lines if not line.startswith(";")).split("\n\n")
+    text = resources.files("evoexp").joinpath("assets", name).read_text(encoding="utf-8")
+    lines = (line for line in text.splitlines() if not line.startswith(";"))
+    blocks = "\n".join(lines).split("\n\n")
     return [[row.split() for row in block.strip().splitlines()] for block in blocks]
 
 
@@ -38,20 +35,19 @@ def rows_of(values: FloatArray, blocked: np.ndarray, edge: str = BLOCKED) -> lis
     Args:
         values: The field.
         blocked: (along x, along y) nodes of obstacles, printed as `*`.
-        edge: What nodes of obstacles are printed as that have a free node beside them.
+        edge: The word printed for nodes of obstacles that have a free node beside them.
     """
     free = np.pad(~blocked, 1)
     beside = free[:-2, 1:-1] | free[2:, 1:-1] | free[1:-1, :-2] | free[1:-1, 2:]
-    words = np.where(
-        blocked, np.where(beside, edge, BLOCKED), np.vectorize(lambda v: f"{v:g}")(values)
-    )
+    numbers = np.vectorize(lambda v: f"{v:g}")(values)
+    words = np.where(blocked, np.where(beside, edge, BLOCKED), numbers)
     return [[str(word) for word in row] for row in words.T[::-1]]
 
 
 def compare(
     name: str, computed: Sequence[Sequence[str]], given: Sequence[Sequence[str]]
 ) -> pd.DataFrame:
-    """Return every cell of a grid with what is printed there.
+    """Compare a computed grid with a printed one, cell by cell.
 
     Returns:
         Columns field, row (from the top), column, computed, printed, slip: empty, `wrong`,

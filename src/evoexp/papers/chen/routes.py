@@ -1,4 +1,4 @@
-"""Routes: which paths over a map pass the same sides of all obstacles."""
+"""Routes: paths over a map that pass the same sides of all obstacles."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -12,12 +12,10 @@ Signature = tuple[int, ...]
 
 
 class Route(NamedTuple):
-    """Paths that can be bent into each other without passing over an obstacle.
-
-    As far as signatures tell.
+    """Paths of one signature: as far as it tells, none passes over an obstacle if bent to another.
 
     Attributes:
-        name: A, B, …; the most frequent one of all is A.
+        name: A, B, …; A is the most frequent route of all.
         members: Keys of the paths.
     """
 
@@ -37,18 +35,13 @@ def signature(path: FloatArray, centres: FloatArray) -> Signature:
     before, after = path[:-1, None, :], path[1:, None, :]
     crosses = (before[..., 0] < centres[:, 0]) != (after[..., 0] < centres[:, 0])
     run = np.where(crosses, after[..., 0] - before[..., 0], 1.0)
-    height = before[..., 1] + (centres[:, 0] - before[..., 0]) / run * (
-        after[..., 1] - before[..., 1]
-    )
-    above = crosses & (height > centres[:, 1])
+    share = (centres[:, 0] - before[..., 0]) / run
+    above = crosses & (before[..., 1] + share * (after[..., 1] - before[..., 1]) > centres[:, 1])
     return tuple(int(value) for value in (above * np.sign(run)).sum(axis=0))
 
 
 def inside_points(boxes: Sequence[Sequence[int]]) -> FloatArray:
-    """Return a point inside each of some boxes (x0, y0, x1, y1) of nodes.
-
-    None has the x of a node.
-    """
+    """Return a point inside each box (x0, y0, x1, y1) of nodes; no point has the x of a node."""
     return np.array(
         [[0.5 * (x0 + x1) + 0.26, 0.5 * (y0 + y1)] for x0, y0, x1, y1 in boxes]
     ).reshape(-1, 2)
@@ -57,25 +50,20 @@ def inside_points(boxes: Sequence[Sequence[int]]) -> FloatArray:
 def routes(paths: Mapping[Any, FloatArray], centres: FloatArray) -> list[Route]:
     """Return paths grouped by signature, the most frequent route first.
 
-    Of equals the one of the first path.
+    Of equally frequent routes, that of the earlier path is first.
 
     Args:
         paths: Key → (nodes, 2).
         centres: See `signature`.
     """
     of = {key: signature(path, centres) for key, path in paths.items()}
-    counts = Counter(of.values())
     return [
         Route(_name(k), tuple(key for key, own in of.items() if own == found))
-        for k, (found, _) in enumerate(counts.most_common())
+        for k, (found, _) in enumerate(Counter(of.values()).most_common())
     ]
 
 
 def _name(number: int) -> str:
-    """Return A to Z, then AA and so on."""
-    letters = ""
-    number += 1
-    while number:
-        number, rest = divmod(number - 1, 26)
-        letters = chr(ord("A") + rest) + letters
-    return letters
+    """Return the name of a route, counted from 0: A to Z, then AA and so on."""
+    before, last = divmod(number, 26)
+    return (_name(before - 1) if before else "") + chr(ord("A") + last)

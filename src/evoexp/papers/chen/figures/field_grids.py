@@ -1,5 +1,7 @@
 """Potential fields as grids of numbers (Chen & Zalzala 1995, Fig. 1)."""
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -9,12 +11,17 @@ from matplotlib.ticker import MaxNLocator
 
 from evoexp.papers.chen.printed_grids import BLOCKED, MISSING, SURPLUS, WRONG
 from evoexp.report import style
-from evoexp.report.rows import groups
+from evoexp.report.rows import groups, records
 
-NAMES = {WRONG: "another number is printed (below, small)",
-MISSING: "nothing is printed for the node",
-         SURPLUS: "a token too many is printed here"}  # fmt: skip
-COLOURS = {WRONG: "#CC3311", MISSING: "#EE7733", SURPLUS: "#0077BB"}
+NAMES = {
+    WRONG: "another number is printed (below, small)",
+    MISSING: "nothing is printed for the node",
+    SURPLUS: "a token too many is printed here",
+}
+FRAMES: dict[str, dict[str, Any]] = {
+    slip: {"fill": False, "edgecolor": colour, "linewidth": 1.4}
+    for slip, colour in ((WRONG, "#CC3311"), (MISSING, "#EE7733"), (SURPLUS, "#0077BB"))
+}
 
 
 def draw_fields(table: pd.DataFrame) -> Figure:
@@ -23,84 +30,71 @@ def draw_fields(table: pd.DataFrame) -> Figure:
     Args:
         table: See `printed_grids.compare`; several fields.
     """
-    names = list(dict.fromkeys(table["field"]))
-    figure = style.figure(7.2 * 0.5 * 1.12, style.WIDTH * (1.0 if len(names) > 1 else 0.55))
-    panels = figure.subplots(1, len(names), squeeze=False)[0]
+    count = table["field"].nunique()
+    figure = style.figure(7.2 * 0.5 * 1.12, style.WIDTH * (1.0 if count > 1 else 0.55))
+    panels = figure.subplots(1, count, squeeze=False)[0]
     for axes, (name, rows) in zip(panels, groups(table, "field"), strict=True):
-        _draw_field(axes, str(name), rows)
-    handles = [Rectangle((0, 0), 1, 1, fill=False, edgecolor=COLOURS[slip], label=text,
-    linewidth=1.4)
-               for slip, text in NAMES.items() if (table["slip"] == slip).any()]  # fmt: skip
-    if handles:
-        figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+        _draw_field(axes, rows)
+        axes.set_title(str(name))
+    keys = [
+        Rectangle((0, 0), 1, 1, label=text, **FRAMES[slip])
+        for slip, text in NAMES.items()
+        if (table["slip"] == slip).any()
+    ]
+    if keys:
+        style.keys_below(figure, keys)
     return figure
 
 
 def draw_maps(table: pd.DataFrame) -> Figure:
     """Draw fields as shaded maps: columns field, x, y, value (NaN where no path can be)."""
-    names = list(dict.fromkeys(table["field"]))
-    figure = style.figure(3.4)
-    panels = figure.subplots(1, len(names), squeeze=False)[0]
+    figure, panels = style.row_of_panels(3.4, table["field"].nunique())
     for axes, (name, rows) in zip(panels, groups(table, "field"), strict=True):
-        image = rows.pivot_table(index="y", columns="x", values="value", dropna=False).to_numpy(
-            dtype=float
-        )
+        wide = rows.pivot_table(index="y", columns="x", values="value", dropna=False)
+        image = wide.to_numpy(dtype=float)
         shown = axes.imshow(image, origin="lower", cmap="viridis", interpolation="nearest")
-        axes.set_facecolor(style.NEUTRAL)
         bar = figure.colorbar(shown, ax=axes, label="potential [–]", shrink=0.75)
         for axis in (axes.xaxis, axes.yaxis, bar.ax.yaxis):
             axis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
         axes.grid(visible=False)
-        axes.set_title(str(name))
-        axes.set_xlabel("x [node]")
-        axes.set_ylabel("y [node]")
+        axes.set(title=str(name), xlabel="x [node]", ylabel="y [node]", facecolor=style.NEUTRAL)
     return figure
 
 
-def _draw_field(axes: Axes, name: str, rows: pd.DataFrame) -> None:
+def _draw_field(axes: Axes, rows: pd.DataFrame) -> None:
+    """Draw a grid: a shaded square with a number per node, frames around slips."""
     count = int(rows["row"].max()) + 1
     width = int(rows.loc[rows["slip"] != SURPLUS, "column"].max()) + 1
     numbers = pd.to_numeric(rows["computed"], errors="coerce")
-    greatest = float(np.nanmax(numbers))
-    for (row, column, text, given, slip), value in zip(
-        rows[["row", "column", "computed", "printed", "slip"]].itertuples(index=False),
-        numbers,
-        strict=True,
-    ):
-        y = count - 1 - row
-        if slip == SURPLUS:
-            at = (column - 0.62, y - 0.46)
-            axes.add_patch(
-                Rectangle(
-                    at, 0.24, 0.92, fill=False, edgecolor=COLOURS[slip], linewidth=1.4, zorder=3
-                )
-            )
+    shades = 0.97 - 0.32 * numbers / float(np.nanmax(numbers))
+    for cell, shade in zip(records(rows), shades, strict=True):
+        x, y = cell.column, count - 1 - cell.row
+        # a token too many stands between two nodes
+        if cell.slip == SURPLUS:
+            axes.add_patch(Rectangle((x - 0.62, y - 0.46), 0.24, 0.92, zorder=3, **FRAMES[SURPLUS]))
             continue
-        shade = style.NEUTRAL if text == BLOCKED else str(0.97 - 0.32 * float(value) / greatest)
-        corner = (column - 0.5, y - 0.5)
-        axes.add_patch(Rectangle(corner, 1, 1, facecolor=shade, edgecolor="white", linewidth=0.5))
-        colour = "white" if text == BLOCKED else "black"
-        lifted = y + (0.12 if slip == WRONG else 0.0)
-        axes.text(
-            column, lifted, text, ha="center", va="center_baseline", fontsize=6.0, color=colour
-        )
-        if slip:
-            inset = (column - 0.46, y - 0.46)
-            axes.add_patch(
-                Rectangle(
-                    inset, 0.92, 0.92, fill=False, edgecolor=COLOURS[slip], linewidth=1.4, zorder=3
-                )
-            )
-        if slip == WRONG:
-            axes.text(
-                column, y - 0.27, given, ha="center", va="center", fontsize=4.2, color=COLOURS[slip]
-            )
-    axes.set_xlim(-0.5, width - 0.3)
-    axes.set_ylim(-0.5, count - 0.5)
-    axes.set_aspect("equal")
+        # the node and its number
+        blocked = cell.computed == BLOCKED
+        face, ink = (style.NEUTRAL, "white") if blocked else (str(shade), "black")
+        square = Rectangle((x - 0.5, y - 0.5), 1, 1, facecolor=face, edgecolor="white", lw=0.5)
+        axes.add_patch(square)
+        middle: dict[str, Any] = {"ha": "center", "va": "center_baseline", "fontsize": 6.0}
+        lifted = y + (0.12 if cell.slip == WRONG else 0.0)
+        axes.text(x, lifted, cell.computed, color=ink, **middle)
+        # a wrong or missing number
+        if cell.slip:
+            look = FRAMES[cell.slip]
+            axes.add_patch(Rectangle((x - 0.46, y - 0.46), 0.92, 0.92, zorder=3, **look))
+        if cell.slip == WRONG:
+            small = middle | {"va": "center", "fontsize": 4.2}
+            axes.text(x, y - 0.27, cell.printed, color=FRAMES[WRONG]["edgecolor"], **small)
     axes.grid(visible=False)
-    axes.set_xticks(range(0, width, 5))
-    axes.set_yticks(range(0, count, 5))
-    axes.set_xlabel("x [node]")
-    axes.set_ylabel("y [node]")
-    axes.set_title(name)
+    axes.set(
+        xlim=(-0.5, width - 0.3),
+        ylim=(-0.5, count - 0.5),
+        aspect="equal",
+        xticks=range(0, width, 5),
+        yticks=range(0, count, 5),
+        xlabel="x [node]",
+        ylabel="y [node]",
+    )

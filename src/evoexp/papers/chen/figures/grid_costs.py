@@ -1,7 +1,6 @@
-"""Costs of paths over a grid: against generations (Chen & Zalzala 1995, Fig.
+"""Costs of paths over a grid (Chen & Zalzala 1995, Fig. 2): by generation, and above the best."""
 
-2), and above the best known.
-"""
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -10,17 +9,17 @@ from matplotlib.figure import Figure
 
 from evoexp.papers.chen.path_measures import Group, gaps
 from evoexp.report import style
+from evoexp.report.results import ConditionResults
 from evoexp.report.rows import groups as grouped
 from evoexp.report.statistics import spread
 
 AVERAGE = "average of a generation"
 EXACT, BOUND = "best path known", "no path costs less"
+NAMES = ["panel", "position", "condition", "quantity", "generation", "median", "lower", "upper"]
 
 
 def costs_table(found: tuple[Group, ...]) -> pd.DataFrame:
-    """Return median and quartiles of costs over replicates, per weighting.
-
-    Condition and generation.
+    """Return median and quartiles of costs over replicates by weighting, condition, generation.
 
     Returns:
         Columns panel, position (of the condition in its panel), condition, quantity (best so far,
@@ -29,40 +28,30 @@ def costs_table(found: tuple[Group, ...]) -> pd.DataFrame:
     rows: list[tuple[object, ...]] = []
     for group in found:
         for position, c in enumerate(group.conditions):
-            quantities = {"best so far": "best_cost"} | (
-                {AVERAGE: "mean_cost"} if position == 0 else {}
-            )
-            for name, column in quantities.items():
+            columns = {"best so far": "best_cost"} | ({} if position else {AVERAGE: "mean_cost"})
+            for name, column in columns.items():
                 for generation, own in c.generations.groupby("index"):
                     values = spread(own[column].to_numpy(dtype=np.float64))
-                    kind = _kind(c.label, group.name)
-                    rows.append((_title(group), position, kind, name, generation, *values[:3]))
+                    given = group.title, position, _name(c, group), name, generation
+                    rows.append((*given, *values[:3]))
         if group.truth is not None:
             for name, value in ((EXACT, group.optimum), (BOUND, group.bound)):
-                rows.append((_title(group), -1, name, name, 0, value, value, value))
-    names = ["panel", "position", "condition", "quantity", "generation", "median", "lower", "upper"]
-    return pd.DataFrame(rows, columns=names)
+                rows.append((group.title, -1, name, name, 0, value, value, value))
+    return pd.DataFrame(rows, columns=NAMES)
 
 
 def draw_costs(table: pd.DataFrame) -> Figure:
     """Draw one panel per weighting."""
-    names = list(dict.fromkeys(table["panel"]))
-    figure = style.figure(2.7)
-    panels = figure.subplots(1, len(names), squeeze=False)[0]
+    figure, panels = style.row_of_panels(2.7, table["panel"].nunique())
     for axes, (name, rows) in zip(panels, grouped(table, "panel"), strict=True):
-        for (position, quantity), line in grouped(
-            rows[rows["position"] >= 0], ["position", "quantity"]
-        ):
+        evolved, known = rows[rows["position"] >= 0], rows[rows["position"] < 0]
+        for (position, quantity), line in grouped(evolved, ["position", "quantity"]):
             _curve(axes, line, style.condition_colour(int(position)), dashed=quantity == AVERAGE)
-        for (kind, line), pattern in zip(
-            grouped(rows[rows["position"] < 0], "quantity"), (":", "-."), strict=False
-        ):
+        for (kind, line), pattern in zip(grouped(known, "quantity"), (":", "-."), strict=False):
             at = float(line["median"].iloc[0])
             axes.axhline(at, color=style.NEUTRAL, linewidth=1.0, linestyle=pattern, label=str(kind))
-        axes.set_title(str(name))
-        axes.set_xlabel("generation")
-        if axes is panels[0]:
-            axes.set_ylabel("cost C(P)")
+        axes.set(title=str(name), xlabel="generation")
+    panels[0].set_ylabel("cost C(P)")
     style.legend_below(figure, panels[0], 3)
     return figure
 
@@ -71,14 +60,8 @@ def _curve(axes: Axes, line: pd.DataFrame, colour: str, *, dashed: bool) -> None
     """Draw a median, and its quartiles unless it is dashed."""
     label, x = str(line["condition"].iloc[0]), line["generation"]
     if dashed:
-        axes.plot(
-            x,
-            line["median"],
-            color=colour,
-            linestyle="--",
-            linewidth=0.9,
-            label=f"{label}, average",
-        )
+        look: dict[str, Any] = {"color": colour, "linestyle": "--", "linewidth": 0.9}
+        axes.plot(x, line["median"], label=f"{label}, average", **look)
         return
     axes.plot(x, line["median"], color=colour, label=label)
     axes.fill_between(x, line["lower"], line["upper"], color=colour, alpha=0.18, linewidth=0)
@@ -87,49 +70,42 @@ def _curve(axes: Axes, line: pd.DataFrame, colour: str, *, dashed: bool) -> None
 def gaps_table(found: tuple[Group, ...]) -> pd.DataFrame:
     """Return every run's gap to the best path known.
 
-    Columns panel, position, condition, replicate, gap_percent.
+    Returns:
+        Columns panel, position, condition, replicate, gap_percent.
     """
-    parts = []
-    for group in found:
-        for position, c in enumerate(group.conditions):
-            kind = _kind(c.label, group.name)
-            given = {
-                "panel": _title(group),
+    parts = [
+        pd.DataFrame(
+            {
+                "panel": group.title,
                 "position": position,
-                "condition": kind,
+                "condition": _name(c, group),
                 "replicate": c.summaries.index,
+                "gap_percent": gaps(c, group.optimum),
             }
-            parts.append(pd.DataFrame(given | {"gap_percent": gaps(c, group.optimum)}))
+        )
+        for group in found
+        for position, c in enumerate(group.conditions)
+    ]
     return pd.concat(parts, ignore_index=True)
 
 
 def draw_gaps(table: pd.DataFrame) -> Figure:
     """Draw the share of runs whose gap is at most x, one panel per weighting."""
-    names = list(dict.fromkeys(table["panel"]))
-    figure = style.figure(2.5)
-    panels = figure.subplots(1, len(names), squeeze=False, sharey=True)[0]
+    figure, panels = style.row_of_panels(2.5, table["panel"].nunique(), sharey=True)
     for axes, (name, rows) in zip(panels, grouped(table, "panel"), strict=True):
-        for position, own in grouped(rows, "position"):
+        for (position, kind), own in grouped(rows, ["position", "condition"]):
             values = np.sort(own["gap_percent"].to_numpy())
-            steps = np.concatenate([[0.0], np.arange(1, len(values) + 1) / len(values)])
+            steps = np.arange(len(values) + 1) / len(values)
             x = np.concatenate([[min(values[0], 0.0)], values])
             colour = style.condition_colour(int(position))
-            axes.step(
-                x, 100.0 * steps, where="post", color=colour, label=str(own["condition"].iloc[0])
-            )
+            axes.step(x, 100.0 * steps, where="post", color=colour, label=str(kind))
         axes.axvline(0.0, color=style.NEUTRAL, linewidth=1.0, linestyle=":")
-        axes.set_title(str(name))
-        axes.set_xlabel("cost above best known [%]")
+        axes.set(title=str(name), xlabel="cost above best known [%]")
     panels[0].set_ylabel("share of runs [%]")
     style.legend_below(figure, panels[0], len(set(table["condition"])))
     return figure
 
 
-def _kind(label: str, group: str) -> str:
-    """Return what a condition adds to its group: "elitism"."""
-    return label.removeprefix(group).strip(" ,·") or "genetic algorithm"
-
-
-def _title(group: Group) -> str:
-    epsilon, lam = group.weights
-    return f"{group.name}  ε = {epsilon:g}, λ = {lam:g}"
+def _name(condition: ConditionResults, group: Group) -> str:
+    """Return the part of a label that the condition adds to its group's: "elitism"."""
+    return condition.label.removeprefix(group.name).strip(" ,·") or "genetic algorithm"

@@ -1,16 +1,11 @@
-"""Paths over a grid: the workspace with its obstacles, and what goes through it.
+"""Paths over a grid among its obstacles (Chen & Zalzala 1995, Fig. 2)."""
 
-Chen & Zalzala 1995, Fig. 2.
-"""
-
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from evoexp.records import FloatArray
@@ -19,16 +14,22 @@ from evoexp.report.rows import groups
 
 OBSTACLE = "obstacle"
 FAINT, MEDIAN, EXACT = "all runs", "run of median cost", "best path known (reference)"
+LOOKS: dict[str, dict[str, Any]] = {
+    FAINT: {"color": "#88aacc", "linewidth": 0.5, "alpha": 0.45},
+    MEDIAN: {"color": style.CONDITION_COLOURS[0], "linewidth": 1.8},
+    EXACT: {"color": style.CONDITION_COLOURS[1], "linewidth": 1.4, "linestyle": "--"},
+}
+NAMES = ["panel", "unit", "kind", "text", "number", "share", "x", "y"]
 
 
 class Line(NamedTuple):
     """A path to draw.
 
     Attributes:
-        kind: What it is; lines of one kind share a place in the legend.
+        kind: Lines of one kind look alike and share an entry in the legend.
         path: (nodes, 2).
-        share: Of the runs, in [0, 1]; its width.
-        text: For the legend; empty: the kind.
+        share: Share of the runs that take it, in [0, 1]; tells its width.
+        text: Entry in the legend; empty: the kind.
     """
 
     kind: str
@@ -41,10 +42,10 @@ class Panel(NamedTuple):
     """One workspace.
 
     Attributes:
-        title: Above it.
-        unit: Of lengths.
-        boxes: (x0, y0, x1, y1) of nodes.
-        lines: Drawn in this order.
+        title: Text above it.
+        unit: Unit of lengths.
+        boxes: Obstacles (x0, y0, x1, y1) of nodes.
+        lines: Paths, drawn in this order.
     """
 
     title: str
@@ -54,7 +55,7 @@ class Panel(NamedTuple):
 
 
 def paths_table(panels: Sequence[Panel]) -> pd.DataFrame:
-    """Return everything that is drawn.
+    """Return obstacles and paths of all workspaces.
 
     Returns:
         Columns panel, unit, kind, text, number (of the line), share, x, y; an obstacle has two
@@ -66,77 +67,61 @@ def paths_table(panels: Sequence[Panel]) -> pd.DataFrame:
         for number, (x0, y0, x1, y1) in enumerate(panel.boxes):
             rows += [(*head, OBSTACLE, "", number, 1.0, x, y) for x, y in ((x0, y0), (x1, y1))]
         for number, line in enumerate(panel.lines):
-            rows += [
-                (*head, line.kind, line.text, number, line.share, x, y)
-                for x, y in line.path.tolist()
-            ]
-    return pd.DataFrame(
-        rows, columns=["panel", "unit", "kind", "text", "number", "share", "x", "y"]
-    )
+            same = (*head, line.kind, line.text, number, line.share)
+            rows += [(*same, x, y) for x, y in line.path.tolist()]
+    return pd.DataFrame(rows, columns=NAMES)
 
 
 def draw_paths(table: pd.DataFrame) -> Figure:
     """Draw workspaces side by side: all runs faint, one run, the reference."""
-    colours = {
-        FAINT: "#88aacc",
-        MEDIAN: style.CONDITION_COLOURS[0],
-        EXACT: style.CONDITION_COLOURS[1],
-    }
-    styles: dict[str, dict[str, Any]] = {
-        FAINT: {"linewidth": 0.5, "alpha": 0.45},
-        MEDIAN: {"linewidth": 1.8},
-        EXACT: {"linewidth": 1.4, "linestyle": "--"},
-    }
     figure, panels = _panels(table, {1: 4.2, 2: 3.6, 3: 2.9}.get(table["panel"].nunique(), 2.4))
-    for axes, (_, rows) in zip(panels, groups(table, "panel"), strict=True):
-        for (kind, _), line in groups(rows[rows["kind"] != OBSTACLE], ["kind", "number"]):
-            axes.plot(line["x"], line["y"], color=colours[str(kind)], **styles[str(kind)])
-    kinds = [kind for kind in colours if (table["kind"] == kind).any()]
-    handles = [Line2D([], [], color=colours[kind], label=kind, **styles[kind]) for kind in kinds]
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    for axes, kind, line in _lines(panels, table):
+        axes.plot(line["x"], line["y"], **LOOKS[kind])
+    kinds = [kind for kind in LOOKS if (table["kind"] == kind).any()]
+    style.keys_below(figure, [style.key(kind, **LOOKS[kind]) for kind in kinds])
     return figure
 
 
 def draw_routes(table: pd.DataFrame) -> Figure:
     """Draw one path per route, as wide as it is frequent, with a legend per workspace."""
-    names = sorted(
-        {str(kind) for kind in table["kind"] if kind != OBSTACLE},
-        key=lambda name: (len(name), name),
-    )
+    found = {str(kind) for kind in table["kind"] if kind != OBSTACLE}
+    names = sorted(found, key=lambda name: (len(name), name))
     figure, panels = _panels(table, 3.1)
-    for axes, (_, rows) in zip(panels, groups(table, "panel"), strict=True):
-        for (kind, _), line in groups(rows[rows["kind"] != OBSTACLE], ["kind", "number"]):
-            colour = style.condition_colour(names.index(str(kind)))
-            width = 0.8 + 3.2 * float(line["share"].iloc[0])
-            axes.plot(
-                line["x"], line["y"], color=colour, linewidth=width, label=line["text"].iloc[0]
-            )
+    for axes, kind, line in _lines(panels, table):
+        text, share = line[["text", "share"]].iloc[0]
+        look = {"color": style.condition_colour(names.index(kind)), "linewidth": 0.8 + 3.2 * share}
+        axes.plot(line["x"], line["y"], label=text, **look)
+    for axes in panels:
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.24), ncols=2, fontsize=6.5)
     return figure
 
 
-def _panels(table: pd.DataFrame, height: float) -> tuple[Figure, np.ndarray]:
-    """Return a figure with one workspace per panel, obstacles drawn."""
-    names = list(dict.fromkeys(table["panel"]))
-    figure = style.figure(height)
-    panels = figure.subplots(1, len(names), squeeze=False, sharey=True)[0]
+def draw_obstacle(axes: Axes, x: pd.Series, y: pd.Series) -> None:
+    """Draw an obstacle between two corners."""
+    (x0, x1), (y0, y1) = x, y
+    look: dict[str, Any] = {"facecolor": "#bbbbbb", "edgecolor": style.NEUTRAL}
+    axes.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, **look))
+
+
+def _lines(panels: list[Axes], table: pd.DataFrame) -> Iterator[tuple[Axes, str, pd.DataFrame]]:
+    """Yield the rows of every path, with its axes and its kind."""
+    for axes, (_, rows) in zip(panels, groups(table, "panel"), strict=True):
+        for (kind, _), line in groups(rows[rows["kind"] != OBSTACLE], ["kind", "number"]):
+            yield axes, str(kind), line
+
+
+def _panels(table: pd.DataFrame, height: float) -> tuple[Figure, list[Axes]]:
+    """Return a figure with one workspace per panel, its obstacles and its ends drawn."""
+    figure, panels = style.row_of_panels(height, table["panel"].nunique(), sharey=True)
     for axes, (name, rows) in zip(panels, groups(table, "panel"), strict=True):
         for _, corners in groups(rows[rows["kind"] == OBSTACLE], "number"):
-            (x0, x1), (y0, y1) = corners["x"], corners["y"]
-            axes.add_patch(
-                Rectangle((x0, y0), x1 - x0, y1 - y0, facecolor="#bbbbbb", edgecolor=style.NEUTRAL)
-            )
-        _ends(axes, rows[rows["kind"] != OBSTACLE])
+            draw_obstacle(axes, corners["x"], corners["y"])
+        ends = rows[rows["kind"] != OBSTACLE].iloc[[0, -1]]
+        for (x, y), marker, size in zip(ends[["x", "y"]].to_numpy(), "o*", (4, 8), strict=True):
+            axes.plot(x, y, marker, color=style.NEUTRAL, markersize=size, zorder=4)
         style.operational_axes(axes, str(rows["unit"].iloc[0]))
-        axes.set_xlim(table["x"].min() - 1.0, table["x"].max() + 1.0)
-        axes.set_ylim(table["y"].min() - 1.0, table["y"].max() + 1.0)
-        axes.set_title(str(name))
-        if axes is not panels[0]:
-            axes.set_ylabel("")
+        limits = {f"{k}lim": (table[k].min() - 1.0, table[k].max() + 1.0) for k in "xy"}
+        axes.set(title=str(name), **limits)
+    for axes in panels[1:]:
+        axes.set_ylabel("")
     return figure, panels
-
-
-def _ends(axes: Axes, rows: pd.DataFrame) -> None:
-    first, last = rows.iloc[0], rows.iloc[-1]
-    axes.plot(first["x"], first["y"], "o", color=style.NEUTRAL, markersize=4, zorder=4)
-    axes.plot(last["x"], last["y"], "*", color=style.NEUTRAL, markersize=8, zorder=4)

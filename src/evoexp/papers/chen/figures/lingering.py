@@ -10,19 +10,15 @@ from evoexp.report import style
 from evoexp.report.results import ConditionResults
 from evoexp.report.rows import groups
 
-Shown = tuple[str, ConditionResults, np.ndarray]
 
-
-def places_table(shown: Sequence[Shown]) -> pd.DataFrame:
+def places_table(shown: Sequence[tuple[str, ConditionResults, np.ndarray]]) -> pd.DataFrame:
     """Return how many nodes of every unsafeness the paths of some conditions pass.
-
-    On average over the runs.
 
     Args:
         shown: (name, condition, unsafeness (along x, along y)).
 
     Returns:
-        Columns position, condition, unsafeness, nodes, runs.
+        Columns position, condition, unsafeness, nodes (mean over the runs), runs.
     """
     rows: list[tuple[object, ...]] = []
     for position, (name, condition, unsafeness) in enumerate(shown):
@@ -36,19 +32,19 @@ def places_table(shown: Sequence[Shown]) -> pd.DataFrame:
 
 def draw_places(table: pd.DataFrame) -> Figure:
     """Draw one bar per unsafeness and condition."""
-    figure = style.figure(2.7)
-    axes = figure.subplots()
+    figure, (axes,) = style.row_of_panels(2.7, 1)
     values = sorted(table.loc[table["nodes"] > 0.0, "unsafeness"].unique())
-    positions = sorted(table["position"].unique())
-    width = 0.8 / len(positions)
+    count = table["position"].nunique()
+    width = 0.8 / count
     for k, (position, rows) in enumerate(groups(table, "position")):
         own = rows.set_index("unsafeness")["nodes"].reindex(values)
-        x = np.arange(len(values)) + width * (k - 0.5 * (len(positions) - 1))
+        x = np.arange(len(values)) + width * (k - 0.5 * (count - 1))
         label = f"{rows['condition'].iloc[0]} (n = {rows['runs'].iloc[0]})"
         axes.bar(x, own, width=width, color=style.condition_colour(int(position)), label=label)
     axes.set_xticks(np.arange(len(values)), [f"{value:g}" for value in values])
-    axes.set_xlabel("unsafeness Sᵢ of a node (1: far from everything)")
-    axes.set_ylabel("nodes per path, mean")
+    axes.set(
+        xlabel="unsafeness Sᵢ of a node (1: far from everything)", ylabel="nodes per path, mean"
+    )
     axes.grid(visible=False, axis="x")
-    style.legend_below(figure, axes, min(len(positions), 4))
+    style.legend_below(figure, axes, min(count, 4))
     return figure

@@ -1,9 +1,6 @@
-"""A mobile manipulator's whole motion.
+"""A mobile manipulator's whole motion: the way from above, the docking posture from the side."""
 
-The platform's way from above, the docking posture from the side.
-"""
-
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -11,21 +8,22 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from evoexp.papers.chen.figures.grid_paths import OBSTACLE, draw_obstacle
 from evoexp.records import FloatArray
 from evoexp.report import style
 from evoexp.report.rows import groups
 
-PATH, OBSTACLE, TRAVEL, DOCKED, TARGET, BODY = (
+PATH, TRAVEL, DOCKED, TARGET, BODY, FORCE = (
     "path",
-    "obstacle",
     "travel posture",
     "docking posture",
     "target",
     "body",
+    "force",
 )
 
 
-class Shown(NamedTuple):
+class Mission(NamedTuple):
     """A motion to draw.
 
     Attributes:
@@ -50,115 +48,79 @@ class Shown(NamedTuple):
     force: tuple[float, float]
 
 
-def missions_table(shown: list[Shown]) -> pd.DataFrame:
+def missions_table(shown: list[Mission]) -> pd.DataFrame:
     """Return everything that is drawn.
 
     Returns:
         Columns row, unit, kind, number, a, b: x and y of the floor; of postures, the body and the
-        target place along the floor and height; of the force (kind "force") its components.
+        target place along the floor and height; of the force its components.
     """
     rows: list[tuple[object, ...]] = []
     for one in shown:
-        head = (one.title, one.unit)
-        for number, (x0, y0, x1, y1) in enumerate(one.boxes):
-            rows += [(*head, OBSTACLE, number, x0, y0), (*head, OBSTACLE, number, x1, y1)]
-        rows += [(*head, PATH, 0, x, y) for x, y in one.path.tolist()]
-        for name, joints in one.postures.items():
-            rows += [(*head, name, 0, a, b) for a, b in joints.tolist()]
-        rows += [
-            (*head, BODY, 0, *one.body),
-            (*head, TARGET, 0, *one.target.tolist()),
-            (*head, "force", 0, *one.force),
+        kinds = [
+            *((OBSTACLE, k, [box[:2], box[2:]]) for k, box in enumerate(one.boxes)),
+            (PATH, 0, one.path.tolist()),
+            *((name, 0, joints.tolist()) for name, joints in one.postures.items()),
+            (BODY, 0, [one.body]),
+            (TARGET, 0, [one.target.tolist()]),
+            (FORCE, 0, [one.force]),
         ]
+        rows += [(one.title, one.unit, *kind, a, b) for *kind, points in kinds for a, b in points]
     return pd.DataFrame(rows, columns=["row", "unit", "kind", "number", "a", "b"])
 
 
 def draw_missions(table: pd.DataFrame) -> Figure:
-    """Draw one row per motion: from above, and from the side, which the axes say.
-
-    Titles have little room.
-    """
-    names = list(dict.fromkeys(table["row"]))
-    figure = style.figure(3.1 * len(names) + 0.3)
-    panels = figure.subplots(len(names), 2, squeeze=False)
+    """Draw one row per motion: from above, and from the side."""
+    count = table["row"].nunique()
+    figure = style.figure(3.1 * count + 0.3)
+    panels = figure.subplots(count, 2, squeeze=False)
     for (above, side), (name, rows) in zip(panels, groups(table, "row"), strict=True):
         _draw_above(above, rows)
         _draw_side(side, rows)
         label, _, told = str(name).partition(", ")
         above.set_title(f"{label}: from above")
         side.set_title(told)
-    handles, labels = panels[0][1].get_legend_handles_labels()
-    own, words = panels[0][0].get_legend_handles_labels()
-    figure.legend(own + handles, words + labels, loc="outside lower center", ncols=3)
+    style.legend_of_all(figure, panels[0], 3)
     return figure
 
 
 def _draw_above(axes: Axes, rows: pd.DataFrame) -> None:
+    """Draw obstacles and the platform's way."""
     for _, corners in groups(rows[rows["kind"] == OBSTACLE], "number"):
-        (x0, x1), (y0, y1) = corners["a"], corners["b"]
-        axes.add_patch(
-            Rectangle((x0, y0), x1 - x0, y1 - y0, facecolor="#bbbbbb", edgecolor=style.NEUTRAL)
-        )
-    path = rows[rows["kind"] == PATH]
-    axes.plot(path["a"], path["b"], color=style.CONDITION_COLOURS[0], label="way of the platform")
-    axes.plot(path["a"].iloc[0], path["b"].iloc[0], "o", color=style.NEUTRAL, markersize=4)
-    axes.plot(
-        path["a"].iloc[-1],
-        path["b"].iloc[-1],
-        "*",
-        color=style.NEUTRAL,
-        markersize=8,
-        label="docking place",
-    )
+        draw_obstacle(axes, corners["a"], corners["b"])
+    path = rows.loc[rows["kind"] == PATH, ["a", "b"]].to_numpy()
+    look: dict[str, Any] = {"color": style.NEUTRAL}
+    axes.plot(*path.T, color=style.CONDITION_COLOURS[0], label="way of the platform")
+    axes.plot(*path[0], "o", markersize=4, **look)
+    axes.plot(*path[-1], "*", markersize=8, label="docking place", **look)
     style.operational_axes(axes, str(rows["unit"].iloc[0]))
     axes.margins(0.08)
 
 
 def _draw_side(axes: Axes, rows: pd.DataFrame) -> None:
+    """Draw the platform, both postures of the arm, the target and the force."""
     (radius, height), unit = _pair(rows, BODY), str(rows["unit"].iloc[0])
-    middle = float(rows.loc[rows["kind"] == DOCKED, "a"].iloc[0])
-    axes.add_patch(
-        Rectangle(
-            (middle - radius, 0.0),
-            2.0 * radius,
-            height,
-            facecolor="#dddddd",
-            edgecolor=style.NEUTRAL,
-        )
-    )
+    middle, _ = _pair(rows, DOCKED)
+    look: dict[str, Any] = {"facecolor": "#dddddd", "edgecolor": style.NEUTRAL}
+    axes.add_patch(Rectangle((middle - radius, 0.0), 2.0 * radius, height, **look))
     for name, colour, pattern in ((TRAVEL, style.FAINT, "--"), (DOCKED, style.ARM_COLOURS[1], "-")):
+        arm: dict[str, Any] = {"marker": "o", "markersize": 3.5, "color": colour, "label": name}
         joints = rows[rows["kind"] == name]
-        axes.plot(
-            joints["a"], joints["b"], pattern, marker="o", markersize=3.5, color=colour, label=name
-        )
-    x, z = _pair(rows, TARGET)
-    fx, fz = _pair(rows, "force")
-    axes.plot(
-        x,
-        z,
-        "x",
-        color=style.NEUTRAL,
-        markersize=7,
-        zorder=4,
-        label="where the end-effector shall be",
-    )
+        axes.plot(joints["a"], joints["b"], pattern, **arm)
+    (x, z), (fx, fz) = _pair(rows, TARGET), _pair(rows, FORCE)
+    cross: dict[str, Any] = {"color": style.NEUTRAL, "markersize": 7, "zorder": 4}
+    axes.plot(x, z, "x", label="where the end-effector shall be", **cross)
     size = np.hypot(fx, fz) or 1.0
     arrow = {"arrowstyle": "-|>", "color": style.FORBIDDEN}
-    axes.annotate(
-        "F",
-        (x, z),
-        (x - 0.6 * fx / size, z - 0.6 * fz / size),
-        arrowprops=arrow,
-        ha="center",
-        fontsize=7.5,
-    )
+    tail = x - 0.6 * fx / size, z - 0.6 * fz / size
+    axes.annotate("F", (x, z), tail, arrowprops=arrow, ha="center", fontsize=7.5)
     axes.axhline(0.0, color=style.NEUTRAL, linewidth=1.0)
     axes.set_aspect("equal", adjustable="datalim")
-    axes.set_xlabel(f"x [{unit}]")
-    axes.set_ylabel(f"height z [{unit}]")
+    axes.set(xlabel=f"x [{unit}]", ylabel=f"height z [{unit}]")
     axes.margins(0.1)
 
 
 def _pair(rows: pd.DataFrame, kind: str) -> tuple[float, float]:
+    """Return a and b of the first row of a kind."""
     first, second = rows.loc[rows["kind"] == kind, ["a", "b"]].iloc[0]
     return float(first), float(second)

@@ -8,34 +8,34 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 
-from evoexp.papers.chen.cases import Case
+from evoexp.papers.chen.cases import CLOSE, METHODS, Case
+from evoexp.records import FloatArray
 from evoexp.report import style
 from evoexp.report.rows import groups, records, rounded
 from evoexp.report.statistics import quantile
 
-METHODS = (
-    "GA",
-    "GA, elitism",
-    "random search",
-    "Newton-type",
-    "Newton-type, smooth form",
-    "subgradient",
-)
-LEAST_GAP = 1e-6  # [-] what is drawn of a smaller one
+RUNS = ("GA", "GA, elitism", "random search")
+ORDER = (*RUNS, *METHODS.values())  # which tells colours
+LEAST_GAP = 1e-6  # [-] smaller gaps are drawn as this one
 POSTURES = ("exact optimum", "best run", "paper's angles")
+FITNESS = [
+    *("panel", "case", "quantity", "method", "generation"),
+    *("median", "lower", "upper", "average", "runs", "optimum"),
+]
+LINKS = ["panel", "case", "element", "posture", "x", "y", "x_end", "y_end", "size"]
 
 
 def _colour(method: str) -> str:
-    return style.condition_colour(METHODS.index(method)) if method in METHODS else style.NEUTRAL
+    return style.condition_colour(ORDER.index(method)) if method in ORDER else style.NEUTRAL
 
 
 # ------------------------------------------------------------------------------------------ fitness
 
 
 def fitness_table(cases: list[Case]) -> pd.DataFrame:
-    """Return median and quartiles of the best fitness f = E_m − E so far over runs.
+    """Return median and quartiles over runs of the best fitness f = E_m − E so far.
 
-    And the optimum's.
+    Of the least torque norm it is the torque norm itself, which the paper draws.
 
     Returns:
         Columns panel, case, quantity, method, generation, median, lower, upper, average (of a
@@ -43,55 +43,42 @@ def fitness_table(cases: list[Case]) -> pd.DataFrame:
     """
     rows = []
     for panel, case in enumerate(cases):
-        greatest = float(case.any.planner.objective.greatest)
-        torque = case.name == "least torque norm"  # which the paper draws itself
+        greatest = float(case.conditions[0].planner.objective.greatest)
+        torque = case.name == "least torque norm"
+        quantity = "torque norm E₁" if torque else "fitness f"
         for method, condition in case.evolved.items():
             for index, own in groups(condition.generations, "index"):
                 best, mean = own["best_cost"].to_numpy(), own["mean_cost"].to_numpy()
-                values, average = (best, mean) if torque else (greatest - best, greatest - mean)
-                spread = [quantile(values, share) for share in (0.5, 0.25, 0.75)]
+                if not torque:
+                    best, mean = greatest - best, greatest - mean
+                spread = (quantile(best, share) for share in (0.5, 0.25, 0.75))
                 optimum = case.least if torque else greatest - case.least
-                quantity = "torque norm E₁" if torque else "fitness f"
-                told = (*spread, quantile(average, 0.5), len(values), optimum)
+                told = (*spread, quantile(mean, 0.5), len(best), optimum)
                 rows.append((panel, case.name, quantity, method, index, *told))
-    names = ["median", "lower", "upper", "average", "runs", "optimum"]
-    return rounded(
-        pd.DataFrame(rows, columns=["panel", "case", "quantity", "method", "generation", *names])
-    )
+    return rounded(pd.DataFrame(rows, columns=FITNESS))
 
 
 def draw_fitness(table: pd.DataFrame) -> Figure:
     """Draw one panel per criterion: the best so far against generations, the optimum as a line."""
-    figure, places = _panels(table["panel"].nunique(), 2.5)
+    figure, places = _panels(table, 2.5)
     for axes, (_, rows) in zip(places, groups(table, "panel"), strict=False):
-        optimum = float(rows["optimum"].iloc[0])
+        optimum, quantity = rows[["optimum", "quantity"]].iloc[0]
         for method, own in groups(rows, "method"):
-            colour = _colour(method)
+            x, colour = own["generation"], _colour(method)
             label = f"{method} (n = {int(own['runs'].max())})"
-            axes.fill_between(
-                own["generation"], own["lower"], own["upper"], color=colour, alpha=0.18, linewidth=0
-            )
-            axes.plot(own["generation"], own["median"], color=colour, label=label)
-        axes.axhline(
-            optimum,
-            color=style.NEUTRAL,
-            linestyle=(0, (5, 1.5, 1, 1.5)),
-            linewidth=1.0,
-            label="optimum",
-        )
+            axes.fill_between(x, own["lower"], own["upper"], color=colour, alpha=0.18, linewidth=0)
+            axes.plot(x, own["median"], color=colour, label=label)
+        line: dict[str, Any] = {"linestyle": (0, (5, 1.5, 1, 1.5)), "linewidth": 1.0}
+        axes.axhline(optimum, color=style.NEUTRAL, label="optimum", **line)
+        # the first generations may be far off: later ones tell the range
         late = rows[rows["generation"] >= min(3, int(rows["generation"].max()))]
         far = max(float((late[["lower", "upper"]] - optimum).abs().to_numpy().max()), 1e-9)
-        low, high = (optimum - 0.08 * far,
-        optimum + far) if rows["quantity"].iloc[0].startswith("t") else (
-            optimum - far,
-            optimum + 0.08 * far,
-        )  # fmt: skip
-        if np.isfinite([low, high]).all():
-            axes.set_ylim(low, high)
+        lower_is_better = quantity.startswith("t")
+        below, above = (0.08, 1.0) if lower_is_better else (1.0, 0.08)
+        if np.isfinite([far, optimum]).all():
+            axes.set_ylim(optimum - below * far, optimum + above * far)
         axes.set_xlim(0, max(1, int(rows["generation"].max())))
-        axes.set_xlabel("generation")
-        axes.set_ylabel(f"{rows['quantity'].iloc[0]} [-]")
-        axes.set_title(rows["case"].iloc[0])
+        axes.set(xlabel="generation", ylabel=f"{quantity} [-]", title=rows["case"].iloc[0])
     style.legend_below(figure, places[0], 4)
     return figure
 
@@ -103,55 +90,40 @@ def gaps_table(cases: list[Case]) -> pd.DataFrame:
     """Return the gap of every run, and of every start of a conventional method, to the optimum.
 
     Returns:
-        Columns panel, case, method, position, gap.
+        Columns panel, case, method, at (place of the method in the legend), gap.
     """
     parts = []
     for panel, case in enumerate(cases):
         costs = {method: c.column("best_cost") for method, c in case.evolved.items()}
         costs |= {method: ends[:, 2] for method, ends in case.ends().items()}
         for method, values in costs.items():
+            given = {"panel": panel, "case": case.name, "method": method}
             gaps = np.maximum(case.gaps(values), 0.0)
-            position = METHODS.index(method)
-            parts.append(
-                pd.DataFrame({"gap": gaps}).assign(
-                    panel=panel, case=case.name, method=method, at=position
-                )
-            )
-    return rounded(pd.concat(parts, ignore_index=True)[["panel", "case", "method", "at", "gap"]])
+            parts.append(pd.DataFrame(given | {"at": ORDER.index(method), "gap": gaps}))
+    return rounded(pd.concat(parts, ignore_index=True))
 
 
 def draw_gaps(table: pd.DataFrame) -> Figure:
     """Draw shares of runs, or starts, whose gap is smaller than x, one panel per criterion."""
-    figure, places = _panels(table["panel"].nunique(), 2.5)
+    figure, places = _panels(table, 2.5)
     for axes, (_, rows) in zip(places, groups(table, "panel"), strict=False):
-        for _, own in groups(rows, "at"):
-            method = own["method"].iloc[0]
-            x = np.sort(
-                np.clip(np.nan_to_num(own["gap"].to_numpy(), posinf=np.inf), LEAST_GAP, None)
-            )
+        for (_, method), own in groups(rows, ["at", "method"]):
+            x = np.sort(np.maximum(np.nan_to_num(own["gap"].to_numpy(), posinf=np.inf), LEAST_GAP))
             share = np.arange(1, len(x) + 1) / len(x)
             finite = np.isfinite(x)
-            kind: Any = "-" if METHODS.index(method) < 3 else (0, (4, 1.5))
-            steps = {
+            look: dict[str, Any] = {
                 "color": _colour(method),
-                "linestyle": kind,
+                "linestyle": "-" if method in RUNS else (0, (4, 1.5)),
                 "label": f"{method} (n = {len(x)})",
             }
-            axes.step(
-                np.append(x[finite], 1e2),
-                np.append(share[finite], finite.mean()),
-                where="post",
-                **steps,
-            )
-        for close in (0.001, 0.01):
+            heights = np.append(share[finite], finite.mean())
+            axes.step(np.append(x[finite], 1e2), heights, where="post", **look)
+        for close in CLOSE:
             axes.axvline(close, color=style.FAINT, linewidth=0.8, linestyle=":")
-        axes.set_xscale("log")
-        axes.set_xlim(LEAST_GAP, 10.0)
-        axes.set_ylim(0.0, 1.02)
-        axes.set_xlabel("gap E / E* − 1 [-]")
-        axes.set_ylabel("share with a smaller gap")
+        axes.set(xscale="log", xlim=(LEAST_GAP, 10.0), ylim=(0.0, 1.02))
+        axes.set(xlabel="gap E / E* − 1 [-]", ylabel="share with a smaller gap")
         axes.set_title(rows["case"].iloc[0])
-    _legend_of_all(figure, places, 3)
+    style.legend_of_all(figure, places, 3)
     return figure
 
 
@@ -159,129 +131,101 @@ def draw_gaps(table: pd.DataFrame) -> Figure:
 
 
 def postures_table(cases: list[Case]) -> pd.DataFrame:
-    """Return the links of the exact optimum, of the best run and at the paper's angles, platform.
-
-    Obstacles, force.
+    """Return obstacles, the force, and three postures: exact optimum, best run, paper's angles.
 
     Returns:
-        Columns panel, case, element (platform, link, obstacle, force, target), posture, x, y,
-        x_end, y_end, size.
+        Columns panel, case, element (platform, link, obstacle, force), posture, x, y, x_end, y_end,
+        size (of an obstacle its radius, of a link its number).
     """
     rows: list[tuple[Any, ...]] = []
     for panel, case in enumerate(cases):
-        head = (panel, case.name)
-        scenario: Any = case.any.condition.scenario
-        for obstacle, (x, y) in zip(scenario.obstacles, scenario.obstacle_points(), strict=True):
-            rows.append(
-                (*head, "obstacle", "", x, y, x, y, float(getattr(obstacle, "radius", 0.0)))
+        scenario: Any = case.conditions[0].condition.scenario
+        own: list[tuple[Any, ...]] = [
+            ("obstacle", "", *place, *place, float(getattr(obstacle, "radius", 0.0)))
+            for obstacle, place in zip(
+                scenario.obstacles, map(tuple, scenario.obstacle_points()), strict=True
             )
+        ]
         force = np.array(scenario.force) / max(float(np.hypot(*scenario.force)), 1e-12)
-        x, y = scenario.target
-        rows.append((*head, "force", "", x, y, x + 0.6 * force[0], y + 0.6 * force[1], 0.0))
-        for posture, angles in _shown(case).items():
-            found = case.measured(angles)
-            if found["branch"] >= 0.0:
-                rows += [(*head, *row) for row in _links(case, posture, found)]
-    names = ["panel", "case", "element", "posture", "x", "y", "x_end", "y_end", "size"]
-    return rounded(pd.DataFrame(rows, columns=names))
-
-
-def _shown(case: Case) -> dict[str, Any]:
-    """Return θ1, θ2 [deg] of the postures that are drawn."""
-    shown: dict[str, Any] = {}
-    if case.optimum is not None:
-        shown[POSTURES[0]] = case.optimum.solutions[case.optimum.best_replicate]
-    run = case.elitist or case.plain
-    if run is not None:
-        shown[POSTURES[1]] = run.solutions[run.best_replicate]
-    if case.printed is not None and case.printed.angles is not None:
-        shown[POSTURES[2]] = case.printed.angles
-    return shown
+        end = np.array(scenario.target) + 0.6 * force
+        own.append(("force", "", *scenario.target, *end, 0.0))
+        run = case.elitist or case.plain
+        best = run.solutions[run.best_replicate] if run is not None else None
+        shown = zip(POSTURES, (case.optimal_angles, best, case.printed_angles), strict=True)
+        for posture, angles in shown:
+            found = {} if angles is None else case.measured(angles)
+            if found.get("branch", -1.0) >= 0.0:
+                own += _links(case, posture, found)
+        rows += [(panel, case.name, *row) for row in own]
+    return rounded(pd.DataFrame(rows, columns=LINKS))
 
 
 def _links(case: Case, posture: str, found: dict[str, float]) -> list[tuple[Any, ...]]:
-    robot: Any = case.any.condition.robot
-    x, y, angle = found["platform_x"], 0.0, 0.0
-    length, height = robot.platform_size
-    rows: list[tuple[Any, ...]] = [
-        ("platform", posture, x - length / 2, -height / 2, x + length / 2, height / 2, 0.0)
+    """Return the platform and the links of a posture, of which the terms are given."""
+    robot: Any = case.conditions[0].condition.robot
+    length, height = 0.5 * np.array(robot.platform_size)
+    angles = np.cumsum([np.radians(found[f"theta_{k}_deg"]) for k in (1, 2, 3)])
+    steps = np.array(robot.link_lengths)[:, None] * np.column_stack(
+        [np.cos(angles), np.sin(angles)]
+    )
+    joints = np.cumsum([(found["platform_x"], 0.0), *steps], axis=0)
+    x, y = joints[0]
+    return [
+        ("platform", posture, x - length, y - height, x + length, y + height, 0.0),
+        *(("link", posture, *joints[k], *joints[k + 1], k + 1.0) for k in range(len(steps))),
     ]
-    for k, link in enumerate(robot.link_lengths):
-        angle += np.radians(found[f"theta_{k + 1}_deg"])
-        end = x + link * np.cos(angle), y + link * np.sin(angle)
-        rows.append(("link", posture, x, y, *end, float(k + 1)))
-        x, y = end
-    return rows
 
 
 def draw_postures(table: pd.DataFrame) -> Figure:
-    """Draw one panel per criterion."""
-    figure, places = _panels(table["panel"].nunique(), 2.6)
-    looks = dict(
-        zip(
-            POSTURES,
-            ((style.NEUTRAL, 3.4), (style.ARM_COLOURS[0], 1.7), (style.ARM_COLOURS[1], 1.1)),
-            strict=True,
-        )
-    )
+    """Draw one panel per criterion: three postures, the force, the obstacle."""
+    figure, places = _panels(table, 2.6)
+    looks = (style.NEUTRAL, 3.4), (style.ARM_COLOURS[0], 1.7), (style.ARM_COLOURS[1], 1.1)
+    cross: dict[str, Any] = {"color": style.FORBIDDEN, "ms": 7, "mec": "white", "zorder": 8}
+    blue = style.ARM_COLOURS[2]
+    arrow = {"arrowstyle": "-|>", "color": blue, "linewidth": 1.4}
     for axes, (_, rows) in zip(places, groups(table, "panel"), strict=False):
         style.operational_axes(axes, "unit")
         axes.axhline(0.0, color=style.FAINT, linewidth=0.8)
-        for posture, (colour, width) in looks.items():
+        for posture, (colour, width) in zip(POSTURES, looks, strict=True):
             own = rows[rows["posture"] == posture]
             if len(own):
                 _draw_posture(axes, own, posture, colour, width)
         for row in records(rows[rows["element"] == "obstacle"]):
-            axes.plot(
-                row.x,
-                row.y,
-                "X",
-                color=style.FORBIDDEN,
-                ms=7,
-                mec="white",
-                zorder=8,
-                label="obstacle",
-            )
+            axes.plot(row.x, row.y, "X", label="obstacle", **cross)
         for row in records(rows[rows["element"] == "force"]):
-            arrow = {"arrowstyle": "-|>", "color": style.ARM_COLOURS[2], "linewidth": 1.4}
             axes.annotate("", (row.x_end, row.y_end), (row.x, row.y), arrowprops=arrow, zorder=7)
-            axes.plot([], [], color=style.ARM_COLOURS[2], label="force F")
-        axes.set_xlim(*_around(table, "x"))
-        axes.set_ylim(*_around(table, "y"))
+            axes.plot([], [], color=blue, label="force F")
+        axes.set(xlim=_around(table, "x"), ylim=_around(table, "y"), title=rows["case"].iloc[0])
         axes.xaxis.set_major_locator(style.few_ticks())
-        axes.set_title(rows["case"].iloc[0])
-    _legend_of_all(figure, places, 5)
+    style.legend_of_all(figure, places, 5)
     return figure
 
 
 def _draw_posture(axes: Axes, rows: pd.DataFrame, label: str, colour: str, width: float) -> None:
+    """Draw the links and the platform of a posture."""
     links = rows[rows["element"] == "link"]
     x, y = ([*links[name], links[f"{name}_end"].iloc[-1]] for name in "xy")
     axes.plot(x, y, "o-", color=colour, linewidth=width, ms=3.0, mfc="white", label=label, zorder=5)
     for row in records(rows[rows["element"] == "platform"]):
         height = row.y_end - row.y
-        look: dict[str, Any] = {
-            "fill": False,
-            "edgecolor": colour,
-            "linewidth": 0.6 * width,
-            "zorder": 4,
-        }
-        rounded_ends = f"round,pad=0,rounding_size={0.499 * height}"
+        look: dict[str, Any] = {"fill": False, "edgecolor": colour, "linewidth": 0.6 * width}
+        ends = f"round,pad=0,rounding_size={0.499 * height}"
         box = FancyBboxPatch(
-            (row.x, row.y), row.x_end - row.x, height, boxstyle=rounded_ends, **look
+            (row.x, row.y), row.x_end - row.x, height, boxstyle=ends, zorder=4, **look
         )
         axes.add_patch(box)
 
 
 def _around(table: pd.DataFrame, name: str) -> tuple[float, float]:
     """Return the range of a coordinate over all panels, with a margin."""
-    values = table[[name, f"{name}_end"]].to_numpy()
+    values: FloatArray = table[[name, f"{name}_end"]].to_numpy()
     margin = 0.07 * float(np.ptp(values)) + 0.05
     return float(values.min()) - margin, float(values.max()) + margin
 
 
-def _panels(count: int, height: float) -> tuple[Figure, list[Axes]]:
-    """Return a figure with so many panels, two or three in a row."""
+def _panels(table: pd.DataFrame, height: float) -> tuple[Figure, list[Axes]]:
+    """Return a figure with a panel for each of the table, three in a row at most."""
+    count = table["panel"].nunique()
     columns = min(count, 3)
     rows = -(-count // columns)
     figure = style.figure(height * rows + 0.6)
@@ -289,12 +233,3 @@ def _panels(count: int, height: float) -> tuple[Figure, list[Axes]]:
     for axes in places[count:]:
         axes.set_axis_off()
     return figure, list(places[:count])
-
-
-def _legend_of_all(figure: Figure, places: list[Axes], columns: int) -> None:
-    """Draw one legend below all panels, of whatever any of them shows."""
-    handles: dict[str, Any] = {}
-    for axes in places:
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            handles.setdefault(label, handle)
-    figure.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=columns)

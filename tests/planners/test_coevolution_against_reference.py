@@ -1,0 +1,215 @@
+"""The compiled co-evolution against the same algorithm in numpy, from the same uniform numbers.
+
+Genes are copied, exchanged and added to, so as long as both take the same decisions (who is drawn,
+who collides, who is on a front) their populations are equal bit for bit. Only sines and cosines
+differ in the last digit, and with them costs.
+"""
+
+import functools
+import json
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from evoexp.condition import Condition
+from evoexp.configuration import compose
+from evoexp.planners.coevolution import kernels
+from evoexp.planners.coevolution import planner as planner_module
+from evoexp.planners.coevolution.planner import Coevolution
+from references import curkovic_numpy
+
+ROUNDING = 1e-12  # relative, of costs; measured: 5e-15
+METHODS = ("I", "II", "III", "IV", "V", "VI", "VII", "VIII")
+DISC = {"shape": "sphere", "center": [0.2, 0.45], "radius": 0.05}
+DISCS = [DISC, {"shape": "sphere", "center": [0.6, 0.25], "radius": 0.04}]
+SMALL = {"ga.population_size": 16, "ga.num_generations": 25, "ga.hall_depth": 0.25}
+
+
+@functools.cache
+def shipped(experiment: str) -> dict[str, Condition]:
+    """Return the conditions of an experiment by label; composing them takes longest."""
+    return dict(compose.expand([f"experiment={experiment}"])[0].conditions)
+
+
+def condition(
+    changes: dict[str, Any], experiment: str = "curkovic_methods", label: str = "V"
+) -> Condition:
+    """Return a shipped condition with some settings changed, in the canonical form's words."""
+    config = json.loads(shipped(experiment)[label].to_json())
+    for path, value in changes.items():
+        *parents, name = (path if "." in path else f"planner.{path}").split(".")
+        inner = config if parents[0] in config else config["planner"]
+        for parent in parents:
+            inner = inner[parent]
+        inner[name] = value
+    return Condition.from_config(config)
+
+
+def compare(given: Condition, seed: int) -> dict[str, int]:
+    """Fail where a generation differs.
+
+    Returns:
+        Numbers of collisions, contacts with obstacles, feasible individuals and restarts: where
+        they are 0, the comparison says nothing of them.
+    """
+    planner, problem = given.prepare()
+    ours = planner.evolve(problem, np.random.default_rng(seed))
+    slow = curkovic_numpy.from_condition(given)
+    theirs = curkovic_numpy.evolve(slow, np.random.default_rng(seed))
+    events = {"collisions": 0, "contacts": 0, "feasible": 0, "restarts": 0}
+    best = np.inf
+    for found, expected in zip(ours, theirs, strict=True):
+        judged = expected.judged
+        assert np.array_equal(found.population, expected.populations), found.index
+        np.testing.assert_allclose(found.costs, judged.costs, rtol=ROUNDING)
+        assert found.num_feasible == expected.num_feasible
+        assert found.best_cost_in_generation == pytest.approx(expected.best_cost, rel=ROUNDING)
+        best = min(best, expected.best_cost)
+        assert found.best_cost == pytest.approx(best, rel=ROUNDING)
+        events["collisions"] += sum(int(table.sum()) for table in judged.hits.values())
+        events["contacts"] += int(judged.blocked.sum())
+        events["feasible"] += expected.num_feasible
+        events["restarts"] += expected.restarted
+    assert found.criteria is not None
+    np.testing.assert_allclose(found.criteria, judged.criteria, rtol=ROUNDING, atol=ROUNDING)
+    return events
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_papers_methods_agree(method: str) -> None:
+    events = compare(condition({"ga.num_generations": 15}, label=method), 0)
+    assert events["collisions"] > 0
+    assert events["feasible"] > 0
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"ga.num_elites": 3},
+        {"ga.mutation_direction": "symmetric"},
+        {"ga.selection": "difference"},
+        {"ga.hall_memory": 2},
+        {"ga.hall_frozen": True},
+        {"collision.collision_substeps": 3},
+        {"chromosome_length": 2},
+        {"ga.population_size": 13, "ga.crossover_rate": 1.0},
+        {
+            "objective.collision_weight": 0.5,
+            "objective.path_weight": 2.0,
+            "objective.rotation_weight": 0.3,
+            "objective.evenness_weight": 4.0,
+        },
+        {"scenario.obstacles": DISCS},
+    ],
+    ids=lambda changes: next(iter(changes)),
+)
+def test_variants_agree(changes: dict[str, Any]) -> None:
+    for seed in range(3):
+        events = compare(condition(SMALL | changes), seed)
+        assert events["collisions"] > 0
+        assert (events["contacts"] > 0) is ("scenario.obstacles" in changes)
+
+
+@pytest.mark.parametrize("discs", [[], [DISC]], ids=["free", "beside a disc"])
+def test_three_robots_agree(discs: list[Any]) -> None:
+    changes = SMALL | {"ga.num_elites": 1, "scenario.obstacles": discs}
+    for label in shipped("curkovic_three"):
+        events = compare(condition(changes, "curkovic_three", label), 3)
+        assert events["collisions"] > 0
+        assert events["feasible"] > 0
+        assert (events["contacts"] > 0) is bool(discs)
+
+
+def test_a_robot_that_stands_still_agrees() -> None:
+    compare(condition(SMALL, "curkovic_stationary", next(iter(shipped("curkovic_stationary")))), 0)
+
+
+def test_restarts_agree() -> None:
+    """Two individuals rarely make a team: fresh populations are drawn, the hall is emptied."""
+    changes = {"ga.population_size": 2, "ga.hall_depth": 0.5, "ga.restart_after": 3}
+    three = condition(changes | {"ga.num_generations": 40}, "curkovic_three", "5 substeps")
+    assert compare(three, 0)["restarts"] > 1
+
+
+def uniform_selection(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kernels, "inverse_weights", lambda costs, out: out.fill(1.0))
+
+
+def no_mutation(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kernels, "mutate_allele", lambda *_: None)
+
+
+def no_crossover(monkeypatch: pytest.MonkeyPatch) -> None:
+    cross = kernels.cross_single_point
+    monkeypatch.setattr(
+        kernels,
+        "cross_single_point",
+        lambda uniforms, genes, parents, rate, out: cross(uniforms, genes, parents, 0.0, out),
+    )
+
+
+def lost_elites(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kernels, "choose_elites", lambda costs, chosen: chosen.fill(0))
+
+
+def swapped_readings_of_eq_9(monkeypatch: pytest.MonkeyPatch) -> None:
+    mutate = kernels.mutate_allele
+    monkeypatch.setattr(kernels, "mutate_allele", lambda *given: mutate(*given[:-1], not given[-1]))
+
+
+def constant_rate_for_eq_10(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(planner_module, "decayed_rate", lambda rate, *_: rate)
+
+
+def c1_without_obstacles(monkeypatch: pytest.MonkeyPatch) -> None:
+    evaluated = Coevolution.evaluated
+
+    def without(planner: Coevolution, problem: Any, populations: Any) -> Any:
+        found = evaluated(planner, problem, populations)
+        extra = found.blocked * populations.shape[2]
+        found.criteria[:, 0] -= extra
+        return found._replace(costs=found.costs - planner.objective.collision_weight * extra)
+
+    monkeypatch.setattr(Coevolution, "evaluated", without)
+
+
+def copies_on_the_front(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kernels, "drop_copies", lambda *_: None)
+
+
+def everybody_on_the_front(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kernels, "non_dominated", lambda criteria, count, out: out.fill(True))
+
+
+def nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave everything as it is: the kernels that faults are planted in agree when interpreted."""
+
+
+FAULTS: list[Callable[[pytest.MonkeyPatch], None]] = [
+    uniform_selection,
+    no_mutation,
+    no_crossover,
+    lost_elites,
+    swapped_readings_of_eq_9,
+    constant_rate_for_eq_10,
+    c1_without_obstacles,
+    copies_on_the_front,
+    everybody_on_the_front,
+]
+
+
+@pytest.mark.parametrize("plant", [nothing, *FAULTS], ids=lambda plant: plant.__name__)
+def test_every_planted_fault_is_noticed(
+    plant: Callable[[pytest.MonkeyPatch], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given = condition(SMALL | {"ga.num_elites": 2, "scenario.obstacles": DISCS})
+    for name in ("breed", "renew"):
+        monkeypatch.setattr(planner_module, name, getattr(kernels, name).py_func)
+    plant(monkeypatch)
+    if plant is nothing:
+        compare(given, 0)
+    else:
+        with pytest.raises(AssertionError):
+            compare(given, 0)

@@ -10,10 +10,15 @@ from evoexp.objectives.posture_cost import (
     AXIAL,
     COLUMNS,
     DISTANCE,
+    EDGED,
     HEADING,
     PARALLEL,
+    POINT,
+    ROD,
+    ROUND,
     TERMS,
     UPRIGHT,
+    Aim,
     AngleTerm,
     FreeSpace,
     LengthTerm,
@@ -37,18 +42,17 @@ def drawn(seed: int) -> tuple[np.ndarray, list[Rotation], np.ndarray]:
     return np.ascontiguousarray(pose), rotations, positions
 
 
-def rated(pose: np.ndarray, aim: np.ndarray) -> np.ndarray:
+def rated(pose: np.ndarray, aim: Aim) -> np.ndarray:
     rows = np.full((len(TERMS), COUNT), np.nan)
     rate_poses(COUNT, pose, aim, rows)
     return rows
 
 
-def aim_at(rotation: Rotation, point: np.ndarray) -> np.ndarray:
-    aim = np.zeros(30)
-    aim[:9], aim[9:12], aim[15:18] = rotation.as_matrix().ravel(), point, point
-    aim[12:15] = rotation.as_matrix()[:, 2]
-    aim[24:27], aim[27:30] = [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]
-    return aim
+def aim_at(rotation: Rotation, point: np.ndarray) -> Aim:
+    matrix = np.ascontiguousarray(rotation.as_matrix())
+    up, across = np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
+    axis = matrix[:, 2].copy()
+    return Aim(matrix.ravel(), point, axis, POINT, 0.0, 0.0, np.zeros(3), up, across)
 
 
 def test_poses_against_scipy() -> None:
@@ -63,10 +67,10 @@ def test_poses_against_scipy() -> None:
 
 
 SHAPES = {
-    "sphere": (coal.Sphere(0.3), (1.0, 0.0, 0.3)),
-    "capsule": (coal.Capsule(0.2, 0.8), (1.0, 0.4, 0.2)),
-    "cylinder": (coal.Cylinder(0.2, 0.8), (2.0, 0.4, 0.2)),
-    "box": (coal.Box(0.4, 0.6, 0.8), (3.0, 0.0, 0.0)),
+    "sphere": (coal.Sphere(0.3), (ROD, 0.0, 0.3)),
+    "capsule": (coal.Capsule(0.2, 0.8), (ROD, 0.4, 0.2)),
+    "cylinder": (coal.Cylinder(0.2, 0.8), (ROUND, 0.4, 0.2)),
+    "box": (coal.Box(0.4, 0.6, 0.8), (EDGED, 0.0, 0.0)),
 }
 
 
@@ -75,10 +79,11 @@ def test_distances_from_surfaces_against_coal(name: str) -> None:
     shape, (kind, half, radius) = SHAPES[name]
     pose, _, positions = drawn(1)
     place = Rotation.from_euler("xyz", [10, 70, -20], degrees=True)
-    aim = aim_at(place, np.array([0.1, -0.2, 0.3]))
-    aim[18], aim[19], aim[20:23], aim[23] = half, radius, [0.2, 0.3, 0.4], kind
+    aim = aim_at(place, np.array([0.1, -0.2, 0.3]))._replace(
+        surface=kind, half_length=half, radius=radius, half_edges=np.array([0.2, 0.3, 0.4])
+    )
     rows = rated(pose, aim)
-    body = coal.Transform3s(place.as_matrix(), aim[9:12])
+    body = coal.Transform3s(place.as_matrix(), aim.point)
     request, result = coal.DistanceRequest(), coal.DistanceResult()
     inside = 0
     for n, position in enumerate(positions):
@@ -92,7 +97,7 @@ def test_distances_from_surfaces_against_coal(name: str) -> None:
             inside += 1
             assert expected - 1e-5 <= rows[DISTANCE, n] <= 0.0
             assert rows[DISTANCE, n] == pytest.approx(
-                depth(name, place.inv().apply(position - aim[9:12])), abs=1e-12
+                depth(name, place.inv().apply(position - aim.point)), abs=1e-12
             )
     assert inside > 3
 
@@ -120,8 +125,7 @@ def test_axial_and_heading_against_their_definitions() -> None:
         Rotation.from_euler("xyz", [10, 70, -20], degrees=True),
         np.array([0.1, -0.2, 0.3]),
     )
-    aim = aim_at(place, middle)
-    aim[18], aim[19], aim[23] = 0.4, 0.2, 2.0
+    aim = aim_at(place, middle)._replace(surface=ROUND, half_length=0.4, radius=0.2)
     rows = rated(pose, aim)
     axis = place.as_matrix()[:, 2]
     for n, (rotation, position) in enumerate(zip(rotations, positions, strict=True)):

@@ -1,12 +1,10 @@
-"""What a posture costs: terms that a configuration chooses and weighs.
+"""The cost of a posture: terms that a configuration chooses and weighs.
 
-Corsépius 2001, section 4.3.
-
-Every term is a field of the objective: what is given counts, what is not given does not. The cost
-is the sum of weight × term. Terms and their units:
+Corsépius 2001, section 4.3. Every term is a field of the objective, and counts if it is given. The
+cost is the sum of weight × term. Terms and their units:
 
 - `goal_distance` [length unit]: of the controlled frame from the goal's point, or from the surface
-  of an object (inside of it the signed distance is negative; what counts is its magnitude).
+  of an object (negative inside of it; its magnitude counts).
 - `goal_angle` [rad]: between the controlled frame and the goal's orientation; with the distance a
   full pose.
 - `axial_approach` [rad]: between the direction across the grasping direction (y of the tool) and
@@ -17,11 +15,10 @@ is the sum of weight × term. Terms and their units:
 - `limit_margin` [-]: 1 − the smallest distance of a joint from its limits, in units of half its
   range.
 - `collision` [-]: 1 if anything touches, else 0.
-- `free_space` [-]: how far the clearance falls short of `reach`, in units of it; 0 beyond, 1 in
-  contact.
+- `free_space` [-]: missing clearance up to `reach`, in units of `reach`; 0 beyond, 1 in contact.
 """
 
-from typing import ClassVar, Literal, Self
+from typing import ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -59,7 +56,7 @@ COLUMNS = (
 )
 """Names of the terms in records, with their units; lengths are in the scene's."""
 
-HALF_PI = 90.0 * DEGREE
+POINT, ROD, ROUND, EDGED = range(4)  # surfaces that a distance is measured to, see `Aim`
 AT = 1e-9  # [length unit] closer to the object's axis than this, every heading is right
 
 
@@ -113,7 +110,7 @@ class FreeSpace(RatioTerm):
     """The preference of free regions.
 
     Attributes:
-        reach: Clearance from which on nothing is gained any more [length unit].
+        reach: Least clearance that counts as free [length unit].
     """
 
     reach: Positive
@@ -155,14 +152,14 @@ class PostureCost(Component):
         return tuple(name for name in TERMS if getattr(self, name) is not None)
 
     def weights(self, terms: tuple[str, ...], field: str) -> FloatArray:
-        """Return the weight of every term, (terms,), 0 for those that do not count.
+        """Return the weight of every term, (terms,); 0: the term does not count.
 
         Args:
-            terms: Names of those that count; empty: all that are given.
-            field: Where they stand in the configuration, for errors.
+            terms: Names of the terms that count; empty: all that are given.
+            field: Their place in the configuration, for errors.
 
         Raises:
-            SettingError: If one is unknown, or has no weight in this objective.
+            SettingError: If a term is unknown, or has no weight in this objective.
         """
         for k, name in enumerate(terms):
             if name not in TERMS:
@@ -190,68 +187,105 @@ class PostureCost(Component):
         )
 
 
+class Aim(NamedTuple):
+    """The goal of a phase, as `rate_poses` takes it.
+
+    Attributes:
+        rotation: (9,) wanted rotation of the controlled frame, row by row; or that of an object.
+        point: (3,) wanted place; of the surface of an object the object's middle [length unit].
+        axis: (3,) axis of the object.
+        surface: The distance is measured to POINT, to a ROD (also a sphere), to a ROUND (a
+            cylinder) or to an EDGED body (a box).
+        half_length: Half the length of the object's axis [length unit].
+        radius: Of rods and cylinders [length unit].
+        half_edges: (3,) of a box [length unit].
+        up: (3,) direction up.
+        local_up: (3,) the up axis of the controlled frame.
+    """
+
+    rotation: FloatArray
+    point: FloatArray
+    axis: FloatArray
+    surface: int
+    half_length: float
+    radius: float
+    half_edges: FloatArray
+    up: FloatArray
+    local_up: FloatArray
+
+
 @kernel
-def rate_poses(count, pose, aim, rows):  # type: ignore[no-untyped-def]
+def rate_poses(count: int, pose: FloatArray, aim: Aim, rows: FloatArray) -> None:
     """Write the terms of a controlled frame: distance, angle, axial, heading, upright, parallel.
 
     Args:
         count: Configurations.
         pose: (12, configurations) rotation of the controlled frame, row by row, and its origin.
-        aim: (30,) of the goal: 0–8 its rotation, row by row; 9–11 its point; 12–14 the axis of the
-            object; 15–17 its middle; 18 half the length of its axis; 19 its radius; 20–22 half the
-            edges of a box; 23 what the distance is measured to (0: the point, 1: a rod, 2: a
-            cylinder, 3: a box); 24–26 up; 27–29 the local up axis.
+        aim: The goal.
         rows: (≥ 6, configurations) written.
     """
+    turn, axis, up, local_up, edges = aim.rotation, aim.axis, aim.up, aim.local_up, aim.half_edges
     for n in range(count):
         xx, xy, xz = pose[0, n], pose[1, n], pose[2, n]
         yx, yy, yz = pose[3, n], pose[4, n], pose[5, n]
         zx, zy, zz = pose[6, n], pose[7, n], pose[8, n]
-        px, py, pz = pose[9, n], pose[10, n], pose[11, n]
-        dx, dy, dz = aim[9] - px, aim[10] - py, aim[11] - pz
-        distance = np.sqrt(dx * dx + dy * dy + dz * dz)
-        trace = aim[0] * xx + aim[1] * xy + aim[2] * xz + aim[3] * yx + aim[4] * yy + aim[5] * yz
-        trace += aim[6] * zx + aim[7] * zy + aim[8] * zz
+        # the frame's place seen from the goal's, distance from its point
+        mx, my, mz = (
+            pose[9, n] - aim.point[0],
+            pose[10, n] - aim.point[1],
+            pose[11, n] - aim.point[2],
+        )
+        distance = np.sqrt(mx * mx + my * my + mz * mz)
+        # angle between both orientations
+        trace = turn[0] * xx + turn[1] * xy + turn[2] * xz + turn[3] * yx + turn[4] * yy
+        trace = trace + turn[5] * yz + (turn[6] * zx + turn[7] * zy + turn[8] * zz)
         rows[ANGLE, n] = acos(min(max(0.5 * (trace - 1.0), -1.0), 1.0))
-        mx, my, mz = px - aim[15], py - aim[16], pz - aim[17]
-        along = mx * aim[12] + my * aim[13] + mz * aim[14]
-        inner = min(max(along, -aim[18]), aim[18])
-        wx, wy, wz = inner * aim[12] - mx, inner * aim[13] - my, inner * aim[14] - mz
+        # the shortest way to the object's axis, signed distance from its surface
+        along = mx * axis[0] + my * axis[1] + mz * axis[2]
+        inner = min(max(along, -aim.half_length), aim.half_length)
+        wx, wy, wz = inner * axis[0] - mx, inner * axis[1] - my, inner * axis[2] - mz
         way = np.sqrt(wx * wx + wy * wy + wz * wz)
-        if aim[23] == 1.0:
-            distance = way - aim[19]
-        elif aim[23] == 2.0:
-            beside = np.sqrt(max(mx * mx + my * my + mz * mz - along * along, 0.0)) - aim[19]
-            beyond = abs(along) - aim[18]
-            distance = _outside(beside, beyond, -np.inf)
-        elif aim[23] == 3.0:
-            u = abs(aim[0] * mx + aim[3] * my + aim[6] * mz) - aim[20]
-            v = abs(aim[1] * mx + aim[4] * my + aim[7] * mz) - aim[21]
-            w = abs(aim[2] * mx + aim[5] * my + aim[8] * mz) - aim[22]
-            distance = _outside(u, v, w)
+        if aim.surface == ROD:
+            distance = way - aim.radius
+        elif aim.surface == ROUND:
+            beside = np.sqrt(max(mx * mx + my * my + mz * mz - along * along, 0.0)) - aim.radius
+            distance = _signed_distance(beside, abs(along) - aim.half_length, -np.inf)
+        elif aim.surface == EDGED:
+            u = abs(turn[0] * mx + turn[3] * my + turn[6] * mz) - edges[0]
+            v = abs(turn[1] * mx + turn[4] * my + turn[7] * mz) - edges[1]
+            w = abs(turn[2] * mx + turn[5] * my + turn[8] * mz) - edges[2]
+            distance = _signed_distance(u, v, w)
         rows[DISTANCE, n] = distance
-        across = abs(xy * aim[12] + yy * aim[13] + zy * aim[14])
+        # grasping: across the axis, toward the axis
+        across = abs(xy * axis[0] + yy * axis[1] + zy * axis[2])
         rows[AXIAL, n] = acos(min(across, 1.0))
         toward = (xz * wx + yz * wy + zz * wz) / max(way, AT)
         rows[HEADING, n] = acos(min(max(toward, -1.0), 1.0)) if way > AT else 0.0
-        ux = xx * aim[27] + xy * aim[28] + xz * aim[29]
-        uy = yx * aim[27] + yy * aim[28] + yz * aim[29]
-        uz = zx * aim[27] + zy * aim[28] + zz * aim[29]
-        tilt = ux * aim[24] + uy * aim[25] + uz * aim[26]
-        rows[UPRIGHT, n] = acos(min(max(tilt, -1.0), 1.0))
-        rise = xz * aim[24] + yz * aim[25] + zz * aim[26]
+        # tilts of the up axis and of the grasping direction
+        ux = xx * local_up[0] + xy * local_up[1] + xz * local_up[2]
+        uy = yx * local_up[0] + yy * local_up[1] + yz * local_up[2]
+        uz = zx * local_up[0] + zy * local_up[1] + zz * local_up[2]
+        rows[UPRIGHT, n] = acos(min(max(ux * up[0] + uy * up[1] + uz * up[2], -1.0), 1.0))
+        rise = xz * up[0] + yz * up[1] + zz * up[2]
         rows[PARALLEL, n] = abs(asin(min(max(rise, -1.0), 1.0)))
 
 
 @kernel
-def _outside(u, v, w):  # type: ignore[no-untyped-def]
-    """Signed distance from what a point is beyond the faces by."""
+def _signed_distance(u: float, v: float, w: float) -> float:
+    """Return the distance from a body of three pairs of faces, negative inside.
+
+    Args:
+        u: How far the point is beyond the nearer face of the first pair; negative between them.
+        v: The same of the second pair.
+        w: The same of the third pair.
+    """
     a, b, c = max(u, 0.0), max(v, 0.0), max(w, 0.0)
-    return np.sqrt(a * a + b * b + c * c) + min(max(u, max(v, w)), 0.0)
+    distance: float = np.sqrt(a * a + b * b + c * c) + min(max(u, max(v, w)), 0.0)
+    return distance
 
 
 @kernel
-def rate_limits(count, q, limits, row):  # type: ignore[no-untyped-def]
+def rate_limits(count: int, q: FloatArray, limits: FloatArray, row: FloatArray) -> None:
     """Write 1 − the smallest normalised margin of the joints.
 
     Args:

@@ -6,8 +6,8 @@ import numpy as np
 
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import sincos
-from evoexp.robots.kinematics import U
 from evoexp.records import FloatArray, IntArray
+from evoexp.robots.kinematics import U
 from evoexp.robots.planar_ends import LANES, PlanarArm, block_ends, load_lanes
 from evoexp.validation import Component, NonNegative
 

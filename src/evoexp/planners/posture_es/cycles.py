@@ -1,40 +1,41 @@
-"""The evolution strategy on postures, cycle by cycle, with the ancestry of everybody.
+"""The evolution strategy on postures, cycle by cycle (Corsépius 2001, section 4.2)."""
 
-Corsépius 2001, section 4.2.
-"""
-
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from evoexp.numeric.elementary import standard_normal
 from evoexp.planners.posture_es import kernels
-from evoexp.planners.posture_es.kernels import COST, EQUAL, GAUSSIAN, NORMAL, ROWS, UNIFORM
+from evoexp.planners.posture_es.kernels import (
+    COST,
+    EQUAL,
+    GAUSSIAN,
+    NORMAL,
+    UNIFORM,
+    Judging,
+    Members,
+    Memory,
+    Strategy,
+)
 from evoexp.planners.posture_es.settings import StrategySettings
-from evoexp.records import FloatArray
+from evoexp.records import FloatArray, IntArray
 
 ROOM = 256  # nodes of the ancestry that memory is first made for
 
 
 class Ancestry:
-    """Postures that became parents, and of each its own parent: enough to tell everybody's path.
+    """Postures that became parents, and of each its own parent: the paths of all individuals.
 
     Attributes:
-        count: How many there are.
+        count: Number of postures.
     """
 
     def __init__(self, nq: int) -> None:
-        self.postures, self.parents, self.count = (
-            np.empty((ROOM, nq)),
-            np.empty(ROOM, dtype=np.int64),
-            0,
-        )
+        self.postures, self.parents = np.empty((ROOM, nq)), np.empty(ROOM, dtype=np.int64)
+        self.count = 0
 
-    def add(self, postures: FloatArray, parents: Any) -> np.ndarray:
-        """Append postures (n, nq) with the nodes of their parents (−1: none).
-
-        Return their nodes.
-        """
+    def add(self, postures: FloatArray, parents: Any) -> IntArray:
+        """Append postures (n, nq) with their parents' nodes (−1: none); return their nodes."""
         stop = self.count + len(postures)
         while stop > len(self.parents):
             self.postures = np.concatenate([self.postures, np.empty_like(self.postures)])
@@ -52,24 +53,6 @@ class Ancestry:
         return np.asarray(self.postures[line[::-1]])
 
 
-class Memory(NamedTuple):
-    """Arrays that a cycle writes; see `kernels.advance`."""
-
-    offspring: FloatArray
-    origin: np.ndarray
-    rows: FloatArray
-    feasible: np.ndarray
-    met: np.ndarray
-
-    @classmethod
-    def of(cls, nq: int, count: int) -> "Memory":
-        """Return memory for `count` individuals."""
-        flags = np.empty(count, dtype=np.bool_), np.empty(count, dtype=np.bool_)
-        return cls(
-            np.empty((nq, count)), np.empty(count, dtype=np.int64), np.empty((ROWS, count)), *flags
-        )
-
-
 class Search:
     """One phase being searched.
 
@@ -78,7 +61,7 @@ class Search:
         best: Node of the best so far: the winner once there is one.
         best_row: (ROWS,) its terms and cost.
         least_cost: Least cost of any so far.
-        cycles: Done so far.
+        cycles: Cycles so far.
         idle: Cycles since the last improvement.
         won: Whether somebody meets the goal.
     """
@@ -87,15 +70,15 @@ class Search:
         self,
         ga: StrategySettings,
         problem: Any,
-        judging: tuple[Any, ...],
-        substeps: int,
+        judging: Judging,
+        edge_check: int,
         ancestry: Ancestry,
         node: int,
     ) -> None:
-        self.ga, self.judging, self.substeps, self.ancestry = ga, judging, substeps, ancestry
-        nq, size = len(problem.scope), ga.num_parents
-        self._nq, room = nq, max(size, 1)
-        self._breeding = (
+        """Begin a phase at a node of the ancestry; `edge_check` as in `kernels.Strategy`."""
+        self.ga, self.judging, self.ancestry = ga, judging, ancestry
+        self._nq, room = len(problem.scope), ga.num_parents
+        self._strategy = Strategy(
             problem.scope,
             problem.limits,
             GAUSSIAN if ga.mutation == "gaussian" else UNIFORM,
@@ -103,19 +86,17 @@ class Search:
             NORMAL if ga.parent_choice == "gaussian" else EQUAL,
             ga.parent_std,
             ga.crossover_rate,
+            ga.selection == "plus",
+            edge_check,
         )
-        self._parents, self._costs, self._nodes = (
-            np.empty((nq, room)),
-            np.empty(room),
-            np.empty(room, dtype=np.int64),
-        )
-        self._num_parents = 1
-        self._parents[:, 0], self._nodes[0] = ancestry.postures[node], node
-        self.memory = Memory.of(nq, 1)
-        self.memory.offspring[:, 0] = ancestry.postures[node]
+        self._members = Members(np.empty((self._nq, room)), np.empty(room), 1)
+        self._nodes = np.full(room, node)
+        # the posture that the phase begins with is judged, and is the first parent
+        self.memory = Memory.of(self._nq, 1)
+        self.memory.offspring[:, 0] = self._members.postures[:, 0] = ancestry.postures[node]
         kernels.judge(self.memory.offspring, judging, *self.memory[2:])
         self.best, self.best_row = node, self.memory.rows[:, 0].copy()
-        self._costs[0] = self.least_cost = float(self.best_row[COST])
+        self._members.costs[0] = self.least_cost = float(self.best_row[COST])
         self.cycles = self.idle = 0
         self.won = bool(self.memory.met[0])
 
@@ -126,63 +107,57 @@ class Search:
         count = bred + ga.num_immigrants
         if self.memory.offspring.shape[1] != count or not self.cycles:
             self.memory = Memory.of(nq, count)
+        # random numbers
         gaussian, normal = ga.mutation == "gaussian", ga.parent_choice == "gaussian"
         per_child = (0 if gaussian else nq) + (2 + nq if ga.crossover_rate > 0.0 else 0)
         uniforms = rng.random(bred * per_child + ga.num_immigrants * nq)
         deviates = bred * ((nq if gaussian else 0) + normal)
         normals = standard_normal(rng, deviates) if deviates else _NONE
-        members = (self._parents, self._costs, self._num_parents)
-        plus = ga.selection == "plus"
+        # the cycle
         chosen, winner = kernels.advance(
-            uniforms,
-            normals,
-            bred,
-            plus,
-            self.substeps,
-            self._breeding,
-            self.judging,
-            members,
-            tuple(self.memory),
+            uniforms, normals, bred, self._strategy, self.judging, self._members, self.memory
         )
         self.cycles += 1
-        self._succeed(chosen, int(winner), count)
+        origins = self._nodes[self.memory.origin]
+        self._take_best(int(winner), self._take_parents(chosen, count, origins), origins)
 
-    def _succeed(self, chosen: np.ndarray, winner: int, count: int) -> None:
-        """Take over what was selected, and note the best."""
-        offspring, origin, rows, feasible, _ = self.memory
-        old = self._nodes[: self._num_parents].copy()
+    def _take_parents(self, chosen: IntArray, count: int, origins: IntArray) -> dict[int, int]:
+        """Take over the selected parents of a cycle of `count` offspring.
+
+        Returns:
+            The nodes of new parents by their places among the offspring.
+        """
+        offspring, costs_of = self.memory.offspring, self.memory.rows[COST]
+        postures, costs, _ = self._members
         new = chosen[chosen < count]
-        nodes = self.ancestry.add(offspring[:, new].T, old[origin[new]])
-        costs = rows[COST]
-        usable = np.where(feasible, costs, np.inf)
-        self.least = int(np.argmin(usable))
-        improved = usable[self.least] < self.least_cost
-        if improved or winner >= 0:
-            best = winner if winner >= 0 else self.least
-            place = np.flatnonzero(new == best)
-            self.best = (
-                int(nodes[place[0]])
-                if len(place)
-                else int(self.ancestry.add(offspring[:, [best]].T, old[origin[[best]]])[0])
-            )
-            self.best_row = rows[:, best].copy()
-            self.won = winner >= 0
-        self.least_cost = min(self.least_cost, float(usable[self.least]))
-        self.idle = 0 if improved else self.idle + 1
+        nodes = self.ancestry.add(offspring[:, new].T, origins[new])
         if len(chosen):  # else nobody is feasible, and the parents stay
-            staying = chosen >= count
-            parents = self._parents[:, np.where(staying, chosen - count, 0)]
-            parents[:, ~staying] = offspring[:, new]
-            kept = self._costs[np.where(staying, chosen - count, 0)]
-            kept[~staying] = costs[new]
-            own = old[np.where(staying, chosen - count, 0)]
-            own[~staying] = nodes
-            size = self._num_parents = len(chosen)
-            self._parents[:, :size], self._costs[:size], self._nodes[:size] = parents, kept, own
+            size, is_new, place = len(chosen), chosen < count, np.maximum(chosen - count, 0)
+            kept = postures[:, place], costs[place], self._nodes[place]
+            kept[0][:, is_new], kept[1][is_new] = offspring[:, new], costs_of[new]
+            kept[2][is_new] = nodes
+            postures[:, :size], costs[:size], self._nodes[:size] = kept
+            self._members = self._members._replace(size=size)
+        return dict(zip(new.tolist(), nodes.tolist(), strict=True))
+
+    def _take_best(self, winner: int, nodes: dict[int, int], origins: IntArray) -> None:
+        """Take over the winner, or else the best individual if it is an improvement."""
+        rows = self.memory.rows
+        usable = np.where(self.memory.feasible, rows[COST], np.inf)
+        least = int(np.argmin(usable))
+        improved = usable[least] < self.least_cost
+        if improved or winner >= 0:
+            best = winner if winner >= 0 else least
+            if best not in nodes:  # it is no parent
+                posture = self.memory.offspring[:, [best]].T
+                nodes[best] = int(self.ancestry.add(posture, origins[[best]])[0])
+            self.best, self.best_row, self.won = nodes[best], rows[:, best].copy(), winner >= 0
+        self.least_cost = min(self.least_cost, float(usable[least]))
+        self.idle = 0 if improved else self.idle + 1
 
     @property
     def stop_reason(self) -> str:
-        """Why the search of this phase ends; nothing while it goes on."""
+        """The reason for which the phase ends; nothing while it goes on."""
         if self.won:
             return "goal"
         if self.idle >= self.ga.patience:

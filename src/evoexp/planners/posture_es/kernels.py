@@ -1,9 +1,9 @@
 """One cycle of the evolution strategy on postures, compiled (Corsépius 2001, Algorithm 1).
 
-A population is an array (nq, individuals) [rad]. What postures are judged by travels as a plain
-tuple, which `posture_stages` makes; settings of the strategy as another, which `posture_search`
-makes.
+A population is an array (nq, individuals) [rad].
 """
+
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,38 +20,134 @@ from evoexp.objectives.posture_cost import (
     PARALLEL,
     TERMS,
     UPRIGHT,
+    Aim,
     rate_limits,
     rate_poses,
 )
+from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.poses import frame_poses
 
 COST = len(TERMS)
 ROWS = COST + 1  # the terms, then the cost
 UNIFORM, GAUSSIAN = range(2)
 EQUAL, NORMAL = range(2)
-TURNS = (ANGLE, AXIAL, HEADING)  # terms that a goal asks for together with its distance
+TURNS = (ANGLE, AXIAL, HEADING)  # terms that must be small, too, where a goal is met
+
+
+class Judging(NamedTuple):
+    """Terms and limits by which postures are judged.
+
+    Attributes:
+        table: The kinematic table's first six fields.
+        joint: Index into the table of the joint that moves the controlled frame.
+        local: (12,) local pose of the controlled frame.
+        aim: The goal.
+        weights: (terms,) of the cost; 0: the term does not count.
+        tilts: (2,) hard limits of `upright` and `keep_parallel` [rad].
+        limits: (nq, 2) of the joints.
+        tables: Tables of the collision model.
+        reach: Of the preference for free space [length unit].
+        tolerances: Of the goal [length unit], [rad].
+    """
+
+    table: tuple[Any, ...]
+    joint: int
+    local: FloatArray
+    aim: Aim
+    weights: FloatArray
+    tilts: FloatArray
+    limits: FloatArray
+    tables: Any
+    reach: float
+    tolerances: FloatArray
+
+
+class Strategy(NamedTuple):
+    """Settings of the operators.
+
+    Attributes:
+        scope: (nq,) greatest step of each joint [rad].
+        limits: (nq, 2) of the joints.
+        mutation: UNIFORM or GAUSSIAN.
+        mutation_std: In units of the scope [-].
+        parent_choice: EQUAL or NORMAL.
+        parent_std: In units of μ [-].
+        crossover_rate: Probability per child.
+        plus: Whether parents may stay.
+        edge_check: Configurations tested between a parent and its child; 0: none.
+    """
+
+    scope: FloatArray
+    limits: FloatArray
+    mutation: int
+    mutation_std: float
+    parent_choice: int
+    parent_std: float
+    crossover_rate: float
+    plus: bool
+    edge_check: int
+
+
+class Members(NamedTuple):
+    """The parents of a cycle, the best first.
+
+    Attributes:
+        postures: (nq, ≥ size) [rad].
+        costs: (≥ size,).
+        size: Number of parents.
+    """
+
+    postures: FloatArray
+    costs: FloatArray
+    size: int
+
+
+class Memory(NamedTuple):
+    """Arrays that a cycle writes.
+
+    Attributes:
+        offspring: (nq, offspring) [rad].
+        origin: (offspring,) index of each child's parent.
+        rows: (ROWS, offspring) terms and cost.
+        feasible: (offspring,).
+        met: (offspring,) whether each meets the goal.
+    """
+
+    offspring: FloatArray
+    origin: IntArray
+    rows: FloatArray
+    feasible: BoolArray
+    met: BoolArray
+
+    @classmethod
+    def of(cls, nq: int, count: int) -> "Memory":
+        """Return memory for `count` individuals."""
+        flags = np.empty(count, dtype=np.bool_), np.empty(count, dtype=np.bool_)
+        origin = np.empty(count, dtype=np.int64)
+        return cls(np.empty((nq, count)), origin, np.empty((ROWS, count)), *flags)
 
 
 @kernel
-def judge(q, judging, rows, feasible, met):  # type: ignore[no-untyped-def]
+def judge(
+    q: FloatArray, judging: Judging, rows: FloatArray, feasible: BoolArray, met: BoolArray
+) -> None:
     """Write terms and cost of postures, whether they are feasible, and whether they meet the goal.
 
     Args:
         q: (nq, postures) [rad].
-        judging: The kinematic table; joint and local pose of the controlled frame; aim of
-            `rate_poses`; weights of the terms (0: does not count); hard limits of the two tilts
-            [rad]; limits (nq, 2); tables of the collision model; reach of the preference for free
-            space; tolerances [length unit, rad].
+        judging: Terms and limits.
         rows: (ROWS, postures) written.
         feasible: (postures,) written.
         met: (postures,) written.
     """
-    table, joint, local, aim, weights, tilts, limits, tables, reach, tolerances = judging
+    weights, reach, tables = judging.weights, judging.reach, judging.tables
     count = q.shape[1]
     pose, clearance = np.empty((12, count)), np.empty((3, count))
-    frame_poses(table, joint, local, q, pose)
-    rate_poses(count, pose, aim, rows)
-    rate_limits(count, q, limits, rows[MARGIN])
+    # poses, limits
+    frame_poses(judging.table, judging.joint, judging.local, q, pose)
+    rate_poses(count, pose, judging.aim, rows)
+    rate_limits(count, q, judging.limits, rows[MARGIN])
+    # collision, free space
     rows[COLLISION], rows[FREE_SPACE] = 0.0, 0.0
     if weights[COLLISION] > 0.0:
         rated = weights[FREE_SPACE] > 0.0
@@ -71,6 +167,8 @@ def judge(q, judging, rows, feasible, met):  # type: ignore[no-untyped-def]
             rows[COLLISION, n] = 0.0 if least >= 0.0 else 1.0
             if rated:
                 rows[FREE_SPACE, n] = min(max(1.0 - least / reach, 0.0), 1.0)
+    # cost, feasibility, goal
+    tilts, tolerances = judging.tilts, judging.tolerances
     for n in range(count):
         cost = 0.0
         for t in range(COST):
@@ -87,64 +185,70 @@ def judge(q, judging, rows, feasible, met):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def judge_edges(parents, origin, offspring, substeps, judging, feasible):  # type: ignore[no-untyped-def]
+def judge_edges(parents: FloatArray, num_between: int, judging: Judging, memory: Memory) -> None:
     """Mark children as infeasible that an infeasible configuration separates from their parent.
 
     Args:
         parents: (nq, ≥ parents).
-        origin: (offspring,) index of each child's parent.
-        offspring: (nq, offspring).
-        substeps: Configurations tested between the two.
-        judging: See `judge`.
-        feasible: (offspring,) changed.
+        num_between: Configurations tested between the two.
+        judging: Terms and limits.
+        memory: Offspring and origin; `feasible` is changed.
     """
+    offspring, origin, feasible = memory.offspring, memory.origin, memory.feasible
     nq, count = offspring.shape
-    between = np.empty((nq, count * substeps))
-    for s in range(substeps):
-        share = (s + 1.0) / (substeps + 1.0)
+    between = np.empty((nq, count * num_between))
+    for s in range(num_between):
+        share = (s + 1.0) / (num_between + 1.0)
         for k in range(nq):
             for n in range(count):
                 begin = parents[k, origin[n]]
                 between[k, s * count + n] = begin + share * (offspring[k, n] - begin)
-    rows, met = np.empty((ROWS, count * substeps)), np.empty(count * substeps, dtype=np.bool_)
-    free = np.empty(count * substeps, dtype=np.bool_)
+    rows, met = np.empty((ROWS, count * num_between)), np.empty(count * num_between, dtype=np.bool_)
+    free = np.empty(count * num_between, dtype=np.bool_)
     judge(between, judging, rows, free, met)
-    for s in range(substeps):
+    for s in range(num_between):
         for n in range(count):
             feasible[n] = feasible[n] and free[s * count + n]
 
 
 @kernel
-def breed(uniforms, normals, parents, num_parents, num_bred, breeding, offspring, origin):  # type: ignore[no-untyped-def]
-    """Write offspring and the parent of each.
+def breed(
+    uniforms: FloatArray,
+    normals: FloatArray,
+    num_bred: int,
+    strategy: Strategy,
+    members: Members,
+    memory: Memory,
+) -> None:
+    """Write offspring, within the limits, and the parent of each.
 
-    A parent, perhaps crossed with another, mutated, within the limits.
-
-    The columns behind `num_bred` are immigrants, uniform within the limits; their parent is the
-    nearest one.
+    A child copies a parent, is perhaps crossed with another one, and is mutated. The columns behind
+    `num_bred` are immigrants, uniform within the limits; the nearest parent counts as theirs.
 
     Args:
         uniforms: (uniforms,) in [0, 1), taken in order.
         normals: (normals,) standard normal deviates, taken in order.
-        parents: (nq, ≥ num_parents), the best first.
-        num_parents: How many there are.
         num_bred: Children of parents.
-        breeding: Scope (nq,) [rad]; limits (nq, 2); mutation and its deviation; parent choice and
-            its deviation; crossover rate.
-        offspring: (nq, offspring) written.
-        origin: (offspring,) written.
+        strategy: Settings of the operators.
+        members: The parents.
+        memory: `offspring` and `origin` are written.
     """
-    scope, limits, mutation, spread, choice, parent_spread, rate = breeding
+    scope, limits, rate = strategy.scope, strategy.limits, strategy.crossover_rate
+    parents, num_parents = members.postures, members.size
+    offspring, origin = memory.offspring, memory.origin
     nq, count = offspring.shape
     u = v = 0
     for n in range(num_bred):
+        # parent: in turn, or by rank
         parent = n % num_parents
-        if choice == NORMAL:
-            parent = min(int(abs(normals[v]) * parent_spread * num_parents), num_parents - 1)
+        if strategy.parent_choice == NORMAL:
+            drawn = abs(normals[v]) * strategy.parent_std * num_parents
+            parent = min(int(drawn), num_parents - 1)
             v += 1
         for k in range(nq):
             offspring[k, n] = parents[k, parent]
         origin[n] = parent
+        # crossover, joint by joint
         if rate > 0.0:
             other = min(int(uniforms[u + 1] * num_parents), num_parents - 1)
             if uniforms[u] < rate:
@@ -152,9 +256,10 @@ def breed(uniforms, normals, parents, num_parents, num_bred, breeding, offspring
                     if uniforms[u + 2 + k] < 0.5:
                         offspring[k, n] = parents[k, other]
             u += 2 + nq
+        # mutation
         for k in range(nq):
-            if mutation == GAUSSIAN:
-                step = scope[k] * spread * normals[v]
+            if strategy.mutation == GAUSSIAN:
+                step = scope[k] * strategy.mutation_std * normals[v]
                 v += 1
             else:
                 step = scope[k] * (2.0 * uniforms[u] - 1.0)
@@ -162,6 +267,7 @@ def breed(uniforms, normals, parents, num_parents, num_bred, breeding, offspring
             offspring[k, n] = min(max(offspring[k, n] + step, limits[k, 0]), limits[k, 1])
         if rate > 0.0:
             origin[n] = nearest_parent(offspring, n, parents, num_parents, scope)
+    # immigrants
     for n in range(num_bred, count):
         for k in range(nq):
             offspring[k, n] = limits[k, 0] + (limits[k, 1] - limits[k, 0]) * uniforms[u]
@@ -170,11 +276,10 @@ def breed(uniforms, normals, parents, num_parents, num_bred, breeding, offspring
 
 
 @kernel
-def nearest_parent(offspring, n, parents, num_parents, scope):  # type: ignore[no-untyped-def]
-    """Return the parent from which the greatest step of a joint, in units of its scope.
-
-    Is least.
-    """
+def nearest_parent(
+    offspring: FloatArray, n: int, parents: FloatArray, num_parents: int, scope: FloatArray
+) -> int:
+    """Return the parent that a child is nearest to, by the greatest step in units of the scope."""
     best, least = 0, np.inf
     for p in range(num_parents):
         step = 0.0
@@ -186,32 +291,39 @@ def nearest_parent(offspring, n, parents, num_parents, scope):  # type: ignore[n
 
 
 @kernel
-def advance(uniforms, normals, bred, plus, substeps, breeding, judging, members, memory):  # type: ignore[no-untyped-def]
+def advance(
+    uniforms: FloatArray,
+    normals: FloatArray,
+    num_bred: int,
+    strategy: Strategy,
+    judging: Judging,
+    members: Members,
+    memory: Memory,
+) -> tuple[IntArray, int]:
     """Breed, judge and select one cycle.
 
     Args:
         uniforms: See `breed`.
         normals: See `breed`.
-        bred: Children of parents; the rest are immigrants.
-        plus: Whether parents may stay.
-        substeps: See `judge_edges`; 0: the motion between parent and child is not tested.
-        breeding: See `breed`.
-        judging: See `judge`.
-        members: Parents (nq, μ), their costs (μ,), how many there are.
-        memory: Offspring (nq, n), origin (n,), rows (ROWS, n), feasible (n,), met (n,): all
-            written.
+        num_bred: Children of parents; the rest are immigrants.
+        strategy: Settings of the operators.
+        judging: Terms and limits.
+        members: The parents.
+        memory: Written.
 
     Returns:
         Indices of the next parents, the best first: below n offspring, from n on parents (none: all
-        parents stay); index of the winner, which meets the goal at the least cost, −1 if none does.
+        parents stay); index of the winner, which meets the goal at the least cost, −1 if nobody
+        does.
     """
-    parents, parent_costs, num_parents = members
-    offspring, origin, rows, feasible, met = memory
-    count = offspring.shape[1]
-    breed(uniforms, normals, parents, num_parents, bred, breeding, offspring, origin)
-    judge(offspring, judging, rows, feasible, met)
-    if substeps > 0:
-        judge_edges(parents, origin, offspring, substeps, judging, feasible)
+    rows, feasible, met = memory.rows, memory.feasible, memory.met
+    count, num_parents = memory.offspring.shape[1], members.size
+    # offspring, judged
+    breed(uniforms, normals, num_bred, strategy, members, memory)
+    judge(memory.offspring, judging, rows, feasible, met)
+    if strategy.edge_check > 0:
+        judge_edges(members.postures, strategy.edge_check, judging, memory)
+    # who may be selected, at which cost; the winner
     keys = np.full(count + num_parents, np.inf)
     winner, usable = -1, 0
     for n in range(count):
@@ -221,9 +333,10 @@ def advance(uniforms, normals, bred, plus, substeps, breeding, judging, members,
             usable += 1
         if met[n] and (winner < 0 or rows[COST, n] < rows[COST, winner]):
             winner = n
-    if plus:
+    if strategy.plus:
         for p in range(num_parents):
-            keys[count + p] = parent_costs[p]
+            keys[count + p] = members.costs[p]
             usable += 1
+    # selection
     order = np.argsort(keys, kind="mergesort")  # stable: the same on every machine
-    return order[: min(len(parent_costs), usable)], winner
+    return order[: min(len(members.costs), usable)], winner

@@ -1,10 +1,8 @@
-"""The phases of a task as the search meets them.
+"""The phases of a task: goals, held objects, permitted contacts, and the bodies of each phase.
 
-Goals, things held, what may touch, and the bodies of each phase.
-
-Where an object is when a phase begins depends on the postures before; the rest is made once. A
-phase ends at the first posture that meets its goal, so a list of postures tells by itself which
-phase each belongs to.
+An object's place at the begin of a phase depends on the postures before; the rest is made once. A
+phase ends at the first posture that meets its goal, so a list of postures alone says which phase
+each of them belongs to.
 """
 
 from typing import Any, NamedTuple
@@ -16,11 +14,20 @@ from evoexp.collision.models.body_covers import Cover
 from evoexp.collision.models.body_models import BodyModel, Carried
 from evoexp.collision.scene import Part, Scene, geometry_scene, obstacle_shapes
 from evoexp.numeric.elementary import DEGREE
-from evoexp.objectives.posture_cost import DISTANCE, PostureCost
+from evoexp.objectives.posture_cost import (
+    DISTANCE,
+    EDGED,
+    POINT,
+    ROD,
+    ROUND,
+    TERMS,
+    Aim,
+    PostureCost,
+)
 from evoexp.paths.motion import Motion
 from evoexp.planners.posture_es import kernels
-from evoexp.planners.posture_es.kernels import COST, ROWS
-from evoexp.records import FloatArray
+from evoexp.planners.posture_es.kernels import COST, ROWS, Judging
+from evoexp.records import BoolArray, FloatArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.poses import IDENTITY, compose, frame_pose, invert, pose_of
 from evoexp.scenarios.obstacles import BOX, CYLINDER, ObstacleTable, rotation_matrix
@@ -35,17 +42,16 @@ from evoexp.scenarios.posture_task import (
 
 KEPT = 64  # stages and scenes that a problem keeps
 
-POINT, ROD, ROUND, EDGED = range(4)  # what a distance is measured to; see `rate_poses`
 TOOL_UP, OBJECT_UP = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 
 
 class Situation(NamedTuple):
-    """Where things are.
+    """The places of all objects.
 
     Attributes:
-        poses: (obstacles, 12) in the world; of an object that is held where it was taken.
-        held: Index of the object held; −1: none.
-        grasp: (12,) of the object held, in the table's frame of the joint that moves the tool.
+        poses: (obstacles, 12) in the world; a held object stands where it was taken.
+        held: Index of the held object; −1: none.
+        grasp: (12,) of the held object, in the table's frame of the joint that moves the tool.
     """
 
     poses: FloatArray
@@ -54,7 +60,7 @@ class Situation(NamedTuple):
 
 
 class Problem(NamedTuple):
-    """What `prepare` made of robot and scenario.
+    """Robot and scenario, prepared for the search.
 
     Attributes:
         assembly: The robot, built.
@@ -63,8 +69,8 @@ class Problem(NamedTuple):
         phases: Its phases, subgoals included.
         weights: (phases, terms) of the cost.
         objective: The cost.
-        obstacles: What stands around at the start.
-        covers: Of the objects that are taken hold of, by index, in their own frames.
+        obstacles: The obstacles at the start.
+        covers: Covers of the objects that are grasped, by index, in their own frames.
         start: (nq,) [rad].
         limits: (nq, 2) [rad].
         scope: (nq,) of a step [rad].
@@ -92,20 +98,20 @@ class Problem(NamedTuple):
 
     @property
     def first_situation(self) -> Situation:
-        """Everything where the scenario puts it."""
+        """All objects where the scenario puts them."""
         table = self.obstacles
         poses = np.hstack([table.rotation, table.center])
         return Situation(poses, -1, IDENTITY)
 
     def parts(self, motion: Motion) -> list[Part]:
-        """Return what the certifier judges: the motion phase by phase, each with its own bodies."""
+        """Return the motion phase by phase, each with its own bodies."""
         return [
             Part(scene_of(self, span.stage), span.first, span.last)
             for span in spans(self, motion.q)
         ]
 
     def spans(self, postures: FloatArray) -> "list[Span]":
-        """Return the phases of a list of postures (postures, nq) [rad], as far as it gets."""
+        """Return the phases that a list of postures (postures, nq) [rad] reaches."""
         return spans(self, postures)
 
     @property
@@ -118,7 +124,7 @@ class Problem(NamedTuple):
         return judge(stage, q)
 
     def obstacles_in(self, stage: "Stage") -> ObstacleTable:
-        """Return the obstacles as they stand in a phase; one that is held where it was taken."""
+        """Return the obstacles in a phase; a held object stands where it was taken."""
         return placed_obstacles(self, stage.situation)
 
 
@@ -128,21 +134,30 @@ class Stage(NamedTuple):
     Attributes:
         number: Of the phase, from 0.
         phase: The phase.
-        situation: Where things are in it.
+        situation: The places of all objects in it.
         controlled: Index into the kinematic table, and local pose (12,), of the frame that is
             controlled.
-        judging: What `kernels.judge` takes.
+        judging: Terms and limits for `kernels.judge`.
     """
 
     number: int
     phase: Phase
     situation: Situation
     controlled: tuple[int, FloatArray]
-    judging: tuple[Any, ...]
+    judging: Judging
+
+    @property
+    def target_position(self) -> FloatArray:
+        """The goal's point, or the middle of the object that is approached, (3,) [length unit]."""
+        return self.judging.aim.point
+
+    def weight(self, term: str) -> float:
+        """Return the weight of a term of the cost, one of `posture_cost.TERMS`; 0: not counted."""
+        return float(self.judging.weights[TERMS.index(term)])
 
 
 class Judged(NamedTuple):
-    """Postures judged.
+    """Judged postures.
 
     Attributes:
         rows: (ROWS, postures) terms, cost.
@@ -151,8 +166,8 @@ class Judged(NamedTuple):
     """
 
     rows: FloatArray
-    feasible: np.ndarray
-    met: np.ndarray
+    feasible: BoolArray
+    met: BoolArray
 
     @property
     def cost(self) -> FloatArray:
@@ -161,7 +176,7 @@ class Judged(NamedTuple):
 
     @property
     def distance(self) -> FloatArray:
-        """How far the goal is, inside of a body, too, (postures,) [length unit]."""
+        """Distance from the goal, also inside of a body, (postures,) [length unit]."""
         return np.asarray(np.abs(self.rows[DISTANCE]))
 
 
@@ -171,7 +186,7 @@ class Span(NamedTuple):
     Attributes:
         stage: The phase, begun.
         first: Index of its first posture.
-        last: Of its last one, where the next phase begins.
+        last: Index of its last posture, where the next phase begins.
         judged: Its postures, judged by it.
         reached: Whether the last one meets its goal.
     """
@@ -187,18 +202,14 @@ def judge(stage: Stage, q: FloatArray) -> Judged:
     """Judge postures q (nq, postures) [rad]."""
     q = np.ascontiguousarray(q)
     count = q.shape[1]
-    found = Judged(
-        np.empty((ROWS, count)), np.empty(count, dtype=np.bool_), np.empty(count, dtype=np.bool_)
-    )
+    flags = np.empty(count, dtype=np.bool_), np.empty(count, dtype=np.bool_)
+    found = Judged(np.empty((ROWS, count)), *flags)
     kernels.judge(q, stage.judging, *found)
     return found
 
 
 def begin(problem: Problem, index: int, q: FloatArray, situation: Situation) -> Stage:
-    """Begin a phase at posture q (nq,).
-
-    Stages are kept: a path is walked again for its verdict and its terms.
-    """
+    """Begin a phase at posture q (nq,); stages are kept, verdict and terms need them again."""
     moved = not _unmoved(problem, situation) or situation.held >= 0
     key = (index, situation.poses.tobytes(), situation.grasp.tobytes()) if moved else (index,)
     if isinstance(problem.phases[index].goal, ShiftGoal):
@@ -216,7 +227,7 @@ def _begun(problem: Problem, index: int, q: FloatArray, situation: Situation) ->
     controlled = (joint, situation.grasp if situation.held >= 0 else local)
     collision = problem.bodies.collision(*_surroundings(problem, phase, situation))
     objective, task = problem.objective, problem.task
-    judging = (
+    judging = Judging(
         problem.assembly.table[:6],
         joint,
         controlled[1],
@@ -232,7 +243,7 @@ def _begun(problem: Problem, index: int, q: FloatArray, situation: Situation) ->
 
 
 def finish(problem: Problem, stage: Stage, q: FloatArray) -> Situation:
-    """Return where things are after a phase that ended at posture q (nq,)."""
+    """Return the places of all objects after a phase that ended at posture q (nq,)."""
     situation, phase = stage.situation, stage.phase
     if phase.then == "attach":
         held = problem.task.names.index(phase.object)
@@ -247,7 +258,7 @@ def finish(problem: Problem, stage: Stage, q: FloatArray) -> Situation:
 
 
 def spans(problem: Problem, postures: FloatArray) -> list[Span]:
-    """Return the phases of a list of postures (postures, nq), as far as it gets."""
+    """Return the phases that a list of postures (postures, nq) reaches."""
     found: list[Span] = []
     first, situation, last = 0, problem.first_situation, len(postures) - 1
     for index in range(len(problem.phases)):
@@ -317,7 +328,7 @@ def _scene(problem: Problem, stage: Stage) -> Scene:
 
 
 def placed_obstacles(problem: Problem, situation: Situation) -> ObstacleTable:
-    """Return the obstacles where they are; one that is held where it was taken."""
+    """Return the obstacles in a situation; a held object stands where it was taken."""
     poses = situation.poses
     return problem.obstacles._replace(rotation=poses[:, :9].copy(), center=poses[:, 9:].copy())
 
@@ -331,19 +342,16 @@ def _allowed(problem: Problem, phase: Phase) -> set[frozenset[str]]:
 
 
 def _apart_from_tool(problem: Problem) -> list[int]:
-    """Return the bodies that an object in the tool must not touch.
-
-    All but those beside the tool's joint.
-    """
+    """Return the bodies that a held object must not touch: all that are not beside the tool."""
     joint, parents = problem.tool[0] + 1, problem.assembly.model.parents
     items = problem.assembly.geometry.geometryObjects
     return [k for k, item in enumerate(items) if item.parentJoint not in (joint, parents[joint])]
 
 
 def _surroundings(problem: Problem, phase: Phase, situation: Situation) -> tuple[Any, ...]:
-    """Return obstacles, pairs (body, obstacle) that may touch, and the object carried.
+    """Return the arguments of `BodyModel.collision`.
 
-    For `BodyModel.collision`.
+    They are the obstacles, the pairs (body, obstacle) that may touch, and the carried object.
     """
     names, bodies = problem.task.names, problem.bodies.names
     allowed = _allowed(problem, phase)
@@ -395,34 +403,40 @@ def _aim(
     q: FloatArray,
     situation: Situation,
     controlled: tuple[int, FloatArray],
-) -> FloatArray:
-    """Return what `rate_poses` measures a frame by."""
-    goal, aim = phase.goal, np.zeros(30)
-    aim[:12] = IDENTITY
+) -> Aim:
+    """Return the goal of a phase that begins at posture q, as the kernels take it."""
+    goal, rotation = phase.goal, IDENTITY[:9].copy()
+    point, axis = np.zeros(3), np.zeros(3)
+    surface, half_length, radius, half_edges = POINT, 0.0, 0.0, np.zeros(3)
     if isinstance(goal, PointGoal | PoseGoal):
-        aim[9:12] = goal.point
+        point = np.array(goal.point, dtype=np.float64)
     if isinstance(goal, PoseGoal):
-        aim[:9] = rotation_matrix(goal.rotation).ravel()
+        rotation = np.array(rotation_matrix(goal.rotation), dtype=np.float64).ravel()
     if isinstance(goal, ShiftGoal):
         table = problem.assembly.table
         now = frame_pose(table, *controlled, q)
-        offset = np.concatenate([IDENTITY[:9], goal.offset])
+        way = np.array(goal.offset, dtype=np.float64)
         if goal.frame == "tool":
             tool = frame_pose(table, *problem.tool, q)
-            way = compose(tool, offset)[9:] - tool[9:]
-        else:
-            way = offset[9:]
-        aim[:9], aim[9:12] = now[:9], now[9:] + way
-    aim[15:18] = aim[9:12]
+            way = compose(tool, np.concatenate([IDENTITY[:9], way]))[9:] - tool[9:]
+        rotation, point = now[:9].copy(), now[9:] + way
     if isinstance(goal, SurfaceGoal):
         k = problem.task.names.index(goal.object)
         pose, kind, size = situation.poses[k], problem.obstacles.kind[k], problem.obstacles.size[k]
-        aim[:12], aim[12:15], aim[15:18] = pose, pose[[2, 5, 8]], pose[9:]
+        rotation, point, axis = pose[:9].copy(), pose[9:].copy(), pose[[2, 5, 8]]
         if kind == BOX:
-            aim[20:23], aim[23] = size, EDGED
+            surface, half_edges = EDGED, size.copy()
         else:
-            aim[18], aim[19], aim[23] = size[1], size[0], ROUND if kind == CYLINDER else ROD
+            surface, half_length, radius = ROUND if kind == CYLINDER else ROD, size[1], size[0]
     up = np.array(problem.task.up)
-    aim[24:27] = up / np.sqrt(np.sum(up * up))
-    aim[27:30] = OBJECT_UP if situation.held >= 0 else TOOL_UP
-    return aim
+    return Aim(
+        rotation,
+        point,
+        axis,
+        surface,
+        float(half_length),
+        float(radius),
+        half_edges,
+        up / np.sqrt(np.sum(up * up)),
+        OBJECT_UP if situation.held >= 0 else TOOL_UP,
+    )

@@ -1,22 +1,20 @@
 """Postures as individuals: an evolution strategy whose winner's ancestry is the path.
 
-Corsépius 2001.
-
-An individual is one posture. The search begins with the momentary posture alone; every cycle
-generates offspring by random steps within a local scope of the parents (Fig. 2), rates them in
-configuration and in work space at once, and selects the best as the next parents. When an
-individual meets the goal, the path is its line of ancestors, from the start on: nobody plans it,
-and inverse kinematics is solved on the way. A task may have several phases, each a search of its
-own that begins at the posture where the last one ended.
+Corsépius 2001. An individual is one posture. The search begins with the momentary posture alone;
+every cycle generates offspring by random steps within a local scope of the parents (Fig. 2), rates
+them in configuration and in work space at once, and selects the best as the next parents. When an
+individual meets the goal, the path is its line of ancestors, from the start on: no path is planned,
+and inverse kinematics is solved on the way. A task may have several phases; each is a search of its
+own that begins at the last posture of the phase before.
 
 A population is an array (nq, individuals) [rad]. A solution is flat: the ancestry, postures × nq
 [rad], from the start to the best so far, through all phases.
 
-What "best so far" means: the individual of the lowest cost in its phase; once one meets the goal,
-that one (of several the cheapest), whose cost need not be the lowest. Costs of different phases are
-worth nothing to each other: while a phase before the last is searched, the plan's cost is inf and
-the phase's own stands in the term `cost`. Individuals that collide or pass a hard limit are rated,
-but are never parents; means and deviations are over the others.
+The best so far is the individual of the lowest cost in its phase; once individuals meet the goal,
+the cheapest of these, whose cost need not be the lowest. Costs of different phases cannot be
+compared: while a phase before the last is searched, the plan's cost is inf and the phase's own cost
+is the term `cost`. Individuals that collide or pass a hard limit are rated, but are never parents;
+means and deviations leave them out.
 """
 
 from collections.abc import Iterator
@@ -31,7 +29,7 @@ from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.posture_cost import COLUMNS, PARALLEL, TERMS, UPRIGHT, PostureCost
 from evoexp.paths.motion import Motion
-from evoexp.planners.planner import Listing, PlannerDefaults
+from evoexp.planners.planner import Candidate, Keeper, Listing, PlannerDefaults
 from evoexp.planners.posture_es import problem as posture_problem
 from evoexp.planners.posture_es.cycles import Ancestry, Search
 from evoexp.planners.posture_es.kernels import COST
@@ -47,7 +45,7 @@ OVERSIZED = 1.0 + 1e-9  # steps beyond the scope by more than rounding
 
 
 class Judgement:
-    """Postures judged by the first phase."""
+    """Postures, judged by the first phase."""
 
     def __init__(
         self, rows: FloatArray, feasible: np.ndarray, met: np.ndarray, chosen: tuple[int, ...]
@@ -72,11 +70,10 @@ class PostureEs(PlannerDefaults, Component):
     Attributes:
         scope: How far a joint may step at most: one number for all joints, or one per joint [rad],
             lengths for sliding joints.
-        edge_check: Configurations tested between a parent and its child; 0: postures only, as in
-            the paper.
+        edge_check: Configurations tested between a parent and its child; 0: none, as in the paper.
         ga: Parents, offspring, selection, mutation, when to stop.
         objective: Terms of the cost.
-        collision: What stands for the bodies.
+        collision: Covers of the bodies.
     """
 
     component: ClassVar[str] = "posture_es"
@@ -91,13 +88,13 @@ class PostureEs(PlannerDefaults, Component):
         """Build the robot and check the task against it.
 
         Raises:
-            SettingError: If they do not fit each other: see `posture_problem`.
+            SettingError: If robot and task do not fit each other, see `problem.prepare`.
         """
         return posture_problem.prepare(robot, scenario, self.scope, self.objective, self.collision)
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield the start and then every cycle, phase by phase; their indices go on counting."""
-        record = _Record(self, problem)
+        paths = _Paths(self, problem)
         ancestry = Ancestry(len(problem.start))
         node = int(ancestry.add(problem.start[None], -1)[0])
         situation = problem.first_situation
@@ -108,7 +105,7 @@ class PostureEs(PlannerDefaults, Component):
             while True:
                 reason = search.stop_reason
                 ends = bool(reason) and (last or reason != "goal")
-                yield record.generation(search, index, reason if ends else "")
+                yield paths.record(search, index, reason if ends else "")
                 if reason:
                     break
                 search.advance(rng)
@@ -123,13 +120,13 @@ class PostureEs(PlannerDefaults, Component):
         return np.asarray(low[:, None] + (high - low)[:, None] * rng.random((len(low), count)))
 
     def cost(self, problem: Problem, population: FloatArray) -> Judgement:
-        """Judge postures (nq, individuals) by the first phase: what random search draws."""
+        """Judge postures (nq, individuals) by the first phase."""
         stage = begin(problem, 0, problem.start, problem.first_situation)
         return Judgement(*judge(stage, population), self.chosen)
 
     @property
     def chosen(self) -> tuple[int, ...]:
-        """Indices of the terms that are recorded: those that the objective gives a weight."""
+        """Indices of the recorded terms: all that the objective gives a weight."""
         return tuple(k for k, name in enumerate(TERMS) if name in self.objective.chosen)
 
     def solution(self, problem: Problem, population: FloatArray, individual: int) -> FloatArray:
@@ -137,14 +134,11 @@ class PostureEs(PlannerDefaults, Component):
         return np.concatenate([problem.start, population[:, individual]])
 
     def motion(self, problem: Problem, solution: FloatArray) -> Motion:
-        """Return the motion of a solution.
-
-        From posture to posture in equal times, straight in joint space.
-        """
+        """Return the motion of a solution: straight in joint space, a posture per instant."""
         return Motion(np.ascontiguousarray(self._postures(problem, solution)))
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
-        """Return the terms of the last posture in its phase, and what the whole path is like.
+        """Return the terms of the last posture in its phase, and of the whole path.
 
         `phase_1_end` and so on are the postures at which phases end, counted from 0; −1: not
         reached.
@@ -153,35 +147,20 @@ class PostureEs(PlannerDefaults, Component):
             ValueError: If the solution is no list of postures.
         """
         postures = self._postures(problem, solution)
-        found = spans(problem, postures)
-        terms = named(found[-1].judged.rows[:, -1], self.chosen) | path_terms(
-            postures, problem.scope
-        )
-        for k in range(len(problem.phases) if len(problem.phases) > 1 else 0):
-            terms[f"phase_{k + 1}_end"] = (
-                float(found[k].last) if k < len(found) and found[k].reached else -1.0
-            )
-        return (
-            terms
-            | {"infeasible_postures": float(sum(np.sum(~s.judged.feasible) for s in found))}
-            | self._tilts(found, postures)
-        )
+        found, several = spans(problem, postures), len(problem.phases) > 1
+        terms = named(found[-1].judged.rows[:, -1], self.chosen)
+        terms |= path_terms(postures, problem.scope)
+        for k in range(len(problem.phases) if several else 0):
+            reached = k < len(found) and found[k].reached
+            terms[f"phase_{k + 1}_end"] = float(found[k].last) if reached else -1.0
+        infeasible = sum(np.sum(~span.judged.feasible) for span in found)
+        return terms | {"infeasible_postures": float(infeasible)} | self._tilts(found, postures)
 
     def listing(self, problem: Problem, solution: FloatArray) -> Listing:
-        """Return names and rows of a table, one row per posture.
-
-        Its phase, terms, cost, step from the one before.
-        """
+        """Return a table with one row per posture: phase, terms, cost, step from the one before."""
         postures = self._postures(problem, solution)
-        names = [
-            "posture",
-            "phase",
-            *(COLUMNS[k] for k in self.chosen),
-            "cost",
-            "goal",
-            "step_rad",
-            "step_scopes",
-        ]
+        terms = (COLUMNS[k] for k in self.chosen)
+        names = ["posture", "phase", *terms, "cost", "goal", "step_rad", "step_scopes"]
         rows: list[list[Any]] = []
         for span in spans(problem, postures):
             for n in range(0 if span.first == 0 else 1, span.last - span.first + 1):
@@ -205,30 +184,17 @@ class PostureEs(PlannerDefaults, Component):
         return posture_problem.notes(problem)
 
     def _tilts(self, found: list[Span], postures: FloatArray) -> dict[str, float]:
-        """Return the greatest tilts at postures and on the motion between them.
-
-        Where a phase limits them.
-        """
+        """Return the greatest limited tilts, at postures and on the motion between them."""
+        limits = {UPRIGHT: self.objective.upright, PARALLEL: self.objective.keep_parallel}
         terms = {}
-        for term, limit in (
-            (UPRIGHT, self.objective.upright),
-            (PARALLEL, self.objective.keep_parallel),
-        ):
-            if limit is None:
-                continue
-            at, between = [0.0], [0.0]
-            for span in found:
-                if span.stage.judging[4][term] > 0.0:
-                    at.append(float(span.judged.rows[term].max()))
-                    between.append(
-                        float(
-                            judge(span.stage, dense(postures[span.first : span.last + 1]))
-                            .rows[term]
-                            .max()
-                        )
-                    )
-            terms[f"greatest_{TERMS[term]}_deg"] = max(at) / DEGREE
-            terms[f"greatest_{TERMS[term]}_between_deg"] = max(between) / DEGREE
+        for term in (term for term, limit in limits.items() if limit is not None):
+            name, at, between = TERMS[term], [0.0], [0.0]
+            for span in (span for span in found if span.stage.weight(name) > 0.0):
+                at.append(float(span.judged.rows[term].max()))
+                on_the_way = dense(postures[span.first : span.last + 1])
+                between.append(float(judge(span.stage, on_the_way).rows[term].max()))
+            terms[f"greatest_{name}_deg"] = max(at) / DEGREE
+            terms[f"greatest_{name}_between_deg"] = max(between) / DEGREE
         return terms
 
     def _postures(self, problem: Problem, solution: FloatArray) -> FloatArray:
@@ -238,55 +204,39 @@ class PostureEs(PlannerDefaults, Component):
         return solution.reshape(-1, num)
 
 
-class _Record:
-    """The records of generations: what was evaluated so far, and the best so far."""
+class _Paths:
+    """The path to the best posture so far, and the records of generations."""
 
     def __init__(self, planner: PostureEs, problem: Problem) -> None:
-        self.planner, self.problem = planner, problem
-        self.index, self.evaluations, self.queries, self.cycles = -1, 0, 0, 0
-        self._node, self._solution, self._path = -1, np.empty(0), {"": 0.0}
+        self._planner, self._problem, self._keeper = planner, problem, Keeper()
+        self._node, self._path, self._cycles = -1, {"": 0.0}, 0
 
-    def generation(self, search: Search, phase: int, stop_reason: str) -> Generation:
-        """Return the record of the cycle that a search has done last.
-
-        Or of the posture that it begins with.
-        """
-        memory, problem, planner = search.memory, self.problem, self.planner
-        count = memory.offspring.shape[1]
-        self.index += 1
-        self.evaluations += count
-        self.queries += count * (1 + (planner.edge_check if search.cycles else 0))
-        self.cycles += min(search.cycles, 1)
+    def record(self, search: Search, phase: int, stop_reason: str) -> Generation:
+        """Return the record of the last cycle, or of the posture that a phase begins with."""
+        memory, problem, planner, keeper = search.memory, self._problem, self._planner, self._keeper
+        last, several = phase == len(problem.phases) - 1, len(problem.phases) > 1
+        self._cycles += min(search.cycles, 1)
+        # the best so far
+        solution = keeper.best.solution
         if search.best != self._node:
             postures = search.ancestry.path(search.best)
-            self._node, self._solution, self._path = (
-                search.best,
-                postures.ravel(),
-                path_terms(postures, problem.scope),
-            )
-        last = phase == len(problem.phases) - 1
-        costs = memory.rows[COST]
-        summary = cost_statistics(np.where(memory.feasible, costs, np.inf))
-        statistics = {
-            "phase": phase + 1.0,
-            "cycles": float(self.cycles),
-            "idle_cycles": float(search.idle),
-        }
-        several = len(problem.phases) > 1
-        return Generation(
-            index=self.index,
-            best=self._solution,
-            best_cost=search.least_cost if last else np.inf,
-            best_cost_in_generation=float(costs.min()) if last else np.inf,
-            mean_cost=summary.mean,
-            std_cost=summary.std,
+            solution, self._node = postures.ravel(), search.best
+            self._path = path_terms(postures, problem.scope)
+        counts = {"phase": phase + 1.0, "cycles": float(self._cycles)}
+        terms = named(search.best_row, planner.chosen) | self._path | counts
+        terms["idle_cycles"] = float(search.idle)
+        best = Candidate(solution, terms, search.won and last)
+        keeper.keep(search.least_cost if last else np.inf, best)
+        # the generation
+        costs, count = memory.rows[COST], memory.offspring.shape[1]
+        return keeper.record(
+            cost_statistics(np.where(memory.feasible, costs, np.inf)),
+            costs[None, :] if several else costs,
+            memory.offspring,
+            lowest=float(costs.min()) if last else np.inf,
             num_feasible=int(np.count_nonzero(memory.feasible)),
-            evaluations=self.evaluations,
-            collision_queries=self.queries,
-            solved=search.won and last,
-            terms=named(search.best_row, planner.chosen) | self._path | statistics,
-            costs=costs[None, :] if several else costs,
-            population=memory.offspring,
+            evaluations=count,
+            collision_queries=count * (1 + (planner.edge_check if search.cycles else 0)),
             stop_reason=stop_reason,
         )
 
@@ -297,10 +247,7 @@ def named(row: FloatArray, chosen: tuple[int, ...]) -> dict[str, float]:
 
 
 def path_terms(postures: FloatArray, scope: FloatArray) -> dict[str, float]:
-    """Return what a path (postures, nq) is like.
-
-    Steps in units of the scope, and how many are larger than it.
-    """
+    """Return the terms of a path (postures, nq): its steps in units of the scope."""
     steps = np.abs(np.diff(postures, axis=0)) / scope
     longest = steps.max(axis=1) if len(steps) else np.zeros(0)
     return {
@@ -311,10 +258,7 @@ def path_terms(postures: FloatArray, scope: FloatArray) -> dict[str, float]:
 
 
 def dense(postures: FloatArray) -> FloatArray:
-    """Return configurations along the straight motion through postures (postures, nq).
-
-    (nq, configurations).
-    """
+    """Return configurations (nq, n) along the straight motion through postures (postures, nq)."""
     shares = np.arange(DENSE) / DENSE
     between = postures[:-1, None, :] + shares[:, None] * np.diff(postures, axis=0)[:, None, :]
     return np.ascontiguousarray(

@@ -1,4 +1,4 @@
-"""What a posture search is asked: robot, task and objective, checked against each other."""
+"""The problem of a posture search: robot, task and objective, checked against each other."""
 
 import functools
 
@@ -88,15 +88,12 @@ def _built(robot: Robot) -> Assembly:
 
 @functools.lru_cache(maxsize=16)
 def _bodies(robot: Robot, collision: CollisionModel) -> BodyModel:
-    """Return a robot's bodies, kept.
-
-    Finding those that never touch takes longer than preparing all else.
-    """
+    """Return a robot's bodies; kept, since finding pairs that never touch takes longest."""
     return collision.bind(_built(robot))
 
 
 def notes(problem: Problem) -> tuple[str, ...]:
-    """Return what the collision model is, and which pairs of bodies it does not test."""
+    """Describe the collision model and list the body pairs that it skips."""
     bodies, names, unit = problem.bodies, problem.bodies.names, problem.task.length_unit
     lines = [
         f"{len(names)} bodies covered by {bodies.num_shapes} spheres and capsules, "
@@ -122,10 +119,7 @@ def _limits(assembly: Assembly) -> FloatArray:
 
 
 def _units(assembly: Assembly) -> FloatArray:
-    """Return (nq,) what turns the scenario's values into those of the model.
-
-    Degrees, lengths of sliding joints.
-    """
+    """Return (nq,) model units per unit of the scenario: degrees, lengths of sliding joints."""
     units = np.full(assembly.model.nq, DEGREE)
     units[assembly.table.index_q[assembly.table.prismatic]] = 1.0
     return units
@@ -173,7 +167,7 @@ def _weights(task: PostureTask, objective: PostureCost, obstacles: ObstacleTable
 def _check_terms(
     phase: Phase, weights: FloatArray, task: PostureTask, obstacles: ObstacleTable, field: str
 ) -> None:
-    """Refuse terms that the goal of a phase gives no meaning, or that contradict it."""
+    """Refuse terms without a meaning for the goal of a phase, or that contradict it."""
     goal, where = phase.goal, field.removesuffix("terms") + "goal"
     if weights[0] == 0.0:
         raise SettingError(
@@ -212,7 +206,7 @@ def _check_terms(
 def _covers(
     task: PostureTask, obstacles: ObstacleTable, collision: CollisionModel
 ) -> dict[int, Cover]:
-    """Return covers of the objects that are taken hold of, in their own frames."""
+    """Return covers of the objects that are grasped, in their own frames."""
     taken = {task.names.index(phase.object) for phase in task.phases if phase.then == "attach"}
     shapes = obstacle_shapes(obstacles)
     return {
@@ -235,12 +229,9 @@ def _check_contacts(task: PostureTask, names: tuple[str, ...]) -> None:
 
 
 def reach(assembly: Assembly, limits: FloatArray) -> tuple[FloatArray, float]:
-    """Return a point (3,) that stands still, and how far from it the tool can be at most.
+    """Return a fixed point (3,) and the greatest distance of the tool from it, links stretched out.
 
-    All links stretched out.
-
-    The point lies on the axis of the first joint, where the second one stands if that is on this
-    axis, too.
+    The point lies on the axis of the first joint: at the second joint, if that is on this axis.
     """
     table, tool = assembly.table, assembly.tools[0]
     joint, far = tool.joint - 1, float(np.sqrt(np.sum(tool.position * tool.position)))
@@ -255,16 +246,13 @@ def reach(assembly: Assembly, limits: FloatArray) -> tuple[FloatArray, float]:
 
 
 def _stroke(assembly: Assembly, limits: FloatArray, joint: int) -> float:
-    """Return how far a joint of the table slides at most; 0 if it turns."""
+    """Return the greatest slide of a joint of the table; 0 if it turns."""
     table = assembly.table
     return float(np.abs(limits[table.index_q[joint]]).max()) if table.prismatic[joint] else 0.0
 
 
 def _check_reach(problem: Problem) -> None:
-    """Refuse goals that the stretched arm cannot reach while it holds nothing.
-
-    In the scene as it begins.
-    """
+    """Refuse goals out of the stretched arm's reach, in the first scene, with nothing held."""
     task = problem.task
     center, far = reach(problem.assembly, problem.limits)
     held, ways = False, len(task.subgoals)
@@ -294,7 +282,7 @@ def _check_reach(problem: Problem) -> None:
 
 
 def _infeasible(problem: Problem, start: FloatArray) -> SettingError:
-    """Say why a start cannot be."""
+    """Return the reason for which a start is refused."""
     scene, given = problem.scene, list(problem.task.q_start)
     assert scene is not None
     data = scene.model.createData()

@@ -16,7 +16,7 @@ class StrategySettings(Component):
         num_offspring: λ: individuals generated per cycle.
         initial_size: Individuals generated in the first cycle, from the start alone.
         num_immigrants: Individuals added at random per cycle (Algorithm 1, the set Q).
-        num_generations: Cycles at most (per phase of a task).
+        num_generations: Cycles per phase of a task, at most.
         patience: Cycles without improvement after which the search is given up.
         selection: `comma`: the next parents are offspring; `plus`: parents may stay.
         mutation: `uniform` in a box of ±scope around the parent; `gaussian` with the standard

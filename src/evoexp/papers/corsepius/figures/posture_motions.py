@@ -129,14 +129,9 @@ def _panel(problem: Any, span: Any, postures: FloatArray, first: int) -> list[di
             {"element": TIP, "instant": first + n, "name": "tool"}
             | dict(zip("xyz", tip, strict=True))
         )
-    goal = (
-        span.stage.judging[3][9:12]
-        if span.stage.phase.goal.kind != "surface"
-        else span.stage.judging[3][15:18]
-    )
     rows.append(
         {"element": GOAL, "instant": span.last, "name": span.stage.phase.name}
-        | dict(zip("xyz", goal, strict=True))
+        | dict(zip("xyz", span.stage.target_position, strict=True))
     )
     situation = span.stage.situation
     table = problem.obstacles_in(span.stage)

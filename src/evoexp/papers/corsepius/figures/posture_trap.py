@@ -81,7 +81,7 @@ def trap_table(stuck: ConditionResults, helped: ConditionResults) -> pd.DataFram
     a, b = sorted(int(k) for k in np.argsort(-np.ptp(failed, axis=0), kind="stable")[:2])
     rows += _cells(problem, stage, failed[-1], a, b)
     rows += _escape(problem, stage, failed[-1])
-    x, y, z = stage.judging[3][9:12]
+    x, y, z = stage.target_position
     rows.append({"element": GOAL, "order": 0, "x": x, "y": y, "z": z})
     for k, (shape, placement) in enumerate(obstacle_shapes(problem.obstacles_in(stage))):
         found = solids.solid(shape, placement)

@@ -128,9 +128,9 @@ def test_a_robot_that_stands_still_agrees() -> None:
 
 def test_restarts_agree() -> None:
     """Two individuals rarely make a team: fresh populations are drawn, the hall is emptied."""
-    changes = {"ga.population_size": 2, "ga.hall_depth": 0.5, "ga.restart_after": 3}
+    changes = {"ga.population_size": 2, "ga.hall_depth": 0.5, "ga.restart_after": 2}
     three = condition(changes | {"ga.num_generations": 40}, "curkovic_three", "5 substeps")
-    assert compare(three, 0)["restarts"] > 1
+    assert sum(compare(three, seed)["restarts"] for seed in range(3)) > 3
 
 
 def uniform_selection(monkeypatch: pytest.MonkeyPatch) -> None:

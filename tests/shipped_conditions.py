@@ -1,13 +1,20 @@
-"""Every condition of every shipped experiment, composed once: composing is what takes long."""
+"""Every condition of every shipped experiment, composed once: composing is what takes long.
+
+Nothing is composed while tests are collected: they are parametrised over rows of the shipped table,
+or over `KINDS`, and ask for conditions when they run.
+"""
 
 import functools
 import os
 import re
+from collections import Counter
 
 from evoexp.condition import Condition
 from evoexp.configuration import expansions
 from evoexp.configuration.experiment import Experiment
 from evoexp.configuration.search_path import options
+
+KINDS = range(66)  # numbers of all kinds of conditions; `test_shipped` checks how many there are
 
 
 @functools.cache
@@ -24,43 +31,30 @@ def shipped_conditions(budget: str) -> dict[tuple[str, str], Condition]:
     }
 
 
+@functools.cache
 def expanded(name: str, budget: str) -> Experiment:
-    """Return a shipped experiment at a budget.
-
-    Kept on disk under the content of `conf` and the code.
-    """
+    """Return a shipped experiment at a budget; it is kept on disk."""
     return expansions.expand([f"experiment={name}", f"budget={budget}"])[0]
 
 
+@functools.cache
 def different_conditions(budget: str) -> dict[str, Condition]:
-    """Return "experiment: label" → condition, each condition once: experiments share some."""
-    found = {
-        condition.id: (f"{name}: {label}", condition)
-        for (name, label), condition in _smallest_last(budget)
-    }
+    """Return "experiment: label" → condition, each condition once, in its smallest experiment."""
+    rows = shipped_conditions(budget)
+    sizes = Counter(name for name, _ in rows)
+    largest_first = sorted(rows.items(), key=lambda row: -sizes[row[0][0]])
+    found = {c.id: (f"{name}: {label}", c) for (name, label), c in largest_first}
     return dict(found.values())
 
 
-def kinds_of_conditions(budget: str) -> dict[str, Condition]:
+@functools.cache
+def kinds_of_conditions(budget: str) -> list[Condition]:
     """Return `different_conditions`, of those that differ in numbers only the last.
 
     Sweeps are long and alike.
     """
-    found = {
-        _kind(condition): (name, condition)
-        for name, condition in different_conditions(budget).items()
-    }
-    return dict(found.values())
-
-
-def _kind(condition: Condition) -> str:
-    """Return the canonical form without its numbers; how many there are stays."""
     numbers = re.compile(r"-?\d+(\.\d+)?([eE][-+]?\d+)?")
-    return numbers.sub("0", condition.to_json().decode())
-
-
-def _smallest_last(budget: str) -> list[tuple[tuple[str, str], Condition]]:
-    """Return all conditions, those of the experiments with the fewest last, in a fixed order."""
-    rows = list(shipped_conditions(budget).items())
-    sizes = {name: sum(other == name for (other, _), _ in rows) for (name, _), _ in rows}
-    return sorted(rows, key=lambda row: -sizes[row[0][0]])
+    found = {
+        numbers.sub("0", c.to_json().decode()): c for c in different_conditions(budget).values()
+    }
+    return list(found.values())

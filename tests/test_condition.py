@@ -21,7 +21,13 @@ from evoexp.errors import (
 from evoexp.registry import component_class
 from evoexp.validation import Component
 from guests import on_path, write_distribution
-from shipped_conditions import different_conditions, kinds_of_conditions, shipped_conditions
+from shipped_conditions import (
+    KINDS,
+    different_conditions,
+    expanded,
+    kinds_of_conditions,
+    shipped_conditions,
+)
 
 Path_ = tuple[str | int, ...]
 
@@ -47,19 +53,17 @@ WORDS = (  # that one setting takes
     ("rad", "deg"),
     ("sine", "step"),
 )
-SHIPPED = different_conditions("paper")
-KINDS = kinds_of_conditions("paper")
 
 
 @pytest.fixture(params=KINDS)
 def shipped(request: pytest.FixtureRequest) -> Condition:
-    return KINDS[request.param]
+    return kinds_of_conditions("paper")[request.param]
 
 
 @pytest.fixture
 def config() -> dict[str, Any]:
     """Return one condition as plain data that a test may spoil."""
-    return json.loads(SHIPPED["rana_obstacles: rana_obstacles"].to_json())
+    return json.loads(expanded("rana_obstacles", "paper").conditions[0].condition.to_json())
 
 
 def leaves(data: Any, path: Path_ = ()) -> Iterator[tuple[Path_, Any]]:
@@ -104,7 +108,7 @@ def test_the_canonical_form_is_read_back_as_the_same_condition(shipped: Conditio
 def test_every_shipped_condition_has_a_hash_of_its_own() -> None:
     everything = shipped_conditions("paper").values()  # experiments share conditions
     different = {c.to_json() for c in everything}
-    assert len({c.id for c in everything}) == len(different) == len(SHIPPED)
+    assert len({c.id for c in everything}) == len(different) == len(different_conditions("paper"))
     assert len(different) > len(everything) // 2
 
 
@@ -262,9 +266,7 @@ def test_an_unknown_setting_in_a_stored_configuration_is_refused(config: dict[st
 
 
 def test_replicates_have_streams_of_their_own_that_conditions_share() -> None:
-    first, other = (
-        SHIPPED[key] for key in ("rana_planar: via-point GA", "rana_planar: random search")
-    )
+    first, other = (c for _, c in expanded("rana_planar", "paper").conditions)
     draws = [condition.rng(k).random(3).tolist() for condition in (first, other) for k in (0, 1)]
     assert draws[:2] == draws[2:]
     assert draws[0] != draws[1]

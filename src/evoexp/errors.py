@@ -7,6 +7,8 @@ error is none of these: it keeps its traceback.
 import difflib
 from collections.abc import Iterable
 
+_SHOWN = 200  # [-] characters of a value in a message
+
 
 class EvoexpError(Exception):
     """Base of everything that evoexp raises on purpose."""
@@ -29,7 +31,9 @@ class SettingError(EvoexpError):
     """
 
     def __init__(self, field: str, must: str, was: object, hint: str = "") -> None:
-        super().__init__(f"{field}: must be {must}, was {was!r}{hint}")
+        shown = repr(was)
+        shown = shown if len(shown) <= _SHOWN else f"{shown[:_SHOWN]}…"
+        super().__init__(f"{field}: must be {must}, was {shown}{hint}")
         self.field = field
         self.must = must
         self.was = was

@@ -1,12 +1,12 @@
 """The base of every component: typed, frozen, checked settings.
 
-A component is a class whose fields are its settings. Building one from plain data (what a YAML file
-or a log's `config.json` holds) checks every type and range and names the offending field as the
-user typed it; nothing is coerced but whole numbers into float fields and lists into tuples.
+A component is a class whose fields are its settings. Building one from plain data (read from a YAML
+file or from the `config.json` of a log) checks every type and range and names the offending field
+by its path; nothing is coerced but whole numbers into float fields and lists into tuples.
 """
 
-from collections.abc import Callable, Mapping
-from typing import Annotated, Any, ClassVar
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Annotated, Any, ClassVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -23,10 +23,7 @@ TARGET = "_target_"
 
 
 class Settings(BaseModel):
-    """Frozen, strictly typed settings that are part of a component (an obstacle.
-
-    Say) but no component themselves.
-    """
+    """Frozen, strictly typed settings that are part of a component, such as an obstacle."""
 
     model_config = ConfigDict(frozen=True, strict=True, extra="forbid", allow_inf_nan=False)
 
@@ -46,7 +43,7 @@ class Settings(BaseModel):
 
 
 class Component(Settings):
-    """Settings with a registered name; what `_target_` in a YAML option refers to.
+    """Settings with a registered name, which `_target_` in a YAML option refers to.
 
     Attributes:
         component: The registered name.
@@ -91,9 +88,7 @@ def build(data: Any, lookup: Callable[[str, str], type[Component]], field: str) 
 
 
 def _construct(kind: type[Component], settings: dict[str, Any], field: str) -> Component:
-    settings.pop(
-        "revision", None
-    )  # what a stored configuration recorded; compared by whoever reads it
+    settings.pop("revision", None)  # as stored; whoever reads a stored configuration compares it
     try:
         return kind(**settings)
     except ValidationError as error:
@@ -105,9 +100,13 @@ def _construct(kind: type[Component], settings: dict[str, Any], field: str) -> C
 def settings_error(
     kind: type[Settings], error: ValidationError, settings: Any, field: str
 ) -> SettingError | UnknownSetting:
-    """Say the first thing that is wrong with some settings in one line.
+    """Return the first thing that is wrong with some settings, as an error of one line.
 
-    With the field's path as it was typed.
+    Args:
+        kind: The class that refused the settings.
+        error: Of its validation.
+        settings: As they were given.
+        field: Dotted path of the settings, as it was typed.
     """
     first = error.errors(include_url=False)[0]
     path, here = field, settings
@@ -116,17 +115,50 @@ def settings_error(
             path, here = f"{path}[{part}]", here[part] if part < len(here) else {}
         elif isinstance(part, int):  # one value in the place of a list
             continue
-        elif (
-            part in here or part == first["loc"][-1]
-        ):  # else: the tag of a union, which nobody typed
-            path, here = _join(path, part), here.get(part, {}) if isinstance(here, Mapping) else {}
+        elif part in _members(here) or part == first["loc"][-1]:
+            path, here = _join(path, part), _members(here).get(part, {})
+        # else: the tag of a union, which nobody typed
     if first["type"] == "extra_forbidden":
-        known = kind.model_fields if len(first["loc"]) == 1 else ()
-        return UnknownSetting(path, known)
+        return UnknownSetting(path, _known(kind, first["loc"][:-1]))
     if first["type"] == "missing":
         return SettingError(path, "given", None)
     must, hint = _must(first)
     return SettingError(path, must, first["input"], hint)
+
+
+def _members(value: Any) -> Mapping[str, Any]:
+    """Return the settings in a value, none if it has none."""
+    return (
+        value if isinstance(value, Mapping) else vars(value) if isinstance(value, Settings) else {}
+    )
+
+
+def _known(kind: type[Settings], location: Sequence[int | str]) -> set[str]:
+    """Return the names of the settings that there are at a location, as pydantic gives it."""
+    kinds = {kind}
+    for part in location:
+        inner = {
+            own
+            for each in kinds
+            if part in each.model_fields
+            for own in _settings_in(each.model_fields[part].annotation)
+        }
+        tagged = {each for each in kinds if part in _tags(each)}
+        kinds = inner or tagged or kinds  # an index leaves the kinds as they are
+    return {name for each in kinds for name in each.model_fields}
+
+
+def _settings_in(annotation: Any) -> Iterator[type[Settings]]:
+    """Yield the classes of settings in the type of a field."""
+    if isinstance(annotation, type) and issubclass(annotation, Settings):
+        yield annotation
+    for inner in get_args(annotation):
+        yield from _settings_in(inner)
+
+
+def _tags(kind: type[Settings]) -> set[Any]:
+    """Return the words by which a union may tell a class from others."""
+    return {word for field in kind.model_fields.values() for word in get_args(field.annotation)}
 
 
 _MUST = {

@@ -3,29 +3,28 @@
 Identities, labels, budgets, and what makes a report another one.
 """
 
-import copy
 import functools
-import shutil
 from collections.abc import Callable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import hydra
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from omegaconf import DictConfig
+from omegaconf import OmegaConf
 
 from evoexp import shipped
 from evoexp.configuration import compose
 from evoexp.configuration.compose import expand
 from evoexp.configuration.experiment import Experiment
-from evoexp.configuration.search_path import description, options
+from evoexp.configuration.overrides import collect
+from evoexp.configuration.search_path import description, find, options
 from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting
-from shipped_conditions import expanded, kinds_of_conditions
+from shipped_conditions import KINDS, expanded, kinds_of_conditions
 
 PLAIN = ("experiment=rana_obstacles",)  # one condition
 BUDGETS = ("paper", "quick", "smoke")
-COMPOSED: dict[tuple[str, ...], DictConfig] = {}
 
 
 def ids(*overrides: str, multirun: bool = False, only: tuple[str, ...] = ()) -> dict[str, str]:
@@ -40,35 +39,16 @@ def one(*overrides: str) -> str:
     return next(iter(ids(*overrides).values()))
 
 
-@pytest.fixture(autouse=True)
-def remember(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Compose nothing twice: these tests ask for the same configurations again and again."""
-
-    def remembered(name: str, overrides: list[str]) -> DictConfig:
-        key = (str(shipped.config_directory()), *overrides)
-        if key not in COMPOSED:
-            COMPOSED[key] = hydra_compose(name, overrides=overrides)
-        return copy.deepcopy(COMPOSED[key])
-
-    hydra_compose = hydra.compose
-    monkeypatch.setattr(hydra, "compose", remembered)
-
-
 @pytest.fixture
 def write_experiment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
-    """Return what writes an experiment file into a copy of `conf`, which then is the one in use."""
-    conf = tmp_path / "conf"
-    shutil.copytree(shipped.config_directory(), conf)
-    monkeypatch.setattr(shipped, "config_directory", lambda: conf)
-    head = (
-        (conf / "experiment/rana_obstacles.yaml")
-        .read_text()
-        .replace("rana_obstacles", "rana_planar")
-    )
+    """Return a function that writes an experiment file into a folder that is searched first."""
+    monkeypatch.setenv("EVOEXP_CONFIG_DIR", str(tmp_path))
+    (tmp_path / "experiment").mkdir()
+    head = Path(find("experiment", "rana_obstacles").path).read_text()
 
     def write(name: str, conditions: str, extra: str = "") -> None:
-        (conf / f"experiment/{name}.yaml").write_text(
-            f"{head}\n{extra}\nconditions:\n{conditions}\n"
+        (tmp_path / f"experiment/{name}.yaml").write_text(
+            f"{head.replace('rana_obstacles', 'rana_planar')}\n{extra}\nconditions:\n{conditions}\n"
         )
 
     return write
@@ -85,8 +65,8 @@ def test_every_experiment_composes_at_every_budget(experiment: str, budget: str)
         assert len(condition.id) == 64
 
 
-@pytest.mark.parametrize("kind", kinds_of_conditions("paper"))
-def test_every_kind_of_condition_can_be_prepared(kind: str) -> None:
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_of_condition_can_be_prepared(kind: int) -> None:
     kinds_of_conditions("paper")[kind].prepare()
 
 
@@ -101,38 +81,27 @@ def test_a_quick_budget_has_the_conditions_of_the_papers(experiment: str) -> Non
 
 
 @pytest.mark.parametrize(
-    "overrides",
+    "words",
     [
-        ("experiment=rana_planar_ablations",),
-        (
-            "experiment=rana_planar",
-            "ga.population_size=9",
-            "robot.arms.1.base_position=[0,9]",
-            "seed=3",
-        ),
-        (
-            "experiment=rana_planar",
-            "++ga.population_size=9",
-            "seed=3",
-        ),  # which Hydra composes as a whole
+        ("experiment=rana_planar", "control=random_search", "seed=3"),
+        ("experiment=rana_planar", "ga.population_size=9", "robot.arms.1.base_position=[0,9]"),
+        ("experiment=lavoie", "++ga.population_size=9", "+scenario.new={a: [1, {b: 'c, d'}]}"),
+        ("experiment=lavoie", "~ga.population_size", "budget=smoke", "report.formats=[pdf,svg]"),
     ],
 )
-def test_conditions_are_those_that_hydra_composes_one_by_one(
-    overrides: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (found,) = expand(overrides)
-    monkeypatch.setattr(compose._Composed, "__call__", lambda _, texts: compose._compose(texts))
-    (plain,) = expand(overrides)
-    assert [(label, c.to_json()) for label, c in found.conditions] == [
-        (label, c.to_json()) for label, c in plain.conditions
-    ]
+def test_settings_are_as_hydra_itself_sets_them(words: tuple[str, ...]) -> None:
+    with hydra.initialize_config_dir(str(shipped.config_directory()), version_base="1.3"):
+        by_hydra = OmegaConf.to_container(hydra.compose("config", overrides=[*words]))
+    chosen = collect(map(compose.parse, words))
+    experiment = find("experiment", chosen.pop("experiment").typed)
+    with TemporaryDirectory() as root:
+        composed = compose._Composer(Path(root))(chosen, experiment)
+    assert composed.config == by_hydra
 
 
 @pytest.mark.parametrize("experiment", options("experiment"))
 def test_an_experiment_file_says_how_it_is_run_and_what_it_is(experiment: str) -> None:
-    lines = (
-        (shipped.config_directory() / "experiment" / f"{experiment}.yaml").read_text().splitlines()
-    )
+    lines = Path(find("experiment", experiment).path).read_text().splitlines()
     assert lines[1] == f"# evoexp run experiment={experiment}"
     assert description(experiment) == lines[2].removeprefix("# ") != ""
 
@@ -486,10 +455,10 @@ def test_a_configuration_without_experiment_has_a_report_of_its_own() -> None:
 def test_a_group_that_the_planner_does_not_take_is_refused(
     write_experiment: Callable[..., None], tmp_path: Path
 ) -> None:
-    planner = tmp_path / "conf/planner/rana_planar.yaml"
     write_experiment("mine", "  a: []")
-    text = planner.read_text()
-    planner.write_text(text.replace("ga: ${ga}\n", ""))
+    text = Path(find("planner", "rana_planar").path).read_text()
+    (tmp_path / "planner").mkdir()
+    (tmp_path / "planner/rana_planar.yaml").write_text(text.replace("ga: ${ga}\n", ""))
     with pytest.raises(SettingError, match="ga: must be a part of the chosen planner, was"):
         expand(["experiment=mine"])
     with pytest.raises(SettingError, match=r"planner.ga: must be given, was None"):

@@ -11,18 +11,12 @@ from evoexp.condition import Condition
 from evoexp.records import flatten
 from evoexp.store.log import Finished
 from evoexp.store.log_reader import read_log, read_summary
-from shipped_conditions import kinds_of_conditions
-
-SHIPPED = [
-    pytest.param(condition, id=name)
-    for name, condition in sorted(kinds_of_conditions("smoke").items())
-]
+from shipped_conditions import KINDS, kinds_of_conditions
 
 
-@pytest.fixture(params=SHIPPED)
+@pytest.fixture(params=KINDS)
 def condition(request: pytest.FixtureRequest) -> Condition:
-    found: Condition = request.param
-    return found
+    return kinds_of_conditions("smoke")[request.param]
 
 
 @functools.cache

@@ -99,6 +99,7 @@ def _notes(experiment: Experiment, label: str, command: str) -> dict[str, Any]:
         "experiment": experiment.name,
         "budget": experiment.budget,
         "label": label,
+        "options": experiment.option_names(label),
         "command": command,
     }
 

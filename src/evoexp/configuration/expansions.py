@@ -1,18 +1,20 @@
-"""Experiments that were composed before, kept on disk.
+"""Experiments that were composed before, kept on disk: Hydra takes a tenth of a second and more.
 
-Hydra takes a tenth of a second and more per choice of options.
-
-An expansion follows from what was typed, from `conf/` and from evoexp's own code; all three, as
-content, are the name that it is kept under, so whatever changes is composed anew. Files that
-conditions refer to are read again, and must say what they said. It is not kept where more has a
-say: URDF files with their meshes, interpolations (which may ask the environment), plug-ins. Errors
-are never kept.
+An expansion follows from the words that were typed, from the options in all folders of the search
+path, from the installed components and from the code of evoexp and of the guests among these. All
+of it, as content, is the name that the expansion is kept under, so whatever changes is composed
+anew. Files that conditions refer to are read again, and must have the content that they had. An
+expansion is not kept where more than this decides: URDF files with their meshes, and interpolations
+(which may ask the environment). Errors are never kept.
 """
 
 import contextlib
 import hashlib
 import importlib.metadata
+import importlib.util
+import json
 import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -24,10 +26,12 @@ from evoexp import attachments, shipped
 from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.condition import Condition
 from evoexp.configuration.experiment import Experiment, Labelled
-from evoexp.configuration.search_path import file_directories, folders
+from evoexp.configuration.interpolations import MARK
+from evoexp.configuration.search_path import EXPERIMENT, file_directories, folders, is_file
 from evoexp.numeric.kernel_cache import cache_root
-from evoexp.registry import COMPONENTS, registrations
+from evoexp.registry import COMPONENTS, Registration, registrations
 from evoexp.report.report_settings import ReportSettings
+from evoexp.shipped import Option
 
 NUM_KEPT = 200  # [-] expansions, the newest ones
 _COMPOSERS = ("hydra-core", "omegaconf")
@@ -36,14 +40,12 @@ _COMPOSERS = ("hydra-core", "omegaconf")
 def expand(
     overrides: Sequence[str], *, multirun: bool = False, only: Sequence[str] = ()
 ) -> list[Experiment]:
-    """Expand overrides into experiments as `compose.expand` does.
-
-    Which is asked where nothing is kept.
+    """Expand overrides into experiments, by `compose.expand` where nothing is kept.
 
     Raises:
         EvoexpError: For whatever cannot be run.
     """
-    path = _path([list(overrides), multirun, list(only)])
+    path = _path(overrides, multirun, list(only))
     if path is not None and (kept := _read(path)) is not None:
         return kept
     from evoexp.configuration import compose  # and Hydra
@@ -55,10 +57,7 @@ def expand(
 
 
 def _files(experiments: Sequence[Experiment]) -> list[tuple[str, str]] | None:
-    """Return (path, SHA-256) of all files that conditions refer to.
-
-    None if one did not come from a path alone.
-    """
+    """Return (path, SHA-256) of all files of conditions, None if one has no path of its own."""
     contents = {name for e in experiments for c in e.conditions for name in c.condition.files()}
     hashes = sorted(name.removeprefix(attachments.PREFIX) for name in contents)
     if not all(attachments.origins(sha256) for sha256 in hashes):
@@ -66,29 +65,48 @@ def _files(experiments: Sequence[Experiment]) -> list[tuple[str, str]] | None:
     return [(path, sha256) for sha256 in hashes for path in attachments.origins(sha256)]
 
 
-def _path(asked: list[Any]) -> Path | None:
-    """Return where an expansion is kept; None where it may not be."""
-    components = registrations(COMPONENTS)
-    if any("${" in word for word in asked[0]) or not all(each.is_own for each in components):
+def _path(overrides: Sequence[str], *others: Any) -> Path | None:
+    """Return the file that an expansion is kept in; None where it may not be kept."""
+    if any(MARK in word for word in overrides):
         return None
+    components = registrations(COMPONENTS)
     versions = [importlib.metadata.version(name) for name in _COMPOSERS]
-    digest = hashlib.sha256(orjson.dumps([asked, versions, pydantic.VERSION]))
-    code = (Path(__file__).parents[1], "**/*.py")
-    for root, pattern in (
-        (shipped.config_directory(), "*.yaml"),
-        *((f.path, "*/*") for f in folders()),
-        code,
-    ):
-        for path in sorted(path for path in root.glob(pattern) if path.is_file()):
+    asked = [list(overrides), others, components, [each.origin for each in folders()], versions]
+    digest = hashlib.sha256(json.dumps([*asked, pydantic.VERSION]).encode())
+    code = [Path(__file__).parents[1], *(root for each in components for root in _sources(each))]
+    places = [(folder.path, "*/*") for folder in folders()]
+    places += [(shipped.config_directory(), "*.yaml"), *((root, "**/*.py") for root in code)]
+    files = [path for root, pattern in places for path in sorted(root.glob(pattern))]
+    files += [path for word in overrides for path in _experiments(word)]
+    for path in files:
+        if path.is_file():
             content = path.read_bytes()
-            digest.update(
-                f"{path.relative_to(root).as_posix()}\0{len(content)}\0".encode() + content
-            )
+            digest.update(f"{path}\0{len(content)}\0".encode(errors="surrogateescape") + content)
     return cache_root() / "expansions" / f"{digest.hexdigest()[:32]}.json"
 
 
+def _experiments(word: str) -> list[Path]:
+    """Return the paths that an override names experiments by, which need not be there."""
+    key, _, typed = word.partition("=")
+    names = [typed, *re.split(r"[\s,()'\"]+", typed)] if key == EXPERIMENT else []
+    return [Path(name).resolve() for name in names if is_file(name)]
+
+
+def _sources(registration: Registration) -> list[Path]:
+    """Return the folders with the code of a guest's component; nothing is imported."""
+    if registration.is_own:
+        return []
+    with contextlib.suppress(ImportError, ValueError):
+        spec = importlib.util.find_spec(registration.module.partition(".")[0])
+        if spec is not None and spec.submodule_search_locations:
+            return [Path(location) for location in spec.submodule_search_locations]
+        if spec is not None and spec.origin:
+            return [Path(spec.origin).parent]
+    return []
+
+
 def _read(path: Path) -> list[Experiment] | None:
-    """Return what is kept; None if there is nothing, or nothing whole."""
+    """Return a kept expansion; None if there is none, or it is damaged or out of date."""
     try:
         digest, _, text = path.read_bytes().partition(b"\n")
     except OSError:
@@ -114,18 +132,17 @@ def _experiment(plain: dict[str, Any]) -> Experiment:
     )
     runner = RunnerSettings.model_validate_json(plain["runner"])
     report = ReportSettings.model_validate_json(plain["report"])
-    return Experiment(
-        **(plain | {"conditions": tuple(conditions), "runner": runner, "report": report})
-    )
+    options = {label: tuple(Option(*each) for each in own) for label, own in plain["options"]}
+    changed = {"conditions": tuple(conditions), "runner": runner, "report": report}
+    return Experiment(**(plain | changed | {"options": options}))
 
 
 def _write(path: Path, experiments: Sequence[Experiment], files: Sequence[tuple[str, str]]) -> None:
-    """Keep an expansion, and not too many of them; silent where that cannot be done."""
-    text = orjson.dumps(
-        {"experiments": [_plain(experiment) for experiment in experiments], "files": files}
-    )
+    """Keep an expansion, and the newest `NUM_KEPT` in all; silent where that cannot be done."""
     temporary = path.with_suffix(f".{os.getpid()}.tmp")
-    with contextlib.suppress(OSError):
+    with contextlib.suppress(OSError, TypeError):  # TypeError: a label that is no UTF-8
+        plain = [_plain(experiment) for experiment in experiments]
+        text = orjson.dumps({"experiments": plain, "files": files})
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary.write_bytes(hashlib.sha256(text).hexdigest().encode() + b"\n" + text)
         temporary.replace(path)
@@ -141,4 +158,5 @@ def _plain(experiment: Experiment) -> dict[str, Any]:
         ],
         "runner": experiment.runner.model_dump_json(),
         "report": experiment.report.model_dump_json(),
+        "options": [(label, list(map(list, own))) for label, own in experiment.options.items()],
     }

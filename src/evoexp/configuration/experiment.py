@@ -1,11 +1,28 @@
 """An experiment: the labelled conditions that one call asks for."""
 
 import hashlib
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.condition import Condition
 from evoexp.report.report_settings import ReportSettings
+from evoexp.shipped import Option
+from evoexp.validation import Count, Settings
+
+
+class Budget(Settings):
+    """A cap on what an experiment may cost.
+
+    Attributes:
+        name: `paper` caps nothing.
+        max_replicates: Cap on the number of replicates.
+        max_generations: Cap on the number of generations; changes the condition.
+    """
+
+    name: str
+    max_replicates: Count | None
+    max_generations: Count | None
 
 
 class Labelled(NamedTuple):
@@ -27,6 +44,8 @@ class Experiment(NamedTuple):
         report: How to report them.
         changed: Whether overrides or `--only` make this another set of conditions than the file's
             own.
+        options: Label → the option that was taken of each group, the experiment file included. No
+            part of any identity: the same settings may come from other options.
     """
 
     name: str
@@ -36,6 +55,7 @@ class Experiment(NamedTuple):
     runner: RunnerSettings
     report: ReportSettings
     changed: bool
+    options: Mapping[str, tuple[Option, ...]]
 
     @property
     def report_name(self) -> str:
@@ -45,3 +65,10 @@ class Experiment(NamedTuple):
             return name
         text = "\n".join(f"{label}\t{condition.id}" for label, condition in self.conditions)
         return f"{name}+{hashlib.sha256(text.encode()).hexdigest()[:8]}"
+
+    def option_names(self, label: str) -> dict[str, dict[str, str]]:
+        """Return group → name and origin of the option taken, as a run's manifest records them."""
+        return {
+            option.group: {"name": option.name, "origin": option.origin}
+            for option in self.options[label]
+        }

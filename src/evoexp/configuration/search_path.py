@@ -123,7 +123,7 @@ def find(group: str, name: str) -> Option:
         if not Path(name).is_file():
             raise SettingError(EXPERIMENT, "the path of a file, or the name of an experiment", name)
         return Option(group, Path(name).stem, name, str(Path(name).resolve()))
-    for folder in folders():
+    for folder in folders() if Path(name).name == name else ():
         path = folder.path / group / f"{name}.yaml"
         if path.is_file():
             return Option(group, name, folder.origin, str(path))

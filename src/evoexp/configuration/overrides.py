@@ -1,0 +1,195 @@
+"""Overrides: settings as one types them, `key=value`, collected, swept over and labelled."""
+
+import itertools
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
+
+from evoexp.configuration.search_path import EXPERIMENT, find, groups
+from evoexp.errors import SettingError, UnknownSetting
+
+ADD, FORCE, DELETE = "+", "++", "~"  # prefixes of an override; without one it sets a value
+JOIN = " · "  # between the parts of a label
+PLANNER_PARTS = ("ga", "objective", "collision")  # groups that a planner takes in by interpolation
+AROUND = ("control", "reference")  # groups whose option is put around the chosen planner
+OPTIONAL = (EXPERIMENT, *AROUND, *PLANNER_PARTS)  # groups that a configuration may do without
+NOT_IDENTITY = (EXPERIMENT, "budget", "num_replicates", "runner", "report")
+SCALARS = ("seed", "num_replicates")  # settings outside the groups
+
+
+class Value(NamedTuple):
+    """A value of an override.
+
+    Attributes:
+        text: As it was typed.
+        data: As plain data.
+    """
+
+    text: str
+    data: Any
+
+
+class Override(NamedTuple):
+    """A change of a configuration.
+
+    Attributes:
+        prefix: `ADD`, `FORCE`, `DELETE`, or empty.
+        key: A group, or the dotted path of a setting.
+        values: One value, several if they are swept over, none of a deletion.
+        is_swept: Whether the values are swept over.
+        text: As it was typed.
+    """
+
+    prefix: str
+    key: str
+    values: tuple[Value, ...]
+    is_swept: bool
+    text: str
+
+    @property
+    def root(self) -> str:
+        """First part of the key."""
+        return re.split("[./]", self.key)[0]
+
+    @property
+    def typed(self) -> str:
+        """Everything behind the first `=`."""
+        return self.text.partition("=")[2]
+
+    def option(self) -> str | None:
+        """Return the option that an override of a group chooses; None: the group is left out."""
+        if self.prefix == DELETE or self.values[0].data is None:
+            return None
+        text, data = self.values[0]
+        return data if isinstance(data, str) else text
+
+
+Choice = Mapping[str, Override]  # by key, each with one value
+
+
+def collect(overrides: Iterable[Override]) -> dict[str, Override]:
+    """Return overrides by key, after refusing those that no configuration can take.
+
+    Raises:
+        EvoexpError: For a key that cannot be set or is given twice, or an unknown option.
+    """
+    found: dict[str, Override] = {}
+    for override in overrides:
+        known = found.setdefault(override.key, override)
+        if known.text != override.text:
+            raise SettingError(override.key, "given once", f"{known.text} {override.text}")
+        if override.key in groups():
+            _check_group(override)
+        else:
+            _check_setting(override)
+    return found
+
+
+def _check_group(override: Override) -> None:
+    """Refuse an override of a group that chooses no option, or an unknown one."""
+    group = override.key
+    if override.prefix == DELETE and group not in OPTIONAL:
+        raise SettingError(group, "given", override.text)
+    for each in single_values(override):
+        name = each.option()
+        if name is not None or group not in OPTIONAL:
+            find(group, "null" if name is None else name)
+    if override.prefix in (ADD, FORCE):
+        raise SettingError(group, f"given without {override.prefix}", override.text)
+
+
+def _check_setting(override: Override) -> None:
+    """Refuse keys that are no setting of evoexp, or that no override may change."""
+    key, text, roots = override.key, override.text, [*groups(), *SCALARS]
+    if override.root == "hydra":
+        raise SettingError("override", "a setting of evoexp (nothing of Hydra's own)", text)
+    if "/" in key:
+        raise SettingError("override", "key=value", text)
+    if override.root == "conditions":
+        must = "left to the experiment's file (choose among them: --only LABEL)"
+        raise SettingError("conditions", must, text)
+    if key == "budget.name":
+        raise SettingError(key, "left as it is: claims are judged by it", text)
+    if override.root == EXPERIMENT:
+        raise SettingError(key, "left out: an experiment has no settings of its own", text)
+    if override.prefix and override.root not in roots:
+        raise UnknownSetting(key, roots)
+    if override.prefix == DELETE and key in SCALARS:
+        raise SettingError(key, "given", text)
+
+
+def refuse_sweeps(overrides: Choice, *, multirun: bool) -> None:
+    """Refuse overrides that are swept over but may not be.
+
+    Args:
+        overrides: By key.
+        multirun: Whether sweeps were asked for.
+
+    Raises:
+        SettingError: Naming the first one.
+    """
+    for key, override in overrides.items():
+        if override.is_swept and not multirun:
+            raise SettingError(key, "one value (or add -m to sweep over several)", override.typed)
+        if override.is_swept and key != EXPERIMENT and override.root in NOT_IDENTITY:
+            must = "one value: a sweep is over what changes a condition"
+            raise SettingError(key, must, override.typed)
+
+
+def single_values(override: Override) -> Iterator[Override]:
+    """Yield an override with each of its values."""
+    if not override.values:
+        yield override
+    for value in override.values:
+        yield override._replace(values=(value,), is_swept=False)
+
+
+def sweep(overrides: Choice) -> Iterator[tuple[str, dict[str, Override]]]:
+    """Cross all swept overrides; yield (label, overrides with one value) of each combination."""
+    swept = [key for key, override in overrides.items() if override.is_swept]
+    short = {key: key.rsplit(".", 1)[-1] for key in swept}
+    if len(set(short.values())) < len(short):
+        short = {key: key for key in swept}
+    for combination in itertools.product(*map(single_values, overrides.values())):
+        chosen = dict(zip(overrides, combination, strict=True))
+        label = JOIN.join(f"{short[key]}={chosen[key].values[0].text}" for key in swept)
+        yield label, chosen
+
+
+def expand_entry(
+    template: str, overrides: Iterable[Override]
+) -> Iterator[tuple[str, dict[str, Override]]]:
+    """Expand an entry of `conditions`: cross its sweeps and fill their values into its label.
+
+    Args:
+        template: Label of the entry, with a `{}` per swept override or none.
+        overrides: Of the entry.
+
+    Yields:
+        Label and overrides with one value of each condition.
+
+    Raises:
+        EvoexpError: If an override or the label cannot be.
+    """
+    field, parsed = f"conditions.{template}", collect(overrides)
+    for key, override in parsed.items():
+        if override.root in NOT_IDENTITY:
+            must = f"free of {key}, which belongs to the whole experiment"
+            raise SettingError(field, must, override.text)
+    swept = [key for key, override in parsed.items() if override.is_swept]
+    pieces = template.split("{}")
+    if len(pieces) - 1 not in (0, len(swept)):
+        raise SettingError(field, "a label with one {} per swept override, or none", template)
+    for suffix, chosen in sweep(parsed):
+        if len(pieces) > 1:
+            values = (chosen[key].values[0].text for key in swept)
+            filled = (value + piece for value, piece in zip(values, pieces[1:], strict=True))
+            yield pieces[0] + "".join(filled), chosen
+        else:
+            yield JOIN.join(part for part in (template, suffix) if part), chosen
+
+
+def dotted(text: str) -> str:
+    """Return an override with the list indices of its key as one may type them, `a[0]` as `a.0`."""
+    key, equals, value = text.partition("=")
+    return re.sub(r"\[(\d+)\]", r".\1", key) + equals + value

@@ -1,0 +1,86 @@
+"""Refusals: errors of the composer, each turned into one line that names a field and a remedy."""
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import yaml
+
+from evoexp.configuration.interpolations import interpolations
+from evoexp.configuration.overrides import PLANNER_PARTS
+from evoexp.configuration.search_path import EXPERIMENT, groups, options
+from evoexp.errors import EvoexpError, SettingError, UnknownOption
+
+HEADER = "# @package _global_"  # first line of an experiment file
+
+
+def chosen(group: str) -> str:
+    """Return the requirement that an option of a group is chosen, with the options."""
+    return f"chosen: {', '.join(options(group))}"
+
+
+def unparsed(text: str) -> SettingError:
+    """Return the refusal of an override that cannot be read.
+
+    Args:
+        text: As typed.
+    """
+    key, equals, value = text.partition("=")
+    if not equals or not re.fullmatch(r"[~+]*[A-Za-z_][\w.\[\]]*", key):
+        return SettingError("override", "key=value", text)
+    must = "a number, a word, a [list], a {mapping} or 'any text' in quotes"
+    return SettingError(key.lstrip("+~"), must, value)
+
+
+def uncomposed(error: Exception, choices: Mapping[str, str | None]) -> EvoexpError:
+    """Return the refusal of options that cannot be composed.
+
+    Args:
+        error: Of the composer.
+        choices: Group → option, as far as the command line and an entry choose.
+    """
+    text, cause = str(error), error
+    while cause.__cause__ is not None and not isinstance(cause, yaml.MarkedYAMLError):
+        cause = cause.__cause__  # type: ignore[assignment]
+    if isinstance(cause, yaml.MarkedYAMLError) and (mark := cause.problem_mark) is not None:
+        must = f"a YAML file (line {mark.line + 1}: {cause.problem})"
+        return SettingError(EXPERIMENT, must, mark.name)
+    if missing := re.search(r"You must specify '([^']+)'", text):
+        group = missing[1]
+        if not choices.get(EXPERIMENT):
+            without = f"without one, every group is needed; the next is {group}"
+            must = f"{chosen(EXPERIMENT)} ({without}: {', '.join(options(group))})"
+            return SettingError(EXPERIMENT, must, None)
+        return SettingError(group, chosen(group), None)
+    if absent := re.search(r"Could not find '([^'/]+)/([^']+)'", text):
+        return UnknownOption(absent[1], absent[2], options(absent[1]))
+    if deleted := re.search(r"Could not delete '(([^=']+).*)'\.", text):
+        return SettingError(deleted[2], "an option that is chosen, to be deleted", f"~{deleted[1]}")
+    if foreign := re.search(r"Could not override '/?([^'@]+)", text):
+        return UnknownOption("group", foreign[1], groups())
+    files = {group: name for group, name in choices.items() if name}
+    group = EXPERIMENT if EXPERIMENT in files else next(iter(files), EXPERIMENT)
+    must = f"an option whose file can be composed ({_first_line(error)})"
+    return SettingError(group, must, files.get(group))
+
+
+def unresolved(error: Exception, config: Mapping[str, Any]) -> SettingError:
+    """Return the refusal of an interpolation, `${name}`, that names nothing.
+
+    Args:
+        error: Of the composer.
+        config: The composed settings, as plain data.
+    """
+    text = str(error)
+    if absent := [group for group in PLANNER_PARTS if f"key '{group}' not found" in text]:
+        return SettingError(absent[0], chosen(absent[0]), None)
+    found = dict(interpolations(config))
+    field = str(getattr(error, "full_key", None) or "")
+    if field not in found:
+        field = next((key for key, value in found.items() if value in text), next(iter(found), ""))
+    must = f"a value, or the name of another setting in ${{…}} ({_first_line(error)})"
+    return SettingError(field or "seed", must, found.get(field))
+
+
+def _first_line(error: Exception) -> str:
+    return next(iter(str(error).strip().splitlines()), type(error).__name__)

@@ -12,9 +12,16 @@ import pytest
 from evoexp.configuration import expansions
 from evoexp.configuration.experiment import Experiment
 from evoexp.papers.lavoie import claims, measures, sweep_claims
-from evoexp.papers.lavoie.measures import Refuted
-from evoexp.report.claims import CONTRADICTED, INCONCLUSIVE, NOT_JUDGED, REPRODUCED, Claim
-from evoexp.report.judging import not_judged
+from evoexp.papers.lavoie.measures import RefutedMotions
+from evoexp.report.claims import (
+    CONTRADICTED,
+    INCONCLUSIVE,
+    NOT_JUDGED,
+    REPRODUCED,
+    Claim,
+    judge_greater,
+)
+from evoexp.report.judging import Judge, judge
 from evoexp.report.proportions import Proportion
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results, StoredLogs
@@ -68,8 +75,7 @@ def below_one(count: int, runs: int = 1000) -> np.ndarray:
 def test_a_printed_percentage_is_a_sample_too(
     one: Proportion, two: Proportion, verdict: str
 ) -> None:
-    assert claims.judge_equal("", one, two, 0.95) == verdict
-    assert claims.judge_equal("budget smoke", one, two, 0.95) == NOT_JUDGED
+    assert claims.judge_equal(one, two, 0.95) == verdict
 
 
 @pytest.mark.parametrize(
@@ -82,14 +88,16 @@ def test_a_printed_percentage_is_a_sample_too(
     ],
 )
 def test_one_proportion_is_greater(one: Proportion, two: Proportion, verdict: str) -> None:
-    assert claims.judge_greater("", one, two, 0.05) == verdict
-    assert claims.judge_greater("budget smoke", one, two, 0.05) == NOT_JUDGED
-    assert claims.judge_greater("", one, two, 0.05, p_adjusted=0.06) == INCONCLUSIVE
+    assert judge_greater("", one, two, 0.05) == verdict
+    assert judge_greater("budget smoke", one, two, 0.05) == NOT_JUDGED
+    assert judge_greater("", one, two, 0.05, p_adjusted=0.06) == INCONCLUSIVE
 
 
 def test_printed_percentages_say_the_numbers_and_the_rule() -> None:
     results = made_up({"7-DOF": below_one(964), "10-DOF": below_one(991)}, "lavoie")
-    (seven, _), (ten, _) = (claims.percentages("", c, SETTINGS) for c in results.conditions)
+    (seven, _), (ten, _) = (
+        claims.percentages(Judge("", 0.05), c, 0.95) for c in results.conditions
+    )
     assert (seven.verdict, ten.verdict) == (CONTRADICTED, REPRODUCED)
     assert seven.text == "7-DOF: a position error below 1 in 93.5 % of runs"
     assert "964 of 1000 = 96.4 % [95.1, 97.4]; the printed one lies outside" in seven.evidence
@@ -108,17 +116,22 @@ def test_a_run_without_a_solution_has_no_error_below_anything() -> None:
     seven = results.conditions[0]
     assert measures.below(seven, 2.0) == Proportion(997, 1000)
     assert np.isinf(measures.effort(seven)[:3]).all()
-    assert claims.no_start_needed(results, seven).verdict == CONTRADICTED
-    assert claims.no_start_needed(results, results.conditions[1]).verdict == REPRODUCED
+    assert claims.no_start_needed(judge(results, SETTINGS), seven).verdict == CONTRADICTED
+    assert (
+        claims.no_start_needed(judge(results, SETTINGS), results.conditions[1]).verdict
+        == REPRODUCED
+    )
 
 
 def test_the_longer_arm_is_compared_with_the_shorter_one() -> None:
     results = made_up({"7-DOF": below_one(964), "10-DOF": below_one(999)}, "lavoie")
-    below_1, below_2 = claims.more_joints_are_better(results, SETTINGS)
+    below_1, below_2 = claims.more_joints_are_better(
+        judge(results, SETTINGS), results.conditions, 0.95
+    )
     assert (below_1.verdict, below_2.verdict) == (REPRODUCED, INCONCLUSIVE)
     assert "Fisher's exact p = 4.1e−10" in below_1.evidence
     alone = results._replace(conditions=results.conditions[:1])
-    assert claims.more_joints_are_better(alone, SETTINGS) == []
+    assert claims.more_joints_are_better(judge(alone, SETTINGS), alone.conditions, 0.95) == []
 
 
 def test_motions_in_contact_contradict() -> None:
@@ -127,11 +140,12 @@ def test_motions_in_contact_contradict() -> None:
     certified = seven.summaries["certified"].copy()
     certified[:115] = False
     seven = seven._replace(summaries=seven.summaries.assign(certified=certified))
-    found = claims.free_of_collision(results, seven, Proportion(115, 1000), SETTINGS)
+    found = claims.free_of_collision(judge(results, SETTINGS), seven, Proportion(115, 1000), 0.95)
     assert found.verdict == CONTRADICTED
     assert "885 of 1000 certified; refuted 115 of 1000 = 11.5 % [9.7, 13.6]" in found.evidence
     assert (
-        claims.free_of_collision(results, ten, Proportion(0, 1000), SETTINGS).verdict == REPRODUCED
+        claims.free_of_collision(judge(results, SETTINGS), ten, Proportion(0, 1000), 0.95).verdict
+        == REPRODUCED
     )
 
 
@@ -141,9 +155,9 @@ def test_what_is_overridden_or_too_few_is_not_judged() -> None:
     other = made_up(errors, "lavoie", "planner.success=finite")
     for results, why in ((few, "fewer replicates than planned"), (other, "settings overridden")):
         for claim in (
-            *claims.percentages(not_judged(results), results.conditions[0], SETTINGS),
-            *claims.more_joints_are_better(results, SETTINGS),
-            claims.no_start_needed(results, results.conditions[0]),
+            *claims.percentages(judge(results, SETTINGS), results.conditions[0], 0.95),
+            *claims.more_joints_are_better(judge(results, SETTINGS), results.conditions, 0.95),
+            claims.no_start_needed(judge(results, SETTINGS), results.conditions[0]),
         ):
             assert claim.verdict == f"{NOT_JUDGED} ({why})"
 
@@ -152,12 +166,12 @@ def sweep(results: Results, in_contact: dict[str, int] | None = None) -> list[Cl
     """Return the claims of a sweep; some accepted runs of each condition, by label, in contact."""
     counts = in_contact or {}
     refuted = {
-        c.label: Refuted(
+        c.label: RefutedMotions(
             Proportion(counts.get(c.label, 0), c.solved), *[Proportion(0, c.solved)] * 2
         )
         for c in results.conditions
     }
-    return list(sweep_claims.of_sweep(results, SETTINGS, refuted))
+    return list(sweep_claims.judge_sweep(results, SETTINGS, refuted))
 
 
 def test_smaller_stopping_values_are_judged_step_by_step() -> None:

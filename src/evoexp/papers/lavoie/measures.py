@@ -1,7 +1,4 @@
-"""What the pages on Lavoie & Boudreau 2001 measure alike.
-
-Errors, effort, and motions that are refuted.
-"""
+"""Measures of Lavoie & Boudreau 2001 that several pages share: errors, effort, refuted motions."""
 
 from typing import NamedTuple
 
@@ -9,21 +6,25 @@ import numpy as np
 
 from evoexp.paths.motion import Motion
 from evoexp.planners.planner import judge_motion
+from evoexp.planners.redundant_ga.planner import RedundantGa
 from evoexp.records import FloatArray
-from evoexp.report import body_contacts, markdown
+from evoexp.report import body_contacts
 from evoexp.report.proportions import Proportion
 from evoexp.report.results import ConditionResults, Results
+from evoexp.report.run_measures import counted, search_seconds, solved
 
 PRINTED_RUNS = 1000  # section 5: "a thousand experiments were conducted for each simulation"
+Contact = tuple[float, str]
+"""Instant of a first contact, names of the bodies."""
 
 
-class Printed(NamedTuple):
+class Percentage(NamedTuple):
     """A percentage that the paper prints beside Fig. 3.
 
     Attributes:
-        joints: Of the arm.
+        joints: Number of joints of the arm.
         bound: x of P(position error < x) [length unit].
-        having: How many of the thousand runs.
+        having: Number of the thousand runs with a smaller error.
     """
 
     joints: int
@@ -32,24 +33,23 @@ class Printed(NamedTuple):
 
     @property
     def proportion(self) -> Proportion:
-        """Of the paper's own runs, which are a sample, too."""
+        """Proportion of the paper's own runs, which are a sample, too."""
         return Proportion(self.having, PRINTED_RUNS)
 
 
 PRINTED = (
-    Printed(7, 1.0, 935),
-    Printed(7, 2.0, 998),
-    Printed(10, 1.0, 991),
-    Printed(10, 2.0, 1000),
+    Percentage(7, 1.0, 935),
+    Percentage(7, 2.0, 998),
+    Percentage(10, 1.0, 991),
+    Percentage(10, 2.0, 1000),
 )
 BOUNDS = (1.0, 2.0)  # those of the printed percentages
 
 
 def fits(results: Results) -> bool:
     """Whether there are results, and all of arms that go by a via point into a box."""
-    return bool(results.with_data) and all(
-        hasattr(c.planner, "stop_cost_sp2") for c in results.with_data
-    )
+    found = results.with_data
+    return bool(found) and all(isinstance(c.planner, RedundantGa) for c in found)
 
 
 def num_joints(condition: ConditionResults) -> int:
@@ -57,77 +57,54 @@ def num_joints(condition: ConditionResults) -> int:
     return len(condition.condition.scenario.q_start)  # type: ignore[attr-defined]
 
 
-def solved(condition: ConditionResults) -> np.ndarray:
-    """Return whether each run ended with a solution, (done,)."""
-    return condition.summaries["solved"].to_numpy(dtype=bool)
+def printed(condition: ConditionResults) -> list[Percentage]:
+    """Return the percentages that the paper prints for an arm of so many joints."""
+    return [one for one in PRINTED if one.joints == num_joints(condition)]
 
 
 def errors(condition: ConditionResults) -> FloatArray:
-    """Return the position error at the end of SP2 of each run, (done,) [length unit].
-
-    Inf without a solution.
-    """
+    """Return the position error at the end of SP2, (done,) [length unit]; inf: no solution."""
     return np.where(solved(condition), condition.column("term_position_error_sp2"), np.inf)
 
 
 def effort(condition: ConditionResults) -> FloatArray:
-    """Return the evaluations that each run took to its solution, (done,).
-
-    Inf without a solution.
-    """
+    """Return the evaluations that each run took to its solution, (done,); inf: no solution."""
     return np.where(solved(condition), condition.column("evaluations"), np.inf)
 
 
 def below(condition: ConditionResults, bound: float) -> Proportion:
-    """Return how many of all runs have a solution with a position error below a bound."""
-    return Proportion(int(np.count_nonzero(errors(condition) < bound)), condition.done)
-
-
-def search_seconds(condition: ConditionResults) -> FloatArray:
-    """Return the CPU time of each run without that of the exact verdict, (done,) [s]."""
-    return np.asarray(condition.column("cpu_s") - condition.column("certificate_s"))
-
-
-def evaluations_per_second(condition: ConditionResults) -> FloatArray:
-    """Return the evaluations per second of CPU time of each search, (done,) [1/s]."""
-    return np.asarray(condition.column("evaluations") / search_seconds(condition))
+    """Count the runs that have a solution with a position error below a bound."""
+    return counted(errors(condition) < bound)
 
 
 def tests_per_second(condition: ConditionResults) -> FloatArray:
-    """Return the tests of a link against an ellipse that each search asks for per second.
+    """Return the tests of a link against an ellipse per second of each search, (done,) [1/s].
 
-    (done,) [1/s].
-
-    Chords are not counted, and kernels skip what cannot touch: it is what the algorithm would take
-    without that.
+    They are those that the algorithm asks for: kernels skip tests of links that cannot touch.
+    Chords are not counted.
     """
     pairs = num_joints(condition) * len(condition.condition.scenario.obstacles)  # type: ignore[attr-defined]
     return np.asarray(pairs * condition.column("collision_queries") / search_seconds(condition))
 
 
-def contacts(
-    condition: ConditionResults, replicate: int, verdict: tuple[float, str]
-) -> list[tuple[float, str]]:
-    """Return the first contact (instant, bodies) on each sub-path that has one.
+def contacts(condition: ConditionResults, replicate: int, verdict: Contact) -> list[Contact]:
+    """Return the first contact on each sub-path that has one.
 
-    A verdict names the first contact of the whole motion only; where that is on SP1, SP2 is judged
-    by itself.
+    A verdict names the first contact of the whole motion only; if that is on SP1, the planner's
+    motion on SP2 is judged by itself.
 
     Args:
-        condition: Whose replicate it is.
-        replicate: Which.
-        verdict: Its first contact.
+        condition: The condition of the replicate.
+        replicate: The replicate.
+        verdict: The first contact of its motion.
     """
     if verdict[0] >= 1.0:
         return [verdict]
-    prepared = condition.prepared
-    q = prepared.planner.motion(prepared.problem, condition.solutions[replicate]).q
-    second = judge_motion(prepared.planner, prepared.problem, Motion(np.ascontiguousarray(q[1:])))
-    return (
-        [verdict]
-        if second.refuted_at is None
-        else [verdict, (1.0 + second.refuted_at, second.refuted_pair)]
-    )
+    q = np.ascontiguousarray(condition.motion(replicate).q[1:])
+    second = judge_motion(*condition.prepared, Motion(q))
+    if second.refuted_at is None:
+        return [verdict]
+    return [verdict, (1.0 + second.refuted_at, second.refuted_pair)]
 
 
 def touches(condition: ConditionResults) -> np.ndarray:
@@ -145,13 +122,13 @@ def refuted_paths(condition: ConditionResults) -> np.ndarray:
     return refuted
 
 
-class Refuted(NamedTuple):
-    """How many of a condition's accepted motions touch an obstacle.
+class RefutedMotions(NamedTuple):
+    """Counts of a condition's accepted motions that touch an obstacle.
 
     Attributes:
-        anywhere: Of all solved runs.
-        sp1: On the first sub-path.
-        sp2: On the second one.
+        anywhere: Motions that touch on either sub-path, of all solved runs.
+        sp1: Motions that touch on the first sub-path.
+        sp2: Motions that touch on the second one.
     """
 
     anywhere: Proportion
@@ -159,20 +136,12 @@ class Refuted(NamedTuple):
     sp2: Proportion
 
 
-def refuted(condition: ConditionResults) -> Refuted:
-    """Count the solved runs whose motion the exact verdict refutes, and on which sub-path."""
-    accepted = solved(condition)
-    paths, total = refuted_paths(condition)[accepted], int(np.count_nonzero(accepted))
-    counts = (np.count_nonzero(paths.any(axis=1)), *np.count_nonzero(paths, axis=0))
-    return Refuted(*(Proportion(int(count), total) for count in counts))
+def refuted(condition: ConditionResults) -> RefutedMotions:
+    """Count the solved runs whose motion the exact verdict refutes, by sub-path."""
+    paths = refuted_paths(condition)[solved(condition)]
+    return RefutedMotions(counted(paths.any(axis=1)), *map(counted, paths.T))
 
 
 def text(proportion: Proportion, confidence: float) -> str:
     """Return a proportion with its interval: "964 of 1000 = 96.4 % [95.1, 97.4]"."""
-    if not proportion.total:
-        return "0 of 0"
-    low, high = proportion.interval(confidence)
-    return (
-        f"{markdown.share(proportion.having, proportion.total)} = {100 * proportion.share:.1f} % "
-        f"[{100 * low:.1f}, {100 * high:.1f}]"
-    )
+    return proportion.with_interval(confidence, 1)

@@ -1,7 +1,4 @@
-"""How probable an error below x is, with a band and the printed percentages.
-
-Lavoie & Boudreau 2001, Fig. 3.
-"""
+"""The probability of an error below x with a band and printed points (Lavoie & Boudreau 2001)."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -12,20 +9,24 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from evoexp.records import FloatArray
 from evoexp.report import style
+from evoexp.report.pages.generic import Values
 from evoexp.report.proportions import Proportion
 from evoexp.report.results import ConditionResults, Results
 from evoexp.report.rows import groups, records
 
 FOUND, PRINTED = "found", "printed"
+NAMES = [
+    *("series", "position", "condition", "error", "having", "total"),
+    *("share", "lower", "upper"),
+]
 Point = tuple[float, Proportion]
-"""(x, how many of the paper's runs)."""
+"""(x, count of the paper's runs)."""
 
 
 def distribution_table(
     results: Results,
-    errors: Callable[[ConditionResults], FloatArray],
+    errors: Values,
     printed: Callable[[ConditionResults], Sequence[Point]],
     confidence: float,
 ) -> pd.DataFrame:
@@ -44,116 +45,64 @@ def distribution_table(
     rows: list[tuple[object, ...]] = []
     for c in results.with_data:
         values = errors(c)
-        points = [(0.0, 0), *zip(*_steps(values), strict=True)]
-        given = results.position(c.label), c.label
-        for error, count in points:
-            share = Proportion(int(count), len(values))
-            rows.append((FOUND, *given, error, *share, share.share, *share.interval(confidence)))
-        for error, share in printed(c):
-            rows.append((PRINTED, *given, error, *share, share.share, *share.interval(confidence)))
-    names = [
-        "series",
-        "position",
-        "condition",
-        "error",
-        "having",
-        "total",
-        "share",
-        "lower",
-        "upper",
-    ]
+        steps, counts = np.unique(values[np.isfinite(values)], return_counts=True)
+        totals = zip([0.0, *steps], [0, *np.cumsum(counts)], strict=True)
+        points = [(FOUND, x, Proportion(int(count), len(values))) for x, count in totals]
+        for series, x, share in [*points, *((PRINTED, *point) for point in printed(c))]:
+            given = series, results.position(c.label), c.label, x
+            rows.append((*given, *share, share.share, *share.interval(confidence)))
     unit = results.with_data[0].condition.length_unit
-    return pd.DataFrame(rows, columns=names).astype({"error": "float64"}).assign(length_unit=unit)
+    return pd.DataFrame(rows, columns=NAMES).astype({"error": "float64"}).assign(length_unit=unit)
 
 
 def draw_distribution(table: pd.DataFrame) -> Figure:
-    """Draw steps with bands over the whole range, and where the printed points are."""
-    figure = style.figure(3.9)
-    whole, close = figure.subplots(1, 2)
-    printed = table[table["series"] == PRINTED]
+    """Draw steps with bands: over the whole range, and where the printed points are."""
+    figure, (whole, close) = style.row_of_panels(3.9, 2)
+    printed, found = (table[table["series"] == series] for series in (PRINTED, FOUND))
     greatest = max(2.1, 1.05 * float(table["error"].max()))
     for axes in (whole, close):
-        for (position, condition), rows in groups(
-            table[table["series"] == FOUND], ["position", "condition"]
-        ):
+        for (position, condition), rows in groups(found, ["position", "condition"]):
             _curve(axes, rows, greatest, style.condition_colour(int(position)), str(condition))
         for position, rows in groups(printed, "position"):
             _points(axes, rows, style.condition_colour(int(position)))
-        axes.set_xlim(0.0, greatest)
-        axes.set_xlabel(f"x [{table['length_unit'].iloc[0]}]")
+        axes.set(xlim=(0.0, greatest), xlabel=f"x [{table['length_unit'].iloc[0]}]")
         axes.set_ylabel("P(position error < x)")
-    whole.set_ylim(-0.02, 1.03)
-    whole.set_title("a  whole range")
-    close.set_title("b  where the printed percentages are")
+    whole.set(ylim=(-0.02, 1.03), title="a  whole range")
     low = min([0.93, *printed["lower"]])
-    close.set_ylim(low - 0.1 * (1.0 - low), 1.0 + 0.1 * (1.0 - low))
+    near = low - 0.1 * (1.0 - low), 1.0 + 0.1 * (1.0 - low)
+    close.set(ylim=near, title="b  where the printed percentages are")
     for row in records(printed):
         _label(close, row, row.share == printed.loc[printed["error"] == row.error, "share"].max())
     style.legend_below(figure, whole, 2)
     return figure
 
 
-def _steps(values: FloatArray) -> tuple[FloatArray, np.ndarray]:
-    """Return the finite values in order, each once, and how many are at or below each."""
-    found, counts = np.unique(values[np.isfinite(values)], return_counts=True)
-    return found, np.cumsum(counts)
-
-
 def _curve(axes: Axes, rows: pd.DataFrame, greatest: float, colour: str, name: str) -> None:
     """Draw one arm's steps on to the right end, and their band."""
-    last = rows.iloc[[-1]].assign(error=greatest)
-    rows = pd.concat([rows, last], ignore_index=True)
-    label = f"{name} (n = {int(rows['total'].iloc[0])})"
-    axes.fill_between(
-        rows["error"],
-        rows["lower"],
-        rows["upper"],
-        step="post",
-        color=colour,
-        alpha=0.22,
-        linewidth=0,
-    )
-    axes.step(rows["error"], rows["share"], where="post", color=colour, label=label)
+    rows = pd.concat([rows, rows.iloc[[-1]].assign(error=greatest)], ignore_index=True)
+    x, label = rows["error"], f"{name} (n = {int(rows['total'].iloc[0])})"
+    band: dict[str, Any] = {"step": "post", "color": colour, "alpha": 0.22, "linewidth": 0}
+    axes.fill_between(x, rows["lower"], rows["upper"], **band)
+    axes.step(x, rows["share"], where="post", color=colour, label=label)
 
 
 def _points(axes: Axes, rows: pd.DataFrame, colour: str) -> None:
     """Draw the printed points of one arm with the intervals of the paper's own sample."""
     name = f"printed, {rows['condition'].iloc[0]} (their n = {int(rows['total'].iloc[0])})"
     axes.vlines(rows["error"], rows["lower"], rows["upper"], color=colour, linewidth=1.0, zorder=4)
-    axes.plot(
-        rows["error"],
-        rows["share"],
-        "D",
-        color="white",
-        mec=colour,
-        mew=1.4,
-        ms=5,
-        zorder=5,
-        label=name,
-    )
+    look: dict[str, Any] = {"color": "white", "mec": colour, "mew": 1.4, "ms": 5, "zorder": 5}
+    axes.plot(rows["error"], rows["share"], "D", label=name, **look)
 
 
 def _label(axes: Axes, row: Any, greatest: bool) -> None:
-    """Write a printed percentage beside its point.
-
-    Above the greatest one at an x, below the others.
-    """
+    """Write a printed percentage above its point if it is the greatest at its x, else below."""
     left = row.error > 0.7 * axes.get_xlim()[1]
-    place = (-6 if left else 7, 4 if greatest else -10)
-    halo = [withStroke(linewidth=2.5, foreground="white")]
     look: dict[str, Any] = {
+        "xytext": (-6 if left else 7, 4 if greatest else -10),
+        "textcoords": "offset points",
+        "ha": "right" if left else "left",
         "color": style.condition_colour(row.position),
         "fontsize": 7.5,
-        "path_effects": halo,
+        "path_effects": [withStroke(linewidth=2.5, foreground="white")],
     }
-    side = "right" if left else "left"
-    at = (row.error, row.share)
-    axes.annotate(
-        f"{100 * row.share:.1f} %",
-        at,
-        xytext=place,
-        textcoords="offset points",
-        ha=side,
-        zorder=6,
-        **look,
-    )
+    axes.annotate(f"{100 * row.share:.1f} %", (row.error, row.share), zorder=6, **look)

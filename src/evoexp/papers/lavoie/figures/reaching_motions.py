@@ -1,7 +1,4 @@
-"""Arms reaching into a box of ellipses.
-
-Start postures and solutions (Lavoie & Boudreau 2001, Figs. 1 and 2).
-"""
+"""Arms reaching into a box of ellipses (Lavoie & Boudreau 2001, Figs. 1 and 2)."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -10,11 +7,11 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Ellipse, Patch, Rectangle
 from matplotlib.patheffects import withStroke
 
 from evoexp.numeric.elementary import DEGREE
+from evoexp.planners.redundant_ga.planner import Problem
 from evoexp.records import FloatArray
 from evoexp.report import body_contacts, motion_geometry, style
 from evoexp.report.results import ConditionResults
@@ -29,34 +26,39 @@ ELLIPSE, BOX, TARGET, LINK, TOUCHING, CONTACT = (
     "contact",
 )
 NAMES = [
-    "element",
-    "name",
-    "sub_path",
-    "instant",
-    "link",
-    "x",
-    "y",
-    "x_end",
-    "y_end",
-    "semi_a",
-    "semi_b",
-    "angle_deg",
+    *("element", "name", "sub_path", "instant", "link"),
+    *("x", "y", "x_end", "y_end", "semi_a", "semi_b", "angle_deg"),
 ]
+NO_SIZE = (np.nan,) * 3
 MOST_POSTURES = 10  # of a sub-path that are drawn
 TARGETS = ("via point", "goal point")
 AROUND = 0.35  # [-] of the box by which a view of it is wider than box and targets
 MARKERS = {"via point": "P", "goal point": "*"}
-NEUTRAL_LINE: dict[str, Any] = {"color": style.NEUTRAL, "linewidth": 2.6}
+START: dict[str, Any] = {"color": style.NEUTRAL, "linewidth": 2.6}
+INSIDE: dict[str, Any] = {"linestyle": (0, (3, 2)), "linewidth": 0.9}
+TOUCH: dict[str, Any] = {
+    "color": style.FORBIDDEN,
+    "linewidth": 1.4,
+    "linestyle": (0, (3, 1.5)),
+}
+CROSS: dict[str, Any] = {
+    "linestyle": "none",
+    "marker": "X",
+    "color": style.FORBIDDEN,
+    "mec": "white",
+    "ms": 9,
+}
+HALO = withStroke(linewidth=2.0, foreground="white")
 
 
-class Shown(NamedTuple):
-    """What one panel shows.
+class ShownMotion(NamedTuple):
+    """The scene of one panel, and the motion in it.
 
     Attributes:
-        title: Of the panel.
-        condition: Whose scene.
-        replicate: Whose solution; None: the start posture only.
-        contacts: (instant, bodies) of its first contacts.
+        title: Title of the panel.
+        condition: The condition whose scene is drawn.
+        replicate: The replicate whose solution is drawn; None: the start posture only.
+        contacts: (instant, bodies) of the first contact on each sub-path that has one.
     """
 
     title: str
@@ -65,7 +67,7 @@ class Shown(NamedTuple):
     contacts: Sequence[tuple[float, str]] = ()
 
 
-def reaching_table(shown: Sequence[Shown]) -> pd.DataFrame:
+def reaching_table(shown: Sequence[ShownMotion]) -> pd.DataFrame:
     """Return scenes, postures and contacts.
 
     Returns:
@@ -76,273 +78,178 @@ def reaching_table(shown: Sequence[Shown]) -> pd.DataFrame:
     parts = []
     for panel, one in enumerate(shown):
         rows = [*_scene(one.condition), *_postures(one), *_contacts(one)]
-        table = pd.DataFrame(
-            [(panel, one.title, *row) for row in rows], columns=["panel", "title", *NAMES]
-        )
-        parts.append(table.assign(length_unit=one.condition.condition.length_unit))
-    return rounded(pd.concat(parts, ignore_index=True))
+        end = one.condition.condition.length_unit
+        parts += [(panel, one.title, *row, end) for row in rows]
+    return rounded(pd.DataFrame(parts, columns=["panel", "title", *NAMES, "length_unit"]))
 
 
 def draw_reaching(table: pd.DataFrame) -> Figure:
-    """Draw every scene with its postures, and below, where anything moves.
-
-    What is around the box.
-    """
+    """Draw every scene with its postures; where anything moves, the box from near, too."""
     panels = [rows for _, rows in groups(table, "panel")]
     ratios = [x / y for x, y in map(_span, panels)]
     moving = bool((table["sub_path"] > 0).any())
     height = min(4.6, 6.1 / sum(ratios))
     figure = style.figure(height + (3.6 if moving else 0.0) + 1.0)
     places = figure.subplots(1 + moving, len(panels), squeeze=False, width_ratios=ratios)
-    for k, rows in enumerate(panels):
-        for axes in places[:, k]:
+    for (whole, *close), rows in zip(places.T, panels, strict=True):
+        links = rows[rows["element"].isin([LINK, TOUCHING])]
+        contacts = rows[rows["element"] == CONTACT]
+        for axes in (whole, *close):
             style.operational_axes(axes, rows["length_unit"].iloc[0])
             _draw_scene(axes, rows)
-            _draw_postures(
-                axes, rows[rows["element"].isin([LINK, TOUCHING])], near=axes is not places[0, k]
-            )
-            contacts = rows[rows["element"] == CONTACT]
-            axes.plot(
-                contacts["x"],
-                contacts["y"],
-                "X",
-                color=style.FORBIDDEN,
-                mec="white",
-                ms=9,
-                zorder=9,
-            )
-        places[0, k].set_title(rows["title"].iloc[0])
-        places[0, k].margins(0.06)
-        if moving:
-            _near_the_box(places[1, k], rows)
-    figure.legend(handles=_legend(table), loc="outside lower center", ncols=3)
+            _draw_postures(axes, links, named=axes is whole)
+            axes.plot(contacts["x"], contacts["y"], zorder=9, **CROSS)
+        whole.set_title(rows["title"].iloc[0])
+        whole.margins(0.06)
+        for axes in close:
+            _near_the_box(axes, rows)
+    style.keys_below(figure, _keys(table), 3)
     return figure
 
 
 def _scene(condition: ConditionResults) -> list[tuple[Any, ...]]:
-    """Return the rows of what stands around."""
+    """Return the rows of ellipses, box and targets."""
     scenario: Any = condition.condition.scenario
-    table, nan, rows = scenario.obstacle_table(), np.nan, []
+    table = scenario.obstacle_table()
+    rows = []
     for k, (center, rotation, size) in enumerate(
         zip(table.center, table.rotation, table.size, strict=True)
     ):
         angle = float(np.degrees(np.arctan2(rotation[3], rotation[0])))
-        rows.append(
-            (
-                ELLIPSE,
-                f"obstacle_{k + 1}",
-                0,
-                nan,
-                -1,
-                *center[:2],
-                *center[:2],
-                size[0],
-                size[1],
-                angle,
-            )
-        )
+        rows.append((ELLIPSE, f"obstacle_{k + 1}", *center[:2], *center[:2], *size[:2], angle))
     left, right, bottom, top = scenario.box
-    rows.append((BOX, "box", 0, nan, -1, left, bottom, right, top, nan, nan, nan))
+    rows.append((BOX, "box", left, bottom, right, top, *NO_SIZE))
     for name, point in zip(TARGETS, (scenario.via_point, scenario.goal_point), strict=True):
-        rows.append((TARGET, name, 0, nan, -1, *point, *point, nan, nan, nan))
-    return rows
+        rows.append((TARGET, name, *point, *point, *NO_SIZE))
+    return [(element, name, 0, np.nan, -1, *rest) for element, name, *rest in rows]
 
 
-def _postures(one: Shown) -> list[tuple[Any, ...]]:
+def _postures(one: ShownMotion) -> list[tuple[Any, ...]]:
     """Return the links at the start, and at tested positions of both sub-paths."""
-    prepared = one.condition.prepared
-    instants = np.zeros(1)
-    q: FloatArray = np.asarray(prepared.problem.start)[:, None]
-    if one.replicate is not None:
-        tested = int(one.condition.planner.collision.num_positions)
-        steps = np.arange(0, tested, -(-tested // MOST_POSTURES))[1:] / tested
-        instants = np.concatenate([[0.0], steps, [1.0], 1.0 + steps, [2.0]])
-        motion = prepared.planner.motion(prepared.problem, one.condition.solutions[one.replicate])
-        q = np.column_stack([motion.at(float(t)) for t in instants])
-    return _links(one, LINK, instants, q)
+    start = one.condition.problem(Problem).start
+    if one.replicate is None:
+        return _links(one, LINK, np.zeros(1), start[:, None])
+    tested = int(one.condition.planner.collision.num_positions)
+    steps = np.arange(0, tested, -(-tested // MOST_POSTURES))[1:] / tested
+    instants = np.concatenate([[0.0], steps, [1.0], 1.0 + steps, [2.0]])
+    motion = one.condition.motion(one.replicate)
+    return _links(one, LINK, instants, np.column_stack([motion.at(float(t)) for t in instants]))
 
 
-def _links(one: Shown, element: str, instants: FloatArray, q: FloatArray) -> list[tuple[Any, ...]]:
+def _links(
+    one: ShownMotion, element: str, instants: FloatArray, q: FloatArray
+) -> list[tuple[Any, ...]]:
     """Return the links at some instants, q (nq, instants) [rad]."""
-    rows = []
-    for _, link, start, end in motion_geometry.joint_positions(
-        one.condition.prepared.problem.assembly, q / DEGREE
-    ):
-        for k, t in enumerate(instants):
-            places = *start[k, :2], *end[k, :2]
-            rows.append((element, "arm", int(np.ceil(t)), t, link, *places, np.nan, np.nan, np.nan))
-    return rows
+    assembly = one.condition.problem(Problem).assembly
+    return [
+        (element, "arm", int(np.ceil(t)), t, link, *start[k, :2], *end[k, :2], *NO_SIZE)
+        for _, link, start, end in motion_geometry.joint_positions(assembly, q / DEGREE)
+        for k, t in enumerate(instants)
+    ]
 
 
-def _contacts(one: Shown) -> list[tuple[Any, ...]]:
-    """Return where bodies touch, and the postures at which they do."""
+def _contacts(one: ShownMotion) -> list[tuple[Any, ...]]:
+    """Return the places at which bodies touch, and the postures at which they do."""
     rows = []
     for instant, pair in one.contacts:
         assert one.replicate is not None, "only motions touch"
-        prepared, solution = one.condition.prepared, one.condition.solutions[one.replicate]
-        x, y = body_contacts.contact(prepared, solution, instant, pair)
-        rows.append(
-            (
-                CONTACT,
-                pair,
-                1 + int(instant >= 1.0),
-                instant,
-                -1,
-                x,
-                y,
-                x,
-                y,
-                np.nan,
-                np.nan,
-                np.nan,
-            )
-        )
-        q = prepared.planner.motion(prepared.problem, solution).at(instant)
-        rows += _links(one, TOUCHING, np.array([instant]), q[:, None])
+        solution, q = one.condition.solutions[one.replicate], one.condition.motion(one.replicate)
+        place = body_contacts.contact(one.condition.prepared, solution, instant, pair)
+        rows.append((CONTACT, pair, 1 + int(instant >= 1.0), instant, -1, *place, *place, *NO_SIZE))
+        rows += _links(one, TOUCHING, np.array([instant]), q.at(instant)[:, None])
     return rows
 
 
 def _span(rows: pd.DataFrame) -> tuple[float, float]:
+    """Return how wide and how high a scene is."""
     x, y = (rows[[name, f"{name}_end"]].to_numpy() for name in "xy")
     return float(np.ptp(x)), float(np.ptp(y))
 
 
 def _draw_scene(axes: Axes, rows: pd.DataFrame) -> None:
+    """Draw ellipses, box and targets."""
     for row in records(rows[rows["element"] == ELLIPSE]):
-        axes.add_patch(
-            Ellipse(
-                (row.x, row.y),
-                2 * row.semi_a,
-                2 * row.semi_b,
-                angle=row.angle_deg,
-                facecolor=style.FAINT,
-                lw=0,
-                zorder=2,
-            )
-        )
+        size = 2 * row.semi_a, 2 * row.semi_b
+        look: dict[str, Any] = {"facecolor": style.FAINT, "lw": 0, "zorder": 2}
+        axes.add_patch(Ellipse((row.x, row.y), *size, angle=row.angle_deg, **look))
     for row in records(rows[rows["element"] == BOX]):
-        look: dict[str, Any] = {
-            "fill": False,
-            "edgecolor": style.FAINT,
-            "linestyle": (0, (3, 2)),
-            "linewidth": 0.9,
-        }
-        axes.add_patch(
-            Rectangle((row.x, row.y), row.x_end - row.x, row.y_end - row.y, zorder=1, **look)
-        )
+        size = row.x_end - row.x, row.y_end - row.y
+        edge: dict[str, Any] = INSIDE | {"fill": False, "edgecolor": style.FAINT, "zorder": 1}
+        axes.add_patch(Rectangle((row.x, row.y), *size, **edge))
     for row in records(rows[rows["element"] == TARGET]):
-        size = 8 if row.name == "via point" else 11
-        axes.plot(
-            row.x, row.y, MARKERS[row.name], color="black", mec="white", mew=0.8, ms=size, zorder=8
-        )
+        marker: dict[str, Any] = {"color": "black", "mec": "white", "mew": 0.8, "zorder": 8}
+        marker["ms"] = 8 if row.name == "via point" else 11
+        axes.plot(row.x, row.y, MARKERS[row.name], **marker)
 
 
 def _near_the_box(axes: Axes, rows: pd.DataFrame) -> None:
-    """Show what is around box and targets only."""
+    """Show the surroundings of box and targets only."""
     shown = rows[rows["element"].isin([BOX, TARGET])]
-    limits = []
     for name in "xy":
         values = shown[[name, f"{name}_end"]].to_numpy()
         pad = AROUND * float(np.ptp(values))
-        limits.append((float(values.min()) - pad, float(values.max()) + pad))
-    axes.set_xlim(*limits[0])
-    axes.set_ylim(*limits[1])
+        axes.set(**{f"{name}lim": (float(values.min()) - pad, float(values.max()) + pad)})
     axes.set_title("around the box", fontweight="normal")
 
 
-def _draw_postures(axes: Axes, links: pd.DataFrame, near: bool) -> None:
+def _draw_postures(axes: Axes, links: pd.DataFrame, named: bool) -> None:
     """Draw the start in black, each sub-path in a colour of its own, its end strong.
 
-    Names from far only.
+    Args:
+        axes: To be drawn into.
+        links: Rows of links.
+        named: Whether names are written at start, A and B.
     """
     for (element, sub_path, instant), rows in groups(links, ["element", "sub_path", "instant"]):
         x, y = ([*rows[name], rows[f"{name}_end"].iloc[-1]] for name in "xy")
+        colour, share = _colour(sub_path), instant - (sub_path - 1)
         if element == TOUCHING:
-            axes.plot(x, y, color=style.FORBIDDEN, linewidth=1.4, linestyle=(0, (3, 1.5)), zorder=6)
+            axes.plot(x, y, **TOUCH, zorder=6)
         elif sub_path == 0:
-            axes.plot(x, y, **NEUTRAL_LINE, zorder=5)
+            axes.plot(x, y, **START, zorder=5)
+        elif share == 1.0:
+            axes.plot(x, y, color=colour, alpha=1.0, linewidth=2.6, zorder=6)
         else:
-            colour, share = _colour(sub_path), instant - (sub_path - 1)
-            look: dict[str, Any] = (
-                {"linewidth": 2.6, "zorder": 6} if share == 1.0 else {"linewidth": 1.0, "zorder": 3}
-            )
-            axes.plot(x, y, color=colour, alpha=1.0 if share == 1.0 else 0.15 + 0.5 * share, **look)
+            axes.plot(x, y, color=colour, alpha=0.15 + 0.5 * share, linewidth=1.0, zorder=3)
+        if element == LINK and sub_path > 0:
             axes.plot(x[-1], y[-1], ".", color=colour, markersize=4, zorder=7)
         if element == LINK and instant == sub_path:
-            _draw_joints(axes, x, y, sub_path, named=not near)
+            _draw_joints(axes, x, y, sub_path, named)
     base = links[links["link"] == 0].iloc[0]
     axes.plot(base["x"], base["y"], "s", color=style.NEUTRAL, markersize=7, zorder=4)
 
 
 def _draw_joints(axes: Axes, x: list[float], y: list[float], sub_path: int, named: bool) -> None:
     """Draw the joints of a posture at the end of a sub-path, and its name."""
-    colour = style.NEUTRAL if sub_path == 0 else _colour(sub_path)
+    colour = _colour(sub_path)
     axes.plot(x[:-1], y[:-1], "o", color="white", mec=colour, ms=3.6, mew=0.9, zorder=7)
     if named:
-        halo = [withStroke(linewidth=2.0, foreground="white")]
-        place: dict[str, Any] = {
-            "xytext": (-4, 5),
-            "textcoords": "offset points",
-            "ha": "right",
-            "fontsize": 8,
-        }
-        name = ("start", "A", "B")[sub_path]
-        axes.annotate(name, (x[-1], y[-1]), color=colour, zorder=10, path_effects=halo, **place)
+        place: dict[str, Any] = {"xytext": (-4, 5), "textcoords": "offset points", "ha": "right"}
+        look: dict[str, Any] = {"fontsize": 8, "color": colour, "path_effects": [HALO]}
+        axes.annotate(("start", "A", "B")[sub_path], (x[-1], y[-1]), zorder=10, **place, **look)
 
 
 def _colour(sub_path: int) -> str:
-    return style.arm_colour(sub_path - 1)
+    """Return the colour of a sub-path; that of the start for 0."""
+    return style.arm_colour(sub_path - 1) if sub_path else style.NEUTRAL
 
 
-def _legend(table: pd.DataFrame) -> list[Any]:
-    handles: list[Any] = [
-        Line2D([], [], **NEUTRAL_LINE, marker="o", mfc="white", ms=4, label="start posture")
+def _keys(table: pd.DataFrame) -> list[Any]:
+    """Return the entries of the legend."""
+    moved = sorted(set(table.loc[table["element"] == LINK, "sub_path"]) - {0})
+    point: dict[str, Any] = {"linestyle": "none", "color": "black", "mec": "white", "ms": 9}
+    touching = [
+        style.key("posture in contact, never tested", **TOUCH),
+        style.key("first contact of a sub-path", **CROSS),
     ]
-    for sub_path in sorted(set(table.loc[table["element"] == LINK, "sub_path"]) - {0}):
-        name = f"SP{sub_path}, to posture {'AB'[sub_path - 1]}"
-        handles.append(Line2D([], [], color=_colour(sub_path), linewidth=2.6, label=name))
-    handles.append(Patch(facecolor=style.FAINT, label="ellipses"))
-    handles.append(
-        Line2D(
-            [],
-            [],
-            color=style.FAINT,
-            linestyle=(0, (3, 2)),
-            linewidth=0.9,
-            label="inside of the box",
-        )
-    )
-    for name in TARGETS:
-        handles.append(
-            Line2D(
-                [],
-                [],
-                linestyle="none",
-                marker=MARKERS[name],
-                color="black",
-                mec="white",
-                ms=9,
-                label=name,
-            )
-        )
-    if (table["element"] == CONTACT).any():
-        look: dict[str, Any] = {
-            "color": style.FORBIDDEN,
-            "linewidth": 1.4,
-            "linestyle": (0, (3, 1.5)),
-        }
-        handles.append(Line2D([], [], label="posture in contact, never tested", **look))
-        label = "first contact of a sub-path"
-        handles.append(
-            Line2D(
-                [],
-                [],
-                linestyle="none",
-                marker="X",
-                color=style.FORBIDDEN,
-                mec="white",
-                ms=9,
-                label=label,
-            )
-        )
-    return handles
+    return [
+        style.key("start posture", **START, marker="o", mfc="white", ms=4),
+        *(
+            style.key(f"SP{k}, to posture {'AB'[k - 1]}", color=_colour(k), linewidth=2.6)
+            for k in moved
+        ),
+        Patch(facecolor=style.FAINT, label="ellipses"),
+        style.key("inside of the box", color=style.FAINT, **INSIDE),
+        *(style.key(name, marker=MARKERS[name], **point) for name in TARGETS),
+        *(touching if (table["element"] == CONTACT).any() else ()),
+    ]

@@ -1,21 +1,23 @@
 """Precision against the value at which a search stops (Lavoie & Boudreau 2001, section 6)."""
 
-from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from evoexp.records import FloatArray
 from evoexp.report import style
-from evoexp.report.results import ConditionResults, Results
+from evoexp.report.pages.generic import Values
+from evoexp.report.results import Results
 from evoexp.report.rows import groups
 from evoexp.report.statistics import spread
 
-Values = Callable[[ConditionResults], FloatArray]
-
 ERROR, EFFORT = "position error", "evaluations"
 BESIDE = 0.012  # [-] of the axis by which series are set apart
+NAMES = [
+    *("quantity", "num_generations", "stop_cost", "condition"),
+    *("median", "lower", "upper", "solved", "done"),
+]
 
 
 def stopping_table(results: Results, errors: Values, effort: Values) -> pd.DataFrame:
@@ -30,61 +32,42 @@ def stopping_table(results: Results, errors: Values, effort: Values) -> pd.DataF
         Columns quantity (position error, evaluations), num_generations, stop_cost, condition,
         median, lower, upper (quartiles over all runs), solved, done, length_unit.
     """
-    rows: list[tuple[object, ...]] = []
+    rows = []
     for name, values in ((ERROR, errors), (EFFORT, effort)):
         for c in results.with_data:
             found = spread(values(c))
             given = name, c.planner.ga.num_generations, c.planner.stop_cost_sp2, c.label
             rows.append((*given, found.median, found.lower, found.upper, c.solved, c.done))
-    names = [
-        "quantity",
-        "num_generations",
-        "stop_cost",
-        "condition",
-        "median",
-        "lower",
-        "upper",
-        "solved",
-        "done",
-    ]
-    return pd.DataFrame(rows, columns=names).assign(
-        length_unit=results.with_data[0].condition.length_unit
-    )
+    unit = results.with_data[0].condition.length_unit
+    return pd.DataFrame(rows, columns=NAMES).assign(length_unit=unit)
 
 
 def draw_stopping(table: pd.DataFrame) -> Figure:
-    """Draw medians with quartiles of error and effort against the stopping value.
-
-    One series per generations.
-    """
+    """Draw medians with quartiles of error and effort, one series per limit of generations."""
     figure = style.figure(3.2)
     panels = figure.subplots(1, 2, sharex=True)
-    series = sorted(table["num_generations"].unique())
+    count = table["num_generations"].nunique()
     apart = BESIDE * float(np.ptp(table["stop_cost"]) or 1.0)
     labels = {
-        ERROR: f"position error [{table['length_unit'].iloc[0]}]",
-        EFFORT: "evaluations to a solution [-]",
+        ERROR: ("a  precision", f"position error [{table['length_unit'].iloc[0]}]"),
+        EFFORT: ("b  effort", "evaluations to a solution [-]"),
     }
-    for axes, (quantity, label) in zip(panels, labels.items(), strict=True):
+    for axes, (quantity, (title, label)) in zip(panels, labels.items(), strict=True):
         own = table[table["quantity"] == quantity].replace(np.inf, np.nan)
         for k, (generations, rows) in enumerate(groups(own, "num_generations")):
             rows = rows.sort_values("stop_cost")
-            x = rows["stop_cost"] + apart * (2 * k - len(series) + 1)
-            solved, done = rows["solved"].sum(), rows["done"].sum()
+            x = rows["stop_cost"] + apart * (2 * k - count + 1)
+            solved, done = rows[["solved", "done"]].sum()
             name = (
                 f"at most {int(generations)} generations ({solved} of {done} runs with a solution)"
             )
-            axes.vlines(
-                x, rows["lower"], rows["upper"], color=style.condition_colour(k), linewidth=1.2
-            )
-            look = {"color": style.condition_colour(k), "markersize": 4.5, "linewidth": 1.0}
+            colour = style.condition_colour(k)
+            axes.vlines(x, rows["lower"], rows["upper"], color=colour, linewidth=1.2)
+            look: dict[str, Any] = {"color": colour, "markersize": 4.5, "linewidth": 1.0}
             axes.plot(x, rows["median"], "o-", label=name, **look)
         axes.set_ylim(bottom=0.0)
-        axes.set_ylabel(label)
-        axes.set_xlabel("stopping value of SP2 (objective) [-]")
+        axes.set(xlabel="stopping value of SP2 (objective) [-]", ylabel=label, title=title)
         axes.set_xticks(sorted(table["stop_cost"].unique()))
-    panels[0].set_title("a  precision")
-    panels[1].set_title("b  effort")
     panels[0].invert_xaxis()
     style.legend_below(figure, panels[0], 2)
     return figure

@@ -10,12 +10,12 @@ from scipy.interpolate import CubicSpline
 
 from collision.certifier_scenes import random_motion, random_scene
 from evoexp.collision.certifier.convex_distance import CONVERGED
-from evoexp.collision.certifier.sweep import (
+from evoexp.collision.certifier.local_minima import polish
+from evoexp.collision.certifier.task import (
     Task,
     least_separation,
     move_to,
     pair_distance,
-    polish,
     work_space,
 )
 from evoexp.collision.certifier.verdict import Limits, _Judgement
@@ -32,8 +32,8 @@ def judgement(seed: int) -> _Judgement:
 
 
 def write_bounds(task: Task, begin: float, end: float, bounds: np.ndarray) -> None:
-    scratch = np.empty(len(task.table[0]))
-    approach_bounds(task.table, task.coefficients[0], begin, end, task.weights, bounds, scratch)
+    scratch = np.empty(len(task.chain.parent))
+    approach_bounds(task.chain, task.coefficients[0], begin, end, task.weights, bounds, scratch)
 
 
 @settings(max_examples=150, deadline=None, derandomize=True)
@@ -120,7 +120,7 @@ def test_bounds_of_distances_hold_however_early_they_stop(seed: int, u: float, s
         assert low <= max(exact, 0.0) + 1e-6
         if task.exact[pair] and exact > 0.0:
             cores = (
-                exact + task.bodies[6][task.pairs[pair]].sum()
+                exact + task.bodies.radius[task.pairs[pair]].sum()
             )  # what is swept around them is taken off
             assert exact - 1e-6 <= high <= low + 1e-3 * cores + 1e-5
 

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoexp.numeric.random_stream import Draws, draw, draw_index, draw_many, used_up
+from evoexp.numeric.random_stream import Block, Draws, draw, draw_index, draw_many, used_up
 
 
 def rng() -> np.random.Generator:
@@ -38,7 +38,7 @@ def test_behind_its_end_a_block_gives_zeros_and_says_so() -> None:
 
 
 def test_indices_stay_below_their_count() -> None:
-    block = (
+    block = Block(
         np.array([0.0, 0.5, np.nextafter(1.0, 0.0), np.nextafter(1.0, 0.0)]),
         np.zeros(1, dtype=np.int64),
     )

@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evoexp.numeric.random_stream import used_up
+from evoexp.numeric.random_stream import Block, used_up
 from evoexp.paths.grid_walks import erase_loops, walk, walk_each
 from paths.walked_worlds import POTENTIALS, SEEDS, SHAPES, World, as_path, nodes_of, without_loops
 
@@ -23,7 +23,7 @@ def test_a_single_walk_is_that_of_a_single_walker(
         np.zeros(world.grid.num_nodes + 1, dtype=np.int32),
         np.zeros(world.grid.num_nodes, dtype=np.int32),
     )
-    walk((uniforms, taken), world.moves, world.ends, erase, path, place)
+    walk(Block(uniforms, taken), world.moves, world.ends, erase, path, place)
     trail = world.trail(iter(uniforms[7:].tolist()))
     assert taken[0] == 7 + len(trail) - 1
     assert nodes_of(path) == as_path(trail, erase, world.grid.num_nodes)
@@ -36,7 +36,7 @@ def test_numbers_that_do_not_suffice_are_said() -> None:
         np.zeros(world.grid.num_nodes, dtype=np.int32),
     )
     for taken in (np.array([0]), np.array([5])):
-        draws = np.full(5, 0.5), taken
+        draws = Block(np.full(5, 0.5), taken)
         walk(draws, world.moves, world.ends, True, path, place)
         assert used_up(draws)
 
@@ -52,7 +52,7 @@ def test_walks_one_by_one_are_those_of_a_walker_wherever_blocks_end(
     begin, end, complete, k = 0, 0, 0, 0
     while complete < len(paths):
         end, k = end + blocks[k % len(blocks)], k + 1
-        draws = uniforms[begin:end], np.array([0])
+        draws = Block(uniforms[begin:end], np.array([0]))
         complete = walk_each(draws, world.moves, world.ends, erase, complete, paths, place)
         begin += int(draws[1][0])
     numbers = iter(uniforms.tolist())

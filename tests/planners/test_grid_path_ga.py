@@ -92,7 +92,7 @@ def test_paths_without_a_common_node_are_crossed_where_they_are_near() -> None:
         row[: len(path) + 1] = [len(path), *map(index, path)]
     arrays = [np.zeros(n, dtype=np.int32) for n in (size, 3 * size + 3, size, size, size + 1)]
     scratch = (arrays[0], arrays[1], np.zeros((2, size + 1), dtype=np.int32), *arrays[2:])
-    draws = rng(1).random(64), np.zeros(1, dtype=np.int64)
+    draws = Block(rng(1).random(64), np.zeros(1, dtype=np.int64))
     for reach, crossed in ((0, False), (2, True)):
         done = kernels.cross(
             draws, problem.world, (table[0], table[1]), (True, reach), (table[2], table[3]), scratch

@@ -184,7 +184,7 @@ def test_nothing_is_farther_than_the_reach(name: str) -> None:
     center, far = reach(problem.assembly, problem.limits)
     q = random_postures(problem, 20000)
     poses = np.empty((12, q.shape[1]))
-    frame_poses(problem.assembly.table[:6], *problem.tool, q, poses)
+    frame_poses(problem.assembly.table.chain, *problem.tool, q, poses)
     away = np.linalg.norm(poses[9:].T - center, axis=1)
     assert away.max() <= far + 1e-12
     assert away.max() > 0.5 * far

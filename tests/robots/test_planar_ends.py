@@ -36,7 +36,7 @@ def pinocchio_ends(q: np.ndarray) -> np.ndarray:
 
 def test_link_ends_agree_with_pinocchio(paths: np.ndarray) -> None:
     starts, ends = (np.ascontiguousarray(q).ravel() for q in paths)
-    arm = tuple(planar_arm(ARM.build()))
+    arm = planar_arm(ARM.build())
     x, y = np.empty((2, 4 * LANES))
     for position in (0, 1, 13, NUM_POSITIONS):
         block_ends(starts, ends, arm, position, NUM_POSITIONS, *np.empty((3, LANES)), x, y)
@@ -50,7 +50,7 @@ def test_link_ends_agree_with_pinocchio(paths: np.ndarray) -> None:
 
 def test_the_last_position_is_the_end_to_the_last_bit(paths: np.ndarray) -> None:
     starts, ends = (np.ascontiguousarray(q).ravel() for q in paths)
-    arm = tuple(planar_arm(ARM.build()))
+    arm = planar_arm(ARM.build())
     x, y, u, v = np.empty((4, 4 * LANES))
     block_ends(starts, ends, arm, NUM_POSITIONS, NUM_POSITIONS, *np.empty((3, LANES)), x, y)
     block_ends(ends, ends, arm, 0, 1, *np.empty((3, LANES)), u, v)
@@ -62,7 +62,7 @@ def test_turned_on_directions_agree_with_computed_ones(paths: np.ndarray) -> Non
     """32 turns, after which the kernels begin anew, at 2e-16 each."""
     starts, ends = (np.ascontiguousarray(q).ravel() for q in paths)
     arm, scratch, turn = (
-        tuple(planar_arm(ARM.build())),
+        planar_arm(ARM.build()),
         np.empty((3, LANES)),
         np.empty((4, 3 * LANES)),
     )

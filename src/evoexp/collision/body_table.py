@@ -1,4 +1,4 @@
-"""Bodies as arrays: what the certifier's kernels know of coal's shapes.
+"""The bodies of a scene as arrays, for the certifier's kernels.
 
 Every shape is a core, swept by a ball: a sphere is a point and a radius, a capsule a segment and a
 radius. The core is given by its support function (the farthest point in a direction), see
@@ -12,26 +12,19 @@ import coal
 import numpy as np
 
 from evoexp.errors import EvoexpError
-from evoexp.records import FloatArray
+from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.kinematics import KinematicTable
 
 SEGMENT, BOX, CYLINDER, CONE, ELLIPSOID, HULL, HALF_SPACE = range(7)
-"""Cores: a segment along z, of length 0 for a point, ….
-
-A half-space holds all points with z ≤ 0.
-"""
+"""Kinds of cores. A segment lies along z, of length 0 for a point; a half-space holds z ≤ 0."""
 
 FLAT_TOLERANCE = 1e-10
-"""[-] of the scene's size: where coal's distances are closed forms.
-
-Or end after finitely many steps (err ≤ 1e-13).
-"""
+"""[-] of the scene's size, for pairs of which coal's distance is a closed form or ends after
+finitely many steps (its error is ≤ 1e-13)."""
 
 ROUND_TOLERANCE = 1e-6
-"""[-] of the scene's size: where coal approaches a curved surface by steps.
-
-Errors up to 4e-8 were seen.
-"""
+"""[-] of the scene's size, for pairs of which coal approaches a curved surface by steps (errors up
+to 4e-8 were seen)."""
 
 
 class UnsupportedShape(EvoexpError):
@@ -60,23 +53,25 @@ class BodyTable(NamedTuple):
             half-spaces.
     """
 
-    joint: np.ndarray
-    kind: np.ndarray
-    exact: np.ndarray
+    joint: IntArray
+    kind: IntArray
+    exact: BoolArray
     rotation: FloatArray
     translation: FloatArray
     size: FloatArray
     radius: FloatArray
-    corners: np.ndarray
+    corners: IntArray
     corner_points: FloatArray
     from_origin: FloatArray
     from_axis: FloatArray
     ball: FloatArray
 
     def tolerance(self, one: int, two: int) -> float:
-        """Return the distance, relative to the scene's size.
+        """Return the distance at which two bodies count as touching, as a part of the scene's size.
 
-        That counts as contact of two bodies.
+        Args:
+            one: Index of a body.
+            two: Index of the other.
         """
         flat = all(
             self.exact[k] and self.kind[k] in (SEGMENT, BOX, HULL, HALF_SPACE) for k in (one, two)
@@ -102,6 +97,10 @@ class _Core(NamedTuple):
 
 def body_table(table: KinematicTable, items: list[Any]) -> BodyTable:
     """Return geometry objects as arrays.
+
+    Args:
+        table: The kinematic table of the model.
+        items: Each a `pin.GeometryObject`.
 
     Raises:
         UnsupportedShape: If a shape is neither convex nor a mesh, or a half-space moves.
@@ -148,7 +147,7 @@ def body_table(table: KinematicTable, items: list[Any]) -> BodyTable:
 
 
 def _core(item: Any) -> tuple[_Core, FloatArray, FloatArray]:
-    """Return a geometry object's core, and its frame in the joint's."""
+    """Return a geometry object's core, and the core's rotation and origin in the joint's frame."""
     shape, placement = item.geometry, item.placement
     rotation, translation = np.array(placement.rotation), np.array(placement.translation)
     swept = float(shape.getSweptSphereRadius()) if isinstance(shape, coal.ShapeBase) else 0.0

@@ -1,20 +1,35 @@
 """Uniform numbers in blocks, for kernels that cannot say before how many they take.
 
-In a kernel, `draws` is a block: its numbers and, as an array of one, how many were taken. Asked for
-more than it has, it gives zeros: whatever was made with them is to be made again from the same
-place of a longer block. So what is drawn does not depend on where blocks end.
+A block that is asked for more numbers than it has gives zeros, and `used_up` says so: the caller
+then repeats the step that took them, from the same place of a longer block. So the numbers drawn do
+not depend on where blocks end.
 """
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import kernel
+
+
+class Block(NamedTuple):
+    """Uniform numbers, some of them taken.
+
+    Attributes:
+        uniforms: (numbers,) in [0, 1).
+        taken: (1,) how many were asked for since the block begins.
+    """
+
+    uniforms: NDArray[np.float64]
+    taken: NDArray[np.int64]
 
 
 class Draws:
     """The blocks of one run, each drawn when the last one is used up.
 
     Attributes:
-        block: See above; for kernels.
+        block: The block that kernels take numbers of.
     """
 
     def __init__(self, least: int) -> None:
@@ -24,40 +39,40 @@ class Draws:
             least: Numbers that are drawn at once, at least.
         """
         self._least = least
-        self.block = np.empty(0), np.zeros(1, dtype=np.int64)
+        self.block = Block(np.empty(0), np.zeros(1, dtype=np.int64))
 
     def extend(self, rng: np.random.Generator) -> None:
-        """Put new numbers behind those that are left, as many as these at least."""
-        uniforms, taken = self.block
-        left = uniforms[taken[0] :]
-        self.block = np.concatenate([left, rng.random(max(self._least, len(left)))]), taken
-        taken[0] = 0
+        """Put new numbers behind those that are left, at least as many as are left."""
+        left = self.block.uniforms[self.block.taken[0] :]
+        drawn = rng.random(max(self._least, len(left)))
+        self.block = Block(np.concatenate([left, drawn]), self.block.taken)
+        self.block.taken[0] = 0
 
 
 @kernel
-def draw(draws):  # type: ignore[no-untyped-def]
+def draw(draws: Block) -> float:
     """Return the next uniform number of a block; 0 behind its end."""
-    uniforms, taken = draws
+    uniforms, taken = draws.uniforms, draws.taken
     taken[0] += 1
     return uniforms[taken[0] - 1] if taken[0] <= len(uniforms) else 0.0
 
 
 @kernel
-def draw_many(draws, count):  # type: ignore[no-untyped-def]
+def draw_many(draws: Block, count: int) -> NDArray[np.float64]:
     """Return the next uniform numbers of a block as a view; none at all, if not all are there."""
-    uniforms, taken = draws
+    uniforms, taken = draws.uniforms, draws.taken
     first = taken[0]
     taken[0] += count
     return uniforms[first : taken[0]] if taken[0] <= len(uniforms) else uniforms[:0]
 
 
 @kernel
-def draw_index(draws, count):  # type: ignore[no-untyped-def]
+def draw_index(draws: Block, count: int) -> int:
     """Return one of 0 … count − 1."""
     return min(int(draw(draws) * count), count - 1)
 
 
 @kernel
-def used_up(draws):  # type: ignore[no-untyped-def]
+def used_up(draws: Block) -> bool:
     """Return whether more numbers were asked for than the block has."""
-    return draws[1][0] > len(draws[0])
+    return draws.taken[0] > len(draws.uniforms)

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from evoexp.numeric.compilation import kernel
+from evoexp.records import FloatArray
 from evoexp.validation import Component, NonNegative
 
 
@@ -35,7 +36,13 @@ class MotionCriteria(Component):
 
 
 @kernel
-def measure_motions(angles, points, weights, criteria, own):  # type: ignore[no-untyped-def]
+def measure_motions(
+    angles: FloatArray,
+    points: FloatArray,
+    weights: tuple[float, float, float],
+    criteria: FloatArray,
+    own: FloatArray,
+) -> None:
     """C2, C3, C4 of every individual.
 
     Args:

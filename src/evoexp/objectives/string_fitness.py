@@ -66,7 +66,13 @@ class StringFitness(Component):
 
 
 @kernel
-def weigh(weights, lengths, unevenness, collisions, cost):  # type: ignore[no-untyped-def]
+def weigh(
+    weights: tuple[float, float, float],
+    lengths: FloatArray,
+    unevenness: FloatArray,
+    collisions: FloatArray,
+    cost: FloatArray,
+) -> None:
     """The bracket of Eq. 7 for every individual.
 
     Args:
@@ -86,7 +92,9 @@ def weigh(weights, lengths, unevenness, collisions, cost):  # type: ignore[no-un
 
 
 @kernel
-def fill_wheel(fitness_offset, costs, weights):  # type: ignore[no-untyped-def]
+def fill_wheel(
+    fitness_offset: float, costs: FloatArray, weights: tuple[float, float, float]
+) -> None:
     """The kernel of `roulette_weights`, for other kernels."""
     for k in range(len(costs)):
         fitness = fitness_offset - costs[k]
@@ -94,7 +102,7 @@ def fill_wheel(fitness_offset, costs, weights):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def count_collisions(clearance, collisions):  # type: ignore[no-untyped-def]
+def count_collisions(clearance: FloatArray, collisions: FloatArray) -> None:
     """Count the instants at which each individual collides (Eq. 6).
 
     Args:

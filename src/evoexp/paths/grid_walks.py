@@ -9,10 +9,18 @@ import numpy as np
 
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.random_stream import used_up
+from evoexp.records import FloatArray
 
 
 @kernel
-def walk(draws, moves, ends, erase, path, place):  # type: ignore[no-untyped-def]
+def walk(
+    draws: Block,
+    moves: Moves,
+    ends: tuple[int, int],
+    erase: bool,
+    path: NDArray[np.int32],
+    place: NDArray[np.int32],
+) -> None:
     """Write a random path: every step draws one of the permitted moves, weighted toward the target.
 
     A neighbour of potential U has the weight U_max − U + 1, U_max being the greatest among the
@@ -48,7 +56,15 @@ def walk(draws, moves, ends, erase, path, place):  # type: ignore[no-untyped-def
 
 
 @kernel
-def walk_each(draws, moves, ends, erase, first, paths, place):  # type: ignore[no-untyped-def]
+def walk_each(
+    draws: Block,
+    moves: Moves,
+    ends: tuple[int, int],
+    erase: bool,
+    first: int,
+    paths: NDArray[np.int32],
+    place: NDArray[np.int32],
+) -> int:
     """Write random paths between the same nodes, one after the other, each as `walk` does.
 
     Args:
@@ -71,7 +87,13 @@ def walk_each(draws, moves, ends, erase, first, paths, place):  # type: ignore[n
 
 
 @kernel
-def _next_node(uniform, neighbours, potentials, steps, node):  # type: ignore[no-untyped-def]
+def _next_node(
+    uniform: float,
+    neighbours: NDArray[np.int32],
+    potentials: FloatArray,
+    steps: NDArray[np.int32],
+    node: int,
+) -> int:
     """Choose one of a node's neighbours by a uniform number; the node itself if it has none.
 
     All moves are looked at, without a branch: which ones are permitted or chosen no processor can
@@ -96,7 +118,9 @@ def _next_node(uniform, neighbours, potentials, steps, node):  # type: ignore[no
 
 
 @kernel
-def erase_loops(nodes, count, path, place):  # type: ignore[no-untyped-def]
+def erase_loops(
+    nodes: NDArray[np.int32], count: int, path: NDArray[np.int32], place: NDArray[np.int32]
+) -> None:
     """Write a path without its loops.
 
     Wherever it comes back to a node, what lies between is left out.
@@ -113,7 +137,9 @@ def erase_loops(nodes, count, path, place):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _leap(nodes, count, path, place):  # type: ignore[no-untyped-def]
+def _leap(
+    nodes: NDArray[np.int32], count: int, path: NDArray[np.int32], place: NDArray[np.int32]
+) -> None:
     """Write a path without its loops, by the last place of every node.
 
     From there it never comes back.
@@ -128,7 +154,13 @@ def _leap(nodes, count, path, place):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _write(trail, count, erase, path, place):  # type: ignore[no-untyped-def]
+def _write(
+    trail: NDArray[np.int32],
+    count: int,
+    erase: bool,
+    path: NDArray[np.int32],
+    place: NDArray[np.int32],
+) -> None:
     """Write a walk of `count` nodes as a path; `place` tells the last place of every node."""
     if erase:
         _leap(trail, count, path, place)
@@ -144,7 +176,9 @@ def _write(trail, count, erase, path, place):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def measure_path(path, kinds, unsafeness):  # type: ignore[no-untyped-def]
+def measure_path(
+    path: NDArray[np.int32], kinds: NDArray[np.int64], unsafeness: FloatArray
+) -> tuple[float, float]:
     """Return length and mean unsafeness of a path (Chen & Zalzala 1995, Eqs. 2 and 3).
 
     Moves of each kind are counted, so the length does not depend on their order.

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from evoexp.numeric.compilation import kernel
+from evoexp.records import IntArray
 
 UNREACHED = -1
 
@@ -142,7 +143,13 @@ def front(of: Grid, sources: np.ndarray, neighbourhood: int) -> np.ndarray:
 
 
 @kernel
-def spread_front(neighbours, num_moves, sources, steps, queue):  # type: ignore[no-untyped-def]
+def spread_front(
+    neighbours: NDArray[np.int32],
+    num_moves: int,
+    sources: IntArray,
+    steps: NDArray[np.int32],
+    queue: NDArray[np.int32],
+) -> None:
     """The kernel of `front`, for other kernels.
 
     Args:

@@ -4,7 +4,7 @@ import numpy as np
 
 from evoexp.numeric.compilation import kernel
 from evoexp.paths.layout import check_arm_slices
-from evoexp.records import FloatArray
+from evoexp.records import FloatArray, IntArray
 
 
 def path_lengths(
@@ -31,7 +31,9 @@ def path_lengths(
 
 
 @kernel
-def measure_paths(via_points, arm_slices, lengths, unevenness):  # type: ignore[no-untyped-def]
+def measure_paths(
+    via_points: FloatArray, arm_slices: IntArray, lengths: FloatArray, unevenness: FloatArray
+) -> None:
     """The kernel of `path_lengths`, for other kernels."""
     num, lanes = via_points.shape[1] - 1, via_points.shape[2]
     steps = np.empty((num, lanes))

@@ -162,7 +162,7 @@ def top_speeds(motion: Motion) -> FloatArray:
 
 
 @kernel
-def speed_bound(coefficients, joint, begin, end):  # type: ignore[no-untyped-def]
+def speed_bound(coefficients: FloatArray, joint: int, begin: float, end: float) -> float:
     """Greatest |dq/du| of a joint on [begin, end] of a segment with `coefficients` (4, nq).
 
     Or more.

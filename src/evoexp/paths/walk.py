@@ -7,7 +7,7 @@ import numpy as np
 
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import sincos
-from evoexp.records import FloatArray
+from evoexp.records import FloatArray, IntArray
 
 
 def num_uniforms(arm_slices: np.ndarray, num_via_points: int) -> int:
@@ -58,7 +58,16 @@ def walk(
 
 
 @kernel
-def walk_strings(via_points, lanes, uniforms, start, goal, arm_slices, step, max_turn):  # type: ignore[no-untyped-def]
+def walk_strings(
+    via_points: FloatArray,
+    lanes: IntArray,
+    uniforms: FloatArray,
+    start: FloatArray,
+    goal: FloatArray,
+    arm_slices: IntArray,
+    step: float,
+    max_turn: float,
+) -> bool:
     """The kernel of `walk`, for other kernels.
 
     Returns false, and writes nothing, if the arrays do not fit.
@@ -100,7 +109,15 @@ def walk_strings(via_points, lanes, uniforms, start, goal, arm_slices, step, max
 
 
 @kernel
-def _turn(direction, first, stop, uniforms, s, taken, max_turn):  # type: ignore[no-untyped-def]
+def _turn(
+    direction: FloatArray,
+    first: int,
+    stop: int,
+    uniforms: FloatArray,
+    s: int,
+    taken: int,
+    max_turn: float,
+) -> float:
     """Turn the hyperspherical angles of a direction, the azimuth first.
 
     Return what scales it to a unit vector.

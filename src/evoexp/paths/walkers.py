@@ -85,7 +85,14 @@ class Walkers:
 
 
 @kernel
-def _go(words, choices, ends, erase, state, paths):  # type: ignore[no-untyped-def]
+def _go(
+    words: NDArray[np.uint64],
+    choices: Choices,
+    ends: tuple[int, int],
+    erase: bool,
+    state: State,
+    paths: NDArray[np.int32],
+) -> int:
     """The kernel of `Walkers`.
 
     Loops are erased where they close, in `trails`; of a node that a trail passes, `places` knows
@@ -127,7 +134,9 @@ def _go(words, choices, ends, erase, state, paths):  # type: ignore[no-untyped-d
 
 
 @kernel
-def _look_at(walker, ends, erase, state, paths):  # type: ignore[no-untyped-def]
+def _look_at(
+    walker: int, ends: tuple[int, int], erase: bool, state: State, paths: NDArray[np.int32]
+) -> None:
     """Have a walker who has arrived begin the next path.
 
     And one whose trail is full erase its loops.

@@ -19,12 +19,12 @@ import pinocchio as pin
 from evoexp.errors import EvoexpError
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import sincos
-from evoexp.records import FloatArray
+from evoexp.records import BoolArray, FloatArray, IntArray
 
 BLOCK = 64
 """Configurations that a kernel carries through all its steps at once.
 
-Its scratch stays in the first-level cache.
+The scratch of so many stays in the first-level cache.
 """
 
 U = np.uint64
@@ -40,8 +40,8 @@ class UnsupportedJoint(EvoexpError):
     """A joint that the kinematic table cannot represent."""
 
 
-class KinematicTable(NamedTuple):
-    """Joints in the order of the model, without the universe; parents come before their children.
+class KinematicChain(NamedTuple):
+    """The part of a kinematic table that kernels read.
 
     Attributes:
         parent: (joints,) index into the table, −1 for the world.
@@ -50,24 +50,54 @@ class KinematicTable(NamedTuple):
             about it.
         turned: (joints,) true where the placement's rotation is not the identity.
         rotation: (joints, 9) placement in the parent's frame, row by row.
-        translation: (joints, 3).
+        translation: (joints, 3) [length unit].
+    """
+
+    parent: IntArray
+    index_q: IntArray
+    prismatic: BoolArray
+    turned: BoolArray
+    rotation: FloatArray
+    translation: FloatArray
+
+
+class KinematicTable(NamedTuple):
+    """Joints in the order of the model, without the universe; parents come before their children.
+
+    Attributes:
+        parent: See `KinematicChain`, as for the next five.
+        index_q: See there.
+        prismatic: See there.
+        turned: See there.
+        rotation: See there.
+        translation: See there.
         alignment: (joints, 3, 3) from the table's frame of a joint to Pinocchio's: columns are the
             table's axes.
         planar: Whether every joint turns about the world's z, so that everything moves in parallel
             planes.
     """
 
-    parent: np.ndarray
-    index_q: np.ndarray
-    prismatic: np.ndarray
-    turned: np.ndarray
+    parent: IntArray
+    index_q: IntArray
+    prismatic: BoolArray
+    turned: BoolArray
     rotation: FloatArray
     translation: FloatArray
     alignment: FloatArray
     planar: bool
 
+    @property
+    def chain(self) -> KinematicChain:
+        """The six arrays that kernels read."""
+        return KinematicChain(*self[:6])
+
     def local(self, joint: int, point: FloatArray) -> FloatArray:
-        """Return a point of Pinocchio's frame of joint `joint` (≥ 1) in the table's frame of it."""
+        """Express a point, given in Pinocchio's frame of a joint, in the table's frame of it.
+
+        Args:
+            joint: Pinocchio's index of the joint, at least 1.
+            point: (3,) [length unit].
+        """
         return np.asarray(self.alignment[joint - 1].T @ point)
 
 
@@ -123,33 +153,36 @@ def forward_kinematics(table: KinematicTable, q: FloatArray) -> tuple[FloatArray
         raise ValueError(f"q must have shape ({num_joints}, configurations), was {q.shape}")
     rotations = np.empty((num_joints, 9, q.shape[1]))
     origins = np.empty((num_joints, 3, q.shape[1]))
-    _forward_kinematics(*table[:6], q, rotations, origins)
+    _forward_kinematics(table.chain, q, rotations, origins)
     return rotations.reshape(num_joints, 3, 3, -1), origins
 
 
 @kernel
-def _forward_kinematics(  # type: ignore[no-untyped-def]
-    parent, index_q, prismatic, turned, rotation, translation, q, rotations, origins
-):
-    num_joints, total = len(parent), q.shape[1]
+def _forward_kinematics(
+    chain: KinematicChain, q: FloatArray, rotations: FloatArray, origins: FloatArray
+) -> None:
+    num_joints, total = len(chain.parent), q.shape[1]
     block_q = np.zeros(q.shape[0] * BLOCK)
     frames, scratch = np.empty(num_joints * SPATIAL_ROWS * BLOCK), np.empty(SPATIAL_ROWS * BLOCK)
     by_row = frames.reshape((num_joints, SPATIAL_ROWS, BLOCK))
     for first in range(0, total, BLOCK):
         count = min(BLOCK, total - first)
         load_block(q, first, count, 1.0, block_q)
-        block_frames(
-            parent, index_q, prismatic, turned, rotation, translation, block_q, frames, scratch
-        )
+        block_frames(chain, block_q, frames, scratch)
         rotations[:, :, first : first + count] = by_row[:, :9, :count]
         origins[:, :, first : first + count] = by_row[:, 9:, :count]
 
 
 @kernel
-def load_block(q, first, count, unit, out):  # type: ignore[no-untyped-def]
-    """Copy `count` configurations of q.
+def load_block(q: FloatArray, first: int, count: int, unit: float, out: FloatArray) -> None:
+    """Copy some configurations to a block.
 
-    Nq, configurations) from `first` on, times a unit, to a block (nq · BLOCK,.
+    Args:
+        q: (nq, configurations).
+        first: The configuration to begin with.
+        count: How many are copied, at most `BLOCK`.
+        unit: Factor of every coordinate.
+        out: (nq · BLOCK,), written.
     """
     for k in range(q.shape[0]):
         row = U(k) * U(BLOCK)
@@ -158,26 +191,25 @@ def load_block(q, first, count, unit, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def block_frames(  # type: ignore[no-untyped-def]
-    parent, index_q, prismatic, turned, rotation, translation, q, frames, scratch
-):
-    """Frames of all joints for one block of configurations.
+def block_frames(
+    chain: KinematicChain, q: FloatArray, frames: FloatArray, scratch: FloatArray
+) -> None:
+    """Compute the frames of all joints for one block of configurations.
 
     Args:
-        parent: Of the table, as the next five.
-        index_q: See `KinematicTable`.
-        prismatic: See `KinematicTable`.
-        turned: See `KinematicTable`.
-        rotation: See `KinematicTable`.
-        translation: See `KinematicTable`.
-        q: (nq · BLOCK,).
+        chain: The joints.
+        q: (nq · BLOCK,) [rad], lengths for prismatic joints.
         frames: (joints · SPATIAL_ROWS · BLOCK,), written: the rotation row by row, then the origin.
         scratch: (SPATIAL_ROWS · BLOCK,): the placed frame before the joint moves.
     """
-    for k in range(len(parent)):
-        own, row = U(k) * U(SPATIAL_ROWS * BLOCK), U(index_q[k]) * U(BLOCK)
-        _place(parent[k], turned[k], rotation[k], translation[k], frames, scratch)
-        if prismatic[k]:
+    for k in range(len(chain.parent)):
+        own, row = U(k) * U(SPATIAL_ROWS * BLOCK), U(chain.index_q[k]) * U(BLOCK)
+        # the frame where the joint stands at 0
+        _place(
+            chain.parent[k], chain.turned[k], chain.rotation[k], chain.translation[k], frames,
+            scratch,
+        )  # fmt: skip
+        if chain.prismatic[k]:  # the same rotation, the origin moved along z
             for n in range(9 * BLOCK):
                 frames[own + U(n)] = scratch[U(n)]
             for e in range(3):
@@ -185,16 +217,13 @@ def block_frames(  # type: ignore[no-untyped-def]
                 for n in range(BLOCK):
                     lane = U(n)
                     frames[own + o + lane] = scratch[o + lane] + scratch[z + lane] * q[row + lane]
-        else:
+        else:  # x and y turned about z, the same origin
             for n in range(BLOCK):
                 lane = U(n)
                 s, c = sincos(q[row + lane])
                 for e in range(3):
-                    x, y, z = (
-                        U(3 * e * BLOCK) + lane,
-                        U((3 * e + 1) * BLOCK) + lane,
-                        U((3 * e + 2) * BLOCK) + lane,
-                    )
+                    x, y = U(3 * e * BLOCK) + lane, U((3 * e + 1) * BLOCK) + lane
+                    z = U((3 * e + 2) * BLOCK) + lane
                     frames[own + x] = scratch[x] * c + scratch[y] * s
                     frames[own + y] = scratch[y] * c - scratch[x] * s
                     frames[own + z] = scratch[z]
@@ -204,9 +233,16 @@ def block_frames(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _place(parent, turned, rotation, translation, frames, placed):  # type: ignore[no-untyped-def]
-    """A joint's frame before it moves: its placement behind its parent's frame."""
-    if parent < 0:
+def _place(
+    parent: int,
+    turned: bool,
+    rotation: FloatArray,
+    translation: FloatArray,
+    frames: FloatArray,
+    placed: FloatArray,
+) -> None:
+    """Compute a joint's frame before it moves: its placement behind its parent's frame."""
+    if parent < 0:  # the placement itself
         for e in range(9):
             placed[e * BLOCK : (e + 1) * BLOCK] = rotation[e]
         for e in range(3):
@@ -217,11 +253,13 @@ def _place(parent, turned, rotation, translation, frames, placed):  # type: igno
     for e in range(3):
         x, o = before + U(3 * e * BLOCK), U((9 + e) * BLOCK)
         y, z = x + U(BLOCK), x + U(2 * BLOCK)
+        # origin
         for n in range(BLOCK):
             lane = U(n)
             placed[o + lane] = frames[before + o + lane] + (
                 frames[x + lane] * dx + frames[y + lane] * dy + frames[z + lane] * dz
             )
+        # row e of the rotation
         for column in range(3):
             c = U((3 * e + column) * BLOCK)
             if turned:
@@ -237,23 +275,20 @@ def _place(parent, turned, rotation, translation, frames, placed):  # type: igno
 
 
 @kernel
-def block_planar_frames(parent, index_q, rotation, translation, q, frames):  # type: ignore[no-untyped-def]
-    """The same for planar tables, where every frame is a turn about z and a point of the plane.
+def block_planar_frames(chain: KinematicChain, q: FloatArray, frames: FloatArray) -> None:
+    """Compute the frames of a planar table, each a turn about z and a point of the plane.
 
     Args:
-        parent: Of the table, as the next three.
-        index_q: See `KinematicTable`.
-        rotation: See `KinematicTable`.
-        translation: See `KinematicTable`.
-        q: (nq · BLOCK,).
+        chain: The joints.
+        q: (nq · BLOCK,) [rad].
         frames: (joints · PLANAR_ROWS · BLOCK,), written: sine and cosine of the angle from the
             world's x axis, x, y.
     """
-    for k in range(len(parent)):
-        own, row = U(k) * U(PLANAR_ROWS * BLOCK), U(index_q[k]) * U(BLOCK)
-        dx, dy = translation[k, 0], translation[k, 1]
-        c0, s0 = rotation[k, 0], rotation[k, 3]
-        if parent[k] < 0:
+    for k in range(len(chain.parent)):
+        own, row = U(k) * U(PLANAR_ROWS * BLOCK), U(chain.index_q[k]) * U(BLOCK)
+        dx, dy = chain.translation[k, 0], chain.translation[k, 1]
+        c0, s0 = chain.rotation[k, 0], chain.rotation[k, 3]
+        if chain.parent[k] < 0:  # a joint on the ground
             for n in range(BLOCK):
                 lane = U(n)
                 s, c = sincos(q[row + lane])
@@ -263,7 +298,8 @@ def block_planar_frames(parent, index_q, rotation, translation, q, frames):  # t
                 frames[own + U(2 * BLOCK) + U(n)] = dx
                 frames[own + U(3 * BLOCK) + U(n)] = dy
         else:
-            before = U(parent[k]) * U(PLANAR_ROWS * BLOCK)
+            before = U(chain.parent[k]) * U(PLANAR_ROWS * BLOCK)
+            # angles add up
             for n in range(BLOCK):
                 lane = U(n)
                 s, c = sincos(q[row + lane])
@@ -271,6 +307,7 @@ def block_planar_frames(parent, index_q, rotation, translation, q, frames):  # t
                 sb, cb = frames[before + lane], frames[before + U(BLOCK) + lane]
                 frames[own + lane] = sb * c1 + cb * s1
                 frames[own + U(BLOCK) + lane] = cb * c1 - sb * s1
+            # the origin stands in the parent's frame
             for n in range(BLOCK):
                 lane = U(n)
                 sb, cb = frames[before + lane], frames[before + U(BLOCK) + lane]
@@ -280,7 +317,11 @@ def block_planar_frames(parent, index_q, rotation, translation, q, frames):  # t
 
 
 def _axis(model: Any, data: Any, neutral: FloatArray, joint: int) -> tuple[FloatArray, bool]:
-    """Return a joint's axis in its own frame, and whether it slides."""
+    """Return a joint's axis in its own frame, and whether it slides.
+
+    Raises:
+        UnsupportedJoint: If it has not exactly one coordinate, or turns and slides at once.
+    """
     name = model.names[joint]
     if model.nqs[joint] != 1 or model.nvs[joint] != 1:
         kind = model.joints[joint].shortname()
@@ -288,9 +329,8 @@ def _axis(model: Any, data: Any, neutral: FloatArray, joint: int) -> tuple[Float
             f"robot: joint '{name}' ({kind}) must have one coordinate, has {model.nqs[joint]}"
         )
     jacobian = pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.LOCAL)
-    jacobian = np.reshape(jacobian, (6, -1))[
-        :, model.idx_vs[joint]
-    ]  # one joint alone comes as a vector
+    # one joint alone comes as a vector
+    jacobian = np.reshape(jacobian, (6, -1))[:, model.idx_vs[joint]]
     linear, angular = jacobian[:3], jacobian[3:]
     slides = bool(np.linalg.norm(angular) < 0.5)
     if not slides and np.linalg.norm(linear) > 1e-12:

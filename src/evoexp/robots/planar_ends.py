@@ -1,6 +1,6 @@
-"""Where the link ends of one planar arm are along straight joint-space paths.
+"""Link ends of a planar arm along straight joint-space paths, for whole populations.
 
-For whole populations.
+Eq. 3 below is that of Lavoie & Boudreau 2001: position j of M is `start + j/M (end − start)`.
 """
 
 from typing import NamedTuple
@@ -10,7 +10,7 @@ import numpy as np
 from evoexp.errors import SettingError
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import atan2, sincos
-from evoexp.records import FloatArray
+from evoexp.records import FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.kinematics import U
 
@@ -34,10 +34,10 @@ class PlanarArm(NamedTuple):
 
 
 def planar_arm(assembly: Assembly) -> PlanarArm:
-    """Return a built robot as a planar arm.
+    """Return the lengths and the base of a built robot that is one planar arm.
 
     Raises:
-        SettingError: If it is none.
+        SettingError: If it is another robot.
     """
     table, links = assembly.table, assembly.links
     straight = all(not link.start.any() and not link.end[1:].any() for link in links)
@@ -58,13 +58,24 @@ def planar_arm(assembly: Assembly) -> PlanarArm:
 
 
 @kernel
-def block_ends(starts, ends, arm, position, num_positions, angle, at_x, at_y, x, y):  # type: ignore[no-untyped-def]
+def block_ends(
+    starts: FloatArray,
+    ends: FloatArray,
+    arm: PlanarArm,
+    position: int,
+    num_positions: int,
+    angle: FloatArray,
+    at_x: FloatArray,
+    at_y: FloatArray,
+    x: FloatArray,
+    y: FloatArray,
+) -> None:
     """Write the base and the link ends of a block at one position, rows 0 … N of `LANES`.
 
     Args:
         starts: (N × LANES) joint angles [rad].
         ends: (N × LANES).
-        arm: (N,) link lengths; base x, base y, direction of the first link at angle 0 [rad].
+        arm: The arm.
         position: j of Eq. 3; at j = M the end itself is taken, without any rounding.
         num_positions: M.
         angle: (LANES,) scratch: running sums are kept apart from what is written, or the loop stays
@@ -74,12 +85,11 @@ def block_ends(starts, ends, arm, position, num_positions, angle, at_x, at_y, x,
         x: ((N + 1) × LANES) written.
         y: Likewise.
     """
-    lengths, base_x, base_y, base_angle = arm
     share, last = position / num_positions, position == num_positions
-    angle[:], at_x[:], at_y[:] = base_angle, base_x, base_y
-    x[:LANES], y[:LANES] = base_x, base_y
-    for k in range(len(lengths)):
-        row, length = U(k) * U(LANES), lengths[k]
+    angle[:], at_x[:], at_y[:] = arm.base_angle, arm.base_x, arm.base_y
+    x[:LANES], y[:LANES] = arm.base_x, arm.base_y
+    for k in range(len(arm.lengths)):
+        row, length = U(k) * U(LANES), arm.lengths[k]
         for n in range(LANES):
             lane, to = U(n), row + U(LANES) + U(n)
             begin, end = starts[row + lane], ends[row + lane]
@@ -91,10 +101,17 @@ def block_ends(starts, ends, arm, position, num_positions, angle, at_x, at_y, x,
 
 
 @kernel
-def begin_turning(starts, ends, arm, position, num_positions, angle, step, turn):  # type: ignore[no-untyped-def]
-    """Write directions of the links at one position.
-
-    And how they turn from one position to the next.
+def begin_turning(
+    starts: FloatArray,
+    ends: FloatArray,
+    arm: PlanarArm,
+    position: int,
+    num_positions: int,
+    angle: FloatArray,
+    step: FloatArray,
+    turn: FloatArray,
+) -> None:
+    """Write the directions of the links at one position, and their turns to the next.
 
     Args:
         starts: (N × LANES) joint angles [rad].
@@ -107,15 +124,10 @@ def begin_turning(starts, ends, arm, position, num_positions, angle, step, turn)
         turn: (4, N × LANES) written: sine and cosine of every link's direction, and of its turn per
             position.
     """
-    share, sine, cosine, turn_sine, turn_cosine = (
-        position / num_positions,
-        turn[0],
-        turn[1],
-        turn[2],
-        turn[3],
-    )
-    angle[:], step[:] = arm[3], 0.0
-    for k in range(len(arm[0])):
+    sine, cosine, turn_sine, turn_cosine = turn[0], turn[1], turn[2], turn[3]
+    share = position / num_positions
+    angle[:], step[:] = arm.base_angle, 0.0
+    for k in range(len(arm.lengths)):
         for n in range(LANES):
             lane, place = U(n), U(k) * U(LANES) + U(n)
             begin, way = starts[place], ends[place] - starts[place]
@@ -126,13 +138,18 @@ def begin_turning(starts, ends, arm, position, num_positions, angle, step, turn)
 
 
 @kernel
-def turned_ends(arm, at_x, at_y, turn, x, y):  # type: ignore[no-untyped-def]
-    """Turn all links on by one position and write their ends.
+def turned_ends(
+    arm: PlanarArm,
+    at_x: FloatArray,
+    at_y: FloatArray,
+    turn: FloatArray,
+    x: FloatArray,
+    y: FloatArray,
+) -> None:
+    """Turn all links on by one position and write their ends, as `block_ends`, without sines.
 
-    As `block_ends` does but without sines.
-
-    Every turn adds some 2e-16 to the error of a direction; whoever takes many of them begins anew
-    now and then.
+    Every turn adds some 2e-16 to the error of a direction, so callers begin anew by
+    `begin_turning` now and then.
 
     Args:
         arm: See `block_ends`.
@@ -142,14 +159,14 @@ def turned_ends(arm, at_x, at_y, turn, x, y):  # type: ignore[no-untyped-def]
         x: ((N + 1) × LANES) written but for the base.
         y: Likewise.
     """
-    lengths, base_x, base_y, _ = arm
     sine, cosine, turn_sine, turn_cosine = turn[0], turn[1], turn[2], turn[3]
-    at_x[:], at_y[:] = base_x, base_y
-    x[:LANES], y[:LANES] = base_x, base_y
-    for k in range(len(lengths)):
-        row, length = U(k) * U(LANES), lengths[k]
+    at_x[:], at_y[:] = arm.base_x, arm.base_y
+    x[:LANES], y[:LANES] = arm.base_x, arm.base_y
+    for k in range(len(arm.lengths)):
+        row, length = U(k) * U(LANES), arm.lengths[k]
         for n in range(LANES):
             lane, place, to = U(n), row + U(n), row + U(LANES) + U(n)
+            # the angle-sum formulas
             s, c, u, v = sine[place], cosine[place], turn_sine[place], turn_cosine[place]
             next_s, next_c = s * v + c * u, c * v - s * u
             tip_x, tip_y = at_x[lane] + length * next_c, at_y[lane] + length * next_s
@@ -158,8 +175,8 @@ def turned_ends(arm, at_x, at_y, turn, x, y):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def load_lanes(q, lanes, first, count, block):  # type: ignore[no-untyped-def]
-    """Gather a block of individuals (N × LANES); what is missing is filled with the last one.
+def load_lanes(q: FloatArray, lanes: IntArray, first: int, count: int, block: FloatArray) -> None:
+    """Gather a block of individuals (N × LANES), and fill it with the last one where too few are.
 
     Args:
         q: (N, individuals).

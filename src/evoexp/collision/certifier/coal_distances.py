@@ -1,6 +1,6 @@
-"""The last word of the certifier.
+"""Distances by coal at Pinocchio's placements, which decide every verdict.
 
-Distances of coal at Pinocchio's placements, and what is settled by them alone.
+Besides the distances: searches that use nothing else.
 """
 
 import threading
@@ -15,10 +15,8 @@ from evoexp.errors import EvoexpError
 from evoexp.paths.motion import Motion
 
 GJK_TOLERANCE = 1e-9
-"""[-] relative: the tightest that coal keeps with all shapes.
-
-At 1e-12 some distances of ellipsoids were 1e-2 wrong.
-"""
+"""[-] relative: the tightest that coal keeps with all shapes (at 1e-12 some distances of ellipsoids
+were 1e-2 wrong)."""
 
 GJK_ITERATIONS = 1000
 
@@ -28,13 +26,16 @@ TINY = 1e-300  # in place of a speed of 0
 
 
 class QueryLimit(EvoexpError):
-    """Coal was asked as often as it may be."""
+    """The limit of coal's queries is used up."""
 
 
 class _Scratch(threading.local):
     """A thread's last `pin.Data`, which takes as long to make as two distances.
 
-    And whose placements it holds.
+    Attributes:
+        model: The model that it belongs to.
+        data: The data.
+        owner: Mark of the `CoalDistance` whose placements it holds.
     """
 
     model: Any = None
@@ -55,10 +56,8 @@ class CoalDistance:
         self._model, self._data, self._token = scene.model, _scratch.data, object()
         self._shapes = scene.shapes
         self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
-        self._request.gjk_tolerance, self._request.gjk_max_iterations = (
-            GJK_TOLERANCE,
-            GJK_ITERATIONS,
-        )
+        self._request.gjk_tolerance = GJK_TOLERANCE
+        self._request.gjk_max_iterations = GJK_ITERATIONS
         self._t = np.nan
 
     def __call__(self, pair: int, t: float) -> float:
@@ -84,9 +83,7 @@ class CoalDistance:
 
 
 def first_contact(distance: CoalDistance, pair: int, t: float, level: float) -> float | None:
-    """Return the instant near t from which on a pair's distance is at or below a level.
-
-    To `TIME_RESOLUTION`.
+    """Find the instant near t from which on a pair's distance is at or below a level.
 
     Args:
         distance: Coal's.
@@ -95,8 +92,9 @@ def first_contact(distance: CoalDistance, pair: int, t: float, level: float) -> 
         level: The distance.
 
     Returns:
-        None if coal sees no such distance there.
+        The instant up to `TIME_RESOLUTION`; None if coal sees no such distance there.
     """
+    # forward from t until coal sees contact, too
     last = float(distance.motion.num_segments)
     touching, step = t, TIME_RESOLUTION
     while distance(pair, touching) > level:
@@ -104,12 +102,14 @@ def first_contact(distance: CoalDistance, pair: int, t: float, level: float) -> 
         step *= 10.0
         if step > 1e-4:
             return None
+    # backward until the pair is free
     free, step = touching, 16.0 * TIME_RESOLUTION
     while free > 0.0 and distance(pair, free) <= level:
         free, touching = max(touching - step, 0.0), free
         step *= 16.0
     if free == 0.0 and distance(pair, 0.0) <= level:
         return 0.0
+    # bisection
     while touching - free > TIME_RESOLUTION:
         middle = 0.5 * (free + touching)
         if distance(pair, middle) <= level:
@@ -120,7 +120,7 @@ def first_contact(distance: CoalDistance, pair: int, t: float, level: float) -> 
 
 
 def walk_down(distance: CoalDistance, pair: int, t: float, step: float) -> tuple[float, float]:
-    """Return t and distance of a local minimum near t, by steps that are halved down to 1e-9."""
+    """Return t and distance of a local minimum near t, by steps halved down to 1e-9 segments."""
     last, best = float(distance.motion.num_segments), distance(pair, t)
     while step > 1e-9:
         for tried in (max(t - step, 0.0), min(t + step, last)):
@@ -134,11 +134,11 @@ def walk_down(distance: CoalDistance, pair: int, t: float, step: float) -> tuple
 
 
 class Leaf(NamedTuple):
-    """What coal found on an interval of one pair.
+    """Coal's findings on an interval for one pair.
 
     Attributes:
-        least: Least distance.
-        at: Its t.
+        least: Least distance [length unit].
+        at: t of it.
         first: t of the first distance at or below the level; inf if none.
         proven: Lower bound before `first`.
     """
@@ -156,16 +156,17 @@ def search_interval(
     speed: float,
     goals: "LeafGoals",
 ) -> Leaf:
-    """Search an interval from left to right, where the least distance is possible.
+    """Search an interval from left to right, wherever the least distance is possible.
 
-    Piyavskii 1972, Shubert 1972.
+    Piyavskii 1972 and Shubert 1972: a function whose slope is bounded lies above the cone below
+    every known value.
 
     Args:
         distance: Coal's.
         pair: The pair.
         interval: Its begin and end, within one segment.
         speed: A bound of |d distance / dt| there.
-        goals: What is to be found out.
+        goals: The distances to be proven or found.
     """
     (begin, end), speed = interval, max(speed, TINY)
     ends = [(begin, distance(pair, begin)), (end, distance(pair, end))]
@@ -191,17 +192,17 @@ def search_interval(
             if d > goals.level:
                 stack.append(((middle, d), (b, d_b)))
             else:
-                stack.clear()  # what comes later does not matter any more
+                stack.clear()  # later intervals do not matter any more
             stack.append(((a, d_a), (middle, d)))
     return Leaf(least, at, np.inf, proven)
 
 
 class LeafGoals(NamedTuple):
-    """What coal shall find out on an interval.
+    """The question that coal answers on an interval.
 
     Attributes:
         goal: Distance that is to be proven at least.
-        level: At or below it a distance is what is looked for.
+        level: The first instant is wanted at which the distance is at or below it.
         slack: Coal's error.
         known: An upper bound of the least distance of the scene.
         resolution: See `Goal`.

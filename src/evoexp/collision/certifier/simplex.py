@@ -3,18 +3,21 @@
 import numpy as np
 
 from evoexp.numeric.compilation import inlined
+from evoexp.records import FloatArray
 
 
 @inlined
-def closest_of_simplex(p, count, out):  # type: ignore[no-untyped-def]
-    """Write the point closest to the origin to `out` and keep the corners that carry it.
-
-    Return their number.
+def closest_of_simplex(p: FloatArray, count: int, out: FloatArray) -> int:
+    """Find the point of a simplex that is closest to the origin, and the corners that carry it.
 
     Args:
-        p: (4, 3) corners.
-        count: How many there are; 4 back means that the origin lies within.
-        out: (3,) written.
+        p: (4, 3) corners; those that carry the point are moved to the front.
+        count: How many corners there are.
+        out: (3,), written: the point.
+
+    Returns:
+        Number of the corners that carry the point; 4 if the origin lies within the simplex, and
+        then nothing is written.
     """
     if count == 1:
         out[0], out[1], out[2] = p[0, 0], p[0, 1], p[0, 2]
@@ -30,6 +33,7 @@ def closest_of_simplex(p, count, out):  # type: ignore[no-untyped-def]
         best, keep = _face(p, 0, 1, 3, best, keep, out)
         best, keep = _face(p, 0, 2, 3, best, keep, out)
         best, keep = _face(p, 1, 2, 3, best, keep, out)
+    # the corners that carry the point to the front
     kept = 0
     for k in range(4):
         if (keep >> k) & 1:
@@ -39,7 +43,9 @@ def closest_of_simplex(p, count, out):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _edge(p, i, j, best, keep, out):  # type: ignore[no-untyped-def]
+def _edge(
+    p: FloatArray, i: int, j: int, best: float, keep: int, out: FloatArray
+) -> tuple[float, int]:
     """Improve the best squared distance, its point and its corners (bits) by those of an edge."""
     ax, ay, az = p[i, 0], p[i, 1], p[i, 2]
     ux, uy, uz = p[j, 0] - ax, p[j, 1] - ay, p[j, 2] - az
@@ -60,14 +66,17 @@ def _edge(p, i, j, best, keep, out):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _face(p, i, j, k, best, keep, out):  # type: ignore[no-untyped-def]
-    """The same by a triangle: its interior if the origin's foot lies there, else its edges."""
+def _face(
+    p: FloatArray, i: int, j: int, k: int, best: float, keep: int, out: FloatArray
+) -> tuple[float, int]:
+    """Improve as `_edge` by a triangle: its interior if the origin's foot is there, or its edges."""
     ax, ay, az, bx, by, bz, cx, cy, cz = (
         p[i, 0], p[i, 1], p[i, 2], p[j, 0], p[j, 1], p[j, 2], p[k, 0], p[k, 1], p[k, 2],
     )  # fmt: skip
     nx, ny, nz = _cross(bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az)
     square = nx * nx + ny * ny + nz * nz
     if square > 0.0:
+        # barycentric coordinates of the origin's foot
         x, y, z = _cross(bx, by, bz, cx, cy, cz)
         u = (nx * x + ny * y + nz * z) / square
         x, y, z = _cross(cx, cy, cz, ax, ay, az)
@@ -87,8 +96,9 @@ def _face(p, i, j, k, best, keep, out):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _within(p):  # type: ignore[no-untyped-def]
-    """Whether the origin lies strictly within the tetrahedron."""
+def _within(p: FloatArray) -> bool:
+    """Return whether the origin lies strictly within the tetrahedron."""
+    # for every face, the corner across it and the origin lie on the same side
     for k in range(4):
         i, j, m = (k + 1) % 4, (k + 2) % 4, (k + 3) % 4
         ax, ay, az = p[i, 0], p[i, 1], p[i, 2]
@@ -103,5 +113,7 @@ def _within(p):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _cross(ax, ay, az, bx, by, bz):  # type: ignore[no-untyped-def]
+def _cross(
+    ax: float, ay: float, az: float, bx: float, by: float, bz: float
+) -> tuple[float, float, float]:
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx

@@ -1,8 +1,8 @@
 """The exact certifier: judges a motion continuously, on exact bodies.
 
-A compiled sweep (`certifier_sweep`) bounds the distances of all pairs over the whole motion. It
-leaves the instants that matter, the first contact or the least clearances, and intervals that its
-own shapes cannot settle; coal settles both, and every distance in a verdict is coal's, at
+A compiled sweep (`certifier.sweep`) bounds the distances of all pairs over the whole motion. It
+names the instants of the first contact or of the least clearances, and the intervals for which its
+own shapes do not suffice; coal settles both, and every distance in a verdict is coal's, at
 Pinocchio's placements.
 """
 
@@ -19,19 +19,13 @@ from evoexp.collision.certifier.coal_distances import (
     search_interval,
     walk_down,
 )
-from evoexp.collision.certifier.sweep import (
-    Goal,
-    Sweep,
-    Task,
-    approach_weights,
-    polish,
-    sweep_motion,
-    work_space,
-)
+from evoexp.collision.certifier.local_minima import polish
+from evoexp.collision.certifier.sweep import Goal, Sweep, sweep_motion
+from evoexp.collision.certifier.task import Task, approach_weights, work_space
 from evoexp.collision.motion_bounds import approach_bounds, moved_by_one
 from evoexp.collision.scene import Scene
 from evoexp.paths.motion import Motion
-from evoexp.records import FloatArray
+from evoexp.records import FloatArray, IntArray
 
 Status = Literal["certified", "refuted", "undecided"]
 
@@ -44,17 +38,17 @@ MAX_POLISHED = 8  # pairs whose local minimum is sought, those with the least di
 
 
 class Verdict(NamedTuple):
-    """What the certifier says of a motion.
+    """The certifier's verdict on a motion.
 
-    T is in instants: 2.5 is half way from instant 2 to instant 3.
+    An instant t may lie between two: 2.5 is half way from instant 2 to instant 3.
 
     Attributes:
-        status: "certified": no two bodies touch, ever; "refuted": two do; "undecided": a limit was
+        status: "certified": no two bodies ever touch; "refuted": two do; "undecided": a limit was
             used up.
-        margin_status: The same of "the clearance is never less than the security margin".
+        margin_status: The same for "the clearance is never less than the security margin".
         clearance: Least distance over the motion [length unit]; 0 where bodies touch, inf without
             pairs.
-        clearance_at: Its t; NaN without pairs.
+        clearance_at: t of it; NaN without pairs.
         clearance_pair: Names of its two bodies; None without pairs.
         refuted_at: t of the first contact; NaN if there is none.
         refuted_pair: Names of its two bodies.
@@ -78,11 +72,11 @@ class Verdict(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """When the certifier gives up.
+    """Numbers after which the certifier gives up.
 
     Attributes:
-        queries: Of coal.
-        intervals: Of the sweep.
+        queries: Distances that coal is asked for.
+        intervals: Intervals that the sweep judges.
     """
 
     queries: int = 100_000
@@ -106,16 +100,16 @@ def certify(
 
     Args:
         scene: The bodies; read only.
-        motion: Its q in the units of the model: radians, lengths.
-        security_margin: Clearance that is asked for [length unit].
+        motion: In the units of the model: radians, lengths.
+        security_margin: Clearance that the task requires [length unit].
         contact_tolerance: A distance at or below it is contact [length unit]; None:
             `Scene.tolerances`.
         resolution: The clearance is proven up to this part of it [-].
-        limits: When to give up.
+        limits: Numbers after which the certifier gives up.
         clock: Returns seconds, for `duration_s`.
 
     Raises:
-        ValueError: If the motion does not fit the model, or a number makes no sense.
+        ValueError: If the motion does not fit the model, or a number is out of its range.
     """
     begin = clock() if clock is not None else np.nan
     _check(scene, motion, security_margin, contact_tolerance, resolution)
@@ -129,7 +123,7 @@ def certify(
 
 
 class _Candidate(NamedTuple):
-    """A distance that coal saw."""
+    """A distance that coal measured."""
 
     distance: float
     t: float
@@ -148,14 +142,8 @@ class _Judgement:
         resolution: float,
         limits: Limits,
     ) -> None:
-        self.scene, self.motion, self.margin, self.resolution, self.limits = (
-            scene,
-            motion,
-            margin,
-            resolution,
-            limits,
-        )
-        self.tolerances = tolerances
+        self.scene, self.motion, self.margin = scene, motion, margin
+        self.tolerances, self.resolution, self.limits = tolerances, resolution, limits
         self.coal = CoalDistance(scene, motion, limits.queries)
         self.floor = 1e-6 * scene.size
         self.intervals, self.looked = 0, False
@@ -164,18 +152,17 @@ class _Judgement:
         if motion.num_segments == 0:
             polynomials = np.zeros((1, 4, motion.q.shape[1]))
             polynomials[0, 0] = motion.q[0]
-        bodies, table = tuple(scene.bodies), tuple(scene.table[:6])
-        weights = approach_weights(table, bodies, scene.pairs, motion.greatest)
+        bodies, chain = scene.bodies, scene.table.chain
         self.task = Task(
-            table,
+            chain,
             bodies,
             scene.pairs,
-            scene.bodies.exact[scene.pairs].all(axis=1),
+            bodies.exact[scene.pairs].all(axis=1),
             np.ascontiguousarray(polynomials),
             motion.coefficients is None,
             float(motion.num_segments),
-            weights,
-            moved_by_one(table, bodies[0], scene.pairs),
+            approach_weights(chain, bodies, scene.pairs, motion.greatest),
+            moved_by_one(chain, bodies.joint, scene.pairs),
         )
         self.work = work_space(self.task)
 
@@ -215,7 +202,7 @@ class _Judgement:
         )
 
     def _judge_margin(self, status: Status, proven: float) -> Status:
-        """Compare with the margin; look closer where the clearance is not proven far enough."""
+        """Compare with the margin; search again where the clearance is not proven far enough."""
         if self._too_close():
             return "refuted"
         if status == "undecided" or proven >= self.margin:
@@ -232,9 +219,9 @@ class _Judgement:
     def _search(
         self, resolution: float, goal: FloatArray, level: FloatArray
     ) -> tuple[_Candidate | None, float]:
-        """Return the first distance at or below its level as coal sees it, and what is proven.
+        """Return the first distance at or below its level, measured by coal, and a lower bound.
 
-        −inf: a limit.
+        The bound is −inf if a limit was used up.
         """
         refine = resolution < np.inf
         rounding = ROUNDING * self.scene.size
@@ -245,34 +232,24 @@ class _Judgement:
         while True:
             known, left = self.best.distance, self.limits.intervals - self.intervals
             instants = not (self.looked and refine)
-            found = sweep_motion(
-                self.task,
-                wanted._replace(known=known, max_nodes=left, instants=instants),
-                self.work,
-            )
+            question = wanted._replace(known=known, max_nodes=left, instants=instants)
+            found = sweep_motion(self.task, question, self.work)
             self.looked = True
             self.intervals += found.nodes
             contact = None
             if found.first < np.inf:
-                t = first_contact(
-                    self.coal,
-                    found.first_pair,
-                    min(found.first, self.task.last),
-                    level[found.first_pair],
-                )
-                if t is None:  # coal does not see it: let coal judge this pair alone
-                    self.task.exact[found.first_pair] = self.looked = False
+                pair = found.first_pair
+                t = first_contact(self.coal, pair, min(found.first, self.task.last), level[pair])
+                if t is None:  # coal sees no contact there: coal alone judges this pair
+                    self.task.exact[pair] = self.looked = False
                     continue
-                contact = _Candidate(level[found.first_pair], t, found.first_pair)
+                contact = _Candidate(level[pair], t, pair)
             self.sweep = found
             earlier, proven = self._search_leaves(found, contact, resolution, goal, level)
             return earlier, proven if found.done else -np.inf
 
     def _look_at_meshes(self, goal: Goal) -> None:
-        """Ask coal for pairs whose shapes the sweep does not know exactly.
-
-        Where their hulls are closest.
-        """
+        """Ask coal for the distances of meshes where their convex hulls are closest."""
         if self.task.exact.all() or self.best.pair >= 0:
             return
         found = sweep_motion(self.task, goal, self.work)
@@ -294,21 +271,11 @@ class _Judgement:
         for pair, begin, end in found.leaves[np.argsort(found.leaves[:, 1], kind="stable")]:
             if contact is not None and begin >= contact.t:
                 break
-            p, segment = int(pair), min(int(begin), len(self.task.coefficients) - 1)
-            speeds, scratch = (
-                np.empty((2, len(self.scene.pairs))),
-                np.empty(len(self.task.table[0])),
-            )
-            piece = self.task.coefficients[segment]
-            approach_bounds(
-                self.task.table,
-                piece,
-                begin - segment,
-                end - segment,
-                self.task.weights,
-                speeds,
-                scratch,
-            )
+            task, p = self.task, int(pair)
+            segment = min(int(begin), len(task.coefficients) - 1)
+            speeds, scratch = np.empty((2, len(task.pairs))), np.empty(len(task.chain.parent))
+            piece, u, v = task.coefficients[segment], begin - segment, end - segment
+            approach_bounds(task.chain, piece, u, v, task.weights, speeds, scratch)
             known = min(self.best.distance, found.least)
             goals = LeafGoals(goal[p], level[p], self.tolerances[p], known, resolution, self.floor)
             end = min(end, float(self.motion.num_segments))
@@ -331,11 +298,10 @@ class _Judgement:
             t, distance = walk_down(self.coal, self.best.pair, t, 1e-3)
             self._note(_Candidate(distance, t, self.best.pair))
 
-    def _polish_from(self, pairs: np.ndarray, begins: FloatArray) -> None:
-        """Ask coal for the least of some pairs' local minima; of equal ones, the first."""
-        t = np.minimum(
-            begins, self.task.last
-        )  # a motion of one instant is swept as a segment without movement
+    def _polish_from(self, pairs: IntArray, begins: FloatArray) -> None:
+        """Ask coal for the least of some pairs' local minima; for the first of equal ones."""
+        # a motion of one instant is swept as a segment without movement
+        t = np.minimum(begins, self.task.last)
         seen = (pairs == self.best.pair) & (np.abs(t - self.best.t) < SAME)
         pairs, t = pairs[~seen], t[~seen]
         if len(pairs) > 0:
@@ -358,16 +324,16 @@ def _check(
     contact_tolerance: float | None,
     resolution: float,
 ) -> None:
-    """Raise ValueError for what cannot be judged."""
+    """Check that the motion fits the model and that every number is in its range.
+
+    Raises:
+        ValueError: If not.
+    """
     nq = scene.model.nq
     if motion.q.ndim != 2 or motion.q.shape[0] == 0 or motion.q.shape[1] != nq:
         raise ValueError(f"motion: q must have shape (instants, {nq}), was {motion.q.shape}")
-    if motion.coefficients is not None and motion.coefficients.shape != (
-        motion.num_segments,
-        4,
-        nq,
-    ):
-        must = (motion.num_segments, 4, nq)
+    must = (motion.num_segments, 4, nq)
+    if motion.coefficients is not None and motion.coefficients.shape != must:
         raise ValueError(
             f"motion: coefficients must have shape {must}, was {motion.coefficients.shape}"
         )

@@ -1,4 +1,4 @@
-"""A robot's bodies as the fast kernels test them, and which pairs of bodies are worth testing.
+"""A robot's bodies as the fast kernels test them, and the pairs of bodies worth testing.
 
 Two models: sphere sets, generated from the bodies' coal geometry (Corsépius 2001, section 5), and
 one capsule per body. Both cover the bodies, so a posture that is free by the model is free on
@@ -30,12 +30,12 @@ Pair = tuple[int, int]
 
 
 class CollisionModel(Component):
-    """What sphere sets and capsules share."""
+    """Base of the collision models that cover bodies: sphere sets and capsules."""
 
     component: ClassVar[str] = "collision_model"
 
     def cover(self, item: Any) -> Cover:
-        """Return what stands for a geometry object."""
+        """Return the cover that stands for a geometry object."""
         raise NotImplementedError
 
     def bind(self, assembly: Assembly) -> "BodyModel":
@@ -177,7 +177,7 @@ def cover_shapes(covers: list[Cover], joints: list[int], first: int = 0) -> Shap
 
 
 def _derived_pairs(assembly: Assembly, shapes: Shapes) -> tuple[tuple[Pair, ...], ...]:
-    """Return pairs that are tested, are adjacent, always touch, never do."""
+    """Return the pairs that are tested, that are adjacent, that always touch, that never touch."""
     items, parents = list(assembly.geometry.geometryObjects), assembly.model.parents
     adjacent: list[Pair] = []
     apart: list[Pair] = []
@@ -190,7 +190,7 @@ def _derived_pairs(assembly: Assembly, shapes: Shapes) -> tuple[tuple[Pair, ...]
     if not apart or not np.isfinite(_limits(assembly)).all():
         return tuple(apart), tuple(adjacent), (), ()
     low, high = _limits(assembly)
-    rng = np.random.Generator(np.random.PCG64(0))  # which pairs these are is part of no search
+    rng = np.random.Generator(np.random.PCG64(0))  # no search draws from it
     q = low[:, None] + (high - low)[:, None] * rng.random((len(low), SAMPLES))
     touching = _coal_touches(assembly, apart, q)
     always = [pair for pair, hits in zip(apart, touching, strict=True) if hits.all()]
@@ -244,28 +244,22 @@ def _coal_touches(assembly: Assembly, pairs: list[Pair], q: FloatArray) -> np.nd
 def _alone(assembly: Assembly, shapes: Shapes, pair: Pair) -> PrimitiveCollision:
     """Return the model of two bodies alone."""
     kept = np.isin(shapes.labels, pair)
-    own = Shapes(
-        *(
-            column[kept]
-            for column in (shapes.joint, shapes.start, shapes.end, shapes.radius, shapes.labels)
-        )
-    )
+    columns = shapes.joint, shapes.start, shapes.end, shapes.radius, shapes.labels
+    own = Shapes(*(column[kept] for column in columns))
     return PrimitiveCollision.build(assembly.model, own, NO_OBSTACLES, (pair,))
 
 
 def _never_touch(assembly: Assembly, shapes: Shapes, pair: Pair) -> bool:
-    """Whether two bodies are proven apart.
+    """Return whether two bodies are proven to stay apart.
 
-    A grid over the joints between them, and how far a step can move them.
-
-    The distances are those of the covers, or where these are too close, coal's on a coarser grid.
-    Proven for two joints at most; what more joints move is tested always.
+    The proof takes a grid over the joints between them and a bound of their motion within a step.
+    The distances are those of the covers or, where these are too close, coal's on a coarser grid.
+    Pairs with more than two joints between them are never proven, and so always tested.
     """
     items, table = list(assembly.geometry.geometryObjects), assembly.table
     bodies = body_table(table, [items[body] for body in pair])
-    plain = table[:6]
     strokes = np.abs(_limits(assembly)).max(axis=0)
-    reach = reaches(plain, bodies.joint, bodies.from_origin, bodies.from_axis, strokes)
+    reach = reaches(table.chain, bodies.joint, bodies.from_origin, bodies.from_axis, strokes)
     way = pair_reaches(np.array([[0, 1]], dtype=np.int64), reach)[0]  # (joints,)
     moving = np.flatnonzero(way > 0.0)
     if len(moving) > 2:
@@ -280,9 +274,16 @@ def _never_touch(assembly: Assembly, shapes: Shapes, pair: Pair) -> bool:
 def _grid(
     assembly: Assembly, moving: np.ndarray, way: FloatArray, size: int
 ) -> tuple[FloatArray, float]:
-    """Return configurations (nq, n) on a grid.
+    """Return configurations on a grid, and a bound of a distance's change within half a step.
 
-    And how much a distance can differ half a step away.
+    Args:
+        assembly: The robot.
+        moving: Indices of the joints that the grid spans.
+        way: (joints,) bound of |d distance / dq| by joint.
+        size: Values per joint.
+
+    Returns:
+        (nq, n) configurations, and the bound [length unit].
     """
     low, high = _limits(assembly)
     columns = assembly.table.index_q[moving]

@@ -1,34 +1,120 @@
-"""Straight links of planar arms among ellipses.
-
-Which individuals of a population collide on their way.
+"""Straight links of planar arms among ellipses: which of a population's paths collide.
 
 An ellipse is mapped to the unit circle by an upper triangular matrix; there a segment meets it
 where its distance to the origin is at most 1. With P, Q its ends in that frame and s = P·Q, the
 nearest point lies between them where P·P − s and Q·Q − s are positive, and then at the squared
-distance (P × Q)² / (P·P + Q·Q − 2 s): no division is needed. What is within a relative 1e-9 of
+distance (P × Q)² / (P·P + Q·Q − 2 s): no division is needed. A link within a relative 1e-9 of
 touching counts as touching, so that rounding never lets a contact pass.
 
-Only whether an individual collides is asked for, so any order of tests gives the same answer. First
-some positions are tested one after the other, the ones that find most collisions first, and whoever
-collides is not tested again; whoever is left goes through all positions, and the chords of its link
-ends are tested on the way. Individuals are innermost, in blocks that `load_lanes` gathers.
+Any order of tests gives the same answer, because only the existence of a collision is asked for.
+First some positions are tested one after the other, beginning with those that find most collisions;
+individuals that collide are not tested again. The others go through all positions, and the chords
+of their link ends are tested on the way. Individuals are innermost, in blocks gathered by
+`load_lanes`.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
 from evoexp.numeric.compilation import borrowed, kernel
+from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.kinematics import U
-from evoexp.robots.planar_ends import LANES, begin_turning, block_ends, load_lanes, turned_ends
+from evoexp.robots.planar_ends import (
+    LANES,
+    PlanarArm,
+    begin_turning,
+    block_ends,
+    load_lanes,
+    turned_ends,
+)
 
-AFRESH = 32  # positions after which sines are computed anew, between them turned on
-CONTACT = (
-    1.0 + 1e-9
-)  # [-] squared distance to the centre of the unit circle that still counts as contact
+AFRESH = 32  # positions after which sines are computed anew; between them directions are turned on
+CONTACT = 1.0 + 1e-9  # [-] squared distance to the unit circle's centre that counts as contact
 BEYOND = CONTACT  # [-] distance from an axis at which nothing counts as contact any more
 
 
+class Ellipses(NamedTuple):
+    """Ellipses around a planar arm.
+
+    Attributes:
+        maps: (E, 5) a … e of the maps (x, y) → (a x + b y + c, d y + e) to the unit circle.
+        first_links: (E,) the first link (1, 2, …) that reaches each ellipse.
+    """
+
+    maps: FloatArray
+    first_links: IntArray
+
+
+class TestedPath(NamedTuple):
+    """The positions of a path that are tested.
+
+    Attributes:
+        num_positions: M of Eq. 3.
+        first_positions: The positions (1 … M) that are tested first.
+        chords: Whether all positions follow, with chords swept.
+    """
+
+    num_positions: int
+    first_positions: IntArray
+    chords: bool
+
+
+class Mapped(NamedTuple):
+    """The link ends of a block in the frames of all ellipses, at one position.
+
+    Attributes:
+        ends: (2, E · (N + 1) · LANES).
+        codes: (E, N + 1) outcodes, see `_map`.
+    """
+
+    ends: FloatArray
+    codes: IntArray
+
+
+class Memory(NamedTuple):
+    """Scratch for a block of individuals.
+
+    Attributes:
+        alive: (count + LANES,) individuals that have not collided.
+        begin: (N · LANES,) angles at the start.
+        end: (N · LANES,) angles at the end.
+        least: (LANES,) at or below 0 where a contact was found.
+        angle: (LANES,) of `block_ends`, as the next two.
+        at_x: (LANES,).
+        at_y: (LANES,).
+        x: ((N + 1) · LANES,) link ends.
+        y: ((N + 1) · LANES,).
+        turn: (4, N · LANES) of `begin_turning`.
+        mapped: The link ends at this position.
+        other: The link ends at the position before.
+    """
+
+    alive: IntArray
+    begin: FloatArray
+    end: FloatArray
+    least: FloatArray
+    angle: FloatArray
+    at_x: FloatArray
+    at_y: FloatArray
+    x: FloatArray
+    y: FloatArray
+    turn: FloatArray
+    mapped: Mapped
+    other: Mapped
+
+
 @kernel
-def paths_collide(starts, ends, lanes, count, arm, ellipses, path, hit):  # type: ignore[no-untyped-def]
+def paths_collide(
+    starts: FloatArray,
+    ends: FloatArray,
+    lanes: IntArray,
+    count: int,
+    arm: PlanarArm,
+    ellipses: Ellipses,
+    path: TestedPath,
+    hit: BoolArray,
+) -> None:
     """Find which straight joint-space paths collide (Lavoie & Boudreau 2001, Eq. 3).
 
     Args:
@@ -36,79 +122,95 @@ def paths_collide(starts, ends, lanes, count, arm, ellipses, path, hit):  # type
         ends: (N, individuals) at its end.
         lanes: (≥ count) indices of the individuals to test.
         count: How many.
-        arm: See `planar_ends.block_ends`.
-        ellipses: (E, 5) maps (x, y) → (a x + b y + c, d y + e) to the unit circle; (E,) the first
-            link (1, 2, …) that reaches each ellipse.
-        path: M; the positions (1 … M) that are tested first; whether all positions follow, with
-            chords swept.
+        arm: The arm.
+        ellipses: The ellipses.
+        path: The positions that are tested.
         hit: (individuals,) written for those tested: whether each collides.
     """
-    rows, num, num_ellipses = len(starts) * LANES, len(starts), len(ellipses[0])
-    alive = np.empty(count + LANES, dtype=np.int64)
-    block = np.empty(rows), np.empty(rows), np.empty(LANES)
-    at = (
+    rows = len(starts) * LANES
+    memory = Memory(
+        np.empty(count + LANES, dtype=np.int64),
+        np.empty(rows),
+        np.empty(rows),
+        np.empty(LANES),
         np.empty(LANES),
         np.empty(LANES),
         np.empty(LANES),
         np.empty(rows + LANES),
         np.empty(rows + LANES),
+        np.empty((4, rows)),
+        _empty_ends(len(ellipses.maps), len(starts) + 1),
+        _empty_ends(len(ellipses.maps), len(starts) + 1),
     )
-    mapped = (
-        np.empty((2, num_ellipses * (rows + LANES))),
-        np.empty((2, num_ellipses * (rows + LANES))),
-    )
-    codes = (
-        np.empty((num_ellipses, num + 1), dtype=np.int64),
-        np.empty((num_ellipses, num + 1), dtype=np.int64),
-    )
-    memory = alive, block, at, np.empty((4, rows)), mapped, codes
     _test_paths(starts, ends, lanes, count, arm, ellipses, path, hit, memory)
 
 
 @kernel
-def _test_paths(starts, ends, lanes, count, arm, ellipses, path, hit, memory):  # type: ignore[no-untyped-def]
-    """Do what `paths_collide` says, given its memory.
+def _empty_ends(num_ellipses: int, num_ends: int) -> Mapped:
+    return Mapped(
+        np.empty((2, num_ellipses * num_ends * LANES)),
+        np.empty((num_ellipses, num_ends), dtype=np.int64),
+    )
 
-    So that no references are counted in the innermost loops.
-    """
+
+@kernel
+def _test_paths(
+    starts: FloatArray,
+    ends: FloatArray,
+    lanes: IntArray,
+    count: int,
+    arm: PlanarArm,
+    ellipses: Ellipses,
+    path: TestedPath,
+    hit: BoolArray,
+    memory: Memory,
+) -> None:
+    """Do the work of `paths_collide` in given memory, so that inner loops count no references."""
     starts, ends, lanes, arm, ellipses, hit, memory = borrowed(
         (starts, ends, lanes, arm, ellipses, hit, memory)
     )
-    num_positions, first_positions, chords = path
-    alive = memory[0]
-    alive[:count] = lanes[:count]
+    memory.alive[:count] = lanes[:count]
     for k in range(count):
         hit[lanes[k]] = False
-    left = count if len(ellipses[0]) > 0 else 0
-    for position in first_positions:
+    left, num_positions = count if len(ellipses.maps) > 0 else 0, path.num_positions
+    for position in path.first_positions:
         left = _drop_colliding(
             starts, ends, left, arm, ellipses, position, num_positions, hit, memory
         )
-    if chords:
+    if path.chords:
         _sweep(starts, ends, left, arm, ellipses, num_positions, hit, memory)
 
 
 @kernel
-def _drop_colliding(  # type: ignore[no-untyped-def]
-    starts, ends, count, arm, ellipses, position, num_positions, hit, memory
-):
-    """Test one position; mark who collides.
+def _drop_colliding(
+    starts: FloatArray,
+    ends: FloatArray,
+    count: int,
+    arm: PlanarArm,
+    ellipses: Ellipses,
+    position: int,
+    num_positions: int,
+    hit: BoolArray,
+    memory: Memory,
+) -> int:
+    """Test one position and mark the individuals that collide.
 
-    Keep the others in front of `alive` and return how many they are.
+    Moves the others to the front of `alive`, and returns their number.
     """
-    alive, (begin, end, least), (angle, at_x, at_y, x, y), _, (mapped, _), (codes, _) = borrowed(
-        memory
-    )
+    memory = borrowed(memory)
+    alive, begin, end, least = memory.alive, memory.begin, memory.end, memory.least
+    angle, at_x, at_y, x, y = memory.angle, memory.at_x, memory.at_y, memory.x, memory.y
+    mapped, codes = memory.mapped.ends, memory.mapped.codes[0]
     num, kept = len(starts), 0
     for first in range(0, count, LANES):
         load_lanes(starts, alive, first, count, begin)
         load_lanes(ends, alive, first, count, end)
         block_ends(begin, end, arm, position, num_positions, angle, at_x, at_y, x, y)
         least[:] = 1.0
-        for e in range(len(ellipses[0])):
-            reached = ellipses[1][e]
-            _map(ellipses[0][e], reached, num, x, y, U(0), mapped, codes[0])
-            _test_links(reached, num, U(0), mapped, codes[0], least)
+        for e in range(len(ellipses.maps)):
+            reached = ellipses.first_links[e]
+            _map(ellipses.maps[e], reached, num, x, y, U(0), mapped, codes)
+            _test_links(reached, num, U(0), mapped, codes, least)
         for n in range(min(LANES, count - first)):
             individual, free = alive[first + n], least[n] > 0.0
             hit[individual] = not free
@@ -118,16 +220,29 @@ def _drop_colliding(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _sweep(starts, ends, count, arm, ellipses, num_positions, hit, memory):  # type: ignore[no-untyped-def]
+def _sweep(
+    starts: FloatArray,
+    ends: FloatArray,
+    count: int,
+    arm: PlanarArm,
+    ellipses: Ellipses,
+    num_positions: int,
+    hit: BoolArray,
+    memory: Memory,
+) -> None:
     """Test all positions, and the chords of all link ends between them."""
-    alive, (begin, end, least), (angle, at_x, at_y, x, y), turn, mapped, codes_of = borrowed(memory)
-    num, rows = len(starts), len(starts) * LANES
-    (before, now), (codes_before, codes) = mapped, codes_of
+    memory = borrowed(memory)
+    alive, begin, end, least = memory.alive, memory.begin, memory.end, memory.least
+    angle, at_x, at_y, x, y = memory.angle, memory.at_x, memory.at_y, memory.x, memory.y
+    num, rows, turn = len(starts), len(starts) * LANES, memory.turn
+    before, now = memory.other.ends, memory.mapped.ends
+    codes_before, codes = memory.other.codes, memory.mapped.codes
     for first in range(0, count, LANES):
         load_lanes(starts, alive, first, count, begin)
         load_lanes(ends, alive, first, count, end)
         least[:] = 1.0
         for position in range(num_positions + 1):
+            # link ends: computed anew at the ends of the path, else turned on
             before, now, codes_before, codes = now, before, codes, codes_before
             if position == 0 or position == num_positions:
                 block_ends(begin, end, arm, position, num_positions, angle, at_x, at_y, x, y)
@@ -135,9 +250,10 @@ def _sweep(starts, ends, count, arm, ellipses, num_positions, hit, memory):  # t
                 if position % AFRESH == 1:
                     begin_turning(begin, end, arm, position - 1, num_positions, angle, at_x, turn)
                 turned_ends(arm, at_x, at_y, turn, x, y)
-            for e in range(len(ellipses[0])):
-                reached, place = ellipses[1][e], U(e) * U(rows + LANES)
-                _map(ellipses[0][e], reached, num, x, y, place, now, codes[e])
+            # links here, chords since the position before
+            for e in range(len(ellipses.maps)):
+                reached, place = ellipses.first_links[e], U(e) * U(rows + LANES)
+                _map(ellipses.maps[e], reached, num, x, y, place, now, codes[e])
                 if position > 0:
                     _test_links(reached, num, place, now, codes[e], least)
                     _test_chords(reached, num, place, before, now, codes_before[e], codes[e], least)
@@ -146,13 +262,21 @@ def _sweep(starts, ends, count, arm, ellipses, num_positions, hit, memory):  # t
 
 
 @kernel
-def _map(ellipse, reached, num, x, y, place, mapped, codes):  # type: ignore[no-untyped-def]
-    """Write link ends in an ellipse's frame.
+def _map(
+    ellipse: FloatArray,
+    reached: int,
+    num: int,
+    x: FloatArray,
+    y: FloatArray,
+    place: np.uint64,
+    mapped: FloatArray,
+    codes: IntArray,
+) -> None:
+    """Write link ends in an ellipse's frame, and their outcodes (Newman & Sproull 1979).
 
-    And the sides of the unit circle that all of a block's lie beyond.
-
-    Where two ends share a side, nothing between them meets the circle (outcodes, Newman & Sproull
-    1979); as the arms of a block are alike, most tests need not be done.
+    The outcode of a link end tells beyond which sides of the unit circle it lies in all lanes of
+    the block. Where two ends share a side, nothing between them meets the circle; as the arms of a
+    block are alike, most tests need not be done.
     """
     a, b, c, d, e = ellipse[0], ellipse[1], ellipse[2], ellipse[3], ellipse[4]
     u, v = mapped[0], mapped[1]
@@ -171,7 +295,9 @@ def _map(ellipse, reached, num, x, y, place, mapped, codes):  # type: ignore[no-
 
 
 @kernel
-def _test_links(reached, num, place, mapped, codes, least):  # type: ignore[no-untyped-def]
+def _test_links(
+    reached: int, num: int, place: np.uint64, mapped: FloatArray, codes: IntArray, least: FloatArray
+) -> None:
     """Lower `least` to 0 or less where a link meets the ellipse."""
     u, v = mapped[0], mapped[1]
     for k in range(reached, num + 1):
@@ -180,8 +306,17 @@ def _test_links(reached, num, place, mapped, codes, least):  # type: ignore[no-u
 
 
 @kernel
-def _test_chords(reached, num, place, before, now, codes_before, codes, least):  # type: ignore[no-untyped-def]
-    """The same for the chords of link ends since the position before."""
+def _test_chords(
+    reached: int,
+    num: int,
+    place: np.uint64,
+    before: FloatArray,
+    now: FloatArray,
+    codes_before: IntArray,
+    codes: IntArray,
+    least: FloatArray,
+) -> None:
+    """Lower `least` to 0 or less where a chord since the position before meets the ellipse."""
     for k in range(reached, num + 1):
         if codes_before[k] & codes[k] == 0:
             row = place + U(k) * U(LANES)
@@ -189,17 +324,20 @@ def _test_chords(reached, num, place, before, now, codes_before, codes, least): 
 
 
 @kernel
-def _test(u, v, row, p, q, to, least):  # type: ignore[no-untyped-def]
+def _test(
+    u: FloatArray,
+    v: FloatArray,
+    row: np.uint64,
+    p: FloatArray,
+    q: FloatArray,
+    to: np.uint64,
+    least: FloatArray,
+) -> None:
     """Lower `least` to 0 or less where a segment from (u, v) to (p, q) touches the unit circle."""
     for n in range(LANES):
         lane = U(n)
-        x_0, y_0, x_1, y_1, lowest = (
-            u[row + lane],
-            v[row + lane],
-            p[to + lane],
-            q[to + lane],
-            least[lane],
-        )
+        x_0, y_0, x_1, y_1 = u[row + lane], v[row + lane], p[to + lane], q[to + lane]
+        lowest = least[lane]
         r, s = x_0 * x_0 + y_0 * y_0, x_1 * x_1 + y_1 * y_1
         inner, nearer = between(x_0, y_0, r, x_1, y_1, s), (r if r < s else s) - CONTACT
         value = inner if inner < nearer else nearer
@@ -207,10 +345,16 @@ def _test(u, v, row, p, q, to, least):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def between(u, v, r, p, q, s):  # type: ignore[no-untyped-def]
-    """Return ≤ 0 if a segment touches the unit circle between its ends (u, v), (p.
+def between(u: float, v: float, r: float, p: float, q: float, s: float) -> float:
+    """Return a number ≤ 0 if a segment touches the unit circle between its ends.
 
-    Q) at squared distances r, s.
+    Args:
+        u: Of one end (u, v), at the squared distance r from the centre.
+        v: See u.
+        r: See u.
+        p: Of the other end (p, q), at the squared distance s.
+        q: See p.
+        s: See p.
     """
     turned, along = u * q - v * p, u * p + v * q
     one, two = r - along, s - along
@@ -220,22 +364,27 @@ def between(u, v, r, p, q, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def first_contact(start, end, arm, ellipses, num_positions, chords):  # type: ignore[no-untyped-def]
-    """Find the first contact of one path, in the order of positions, ellipses and links.
-
-    A chord before its position.
+def first_contact(
+    start: FloatArray,
+    end: FloatArray,
+    arm: PlanarArm,
+    ellipses: Ellipses,
+    num_positions: int,
+    chords: bool,
+) -> tuple[int, int, int, bool]:
+    """Find the first contact of one path, by position, ellipse and link, chords before links.
 
     Args:
         start: (N,) joint angles at the start [rad].
         end: (N,) at the end.
-        arm: See `planar_ends.block_ends`.
-        ellipses: See `paths_collide`.
+        arm: The arm.
+        ellipses: The ellipses.
         num_positions: M.
         chords: Whether chords are swept.
 
     Returns:
-        Position; place of the ellipse; link, or link end, from 1; whether it is a chord that
-        touches. All −1 and false if nothing does.
+        Position; index of the ellipse; link, or link end, from 1; whether the chord of that end
+        touches. −1, −1, −1 and false if nothing touches.
     """
     num = len(start)
     begin, stop = np.repeat(start, LANES), np.repeat(end, LANES)
@@ -245,8 +394,8 @@ def first_contact(start, end, arm, ellipses, num_positions, chords):  # type: ig
     for position in range(1, num_positions + 1):
         old, new = (position + 1) % 2, position % 2
         block_ends(begin, stop, arm, position, num_positions, angle, at_x, at_y, x[new], y[new])
-        for e in range(len(ellipses[0])):
-            ellipse = ellipses[0][e]
+        for e in range(len(ellipses.maps)):
+            ellipse = ellipses.maps[e]
             for k in range(num + 1):
                 at, root = k * LANES, max(k - 1, 0) * LANES
                 here = _mapped(ellipse, x[new, at], y[new, at])
@@ -258,13 +407,14 @@ def first_contact(start, end, arm, ellipses, num_positions, chords):  # type: ig
 
 
 @kernel
-def _mapped(ellipse, x, y):  # type: ignore[no-untyped-def]
+def _mapped(ellipse: FloatArray, x: float, y: float) -> tuple[float, float, float]:
+    """Return a point in an ellipse's frame, and its squared distance from the centre."""
     p, q = ellipse[0] * x + ellipse[1] * y + ellipse[2], ellipse[3] * y + ellipse[4]
     return p, q, p * p + q * q
 
 
 @kernel
-def _meets(one, two):  # type: ignore[no-untyped-def]
-    """Whether a segment touches the unit circle."""
+def _meets(one: tuple[float, float, float], two: tuple[float, float, float]) -> bool:
+    """Return whether a segment, given by its `_mapped` ends, touches the unit circle."""
     (u, v, r), (p, q, s) = one, two
     return between(u, v, r, p, q, s) <= 0.0 or r - CONTACT <= 0.0 or s - CONTACT <= 0.0

@@ -1,11 +1,27 @@
-"""Kernels of encounters: the shapes of a body against obstacles, or against those of another body.
+"""Kernels of encounters: the shapes of a body against obstacles, or against another body's.
 
-An encounter is gathered from the frames of its configuration; what is measured is in
-`primitive_distances` and `segment_distances`.
+An encounter is a configuration of the batch in which a body is near an obstacle or another body.
+Its frames are gathered here; its distances are measured by `primitive_distances` and
+`segment_distances`.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
+from evoexp.collision.models.packed_shapes import (
+    BOXES,
+    CORE_SIZE,
+    CYLINDERS,
+    FIRST_CAPSULE,
+    FIRST_RUN,
+    JOINT,
+    STOP_CAPSULE,
+    STOP_RUN,
+    TURN,
+    PackedObstacles,
+    PackedShapes,
+    Units,
+)
 from evoexp.collision.models.primitive_distances import (
     AXES,
     BASE,
@@ -31,43 +47,56 @@ from evoexp.collision.models.segment_distances import (
     segments_to_point,
 )
 from evoexp.numeric.compilation import kernel
+from evoexp.records import FloatArray
 from evoexp.robots.kinematics import BLOCK, SPATIAL_ROWS, U
-
-BOXES, CYLINDERS, HALF_SPACES = range(3)
-"""Classes of obstacles; spheres and capsules are thickened boxes."""
 
 
 @kernel
-def body_meets_obstacles(width, c, unit, units, shapes, obstacles, near, frames, place, work, best):  # type: ignore[no-untyped-def]
+def body_meets_obstacles(
+    width: int,
+    c: int,
+    unit: int,
+    units: Units,
+    shapes: PackedShapes,
+    obstacles: PackedObstacles,
+    lane_of: NDArray[np.uint64],
+    obstacle_of: NDArray[np.uint64],
+    frames: FloatArray,
+    place: NDArray[np.uint64],
+    work: FloatArray,
+    best: FloatArray,
+) -> None:
     """Lower `best` to the clearances of a body from obstacles of one class.
 
     Args:
         width: Encounters.
         c: Class of the obstacles.
         unit: The body.
-        units: Of `PrimitiveCollision.tables`, as the next two.
-        shapes: See there.
-        obstacles: See there.
-        near: Lanes and obstacles of the encounters.
-        frames: Of all joints and blocks.
-        place: Offset of each lane in `frames`.
+        units: Bodies and parts.
+        shapes: Their shapes.
+        obstacles: The obstacles.
+        lane_of: (width,) lanes of the encounters.
+        obstacle_of: (width,) obstacles of the encounters.
+        frames: Frames of all joints and blocks.
+        place: (lanes,) offset of each lane in `frames`.
         work: Scratch.
         best: Lowered.
     """
-    runs, spheres, capsules, _ = shapes
-    lane_of, obstacle_of = near
-    data, whole = obstacles[0], units[0]
-    _gather(width, whole[unit, 0], lane_of, frames, place, FRAME, work)
+    runs, spheres, capsules = shapes.runs, shapes.spheres, shapes.capsules
+    data, whole = obstacles.data, units.whole
+    # the body's frame and the obstacle's, and the motion from one to the other
+    _gather(width, whole[unit, JOINT], lane_of, frames, place, FRAME, work)
     for n in range(width):
         o, k = obstacle_of[U(n)], U(n)
         for row in range(9):
-            work[BASE + U(row) * W + k] = data[o, 3 + row]
+            work[BASE + U(row) * W + k] = data[o, TURN + row]
         for row in range(3):
             work[BASE + U(9 + row) * W + k] = data[o, row]
         for row in range(4):
-            work[CORE + U(row) * W + k] = data[o, 12 + row]
+            work[CORE + U(row) * W + k] = data[o, CORE_SIZE + row]
     _relative(width, work)
-    first, stop = whole[unit, 1], whole[unit, 2]
+    # spheres, then capsules
+    first, stop = whole[unit, FIRST_RUN], whole[unit, STOP_RUN]
     if first < stop:
         if c == BOXES:
             spheres_to_boxes(width, runs, spheres, first, stop, work)
@@ -75,7 +104,7 @@ def body_meets_obstacles(width, c, unit, units, shapes, obstacles, near, frames,
             spheres_to_cylinders(width, runs, spheres, first, stop, work)
         else:
             spheres_to_half_spaces(width, runs, spheres, first, stop, work)
-    for i in range(whole[unit, 3], whole[unit, 4]):
+    for i in range(whole[unit, FIRST_CAPSULE], whole[unit, STOP_CAPSULE]):
         _move_segment(width, capsules[i], work)
         if c == BOXES:
             segment_to_boxes(width, capsules[i, 6], work)
@@ -89,65 +118,78 @@ def body_meets_obstacles(width, c, unit, units, shapes, obstacles, near, frames,
 
 
 @kernel
-def body_meets_body(width, one, two, units, shapes, lane_of, frames, place, work):  # type: ignore[no-untyped-def]
+def body_meets_body(
+    width: int,
+    one: int,
+    two: int,
+    units: Units,
+    shapes: PackedShapes,
+    lane_of: NDArray[np.uint64],
+    frames: FloatArray,
+    place: NDArray[np.uint64],
+    work: FloatArray,
+) -> None:
     """Write the clearances of two bodies to VALUE, as seen from the first one's frame.
 
     Args:
         width: Encounters.
         one: First unit, whose shapes are constants.
         two: Second unit.
-        units: See `body_meets_obstacles`.
+        units: See `body_meets_obstacles`, as for the next.
         shapes: See there.
-        lane_of: Lanes of the encounters.
-        frames: See there.
-        place: See there.
+        lane_of: (width,) lanes of the encounters.
+        frames: Frames of all joints and blocks.
+        place: (lanes,) offset of each lane in `frames`.
         work: Scratch.
     """
-    runs, spheres, capsules, _ = shapes
-    whole = units[0]
-    _gather(width, whole[one, 0], lane_of, frames, place, BASE, work)
-    _gather(width, whole[two, 0], lane_of, frames, place, FRAME, work)
+    runs, spheres, capsules = shapes.runs, shapes.spheres, shapes.capsules
+    whole = units.whole
+    # both bodies' frames, and the motion from the second's to the first's
+    _gather(width, whole[one, JOINT], lane_of, frames, place, BASE, work)
+    _gather(width, whole[two, JOINT], lane_of, frames, place, FRAME, work)
     _relative(width, work)
-    first, stop = whole[two, 1], whole[two, 2]
+    first, stop = whole[two, FIRST_RUN], whole[two, STOP_RUN]
     begin, end = (runs[first, 0], runs[stop - 1, 1]) if first < stop else (0, 0)
+    rods, own_rods = whole[two, FIRST_CAPSULE], whole[one, FIRST_CAPSULE]
     for j in range(begin, end):
-        move(
-            width,
-            spheres[j, 0],
-            spheres[j, 1],
-            spheres[j, 2],
-            1.0,
-            CENTERS + U(j - begin) * U(3) * W,
-            work,
-        )
-    for run in range(whole[one, 1], whole[one, 2]):
+        x, y, z = spheres[j, 0], spheres[j, 1], spheres[j, 2]
+        move(width, x, y, z, 1.0, CENTERS + U(j - begin) * U(3) * W, work)
+    # the second's spheres against the first's spheres and capsules
+    for run in range(whole[one, FIRST_RUN], whole[one, STOP_RUN]):
         spheres_to_spheres(width, runs, spheres, run, first, stop, work)
-    for i in range(whole[one, 3], whole[one, 4]):
+    for i in range(own_rods, whole[one, STOP_CAPSULE]):
         for j in range(begin, end):
             both = capsules[i, 6] + spheres[j, 3]
             segment_to_points(width, capsules[i], CENTERS + U(j - begin) * U(3) * W, both, work)
-    for j in range(whole[two, 3], whole[two, 4]):
+    # the second's capsules against both
+    for j in range(rods, whole[two, STOP_CAPSULE]):
         _move_segment(width, capsules[j], work)
-        for run in range(whole[one, 1], whole[one, 2]):
+        inverse, thickness = capsules[j, 7], capsules[j, 6]
+        for run in range(whole[one, FIRST_RUN], whole[one, STOP_RUN]):
             for i in range(runs[run, 0], runs[run, 1]):
-                segments_to_point(
-                    width, spheres[i], capsules[j, 7], capsules[j, 6] + spheres[i, 3], work
-                )
-        for i in range(whole[one, 3], whole[one, 4]):
-            segment_to_segments(
-                width, capsules[i], capsules[j, 7], capsules[i, 6] + capsules[j, 6], work
-            )
+                segments_to_point(width, spheres[i], inverse, thickness + spheres[i, 3], work)
+        for i in range(own_rods, whole[one, STOP_CAPSULE]):
+            segment_to_segments(width, capsules[i], inverse, capsules[i, 6] + thickness, work)
 
 
 @kernel
-def _move_segment(width, capsule, work):  # type: ignore[no-untyped-def]
+def _move_segment(width: int, capsule: FloatArray, work: FloatArray) -> None:
+    """Write a capsule's axis as MOTION sees it to STARTS and AXES."""
     move(width, capsule[0], capsule[1], capsule[2], 1.0, STARTS, work)
     move(width, capsule[3], capsule[4], capsule[5], 0.0, AXES, work)
 
 
 @kernel
-def _gather(width, joint, lane_of, frames, place, target, work):  # type: ignore[no-untyped-def]
-    """The frames of one joint in the encounters' configurations."""
+def _gather(
+    width: int,
+    joint: int,
+    lane_of: NDArray[np.uint64],
+    frames: FloatArray,
+    place: NDArray[np.uint64],
+    target: np.uint64,
+    work: FloatArray,
+) -> None:
+    """Copy the frames of one joint in the encounters' configurations to rows at `target`."""
     j = U(joint) * U(SPATIAL_ROWS * BLOCK)
     for n in range(width):
         begin, o = place[lane_of[U(n)]] + j, target + U(n)
@@ -156,8 +198,8 @@ def _gather(width, joint, lane_of, frames, place, target, work):  # type: ignore
 
 
 @kernel
-def _relative(width, work):  # type: ignore[no-untyped-def]
-    """Write MOTION: FRAME as seen from BASE; and begin VALUE with +inf."""
+def _relative(width: int, work: FloatArray) -> None:
+    """Write MOTION, which is FRAME as seen from BASE, and begin VALUE with +inf."""
     for row in range(3):
         a, b, c = BASE + U(row) * W, BASE + U(3 + row) * W, BASE + U(6 + row) * W
         for column in range(3):

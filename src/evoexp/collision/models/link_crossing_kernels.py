@@ -1,6 +1,4 @@
-"""Kernels of crossing links: two populations of two-link arms.
-
-Every individual of one against every one of the other.
+"""Kernels of crossing links: every individual of a population of two-link arms against another's.
 
 Arm 1 has its base A, elbow B = A + u1, tip C = B + u2; arm 2 D, E = D + v1, F = E + v2. Two links
 cross where the ends of each lie on different sides of the other's line. All sixteen line functions
@@ -26,23 +24,22 @@ to blocks.
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from evoexp.collision.models.segment_predicates import touching
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import sincos
+from evoexp.records import FloatArray, IntArray
 from evoexp.robots.kinematics import U
 
 LANES = 104
-"""Individuals per block of a table.
-
-Of the last block only as many as there are, in eights, are computed.
-"""
+"""Individuals per block of a table; the last block is computed up to the next multiple of eight."""
 
 ROWS = 6
-"""Rows of a table, in single precision.
+"""Rows of a table, in single precision: u1 (x, y), u2 (x, y), and both links' line functions at the
+other's base."""
 
-U1 (x, y), u2 (x, y), and both links' line functions at the other's base.
-"""
+Point = tuple[float, float]
 
 MOST_CONFIGURATIONS = 32767  # both counters of a pair share an int32, and counts are int16
 
@@ -55,8 +52,24 @@ _HIGHEST = 1000
 
 
 @kernel
-def link_points(q, base_x, base_y, first_length, second_length, out):  # type: ignore[no-untyped-def]
-    """Elbows and tips: q (K, 2, N) [rad], from +x; out (K, 4, N): elbow x, y, tip x, y."""
+def link_points(
+    q: FloatArray,
+    base_x: float,
+    base_y: float,
+    first_length: float,
+    second_length: float,
+    out: FloatArray,
+) -> None:
+    """Write elbows and tips.
+
+    Args:
+        q: (K, 2, N) angles of the links from +x [rad].
+        base_x: Of the first joint [length unit].
+        base_y: Likewise.
+        first_length: Of the first link [length unit].
+        second_length: Of the second.
+        out: (K, 4, N), written: elbow x, y, tip x, y.
+    """
     num = q.shape[2]
     angles, place = q.reshape(-1), out.reshape(-1)
     for link in range(2 * q.shape[0]):
@@ -77,8 +90,10 @@ def link_points(q, base_x, base_y, first_length, second_length, out):  # type: i
 
 
 @kernel
-def directions(angles, a, num, out, x, y):  # type: ignore[no-untyped-def]
-    """Cosines and sines of a row of angles, from offset a to offsets x and y."""
+def directions(
+    angles: FloatArray, a: np.uint64, num: int, out: FloatArray, x: np.uint64, y: np.uint64
+) -> None:
+    """Write cosines and sines of a row of angles, from offset a, to offsets x and y."""
     for n in range(num):
         s, c = sincos(angles[a + U(n)])
         out[x + U(n)] = c
@@ -86,10 +101,17 @@ def directions(angles, a, num, out, x, y):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def substeps(genes, start, goal, steps, out):  # type: ignore[no-untyped-def]
-    """Configurations tested on the way start → genes → goal: genes (K, 2, N).
+def substeps(
+    genes: FloatArray, start: FloatArray, goal: FloatArray, steps: int, out: FloatArray
+) -> None:
+    """Write the configurations tested on the way start → genes → goal.
 
-    Out ((K + 1) · steps − 1, 2, N).
+    Args:
+        genes: (K, 2, N) [rad].
+        start: (2,).
+        goal: (2,).
+        steps: Parts of each segment.
+        out: ((K + 1) · steps − 1, 2, N), written.
     """
     last = genes.shape[0]
     for k in range(last + 1):
@@ -106,8 +128,8 @@ def substeps(genes, start, goal, steps, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def longest_link(base_x, base_y, points):  # type: ignore[no-untyped-def]
-    """Greatest squared length of a link; infinite where a coordinate is not finite."""
+def longest_link(base_x: float, base_y: float, points: FloatArray) -> float:
+    """Return the greatest squared length of a link; infinite where a coordinate is not finite."""
     first = second = 0.0
     wrong = 0
     for k in range(points.shape[0]):
@@ -123,10 +145,8 @@ def longest_link(base_x, base_y, points):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _threshold(longest, distance):  # type: ignore[no-untyped-def]
-    """Return the scale 2^-e of tables, and tau.
-
-    Above all errors of a product of two line functions.
+def _threshold(longest: float, distance: float) -> tuple[float, np.float32]:
+    """Return the scale 2^-e of tables, and tau, a bound on the error of a product of line functions.
 
     With links ≤ l, bases d apart and u = 2^-24, every line function is at most V = l (d + 3 l). Its
     error is below 5 u V: the vectors are rounded (2 u), their products and differences (2 u, four
@@ -141,10 +161,19 @@ def _threshold(longest, distance):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _fill_table(points, base_x, base_y, other_x, other_y, members, scale, out):  # type: ignore[no-untyped-def]
-    """Table of some individuals of a population.
+def _fill_table(
+    points: FloatArray,
+    base_x: float,
+    base_y: float,
+    other_x: float,
+    other_y: float,
+    members: IntArray,
+    scale: float,
+    out: NDArray[np.float32],
+) -> None:
+    """Write the table of some individuals of a population.
 
-    Lanes without an individual are apart from everything.
+    Lanes without an individual hold line functions that are apart from everything.
     """
     num_configurations = points.shape[0]
     dx, dy = (other_x - base_x) * scale, (other_y - base_y) * scale
@@ -171,10 +200,27 @@ def _fill_table(points, base_x, base_y, other_x, other_y, members, scale, out): 
 
 
 @kernel
-def _add_crossings(one, own, two, other, num_configurations, lanes, tau, seen):  # type: ignore[no-untyped-def]
-    """An individual (at own) against a block (at other).
+def _add_crossings(
+    one: NDArray[np.float32],
+    own: np.uint64,
+    two: NDArray[np.float32],
+    other: np.uint64,
+    num_configurations: int,
+    lanes: int,
+    tau: np.float32,
+    seen: NDArray[np.int32],
+) -> None:
+    """Count the configurations in which an individual crosses those of a block.
 
-    Seen (LANES,) certain crossings + 65536 · possible ones.
+    Args:
+        one: Table of the individual's population.
+        own: Offset of the individual in it.
+        two: Table of the other population.
+        other: Offset of the block in it.
+        num_configurations: K.
+        lanes: Individuals of the block.
+        tau: Bound on rounding.
+        seen: (LANES,), written: certain crossings + 65536 · possible ones.
     """
     low = -tau
     for n in range(lanes):
@@ -187,12 +233,14 @@ def _add_crossings(one, own, two, other, num_configurations, lanes, tau, seen): 
             j = o + U(n)
             vx, vy, wx, wy = two[j], two[j + U(LANES)], two[j + U(2 * LANES)], two[j + U(3 * LANES)]
             m1a, m2a = two[j + U(4 * LANES)], two[j + U(5 * LANES)]
+            # cross products, then line functions at the ends of the other's links
             c11, c12 = ax * vy - ay * vx, ax * wy - ay * wx
             c21, c22 = bx * vy - by * vx, bx * wy - by * wx
             l1e, l2e = l1d + c11, l2d + c21
             l1f, l2f = l1e + c12, l2e + c22
             m1b, m2b = m1a - c11, m2a - c12
             m1c, m2c = m1b - c21, m2b - c22
+            # per pair of links the greater sign product, of all four pairs the least
             p, q = l1d * l1e, m1a * m1b
             least = p if p > q else q
             p, q = l1e * l1f, m2a * m2b
@@ -208,8 +256,10 @@ def _add_crossings(one, own, two, other, num_configurations, lanes, tau, seen): 
 
 
 @kernel
-def colliding(base_1, points_1, i, base_2, points_2, j, k):  # type: ignore[no-untyped-def]
-    """Whether two individuals collide in configuration k: the exact test."""
+def colliding(
+    base_1: Point, points_1: FloatArray, i: int, base_2: Point, points_2: FloatArray, j: int, k: int
+) -> bool:
+    """Return whether two individuals collide in configuration k, by the exact predicates."""
     ax, ay, dx, dy = base_1[0], base_1[1], base_2[0], base_2[1]
     bx, by, cx, cy = points_1[k, 0, i], points_1[k, 1, i], points_1[k, 2, i], points_1[k, 3, i]
     ex, ey, fx, fy = points_2[k, 0, j], points_2[k, 1, j], points_2[k, 2, j], points_2[k, 3, j]
@@ -222,13 +272,19 @@ def colliding(base_1, points_1, i, base_2, points_2, j, k):  # type: ignore[no-u
 
 
 @kernel
-def _count_rows(  # type: ignore[no-untyped-def]
-    base_1, points_1, one, rows, base_2, points_2, two, columns, tau, counts
-):
-    """Fill counts[rows, columns].
-
-    `one` is the table of all of population 1, `two` of the columns alone.
-    """
+def _count_rows(
+    base_1: Point,
+    points_1: FloatArray,
+    one: NDArray[np.float32],
+    rows: IntArray,
+    base_2: Point,
+    points_2: FloatArray,
+    two: NDArray[np.float32],
+    columns: IntArray,
+    tau: np.float32,
+    counts: NDArray[np.int16],
+) -> None:
+    """Fill counts[rows, columns]: `one` is the table of population 1, `two` of the columns alone."""
     num_configurations, dense = points_1.shape[0], len(columns) == points_2.shape[2]
     seen = np.empty(LANES, dtype=np.int32)
     for row in range(len(rows)):
@@ -240,6 +296,7 @@ def _count_rows(  # type: ignore[no-untyped-def]
             lanes = (count + 7) // 8 * 8
             other = U(block * num_configurations * ROWS * LANES)
             _add_crossings(one, own, two, other, num_configurations, lanes, tau, seen)
+            # pairs that rounding leaves open are counted
             undecided = 0
             if dense:
                 for n in range(count):
@@ -252,21 +309,22 @@ def _count_rows(  # type: ignore[no-untyped-def]
                     counts[U(i), U(columns[first + n])] = certain
                     undecided += certain != possible
             if undecided > 0:
-                _decide(
-                    base_1,
-                    points_1,
-                    i,
-                    base_2,
-                    points_2,
-                    columns[first : first + count],
-                    seen,
-                    counts,
-                )
+                chosen = columns[first : first + count]
+                _decide(base_1, points_1, i, base_2, points_2, chosen, seen, counts)
 
 
 @kernel
-def _decide(base_1, points_1, i, base_2, points_2, columns, seen, counts):  # type: ignore[no-untyped-def]
-    """Count the pairs of a row anew that may be wrong, by the exact test."""
+def _decide(
+    base_1: Point,
+    points_1: FloatArray,
+    i: int,
+    base_2: Point,
+    points_2: FloatArray,
+    columns: IntArray,
+    seen: NDArray[np.int32],
+    counts: NDArray[np.int16],
+) -> None:
+    """Count those pairs of a row anew that rounding leaves open, by the exact predicates."""
     for n in range(len(columns)):
         if (seen[n] >> 16) != (seen[n] & 0xFFFF):
             j, total = columns[n], 0
@@ -276,8 +334,8 @@ def _decide(base_1, points_1, i, base_2, points_2, columns, seen, counts):  # ty
 
 
 @kernel
-def sum_counts(counts, sums_1, sums_2):  # type: ignore[no-untyped-def]
-    """Sums of a matrix's rows and columns."""
+def sum_counts(counts: NDArray[np.int16], sums_1: IntArray, sums_2: IntArray) -> None:
+    """Write the sums of a matrix's rows and columns."""
     for j in range(counts.shape[1]):
         sums_2[U(j)] = 0
     for i in range(counts.shape[0]):
@@ -290,17 +348,26 @@ def sum_counts(counts, sums_1, sums_2):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def crossings(  # type: ignore[no-untyped-def]
-    base_1, points_1, rows, other_rows, base_2, points_2, columns, counts, sums_1, sums_2
-):
+def crossings(
+    base_1: Point,
+    points_1: FloatArray,
+    rows: IntArray,
+    other_rows: IntArray,
+    base_2: Point,
+    points_2: FloatArray,
+    columns: IntArray,
+    counts: NDArray[np.int16],
+    sums_1: IntArray,
+    sums_2: IntArray,
+) -> bool:
     """Bring a matrix of counts up to date, and its sums.
 
     Args:
-        base_1: (2,) or a pair.
+        base_1: x, y of the base of arm 1.
         points_1: (K, 4, N1).
         rows: Individuals of population 1 that changed.
         other_rows: Those that did not.
-        base_2: As base_1.
+        base_2: x, y of the base of arm 2.
         points_2: (K, 4, N2).
         columns: Individuals of population 2 that changed.
         counts: (N1, N2) int16.
@@ -310,24 +377,24 @@ def crossings(  # type: ignore[no-untyped-def]
     Returns:
         False, with nothing written, if a coordinate is not finite.
     """
-    squared = max(
-        longest_link(base_1[0], base_1[1], points_1), longest_link(base_2[0], base_2[1], points_2)
-    )
-    dx, dy = base_2[0] - base_1[0], base_2[1] - base_1[1]
-    apart = dx * dx + dy * dy
+    # scale of the tables, bound on rounding
+    (x_1, y_1), (x_2, y_2) = base_1, base_2
+    squared = max(longest_link(x_1, y_1, points_1), longest_link(x_2, y_2, points_2))
+    apart = (x_2 - x_1) * (x_2 - x_1) + (y_2 - y_1) * (y_2 - y_1)
     if not squared + apart < _LARGEST:
         return False
     scale, tau = _threshold(math.sqrt(squared), math.sqrt(apart))
     num_1, num_2, size = points_1.shape[2], points_2.shape[2], points_1.shape[0] * ROWS * LANES
     one = np.empty((num_1 + LANES - 1) // LANES * size, dtype=np.float32)
     two = np.empty((num_2 + LANES - 1) // LANES * size, dtype=np.float32)
-    _fill_table(points_1, base_1[0], base_1[1], base_2[0], base_2[1], np.arange(num_1), scale, one)
+    _fill_table(points_1, x_1, y_1, x_2, y_2, np.arange(num_1), scale, one)
+    # changed rows against all columns, then the other rows against changed columns
     if len(rows) > 0:
         everyone = np.arange(num_2)
-        _fill_table(points_2, base_2[0], base_2[1], base_1[0], base_1[1], everyone, scale, two)
+        _fill_table(points_2, x_2, y_2, x_1, y_1, everyone, scale, two)
         _count_rows(base_1, points_1, one, rows, base_2, points_2, two, everyone, tau, counts)
     if len(columns) > 0 and len(other_rows) > 0:
-        _fill_table(points_2, base_2[0], base_2[1], base_1[0], base_1[1], columns, scale, two)
+        _fill_table(points_2, x_2, y_2, x_1, y_1, columns, scale, two)
         _count_rows(base_1, points_1, one, other_rows, base_2, points_2, two, columns, tau, counts)
     sum_counts(counts, sums_1, sums_2)
     return True

@@ -19,9 +19,7 @@ from numpy.typing import NDArray
 from evoexp.collision.models import link_crossing_kernels as kernels
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import atan2, sincos
-from evoexp.records import FloatArray
-
-IntArray = NDArray[np.int64]
+from evoexp.records import BoolArray, FloatArray, IntArray
 
 PARALLEL = 1e-12
 """`closed_form` takes two links as parallel up to this sine of the angle between them [-]."""
@@ -94,8 +92,8 @@ def update_crossings(
     points_1: FloatArray,
     two: Arm,
     points_2: FloatArray,
-    changed_1: NDArray[np.bool_],
-    changed_2: NDArray[np.bool_],
+    changed_1: BoolArray,
+    changed_2: BoolArray,
 ) -> None:
     """Count anew, in place, the pairs of which at least one individual changed.
 
@@ -165,10 +163,10 @@ class ClosedForm(NamedTuple):
 
     mu: FloatArray
     nu: FloatArray
-    crossing: NDArray[np.bool_]
+    crossing: BoolArray
 
     @property
-    def colliding(self) -> NDArray[np.bool_]:
+    def colliding(self) -> BoolArray:
         """Whether any pair of links crosses, (n,)."""
         return np.asarray(self.crossing.any(axis=0))
 
@@ -221,7 +219,9 @@ def closed_form(one: Arm, q_1: FloatArray, two: Arm, q_2: FloatArray) -> ClosedF
 
 
 @kernel
-def _intersect(length, angle, mu, nu, crossing):  # type: ignore[no-untyped-def]
+def _intersect(
+    length: FloatArray, angle: FloatArray, mu: FloatArray, nu: FloatArray, crossing: BoolArray
+) -> None:
     sines, cosines = np.empty((5, 5)), np.empty((5, 5))
     for n in range(angle.shape[1]):
         for a in range(5):
@@ -304,8 +304,8 @@ def changed_members(
     crossings: Crossings,
     num_1: int,
     num_2: int,
-    changed_1: NDArray[np.bool_],
-    changed_2: NDArray[np.bool_],
+    changed_1: BoolArray,
+    changed_2: BoolArray,
 ) -> tuple[IntArray, IntArray, IntArray]:
     """Return the changed and the unchanged individuals of population 1.
 

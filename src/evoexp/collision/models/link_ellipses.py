@@ -1,15 +1,17 @@
-"""The collision model of Lavoie & Boudreau 2001.
-
-A planar arm's links as lines among ellipses, along a whole path.
-"""
+"""The collision model of Lavoie & Boudreau 2001: a planar arm's links as lines among ellipses."""
 
 from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.ellipse_kernels import first_contact, paths_collide
+from evoexp.collision.models.ellipse_kernels import (
+    Ellipses,
+    TestedPath,
+    first_contact,
+    paths_collide,
+)
 from evoexp.errors import SettingError
-from evoexp.records import FloatArray
+from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.planar_ends import PlanarArm, planar_arm
 from evoexp.scenarios.obstacles import ELLIPSE, ObstacleTable
@@ -52,22 +54,22 @@ class LinkEllipses(Component):
                     f"scenario.obstacles[{k}].shape", "an ellipse in the plane z = 0", int(kind)
                 )
         seen = 0 if self.blind else len(obstacles.kind)
-        rows = list(zip(*obstacles[1:], strict=True))[:seen]
+        columns = obstacles.center, obstacles.rotation, obstacles.size
+        rows = list(zip(*columns, strict=True))[:seen]
         maps = np.array([_to_unit_circle(*row) for row in rows]).reshape(-1, 5)
         reached = np.array([_first_link(arm, *row) for row in rows], dtype=np.int64)
-        return EllipseCollision(
-            arm, (maps, reached), self.num_positions, self.swept == "chords", obstacles
-        )
+        ellipses, swept = Ellipses(maps, reached), self.swept == "chords"
+        return EllipseCollision(arm, ellipses, self.num_positions, swept, obstacles)
 
 
 class Contact(NamedTuple):
-    """Where a path first touches.
+    """The first contact of a path.
 
     Attributes:
         position: j of Eq. 3.
         obstacle: Counted from 1.
         link: Link, or link end if it was swept, counted from 1.
-        swept: Whether it is the chord of a link end, between position j − 1 and j, that touches.
+        swept: Whether the chord of a link end, between positions j − 1 and j, touches.
     """
 
     position: int
@@ -81,33 +83,31 @@ class EllipseCollision(NamedTuple):
 
     Attributes:
         arm: Link lengths and base.
-        ellipses: See `ellipse_kernels.paths_collide`.
+        ellipses: The ellipses as the kernels read them.
         num_positions: M.
         chords: Whether chords are swept.
         obstacles: The obstacle table.
     """
 
     arm: PlanarArm
-    ellipses: tuple[FloatArray, np.ndarray]
+    ellipses: Ellipses
     num_positions: int
     chords: bool
     obstacles: ObstacleTable
 
     @property
-    def path(self) -> tuple[int, np.ndarray, bool]:
-        """M; the positions tested first, the end, then halves, quarters, ….
-
-        Whether all follow, with chords swept.
-        """
+    def path(self) -> TestedPath:
+        """The positions tested: the end, then halves, quarters, …; all again if chords are swept."""
         first = _spread(self.num_positions)
-        return self.num_positions, first[:NUM_FIRST] if self.chords else first, self.chords
+        first = first[:NUM_FIRST] if self.chords else first
+        return TestedPath(self.num_positions, first, self.chords)
 
     @property
     def queries(self) -> int:
         """Configurations that judging one path asks for; none if there is nothing to meet."""
-        return self.num_positions if len(self.ellipses[0]) else 0
+        return self.num_positions if len(self.ellipses.maps) else 0
 
-    def collide(self, starts: FloatArray, ends: FloatArray) -> np.ndarray:
+    def collide(self, starts: FloatArray, ends: FloatArray) -> BoolArray:
         """Return which paths collide, (individuals,).
 
         Args:
@@ -117,7 +117,7 @@ class EllipseCollision(NamedTuple):
         Raises:
             ValueError: If their shapes are others.
         """
-        num = len(self.arm[0])
+        num = len(self.arm.lengths)
         if starts.shape != ends.shape or starts.ndim != 2 or len(starts) != num:
             raise ValueError(
                 f"starts and ends must be ({num}, individuals), were {starts.shape} and "
@@ -130,10 +130,7 @@ class EllipseCollision(NamedTuple):
         return hit
 
     def contact(self, start: FloatArray, end: FloatArray) -> Contact | None:
-        """Return the first contact of one path between postures (N,) [rad].
-
-        None if there is none.
-        """
+        """Return the first contact of one path between postures (N,) [rad]; None without contact."""
         start, end = (np.ascontiguousarray(q, dtype=np.float64) for q in (start, end))
         position, obstacle, link, swept = first_contact(
             start, end, self.arm, self.ellipses, self.num_positions, self.chords
@@ -144,11 +141,9 @@ class EllipseCollision(NamedTuple):
 def _to_unit_circle(
     center: FloatArray, rotation: FloatArray, size: FloatArray
 ) -> tuple[float, ...]:
-    """Return a, b, c, d, e of (x, y) → (a x + b y + c, d y + e).
+    """Return a … e of the map (x, y) → (a x + b y + c, d y + e) of an ellipse to the unit circle.
 
-    Which maps an ellipse to the unit circle.
-
-    The Cholesky factor of R diag(1/a², 1/b²) Rᵀ; d follows from its determinant, without
+    The map is the Cholesky factor of R diag(1/a², 1/b²) Rᵀ; d follows from its determinant, without
     cancellation.
     """
     (cosine, sine), one, two = (rotation[0], rotation[3]), 1.0 / size[0], 1.0 / size[1]
@@ -158,29 +153,19 @@ def _to_unit_circle(
 
 
 def _first_link(arm: PlanarArm, center: FloatArray, rotation: FloatArray, size: FloatArray) -> int:
-    """Return the first link (1, 2, …) whose end can reach an ellipse's bounding box.
-
-    N + 2 if none does.
-    """
-    lengths, base_x, base_y = arm[:3]
-    c, s = rotation[0], rotation[3]
-    half = np.array(
-        [
-            np.sqrt((c * size[0]) ** 2 + (s * size[1]) ** 2),
-            np.sqrt((s * size[0]) ** 2 + (c * size[1]) ** 2),
-        ]
-    )
-    off = np.maximum(np.abs(center[:2] - (base_x, base_y)) - half, 0.0)
+    """Return the first link (1, 2, …) whose end can reach an ellipse's bounding box, else N + 2."""
+    lengths, c, s = arm.lengths, rotation[0], rotation[3]
+    wide = np.sqrt((c * size[0]) ** 2 + (s * size[1]) ** 2)
+    high = np.sqrt((s * size[0]) ** 2 + (c * size[1]) ** 2)
+    half = np.array([wide, high])
+    off = np.maximum(np.abs(center[:2] - (arm.base_x, arm.base_y)) - half, 0.0)
     nearest = float(np.sqrt(np.sum(off * off))) * (1.0 - 1e-9)
     within = np.flatnonzero(np.cumsum(lengths) >= nearest)
     return int(within[0]) + 1 if len(within) else len(lengths) + 2
 
 
-def _spread(num_positions: int) -> np.ndarray:
-    """Return 1 … M so that every next one is far from those before.
-
-    M, the middle, the quarters, ….
-    """
+def _spread(num_positions: int) -> IntArray:
+    """Return 1 … M in an order that spreads: M, the middle, the quarters, …."""
     order, parts = [num_positions], 2
     while len(order) < num_positions:
         for k in range(1, parts, 2):

@@ -1,34 +1,33 @@
-"""Kernels of arms with envelopes.
-
-Two boundary lines per link, at ± half its width, and a circle around the tip.
+"""Kernels of arms with envelopes: two boundary lines per link, and a circle around the tip.
 
 As in `link_crossing_kernels`, all follows from what each individual has on its own and from four
 cross and four dot products of the arms' directions; here the directions are unit vectors, so that
 line functions are distances [length unit of the scene]. A pair's configuration takes some 260
 operations in single precision for its sixteen pairs of boundary lines, eight of a circle and a
-line, and one of two circles; what they leave open is decided in double precision, the lines
-exactly. Measured with vectors of eight (AVX2), 100 × 100 pairs in 4 configurations: 220 µs, nearly
+line, and one of two circles; cases that rounding leaves open are decided in double precision, the
+lines exactly. Measured with vectors of eight (AVX2), 100 × 100 pairs in 4 configurations: 220 µs, nearly
 all of them this loop, which no longer fits the registers.
 
 Outlines are (K, 8, N): elbow x, y, tip x, y, direction of the first link x, y, of the second x, y.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from evoexp.collision.models.link_crossing_kernels import directions, sum_counts
-from evoexp.collision.models.segment_predicates import touching
+from evoexp.collision.models.link_crossing_kernels import Point, directions, sum_counts
+from evoexp.collision.models.segment_predicates import squared_distance, touching
 from evoexp.numeric.compilation import kernel
+from evoexp.records import FloatArray, IntArray
 from evoexp.robots.kinematics import U
 
 LANES = 104
 
 ROWS = 8
-"""Rows of a table: direction of link 1 (x, y), of link 2 (x, y), both links' (across.
-
-Along) of the other's base.
-"""
+"""Rows of a table: direction of link 1 (x, y), of link 2 (x, y), and where the other's base lies
+across and along either link."""
 
 _ONE, _MANY, _NONE = np.int32(1), np.int32(65536), np.int32(0)
 _ZERO = np.float32(0.0)
@@ -36,8 +35,50 @@ _UNIT = 2.0**-24
 _FLOOR = 2.0**-100
 
 
+class Envelope(NamedTuple):
+    """An arm of two links with its envelope [length unit of the scene].
+
+    Attributes:
+        base: x, y of its first joint.
+        lengths: Of its links.
+        half_width: Distance of the boundary lines from their link.
+        tcp_radius: Of the circle around the tip.
+    """
+
+    base: Point
+    lengths: Point
+    half_width: float
+    tcp_radius: float
+
+
+class Sizes(NamedTuple):
+    """Sizes of two arms in the scale of tables, single precision.
+
+    Attributes:
+        l1: Length of arm 1's first link.
+        l2: Of its second.
+        half: Its half width.
+        squared: Square of its circle's radius.
+        m1: Length of arm 2's first link.
+        m2: Of its second.
+        wide: Its half width.
+        other_squared: Square of its circle's radius.
+        both_squared: Square of the sum of the radii.
+    """
+
+    l1: np.float32
+    l2: np.float32
+    half: np.float32
+    squared: np.float32
+    m1: np.float32
+    m2: np.float32
+    wide: np.float32
+    other_squared: np.float32
+    both_squared: np.float32
+
+
 @kernel
-def outlines(q, base_x, base_y, lengths, out):  # type: ignore[no-untyped-def]
+def outlines(q: np.float32, base_x: float, base_y: float, lengths: Point, out: FloatArray) -> None:
     """Fill out (K, 8, N) from q (K, 2, N) [rad]."""
     num, (first, second) = q.shape[2], lengths
     angles, place = q.reshape(-1), out.reshape(-1)
@@ -65,73 +106,84 @@ def outlines(q, base_x, base_y, lengths, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def boundary(arm, outline, k, n, link, side):  # type: ignore[no-untyped-def]
-    """Ends (x, y, x, y) of a boundary line; side −1 is to the right of the link, +1 to its left."""
-    base, _, half_width, _ = arm
+def boundary(
+    arm: Envelope, outline: FloatArray, k: int, n: int, link: int, side: float
+) -> tuple[float, float, float, float]:
+    """Return the ends (x, y, x, y) of a boundary line: side −1 right of the link, +1 left of it."""
     c, s = outline[k, 4 + 2 * link, n], outline[k, 5 + 2 * link, n]
-    x, y = -(side * half_width * s), side * half_width * c
+    x, y = -(side * arm.half_width * s), side * arm.half_width * c
     elbow_x, elbow_y = outline[k, 0, n], outline[k, 1, n]
     if link == 0:
-        return base[0] + x, base[1] + y, elbow_x + x, elbow_y + y
+        return arm.base[0] + x, arm.base[1] + y, elbow_x + x, elbow_y + y
     return elbow_x + x, elbow_y + y, outline[k, 2, n] + x, outline[k, 3, n] + y
 
 
 @kernel
-def colliding(arm_1, outline_1, i, arm_2, outline_2, j, k):  # type: ignore[no-untyped-def]
-    """Whether two individuals collide in configuration k: the careful test."""
-    radius_1, radius_2 = arm_1[3], arm_2[3]
+def colliding(
+    arm_1: Envelope,
+    outline_1: FloatArray,
+    i: int,
+    arm_2: Envelope,
+    outline_2: FloatArray,
+    j: int,
+    k: int,
+) -> bool:
+    """Return whether two individuals collide in configuration k, decided in double precision."""
+    radius_1, radius_2 = arm_1.tcp_radius, arm_2.tcp_radius
+    # circle against circle
     cx, cy, fx, fy = outline_1[k, 2, i], outline_1[k, 3, i], outline_2[k, 2, j], outline_2[k, 3, j]
     reach = radius_1 + radius_2
     if (fx - cx) * (fx - cx) + (fy - cy) * (fy - cy) < reach * reach:
         return True
+    # boundary lines of arm 1 against the circle and the boundary lines of arm 2
     for one in range(4):
         ax, ay, bx, by = boundary(arm_1, outline_1, k, i, one // 2, 2.0 * (one % 2) - 1.0)
-        if _squared_distance(ax, ay, bx, by, fx, fy) < radius_2 * radius_2:
+        if squared_distance(ax, ay, bx, by, fx, fy) < radius_2 * radius_2:
             return True
         for two in range(4):
             dx, dy, ex, ey = boundary(arm_2, outline_2, k, j, two // 2, 2.0 * (two % 2) - 1.0)
             if touching(ax, ay, bx, by, dx, dy, ex, ey):
                 return True
+    # boundary lines of arm 2 against the circle of arm 1
     for two in range(4):
         dx, dy, ex, ey = boundary(arm_2, outline_2, k, j, two // 2, 2.0 * (two % 2) - 1.0)
-        if _squared_distance(dx, dy, ex, ey, cx, cy) < radius_1 * radius_1:
+        if squared_distance(dx, dy, ex, ey, cx, cy) < radius_1 * radius_1:
             return True
     return False
 
 
 @kernel
-def _squared_distance(ax, ay, bx, by, x, y):  # type: ignore[no-untyped-def]
-    """Of a point from a segment."""
-    ux, uy, x, y = bx - ax, by - ay, x - ax, y - ay
-    squared = ux * ux + uy * uy
-    t = min(max((ux * x + uy * y) / squared, 0.0), 1.0) if squared > 0.0 else 0.0
-    x, y = x - t * ux, y - t * uy
-    return x * x + y * y
-
-
-@kernel
-def _threshold(arm_1, arm_2):  # type: ignore[no-untyped-def]
-    """Return the scale of tables, and tau: above all errors of the quantities compared.
+def _threshold(arm_1: Envelope, arm_2: Envelope) -> tuple[float, np.float32]:
+    """Return the scale of tables, and tau, a bound on the errors of the quantities compared.
 
     With links ≤ l, bases d apart, half widths and radii ≤ h: every distance is below V = d + 3 l +
     4 h and errs by less than 10 u V, u = 2^-24: the unit vectors' products (4 u), their multiples
     (2 u), and sums of up to six terms. So the product of two errs by less than 21 u V², a sum of
     two squares by less than 32 u V² (40 taken).
     """
-    (ax, ay), lengths_1, half_1, radius_1 = arm_1
-    (dx, dy), lengths_2, half_2, radius_2 = arm_2
+    (ax, ay), (dx, dy) = arm_1.base, arm_2.base
     apart = math.sqrt((dx - ax) * (dx - ax) + (dy - ay) * (dy - ay))
-    longest = max(max(lengths_1[0], lengths_1[1]), max(lengths_2[0], lengths_2[1]))
-    most = apart + 3.0 * longest + half_1 + half_2 + radius_1 + radius_2
+    (first, second), (third, fourth) = arm_1.lengths, arm_2.lengths
+    longest = max(max(first, second), max(third, fourth))
+    most = apart + 3.0 * longest + arm_1.half_width + arm_2.half_width
+    most = most + arm_1.tcp_radius + arm_2.tcp_radius
     scale = math.ldexp(1.0, -max(math.frexp(most)[1], -1000))
     return scale, np.float32(40.0 * _UNIT * (most * scale) * (most * scale) + _FLOOR)
 
 
 @kernel
-def _fill_table(outline, lengths, dx, dy, members, scale, out):  # type: ignore[no-untyped-def]
-    """Table of some individuals; (dx, dy) leads to the other's base.
+def _fill_table(
+    outline: FloatArray,
+    lengths: Point,
+    dx: float,
+    dy: float,
+    members: IntArray,
+    scale: float,
+    out: NDArray[np.float32],
+) -> None:
+    """Write the table of some individuals; (dx, dy) leads from their base to the other's.
 
-    Lanes without an individual are apart.
+    Lanes without an individual repeat the last one.
     """
     num_configurations = outline.shape[0]
     first = lengths[0] * scale
@@ -155,13 +207,24 @@ def _fill_table(outline, lengths, dx, dy, members, scale, out):  # type: ignore[
 
 
 @kernel
-def _apart(p, q, least):  # type: ignore[no-untyped-def]
+def _apart(p: np.float32, q: np.float32, least: np.float32) -> np.float32:
+    """Return the lesser of `least` and the greater of two sign products."""
     r = p if p > q else q
     return r if r < least else least
 
 
 @kernel
-def _lines(across, turned, sine, cosine, sizes, least):  # type: ignore[no-untyped-def]
+def _lines(
+    across: np.float32,
+    turned: np.float32,
+    sine: np.float32,
+    cosine: np.float32,
+    length_1: np.float32,
+    half_1: np.float32,
+    length_2: np.float32,
+    half_2: np.float32,
+    least: np.float32,
+) -> np.float32:
     """Lower `least` to the greater sign product of each pair of two links' boundary lines.
 
     Args:
@@ -169,10 +232,12 @@ def _lines(across, turned, sine, cosine, sizes, least):  # type: ignore[no-untyp
         turned: The other way round.
         sine: Of the angle from the first link to the second.
         cosine: Of it.
-        sizes: Length and half width of the first link, of the second.
+        length_1: Of the first link.
+        half_1: Its half width.
+        length_2: Of the second link.
+        half_2: Its half width.
         least: So far.
     """
-    length_1, half_1, length_2, half_2 = sizes
     shift, step = half_2 * cosine, length_2 * sine
     twist, fall = half_1 * cosine, length_1 * sine
     left, right = across + shift, across - shift  # of the second's boundary lines
@@ -187,7 +252,14 @@ def _lines(across, turned, sine, cosine, sizes, least):  # type: ignore[no-untyp
 
 
 @kernel
-def _circle(across, along, length, half_width, squared_radius, least):  # type: ignore[no-untyped-def]
+def _circle(
+    across: np.float32,
+    along: np.float32,
+    length: np.float32,
+    half_width: np.float32,
+    squared_radius: np.float32,
+    least: np.float32,
+) -> np.float32:
     """Lower `least` to distance² − radius² of a circle and a link's nearer boundary line."""
     off, beyond = abs(across) - half_width, along - length
     out = beyond if beyond > -along else -along
@@ -197,50 +269,47 @@ def _circle(across, along, length, half_width, squared_radius, least):  # type: 
 
 
 @kernel
-def _add_collisions(one, s, two, o, lanes, sizes, tau, seen):  # type: ignore[no-untyped-def]
-    """One configuration of an individual (at s) against a block (at o)."""
+def _add_collisions(
+    one: NDArray[np.float32],
+    s: np.uint64,
+    two: NDArray[np.float32],
+    o: np.uint64,
+    lanes: int,
+    sizes: Sizes,
+    tau: np.float32,
+    seen: NDArray[np.int32],
+) -> None:
+    """Add one configuration of an individual (at s) against a block (at o) to `seen`."""
     low = -tau
-    l1, l2, half, squared, m1, m2, wide, other_squared, both_squared = sizes
+    l1, l2, m1, m2 = sizes.l1, sizes.l2, sizes.m1, sizes.m2
+    half, wide, squared = sizes.half, sizes.wide, sizes.squared
+    other_squared, both_squared = sizes.other_squared, sizes.both_squared
     ax, ay, bx, by = one[s], one[s + U(LANES)], one[s + U(2 * LANES)], one[s + U(3 * LANES)]
-    p1, g1, p2, g2 = (
-        one[s + U(4 * LANES)],
-        one[s + U(5 * LANES)],
-        one[s + U(6 * LANES)],
-        one[s + U(7 * LANES)],
-    )
+    p1, g1 = one[s + U(4 * LANES)], one[s + U(5 * LANES)]
+    p2, g2 = one[s + U(6 * LANES)], one[s + U(7 * LANES)]
     for n in range(lanes):
         j = o + U(n)
         vx, vy, wx, wy = two[j], two[j + U(LANES)], two[j + U(2 * LANES)], two[j + U(3 * LANES)]
-        r1, e1, r2, e2 = (
-            two[j + U(4 * LANES)],
-            two[j + U(5 * LANES)],
-            two[j + U(6 * LANES)],
-            two[j + U(7 * LANES)],
-        )
-        c11, c12, c21, c22 = (
-            ax * vy - ay * vx,
-            ax * wy - ay * wx,
-            bx * vy - by * vx,
-            bx * wy - by * wx,
-        )
-        d11, d12, d21, d22 = (
-            ax * vx + ay * vy,
-            ax * wx + ay * wy,
-            bx * vx + by * vy,
-            bx * wx + by * wy,
-        )
+        r1, e1 = two[j + U(4 * LANES)], two[j + U(5 * LANES)]
+        r2, e2 = two[j + U(6 * LANES)], two[j + U(7 * LANES)]
+        # sines and cosines of the angles between links
+        c11, c12 = ax * vy - ay * vx, ax * wy - ay * wx
+        c21, c22 = bx * vy - by * vx, bx * wy - by * wx
+        d11, d12 = ax * vx + ay * vy, ax * wx + ay * wy
+        d21, d22 = bx * vx + by * vy, bx * wx + by * wy
         p12, p22 = p1 + m1 * c11, p2 + m1 * c21  # the other's elbow from the lines of links 1 and 2
         r12, r22 = r1 - l1 * c11, r2 - l1 * c12  # the own elbow from the other's lines
         q1, q2 = p12 + m2 * c12, p22 + m2 * c22  # tips
         t1, t2 = r12 - l2 * c21, r22 - l2 * c22
         h1, h2 = g1 + m1 * d11 + m2 * d12, g2 + m1 * d21 + m2 * d22  # tips along the links
         k1, k2 = e1 + l1 * d11 + l2 * d21, e2 + l1 * d12 + l2 * d22
+        # both circles, sixteen pairs of lines, eight pairs of a circle and a line
         away = h2 - l2
         least = away * away + q2 * q2 - both_squared
-        least = _lines(p1, r1, c11, d11, (l1, half, m1, wide), least)
-        least = _lines(p12, r2, c12, d12, (l1, half, m2, wide), least)
-        least = _lines(p2, r12, c21, d21, (l2, half, m1, wide), least)
-        least = _lines(p22, r22, c22, d22, (l2, half, m2, wide), least)
+        least = _lines(p1, r1, c11, d11, l1, half, m1, wide, least)
+        least = _lines(p12, r2, c12, d12, l1, half, m2, wide, least)
+        least = _lines(p2, r12, c21, d21, l2, half, m1, wide, least)
+        least = _lines(p22, r22, c22, d22, l2, half, m2, wide, least)
         least = _circle(q1, h1, l1, half, other_squared, least)
         least = _circle(q2, h2, l2, half, other_squared, least)
         least = _circle(t1, k1, m1, wide, squared, least)
@@ -249,13 +318,20 @@ def _add_collisions(one, s, two, o, lanes, sizes, tau, seen):  # type: ignore[no
 
 
 @kernel
-def _count_rows(  # type: ignore[no-untyped-def]
-    arm_1, outline_1, one, rows, arm_2, outline_2, two, columns, sizes, tau, counts
-):
-    """Fill counts[rows, columns].
-
-    `one` is the table of all of population 1, `two` of the columns alone.
-    """
+def _count_rows(
+    arm_1: Envelope,
+    outline_1: FloatArray,
+    one: NDArray[np.float32],
+    rows: IntArray,
+    arm_2: Envelope,
+    outline_2: FloatArray,
+    two: NDArray[np.float32],
+    columns: IntArray,
+    sizes: Sizes,
+    tau: np.float32,
+    counts: NDArray[np.int16],
+) -> None:
+    """Fill counts[rows, columns]: `one` is the table of population 1, `two` of the columns alone."""
     num_configurations = outline_1.shape[0]
     seen = np.empty(LANES, dtype=np.int32)
     for row in range(len(rows)):
@@ -272,6 +348,7 @@ def _count_rows(  # type: ignore[no-untyped-def]
                 _add_collisions(
                     one, U(own + k * ROWS * LANES), two, U(other), lanes, sizes, tau, seen
                 )
+            # pairs that rounding leaves open are counted anew
             for n in range(count):
                 j, total = columns[first + n], seen[U(n)] & 0xFFFF
                 if seen[U(n)] >> 16 != total:
@@ -282,17 +359,26 @@ def _count_rows(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def collisions(  # type: ignore[no-untyped-def]
-    arm_1, outline_1, rows, other_rows, arm_2, outline_2, columns, counts, sums_1, sums_2
-):
+def collisions(
+    arm_1: Envelope,
+    outline_1: FloatArray,
+    rows: IntArray,
+    other_rows: IntArray,
+    arm_2: Envelope,
+    outline_2: FloatArray,
+    columns: IntArray,
+    counts: NDArray[np.int16],
+    sums_1: IntArray,
+    sums_2: IntArray,
+) -> None:
     """Bring a matrix of counts up to date, and its sums.
 
     Args:
-        arm_1: Base (x, y), lengths of two links, half width, radius of the circle: nested tuples.
+        arm_1: Arm of population 1.
         outline_1: (K, 8, N1), finite.
         rows: Individuals of population 1 that changed.
         other_rows: Those that did not.
-        arm_2: As arm_1.
+        arm_2: Arm of population 2.
         outline_2: (K, 8, N2).
         columns: Individuals of population 2 that changed.
         counts: (N1, N2) int16.
@@ -301,19 +387,21 @@ def collisions(  # type: ignore[no-untyped-def]
     """
     scale, tau = _threshold(arm_1, arm_2)
     sizes = _sizes(arm_1, arm_2, scale)
-    dx, dy = arm_2[0][0] - arm_1[0][0], arm_2[0][1] - arm_1[0][1]
+    (ax, ay), (bx, by) = arm_1.base, arm_2.base
+    dx, dy = bx - ax, by - ay
     num_1, num_2, size = outline_1.shape[2], outline_2.shape[2], outline_1.shape[0] * ROWS * LANES
     one = np.empty((num_1 + LANES - 1) // LANES * size, dtype=np.float32)
     two = np.empty((num_2 + LANES - 1) // LANES * size, dtype=np.float32)
-    _fill_table(outline_1, arm_1[1], dx, dy, np.arange(num_1), scale, one)
+    _fill_table(outline_1, arm_1.lengths, dx, dy, np.arange(num_1), scale, one)
+    # changed rows against all columns, then the other rows against changed columns
     if len(rows) > 0:
         everyone = np.arange(num_2)
-        _fill_table(outline_2, arm_2[1], -dx, -dy, everyone, scale, two)
+        _fill_table(outline_2, arm_2.lengths, -dx, -dy, everyone, scale, two)
         _count_rows(
             arm_1, outline_1, one, rows, arm_2, outline_2, two, everyone, sizes, tau, counts
         )
     if len(columns) > 0 and len(other_rows) > 0:
-        _fill_table(outline_2, arm_2[1], -dx, -dy, columns, scale, two)
+        _fill_table(outline_2, arm_2.lengths, -dx, -dy, columns, scale, two)
         _count_rows(
             arm_1, outline_1, one, other_rows, arm_2, outline_2, two, columns, sizes, tau, counts
         )
@@ -321,18 +409,14 @@ def collisions(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _sizes(arm_1, arm_2, scale):  # type: ignore[no-untyped-def]
-    _, (l1, l2), half_1, radius_1 = arm_1
-    _, (m1, m2), half_2, radius_2 = arm_2
-    squared_1, squared_2 = (
-        (radius_1 * scale) * (radius_1 * scale),
-        (radius_2 * scale) * (radius_2 * scale),
-    )
-    both = ((radius_1 + radius_2) * scale) * ((radius_1 + radius_2) * scale)
-    return (
-        np.float32(l1 * scale), np.float32(l2 * scale), np.float32(half_1 * scale),
-        np.float32(squared_1),
-        np.float32(m1 * scale), np.float32(m2 * scale), np.float32(half_2 * scale),
-        np.float32(squared_2),
-        np.float32(both),
+def _sizes(arm_1: Envelope, arm_2: Envelope, scale: float) -> Sizes:
+    """Return the sizes of two arms in the scale of tables."""
+    (l1, l2), (m1, m2) = arm_1.lengths, arm_2.lengths
+    one, two = arm_1.tcp_radius * scale, arm_2.tcp_radius * scale
+    both = (arm_1.tcp_radius + arm_2.tcp_radius) * scale
+    half, wide = arm_1.half_width * scale, arm_2.half_width * scale
+    return Sizes(
+        np.float32(l1 * scale), np.float32(l2 * scale), np.float32(half), np.float32(one * one),
+        np.float32(m1 * scale), np.float32(m2 * scale), np.float32(wide), np.float32(two * two),
+        np.float32(both * both),
     )  # fmt: skip

@@ -1,6 +1,4 @@
-"""Collisions of planar arms of two links with envelopes around them.
-
-Whole populations against each other.
+"""Collisions of planar arms of two links with envelopes, whole populations against each other.
 
 Curkovic, Jerbic & Stipancic 2013, section 4: each link is a set of two boundary lines, parallel to
 it, and a circle of variable radius lies around the tool centre point (Fig. 11). Two arms collide in
@@ -15,24 +13,22 @@ The lines are decided exactly, as given by `EnvelopedArm.boundaries`; distances 
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from evoexp.collision.models import link_envelope_kernels as kernels
 from evoexp.collision.models.link_crossings import (
     Arm,
     Crossings,
-    IntArray,
     changed_members,
     checked,
     checked_pair,
     everyone,
     no_crossings,
 )
-from evoexp.records import FloatArray
+from evoexp.records import BoolArray, FloatArray, IntArray
 
 
 class EnvelopedArm(NamedTuple):
-    """A planar arm of two links, and what surrounds it.
+    """A planar arm of two links with its envelope.
 
     Attributes:
         arm: The arm.
@@ -45,15 +41,14 @@ class EnvelopedArm(NamedTuple):
     tcp_radius: float
 
     def outlines(self, q: FloatArray) -> FloatArray:
-        """Return elbow x, y, tip x, y [length unit of the scene].
-
-        And the links' unit directions x, y, x, y.
+        """Return the outlines of a population.
 
         Args:
             q: (K, 2, N) angles of the links from +x [rad].
 
         Returns:
-            (K, 8, N).
+            (K, 8, N): elbow x, y, tip x, y [length unit of the scene], and the links' unit
+            directions x, y, x, y.
 
         Raises:
             ValueError: If q has another shape.
@@ -65,9 +60,7 @@ class EnvelopedArm(NamedTuple):
         return out
 
     def boundaries(self, outlines: FloatArray) -> FloatArray:
-        """Return the boundary lines: right and left of the first link.
-
-        Right and left of the second.
+        """Return the boundary lines: right and left of the first link, then of the second.
 
         Args:
             outlines: (K, 8, N).
@@ -77,18 +70,15 @@ class EnvelopedArm(NamedTuple):
         """
         outlines = checked("outlines", outlines, 8)
         base = np.zeros(outlines[:, 0].shape)
-        ends = [
-            base + self.arm.base[0],
-            base + self.arm.base[1],
-            *(outlines[:, row] for row in range(4)),
-        ]
+        (x, y), joints = self.arm.base, (outlines[:, row] for row in range(4))
+        ends = [base + x, base + y, *joints]
         lines = []
         for link in (0, 1):
             c, s = outlines[:, 4 + 2 * link], outlines[:, 5 + 2 * link]
             for side in (-1.0, 1.0):
-                x, y = -(side * self.half_width * s), side * self.half_width * c
-                first, second = ends[2 * link : 2 * link + 2], ends[2 * link + 2 : 2 * link + 4]
-                lines.append([first[0] + x, first[1] + y, second[0] + x, second[1] + y])
+                dx, dy = -(side * self.half_width * s), side * self.half_width * c
+                ax, ay, bx, by = ends[2 * link : 2 * link + 4]
+                lines.append([ax + dx, ay + dy, bx + dx, by + dy])
         return np.array(lines)
 
 
@@ -119,12 +109,10 @@ def update_collisions(
     outlines_1: FloatArray,
     two: EnvelopedArm,
     outlines_2: FloatArray,
-    changed_1: NDArray[np.bool_],
-    changed_2: NDArray[np.bool_],
+    changed_1: BoolArray,
+    changed_2: BoolArray,
 ) -> None:
-    """Count anew, in place, the pairs of which at least one individual changed.
-
-    See `update_crossings`.
+    """Count anew, in place, the pairs of which an individual changed, as `update_crossings` does.
 
     Args:
         crossings: Of the outlines before, altered.
@@ -156,17 +144,17 @@ def _update(
     rows, others, columns = members
     arms = []
     for name, enveloped in (("one", one), ("two", two)):
-        (base, lengths), half_width, radius = enveloped
-        if not np.isfinite([*base, *lengths, half_width, radius]).all():
+        (x, y), (first, second) = enveloped.arm.base, enveloped.arm.lengths
+        half_width, radius = enveloped.half_width, enveloped.tcp_radius
+        if not np.isfinite([x, y, first, second, half_width, radius]).all():
             raise ValueError(f"{name} must be finite, was {enveloped}")
         if half_width < 0.0 or radius < 0.0:
             raise ValueError(
                 f"{name}: half_width and tcp_radius must be at least 0, were {half_width} and "
                 f"{radius}"
             )
-        arms.append(
-            (tuple(map(float, base)), tuple(map(float, lengths)), float(half_width), float(radius))
-        )
+        base, lengths = (float(x), float(y)), (float(first), float(second))
+        arms.append(kernels.Envelope(base, lengths, float(half_width), float(radius)))
     if not (np.isfinite(outlines_1).all() and np.isfinite(outlines_2).all()):
         raise ValueError("outlines must be finite")
     kernels.collisions(arms[0], outlines_1, rows, others, arms[1], outlines_2, columns, *found)

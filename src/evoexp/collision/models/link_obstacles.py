@@ -1,21 +1,19 @@
-"""Collisions of planar arms of two links with static obstacles of the plane.
-
-Discs, rectangles, capsules, half-planes.
+"""Collisions of planar arms of two links with discs, rectangles, capsules and half-planes.
 
 A link, or a boundary line of an envelope, collides where it has a point in common with the solid; a
-circle around the tip where it is nearer than its radius. Decided in double precision: right away
-from touching.
+circle around the tip collides where the solid is nearer than its radius. Both are decided in double
+precision, which is right but within rounding of touching.
 """
 
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from evoexp.collision.models.link_crossings import Arm, IntArray, checked
+from evoexp.collision.models.link_crossings import Arm, checked
 from evoexp.collision.models.link_envelopes import EnvelopedArm
+from evoexp.collision.models.segment_predicates import squared_distance
 from evoexp.numeric.compilation import kernel
-from evoexp.records import FloatArray
+from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.kinematics import U
 from evoexp.scenarios.obstacles import BOX, CAPSULE, HALF_SPACE, SPHERE, ObstacleTable
 
@@ -91,9 +89,9 @@ def count_obstacle_collisions(arm: Arm, points: FloatArray, obstacles: PlanarObs
 def count_enveloped_obstacle_collisions(
     arm: EnvelopedArm, outlines: FloatArray, obstacles: PlanarObstacles
 ) -> IntArray:
-    """Count the configurations in which a boundary line or the circle meets an obstacle.
+    """Count per individual (N,) the configurations in which its envelope meets an obstacle.
 
-    Per individual, (N,).
+    The envelope is its boundary lines and the circle around its tip.
 
     Args:
         arm: The arm and its envelope.
@@ -107,47 +105,46 @@ def count_enveloped_obstacle_collisions(
     if arm.tcp_radius > 0.0:
         tips = np.ascontiguousarray(outlines[:, 2:4].transpose(1, 0, 2))
         near = np.zeros(hit.shape, dtype=np.int64)
-        _circles(tips.reshape(2, -1), arm.tcp_radius, *obstacles, near.reshape(-1))
+        _circles(tips.reshape(2, -1), arm.tcp_radius, obstacles, near.reshape(-1))
         hit |= near > 0
     return np.asarray(hit.sum(axis=0))
 
 
-def _hits(lines: FloatArray, obstacles: PlanarObstacles) -> NDArray[np.bool_]:
+def _hits(lines: FloatArray, obstacles: PlanarObstacles) -> BoolArray:
     hit = np.zeros(lines.shape[2:], dtype=np.int64)
     flat = lines.reshape(len(lines), 4, -1)
     for line in flat:
-        _segments(line, *obstacles, hit.reshape(-1))
+        _segments(line, obstacles, hit.reshape(-1))
     return np.asarray(hit > 0)
 
 
 @kernel
-def _segments(lines, kind, center, direction, size, hit):  # type: ignore[no-untyped-def]
-    """Add the obstacles that each segment meets: lines (4, n), hit (n,)."""
+def _segments(lines: FloatArray, obstacles: PlanarObstacles, hit: IntArray) -> None:
+    """Count the obstacles that each segment meets.
+
+    Args:
+        lines: (4, n) x, y, x, y of the ends.
+        obstacles: The obstacles.
+        hit: (n,), to which the numbers are added.
+    """
+    kind, center, direction, size = (
+        obstacles.kind, obstacles.center, obstacles.direction, obstacles.size,
+    )  # fmt: skip
     for o in range(len(kind)):
-        x, y, c, s, a, b = (
-            center[o, 0],
-            center[o, 1],
-            direction[o, 0],
-            direction[o, 1],
-            size[o, 0],
-            size[o, 1],
-        )
-        what = kind[o]
+        x, y, c, s = center[o, 0], center[o, 1], direction[o, 0], direction[o, 1]
+        a, b = size[o, 0], size[o, 1]
+        shape = kind[o]
         for m in range(lines.shape[1]):
             n = U(m)
             # in the obstacle's frame
-            dx, dy, ex, ey = (
-                lines[U(0), n] - x,
-                lines[U(1), n] - y,
-                lines[U(2), n] - x,
-                lines[U(3), n] - y,
-            )
+            dx, dy = lines[U(0), n] - x, lines[U(1), n] - y
+            ex, ey = lines[U(2), n] - x, lines[U(3), n] - y
             px, py, qx, qy = c * dx + s * dy, c * dy - s * dx, c * ex + s * ey, c * ey - s * ex
-            if what == SPHERE:
-                met = _squared_distance(dx, dy, ex, ey, 0.0, 0.0) <= a * a
-            elif what == BOX:
+            if shape == SPHERE:
+                met = squared_distance(dx, dy, ex, ey, 0.0, 0.0) <= a * a
+            elif shape == BOX:
                 met = _meets_box(px, py, qx, qy, a, b)
-            elif what == CAPSULE:
+            elif shape == CAPSULE:
                 met = _meets_capsule(px, py, qx, qy, a, b)
             else:
                 met = min(px, qx) <= 0.0
@@ -155,17 +152,21 @@ def _segments(lines, kind, center, direction, size, hit):  # type: ignore[no-unt
 
 
 @kernel
-def _circles(tips, radius, kind, center, direction, size, hit):  # type: ignore[no-untyped-def]
-    """Add the obstacles that are nearer to each point than a radius: tips (2, n), hit (n,)."""
+def _circles(tips: FloatArray, radius: float, obstacles: PlanarObstacles, hit: IntArray) -> None:
+    """Count the obstacles that are nearer to each point than a radius.
+
+    Args:
+        tips: (2, n) x, y of the points.
+        radius: The radius [length unit].
+        obstacles: The obstacles.
+        hit: (n,), to which the numbers are added.
+    """
+    kind, center, direction, size = (
+        obstacles.kind, obstacles.center, obstacles.direction, obstacles.size,
+    )  # fmt: skip
     for o in range(len(kind)):
-        x, y, c, s, a, b = (
-            center[o, 0],
-            center[o, 1],
-            direction[o, 0],
-            direction[o, 1],
-            size[o, 0],
-            size[o, 1],
-        )
+        x, y, c, s = center[o, 0], center[o, 1], direction[o, 0], direction[o, 1]
+        a, b = size[o, 0], size[o, 1]
         for m in range(tips.shape[1]):
             n = U(m)
             dx, dy = tips[U(0), n] - x, tips[U(1), n] - y
@@ -185,10 +186,10 @@ def _circles(tips, radius, kind, center, direction, size, hit):  # type: ignore[
 
 
 @kernel
-def _meets_box(px, py, qx, qy, a, b):  # type: ignore[no-untyped-def]
-    """Whether a segment and the box ± a, ± b meet.
+def _meets_box(px: float, py: float, qx: float, qy: float, a: float, b: float) -> bool:
+    """Return whether a segment and the box ± a, ± b meet, by the separating axes.
 
-    No axis, and not the segment's normal, keeps them apart.
+    The axes are the box's two and the segment's normal.
     """
     mx, my, ex, ey = 0.5 * (px + qx), 0.5 * (py + qy), 0.5 * (qx - px), 0.5 * (qy - py)
     beside = abs(mx * ey - my * ex) <= a * abs(ey) + b * abs(ex)
@@ -196,24 +197,14 @@ def _meets_box(px, py, qx, qy, a, b):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _meets_capsule(px, py, qx, qy, radius, half):  # type: ignore[no-untyped-def]
-    """Whether a segment and the capsule around (−half, 0), (half, 0) meet."""
+def _meets_capsule(px: float, py: float, qx: float, qy: float, radius: float, half: float) -> bool:
+    """Return whether a segment and the capsule around (−half, 0), (half, 0) meet."""
     ux, uy = qx - px, qy - py
     left, right = ux * (0.0 - py) - uy * (-half - px), ux * (0.0 - py) - uy * (half - px)
     crossing = (py * qy < 0.0) & (left * right < 0.0)
     u, v = max(abs(px) - half, 0.0), max(abs(qx) - half, 0.0)
     ends = min(u * u + py * py, v * v + qy * qy)
     tips = min(
-        _squared_distance(px, py, qx, qy, -half, 0.0), _squared_distance(px, py, qx, qy, half, 0.0)
+        squared_distance(px, py, qx, qy, -half, 0.0), squared_distance(px, py, qx, qy, half, 0.0)
     )
     return crossing | (min(ends, tips) <= radius * radius)
-
-
-@kernel
-def _squared_distance(ax, ay, bx, by, x, y):  # type: ignore[no-untyped-def]
-    """Of a point from a segment."""
-    ux, uy, x, y = bx - ax, by - ay, x - ax, y - ay
-    squared = ux * ux + uy * uy
-    t = min(max((ux * x + uy * y) / (squared if squared > 0.0 else 1.0), 0.0), 1.0)
-    x, y = x - t * ux, y - t * uy
-    return x * x + y * y

@@ -1,21 +1,47 @@
-"""Kernels of static obstacles.
+"""Kernels of static obstacles: signed distances of a robot's points to their surfaces, in blocks."""
 
-Signed distances of points of a robot to their surfaces, a block at a time.
-"""
+import math
+from typing import NamedTuple
 
 import numpy as np
 
 from evoexp.numeric.compilation import borrowed, kernel
+from evoexp.records import FloatArray
 from evoexp.robots.kinematics import BLOCK, U
-from evoexp.scenarios.obstacles import BOX, CAPSULE, CYLINDER, HALF_SPACE, SPHERE
+from evoexp.scenarios.obstacles import (
+    BOX,
+    CAPSULE,
+    CYLINDER,
+    HALF_SPACE,
+    SPHERE,
+    ObstacleTable,
+)
 
 ROWS = 3 * BLOCK  # x, y, z of a point in a block
-MARGIN = 1.0 + 1e-9  # bounds are widened by it, so that rounding cannot skip what touches
+MARGIN = 1.0 + 1e-9  # bounds are widened by it, so that rounding skips no contact
+
+
+class LinkBalls(NamedTuple):
+    """A ball around the centres of every link's spheres.
+
+    Attributes:
+        joint: (links,) index into the kinematic table.
+        local: (links, 3) in the table's frames [length unit].
+        radius: (links,) greatest distance of a centre.
+        spheres: (links, 2) first and one-past-last sphere of each link.
+        arm_links: (arms, 2) first and one-past-last link of each arm.
+    """
+
+    joint: IntArray
+    local: FloatArray
+    radius: FloatArray
+    spheres: IntArray
+    arm_links: IntArray
 
 
 @kernel
-def meet(one, i, two, j, within):  # type: ignore[no-untyped-def]
-    """Whether the points at offsets i and j are closer than `within` in any lane."""
+def meet(one: FloatArray, i: np.uint64, two: FloatArray, j: np.uint64, within: float) -> bool:
+    """Return whether the points at offsets i and j are closer than `within` in any lane."""
     squared = within * within
     count = 0
     for n in range(BLOCK):
@@ -27,8 +53,10 @@ def meet(one, i, two, j, within):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _below(rotation, origin, points, i, within):  # type: ignore[no-untyped-def]
-    """Whether the point at offset i is lower than `within` above a frame's z = 0 in any lane."""
+def _below(
+    rotation: FloatArray, origin: FloatArray, points: FloatArray, i: np.uint64, within: float
+) -> bool:
+    """Return whether the point at i is lower than `within` above a frame's z = 0 in any lane."""
     x, y, z = rotation[2], rotation[5], rotation[8]
     level = x * origin[0] + y * origin[1] + z * origin[2]
     level += within + (abs(within) + abs(level)) * (MARGIN - 1.0)
@@ -40,13 +68,32 @@ def _below(rotation, origin, points, i, within):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def to_obstacles(obstacles, bounds, limit, centers, middles, scratch, place, out):  # type: ignore[no-untyped-def]
-    """Lower `out` (BLOCK,), the limit.
+def to_obstacles(
+    obstacles: ObstacleTable,
+    bounds: LinkBalls,
+    limit: float,
+    centers: FloatArray,
+    middles: FloatArray,
+    scratch: FloatArray,
+    place: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Lower `out` to the least signed distance of a centre from an obstacle's surface.
 
-    To the signed distance of any centre to any obstacle's surface.
+    Args:
+        obstacles: The obstacles.
+        bounds: Balls around the spheres of each link.
+        limit: Above it nothing is measured [length unit].
+        centers: (spheres · ROWS,) centres of the spheres.
+        middles: (links · ROWS,) centres of the balls.
+        scratch: (≥ ROWS,).
+        place: (ROWS,) scratch.
+        out: (BLOCK,), lowered.
     """
-    _, _, reach, spheres, _ = borrowed(bounds)
-    kind, center, rotation, size = borrowed(obstacles)
+    bounds, obstacles = borrowed((bounds, obstacles))
+    reach, spheres = bounds.radius, bounds.spheres
+    kind, center, rotation = obstacles.kind, obstacles.center, obstacles.rotation
+    size = obstacles.size
     centers, middles, scratch, place, out = borrowed((centers, middles, scratch, place, out))
     for o in range(len(kind)):
         for row in range(3):
@@ -57,14 +104,12 @@ def to_obstacles(obstacles, bounds, limit, centers, middles, scratch, place, out
             else _length(size[o, 0], size[o, 1], size[o, 2])
         )
         for link in range(len(reach)):
+            # the ball around the link decides whether its spheres are measured
+            at, within = U(link) * U(ROWS), limit + reach[link]
             if kind[o] == HALF_SPACE:
-                near = _below(
-                    rotation[o], center[o], middles, U(link) * U(ROWS), limit + reach[link]
-                )
+                near = _below(rotation[o], center[o], middles, at, within)
             else:
-                near = meet(
-                    middles, U(link) * U(ROWS), place, U(0), (limit + reach[link] + extent) * MARGIN
-                )
+                near = meet(middles, at, place, U(0), (within + extent) * MARGIN)
             if near:
                 for i in range(spheres[link, 0], spheres[link, 1]):
                     _into_frame(center[o], rotation[o], centers, U(i) * U(ROWS), scratch)
@@ -72,7 +117,9 @@ def to_obstacles(obstacles, bounds, limit, centers, middles, scratch, place, out
 
 
 @kernel
-def _to_obstacle(kind, a, b, c, point, out):  # type: ignore[no-untyped-def]
+def _to_obstacle(
+    kind: int, a: float, b: float, c: float, point: FloatArray, out: FloatArray
+) -> None:
     """Lower `out` to the signed distance of points in an obstacle's frame to its surface."""
     for n in range(BLOCK):
         lane = U(n)
@@ -93,21 +140,20 @@ def _to_obstacle(kind, a, b, c, point, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _into_frame(center, rotation, centers, i, out):  # type: ignore[no-untyped-def]
-    """Centres at offset i seen from a frame, (ROWS,)."""
+def _into_frame(
+    center: FloatArray, rotation: FloatArray, centers: FloatArray, i: np.uint64, out: FloatArray
+) -> None:
+    """Write the centres at offset i as seen from a frame, (ROWS,)."""
     cx, cy, cz = center[0], center[1], center[2]
     for row in range(3):
         a, b, c, e = rotation[row], rotation[3 + row], rotation[6 + row], U(row * BLOCK)
         for n in range(BLOCK):
             lane = i + U(n)
-            x, y, z = (
-                centers[lane] - cx,
-                centers[lane + U(BLOCK)] - cy,
-                centers[lane + U(2 * BLOCK)] - cz,
-            )
+            x, y = centers[lane] - cx, centers[lane + U(BLOCK)] - cy
+            z = centers[lane + U(2 * BLOCK)] - cz
             out[e + U(n)] = a * x + b * y + c * z
 
 
 @kernel
-def _length(x, y, z):  # type: ignore[no-untyped-def]
-    return np.sqrt(x * x + y * y + z * z)
+def _length(x: float, y: float, z: float) -> float:
+    return math.sqrt(x * x + y * y + z * z)

@@ -15,6 +15,7 @@ by a radius.
 import numpy as np
 
 from evoexp.numeric.compilation import kernel
+from evoexp.records import FloatArray, IntArray
 from evoexp.robots.kinematics import U
 
 WIDTH = 64
@@ -44,7 +45,9 @@ FIXED_ROWS = 49
 
 
 @kernel
-def spheres_to_boxes(width, runs, spheres, first, stop, work):  # type: ignore[no-untyped-def]
+def spheres_to_boxes(
+    width: int, runs: IntArray, spheres: FloatArray, first: int, stop: int, work: FloatArray
+) -> None:
     """Lower VALUE to the signed distances of a body's spheres to thickened boxes.
 
     Args:
@@ -100,7 +103,9 @@ def spheres_to_boxes(width, runs, spheres, first, stop, work):  # type: ignore[n
 
 
 @kernel
-def spheres_to_cylinders(width, runs, spheres, first, stop, work):  # type: ignore[no-untyped-def]
+def spheres_to_cylinders(
+    width: int, runs: IntArray, spheres: FloatArray, first: int, stop: int, work: FloatArray
+) -> None:
     """The same for cylinders."""
     for i in range(runs[first, 0], runs[stop - 1, 1]):
         lx, ly, lz, radius = spheres[i, 0], spheres[i, 1], spheres[i, 2], spheres[i, 3]
@@ -129,7 +134,9 @@ def spheres_to_cylinders(width, runs, spheres, first, stop, work):  # type: igno
 
 
 @kernel
-def spheres_to_half_spaces(width, runs, spheres, first, stop, work):  # type: ignore[no-untyped-def]
+def spheres_to_half_spaces(
+    width: int, runs: IntArray, spheres: FloatArray, first: int, stop: int, work: FloatArray
+) -> None:
     """The same for half-spaces, z ≤ 0 in their frames."""
     for i in range(runs[first, 0], runs[stop - 1, 1]):
         lx, ly, lz, radius = spheres[i, 0], spheres[i, 1], spheres[i, 2], spheres[i, 3]
@@ -146,7 +153,9 @@ def spheres_to_half_spaces(width, runs, spheres, first, stop, work):  # type: ig
 
 
 @kernel
-def move(width, x, y, z, w, target, work):  # type: ignore[no-untyped-def]
+def move(
+    width: int, x: float, y: float, z: float, w: float, target: np.uint64, work: FloatArray
+) -> None:
     """Write a constant point (w = 1) or direction (w = 0) as MOTION sees it to rows at `target`."""
     for row in range(3):
         a, t, o = MOTION + U(3 * row) * W, MOTION + U(9 + row) * W, target + U(row) * W
@@ -157,7 +166,15 @@ def move(width, x, y, z, w, target, work):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def spheres_to_spheres(width, runs, spheres, one, other, other_stop, work):  # type: ignore[no-untyped-def]
+def spheres_to_spheres(
+    width: int,
+    runs: IntArray,
+    spheres: FloatArray,
+    one: int,
+    other: int,
+    other_stop: int,
+    work: FloatArray,
+) -> None:
     """Lower VALUE to the distances of one run of constant spheres from the spheres at CENTERS.
 
     Less both radii.
@@ -201,7 +218,7 @@ def spheres_to_spheres(width, runs, spheres, one, other, other_stop, work):  # t
 
 
 @kernel
-def _three_squares(width, spheres, i, o, work):  # type: ignore[no-untyped-def]
+def _three_squares(width: int, spheres: FloatArray, i: int, o: np.uint64, work: FloatArray) -> None:
     """Lower OUTSIDE to the squared distances of one moved centre from three fixed ones.
 
     Held in registers.

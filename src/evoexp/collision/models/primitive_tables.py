@@ -1,6 +1,4 @@
-"""What the kernels of spheres and capsules read.
-
-Shapes, bodies and their parts, obstacles, as arrays.
+"""Shapes, bodies and their parts, and obstacles, packed into arrays for the kernels.
 
 A body is all shapes that move with one joint. Bodies of many shapes are cut into parts for the
 checks between bodies: the balls around parts are smaller, and rule out more.
@@ -11,17 +9,22 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.encounter_kernels import BOXES, CYLINDERS, HALF_SPACES
-from evoexp.records import FloatArray
+from evoexp.collision.models.packed_shapes import (
+    BOXES,
+    CYLINDERS,
+    FIRST_RUN,
+    HALF_SPACES,
+    STOP_RUN,
+    PackedObstacles,
+    PackedShapes,
+    Units,
+)
+from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.kinematics import KinematicTable
 from evoexp.scenarios.obstacles import BOX, CAPSULE, CYLINDER, HALF_SPACE, SPHERE, ObstacleTable
 
-SHORTEST = 1e-100
-"""[length unit] A capsule whose ends are nearer than this is a sphere."""
-
-PART = 6
-"""Shapes of a part, at most; a capsule counts as `CAPSULE_WEIGHT`."""
-
+SHORTEST = 1e-100  # [length unit] a capsule whose ends are nearer than this is a sphere
+PART = 6  # most shapes of a part; a capsule counts as `CAPSULE_WEIGHT`
 CAPSULE_WEIGHT = 4
 
 Pairs = Iterable[tuple[int, int]]
@@ -39,14 +42,14 @@ class Shapes(NamedTuple):
             one body, whose number is the joint's.
     """
 
-    joint: np.ndarray
+    joint: IntArray
     start: FloatArray
     end: FloatArray
     radius: FloatArray
-    body: np.ndarray | None = None
+    body: IntArray | None = None
 
     @property
-    def labels(self) -> np.ndarray:
+    def labels(self) -> IntArray:
         """(shapes,) number of the body that each belongs to."""
         return self.joint if self.body is None else self.body
 
@@ -56,13 +59,9 @@ class Shapes(NamedTuple):
         Raises:
             ValueError: If arrays do not fit each other or the model, or a radius is negative.
         """
-        joint, radius = (
-            np.asarray(self.joint, dtype=np.int64),
-            np.asarray(self.radius, dtype=np.float64),
-        )
-        start, end = (
-            np.asarray(self.start, dtype=np.float64),
-            np.asarray(self.end, dtype=np.float64),
+        joint = np.asarray(self.joint, dtype=np.int64)
+        start, end, radius = (
+            np.asarray(given, dtype=np.float64) for given in (self.start, self.end, self.radius)
         )
         if joint.ndim != 1 or len(joint) == 0:
             raise ValueError(
@@ -89,62 +88,21 @@ class Shapes(NamedTuple):
         return Shapes(joint, start, end, radius, body)
 
 
-class Units(NamedTuple):
-    """Bodies and then parts of bodies, each with a ball around it.
-
-    Attributes:
-        whole: (units, 7) frame (a joint of the kinematic table, one past its end: the world); first
-            and one-past-last run of spheres; capsule; entry in the list of obstacles that a body is
-            checked against.
-        ball: (units, 5) centre in the frame, radius, and the least distance of any shape's end from
-            this centre, less its own radius.
-    """
-
-    whole: np.ndarray
-    ball: FloatArray
-
-
-class PackedShapes(NamedTuple):
-    """Spheres and capsules in the frames of the kinematic table, in the order of the units.
-
-    Attributes:
-        runs: (runs, 2) first and one-past-last sphere of equal radius.
-        spheres: (spheres, 4) centre, radius.
-        capsules: (capsules, 8) one end, from there to the other, radius, 1 / squared length.
-        most: Greatest number of spheres of a unit.
-    """
-
-    runs: np.ndarray
-    spheres: FloatArray
-    capsules: FloatArray
-    most: int
-
-
-class PackedObstacles(NamedTuple):
-    """Obstacles, and the lists of those that each body is checked against.
-
-    Attributes:
-        data: (obstacles, 21) centre; rotation, row by row; half the edges and thickness of a box,
-            or radius and half the length of a cylinder; radius of a ball around; half the edges and
-            thickness of a box around.
-        listed: (entries, 2) obstacle, and its class: BOXES, CYLINDERS or HALF_SPACES; body by body.
-    """
-
-    data: FloatArray
-    listed: np.ndarray
-
-
 def pack_shapes(
-    table: KinematicTable, shapes: Shapes, numbers: np.ndarray, joints: np.ndarray
+    table: KinematicTable, shapes: Shapes, numbers: IntArray, joints: IntArray
 ) -> tuple[Units, PackedShapes, list[list[int]]]:
-    """Return the shapes of all bodies, and of each body the units that are its parts.
+    """Pack the shapes of all bodies, body by body and part by part.
 
     Args:
         table: The kinematic table.
         shapes: All shapes.
         numbers: (bodies,) of the bodies.
         joints: (bodies,) that move them.
+
+    Returns:
+        The units, their shapes, and for each body the indices of the units that are its parts.
     """
+    # ends and axes in the table's frames
     world = len(table.parent)
     turn = np.concatenate([np.eye(3)[None], table.alignment.transpose(0, 2, 1)])[shapes.joint]
     start = np.einsum("nij,nj->ni", turn, shapes.start)
@@ -160,34 +118,20 @@ def pack_shapes(
     for k, (number, joint) in enumerate(zip(numbers, joints, strict=True)):
         own, first = np.flatnonzero(shapes.labels == number), (len(runs), len(rods))
         frame = int(joint) - 1 if joint > 0 else world
-        rows = []
+        rows: list[tuple[Any, ...]] = []
         for cut in _cut(own, start + 0.5 * axis, ball):
             begin = len(runs), len(rods)
+            # runs of spheres of equal radius, then the capsules
             for radius in np.unique(shapes.radius[cut[ball[cut]]]):
                 same = cut[ball[cut] & (shapes.radius[cut] == radius)]
                 runs.append((len(spheres), len(spheres) + len(same)))
                 spheres.extend(same)
             rods.extend(cut[~ball[cut]])
-            rows.append(
-                (
-                    frame,
-                    begin[0],
-                    len(runs),
-                    begin[1],
-                    len(rods),
-                    _ball(start, axis, shapes.radius, cut),
-                )
-            )
-        bodies.append(
-            (
-                frame,
-                first[0],
-                len(runs),
-                first[1],
-                len(rods),
-                _ball(start, axis, shapes.radius, own),
-            )
-        )
+            around = _ball(start, axis, shapes.radius, cut)
+            rows.append((frame, begin[0], len(runs), begin[1], len(rods), around))
+        around = _ball(start, axis, shapes.radius, own)
+        bodies.append((frame, first[0], len(runs), first[1], len(rods), around))
+        # a body of one part is that part itself
         only = len(rows) == 1
         parts.append([k] if only else [len(joints) + len(cuts) + n for n in range(len(rows))])
         cuts.extend([] if only else rows)
@@ -199,23 +143,23 @@ def pack_shapes(
     centers = np.column_stack([start[at], shapes.radius[at]])
     capsules = np.column_stack([start[of], axis[of], shapes.radius[of], 1.0 / square[of]])
     packed = PackedShapes(bounds, centers, capsules, 0)
-    return (
-        units,
-        packed._replace(most=max(num_spheres(units, packed, k) for k in range(len(units.ball)))),
-        parts,
-    )
+    most = max(num_spheres(units, packed, k) for k in range(len(units.ball)))
+    return units, packed._replace(most=most), parts
 
 
 def num_spheres(units: Units, shapes: PackedShapes, unit: int) -> int:
     """Return how many spheres a unit has."""
-    first, stop = units.whole[unit, 1:3]
+    first, stop = units.whole[unit, FIRST_RUN], units.whole[unit, STOP_RUN]
     return int(shapes.runs[stop - 1, 1] - shapes.runs[first, 0]) if first < stop else 0
 
 
-def _cut(own: np.ndarray, middle: FloatArray, ball: np.ndarray) -> list[np.ndarray]:
-    """Halve a set of shapes, by number, across its longest extent.
+def _cut(own: IntArray, middle: FloatArray, ball: BoolArray) -> list[IntArray]:
+    """Halve a set of shapes across its longest extent until every piece is a part.
 
-    Until every piece is small enough for a part.
+    Args:
+        own: Indices of the shapes.
+        middle: (shapes, 3) their middles.
+        ball: (shapes,) whether each is a sphere.
     """
     if len(own) == 1 or np.where(ball[own], 1, CAPSULE_WEIGHT).sum() <= PART:
         return [own]
@@ -225,15 +169,10 @@ def _cut(own: np.ndarray, middle: FloatArray, ball: np.ndarray) -> list[np.ndarr
     return _cut(order[:half], middle, ball) + _cut(order[half:], middle, ball)
 
 
-def _ball(start: FloatArray, axis: FloatArray, radius: FloatArray, own: np.ndarray) -> FloatArray:
-    """Return (5,) centre and radius of a ball around some capsules.
-
-    And the slack that `Units` tells of.
-    """
-    ends, radii = (
-        np.concatenate([start[own], start[own] + axis[own]]),
-        np.concatenate([radius[own], radius[own]]),
-    )
+def _ball(start: FloatArray, axis: FloatArray, radius: FloatArray, own: IntArray) -> FloatArray:
+    """Return a row of `Units.ball` (5,) for some capsules."""
+    ends = np.concatenate([start[own], start[own] + axis[own]])
+    radii = np.concatenate([radius[own], radius[own]])
     center = 0.5 * ((ends - radii[:, None]).min(axis=0) + (ends + radii[:, None]).max(axis=0))
     away = np.sqrt(((ends - center) ** 2).sum(axis=1))
     return np.array([*center, (away + radii).max(), (away - radii).min()])
@@ -241,13 +180,22 @@ def _ball(start: FloatArray, axis: FloatArray, radius: FloatArray, own: np.ndarr
 
 def pack_obstacles(
     obstacles: ObstacleTable,
-    numbers: np.ndarray,
-    joints: np.ndarray,
+    numbers: IntArray,
+    joints: IntArray,
     ignored: tuple[tuple[int, int], ...],
-) -> tuple[PackedObstacles, np.ndarray]:
-    """Return the obstacles, and where each body's list of them begins and ends, (bodies, 2).
+) -> tuple[PackedObstacles, IntArray]:
+    """Pack the obstacles, and list for each body those that it is checked against.
 
     A body is checked against all but the ignored ones; bodies of the world against none.
+
+    Args:
+        obstacles: The obstacles.
+        numbers: (bodies,) of the bodies.
+        joints: (bodies,) that move them.
+        ignored: Pairs (body's number, obstacle).
+
+    Returns:
+        The obstacles, and the first and one-past-last entry of each body's list, (bodies, 2).
 
     Raises:
         SettingError: If an obstacle is an ellipse.
@@ -261,6 +209,7 @@ def pack_obstacles(
                 f"{len(kind) - 1}"
             )
             raise ValueError(f"ignored must hold {must}, was {(number, k)}")
+    # half the edges and thickness of a box, or radius and half the length of a cylinder
     core = np.zeros((len(kind), 4))
     core[kind == SPHERE, 3] = size[kind == SPHERE, 0]
     core[kind == BOX, :3] = size[kind == BOX]
@@ -276,8 +225,7 @@ def pack_obstacles(
         [k for k in range(len(kind)) if joint > 0 and (int(number), k) not in skipped]
         for number, joint in zip(numbers, joints, strict=True)
     ]
-    listed = np.array([(k, classes[k]) for one in lists for k in one], dtype=np.int64).reshape(
-        -1, 2
-    )
+    entries = [(k, classes[k]) for one in lists for k in one]
+    listed = np.array(entries, dtype=np.int64).reshape(-1, 2)
     ends = np.cumsum([0, *map(len, lists)])
     return PackedObstacles(data, listed), np.column_stack([ends[:-1], ends[1:]])

@@ -1,8 +1,8 @@
-"""Robots as spheres and capsules, among obstacles of all kinds: the kernels in three dimensions.
+"""Robots as spheres and capsules in space, among obstacles of all kinds.
 
 Any Pinocchio model whose joints have one coordinate, any number of arms; the kernels are in
-`primitive_kernels`. A body is all shapes that move with one joint, or what is told apart of them.
-Angles are radians here, as in Pinocchio.
+`primitive_kernels`. A body is all shapes that move with one joint, unless the shapes name their
+bodies. Angles are radians here, as in Pinocchio.
 """
 
 from collections.abc import Iterable, Sequence
@@ -11,26 +11,28 @@ from typing import Any, NamedTuple
 import coal
 import numpy as np
 
-from evoexp.collision.models.primitive_kernels import BETWEEN, SELF, primitive_clearances
-from evoexp.collision.models.primitive_tables import (
+from evoexp.collision.models.packed_shapes import (
+    FIRST_LISTED,
     PackedObstacles,
     PackedShapes,
+    PrimitiveTables,
+    Units,
+)
+from evoexp.collision.models.primitive_kernels import BETWEEN, SELF, primitive_clearances
+from evoexp.collision.models.primitive_tables import (
     Pairs,
     Shapes,
-    Units,
     num_spheres,
     pack_obstacles,
     pack_shapes,
 )
-from evoexp.records import FloatArray
+from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.kinematics import KinematicTable, kinematic_table
 from evoexp.scenarios.obstacles import ObstacleTable
 
 
 class Clearances(NamedTuple):
-    """Least clearances of a batch.
-
-    Negative where shapes overlap, +inf where there is nothing to meet.
+    """Least clearances of a batch: negative where shapes overlap, +inf where nothing is met.
 
     Attributes:
         to_obstacles: (configurations,) least distance of the robot's shapes to obstacles [length
@@ -80,10 +82,7 @@ def default_pairs(model: Any, joints: Iterable[int]) -> tuple[tuple[int, int], .
 
 
 def arms_of_joints(model: Any) -> tuple[int, ...]:
-    """Return which arm each joint belongs to, the world included as −1.
-
-    The trees that start at the world, counted.
-    """
+    """Return the arm of each joint, the world's being −1: a tree that starts at the world each."""
     arms, count = [-1], 0
     for joint in range(1, model.njoints):
         root = model.parents[joint] == 0
@@ -93,25 +92,37 @@ def arms_of_joints(model: Any) -> tuple[int, ...]:
 
 
 class PrimitiveCollision(NamedTuple):
-    """Spheres and capsules on one robot, the obstacles around it, and what is checked against what.
+    """Spheres and capsules on one robot, the obstacles around it, and the pairs to be checked.
 
     Attributes:
         table: The kinematic table of the model.
         joints: (bodies,) the Pinocchio joint of each body.
-        units: Bodies, then their parts, as the kernels read them.
-        shapes: Of the units.
-        obstacles: The obstacles, and which body is checked against which.
-        pairs: (pairs, 3) two units, and the row of the result that they count for.
-        tables: All this as the kernel `primitive_clearances` reads it: plain tuples of arrays.
+        tables: The tables that the kernel `primitive_clearances` reads.
     """
 
     table: KinematicTable
-    joints: np.ndarray
-    units: Units
-    shapes: PackedShapes
-    obstacles: PackedObstacles
-    pairs: np.ndarray
-    tables: tuple[Any, ...]
+    joints: IntArray
+    tables: PrimitiveTables
+
+    @property
+    def units(self) -> Units:
+        """Bodies, then their parts."""
+        return self.tables.units
+
+    @property
+    def shapes(self) -> PackedShapes:
+        """Shapes of the units."""
+        return self.tables.shapes
+
+    @property
+    def obstacles(self) -> PackedObstacles:
+        """The obstacles, and which body is checked against which."""
+        return self.tables.obstacles
+
+    @property
+    def pairs(self) -> IntArray:
+        """(pairs, 3) two units, and the row of the result that they count for."""
+        return self.tables.pairs
 
     @classmethod
     def build(
@@ -145,22 +156,17 @@ class PrimitiveCollision(NamedTuple):
         numbers, first = np.unique(shapes.labels, return_index=True)
         joints = shapes.joint[first]
         units, packed, parts = pack_shapes(table, shapes, numbers, joints)
-        chosen = (
-            default_pairs(model, joints)
-            if pairs is None
-            else tuple((int(a), int(b)) for a, b in pairs)
-        )
+        given = default_pairs(model, joints) if pairs is None else pairs
+        chosen = tuple((int(a), int(b)) for a, b in given)
         arm = arms_of_joints(model) if arms is None else tuple(arms)
         if len(arm) != model.njoints:
             raise ValueError(
                 f"arms must have one number per joint of the model, {model.njoints}, had {len(arm)}"
             )
-        around, units.whole[: len(joints), 5:] = pack_obstacles(
-            obstacles, numbers, joints, tuple(ignored)
-        )
+        around, lists = pack_obstacles(obstacles, numbers, joints, tuple(ignored))
+        units.whole[: len(joints), FIRST_LISTED:] = lists
         rows = _pair_table(numbers, chosen, [arm[joint] for joint in joints], parts, units, packed)
-        tables = (table[:6], tuple(units), tuple(packed), tuple(around), rows)
-        return cls(table, joints, units, packed, around, rows, tables)
+        return cls(table, joints, PrimitiveTables(table.chain, units, packed, around, rows))
 
     @classmethod
     def from_geometry(
@@ -172,22 +178,22 @@ class PrimitiveCollision(NamedTuple):
         ignored: Pairs = (),
         arms: Sequence[int] | None = None,
     ) -> "PrimitiveCollision":
-        """Return the same for a `pin.GeometryModel` that holds coal spheres and capsules.
+        """Return the collision model of coal spheres and capsules in a `pin.GeometryModel`.
 
-        See `build`.
+        See `build` for the arguments.
         """
         return cls.build(model, shapes_of_geometry(geometry), obstacles, pairs, ignored, arms)
 
     def clearance(self, q: FloatArray, limit: float = np.inf) -> Clearances:
         """Return the clearances of a batch of configurations.
 
-        They are exact, but for a capsule whose axis enters a box or a cylinder: there some value ≤
-        −radius stands.
+        They are exact, but for a capsule whose axis enters a box or a cylinder: its clearance is
+        some value ≤ −radius.
 
         Args:
             q: (nq, configurations) [rad], lengths for prismatic joints. NaN where q holds NaN.
-            limit: Above it nothing is asked: a clearance is exact where it is less, elsewhere it is
-                the limit.
+            limit: Above it nothing is measured: a clearance is exact where it is less, elsewhere it
+                is the limit.
 
         Raises:
             ValueError: If q has another number of rows than the model has coordinates, or the limit
@@ -196,19 +202,19 @@ class PrimitiveCollision(NamedTuple):
         if np.isnan(limit):
             raise ValueError("limit must be a number, was nan")
         out = self._rows(q)
-        primitive_clearances(*self.tables, float(limit), False, *out)
+        primitive_clearances(self.tables, float(limit), False, *out)
         return Clearances(*out[1])
 
-    def collides(self, q: FloatArray) -> np.ndarray:
-        """Return which configurations collide, (configurations,).
+    def collides(self, q: FloatArray) -> BoolArray:
+        """Return which configurations collide, (configurations,); true for NaN.
 
-        The sign of `clearance`, for less; true for NaN.
+        The answer is the sign of `clearance`, found in less time.
 
         Raises:
             ValueError: If q has another number of rows than the model has coordinates.
         """
         out = self._rows(q)
-        primitive_clearances(*self.tables, 0.0, True, *out)
+        primitive_clearances(self.tables, 0.0, True, *out)
         return np.asarray(~(out[1][0] >= 0.0))  # all rows say the same
 
     def _rows(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -220,16 +226,16 @@ class PrimitiveCollision(NamedTuple):
 
 
 def _pair_table(
-    numbers: np.ndarray,
+    numbers: IntArray,
     pairs: tuple[tuple[int, int], ...],
     arms: Sequence[int],
     parts: list[list[int]],
     units: Units,
     shapes: PackedShapes,
-) -> np.ndarray:
-    """Return all pairs of parts of the bodies that are paired.
+) -> IntArray:
+    """Return all pairs of parts of the bodies that are paired, (pairs, 3).
 
-    The part with more spheres stays in its frame.
+    The part with more spheres comes first: it stays in its frame.
     """
     body = {int(number): k for k, number in enumerate(numbers)}
     rows: list[tuple[int, int, int]] = []
@@ -242,10 +248,7 @@ def _pair_table(
         between = arm != other and arm >= 0 and other >= 0
         for a in parts[body[one]]:
             for b in parts[body[two]]:
-                more, fewer = (
-                    (a, b)
-                    if num_spheres(units, shapes, a) >= num_spheres(units, shapes, b)
-                    else (b, a)
-                )
+                keep = num_spheres(units, shapes, a) >= num_spheres(units, shapes, b)
+                more, fewer = (a, b) if keep else (b, a)
                 rows.append((more, fewer, BETWEEN if between else SELF))
     return np.array(rows, dtype=np.int64).reshape(-1, 3)

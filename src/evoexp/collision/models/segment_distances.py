@@ -11,6 +11,7 @@ import numpy as np
 
 from evoexp.collision.models.primitive_distances import AXES, CORE, STARTS, VALUE, W
 from evoexp.numeric.compilation import kernel
+from evoexp.records import FloatArray
 from evoexp.robots.kinematics import U
 
 SEARCHES = 100  # [-] steps along a segment beside a cylinder at most; some five are taken
@@ -19,25 +20,36 @@ TINY = 1e-150  # [length unit] components of axes below it count as 0: their squ
 
 
 @kernel
-def _clamped(value, least, most):  # type: ignore[no-untyped-def]
+def _clamped(value: float, least: float, most: float) -> float:
     return min(max(value, least), most)
 
 
 @kernel
-def _beyond(value, half):  # type: ignore[no-untyped-def]
+def _beyond(value: float, half: float) -> float:
     """How far a coordinate lies outside ±half, with sign."""
     return value - min(max(value, -half), half)
 
 
 @kernel
-def _inverse(value):  # type: ignore[no-untyped-def]
+def _inverse(value: float) -> float:
     """1 / value, and 0 where that means nothing."""
     tiny = abs(value) < TINY
     return (0.0 if tiny else 1.0) / (1.0 if tiny else value)
 
 
 @kernel
-def _slope(t, px, py, pz, ux, uy, uz, a, b, c):  # type: ignore[no-untyped-def]
+def _slope(
+    t: float,
+    px: float,
+    py: float,
+    pz: float,
+    ux: float,
+    uy: float,
+    uz: float,
+    a: float,
+    b: float,
+    c: float,
+) -> float:
     """Of half the squared distance of the point p + t u from a box."""
     return (
         ux * _beyond(px + t * ux, a) + uy * _beyond(py + t * uy, b) + uz * _beyond(pz + t * uz, c)
@@ -45,7 +57,9 @@ def _slope(t, px, py, pz, ux, uy, uz, a, b, c):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _narrowed(t, slope, low, low_slope, high, high_slope):  # type: ignore[no-untyped-def]
+def _narrowed(
+    t: float, slope: float, low: float, low_slope: float, high: float, high_slope: float
+) -> tuple[float, float, float, float]:
     """A bracket of the zero of a rising slope, narrowed by one more value of it."""
     rises = slope <= 0.0 and t > low
     falls = slope >= 0.0 and t < high
@@ -58,7 +72,7 @@ def _narrowed(t, slope, low, low_slope, high, high_slope):  # type: ignore[no-un
 
 
 @kernel
-def _crossing(p, u, inverse, half):  # type: ignore[no-untyped-def]
+def _crossing(p: float, u: float, inverse: float, half: float) -> tuple[float, float, float, float]:
     """Where a coordinate p + t u enters and leaves ±half; the kinks of the slope."""
     one, two = (-half - p) * inverse, (half - p) * inverse
     within = np.inf if abs(p) <= half else -np.inf
@@ -68,7 +82,7 @@ def _crossing(p, u, inverse, half):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def segment_to_boxes(width, radius, work):  # type: ignore[no-untyped-def]
+def segment_to_boxes(width: int, radius: float, work: FloatArray) -> None:
     """Lower VALUE to the signed distances of the segments at STARTS, AXES to thickened boxes.
 
     Less a radius.
@@ -115,7 +129,17 @@ def segment_to_boxes(width, radius, work):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _cylinder_slope(t, px, py, pz, ux, uy, uz, radius, half):  # type: ignore[no-untyped-def]
+def _cylinder_slope(
+    t: float,
+    px: float,
+    py: float,
+    pz: float,
+    ux: float,
+    uy: float,
+    uz: float,
+    radius: float,
+    half: float,
+) -> tuple[float, float]:
     """Slope and curvature of half the squared distance of the point p + t u from a cylinder."""
     x, y, e = px + t * ux, py + t * uy, _beyond(pz + t * uz, half)
     along, flat = x * ux + y * uy, ux * ux + uy * uy
@@ -132,7 +156,7 @@ def _cylinder_slope(t, px, py, pz, ux, uy, uz, radius, half):  # type: ignore[no
 
 
 @kernel
-def segment_to_cylinders(width, radius, work):  # type: ignore[no-untyped-def]
+def segment_to_cylinders(width: int, radius: float, work: FloatArray) -> None:
     """The same for cylinders; core: radius, half the length.
 
     No vector code: the searches differ in length.
@@ -151,7 +175,9 @@ def segment_to_cylinders(width, radius, work):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _beside_cylinder(px, py, pz, ux, uy, uz, radius, half):  # type: ignore[no-untyped-def]
+def _beside_cylinder(
+    px: float, py: float, pz: float, ux: float, uy: float, uz: float, radius: float, half: float
+) -> float:
     """The place t in [0, 1] where p + t u is nearest to a cylinder.
 
     Inside, the middle of the part inside.
@@ -179,7 +205,18 @@ def _beside_cylinder(px, py, pz, ux, uy, uz, radius, half):  # type: ignore[no-u
 
 
 @kernel
-def _zero_of_slope(px, py, pz, ux, uy, uz, radius, half, low, high):  # type: ignore[no-untyped-def]
+def _zero_of_slope(
+    px: float,
+    py: float,
+    pz: float,
+    ux: float,
+    uy: float,
+    uz: float,
+    radius: float,
+    half: float,
+    low: float,
+    high: float,
+) -> float:
     t, last = 0.5 * (low + high), high - low
     for _ in range(SEARCHES):
         slope, curvature = _cylinder_slope(t, px, py, pz, ux, uy, uz, radius, half)
@@ -196,7 +233,7 @@ def _zero_of_slope(px, py, pz, ux, uy, uz, radius, half, low, high):  # type: ig
 
 
 @kernel
-def segment_to_half_spaces(width, radius, work):  # type: ignore[no-untyped-def]
+def segment_to_half_spaces(width: int, radius: float, work: FloatArray) -> None:
     """The same for half-spaces: the lower end counts; exact on both sides of the boundary."""
     for n in range(width):
         z, w, best = (
@@ -209,7 +246,9 @@ def segment_to_half_spaces(width, radius, work):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def segment_to_points(width, capsule, p, both, work):  # type: ignore[no-untyped-def]
+def segment_to_points(
+    width: int, capsule: FloatArray, p: np.uint64, both: float, work: FloatArray
+) -> None:
     """Lower VALUE to the distance of one constant segment from the points at offset p, less `both`.
 
     Args:
@@ -233,7 +272,9 @@ def segment_to_points(width, capsule, p, both, work):  # type: ignore[no-untyped
 
 
 @kernel
-def segments_to_point(width, point, inverse, both, work):  # type: ignore[no-untyped-def]
+def segments_to_point(
+    width: int, point: FloatArray, inverse: float, both: float, work: FloatArray
+) -> None:
     """Lower VALUE to the distance of one constant point from the segments at STARTS, AXES.
 
     Less `both`.
@@ -252,7 +293,9 @@ def segments_to_point(width, point, inverse, both, work):  # type: ignore[no-unt
 
 
 @kernel
-def segment_to_segments(width, capsule, other, both, work):  # type: ignore[no-untyped-def]
+def segment_to_segments(
+    width: int, capsule: FloatArray, other: float, both: float, work: FloatArray
+) -> None:
     """Lower VALUE to the distance of one constant segment from the segments at STARTS, AXES.
 
     Less `both`.

@@ -1,6 +1,4 @@
-"""Exact decisions about segments in the plane, whatever their rounding.
-
-Parallel, collinear, touching, of length zero.
+"""Exact decisions about segments in the plane: parallel, collinear, touching, of length zero.
 
 `orientation` first takes the plain determinant where its sign is beyond doubt, and else sums
 without error (Shewchuk 1997, "Adaptive precision floating-point arithmetic and fast robust
@@ -23,12 +21,10 @@ _MOST = 1000
 
 
 @kernel
-def orientation(ax, ay, bx, by, cx, cy):  # type: ignore[no-untyped-def]
-    """Return a number > 0, = 0 or < 0 as c lies to the left of, on.
+def orientation(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> float:
+    """Return a number > 0, = 0 or < 0 as c lies left of, on or right of the line from a to b.
 
-    Or to the right of the line from a to b.
-
-    Zero, too, if two of the points coincide.
+    It is zero, too, if two of the points coincide.
     """
     left, right = (ax - cx) * (by - cy), (ay - cy) * (bx - cx)
     value = left - right
@@ -42,22 +38,28 @@ def orientation(ax, ay, bx, by, cx, cy):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def touching(ax, ay, bx, by, cx, cy, dx, dy):  # type: ignore[no-untyped-def]
+def touching(
+    ax: float, ay: float, bx: float, by: float, cx: float, cy: float, dx: float, dy: float
+) -> bool:
     """Return whether the segments ab and cd have a point in common, their ends included."""
+    # boxes around the segments
     if max(ax, bx) < min(cx, dx) or max(cx, dx) < min(ax, bx):
         return False
     if max(ay, by) < min(cy, dy) or max(cy, dy) < min(ay, by):
         return False
+    # both ends of one on the same side of the other's line
     c, d = orientation(ax, ay, bx, by, cx, cy), orientation(ax, ay, bx, by, dx, dy)
     if (c > 0.0 and d > 0.0) or (c < 0.0 and d < 0.0):
         return False
     a, b = orientation(cx, cy, dx, dy, ax, ay), orientation(cx, cy, dx, dy, bx, by)
     if (a > 0.0 and b > 0.0) or (a < 0.0 and b < 0.0):
         return False
+    # ends of both on different sides
     if ((c > 0.0 and d < 0.0) or (c < 0.0 and d > 0.0)) and (
         (a > 0.0 and b < 0.0) or (a < 0.0 and b > 0.0)
     ):
         return True
+    # an end of one on the other
     return (
         (c == 0.0 and _between(ax, ay, bx, by, cx, cy))
         or (d == 0.0 and _between(ax, ay, bx, by, dx, dy))
@@ -67,14 +69,14 @@ def touching(ax, ay, bx, by, cx, cy, dx, dy):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _between(ax, ay, bx, by, cx, cy):  # type: ignore[no-untyped-def]
-    """Whether c, a point of the line ab, lies on the segment."""
+def _between(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> bool:
+    """Return whether c, a point of the line ab, lies on the segment."""
     return min(ax, bx) <= cx <= max(ax, bx) and min(ay, by) <= cy <= max(ay, by)
 
 
 @kernel
-def _exact(ax, ay, bx, by, cx, cy):  # type: ignore[no-untyped-def]
-    """The sign of the determinant, by sums without error."""
+def _exact(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> float:
+    """Return a number of the determinant's sign, by sums without error."""
     x, x_tail = _difference(ax, cx)
     y, y_tail = _difference(by, cy)
     u, u_tail = _difference(bx, cx)
@@ -102,21 +104,21 @@ def _exact(ax, ay, bx, by, cx, cy):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _sum(a, b):  # type: ignore[no-untyped-def]
-    """Return a + b rounded, and what the rounding lost."""
+def _sum(a: float, b: float) -> tuple[float, float]:
+    """Return a + b rounded, and the rounding error."""
     total = a + b
     part = total - a
     return total, (a - (total - part)) + (b - part)
 
 
 @kernel
-def _difference(a, b):  # type: ignore[no-untyped-def]
+def _difference(a: float, b: float) -> tuple[float, float]:
     return _sum(a, -b)
 
 
 @kernel
-def _product(a, b):  # type: ignore[no-untyped-def]
-    """Return a b rounded, and what the rounding lost (Dekker, Veltkamp)."""
+def _product(a: float, b: float) -> tuple[float, float]:
+    """Return a b rounded, and the rounding error (Dekker, Veltkamp)."""
     product = a * b
     c = _SPLITTER * a
     a_high = c - (c - a)
@@ -127,3 +129,13 @@ def _product(a, b):  # type: ignore[no-untyped-def]
     return product, a_low * b_low - (
         ((product - a_high * b_high) - a_low * b_high) - a_high * b_low
     )
+
+
+@kernel
+def squared_distance(ax: float, ay: float, bx: float, by: float, x: float, y: float) -> float:
+    """Return the squared distance of the point (x, y) from the segment ab; rounded, unlike above."""
+    ux, uy, x, y = bx - ax, by - ay, x - ax, y - ay
+    squared = ux * ux + uy * uy
+    t = min(max((ux * x + uy * y) / (squared if squared > 0.0 else 1.0), 0.0), 1.0)
+    x, y = x - t * ux, y - t * uy
+    return x * x + y * y

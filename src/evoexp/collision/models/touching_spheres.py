@@ -8,9 +8,10 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.sphere_kernels import clearances
+from evoexp.collision.models.obstacle_kernels import LinkBalls
+from evoexp.collision.models.sphere_kernels import Spheres, SphereTables, clearances
 from evoexp.errors import SettingError
-from evoexp.records import FloatArray
+from evoexp.records import FloatArray, IntArray
 from evoexp.robots.assembly import Assembly, sphere_geometry
 from evoexp.scenarios.obstacles import ObstacleTable, obstacle_table
 from evoexp.validation import Component, Count, Positive
@@ -59,15 +60,12 @@ class TouchingSpheres(Component):
         arms = np.array([sphere.arm for sphere in kept])
         links = np.cumsum(np.diff(joint, prepend=joint[0]) != 0)
         link_arms = np.array([arms[np.argmax(links == k)] for k in range(links[-1] + 1)])
+        of_links, of_arms = _ranges(links, links[-1] + 1), _ranges(link_arms, assembly.num_arms)
         return SphereCollision(
             assembly,
-            joint,
-            local,
+            Spheres(joint, local, self.sphere_radius),
             _ranges(arms, assembly.num_arms),
-            _bounds(
-                joint, local, _ranges(links, links[-1] + 1), _ranges(link_arms, assembly.num_arms)
-            ),
-            self.sphere_radius,
+            _balls(joint, local, of_links, of_arms),
             obstacle_table(obstacles).without_ellipses(),
             sphere_geometry(
                 assembly,
@@ -94,43 +92,21 @@ class _Sphere(NamedTuple):
     assembly: Assembly
 
     def repeats(self, other: "_Sphere") -> bool:
-        """Whether it is the end of the other's link, at the joint that both share.
-
-        The same point for every q.
-        """
+        """Whether it ends the other's link at the joint that both share: one point for every q."""
         model = self.assembly.model
         if self.arm != other.arm or model.parents[self.joint] != other.joint or self.center.any():
             return False
         return bool(np.array_equal(model.jointPlacements[self.joint].translation, other.center))
 
 
-class _Bounds(NamedTuple):
-    """A ball around the centres of every link's spheres.
-
-    Attributes:
-        joint: (links,) index into the kinematic table.
-        local: (links, 3) in the table's frames.
-        radius: (links,) greatest distance of a centre.
-        spheres: (links, 2) first and one-past-last sphere of each link.
-        arm_links: (arms, 2) first and one-past-last link of each arm.
-    """
-
-    joint: np.ndarray
-    local: FloatArray
-    radius: FloatArray
-    spheres: np.ndarray
-    arm_links: np.ndarray
-
-
-def _bounds(
-    joint: np.ndarray, local: FloatArray, spheres: np.ndarray, arm_links: np.ndarray
-) -> _Bounds:
+def _balls(joint: IntArray, local: FloatArray, spheres: IntArray, arm_links: IntArray) -> LinkBalls:
+    """Return a ball around the centres of every link's spheres."""
     middle = np.array([0.5 * (local[a:b].min(axis=0) + local[a:b].max(axis=0)) for a, b in spheres])
     squares = [
         ((local[a:b] - center) ** 2).sum(axis=1).max()
         for (a, b), center in zip(spheres, middle, strict=True)
     ]
-    return _Bounds(joint[spheres[:, 0]], middle, np.sqrt(squares), spheres, arm_links)
+    return LinkBalls(joint[spheres[:, 0]], middle, np.sqrt(squares), spheres, arm_links)
 
 
 def _ranges(owners: np.ndarray, count: int) -> np.ndarray:
@@ -148,9 +124,7 @@ def _without_repetitions(spheres: list[_Sphere]) -> list[_Sphere]:
 
 
 class Clearance(NamedTuple):
-    """Least clearances of a batch.
-
-    Negative where spheres overlap, +inf where there is nothing to meet.
+    """Least clearances of a batch: negative where spheres overlap, +inf where nothing is met.
 
     Attributes:
         between_arms: (configurations,) least centre distance of spheres of two arms, less both
@@ -173,21 +147,17 @@ class SphereCollision(NamedTuple):
 
     Attributes:
         assembly: The robot.
-        sphere_joint: (spheres,) index into the kinematic table, arm by arm.
-        sphere_local: (spheres, 3) centres in the table's frames.
+        spheres: The spheres.
         arm_spheres: (arms, 2) first and one-past-last sphere of each arm.
         bounds: Balls around the spheres of each link.
-        radius: Of every sphere.
         obstacles: The obstacle table.
         geometry: The same spheres as a `pin.GeometryModel` of coal spheres.
     """
 
     assembly: Assembly
-    sphere_joint: np.ndarray
-    sphere_local: FloatArray
-    arm_spheres: np.ndarray
-    bounds: _Bounds
-    radius: float
+    spheres: Spheres
+    arm_spheres: IntArray
+    bounds: LinkBalls
     obstacles: ObstacleTable
     geometry: Any
 
@@ -196,8 +166,9 @@ class SphereCollision(NamedTuple):
 
         Args:
             q: (nq, configurations) [deg].
-            limit: Above it nothing is asked: a clearance is exact where it is less, elsewhere some
-                value not below it. With 0 the signs are right, and what is far apart is skipped.
+            limit: Above it nothing is measured: a clearance is exact where it is less, elsewhere
+                some value not below it. With 0 the signs are right, and bodies far apart are
+                skipped.
 
         Raises:
             ValueError: If q has another number of rows than the robot has joints.
@@ -213,14 +184,13 @@ class SphereCollision(NamedTuple):
         return Clearance(out[0], out[1])
 
     @property
-    def tables(self) -> tuple[Any, ...]:
-        """What the kernel `clearances` reads, as plain tuples of arrays."""
+    def radius(self) -> float:
+        """Radius of every sphere [length unit]."""
+        return self.spheres.radius
+
+    @property
+    def tables(self) -> SphereTables:
+        """The tables that the kernel `clearances` reads."""
         table = self.assembly.table
-        spheres = (self.sphere_joint, self.sphere_local, self.radius)
-        return (
-            table[:6],
-            None if table.planar else True,
-            spheres,
-            tuple(self.bounds),
-            tuple(self.obstacles),
-        )
+        space = None if table.planar else True
+        return SphereTables(table.chain, space, self.spheres, self.bounds, self.obstacles)

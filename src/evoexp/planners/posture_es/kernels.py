@@ -151,17 +151,7 @@ def judge(
     rows[COLLISION], rows[FREE_SPACE] = 0.0, 0.0
     if weights[COLLISION] > 0.0:
         rated = weights[FREE_SPACE] > 0.0
-        primitive_clearances(
-            tables[0],
-            tables[1],
-            tables[2],
-            tables[3],
-            tables[4],
-            reach if rated else 0.0,
-            not rated,
-            q,
-            clearance,
-        )
+        primitive_clearances(tables, reach if rated else 0.0, not rated, q, clearance)
         for n in range(count):
             least = min(clearance[0, n], min(clearance[1, n], clearance[2, n]))
             rows[COLLISION, n] = 0.0 if least >= 0.0 else 1.0

@@ -228,7 +228,7 @@ def _begun(problem: Problem, index: int, q: FloatArray, situation: Situation) ->
     collision = problem.bodies.collision(*_surroundings(problem, phase, situation))
     objective, task = problem.objective, problem.task
     judging = Judging(
-        problem.assembly.table[:6],
+        problem.assembly.table.chain,
         joint,
         controlled[1],
         _aim(problem, phase, q, situation, controlled),

@@ -1,0 +1,164 @@
+"""A motion among bodies as the certifier's kernels take it, and a pair's distance at one instant."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from evoexp.collision.body_table import BodyTable
+from evoexp.collision.certifier.convex_distance import distance_bounds, separation_later
+from evoexp.collision.motion_bounds import (
+    FRAME,
+    configuration,
+    joint_frames,
+    joint_twists,
+    pair_reaches,
+    reaches,
+)
+from evoexp.numeric.compilation import inlined, kernel
+from evoexp.records import BoolArray, FloatArray, IntArray
+from evoexp.robots.kinematics import KinematicChain
+
+WIDER = 1.0 + 1e-9  # on all bounds of speed: more than rounding
+
+
+class Task(NamedTuple):
+    """A motion among bodies.
+
+    Attributes:
+        chain: The joints.
+        bodies: The bodies.
+        pairs: (pairs, 2) indices of bodies.
+        exact: (pairs,) whether upper bounds of distances are believed; where they are not, every
+            interval in which contact cannot be excluded becomes a leaf.
+        coefficients: (segments, 4, nq) of the motion.
+        straight: Whether all segments are straight lines.
+        last: The last instant: the number of segments, or 0 for a motion of one instant.
+        weights: (pairs, joints) from `approach_weights`.
+        by_one: (pairs,) from `moved_by_one`.
+    """
+
+    chain: KinematicChain
+    bodies: BodyTable
+    pairs: IntArray
+    exact: BoolArray
+    coefficients: FloatArray
+    straight: bool
+    last: float
+    weights: FloatArray
+    by_one: BoolArray
+
+
+class Workspace(NamedTuple):
+    """The configuration that is looked at, and scratch.
+
+    Attributes:
+        q: (nq,).
+        frames: (joints, FRAME) of the joints.
+        world: (bodies, FRAME) of the bodies.
+        stamps: (bodies + 2,) the configuration's number when each body was placed; the last but one
+            when the twists were computed; the last: its number now.
+        normals: (pairs, 3) direction across which each pair was last separated.
+        simplex: (4, 3) of `distance_bounds`.
+        scratch: (3, 3).
+        twists: (joints, 6) of the joints.
+    """
+
+    q: FloatArray
+    frames: FloatArray
+    world: FloatArray
+    stamps: IntArray
+    normals: FloatArray
+    simplex: FloatArray
+    scratch: FloatArray
+    twists: FloatArray
+
+
+def work_space(task: Task) -> Workspace:
+    """Return the workspace of a task; bodies that stand still are in their places."""
+    num_joints, bodies = len(task.chain.parent), task.bodies
+    return Workspace(
+        q=np.zeros(num_joints),
+        frames=np.zeros((num_joints, FRAME)),
+        world=np.hstack([bodies.rotation, bodies.translation]),
+        stamps=np.zeros(len(bodies.joint) + 2, dtype=np.int64),
+        normals=np.ones((len(task.pairs), 3)),
+        simplex=np.zeros((4, 3)),
+        scratch=np.zeros((3, 3)),
+        twists=np.zeros((num_joints, 6)),
+    )
+
+
+@kernel
+def approach_weights(
+    chain: KinematicChain, bodies: BodyTable, pairs: IntArray, strokes: FloatArray
+) -> FloatArray:
+    """Bound the change of each pair's distance by each joint's speed, widened against rounding.
+
+    Args:
+        chain: The joints.
+        bodies: The bodies.
+        pairs: (pairs, 2) indices of bodies.
+        strokes: (nq,) greatest |q| in the motion.
+
+    Returns:
+        (pairs, joints).
+    """
+    reach = reaches(chain, bodies.joint, bodies.from_origin, bodies.from_axis, strokes)
+    return pair_reaches(pairs, reach) * WIDER
+
+
+@inlined
+def move_to(task: Task, work: Workspace, segment: int, u: float) -> None:
+    """Place the joints at u in [0, 1] on a segment."""
+    work.stamps[-1] += 1
+    configuration(task.coefficients[segment], u, work.q)
+    joint_frames(task.chain, work.q, work.frames)
+
+
+@inlined
+def pair_distance(
+    task: Task, work: Workspace, pair: int, need: float, enough: float, converged: float
+) -> tuple[float, float]:
+    """Return `distance_bounds` of a pair, whose bodies are placed first unless they already are."""
+    bodies, stamps, world = task.bodies, work.stamps, work.world
+    for side in range(2):
+        body = task.pairs[pair, side]
+        joint = bodies.joint[body]
+        if joint >= 0 and stamps[body] != stamps[-1]:
+            stamps[body] = stamps[-1]
+            _place_body(
+                work.frames[joint], bodies.rotation[body], bodies.translation[body], world[body]
+            )
+    one, two, normal = task.pairs[pair, 0], task.pairs[pair, 1], work.normals[pair]
+    return distance_bounds(
+        bodies, world, one, two, need, enough, converged, normal, work.simplex, work.scratch
+    )
+
+
+@inlined
+def _place_body(
+    frame: FloatArray, rotation: FloatArray, translation: FloatArray, out: FloatArray
+) -> None:
+    """Write a body's frame in the world (FRAME,) from its joint's frame and its place in it."""
+    for e in range(3):
+        a, b, c = frame[3 * e], frame[3 * e + 1], frame[3 * e + 2]
+        for k in range(3):
+            out[3 * e + k] = a * rotation[k] + b * rotation[3 + k] + c * rotation[6 + k]
+        out[9 + e] = frame[9 + e] + (a * translation[0] + b * translation[1] + c * translation[2])
+
+
+@inlined
+def least_separation(
+    task: Task, work: Workspace, pair: int, segment: int, u: float, half: float
+) -> float:
+    """Return the least gap across a pair's last normal from u − half to u + half.
+
+    Velocities count as constant; the gap is concave, so it is least at an end.
+    """
+    if work.stamps[-2] != work.stamps[-1]:
+        work.stamps[-2] = work.stamps[-1]
+        joint_twists(task.chain, task.coefficients[segment], u, work.frames, work.twists)
+    bodies, world, twists, scratch = task.bodies, work.world, work.twists, work.scratch
+    one, two, normal = task.pairs[pair, 0], task.pairs[pair, 1], work.normals[pair]
+    before = separation_later(bodies, world, twists, one, two, normal, -half, scratch)
+    return min(before, separation_later(bodies, world, twists, one, two, normal, half, scratch))

@@ -1,0 +1,81 @@
+"""The arrays that the kernels of spheres and capsules read, and the names of their columns."""
+
+from typing import NamedTuple
+
+from evoexp.records import FloatArray, IntArray
+from evoexp.robots.kinematics import KinematicChain
+
+BOXES, CYLINDERS, HALF_SPACES = range(3)
+"""Classes of obstacles; spheres and capsules are thickened boxes."""
+
+JOINT, FIRST_RUN, STOP_RUN, FIRST_CAPSULE, STOP_CAPSULE, FIRST_LISTED, STOP_LISTED = range(7)
+"""Columns of `Units.whole`."""
+
+REACH, SLACK = 3, 4
+"""Columns of `Units.ball` behind the centre."""
+
+TURN, CORE_SIZE, AROUND, BOX, BOX_THICKNESS = 3, 12, 16, 17, 20
+"""First columns in `PackedObstacles.data`, behind the centre."""
+
+
+class Units(NamedTuple):
+    """Bodies and then parts of bodies, each with a ball around it.
+
+    Attributes:
+        whole: (units, 7) frame (a joint of the kinematic table, one past its end: the world); first
+            and one-past-last run of spheres; the same of capsules; the same of entries in the list
+            of obstacles that a body is checked against.
+        ball: (units, 5) centre in the frame, radius, and the slack: the least distance of any
+            shape's end from this centre, less its own radius.
+    """
+
+    whole: IntArray
+    ball: FloatArray
+
+
+class PackedShapes(NamedTuple):
+    """Spheres and capsules in the frames of the kinematic table, in the order of the units.
+
+    Attributes:
+        runs: (runs, 2) first and one-past-last sphere of equal radius.
+        spheres: (spheres, 4) centre, radius.
+        capsules: (capsules, 8) one end, from there to the other, radius, 1 / squared length.
+        most: Greatest number of spheres of a unit.
+    """
+
+    runs: IntArray
+    spheres: FloatArray
+    capsules: FloatArray
+    most: int
+
+
+class PackedObstacles(NamedTuple):
+    """Obstacles, and the lists of those that each body is checked against.
+
+    Attributes:
+        data: (obstacles, 21) centre; rotation, row by row; half the edges and thickness of a box,
+            or radius and half the length of a cylinder; radius of a ball around; half the edges and
+            thickness of a box around.
+        listed: (entries, 2) obstacle, and its class: BOXES, CYLINDERS or HALF_SPACES; body by body.
+    """
+
+    data: FloatArray
+    listed: IntArray
+
+
+class PrimitiveTables(NamedTuple):
+    """All tables of a robot among obstacles.
+
+    Attributes:
+        chain: The joints.
+        units: Bodies, then their parts.
+        shapes: Of the units.
+        obstacles: The obstacles, and which body is checked against which.
+        pairs: (pairs, 3) two units, and the row of the result that they count for.
+    """
+
+    chain: KinematicChain
+    units: Units
+    shapes: PackedShapes
+    obstacles: PackedObstacles
+    pairs: IntArray

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from evoexp.collision.models.link_crossings import Arm, count_crossings
-from evoexp.collision.models.link_envelope_kernels import colliding
+from evoexp.collision.models.link_envelope_kernels import Envelope, colliding
 from evoexp.collision.models.link_envelopes import EnvelopedArm, count_collisions, update_collisions
 from references import link_crossings_numpy as plain
 
@@ -96,7 +96,7 @@ def test_single_precision_decides_nothing_that_is_close() -> None:
         arm.outlines(q + rng.uniform(-1.0, 1.0, q.shape) * 10.0 ** rng.uniform(-9.0, -5.0, q.shape))
         for arm, q in zip(arms, angles, strict=True)
     ]
-    one, two = ((*arm.arm, arm.half_width, arm.tcp_radius) for arm in arms)
+    one, two = (Envelope(*arm.arm, arm.half_width, arm.tcp_radius) for arm in arms)
     counts = np.zeros((80, 80), dtype=np.int64)
     for k, i, j in np.ndindex(3, 80, 80):
         counts[i, j] += colliding(one, drawn[0], i, two, drawn[1], j, k)

@@ -125,8 +125,8 @@ def test_planar_and_spatial_kernels_agree() -> None:
 def test_circles_stand_joint_to_joint_and_shared_ones_count_once() -> None:
     collision = MODEL.bind(TWO_PLANAR.build(), ())
     assert collision.arm_spheres.tolist() == [[0, 9], [9, 18]]
-    assert collision.sphere_local[:5, 0].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
-    assert collision.sphere_local[5:9, 0].tolist() == [1.0, 2.0, 3.0, 4.0]
+    assert collision.spheres.local[:5, 0].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+    assert collision.spheres.local[5:9, 0].tolist() == [1.0, 2.0, 3.0, 4.0]
 
 
 def test_a_single_arm_meets_no_other_arm() -> None:
@@ -153,7 +153,7 @@ def test_touching_is_no_collision_and_less_is() -> None:
 
 def test_one_sphere_per_link_sits_in_the_middle() -> None:
     single = TouchingSpheres(spheres_per_link=1, sphere_radius=0.5, collision_substeps=1)
-    assert single.bind(ONE_PLANAR.build(), ()).sphere_local[:, 0].tolist() == [2.0, 2.0]
+    assert single.bind(ONE_PLANAR.build(), ()).spheres.local[:, 0].tolist() == [2.0, 2.0]
 
 
 def test_a_batch_is_its_configurations_one_by_one() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from evoexp.objectives.reaching import measure_reach, measure_reach_from
-from evoexp.robots.planar_ends import LANES
+from evoexp.robots.planar_ends import LANES, PlanarArm
 
 
 @pytest.mark.parametrize("count", [1, LANES, 2 * LANES + 5, 300])
@@ -14,7 +14,7 @@ def test_a_whole_table_is_measured_as_a_list_of_individuals_is(count: int) -> No
     rng = np.random.default_rng(count)
     lengths = rng.uniform(0.5, 3.0, 6)
     arm, target, box = (
-        (lengths, 0.5, -0.25, 0.3),
+        PlanarArm(lengths, 0.5, -0.25, 0.3),
         np.array([3.0, 4.0]),
         np.array([-2.0, 6.0, -3.0, 5.0]),
     )

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from hypothesis import strategies as st
 
-from evoexp.paths.grids import UNREACHED, Grid, front, grid
+from evoexp.paths.grids import UNREACHED, Grid, Moves, front, grid
 
 SEEDS = st.integers(0, 2**32)
 SHAPES = st.sampled_from([(1, 2), (3, 3), (6, 5), (9, 9), (3, 3, 3)])
@@ -32,7 +32,7 @@ class World:
         self.potentials = np.array(
             [0.0, *(one + (two - one) * k for k in range(self.grid.num_nodes))]
         )
-        self.moves = self.grid.neighbours, self.potentials, self.steps
+        self.moves = Moves(self.grid.neighbours, self.potentials, self.steps)
 
     def weights(self, node: int) -> dict[int, float]:
         """Where moves lead to, in their order, and what they weigh.

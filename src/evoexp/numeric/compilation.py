@@ -4,7 +4,7 @@ The options keep results bit-identical: no fastmath, no contraction, no reassoci
 """
 
 from collections.abc import Callable
-from typing import Any, TypeVar, cast
+from typing import Any, Protocol, TypeVar, cast
 
 import numba
 from numba.core import cgutils, types
@@ -13,6 +13,7 @@ from numba.extending import intrinsic
 from evoexp.numeric.kernel_cache import SharedCache, use_content_cache
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+Value = TypeVar("Value")
 
 use_content_cache()
 
@@ -25,9 +26,10 @@ _OPTIONS: dict[str, Any] = {
 }
 
 
-def kernel(function: Any) -> Any:
+def kernel(function: Function) -> Function:
     """Compile a function with the options that keep results bit-identical, once for all time."""
-    return _kept(numba.njit(**_OPTIONS)(function))
+    compiled: Function = _kept(numba.njit(**_OPTIONS)(function))
+    return compiled
 
 
 def inlined(function: Function) -> Function:
@@ -67,13 +69,15 @@ def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     return value
 
 
-borrowed: Callable[[Any], Any] = cast(Any, intrinsic(_borrow))
-"""Return arrays, generators, or tuples of them to any depth, as views that own nothing.
+class _Borrowing(Protocol):
+    def __call__(self, value: Value, /) -> Value: ...
 
-No counting of references.
+
+borrowed: _Borrowing = cast(Any, intrinsic(_borrow))
+"""Return arrays, generators, or tuples of them to any depth, as views that own nothing.
 
 numba counts a reference, atomically, wherever an array is read out of a tuple or handed on, and
 wherever a number is drawn; in a kernel that takes dozens of arrays and calls small `inlined`
-functions that is most of the time. For arguments only: their caller keeps them alive, while an
-array born in a kernel is freed where its name is last used.
+functions the counting takes most of the time. To be used for arguments only: the caller keeps them
+alive, while an array born in a kernel is freed where its name is last used.
 """

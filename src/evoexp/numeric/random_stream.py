@@ -75,4 +75,4 @@ def draw_index(draws: Block, count: int) -> int:
 @kernel
 def used_up(draws: Block) -> bool:
     """Return whether more numbers were asked for than the block has."""
-    return draws.taken[0] > len(draws.uniforms)
+    return bool(draws.taken[0] > len(draws.uniforms))

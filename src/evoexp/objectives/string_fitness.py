@@ -92,9 +92,7 @@ def weigh(
 
 
 @kernel
-def fill_wheel(
-    fitness_offset: float, costs: FloatArray, weights: tuple[float, float, float]
-) -> None:
+def fill_wheel(fitness_offset: float, costs: FloatArray, weights: FloatArray) -> None:
     """The kernel of `roulette_weights`, for other kernels."""
     for k in range(len(costs)):
         fitness = fitness_offset - costs[k]

@@ -10,13 +10,12 @@ per pass: with eight, LLVM meets more pairs of rows than it is willing to test f
 not vectorise (three times slower).
 """
 
-from typing import Any
-
 import numpy as np
 
 from evoexp.numeric.compilation import kernel
 from evoexp.paths.spline import square_speeds
 from evoexp.paths.workspace import R2, R3, R4, R5, R6, ROW, U1, U2, U3, U4
+from evoexp.records import FloatArray
 
 
 @kernel
@@ -28,7 +27,15 @@ def between(v0: float, v1: float, v2: float, v3: float) -> float:
 
 
 @kernel
-def advance_pair(w: Any, knot: Any, other: Any, s: Any, count: Any, u0: float, h: float) -> None:
+def advance_pair(
+    w: FloatArray,
+    knot: np.uint64,
+    other: np.uint64,
+    s: np.uint64,
+    count: np.uint64,
+    u0: float,
+    h: float,
+) -> None:
     """Write four speeds of a two-joint arm from sample `s` on.
 
     And the four lengths that they complete.
@@ -83,7 +90,9 @@ def root(q0: float, q1: float, q2: float, q3: float, q4: float, u: float) -> flo
 
 
 @kernel
-def advance(w: Any, q: Any, s: Any, count: Any, u0: float, h: float) -> None:
+def advance(
+    w: FloatArray, q: np.uint64, s: np.uint64, count: np.uint64, u0: float, h: float
+) -> None:
     """As `advance_pair` for any number of joints.
 
     From the coefficients of the squared speed at row `q`.
@@ -118,7 +127,13 @@ def advance(w: Any, q: Any, s: Any, count: Any, u0: float, h: float) -> None:
 
 @kernel
 def close_ends(
-    w: Any, knot: Any, joints: Any, pitch: Any, first: Any, last: Any, count: Any
+    w: FloatArray,
+    knot: np.uint64,
+    joints: np.uint64,
+    pitch: np.uint64,
+    first: np.uint64,
+    last: np.uint64,
+    count: np.uint64,
 ) -> None:
     """Add the sample at the goal and complete the first and the last two lengths.
 
@@ -156,7 +171,13 @@ def close_ends(
 
 @kernel
 def integrate_speed(
-    w: Any, joints: Any, N: Any, S: Any, count: Any, samples: Any, work: Any
+    w: FloatArray,
+    joints: np.uint64,
+    N: np.uint64,
+    S: np.uint64,
+    count: np.uint64,
+    samples: np.uint64,
+    work: np.uint64,
 ) -> None:
     """Fill the rows of speed and length of all samples.
 

@@ -1,14 +1,15 @@
 """Paths over a grid: random walks toward a target, loop erasure, length.
 
 A path is written into one row of a table: its number of nodes, then their indices. Its first node
-is the start, its last the goal. Which nodes a path has is looked up in `place` (nodes,): a node is
-in the path if the path has it at its place; so nothing needs to be cleared between paths.
+is the start, its last the goal. `place` (nodes,) tells the nodes of a path: a node belongs to it if
+the path has that node at its place; so nothing needs to be cleared between paths.
 """
 
 import numpy as np
 
 from evoexp.numeric.compilation import borrowed, kernel
-from evoexp.numeric.random_stream import used_up
+from evoexp.numeric.random_stream import Block, used_up
+from evoexp.paths.grids import Moves, NodeArray, StepArray
 from evoexp.records import FloatArray
 
 
@@ -18,8 +19,8 @@ def walk(
     moves: Moves,
     ends: tuple[int, int],
     erase: bool,
-    path: NDArray[np.int32],
-    place: NDArray[np.int32],
+    path: NodeArray,
+    place: NodeArray,
 ) -> None:
     """Write a random path: every step draws one of the permitted moves, weighted toward the target.
 
@@ -29,16 +30,13 @@ def walk(
 
     Args:
         draws: One number is taken per step; if they are used up, the walk breaks off.
-        moves: Neighbours (nodes, moves), see `grids.Grid`; potential after so many steps of the
-            front from the target (≥ greatest number of steps + 1,); those steps (nodes,), see
-            `grids.front`.
+        moves: The moves and their weights.
         ends: Indices of the node it starts at and of the target, which the front must reach.
         erase: Whether loops are erased.
-        path: (≥ nodes + 1,) written; see above.
+        path: (≥ nodes + 1,), written; see above.
         place: (nodes,) scratch.
     """
-    uniforms, taken = draws
-    neighbours, potentials, steps = moves
+    uniforms, taken = draws.uniforms, draws.taken
     node, target = ends
     at, num = taken[0], len(uniforms)
     trail = np.empty(num - min(at, num) + 2, np.int32)
@@ -46,7 +44,7 @@ def walk(
     trail[1] = node
     place[node] = 1
     while node != target and at < num:
-        node = _next_node(uniforms[at], neighbours, potentials, steps, node)
+        node = _next_node(uniforms[at], moves.neighbours, moves.potentials, moves.steps, node)
         at += 1
         count += 1
         trail[count] = node
@@ -62,13 +60,13 @@ def walk_each(
     ends: tuple[int, int],
     erase: bool,
     first: int,
-    paths: NDArray[np.int32],
-    place: NDArray[np.int32],
+    paths: NodeArray,
+    place: NodeArray,
 ) -> int:
     """Write random paths between the same nodes, one after the other, each as `walk` does.
 
     Args:
-        draws: See `walk`, and so are `moves`, `ends`, `erase` and `place`.
+        draws: See `walk`, as for `moves`, `ends`, `erase` and `place`.
         first: The path to begin with.
         paths: (paths, nodes + 1) written.
 
@@ -78,10 +76,10 @@ def walk_each(
     """
     draws, moves, paths = borrowed((draws, moves, paths))
     for k in range(first, len(paths)):
-        before = draws[1][0]
+        before = draws.taken[0]
         walk(draws, moves, ends, erase, paths[k], place)
         if used_up(draws):
-            draws[1][0] = before
+            draws.taken[0] = before
             return k
     return len(paths)
 
@@ -89,16 +87,17 @@ def walk_each(
 @kernel
 def _next_node(
     uniform: float,
-    neighbours: NDArray[np.int32],
+    neighbours: NodeArray,
     potentials: FloatArray,
-    steps: NDArray[np.int32],
+    steps: StepArray,
     node: int,
 ) -> int:
     """Choose one of a node's neighbours by a uniform number; the node itself if it has none.
 
-    All moves are looked at, without a branch: which ones are permitted or chosen no processor can
-    foresee.
+    All moves are looked at without a branch, because no processor can foresee the permitted and the
+    chosen ones.
     """
+    # greatest potential, sum and number of the permitted neighbours
     greatest, total, count = 0.0, 0.0, 0
     for move in range(neighbours.shape[1]):
         other = neighbours[node, move]
@@ -107,6 +106,7 @@ def _next_node(
         greatest = max(greatest, potential if permitted else 0.0)
         total += potential if permitted else 0.0
         count += permitted
+    # the neighbour at which the sum of weights passes the uniform part
     left, chosen = uniform * (count * (greatest + 1.0) - total), node
     for move in range(neighbours.shape[1]):
         other = neighbours[node, move]
@@ -118,17 +118,13 @@ def _next_node(
 
 
 @kernel
-def erase_loops(
-    nodes: NDArray[np.int32], count: int, path: NDArray[np.int32], place: NDArray[np.int32]
-) -> None:
-    """Write a path without its loops.
-
-    Wherever it comes back to a node, what lies between is left out.
+def erase_loops(nodes: NodeArray, count: int, path: NodeArray, place: NodeArray) -> None:
+    """Write a path without its loops: the nodes between two visits of a node are left out.
 
     Args:
         nodes: (≥ count + 1,) a path, its nodes from index 1 on; may be `path` itself.
         count: Number of its nodes.
-        path: (≥ nodes + 1,) written; so is its number of nodes.
+        path: (≥ nodes + 1,), written, its number of nodes first.
         place: (nodes,) scratch.
     """
     for k in range(1, count + 1):
@@ -137,13 +133,8 @@ def erase_loops(
 
 
 @kernel
-def _leap(
-    nodes: NDArray[np.int32], count: int, path: NDArray[np.int32], place: NDArray[np.int32]
-) -> None:
-    """Write a path without its loops, by the last place of every node.
-
-    From there it never comes back.
-    """
+def _leap(nodes: NodeArray, count: int, path: NodeArray, place: NodeArray) -> None:
+    """Write a path without its loops: from the last place of a node it never comes back."""
     kept, k = 0, 1
     while k <= count:
         node = nodes[k]
@@ -155,19 +146,27 @@ def _leap(
 
 @kernel
 def _write(
-    trail: NDArray[np.int32],
+    trail: NodeArray,
     count: int,
     erase: bool,
-    path: NDArray[np.int32],
-    place: NDArray[np.int32],
+    path: NodeArray,
+    place: NodeArray,
 ) -> None:
-    """Write a walk of `count` nodes as a path; `place` tells the last place of every node."""
+    """Write a walk of `count` nodes as a path.
+
+    Args:
+        trail: Nodes of the walk, from index 1 on.
+        count: How many.
+        erase: Whether loops are erased.
+        path: Written.
+        place: (nodes,) the last place of every node in the walk.
+    """
     if erase:
         _leap(trail, count, path, place)
         return
     kept = 0
     for k in range(1, count + 1):
-        if kept == len(path) - 1:  # full: what has no loops fits always
+        if kept == len(path) - 1:  # full: a path without loops always fits
             erase_loops(path, kept, path, place)
             kept = path[0]
         kept += 1
@@ -176,9 +175,7 @@ def _write(
 
 
 @kernel
-def measure_path(
-    path: NDArray[np.int32], kinds: NDArray[np.int64], unsafeness: FloatArray
-) -> tuple[float, float]:
+def measure_path(path: NodeArray, kinds: NodeArray, unsafeness: FloatArray) -> tuple[float, float]:
     """Return length and mean unsafeness of a path (Chen & Zalzala 1995, Eqs. 2 and 3).
 
     Moves of each kind are counted, so the length does not depend on their order.
@@ -189,7 +186,7 @@ def measure_path(
         unsafeness: (nodes,).
 
     Returns:
-        D [cell], S.
+        D [cell] and S [-].
     """
     count = path[0]
     diagonal, spatial = 0, 0

@@ -10,11 +10,15 @@ import itertools
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import kernel
-from evoexp.records import IntArray
+from evoexp.records import BoolArray, FloatArray
 
 UNREACHED = -1
+
+NodeArray = NDArray[np.int32]  # indices of nodes
+StepArray = NDArray[np.integer[Any]]  # numbers of steps
 
 
 class Grid(NamedTuple):
@@ -32,11 +36,11 @@ class Grid(NamedTuple):
             changes, by that difference.
     """
 
-    free: np.ndarray
-    coordinates: np.ndarray
-    neighbours: np.ndarray
-    changes: np.ndarray
-    kinds: np.ndarray
+    free: BoolArray
+    coordinates: NodeArray
+    neighbours: NodeArray
+    changes: NodeArray
+    kinds: NodeArray
 
     @property
     def num_nodes(self) -> int:
@@ -48,21 +52,30 @@ class Grid(NamedTuple):
         return int(np.ravel_multi_index(tuple(value + 1 for value in node), self.free.shape))
 
     def inner(self, values: np.ndarray) -> np.ndarray:
-        """Return values (nodes,) as an array over the nodes without the ring,.
-
-        Along x, along y[, along z].
-        """
+        """Return values (nodes,) without the ring: (nodes along x, along y[, along z])."""
         return values.reshape(self.free.shape)[(slice(1, -1),) * self.free.ndim]
 
     def moves_within(self, neighbourhood: int) -> int:
-        """Return how many moves change at most so many coordinates.
-
-        Those to p-neighbours come first.
-        """
+        """Return how many moves change at most so many coordinates; they come first."""
         return int(np.count_nonzero(self.changes <= neighbourhood))
 
 
-def grid(blocked: np.ndarray) -> Grid:
+class Moves(NamedTuple):
+    """The moves of random walks to one target, and their weights.
+
+    Attributes:
+        neighbours: (nodes, moves), see `Grid`.
+        potentials: (≥ greatest number of steps + 1,) potential after so many steps of the front
+            from the target.
+        steps: (nodes,) of that front, see `front`.
+    """
+
+    neighbours: NodeArray
+    potentials: FloatArray
+    steps: StepArray
+
+
+def grid(blocked: BoolArray) -> Grid:
     """Return a grid with its permitted moves.
 
     A diagonal move is permitted if its two nodes are also joined by lateral moves within the box
@@ -71,7 +84,7 @@ def grid(blocked: np.ndarray) -> Grid:
     section 2.1), and may touch the corner of one.
 
     Args:
-        blocked: (nodes along x, along y[, along z]), true for a node that is no place to be.
+        blocked: (nodes along x, along y[, along z]), true for a node of an obstacle.
 
     Raises:
         ValueError: If it has another number of dimensions than two or three.
@@ -101,10 +114,7 @@ def grid(blocked: np.ndarray) -> Grid:
 
 
 def _permitted(free: np.ndarray, move: tuple[int, ...]) -> np.ndarray:
-    """Return whether a move can be made from every node.
-
-    Whether any order of its lateral parts passes free nodes.
-    """
+    """Return for every node whether a move can be made: an order of its parts passes free nodes."""
     parts = [
         tuple(step if axis == other else 0 for other in range(len(move)))
         for axis, step in enumerate(move)
@@ -120,8 +130,8 @@ def _permitted(free: np.ndarray, move: tuple[int, ...]) -> np.ndarray:
     return permitted
 
 
-def front(of: Grid, sources: np.ndarray, neighbourhood: int) -> np.ndarray:
-    """Return in how many steps a wave front reaches every node (Barraquand & Latombe 1991).
+def front(of: Grid, sources: NDArray[np.integer[Any]], neighbourhood: int) -> NodeArray:
+    """Return after how many steps a wave front reaches every node (Barraquand & Latombe 1991).
 
     Args:
         of: The grid; the front makes the moves that it permits.
@@ -132,33 +142,25 @@ def front(of: Grid, sources: np.ndarray, neighbourhood: int) -> np.ndarray:
         (nodes,) steps, `UNREACHED` where it never comes.
     """
     steps, queue = np.empty(of.num_nodes, dtype=np.int32), np.empty(of.num_nodes, dtype=np.int32)
-    spread_front(
-        of.neighbours,
-        of.moves_within(neighbourhood),
-        np.asarray(sources, dtype=np.int32),
-        steps,
-        queue,
-    )
+    starts = np.asarray(sources, dtype=np.int32)
+    spread_front(of.neighbours, of.moves_within(neighbourhood), starts, steps, queue)
     return steps
 
 
 @kernel
 def spread_front(
-    neighbours: NDArray[np.int32],
-    num_moves: int,
-    sources: IntArray,
-    steps: NDArray[np.int32],
-    queue: NDArray[np.int32],
+    neighbours: NodeArray, num_moves: int, sources: NodeArray, steps: StepArray, queue: NodeArray
 ) -> None:
-    """The kernel of `front`, for other kernels.
+    """Run the kernel of `front`.
 
     Args:
         neighbours: (nodes, moves), see `Grid`.
         num_moves: How many of the moves the front makes.
         sources: (any,) indices of nodes.
-        steps: (nodes,) written.
+        steps: (nodes,), written.
         queue: (nodes,) scratch.
     """
+    # the sources, each once
     steps[:] = UNREACHED
     head, tail = 0, 0
     for k in range(len(sources)):
@@ -166,6 +168,7 @@ def spread_front(
             steps[sources[k]] = 0
             queue[tail] = sources[k]
             tail += 1
+    # breadth first
     while head < tail:
         node = queue[head]
         head += 1
@@ -178,7 +181,7 @@ def spread_front(
 
 
 def _shifted(padded: np.ndarray, move: tuple[int, ...]) -> np.ndarray:
-    """Return what stands one move away from every node, of an array with a ring around it."""
+    """Return the values one move away from every node, of an array with a ring around it."""
     stop = [size - 1 for size in padded.shape]
     return padded[
         tuple(slice(1 + step, last + step) for step, last in zip(move, stop, strict=True))

@@ -163,12 +163,16 @@ def top_speeds(motion: Motion) -> FloatArray:
 
 @kernel
 def speed_bound(coefficients: FloatArray, joint: int, begin: float, end: float) -> float:
-    """Greatest |dq/du| of a joint on [begin, end] of a segment with `coefficients` (4, nq).
+    """Return an upper bound of a joint's |dq/du| on [begin, end] of a segment.
 
-    Or more.
+    Args:
+        coefficients: (4, nq) of the segment.
+        joint: Index into q.
+        begin: u where the part begins.
+        end: u where it ends.
     """
     c1, c2, c3 = coefficients[1, joint], 2.0 * coefficients[2, joint], 3.0 * coefficients[3, joint]
     first = abs(c1 + begin * (c2 + begin * c3))
     last = abs(c1 + end * (c2 + end * c3))
     middle = abs(c1 + 0.5 * c2 * (begin + end) + c3 * begin * end)
-    return max(first, max(middle, last))
+    return float(max(first, max(middle, last)))

@@ -22,10 +22,7 @@ roots alone (3 cycles each) take 18; copying records from each lane's own place,
 vectorise, 14 µs; the bisection 9 µs; splines 3 µs; and arithmetic.
 """
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.paths.arc_length import integrate_speed
@@ -44,8 +41,10 @@ from evoexp.paths.workspace import (
     U0,
     U1,
     U3,
+    Offsets,
     Redistribution,
 )
+from evoexp.records import FloatArray, IntArray
 
 _LONGEST = (
     1e300  # a path that is longer has overflowed (garbage in a padded lane0) and stays as it is
@@ -54,7 +53,14 @@ _LONGEST = (
 
 @kernel
 def enter_segments(
-    w: Any, N: Any, S: Any, count: Any, samples: Any, work: Any, entered: Any, at: Any
+    w: FloatArray,
+    N: np.uint64,
+    S: np.uint64,
+    count: np.uint64,
+    samples: np.uint64,
+    work: np.uint64,
+    entered: Offsets,
+    at: Offsets,
 ) -> None:
     """Write to row i of `entered` the last segment that begins at or before target i.
 
@@ -86,7 +92,14 @@ def enter_segments(
 
 @kernel
 def find_samples(
-    w: Any, fraction: float, S: Any, count: Any, samples: Any, work: Any, segment: Any, at: Any
+    w: FloatArray,
+    fraction: float,
+    S: np.uint64,
+    count: np.uint64,
+    samples: np.uint64,
+    work: np.uint64,
+    segment: Offsets,
+    at: Offsets,
 ) -> None:
     """Write target lengths to work row 0, and to `at` the last sample not beyond each of them."""
     for lane in range(count):
@@ -108,7 +121,7 @@ def find_samples(
 
 
 @kernel
-def gather(w: Any, base: Any, work: Any, count: Any, at: Any) -> None:
+def gather(w: FloatArray, base: np.uint64, work: np.uint64, count: np.uint64, at: Offsets) -> None:
     """Copy four consecutive rows, each lane0 from its own place, to the work rows 1..4."""
     for lane in range(count):
         f = base + at[lane]
@@ -125,7 +138,9 @@ def gather(w: Any, base: Any, work: Any, count: Any, at: Any) -> None:
 
 
 @kernel
-def find_parameters(w: Any, S: Any, count: Any, work: Any, at: Any) -> None:
+def find_parameters(
+    w: FloatArray, S: np.uint64, count: np.uint64, work: np.uint64, at: Offsets
+) -> None:
     """Replace the target lengths by u in [0, 1] within their segments.
 
     From the gathered speeds and lengths.
@@ -150,7 +165,13 @@ def find_parameters(w: Any, S: Any, count: Any, work: Any, at: Any) -> None:
 
 @kernel
 def evaluate(
-    via_points: Any, joint: Any, i: Any, lane0: Any, w: Any, work: Any, count: Any
+    via_points: FloatArray,
+    joint: np.uint64,
+    i: int,
+    lane0: np.uint64,
+    w: FloatArray,
+    work: np.uint64,
+    count: np.uint64,
 ) -> None:
     """Move point i of one joint to the spline's value at u, except on paths without length.
 
@@ -172,10 +193,20 @@ def evaluate(
 
 @kernel
 def move_points(
-    via_points: Any, first: Any, joints: Any, lane0: Any, count: Any, N: Any, S: Any, w: Any,
-    samples: Any, work: Any,
-    entered: Any, segment: Any, at: Any,
-) -> None:  # fmt: skip
+    via_points: FloatArray,
+    first: np.uint64,
+    joints: np.uint64,
+    lane0: np.uint64,
+    count: np.uint64,
+    N: np.uint64,
+    S: np.uint64,
+    w: FloatArray,
+    samples: np.uint64,
+    work: np.uint64,
+    entered: Offsets,
+    segment: Offsets,
+    at: Offsets,
+) -> None:
     """Move the points 1..N−1 of one arm in one block of lanes."""
     pitch = (N + U1) * R2
     for lane in range(count):
@@ -196,13 +227,13 @@ def move_points(
 
 @kernel
 def redistribute_arms(
-    via_points: Any,
-    arm_slices: Any,
+    via_points: FloatArray,
+    arm_slices: IntArray,
     num_lanes: int,
     samples_per_segment: int,
-    pivots: Any,
-    w: Any,
-    integers: Any,
+    pivots: FloatArray,
+    w: FloatArray,
+    integers: Offsets,
 ) -> None:
     """See `redistribute`; num_lanes is a multiple of eight here."""
     via_points, pivots, w, integers = borrowed((via_points, pivots, w, integers))
@@ -246,8 +277,8 @@ def redistribute_arms(
 
 
 def redistribute(
-    via_points: NDArray[np.float64],
-    arm_slices: NDArray[np.int64],
+    via_points: FloatArray,
+    arm_slices: IntArray,
     num_lanes: int,
     workspace: Redistribution,
 ) -> None:

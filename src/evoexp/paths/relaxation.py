@@ -1,16 +1,14 @@
 """Relaxation: a path pulled tight like an elastic string (Rana & Zalzala 1995, Eqs 8 and 9)."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import kernel
 from evoexp.paths.layout import check_via_points, padded
+from evoexp.records import FloatArray
 
 
 @kernel
-def relax_points(via_points: Any, delta: float, num_lanes: int) -> None:
+def relax_points(via_points: FloatArray, delta: float, num_lanes: int) -> None:
     """See `relax`; two loops per point.
 
     Because one that reads and writes neighbouring rows does not vectorise.
@@ -25,7 +23,7 @@ def relax_points(via_points: Any, delta: float, num_lanes: int) -> None:
                 via_points[j, i, lane] = a + delta * (middle[lane] - a)  # (Eqs 8, 9)
 
 
-def relax(via_points: NDArray[np.float64], delta: float, num_lanes: int) -> None:
+def relax(via_points: FloatArray, delta: float, num_lanes: int) -> None:
     """Move every via-point by `delta` toward the middle of its neighbours, in place and in order.
 
     One sweep.

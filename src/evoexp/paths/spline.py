@@ -6,15 +6,23 @@ On segment k, with u in [0, 1], a and m (a sixth of the second derivative) at bo
     b0 = a1 − a0 − 2 m0 − m1,   b1 = 6 m0,   b2 = 3 (m1 − m0).
 """
 
-from typing import Any
+import numpy as np
 
 from evoexp.numeric.compilation import kernel
 from evoexp.paths.workspace import R2, R3, R4, ROW, U1, U2
+from evoexp.records import FloatArray
 
 
 @kernel
 def fit_spline(
-    via_points: Any, joint: Any, lane0: Any, count: Any, N: Any, pivots: Any, w: Any, knots: Any
+    via_points: FloatArray,
+    joint: np.uint64,
+    lane0: np.uint64,
+    count: np.uint64,
+    N: np.uint64,
+    pivots: FloatArray,
+    w: FloatArray,
+    knots: np.uint64,
 ) -> None:
     """Copy one joint's coordinates to the scratch w at `knots` and solve for m beside them.
 
@@ -40,15 +48,15 @@ def fit_spline(
         w[row + lane] = a
         w[row + ROW + lane] = ((a_last - a) - w[row - ROW + lane]) * pivot
     for back in range(N):
-        i = N - U1 - back
-        row = knots + i * R2
-        pivot = pivots[i]
+        k = N - U1 - back
+        row = knots + k * R2
+        pivot = pivots[k]
         for lane in range(count):
             w[row + ROW + lane] -= pivot * w[row + R3 + lane]
 
 
 @kernel
-def square_speed(w: Any, knot: Any, out: Any, count: Any) -> None:
+def square_speed(w: FloatArray, knot: np.uint64, out: np.uint64, count: np.uint64) -> None:
     """Write the five coefficients of s'(u)² of one joint on the segment that begins at `knot`."""
     for lane in range(count):
         a0, m0, a1, m1 = (
@@ -66,7 +74,9 @@ def square_speed(w: Any, knot: Any, out: Any, count: Any) -> None:
 
 
 @kernel
-def add_square_speed(w: Any, knot: Any, given: Any, out: Any, count: Any) -> None:
+def add_square_speed(
+    w: FloatArray, knot: np.uint64, given: np.uint64, out: np.uint64, count: np.uint64
+) -> None:
     """Write to `out` the coefficients at `given` plus those of one joint more.
 
     In place would not vectorise.
@@ -87,7 +97,14 @@ def add_square_speed(w: Any, knot: Any, given: Any, out: Any, count: Any) -> Non
 
 
 @kernel
-def square_speeds(w: Any, knot: Any, joints: Any, pitch: Any, work: Any, count: Any) -> Any:
+def square_speeds(
+    w: FloatArray,
+    knot: np.uint64,
+    joints: np.uint64,
+    pitch: np.uint64,
+    work: np.uint64,
+    count: np.uint64,
+) -> np.uint64:
     """Return where the coefficients of |s'(u)|² over all joints of an arm were written.
 
     `work`, or eight rows on.

@@ -18,6 +18,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from evoexp.records import FloatArray
+
 ROW = np.uint64(64)  # lanes per block, and distance of two rows of scratch
 R2, R3, R4, R5, R6, R7, R8 = (np.uint64(rows * 64) for rows in range(2, 9))
 ROW_SHIFT = np.uint64(6)  # ROW = 2^6
@@ -25,6 +27,7 @@ U0, U1, U2, U3, U4 = (np.uint64(u) for u in range(5))
 WORK_ROWS = 16
 MAX_SAMPLES = 1024
 
+Offsets = NDArray[np.uint64]
 EndCondition = Literal["natural", "clamped"]
 
 
@@ -47,12 +50,12 @@ class Redistribution(NamedTuple):
     max_joints: int
     end_condition: EndCondition
     samples_per_segment: int
-    pivots: NDArray[np.float64]
-    floats: NDArray[np.float64]
-    integers: NDArray[np.uint64]
+    pivots: FloatArray
+    floats: FloatArray
+    integers: Offsets
 
 
-def spline_pivots(num_segments: int, end_condition: EndCondition) -> NDArray[np.float64]:
+def spline_pivots(num_segments: int, end_condition: EndCondition) -> FloatArray:
     """Return the reciprocal pivots (N + 1,) of the system for m.
 
     A sixth of a cubic spline's second derivatives.
@@ -70,7 +73,7 @@ def spline_pivots(num_segments: int, end_condition: EndCondition) -> NDArray[np.
     return pivots
 
 
-def aligned_zeros(size: int) -> NDArray[np.float64]:
+def aligned_zeros(size: int) -> FloatArray:
     """Return zeros (size,) float64 that begin at a cache line."""
     raw = np.zeros(size + 8)
     offset = (-raw.ctypes.data % 64) // 8

@@ -69,7 +69,7 @@ def _edge(
 def _face(
     p: FloatArray, i: int, j: int, k: int, best: float, keep: int, out: FloatArray
 ) -> tuple[float, int]:
-    """Improve as `_edge` by a triangle: its interior if the origin's foot is there, or its edges."""
+    """Improve the best as `_edge` does, by a triangle: its interior, or else its edges."""
     ax, ay, az, bx, by, bz, cx, cy, cz = (
         p[i, 0], p[i, 1], p[i, 2], p[j, 0], p[j, 1], p[j, 2], p[k, 0], p[k, 1], p[k, 2],
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""A motion among bodies as the certifier's kernels take it, and a pair's distance at one instant."""
+"""A motion among bodies for the certifier's kernels, and a pair's distance at one instant."""
 
 from typing import NamedTuple
 

@@ -245,7 +245,7 @@ def _mark_box(
     bit: np.uint64,
     bits: Bits,
 ) -> None:
-    """Mark the lanes in which a unit's ball is nearer to the box around an obstacle than the best."""
+    """Mark the lanes in which a unit's ball is nearer to an obstacle's box than the best."""
     cx, cy, cz = obstacle[0], obstacle[1], obstacle[2]
     xx, xy, xz = obstacle[3], obstacle[4], obstacle[5]
     yx, yy, yz = obstacle[6], obstacle[7], obstacle[8]

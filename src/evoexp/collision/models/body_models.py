@@ -244,8 +244,13 @@ def _coal_touches(assembly: Assembly, pairs: list[Pair], q: FloatArray) -> np.nd
 def _alone(assembly: Assembly, shapes: Shapes, pair: Pair) -> PrimitiveCollision:
     """Return the model of two bodies alone."""
     kept = np.isin(shapes.labels, pair)
-    columns = shapes.joint, shapes.start, shapes.end, shapes.radius, shapes.labels
-    own = Shapes(*(column[kept] for column in columns))
+    own = Shapes(
+        shapes.joint[kept],
+        shapes.start[kept],
+        shapes.end[kept],
+        shapes.radius[kept],
+        shapes.labels[kept],
+    )
     return PrimitiveCollision.build(assembly.model, own, NO_OBSTACLES, (pair,))
 
 

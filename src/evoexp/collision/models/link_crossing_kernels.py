@@ -146,7 +146,7 @@ def longest_link(base_x: float, base_y: float, points: FloatArray) -> float:
 
 @kernel
 def _threshold(longest: float, distance: float) -> tuple[float, np.float32]:
-    """Return the scale 2^-e of tables, and tau, a bound on the error of a product of line functions.
+    """Return the scale 2^-e of tables, and tau, a bound on the error of line functions' products.
 
     With links ≤ l, bases d apart and u = 2^-24, every line function is at most V = l (d + 3 l). Its
     error is below 5 u V: the vectors are rounded (2 u), their products and differences (2 u, four
@@ -284,7 +284,7 @@ def _count_rows(
     tau: np.float32,
     counts: NDArray[np.int16],
 ) -> None:
-    """Fill counts[rows, columns]: `one` is the table of population 1, `two` of the columns alone."""
+    """Fill counts[rows, columns] from the tables `one` of population 1 and `two` of the columns."""
     num_configurations, dense = points_1.shape[0], len(columns) == points_2.shape[2]
     seen = np.empty(LANES, dtype=np.int32)
     for row in range(len(rows)):

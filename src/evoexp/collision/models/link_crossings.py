@@ -49,7 +49,8 @@ class Arm(NamedTuple):
         """
         q = checked("q", q, 2)
         out = np.empty((q.shape[0], 4, q.shape[2]))
-        kernels.link_points(q, *map(float, self.base), *map(float, self.lengths), out)
+        (x, y), (first, second) = self.base, self.lengths
+        kernels.link_points(q, float(x), float(y), float(first), float(second), out)
         return out
 
 
@@ -142,12 +143,12 @@ def path_configurations(
     genes = checked("genes", genes, 2)
     if collision_substeps < 1:
         raise ValueError(f"collision_substeps must be at least 1, was {collision_substeps}")
-    ends = [np.ascontiguousarray(end, dtype=np.float64) for end in (start, goal)]
-    for name, end in zip(("start", "goal"), ends, strict=True):
+    first, last = (np.ascontiguousarray(end, dtype=np.float64) for end in (start, goal))
+    for name, end in (("start", first), ("goal", last)):
         if end.shape != (2,):
             raise ValueError(f"{name} must have shape (2,), was {end.shape}")
     out = np.empty(((genes.shape[0] + 1) * collision_substeps - 1, 2, genes.shape[2]))
-    kernels.substeps(genes, *ends, collision_substeps, out)
+    kernels.substeps(genes, first, last, collision_substeps, out)
     return out
 
 

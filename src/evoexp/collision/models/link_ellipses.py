@@ -97,7 +97,7 @@ class EllipseCollision(NamedTuple):
 
     @property
     def path(self) -> TestedPath:
-        """The positions tested: the end, then halves, quarters, …; all again if chords are swept."""
+        """The positions tested: the end, halves, quarters, …; all again if chords are swept."""
         first = _spread(self.num_positions)
         first = first[:NUM_FIRST] if self.chords else first
         return TestedPath(self.num_positions, first, self.chords)
@@ -130,7 +130,7 @@ class EllipseCollision(NamedTuple):
         return hit
 
     def contact(self, start: FloatArray, end: FloatArray) -> Contact | None:
-        """Return the first contact of one path between postures (N,) [rad]; None without contact."""
+        """Return the first contact of a path between postures (N,) [rad]; None if it is free."""
         start, end = (np.ascontiguousarray(q, dtype=np.float64) for q in (start, end))
         position, obstacle, link, swept = first_contact(
             start, end, self.arm, self.ellipses, self.num_positions, self.chords

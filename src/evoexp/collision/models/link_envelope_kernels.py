@@ -5,8 +5,8 @@ cross and four dot products of the arms' directions; here the directions are uni
 line functions are distances [length unit of the scene]. A pair's configuration takes some 260
 operations in single precision for its sixteen pairs of boundary lines, eight of a circle and a
 line, and one of two circles; cases that rounding leaves open are decided in double precision, the
-lines exactly. Measured with vectors of eight (AVX2), 100 × 100 pairs in 4 configurations: 220 µs, nearly
-all of them this loop, which no longer fits the registers.
+lines exactly. Measured with vectors of eight (AVX2), 100 × 100 pairs in 4 configurations: 220 µs,
+nearly all of them this loop, which no longer fits the registers.
 
 Outlines are (K, 8, N): elbow x, y, tip x, y, direction of the first link x, y, of the second x, y.
 """
@@ -78,7 +78,7 @@ class Sizes(NamedTuple):
 
 
 @kernel
-def outlines(q: np.float32, base_x: float, base_y: float, lengths: Point, out: FloatArray) -> None:
+def outlines(q: FloatArray, base_x: float, base_y: float, lengths: Point, out: FloatArray) -> None:
     """Fill out (K, 8, N) from q (K, 2, N) [rad]."""
     num, (first, second) = q.shape[2], lengths
     angles, place = q.reshape(-1), out.reshape(-1)
@@ -331,7 +331,7 @@ def _count_rows(
     tau: np.float32,
     counts: NDArray[np.int16],
 ) -> None:
-    """Fill counts[rows, columns]: `one` is the table of population 1, `two` of the columns alone."""
+    """Fill counts[rows, columns] from the tables `one` of population 1 and `two` of the columns."""
     num_configurations = outline_1.shape[0]
     seen = np.empty(LANES, dtype=np.int32)
     for row in range(len(rows)):

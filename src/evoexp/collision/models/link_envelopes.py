@@ -55,8 +55,8 @@ class EnvelopedArm(NamedTuple):
         """
         q = checked("q", q, 2)
         out = np.empty((q.shape[0], 8, q.shape[2]))
-        base_x, base_y = self.arm.base
-        kernels.outlines(q, float(base_x), float(base_y), tuple(map(float, self.arm.lengths)), out)
+        (x, y), (first, second) = self.arm.base, self.arm.lengths
+        kernels.outlines(q, float(x), float(y), (float(first), float(second)), out)
         return out
 
     def boundaries(self, outlines: FloatArray) -> FloatArray:

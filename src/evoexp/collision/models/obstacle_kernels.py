@@ -1,4 +1,4 @@
-"""Kernels of static obstacles: signed distances of a robot's points to their surfaces, in blocks."""
+"""Kernels of static obstacles: signed distances of a robot's points to their surfaces."""
 
 import math
 from typing import NamedTuple
@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from evoexp.numeric.compilation import borrowed, kernel
-from evoexp.records import FloatArray
+from evoexp.records import FloatArray, IntArray
 from evoexp.robots.kinematics import BLOCK, U
 from evoexp.scenarios.obstacles import (
     BOX,

@@ -2,9 +2,9 @@
 
 Per block of `LANES` configurations: forward kinematics; the centres of balls around bodies and
 parts of bodies; balls against obstacles and against each other (`ball_tests`). An encounter that no
-ball rules out sets one bit of a word per configuration; encounters are listed per body and class of obstacle, or per pair of parts, gathered
-into dense rows, and measured exactly, as vectors again (`encounter_kernels`). The
-result does not depend on the encounters skipped, nor on the batch.
+ball rules out sets one bit of a word per configuration; encounters are listed per body and class of
+obstacle, or per pair of parts, gathered into dense rows, and measured exactly, as vectors again
+(`encounter_kernels`). The result does not depend on the encounters skipped, nor on the batch.
 
 The number of encounters limits the speed, here for a 6R arm of 59 spheres and ten obstacles: random
 configurations have 0.7 with obstacles and 4 between parts of the arm (fewer where only collisions
@@ -44,11 +44,10 @@ from evoexp.records import FloatArray, IntArray
 from evoexp.robots.kinematics import BLOCK, SPATIAL_ROWS, U, block_frames, load_block
 
 WORD = 64
-"""Encounters of one configuration that one word of bits can hold."""
+"""Encounters of one configuration that fit a word of bits."""
 
 GROUP = 8
-"""Pairs that are marked together where only collisions are asked for: a collision found in one group
-spares the next."""
+"""Pairs that are marked together where only collisions are asked for: one found spares the next."""
 
 CLASSES = 3
 
@@ -181,7 +180,7 @@ def _room(whole: IntArray, pairs: IntArray) -> int:
 
 @kernel
 def _begin(num_units: int, limit: float, count: int, middles: FloatArray, best: FloatArray) -> None:
-    """Begin `best` with the limit; with NaN where q is NaN; with −inf in padding, which skips it."""
+    """Begin `best`: the limit, NaN where q is NaN, and −inf, which skips a lane, in padding."""
     best[:] = 0.0
     for b in range(3 * num_units):
         for lane in range(LANES):

@@ -99,7 +99,7 @@ def _exact(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> 
         terms[k] = carry
     for k in range(11, -1, -1):
         if terms[k] != 0.0:
-            return terms[k]
+            return float(terms[k])
     return 0.0
 
 
@@ -133,7 +133,7 @@ def _product(a: float, b: float) -> tuple[float, float]:
 
 @kernel
 def squared_distance(ax: float, ay: float, bx: float, by: float, x: float, y: float) -> float:
-    """Return the squared distance of the point (x, y) from the segment ab; rounded, unlike above."""
+    """Return the squared distance of the point (x, y) from the segment ab, rounded."""
     ux, uy, x, y = bx - ax, by - ay, x - ax, y - ay
     squared = ux * ux + uy * uy
     t = min(max((ux * x + uy * y) / (squared if squared > 0.0 else 1.0), 0.0), 1.0)

@@ -217,7 +217,7 @@ def _between_arms(
     least: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Write the least centre distance over all pairs of arms (BLOCK,), as far as below the limit."""
+    """Write the least centre distance over all pairs of arms (BLOCK,), at most the limit."""
     bounds, centers, middles, least, out = borrowed((bounds, centers, middles, least, out))
     reach, spheres, arm_links = bounds.radius, bounds.spheres, bounds.arm_links
     out[:] = limit

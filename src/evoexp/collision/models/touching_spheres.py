@@ -9,7 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from evoexp.collision.models.obstacle_kernels import LinkBalls
-from evoexp.collision.models.sphere_kernels import Spheres, SphereTables, clearances
+from evoexp.collision.models.sphere_kernels import Space, Spheres, SphereTables, clearances
 from evoexp.errors import SettingError
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.assembly import Assembly, sphere_geometry
@@ -192,5 +192,5 @@ class SphereCollision(NamedTuple):
     def tables(self) -> SphereTables:
         """The tables that the kernel `clearances` reads."""
         table = self.assembly.table
-        space = None if table.planar else True
+        space: Space = None if table.planar else True
         return SphereTables(table.chain, space, self.spheres, self.bounds, self.obstacles)

@@ -12,7 +12,7 @@ from evoexp.evolution.selection import choose_elites
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.random_stream import draw, draw_index, draw_many, used_up
 from evoexp.paths.grid_walks import erase_loops, measure_path, walk
-from evoexp.paths.grids import spread_front
+from evoexp.paths.grids import Moves, spread_front
 
 RESULTS = 3
 DISTANCE, UNSAFENESS, COST = range(RESULTS)
@@ -355,10 +355,10 @@ def mutate(draws, world, erase, path, scratch):  # type: ignore[no-untyped-def]
     low, high = min(first, second), max(first, second)
     ends = (path[low], path[high])
     if len(fronts) > 0:
-        walk(draws, (neighbours, potentials, fronts[ends[1]]), ends, erase, walked, place)
+        walk(draws, Moves(neighbours, potentials, fronts[ends[1]]), ends, erase, walked, place)
     else:
         spread_front(neighbours, num_moves, path[high : high + 1], steps, queue)
-        walk(draws, (neighbours, potentials, steps), ends, erase, walked, place)
+        walk(draws, Moves(neighbours, potentials, steps), ends, erase, walked, place)
     last = low - 1
     for k in range(1, low):
         joined[k] = path[k]

@@ -24,9 +24,9 @@ from evoexp.evolution.scaled_settings import ScaledGenetic
 from evoexp.numeric.random_stream import Draws
 from evoexp.objectives.path_cost import PathCost
 from evoexp.paths.grid_walks import walk_each
-from evoexp.paths.grids import UNREACHED, spread_front
+from evoexp.paths.grids import UNREACHED, Moves, spread_front
 from evoexp.paths.motion import Motion
-from evoexp.paths.walkers import LANES, WORDS, Walkers, choice_table
+from evoexp.paths.walkers import LANES, WORDS, Choices, Walkers, choice_table
 from evoexp.planners.grid_path_ga import kernels
 from evoexp.planners.grid_path_ga.kernels import COST, DISTANCE, RESULTS, UNSAFENESS
 from evoexp.planners.planner import PlannerDefaults
@@ -51,8 +51,7 @@ class Problem(NamedTuple):
 
     Attributes:
         fields: Grid, unsafeness, potentials.
-        moves: What walks to the goal need, see `grid_walks.walk`; the last of it are the steps of
-            every node to it.
+        moves: The moves of walks to the goal, and their weights.
         choices: The same as a table, see `walkers.choice_table`.
         ends: Indices of start and goal.
         world: What the kernels of a generation need, see `kernels.advance`.
@@ -61,8 +60,8 @@ class Problem(NamedTuple):
     """
 
     fields: Fields
-    moves: tuple[np.ndarray, FloatArray, np.ndarray]
-    choices: tuple[np.ndarray, np.ndarray]
+    moves: Moves
+    choices: Choices
     ends: tuple[int, int]
     world: tuple[Any, ...]
     scene: Scene
@@ -143,7 +142,7 @@ class GridPathGa(PlannerDefaults, Component):
     def _fill(self, problem: Problem, rng: np.random.Generator, paths: np.ndarray) -> None:
         """Let walkers fill a table of paths."""
         walkers = Walkers(problem.choices, problem.ends, not self.revisits, paths)
-        steps = STEPS_PER_WALK * len(paths) * problem.moves[2][problem.ends[0]]
+        steps = STEPS_PER_WALK * len(paths) * problem.moves.steps[problem.ends[0]]
         num_words = WORDS * (int(steps / LANES) + 1)
         while walkers.complete < len(paths):
             walkers.go(rng.bit_generator.random_raw(num_words))
@@ -329,7 +328,7 @@ def _prepared(collision: PotentialFields, robot: FloorPlatform, scenario: GridMo
     )
     ends = start, goal
     bodies = scene(robot.build(), scenario.bodies())
-    moves = own.neighbours, fields.potentials, steps
+    moves = Moves(own.neighbours, fields.potentials, steps)
     world += (_fronts(fields),)
     return Problem(
         fields, moves, choice_table(*moves), ends, world, bodies, scenario.security_margin

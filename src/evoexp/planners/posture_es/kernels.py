@@ -3,10 +3,11 @@
 A population is an array (nq, individuals) [rad].
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from evoexp.collision.models.packed_shapes import PrimitiveTables
 from evoexp.collision.models.primitive_kernels import primitive_clearances
 from evoexp.numeric.compilation import kernel
 from evoexp.objectives.posture_cost import (
@@ -25,6 +26,7 @@ from evoexp.objectives.posture_cost import (
     rate_poses,
 )
 from evoexp.records import BoolArray, FloatArray, IntArray
+from evoexp.robots.kinematics import KinematicChain
 from evoexp.robots.poses import frame_poses
 
 COST = len(TERMS)
@@ -38,7 +40,7 @@ class Judging(NamedTuple):
     """Terms and limits by which postures are judged.
 
     Attributes:
-        table: The kinematic table's first six fields.
+        chain: The robot's joints.
         joint: Index into the table of the joint that moves the controlled frame.
         local: (12,) local pose of the controlled frame.
         aim: The goal.
@@ -50,14 +52,14 @@ class Judging(NamedTuple):
         tolerances: Of the goal [length unit], [rad].
     """
 
-    table: tuple[Any, ...]
+    chain: KinematicChain
     joint: int
     local: FloatArray
     aim: Aim
     weights: FloatArray
     tilts: FloatArray
     limits: FloatArray
-    tables: Any
+    tables: PrimitiveTables
     reach: float
     tolerances: FloatArray
 
@@ -144,7 +146,7 @@ def judge(
     count = q.shape[1]
     pose, clearance = np.empty((12, count)), np.empty((3, count))
     # poses, limits
-    frame_poses(judging.table, judging.joint, judging.local, q, pose)
+    frame_poses(judging.chain, judging.joint, judging.local, q, pose)
     rate_poses(count, pose, judging.aim, rows)
     rate_limits(count, q, judging.limits, rows[MARGIN])
     # collision, free space

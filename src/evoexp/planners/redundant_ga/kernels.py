@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.ellipse_kernels import paths_collide
+from evoexp.collision.models.ellipse_kernels import Ellipses, TestedPath, paths_collide
 from evoexp.evolution.cost_statistics import summarise
 from evoexp.evolution.crossover import cross_single_point
 from evoexp.evolution.gene_crossover import ONE_POINT, cross_genes
@@ -79,16 +79,16 @@ class Judging(NamedTuple):
 
     Attributes:
         arm: The arm.
-        ellipses: See `ellipse_kernels.paths_collide`, and so is `path`.
-        path: See there.
+        ellipses: The ellipses.
+        path: The positions that are tested.
         target: (2,) desired place of the tip [length unit].
         box: (4,) least and greatest x, least and greatest y of the tip [length unit].
         weights: w1, w2 of Eq. 4.
     """
 
     arm: PlanarArm
-    ellipses: tuple[FloatArray, IntArray]
-    path: tuple[int, IntArray, bool]
+    ellipses: Ellipses
+    path: TestedPath
     target: FloatArray
     box: FloatArray
     weights: tuple[float, float]

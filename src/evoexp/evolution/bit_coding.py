@@ -5,7 +5,7 @@ A gene of B ≤ 52 bits is a number in [0, 2^B); its highest bit comes first in 
 
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import log
-from evoexp.numeric.random_stream import draw
+from evoexp.numeric.random_stream import Block, draw
 from evoexp.records import FloatArray, IntArray
 
 
@@ -76,7 +76,7 @@ def cross_strings(
 
 
 @kernel
-def flip_strings(draws: tuple[FloatArray, IntArray], strings: IntArray, bits: int, count: int, rate: float) -> None:
+def flip_strings(draws: Block, strings: IntArray, bits: int, count: int, rate: float) -> None:
     """Flip every bit with probability p, in place (Holland 1975).
 
     The number of bits that stay before the next flipped one is geometrically distributed, ⌊ln(1 −

@@ -176,10 +176,10 @@ class Strings:
         num_drawn = sum(counts) + counts.new * (1 + self.num_uniforms)
         while True:
             uniforms = rng.random(num_drawn)
-            *statistics, num_feasible = kernels.advance(
+            best, mean, std, num_feasible = kernels.advance(
                 uniforms, self.problem.arm_slices, settings, arrays
             )
-            yield JudgedGeneration(judged, CostStatistics(*statistics), num_feasible)
+            yield JudgedGeneration(judged, CostStatistics(best, mean, std), num_feasible)
 
     def _unjudged(self, strings: FloatArray, count: int) -> Judgement:
         """Return memory for a judgement."""

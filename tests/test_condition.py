@@ -202,11 +202,11 @@ def test_components_in_the_wrong_place_are_refused(config: dict[str, Any]) -> No
     robot, scenario, planner = config["robot"], config["scenario"], config["planner"]
     assert (
         refusal(config | {"robot": scenario})
-        == "robot: must be what via_point_ga takes, a Robot, was 'arm_motion'"
+        == "robot: must be one that via_point_ga takes, a Robot, was 'arm_motion'"
     )
     assert (
         refusal(config | {"scenario": robot})
-        == "scenario: must be what via_point_ga takes, a ArmMotion, was 'arms'"
+        == "scenario: must be one that via_point_ga takes, a ArmMotion, was 'arms'"
     )
     assert refusal(config | {"planner": robot}) == "planner: must be a planner, was 'arms'"
     search = {"_target_": "random_search", "revision": 1}
@@ -214,7 +214,7 @@ def test_components_in_the_wrong_place_are_refused(config: dict[str, Any]) -> No
         refusal(config | {"planner": search | {"planner": 3}})
         == "planner: must be a planner, was 3"
     )
-    assert "scenario: must be what via_point_ga" in refusal(
+    assert "scenario: must be one that via_point_ga" in refusal(
         config | {"planner": search | {"planner": planner}, "scenario": robot}
     )
     assert refusal(config | {"planner": planner | {"ga": robot}}).startswith(
@@ -263,6 +263,26 @@ def test_an_unknown_setting_in_a_stored_configuration_is_refused(config: dict[st
         match="planner.ga.population_sise: unknown setting; did you mean 'population_si",
     ):
         Condition.from_json(json.dumps(config).encode())
+
+
+def test_a_planner_that_lacks_something_of_the_protocol_is_refused_by_name(
+    tmp_path: Path, config: dict[str, Any]
+) -> None:
+    (tmp_path / "lacking_planner.py").write_text(
+        "from typing import ClassVar\nfrom evoexp.validation import Component\n"
+        "class Half(Component):\n    component: ClassVar[str] = 'half'\n"
+        "    num_generations: int = 1\n"
+        "    def prepare(self, robot, scenario): return None\n"
+        "    def evolve(self, problem, rng): yield from ()\n"
+    )
+    write_distribution(tmp_path, "half", components={"half": "lacking_planner:Half"})
+    with on_path(tmp_path):
+        text = refusal(config | {"planner": {"_target_": "half", "revision": 1}})
+    assert text.startswith("planner: must be a planner; lacking_planner.Half lacks ")
+    assert text.endswith("was 'half'")
+    lacking = text.partition(" lacks ")[2].partition(", was ")[0].split(", ")
+    assert {"reproducibility", "sample", "cost", "motion", "shape", "notes"} <= set(lacking)
+    assert not {"component", "revision", "prepare", "evolve", "num_generations"} & set(lacking)
 
 
 def test_replicates_have_streams_of_their_own_that_conditions_share() -> None:

@@ -1,9 +1,10 @@
 """A condition: everything that can change a result, as one typed value with a hash."""
 
+import contextlib
 import functools
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, get_type_hints
 
@@ -53,11 +54,11 @@ class Prepared(NamedTuple):
 
 
 class Condition(NamedTuple):
-    """Robot, scenario, planner with its parts, and the seed; nothing else has a say in a result."""
+    """Robot, scenario, planner with its parts, and the seed; nothing else can change a result."""
 
     robot: Component
     scenario: Component
-    planner: Component
+    planner: Any  # a component that is a `planners.planner.Planner`
     seed: int
 
     @classmethod
@@ -110,10 +111,7 @@ class Condition(NamedTuple):
         return cls.from_config(config)
 
     def to_json(self) -> bytes:
-        """Return the canonical form: keys sorted, floats by shortest repr.
-
-        Its SHA-256 is the identity.
-        """
+        """Return the canonical form, whose SHA-256 is the identity: keys sorted, floats short."""
         config = {part: getattr(self, part).canonical() for part in PARTS} | {"seed": self.seed}
         return json.dumps(config, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
 
@@ -134,13 +132,16 @@ class Condition(NamedTuple):
     @property
     def is_reference(self) -> bool:
         """Whether this is a reference: a truth that needs no seed, and one replicate."""
-        return bool(getattr(self.planner, "is_reference", False))
+        return bool(self.planner.is_reference)
+
+    @property
+    def reproducibility(self) -> str:
+        """`environment` if that of the planner, or of a planner in it, is; else `bits`."""
+        all_bits = all(planner.reproducibility == "bits" for planner in _nested(self.planner))
+        return "bits" if all_bits else "environment"
 
     def num_replicates(self, asked: int) -> int:
-        """Return how many replicates this condition gets where so many are asked for.
-
-        A reference has one.
-        """
+        """Return the number of replicates of this condition: one of a reference, else as asked."""
         return 1 if self.is_reference else asked
 
     def rng(self, replicate: int) -> np.random.Generator:
@@ -153,9 +154,7 @@ class Condition(NamedTuple):
         )
 
     def prepare(self) -> Prepared:
-        """Build the robot, check the scenario against it, and let the planner prepare.
-
-        Once per process.
+        """Build the robot, check the scenario against it, and let the planner prepare, once.
 
         Raises:
             SettingError: If the parts contradict each other (a start in collision, say).
@@ -163,36 +162,49 @@ class Condition(NamedTuple):
         return _prepare(self)
 
 
-def _check_roles(robot: Component, scenario: Component, planner: Component) -> None:
-    """Refuse components that are no planner.
+def _nested(planner: Any) -> Iterator[Any]:
+    """Yield a planner and those that it stands beside, the outermost first."""
+    yield planner
+    if isinstance(planner, Component) and "planner" in type(planner).model_fields:
+        yield from _nested(getattr(planner, "planner"))  # noqa: B009  # a field of the planner
 
-    Or that this planner does not take as robot or scenario.
-    """
-    inner: Any = planner
-    while hasattr(inner, "planner"):  # a control stands around the planner
-        inner = inner.planner
-    if not (isinstance(inner, Component) and hasattr(inner, "prepare")):
-        raise SettingError("planner", "a planner", getattr(inner, "component", inner))
-    hints = get_type_hints(inner.prepare)
-    for part, value in (("robot", robot), ("scenario", scenario)):
-        kind = hints.get(part, Any)
-        if isinstance(kind, type) and not isinstance(value, kind):
-            raise SettingError(
-                part, f"what {inner.component} takes, a {kind.__name__}", value.component
-            )
+
+def _check_roles(robot: Component, scenario: Component, planner: Component) -> None:
+    """Refuse a planner that is none, or that takes no such robot or scenario."""
+    *_, inner = planners = list(_nested(planner))
+    for each in planners:
+        if not isinstance(each, Component) or not hasattr(each, "prepare"):
+            raise SettingError("planner", "a planner", getattr(each, "component", each))
+        if lacking := _lacking(type(each)):
+            name = f"{type(each).__module__}.{type(each).__qualname__}"
+            must = f"a planner; {name} lacks {', '.join(lacking)}"
+            raise SettingError("planner", must, each.component)
+    with contextlib.suppress(NameError):  # of a type that is not imported when the planner runs
+        hints = get_type_hints(inner.prepare)
+        for part, value in (("robot", robot), ("scenario", scenario)):
+            kind = hints.get(part, Any)
+            if isinstance(kind, type) and not isinstance(value, kind):
+                must = f"one that {inner.component} takes, a {kind.__name__}"
+                raise SettingError(part, must, value.component)
+
+
+@functools.cache
+def _lacking(kind: type[Component]) -> list[str]:
+    """Return the members of the planners' protocol that a class does not have."""
+    from evoexp.planners.planner import Planner  # and pinocchio, which `evoexp list` needs not
+
+    members = [name for name in {**Planner.__annotations__, **vars(Planner)} if name[0] != "_"]
+    return [name for name in members if name not in kind.model_fields and not hasattr(kind, name)]
 
 
 @functools.lru_cache(maxsize=64)
 def _prepare(condition: Condition) -> Prepared:
-    planner: Any = condition.planner
-    return Prepared(planner, planner.prepare(condition.robot, condition.scenario))
+    prepared = condition.planner.prepare(condition.robot, condition.scenario)
+    return Prepared(condition.planner, prepared)
 
 
 def revisions(config: Any, field: str = "") -> list[tuple[str, Any, int]]:
-    """Return (field, stored revision.
-
-    Installed revision) of every component in plain configuration data.
-    """
+    """Return (field, stored revision, installed revision) of every component in plain data."""
     found: list[tuple[str, Any, int]] = []
     if isinstance(config, dict):
         if TARGET in config:

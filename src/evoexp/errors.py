@@ -77,10 +77,11 @@ class MissingDistribution(EvoexpError):
         packages: Distribution and version of each, `my-planner 0.3`.
     """
 
-    def __init__(self, packages: Iterable[str]) -> None:
+    def __init__(self, log: str, packages: Iterable[str]) -> None:
         self.packages = sorted(packages)
         verb = "is" if len(self.packages) == 1 else "are"
-        super().__init__(f"needs {' and '.join(self.packages)}, which {verb} not installed")
+        names = " and ".join(self.packages)
+        super().__init__(f"{log}: needs {names}, which {verb} not installed")
 
 
 class UnknownHash(EvoexpError):

@@ -16,10 +16,10 @@ import importlib
 import importlib.metadata
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple, cast
 
-from evoexp.errors import MissingDistribution, RegistrationError, SettingError, nearest
+from evoexp.errors import RegistrationError, SettingError, nearest
 from evoexp.validation import TARGET, Component
 
 COMPONENTS, PAGES, CONF = "evoexp.components", "evoexp.pages", "evoexp.conf"
@@ -176,15 +176,11 @@ def guests(config_json: bytes) -> dict[str, str]:
     return {each.name: each.package for each in found if each is not None and not each.is_own}
 
 
-def require(components: dict[str, str]) -> None:
-    """Check that components which a log recorded are registered here.
+def missing(components: Mapping[str, str]) -> list[str]:
+    """Return the packages of components that are not registered here, as a log recorded them.
 
     Args:
         components: As `guests` returned them when the log was written.
-
-    Raises:
-        MissingDistribution: If one is not; names its distribution.
     """
     known = names(COMPONENTS)
-    if missing := sorted({package for name, package in components.items() if name not in known}):
-        raise MissingDistribution(missing)
+    return sorted({package for name, package in components.items() if name not in known})

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from evoexp.batch import replicate
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.reproduction import difference, farthest, fingerprint, same_fingerprint
 from evoexp.cli import main
@@ -13,6 +14,7 @@ from evoexp.configuration import compose
 from evoexp.errors import EvoexpError, SettingError
 from evoexp.report.results import gather
 from evoexp.store.log_reader import array_names, read_array, read_log
+from evoexp.store.manifest import environment
 from evoexp.store.run_directory import RunDirectory
 from guests import on_path, write_distribution
 
@@ -118,9 +120,12 @@ def test_run_list_show_reproduce_report(
     assert found.id[:12] in said("list")
     shown = said("show", found.id[:12])
     assert "array: table (3 × 3), attached to 0000.mcap" in shown
-    assert "MATCH to 1e-09" in said("reproduce", found.id[:12])
+    assert "1 of 1 MATCH" in said("reproduce", found.id[:12])
     monkeypatch.setenv("DISTURBED", "1e-10")
-    assert "MATCH to 1e-09 (at most" in said("reproduce", found.id[:12])
+    assert "DIVERGES at generation 0" in said("reproduce", found.id[:12], code=1)
+    elsewhere = environment() | {"cpu": {"name": "another", "features": []}}
+    monkeypatch.setattr(replicate, "environment", lambda components: elsewhere)
+    assert "MATCH to 1e-09 (in another environment; at most" in said("reproduce", found.id[:12])
     monkeypatch.setenv("DISTURBED", "1e-3")
     assert "DIVERGES by" in said("reproduce", found.id[:12], code=1)
 

@@ -10,6 +10,7 @@ from evoexp.attachments import SHA256
 from evoexp.condition import Condition
 from evoexp.planners.planner import judge_motion
 from evoexp.records import Generation, ReplicateSummary
+from evoexp.registry import guests
 from evoexp.store.log import Finished, Log
 from evoexp.store.manifest import environment
 
@@ -31,7 +32,7 @@ def run_replicate(condition: Condition, index: int, config_json: bytes | None = 
     config_json = config_json or condition.to_json()
     condition_id = hashlib.sha256(config_json).hexdigest()
     files = condition.files() if HASHED in config_json else None
-    log = Log(condition_id, config_json, index, rng, files, environment())
+    log = Log(condition_id, config_json, index, rng, files, environment(guests(config_json)))
     first_feasible: int | None = None
     last: Generation | None = None
     for last in planner.evolve(problem, rng):

@@ -1,7 +1,7 @@
 """Runs stored replicates again and compares: MATCH, or the first generation that differs.
 
-References are compared by their numbers, to `TOLERANCE`: libraries compute them that are not
-reproducible bit by bit.
+A planner whose reproducibility is `environment` is compared bit by bit in an equal environment, and
+elsewhere by its numbers, to `TOLERANCE`.
 """
 
 import math
@@ -14,16 +14,15 @@ import numpy as np
 from evoexp.attachments import PREFIX, keep_all
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
-from evoexp.errors import CorruptLog
+from evoexp.errors import CorruptLog, MissingDistribution
 from evoexp.records import GenerationRow, ReplicateSummary
+from evoexp.registry import missing
 from evoexp.store.log import ARRAY
 from evoexp.store.log_reader import LogContents, decode_array, read_log
-from evoexp.store.manifest import differences, environment
+from evoexp.store.manifest import differences
 
-# [-] by which numbers of a reference may differ: of their size, or absolutely where they are below
-# 1
-TOLERANCE = 1e-9
-_COST = "cost "  # what stands in the place of a reference's digest begins with it
+TOLERANCE = 1e-9  # [-] by which numbers may differ: of their size, or absolutely if it is below 1
+_COST = "cost "  # begins a fingerprint that is no digest
 
 
 class Comparison(NamedTuple):
@@ -36,8 +35,8 @@ class Comparison(NamedTuple):
         digest_matches: Whether the ends of both chains agree (they include the last population).
         num_generations: Generations compared, the initial one included.
         environment: Differences between then and now, one line each.
-        farthest: Of a reference, instead of the chains: the number that differs most, and by how
-            much; None: no reference.
+        farthest: Where numbers are compared instead of chains: the number that differs most, and
+            by how much [-]; None: chains are compared.
     """
 
     condition_id: str
@@ -50,7 +49,7 @@ class Comparison(NamedTuple):
 
     @property
     def matches(self) -> bool:
-        """Whether every bit agrees, of a reference every number to `TOLERANCE`."""
+        """Whether every bit agrees, or every number to `TOLERANCE` where numbers are compared."""
         if self.farthest is not None:
             return self.farthest[1] <= TOLERANCE
         return self.diverged_at is None and self.digest_matches
@@ -61,10 +60,9 @@ class Comparison(NamedTuple):
         if self.farthest is not None:
             name, difference = self.farthest
             if self.matches:
-                return f"MATCH to {TOLERANCE:g}" + (
-                    f" (at most {difference:.1e}, {name})" if difference else ""
-                )
-            return f"DIVERGES by {difference:.1e} in {name}"
+                most = f"; at most {difference:.1e}, {name}" if difference else ""
+                return f"MATCH to {TOLERANCE:g} (in another environment{most})"
+            return f"DIVERGES by {difference:.1e} in {name} (in another environment)"
         if self.matches:
             return "MATCH"
         if self.diverged_at is None:
@@ -78,8 +76,11 @@ def reproduce_log(path: Path) -> Comparison:
     Raises:
         CorruptLog: If the log cannot be trusted.
         RevisionMismatch: If a component has another revision in this installation.
+        MissingDistribution: If the package of a component is not installed.
     """
     stored = read_log(path)
+    if packages := missing(stored.environment.get("components", {})):
+        raise MissingDistribution(str(path), packages)
     keep_all(data for name, data in stored.attachments.items() if name.startswith(PREFIX))
     condition = Condition.from_json(stored.config_json)
     if condition.id != stored.condition_id:
@@ -89,7 +90,9 @@ def reproduce_log(path: Path) -> Comparison:
         )
     again = read_log(run_replicate(condition, stored.replicate).content)
     found = compare(stored, again)
-    return found._replace(farthest=farthest(stored, again)) if condition.is_reference else found
+    if condition.reproducibility == "bits" or not found.environment:
+        return found
+    return found._replace(farthest=farthest(stored, again))
 
 
 def compare(stored: LogContents, again: LogContents) -> Comparison:
@@ -100,15 +103,12 @@ def compare(stored: LogContents, again: LogContents) -> Comparison:
         first_divergence(stored.generations, again.generations),
         stored.summary.digest == again.summary.digest,
         len(stored.generations),
-        tuple(map(str, differences(stored.environment, environment()))),
+        tuple(map(str, differences(stored.environment, again.environment))),
     )
 
 
 def first_divergence(stored: list[GenerationRow], again: list[GenerationRow]) -> int | None:
-    """Return the index of the first generation that differs or is missing on one side.
-
-    None if there is none.
-    """
+    """Return the index of the first generation that differs or is missing in one log, or None."""
     for before, now in zip(stored, again, strict=False):
         if before.chain != now.chain:
             return before.index
@@ -119,10 +119,7 @@ def first_divergence(stored: list[GenerationRow], again: list[GenerationRow]) ->
 
 
 def farthest(stored: LogContents, again: LogContents) -> tuple[str, float]:
-    """Return which number of a reference differs most from that of its re-execution.
-
-    And by how much [-].
-    """
+    """Return the number that differs most between two logs: its name, and its `difference` [-]."""
     before, now = dict(_numbers(stored)), dict(_numbers(again))
     if unmatched := sorted(before.keys() ^ now.keys()):
         return unmatched[0], math.inf
@@ -131,12 +128,10 @@ def farthest(stored: LogContents, again: LogContents) -> tuple[str, float]:
 
 
 def difference(one: Any, two: Any) -> float:
-    """Return by how much two numbers or arrays differ at most, in units of their size.
+    """Return the largest difference of two numbers or arrays, in units of their size, at least 1.
 
-    Or of 1 below it.
-
-    Two infinities of one sign, and two NaN, do not differ; those of one array only differ by inf,
-    as do other shapes.
+    Two infinities of one sign, and two NaN, do not differ. A number that is not finite in one array
+    only differs by inf, and so do arrays of different shapes.
     """
     a, b = np.asarray(one, dtype=np.float64), np.asarray(two, dtype=np.float64)
     if a.shape != b.shape:
@@ -151,18 +146,16 @@ def difference(one: Any, two: Any) -> float:
 
 
 def fingerprint(condition: Condition, summary: ReplicateSummary) -> str:
-    """Return what the shipped table keeps of a first replicate.
+    """Return the entry of the shipped table for a first replicate: its digest, or its cost.
 
-    Its digest, of a reference its cost.
+    The cost stands for planners that are not reproducible bit by bit in every environment.
     """
-    return f"{_COST}{summary.best_cost!r}" if condition.is_reference else summary.digest
+    is_digest = condition.reproducibility == "bits"
+    return summary.digest if is_digest else f"{_COST}{summary.best_cost!r}"
 
 
 def same_fingerprint(one: str, two: str) -> bool:
-    """Return whether two fingerprints agree.
-
-    Digests to the bit, costs of references to `TOLERANCE`.
-    """
+    """Return whether two fingerprints agree: digests to the bit, costs to `TOLERANCE`."""
     if one.startswith(_COST) and two.startswith(_COST):
         return (
             difference(float(one.removeprefix(_COST)), float(two.removeprefix(_COST))) <= TOLERANCE
@@ -171,7 +164,7 @@ def same_fingerprint(one: str, two: str) -> bool:
 
 
 def _numbers(log: LogContents) -> Iterator[tuple[str, Any]]:
-    """Yield every number that a reference's log holds: cost, terms, solution, arrays.
+    """Yield the numbers of a log: costs, terms, solution, arrays.
 
     Neither times nor counts of evaluations: rounding decides how many steps a library takes to the
     same end.
@@ -179,6 +172,7 @@ def _numbers(log: LogContents) -> Iterator[tuple[str, Any]]:
     summary, last = log.summary, log.generations[-1]
     yield from (("cost", summary.best_cost), ("solved", summary.solved))
     yield from (("clearance", summary.clearance), ("feasible", last.num_feasible))
+    yield "best cost of each generation", [row.best_cost for row in log.generations]
     yield from (
         (f"term {name}", value)
         for name, value in summary.terms.items()

@@ -28,7 +28,7 @@ from evoexp.numeric.kernel_cache import is_compiled, note_compiled
 from evoexp.paths.motion import Motion
 from evoexp.planners.planner import judge_motion
 from evoexp.records import ReplicateSummary
-from evoexp.registry import component_modules
+from evoexp.registry import component_modules, guests
 from evoexp.store.manifest import manifest
 from evoexp.store.run_directory import RunDirectory, create_all, lock_all
 from evoexp.store.summaries import write_summary
@@ -100,8 +100,9 @@ class Batch:
             with loading(num_workers, load, config_jsons, files):
                 wanted = ((run, *self._wanted[key]) for key, run in self.runs.items())
                 create_all(
-                    (run, own.to_json(), manifest(own.id) | notes, own.files())
+                    (run, text, manifest(own.id, guests(text)) | notes, own.files())
                     for run, own, _, notes in wanted
+                    for text in (own.to_json(),)
                 )
                 _compile(config_jsons)
             try:

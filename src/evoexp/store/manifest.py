@@ -1,7 +1,4 @@
-"""Where something was computed: versions, processor, code.
-
-Noted, compared, and never part of an identity.
-"""
+"""The environment of a computation: versions, processor, code; never part of an identity."""
 
 import os
 import platform
@@ -34,9 +31,11 @@ _DISTRIBUTIONS = (
     "pyarrow",
 )
 
-# Those that decide which instructions a compiler may choose; the rest of the flags says nothing
-# about numbers.
+# Processor flags that decide which instructions a compiler may choose; others change no number.
 _VECTOR_PREFIXES = ("sse", "ssse", "avx", "fma", "f16c", "bmi", "amx", "asimd", "sve", "neon", "fp")
+
+
+_NO_COMPONENTS: Mapping[str, str] = {}
 
 
 class Difference(NamedTuple):
@@ -51,20 +50,28 @@ class Difference(NamedTuple):
         return f"{self.name}: was {self.was}, now {self.now}"
 
 
-def manifest(condition_id: str) -> dict[str, Any]:
-    """Return what `manifest.json` says of a run.
+def manifest(condition_id: str, components: Mapping[str, str] = _NO_COMPONENTS) -> dict[str, Any]:
+    """Return the manifest of a run: its full hash, the environment, the state of the code.
 
-    Its full hash, the environment, the state of the code.
+    Args:
+        condition_id: 64 hex digits.
+        components: As for `environment`.
     """
-    return {"condition": condition_id, **environment(), "git": git_state()}
+    return {"condition": condition_id, **environment(components), "git": git_state()}
+
+
+def environment(components: Mapping[str, str] = _NO_COMPONENTS) -> dict[str, Any]:
+    """Return versions, platform and processor, without importing any of the packages.
+
+    Args:
+        components: Component → `distribution version` of those that are not evoexp's.
+    """
+    return {**_environment(), "components": dict(components)} if components else _environment()
 
 
 @cache
-def environment() -> dict[str, Any]:
-    """Return versions, platform and processor, without importing any of the packages.
-
-    15 ms, once per process.
-    """
+def _environment() -> dict[str, Any]:
+    """Return the part of the environment that is the same for all conditions, found in 15 ms."""
     return {
         "versions": {"python": platform.python_version(), **_versions()},
         "platform": {
@@ -78,10 +85,7 @@ def environment() -> dict[str, Any]:
 
 @cache
 def git_state() -> dict[str, Any] | None:
-    """Return commit and dirty flag of the checkout that this package is imported from.
-
-    None where it is none.
-    """
+    """Return commit and dirty flag of the checkout that evoexp is imported from, or None."""
     root = Path(__file__).resolve().parents[3]  # <root>/src/evoexp/store/manifest.py
     if not (root / ".git").exists() or not (root / "pyproject.toml").exists():
         return None
@@ -93,8 +97,8 @@ def git_state() -> dict[str, Any] | None:
 def differences(was: Mapping[str, Any], now: Mapping[str, Any]) -> list[Difference]:
     """Return the entries in which two manifests or environments differ, in alphabetical order.
 
-    Only what both describe is compared section by section: a log's environment has no condition and
-    no git state. Of two lists (the features of processors) only what the other lacks is named.
+    Only sections that both have are compared: the environment of a log has no condition and no git
+    state. Of two lists (the features of processors) only entries that the other lacks are named.
     """
     shared = was.keys() & now.keys() - {"condition"}
     before = dict(_leaves({name: was[name] for name in shared}))

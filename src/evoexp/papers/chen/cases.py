@@ -149,7 +149,7 @@ def fits(results: Results) -> bool:
 def _role(condition: ConditionResults) -> str:
     """Return the attribute of `Case` that a condition belongs to."""
     if condition.is_reference:
-        return condition.condition.planner.component.removeprefix("placement_")
+        return str(condition.condition.planner.component).removeprefix("placement_")
     if condition.is_control:
         return "search"
     return "elitist" if condition.planner.ga.num_elites else "plain"

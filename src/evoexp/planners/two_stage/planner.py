@@ -23,7 +23,7 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion
 from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.planners.placement_ga.planner import PlacementGa
-from evoexp.planners.planner import PlannerDefaults
+from evoexp.planners.planner import Judgement, PlannerDefaults
 from evoexp.records import FloatArray
 from evoexp.records import Generation as Record
 from evoexp.robots.floor_manipulator import NUM_JOINTS, FloorManipulator
@@ -159,6 +159,32 @@ class TwoStage(PlannerDefaults, Component):
         named = {name: float(terms[name]) for name in POSTURE}
         return named | {"posture_cost": float(terms["cost"])}
 
+    @property
+    def num_generations(self) -> int:
+        """Generations of both stages, at most, of which one is the second initial population."""
+        return self.placement.num_generations + 1 + self.path.num_generations
+
+    def num_evaluations(self, index: int) -> int:
+        """Return the evaluations of a generation of one of the stages."""
+        first = self.placement.num_generations + 1
+        return (
+            self.placement.num_evaluations(index)
+            if index < first
+            else self.path.num_evaluations(index - first)
+        )
+
+    def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
+        """Refuse: there are two populations, one per stage."""
+        raise _no_population()
+
+    def cost(self, problem: Problem, population: FloatArray) -> Judgement:
+        """Refuse: there are two populations, one per stage."""
+        raise _no_population()
+
+    def solution(self, problem: Problem, population: FloatArray, individual: int) -> FloatArray:
+        """Refuse: there are two populations, one per stage."""
+        raise _no_population()
+
     def motion(self, problem: Problem, solution: FloatArray) -> Motion | None:
         """Return the whole motion, (nodes + 2, 5) in equal times.
 
@@ -199,3 +225,7 @@ class TwoStage(PlannerDefaults, Component):
     def _parts(self, solution: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return θ1 and θ2, and the nodes (nodes, 2)."""
         return solution[:ANGLES], solution[ANGLES:].reshape(-1, 2)
+
+
+def _no_population() -> SettingError:
+    return SettingError("planner", "one with a single population", TwoStage.component)

@@ -71,8 +71,17 @@ def test_a_control_has_the_limits_of_the_planner_beside_it() -> None:
 
 def test_distances_of_bodies_are_those_of_links(one: Prepared, solution: FloatArray) -> None:
     q = link_motions.sampled(link_motions.executed(one, solution), 20).q
-    expected = motion_geometry.LinkDistance(one.problem.assembly)(q)
-    np.testing.assert_allclose(body_contacts.distances(one.problem.scene, q), expected, atol=1e-12)
+    q = np.radians(q)
+    expected = motion_geometry.link_distance(one.problem.assembly)(q)
+    scene = one.problem.scene
+    found = motion_geometry.BodyDistance(scene.model, scene.geometry)(q)
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+def test_arms_are_those_of_the_collision_model(one: Prepared) -> None:
+    for found, own in zip(link_motions.arms(one), one.problem.collision.arms, strict=True):
+        assert found.base == pytest.approx(own.base, abs=1e-12)
+        assert found.lengths == pytest.approx(own.lengths, rel=1e-12)
 
 
 def test_a_contact_lies_on_both_bodies() -> None:

@@ -12,6 +12,7 @@ import pytest
 
 from evoexp.configuration import compose
 from evoexp.errors import NothingStored, UnknownOption
+from evoexp.papers.rana import motions
 from evoexp.papers.rana import page as rana_page
 from evoexp.report import build
 from evoexp.report.report_settings import ReportSettings
@@ -313,10 +314,10 @@ def test_claims_are_judged_only_on_the_papers_own_settings(results: Results) -> 
 
 def test_redistribution_is_applied_to_solved_strings_only(results: Results) -> None:
     search = results.conditions[1]
-    count = rana_page.colliding_after(search, relaxed=False)
+    count = motions.colliding_after(search, relaxed=False)
     assert 0 <= count <= search.solved
     none = search.summaries.assign(solved=False)
-    assert rana_page.colliding_after(search._replace(summaries=none), relaxed=True) == 0
+    assert motions.colliding_after(search._replace(summaries=none), relaxed=True) == 0
 
 
 def test_drawing_leaves_matplotlib_as_it_was(page: Path) -> None:

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from evoexp.condition import Prepared
+from evoexp.papers.rana import motions
 from evoexp.records import FloatArray
 from evoexp.report import motion_geometry
 from evoexp.report.results import Results
@@ -71,9 +72,9 @@ def test_link_distances_are_those_of_segments(prepared: Prepared, q: FloatArray)
     ]
     expected = np.min(pairs, axis=0)
     assert (expected == 0.0).any()
-    links = motion_geometry.LinkDistance(prepared.problem.assembly)
-    np.testing.assert_allclose(links(q), expected, atol=1e-9)
-    nearest = links.nearest(q[:, 0])
+    links = motion_geometry.link_distance(prepared.problem.assembly)
+    np.testing.assert_allclose(links(np.radians(q)), expected, atol=1e-9)
+    nearest = links.nearest(np.radians(q[:, 0]))
     assert nearest.distance == pytest.approx(expected[0], abs=1e-9)
     assert np.linalg.norm(nearest.points[0] - nearest.points[1]) == pytest.approx(
         expected[0], abs=1e-9
@@ -84,9 +85,9 @@ def test_link_distances_are_those_of_segments(prepared: Prepared, q: FloatArray)
 
 
 def test_centre_distances_are_those_of_the_centres(prepared: Prepared, q: FloatArray) -> None:
-    found = motion_geometry.centre_distances(prepared.problem, q)
+    found = motions.centre_distances(prepared.problem, q)
     for k in range(20):
-        one, other = motion_geometry.sphere_centres(prepared.problem.collision, q[:, k])
+        one, other = motions.sphere_centres(prepared.problem, q[:, k])
         assert one.shape == other.shape == (9, 3)
         least = np.linalg.norm(one[:, None] - other, axis=2).min()
         assert found[k] == pytest.approx(least, abs=1e-9)
@@ -102,7 +103,8 @@ def test_a_dense_motion_passes_its_via_points(q: FloatArray) -> None:
 
 
 def test_the_straight_line_collides(prepared: Prepared) -> None:
-    line = motion_geometry.straight_line(prepared)
+    planner, problem = prepared
+    line = motion_geometry.straight_line(planner.shape(problem), problem.start, problem.goal)
     q = motion_geometry.configurations(prepared, line)
     np.testing.assert_allclose(q[:, 10], 0.5 * (prepared.problem.start + prepared.problem.goal))
     terms = prepared.planner.evaluate(prepared.problem, line)
@@ -114,7 +116,7 @@ def test_distances_agree_with_the_recorded_terms(results: Results) -> None:
     condition = results.conditions[0]
     for replicate, solution in condition.solutions.items():
         q = motion_geometry.configurations(condition.prepared, solution)
-        at = motion_geometry.centre_distances(condition.prepared.problem, q).min()
+        at = motions.centre_distances(condition.prepared.problem, q).min()
         term = condition.summaries.loc[replicate, "term_arm_distance_at_via_points"]
         assert at == pytest.approx(float(term), abs=1e-9)
 

@@ -1,9 +1,11 @@
-"""Geometry of stored motions: where links and circles are, and how far the arms are apart."""
+"""Geometry of stored motions: places of links, outlines of obstacles, distances of bodies."""
 
-from collections.abc import Iterator
+import itertools
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 import pinocchio as pin
 from scipy.spatial import ConvexHull
 
@@ -14,10 +16,11 @@ from evoexp.robots.assembly import Assembly
 from evoexp.scenarios.obstacles import BOX, CYLINDER, ELLIPSE, HALF_SPACE, SPHERE, ObstacleTable
 
 OUTLINE_POINTS = 49  # of a round obstacle
+LINK = ["arm", "link", "x", "y", "z", "x_end", "y_end", "z_end"]  # columns of `links_table`
 
 
 class Nearest(NamedTuple):
-    """Two nearest points of two arms.
+    """The two nearest points of two bodies.
 
     Attributes:
         distance: Between them.
@@ -29,23 +32,25 @@ class Nearest(NamedTuple):
 
 
 def configurations(prepared: Prepared, solution: FloatArray) -> FloatArray:
-    """Return the instants of a solution's motion, (nq, instants) [deg]."""
+    """Return the configurations of a solution's motion, (nq, instants) [deg]."""
     return np.ascontiguousarray(prepared.planner.motion(prepared.problem, solution).q.T / DEGREE)
 
 
-def straight_line(prepared: Prepared) -> FloatArray:
-    """Return the solution whose arms go straight from start to goal in configuration space.
+def straight_line(
+    shape: Sequence[tuple[int, int]], start: FloatArray, goal: FloatArray
+) -> FloatArray:
+    """Return the solution that goes straight from start to goal in equal steps, flat.
 
-    Flat [deg].
+    Args:
+        shape: Of a solution, part by part: (rows, joints).
+        start: (sum of joints,).
+        goal: (sum of joints,) in the same unit.
     """
-    problem, parts = prepared.problem, []
-    for (first, stop), (rows, _) in zip(
-        problem.arm_slices, prepared.planner.shape(problem), strict=True
-    ):
-        share = np.linspace(0.0, 1.0, rows)[:, None]
-        parts.append(
-            ((1.0 - share) * problem.start[first:stop] + share * problem.goal[first:stop]).ravel()
-        )
+    parts, first = [], 0
+    for rows, joints in shape:
+        own, share = slice(first, first + joints), np.linspace(0.0, 1.0, rows)[:, None]
+        parts.append(((1.0 - share) * start[own] + share * goal[own]).ravel())
+        first += joints
     return np.concatenate(parts)
 
 
@@ -74,21 +79,19 @@ def joint_positions(
         assembly: The robot.
         q: (nq, instants) [deg].
     """
-    frames = [frame.copy() for frame in _frames(assembly, q)]
+    frames = list(_frames(assembly, q))
     numbers = [0] * assembly.num_arms
     for link in assembly.links:
-        start = np.array([frame[link.joint] @ np.append(link.start, 1.0) for frame in frames])[
-            :, :3
-        ]
-        end = np.array([frame[link.joint] @ np.append(link.end, 1.0) for frame in frames])[:, :3]
+        start, end = (
+            np.array([frame[link.joint] @ np.append(point, 1.0) for frame in frames])[:, :3]
+            for point in (link.start, link.end)
+        )
         yield link.arm, numbers[link.arm], start, end
         numbers[link.arm] += 1
 
 
 def obstacle_outlines(table: ObstacleTable, reach: float = 1.0) -> list[FloatArray]:
-    """Return the outlines of obstacles as seen along z, each (points, 2).
-
-    First and last point the same.
+    """Return the closed outlines of obstacles as seen along z, each (points, 2).
 
     Args:
         table: The obstacles.
@@ -130,81 +133,86 @@ def obstacle_outlines(table: ObstacleTable, reach: float = 1.0) -> list[FloatArr
     return outlines
 
 
-def sphere_centres(collision: Any, q: FloatArray) -> list[FloatArray]:
-    """Return the centres of the collision model's circles or spheres at one configuration.
+class BodyDistance:
+    """Exact distances between bodies, by coal."""
 
-    Per arm (spheres, 3).
+    def __init__(self, model: Any, geometry: Any) -> None:
+        """Take a robot and the pairs of bodies that are looked at.
 
-    Args:
-        collision: The bound collision model.
-        q: (nq,) [deg].
-    """
-    model, geometry = collision.assembly.model, collision.geometry
-    data, placements = model.createData(), geometry.createData()
-    pin.updateGeometryPlacements(model, data, geometry, placements, DEGREE * q)
-    centres = np.array([placement.translation for placement in placements.oMg])
-    return [centres[first:stop] for first, stop in collision.arm_spheres]
-
-
-def centre_distances(problem: Any, q: FloatArray) -> FloatArray:
-    """Return the least distance of circle centres of two arms, as the paper draws it.
-
-    Args:
-        problem: With its bound collision model.
-        q: (nq, configurations) [deg].
-
-    Returns:
-        (configurations,) [length unit].
-    """
-    return np.asarray(problem.collision.clearance(q).between_arms + 2.0 * problem.collision.radius)
-
-
-class LinkDistance:
-    """Exact distances between the links of different arms.
-
-    Coal, on the shapes that the robot is made of.
-    """
-
-    def __init__(self, assembly: Assembly) -> None:
-        """Take the robot's own geometry and pair the links of different arms."""
-        self._model, self._data = assembly.model, assembly.model.createData()
-        self._geometry = assembly.geometry.copy()
-        for a, first in enumerate(assembly.links):
-            for b, second in enumerate(assembly.links[:a]):
-                if first.arm != second.arm:
-                    self._geometry.addCollisionPair(pin.CollisionPair(b, a))
-        self._placements = self._geometry.createData()
-        self._pairs = range(len(self._geometry.collisionPairs))
-
-    def nearest(self, q: FloatArray) -> Nearest:
-        """Return the nearest points of two arms at one configuration (nq,) [deg].
-
-        0 where links cross.
+        Args:
+            model: A `pin.Model`.
+            geometry: A `pin.GeometryModel` with its collision pairs.
         """
-        self._compute(q)
-        results = [self._placements.distanceResults[k] for k in self._pairs]
-        least = min(results, key=lambda result: float(result.min_distance))
+        self._model, self._geometry = model, geometry
+        self._data, self._placements = model.createData(), geometry.createData()
+
+    def nearest(self, q: FloatArray, pair: int | None = None) -> Nearest:
+        """Return the nearest points of two bodies at one configuration (nq,) [rad].
+
+        Args:
+            q: The configuration.
+            pair: Number of the pair; None: the closest one.
+
+        Returns:
+            The points with their distance, 0 where bodies touch.
+        """
+        pin.computeDistances(self._model, self._data, self._geometry, self._placements, q)
+        results = list(self._placements.distanceResults)
+        least = min(results if pair is None else [results[pair]], key=lambda r: r.min_distance)
         points = np.array([least.getNearestPoint1(), least.getNearestPoint2()])
         return Nearest(max(0.0, float(least.min_distance)), points)
 
     def __call__(self, q: FloatArray) -> FloatArray:
-        """Return the least distance at each configuration (nq, configurations) [deg].
+        """Return the least distance at each configuration (nq, configurations) [rad]."""
+        return np.array([self.nearest(one).distance for one in np.ascontiguousarray(q.T)])
 
-        0 where links cross.
-        """
-        distances = np.empty(q.shape[1])
-        for k, configuration in enumerate(np.ascontiguousarray(q.T)):
-            self._compute(configuration)
-            distances[k] = min(
-                self._placements.distanceResults[pair].min_distance for pair in self._pairs
-            )
-        return np.maximum(distances, 0.0)
 
-    def _compute(self, q: FloatArray) -> None:
-        pin.updateGeometryPlacements(
-            self._model, self._data, self._geometry, self._placements, DEGREE * q
-        )
-        pin.computeDistances(self._geometry, self._placements)
+def link_distance(assembly: Assembly) -> BodyDistance:
+    """Return the distances between links of different arms, on the robot's own geometry."""
+    geometry = assembly.geometry.copy()
+    for a, first in enumerate(assembly.links):
+        for b, second in enumerate(assembly.links[:a]):
+            if first.arm != second.arm:
+                geometry.addCollisionPair(pin.CollisionPair(b, a))
+    return BodyDistance(assembly.model, geometry)
+
+
+def links_table(assembly: Assembly, q: FloatArray) -> pd.DataFrame:
+    """Return all links at every instant of a motion.
+
+    Args:
+        assembly: The robot.
+        q: (nq, instants) [deg].
+
+    Returns:
+        Columns instant, arm, link, x, y, z, x_end, y_end, z_end [length unit], link by link.
+    """
+    rows = [
+        (instant, arm, link, *start[instant], *end[instant])
+        for arm, link, start, end in joint_positions(assembly, q)
+        for instant in range(q.shape[1])
+    ]
+    return pd.DataFrame(rows, columns=["instant", *LINK])
+
+
+def in_stages(table: pd.DataFrame, num_stages: int) -> pd.DataFrame:
+    """Return the rows of a motion's instants stage by stage, and all of them as the last stage.
+
+    Args:
+        table: With the column instant, whole numbers from 0 on.
+        num_stages: Stages that the motion is cut into, as far as it has instants.
+
+    Returns:
+        The columns of the table, stage, first and last (instants of the stage); an instant between
+        two stages belongs to both.
+    """
+    last = int(table["instant"].max())
+    cuts = np.unique(np.round(np.linspace(0, last, min(num_stages, last) + 1)).astype(np.int64))
+    parts = [
+        table[table["instant"].between(first, stop)].assign(stage=stage, first=first, last=stop)
+        for stage, (first, stop) in enumerate([*itertools.pairwise(cuts), (0, last)])
+    ]
+    return pd.concat(parts, ignore_index=True)
 
 
 def _frames(assembly: Assembly, q: FloatArray) -> Iterator[FloatArray]:

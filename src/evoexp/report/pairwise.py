@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.records import FloatArray
 from evoexp.report import markdown
 from evoexp.report.claims import Comparison
 from evoexp.report.claims import adjusted as adjusted_rows
@@ -17,6 +16,7 @@ from evoexp.report.page import Drawing, Table
 from evoexp.report.proportions import Proportion, fisher_exact, newcombe
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
+from evoexp.report.run_measures import search_seconds, success
 from evoexp.report.statistics import holm
 
 MOST = 6  # conditions of which every pair is tabled; of more, the first against each other one
@@ -29,16 +29,6 @@ class Effort(NamedTuple):
 
     name: str
     values: Values
-
-
-def searching_seconds(condition: ConditionResults) -> FloatArray:
-    """Return the CPU time of each run's search, the exact verdict left out, (done,) [s]."""
-    return condition.column("cpu_s") - np.nan_to_num(condition.column("certificate_s"))
-
-
-def solved(condition: ConditionResults) -> Proportion:
-    """Return how many finished runs have a solution that the planner's own model accepts."""
-    return Proportion(condition.solved, condition.done)
 
 
 def certified(condition: ConditionResults) -> Proportion:
@@ -55,10 +45,10 @@ EFFORTS = (
     Effort("best cost", by_column("best_cost")),
     Effort("evaluations", by_column("evaluations")),
     Effort("collision queries", by_column("collision_queries")),
-    Effort("CPU time, search [s]", searching_seconds),
+    Effort("CPU time, search [s]", search_seconds),
 )
 SHARES: dict[str, Callable[[ConditionResults], Proportion]] = {
-    "solved": solved,
+    "solved": success,
     "certified": certified,
     "margin certified": keeping_margin,
 }

@@ -1,7 +1,8 @@
 """What the outputs hold of the conditions that a report is asked for."""
 
 import functools
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -282,6 +283,13 @@ class Results(NamedTuple):
         """Names of the terms that any summary has, in order."""
         columns = {str(name) for c in self.with_data for name in c.summaries}
         return sorted(name.removeprefix(TERM) for name in columns if name.startswith(TERM))
+
+    @property
+    def suffixed(self) -> Iterator[tuple[ConditionResults, str]]:
+        """Conditions of `main` with the ends of their files' names; a single one has none."""
+        for k, condition in enumerate(self.main):
+            slug = re.sub(r"[^a-z0-9]+", "_", condition.label.lower()).strip("_") or str(k)
+            yield condition, "" if len(self.main) == 1 else f"_{k + 1}_{slug}"
 
     def position(self, label: str) -> int:
         """Return a condition's place in the experiment, which gives it its colour."""

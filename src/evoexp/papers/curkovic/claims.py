@@ -2,9 +2,10 @@
 
 from collections.abc import Callable, Sequence
 
-from evoexp.papers.curkovic.families import Tested
+from evoexp.papers.curkovic.families import FamilyComparison
 from evoexp.report import claims, judging, markdown
 from evoexp.report.claims import Claim, Comparison
+from evoexp.report.judging import Judge
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
 from evoexp.report.statistics import spread
@@ -15,27 +16,25 @@ READINGS = {"one_sided": "Eq. 9 as printed", "symmetric": "Eq. 9 read as symmetr
 
 
 def of_sweep(
-    results: Results, settings: ReportSettings, found: Sequence[Tested]
+    results: Results, settings: ReportSettings, found: Sequence[FamilyComparison]
 ) -> tuple[Claim, ...]:
-    """Return the claims that a sweep can judge, told by what its conditions differ in."""
-    judge: Callable[[Results, ReportSettings, Sequence[Tested]], list[Claim]]
+    """Return the claims that a sweep can judge; the settings that differ tell which ones."""
+    claims_of: Callable[[Judge, Results, Sequence[FamilyComparison]], list[Claim]]
     varied = _varied(results)
     if varied <= HALL and varied & {"ga.hall_frozen", "ga.num_elites"}:
-        judge = _hall
+        claims_of = _hall
     elif varied == {"ga.hall_depth"}:
-        judge = _depth
+        claims_of = _depth
     elif varied <= MUTATION and varied & {"ga.mutation_rate", "ga.mutation_decay"}:
-        judge = _mutation
+        claims_of = _mutation
     else:
         return ()
-    return tuple(judge(results, settings, [one for one in found if one.measure.converges]))
+    judge = judging.judge(results, settings)
+    return tuple(claims_of(judge, results, [one for one in found if one.measure.converges]))
 
 
 def _varied(results: Results) -> set[str]:
-    """Return the settings of the planner in which conditions differ.
-
-    Those of its algorithm one by one.
-    """
+    """Return the settings of the planner in which conditions differ, `ga.…` among them."""
     given = [c.planner.canonical() for c in results.with_data]
     flat = [
         {**{f"ga.{key}": value for key, value in one.pop("ga").items()}, **one} for one in given
@@ -43,47 +42,38 @@ def _varied(results: Results) -> set[str]:
     return {key for key in flat[0] if any(one[key] != flat[0][key] for one in flat)}
 
 
-def _hall(results: Results, settings: ReportSettings, found: Sequence[Tested]) -> list[Claim]:
-    reason, judged = judging.not_judged(results), []
+def _hall(judge: Judge, results: Results, found: Sequence[FamilyComparison]) -> list[Claim]:
+    judged = []
     for c in results.with_data[1:]:
-        ga = c.planner.ga
+        ga, source = c.planner.ga, "section 3"
         if ga.hall_frozen:
-            text, source = "A hall of fame that never changes slows convergence", "section 3"
+            text = "A hall of fame that never changes slows convergence"
         elif ga.hall_depth == 0.0 and ga.num_elites:
             text, source = (
                 f"It is the hall, not just elitism ({ga.num_elites} elites)",
                 "our question",
             )
         elif ga.hall_depth == 0.0:
-            text, source = (
-                "A hall of fame speeds convergence up, against neither hall nor elites",
-                "section 3",
-            )
+            text = "A hall of fame speeds convergence up, against neither hall nor elites"
         else:
             continue
         for one in found:
             row = next((row for row in one.rows if row.quantity == c.label), None)
-            told = judging.evidence(row, "better") if row else "nothing to compare"
-            evidence = f"{one.family.name} against {c.label}: {told}"
-            verdict = claims.judge_better(reason, row, settings.significance)
-            judged.append(
-                judging.claim(
-                    f"{text}, judged by {one.measure.name}", source, evidence, verdict, reason
-                )
-            )
+            told = f"{one.family.name} against {c.label}: {{}}"
+            claim = f"{text}, judged by {one.measure.name}"
+            judged.append(judge.better(claim, source, row, "better", told))
     return judged
 
 
-def _depth(results: Results, settings: ReportSettings, found: Sequence[Tested]) -> list[Claim]:
-    reason, (first, *others) = judging.not_judged(results), results.with_data
+def _depth(judge: Judge, results: Results, found: Sequence[FamilyComparison]) -> list[Claim]:
+    first, *others = results.with_data
     judged = []
     for one in found:
         own, *medians = (spread(one.measure.values(c)).median for c in (first, *others))
-        verdict = claims.judge_best(reason, one.rows, own <= min(medians), settings.significance)
         best, median = min(zip(others, medians, strict=True), key=lambda pair: pair[1])
         evidence = (
             f"median {markdown.number(own)}; best of the others {best.label}: "
-            f"{markdown.number(median)}; {_who(first, one.rows, settings.significance)} "
+            f"{markdown.number(median)}; {_outcomes(first, one.rows, judge.significance)} "
             "(reproduced: best median, one other at least significantly worse; contradicted: one "
             "significantly better)"
         )
@@ -91,35 +81,29 @@ def _depth(results: Results, settings: ReportSettings, found: Sequence[Tested]) 
             f"A hall of at most {first.label} of the population is the best, judged by "
             f"{one.measure.name}"
         )
-        judged.append(judging.claim(text, "section 3", evidence, verdict, reason))
+        verdict = claims.judge_best("", one.rows, own <= min(medians), judge.significance)
+        judged.append(judge.claim(text, "section 3", evidence, verdict))
     return judged
 
 
-def _mutation(results: Results, settings: ReportSettings, found: Sequence[Tested]) -> list[Claim]:
-    reason, judged = judging.not_judged(results), []
-    for one in found:
-        if not one.rows:
-            continue
+def _mutation(judge: Judge, results: Results, found: Sequence[FamilyComparison]) -> list[Claim]:
+    judged = []
+    for one in (one for one in found if one.rows):
         first = one.family.pairs[0][0]
-        verdict = claims.judge_better_than_all(reason, one.rows, settings.significance)
-        rule = (
+        evidence = (
+            f"{_outcomes(first, one.rows, judge.significance)} "
             "(reproduced: significantly better than each; contradicted: one significantly better)"
         )
-        evidence = f"{_who(first, one.rows, settings.significance)} {rule}"
-        reading = READINGS[first.planner.ga.mutation_direction]
         text = (
             "A rate that falls (Eq. 10) helps, against constant rates, judged by "
-            f"{one.measure.name}; {reading}"
+            f"{one.measure.name}; {READINGS[first.planner.ga.mutation_direction]}"
         )
-        judged.append(judging.claim(text, "section 3, Eq. 10", evidence, verdict, reason))
+        judged.append(judge.better_than_all(text, "section 3, Eq. 10", evidence, one.rows))
     return judged
 
 
-def _who(first: ConditionResults, rows: Sequence[Comparison], significance: float) -> str:
-    """Say whom the first condition is better than, whom worse.
-
-    And from whom it cannot be told apart.
-    """
+def _outcomes(first: ConditionResults, rows: Sequence[Comparison], significance: float) -> str:
+    """List the conditions that the first is better than, worse than, or not told from."""
     words = {
         1: "is significantly better than",
         -1: "is significantly worse than",

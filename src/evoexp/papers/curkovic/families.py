@@ -1,10 +1,10 @@
-"""Which conditions of a sweep are compared with which, in what, and what the tests say."""
+"""Families of conditions in a sweep, the quantities they are compared in, and their tests."""
 
 from functools import partial
 from typing import Any, NamedTuple
 
 from evoexp.papers.curkovic import measures
-from evoexp.report import claims, markdown
+from evoexp.report import markdown
 from evoexp.report.claims import Comparison
 from evoexp.report.pages import generic
 from evoexp.report.pages.generic import Values
@@ -39,13 +39,14 @@ class Measure(NamedTuple):
     converges: bool = True
 
 
-class Tested(NamedTuple):
-    """A family compared in one quantity; p-values are adjusted over the rows.
+class FamilyComparison(NamedTuple):
+    """A family compared in one quantity.
 
     Attributes:
-        measure: In what.
-        family: Whom.
-        rows: One per pair, each named by its other condition; without those that share no seed.
+        measure: The quantity.
+        family: The conditions.
+        rows: One per pair that shares seeds, each named by its other condition; p-values are
+            adjusted over them.
     """
 
     measure: Measure
@@ -54,9 +55,10 @@ class Tested(NamedTuple):
 
 
 def families(results: Results) -> tuple[Family, ...]:
-    """Return what is compared: twins that differ in collision substeps.
+    """Return the families of a sweep.
 
-    Else all with the first of their Eq. 9.
+    Conditions that differ in collision substeps are compared with their twins; if there are none,
+    all conditions with the first one that reads Eq. 9 as they do.
     """
     conditions = results.with_data
     fewest = min(_substeps(c) for c in conditions)
@@ -73,7 +75,9 @@ def families(results: Results) -> tuple[Family, ...]:
     return tuple(found)
 
 
-def tested(results: Results, settings: ReportSettings, threshold: float) -> tuple[Tested, ...]:
+def tested(
+    results: Results, settings: ReportSettings, threshold: float
+) -> tuple[FamilyComparison, ...]:
     """Return all comparisons of a sweep.
 
     Args:
@@ -81,27 +85,15 @@ def tested(results: Results, settings: ReportSettings, threshold: float) -> tupl
         settings: Levels and resamples.
         threshold: Cost that "generations to a team" means.
     """
-    found = []
-    for measure in _measures(results, threshold):
-        for family in families(results):
-            rows = [
-                generic.compare_on_common_seeds(
-                    first, other, other.label, True, measure.values, settings
-                )
-                for first, other in family.pairs
-            ]
-            found.append(
-                Tested(
-                    measure,
-                    family,
-                    tuple(claims.adjusted([row for row in rows if row is not None])),
-                )
-            )
-    return tuple(found)
+    return tuple(
+        FamilyComparison(one, family, generic.compared(family.pairs, one.values, settings))
+        for one in _measures(results, threshold)
+        for family in families(results)
+    )
 
 
 def curved(results: Results) -> bool:
-    """Whether any motion is executed as a curve."""
+    """Return whether any motion is executed as a curve."""
     return any(c.planner.interpolation == "cubic" for c in results.with_data)
 
 

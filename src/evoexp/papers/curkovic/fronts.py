@@ -7,14 +7,12 @@ from evoexp.store.run_directory import RunDirectory
 
 
 def read_fronts(results: Results, condition: ConditionResults, replicate: int) -> list[FrontRow]:
-    """Return what a finished replicate's log says of its populations' criteria.
-
-    One record per population.
+    """Return the criteria of a finished replicate's populations, one record per population.
 
     Args:
-        results: That the condition is one of.
-        condition: Whose replicate.
-        replicate: Which.
+        results: The results that the condition is part of.
+        condition: The condition.
+        replicate: Number of the replicate.
 
     Raises:
         CorruptLog: If the log cannot be trusted.

@@ -1,20 +1,19 @@
-"""Executed motions of robots of two links, in absolute link angles.
-
-Straight or curved between configurations.
-"""
+"""Executed motions of robots of two links, in absolute link angles."""
 
 from typing import NamedTuple
 
 import numpy as np
 
+from evoexp.collision.models.link_crossings import Arm
 from evoexp.condition import Prepared
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion, cubic_motion, top_speeds
 from evoexp.records import FloatArray
+from evoexp.report import motion_geometry
 from evoexp.report.results import WRAPPED
 
 
-class Sampled(NamedTuple):
+class SampledMotion(NamedTuple):
     """A motion at many instants.
 
     Attributes:
@@ -35,8 +34,24 @@ class Sampled(NamedTuple):
         return np.ascontiguousarray(relative.reshape(len(relative), -1).T)
 
 
+def arms(prepared: Prepared) -> tuple[Arm, ...]:
+    """Return base and link lengths of every robot."""
+    assembly = prepared.problem.assembly
+    placed = motion_geometry.joint_positions(assembly, np.zeros((assembly.model.nq, 1)))
+    bases = {robot: start[0] for robot, link, start, _ in placed if link == 0}
+    found = []
+    for robot, (x, y, _) in bases.items():
+        links = [link for link in assembly.links if link.arm == robot][:2]
+        one, two = (float(np.sqrt(np.sum((k.end - k.start) ** 2))) for k in links)
+        found.append(Arm((float(x), float(y)), (one, two)))
+    return tuple(found)
+
+
 def executed(prepared: Prepared, solution: FloatArray) -> Motion:
-    """Return what is executed of a solution, in absolute link angles [rad], robot by robot."""
+    """Return the motion that a solution executes, in absolute link angles [rad].
+
+    Straight lines or cubic curves lead from configuration to configuration, robot by robot.
+    """
     polynomials = prepared.planner.motion(prepared.problem, solution).polynomials.copy()
     links = polynomials.reshape(
         *polynomials.shape[:2], -1, 2
@@ -45,7 +60,7 @@ def executed(prepared: Prepared, solution: FloatArray) -> Motion:
     return cubic_motion(polynomials)
 
 
-def sampled(motion: Motion, samples: int) -> Sampled:
+def sampled(motion: Motion, samples: int) -> SampledMotion:
     """Sample a motion in absolute link angles.
 
     Args:
@@ -59,37 +74,27 @@ def sampled(motion: Motion, samples: int) -> Sampled:
     c0, c1, c2, c3 = motion.polynomials[before].transpose(1, 0, 2)
     shape = (len(instants), -1, 2)
     angles, speeds = c0 + u * (c1 + u * (c2 + u * c3)), c1 + u * (2.0 * c2 + 3.0 * u * c3)
-    return Sampled(instants, angles.reshape(shape) / DEGREE, speeds.reshape(shape) / DEGREE)
+    return SampledMotion(instants, angles.reshape(shape) / DEGREE, speeds.reshape(shape) / DEGREE)
 
 
 def speed_limits(prepared: Prepared) -> FloatArray:
-    """Return how far either link of every robot may turn per sampling step (Curkovic et al.
-
-    2013, Eq. 2).
+    """Return how far either link of every robot may turn per sampling step (Eq. 2).
 
     Returns:
         (robots, 2) [deg].
     """
-    arms = prepared.problem.collision.arms
     limit = getattr(prepared.planner, WRAPPED, prepared.planner).speed_limit
-    return np.array([limit.greatest_steps(arm.lengths) for arm in arms])
+    return np.array([limit.greatest_steps(arm.lengths) for arm in arms(prepared)])
 
 
 def times_over_limit(prepared: Prepared, solution: FloatArray) -> float:
-    """Return the greatest speed of any link over what Eq.
-
-    2 allows it, at a motion's fastest instant [-].
-    """
+    """Return the greatest speed of any link during a motion, over its limit by Eq. 2 [-]."""
     turns = top_speeds(executed(prepared, solution)).reshape(-1, 2) / DEGREE
     return float(np.max(turns / speed_limits(prepared)))
 
 
 def straight(prepared: Prepared) -> FloatArray:
     """Return the solution whose link angles go straight from start to goal, flat [deg]."""
-    problem, parts = prepared.problem, []
-    for start, goal, (rows, _) in zip(
-        problem.start, problem.goal, prepared.planner.shape(problem), strict=True
-    ):
-        share = np.linspace(0.0, 1.0, rows)[:, None]
-        parts.append((((1.0 - share) * start + share * goal) / DEGREE).ravel())
-    return np.concatenate(parts)
+    planner, problem = prepared
+    ends = problem.start.ravel(), problem.goal.ravel()
+    return motion_geometry.straight_line(planner.shape(problem), *ends) / DEGREE

@@ -1,7 +1,4 @@
-"""Curkovic et al. 2013: motions of robots. Figs.
-
-7–11, known defects of the executed curves, claims about scenes.
-"""
+"""The page of motions of Curkovic et al. 2013, Figs. 7–11: curves, their defects, scenes."""
 
 import itertools
 from functools import partial
@@ -15,11 +12,12 @@ from evoexp.papers.curkovic.figures import (
     link_intersection,
     robot_motions,
 )
+from evoexp.planners.coevolution.planner import Problem
 from evoexp.records import FloatArray
-from evoexp.report import claims, judging, markdown
+from evoexp.report import judging, markdown
 from evoexp.report.claims import Claim, Comparison
 from evoexp.report.page import Drawing, Page
-from evoexp.report.pages import generic, planar_arms
+from evoexp.report.pages import generic
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
 
@@ -39,20 +37,17 @@ def page(results: Results, settings: ReportSettings) -> Page:
         return generic.page(results, settings)
     base = generic.basis(results, settings)
     unit = results.with_data[0].condition.length_unit
-    row = partial(generic.quantity, results)
     tools = _tools(results, settings)
+    speed = "greatest speed of a link over what Eq. 2 allows"
+    kept = generic.quantity(results, f"{KEPT}, its centre line", unit, tool_distance)
     return base._replace(
         title=f"Curkovic et al. 2013: {results.experiment or 'stored runs'}",
         introduction=INTRODUCTION,
         quantities=(
             base.quantities[0]._replace(name="best cost of a collision-free team"),
-            row(
-                "clearance of the bodies over the whole motion (exact)",
-                unit,
-                generic.by_column("clearance"),
-            ),
-            row("greatest speed of a link over what Eq. 2 allows", "–", measures.times_over_limit),
-            *((row(f"{KEPT}, its centre line", unit, tool_distance),) if tools else ()),
+            measures.clearance_quantity(results),
+            generic.quantity(results, speed, "–", measures.times_over_limit),
+            *((kept,) if tools else ()),
             *base.quantities[1:],
         ),
         claims=_claims(results, settings, tools),
@@ -61,38 +56,31 @@ def page(results: Results, settings: ReportSettings) -> Page:
             *base.comparisons,
             *((("Largest against smallest radius", tools),) if tools else ()),
         ),
-        drawings=(*_drawings(results, settings), measures.convergence_drawing(results)),
+        drawings=(*_drawings(results, settings), generic.best_drawing(results)),
     )
 
 
 def tool_distance(condition: ConditionResults) -> FloatArray:
-    """Return how near any end-effector comes to a link of another robot, lines without thickness,.
+    """Return how near any end-effector comes to a link of another robot, (done,) [length unit].
 
-    Done,.
+    Links and end-effectors have no thickness here.
     """
     prepared, found = condition.prepared, []
-    arms = prepared.problem.collision.arms
+    arms = link_motions.arms(prepared)
     for k in condition.summaries.index:
         motion = link_motions.executed(prepared, condition.solutions[int(k)])
-        links = link_motions.sampled(motion, SAMPLES).links
-        points = [
-            arm.points(np.ascontiguousarray(np.radians(links[:, r])[:, :, None]))
-            for r, arm in enumerate(arms)
-        ]
-        least = np.inf
-        for one, own in enumerate(points):
-            for other, (arm, theirs) in enumerate(zip(arms, points, strict=True)):
-                if one != other:
-                    chain = [
-                        np.broadcast_to(arm.base, (len(links), 2)),
-                        theirs[:, :2, 0],
-                        theirs[:, 2:, 0],
-                    ]
-                    tips = own[:, 2:, 0]
-                    least = min(
-                        least, *(to_segment(tips, a, b) for a, b in itertools.pairwise(chain))
-                    )
-        found.append(least)
+        links = np.radians(link_motions.sampled(motion, SAMPLES).links)
+        chains = []  # of each robot: base, elbows, tips
+        for r, arm in enumerate(arms):
+            points = arm.points(np.ascontiguousarray(links[:, r, :, None]))[:, :, 0]
+            base = np.broadcast_to(arm.base, (len(links), 2))
+            chains.append((base, points[:, :2], points[:, 2:]))
+        distances = (
+            to_segment(own[-1], start, end)
+            for own, other in itertools.permutations(chains, 2)
+            for start, end in itertools.pairwise(other)
+        )
+        found.append(min(distances))
     return np.array(found)
 
 
@@ -104,10 +92,7 @@ def to_segment(points: FloatArray, start: FloatArray, end: FloatArray) -> float:
 
 
 def _by_radius(results: Results) -> dict[int, list[ConditionResults]]:
-    """Return the conditions by their collision substeps, each list by growing radius.
-
-    Empty if no radius differs.
-    """
+    """Return collision substeps → conditions by growing radius; nothing if no radius differs."""
     found: dict[int, list[ConditionResults]] = {}
     for c in sorted(results.main, key=lambda c: float(c.planner.collision.tcp_radius)):
         found.setdefault(c.planner.collision.collision_substeps, []).append(c)
@@ -117,106 +102,76 @@ def _by_radius(results: Results) -> dict[int, list[ConditionResults]]:
 
 def _tools(results: Results, settings: ReportSettings) -> tuple[Comparison, ...]:
     """Compare the largest radius with the smallest one, for every number of collision substeps."""
-    rows = []
-    for substeps, (*smaller, largest) in _by_radius(results).items():
-        if smaller:
-            what = f"{KEPT}: {largest.label} against {smaller[0].label}" + _tested(substeps)
-            rows.append(
-                generic.compare_on_common_seeds(
-                    largest, smaller[0], what, False, tool_distance, settings
-                ),
-            )
-    return tuple(claims.adjusted([row for row in rows if row is not None]))
+    pairs = [(own[-1], own[0]) for own in _by_radius(results).values() if len(own) > 1]
+    return generic.compared(pairs, tool_distance, settings, lower_is_better=False, named=_pair)
 
 
-def _tested(substeps: int) -> str:
-    return "" if substeps == 1 else f" (tested at {substeps} substeps)"
+def _pair(largest: ConditionResults, smallest: ConditionResults) -> str:
+    """Name the comparison of two radii."""
+    substeps = largest.planner.collision.collision_substeps
+    tested = "" if substeps == 1 else f" (tested at {substeps} substeps)"
+    return f"{KEPT}: {largest.label} against {smallest.label}{tested}"
 
 
 def _claims(
     results: Results, settings: ReportSettings, tools: tuple[Comparison, ...]
 ) -> tuple[Claim, ...]:
-    reason, found = judging.not_judged(results), []
+    judge, found = judging.judge(results, settings), []
     for c in results.main:
-        problem = c.prepared.problem
-        if len(problem.start) > 2:
-            text, source = (
-                "The method takes new robots: it finds a collision-free motion of three",
-                "section 5",
-            )
-        elif not problem.moving.all():
-            text, source = (
-                "One robot stands still, obstacles stand around: a collision-free motion",
-                "section 4, Fig. 10",
-            )
-        elif problem.collision.enveloped:
-            text, source = (
-                "Envelopes and circles: a collision-free motion of the robots with their bodies",
-                "section 4",
-            )
-        else:
-            text, source = (
-                "A collision-free motion of two robots in each other's way",
-                "section 4, Figs. 8, 9",
-            )
+        text, source = _scene_claim(c)
         certified = int((c.summaries["certified"].eq(True) & c.summaries["solved"]).sum())
-        decided = c.done - c.verdicts.undecided
-        for judge, holds, judged in (
+        for who, holds, judged in (
             ("the paper's model", c.solved, c.done),
-            ("the exact verdict on the whole motion", certified, decided),
+            ("the exact verdict on the whole motion", certified, c.done - c.verdicts.undecided),
         ):
-            verdict = claims.judge_all(reason, holds, judged, c.planned)
-            evidence = f"{markdown.share(holds, judged)} runs"
-            found.append(
-                judging.claim(
-                    f"{c.label}: {text}, in every run, by {judge}",
-                    source,
-                    evidence,
-                    verdict,
-                    reason,
-                )
-            )
-    for comparison in tools:
-        text = f"A larger radius forces the robots further apart: {comparison.quantity}"
-        verdict = claims.judge_better(reason, comparison, settings.significance)
-        found.append(
-            judging.claim(
-                text, "section 4, Fig. 11", judging.evidence(comparison, "larger"), verdict, reason
-            )
-        )
+            claim = f"{c.label}: {text}, in every run, by {who}"
+            told = f"{markdown.share(holds, judged)} runs"
+            found.append(judge.every(claim, source, told, holds, judged, c.planned))
+    for row in tools:
+        text = f"A larger radius forces the robots further apart: {row.quantity}"
+        found.append(judge.better(text, "section 4, Fig. 11", row, "larger"))
     return tuple(found)
 
 
+def _scene_claim(condition: ConditionResults) -> tuple[str, str]:
+    """Return the claim that the paper makes of a scene, and its source."""
+    problem = condition.problem(Problem)
+    if len(problem.start) > 2:
+        return "The method takes new robots: it finds a collision-free motion of three", "section 5"
+    if not problem.moving.all():
+        text = "One robot stands still, obstacles stand around: a collision-free motion"
+        return text, "section 4, Fig. 10"
+    if _enveloped(condition):
+        text = "Envelopes and circles: a collision-free motion of the robots with their bodies"
+        return text, "section 4"
+    return "A collision-free motion of two robots in each other's way", "section 4, Figs. 8, 9"
+
+
+def _enveloped(condition: ConditionResults) -> bool:
+    """Return whether the search tests more of the robots than their lines."""
+    collision = condition.planner.collision
+    return bool(collision.half_width > 0.0 or collision.tcp_radius > 0.0)
+
+
 def _checks(results: Results) -> tuple[tuple[str, str], ...]:
-    defects = [
-        (f"Solved motions that fail: {rate.defect}", measures.rates_text(results, which))
-        for which, rate in enumerate(measures.rates(results.with_data[0]))
-    ]
     first = results.with_data[0]
-    prepared = first.prepared
-    if prepared.problem.collision.enveloped:
-        sticks = [c.label for c in results.with_data if _sticks_out(c)]
-        what = (
+    checks = [measures.rates_check(results, defect) for defect in measures.DEFECTS]
+    if _enveloped(first):
+        models = {c.label: c.planner.collision for c in results.with_data}
+        sticks = [name for name, model in models.items() if model.tcp_radius < model.half_width]
+        title = (
             "Boundary lines have no ends: the body of a link, round at its end, sticks out where "
             "the tool is smaller"
         )
-        defects.append((what, "; ".join(sticks) or "nowhere"))
-    notes = [
-        ("Length of the chromosome (Eqs. 2, 3)", note)
-        for note in first.planner.notes(prepared.problem)
-    ]
-    return (*defects, *notes)
-
-
-def _sticks_out(condition: ConditionResults) -> bool:
-    collision = condition.planner.collision
-    return bool(collision.tcp_radius < collision.half_width)
+        checks.append((title, "; ".join(sticks) or "nowhere"))
+    notes = first.planner.notes(first.prepared.problem)
+    return (*checks, *(("Length of the chromosome (Eqs. 2, 3)", note) for note in notes))
 
 
 def _drawings(results: Results, settings: ReportSettings) -> list[Drawing]:
     first, drawn = results.main[0], []
-    problem = first.prepared.problem
-    if len(problem.start) == 2 and not problem.collision.enveloped and problem.moving.all():
+    problem = first.problem(Problem)
+    if len(problem.start) == 2 and not _enveloped(first) and problem.moving.all():
         drawn.append(
             Drawing(
                 "fig_7_intersection",
@@ -229,7 +184,7 @@ def _drawings(results: Results, settings: ReportSettings) -> list[Drawing]:
                 (first,),
             )
         )
-    for condition, suffix in planar_arms.suffixed(results):
+    for condition, suffix in results.suffixed:
         drawn += _of_condition(results, condition, suffix)
     if radii := _by_radius(results):
         shown = tuple(c for conditions in radii.values() for c in conditions)
@@ -262,7 +217,7 @@ def _drawings(results: Results, settings: ReportSettings) -> list[Drawing]:
 
 
 def _of_condition(results: Results, condition: ConditionResults, suffix: str) -> list[Drawing]:
-    problem = condition.prepared.problem
+    problem = condition.problem(Problem)
     name = f" ({condition.label})" if suffix else ""
     if not problem.moving.all():
         number, title = "10", "Fig. 10: one robot stands still"

@@ -1,7 +1,4 @@
-"""Curkovic et al. 2013: methods of co-evolution side by side. Fig.
-
-6, effort to a threshold, matched pairs.
-"""
+"""The page of Curkovic et al. 2013, Fig. 6: methods of co-evolution side by side."""
 
 from functools import partial
 
@@ -9,13 +6,12 @@ import numpy as np
 
 from evoexp.papers.curkovic import measures
 from evoexp.papers.curkovic.figures import methods
-from evoexp.records import FloatArray
 from evoexp.report import claims, judging, markdown
 from evoexp.report.claims import Comparison
 from evoexp.report.page import Drawing, Page
 from evoexp.report.pages import generic
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
+from evoexp.report.results import Results
 
 PAIRS = (("V", "I"), ("VI", "II"), ("VII", "III"), ("VIII", "IV"))
 INTRODUCTION = (
@@ -32,14 +28,19 @@ def page(results: Results, settings: ReportSettings) -> Page:
     """Build the page of methods, or the generic page if another planner was run."""
     if not measures.fits(results):
         return generic.page(results, settings)
-    first = results.with_data[0]
-    bound = measures.lower_bound(first)
+    bound = measures.lower_bound(results.with_data[0])
     threshold = settings.threshold_ratio * bound
-    compared = {
-        name: _matched(results, settings, name, threshold) for name in ("best cost", "generations")
-    }
+    by_label = {c.label: c for c in results.with_data}
+    pairs = [(by_label[a], by_label[b]) for a, b in PAIRS if {a, b} <= set(by_label)]
+    matched = partial(
+        generic.compared,
+        pairs,
+        settings=settings,
+        named=lambda a, b: f"{a.label} against {b.label}",
+    )
+    costs = matched(generic.by_column("best_cost"))
+    generations = matched(partial(measures.generations_to, threshold=threshold))
     one_scene = len({(c.condition.robot, c.condition.scenario) for c in results.with_data}) == 1
-    drawings = (_methods(results, bound),) if one_scene else (generic.cost_drawing(results),)
     return Page(
         title=f"Curkovic et al. 2013: {results.experiment or 'stored runs'}",
         introduction=INTRODUCTION,
@@ -47,84 +48,54 @@ def page(results: Results, settings: ReportSettings) -> Page:
             *measures.team_quantities(results, threshold),
             *generic.term_quantities(results),
         ),
-        claims=_claims(results, settings, compared, threshold),
+        claims=_claims(results, settings, generations, costs, threshold),
         checks=_checks(results, bound),
         comparisons=tuple(
             (f"{title}: matched pairs of methods", rows)
             for title, rows in (
-                ("best cost of a team", compared["best cost"]),
-                (
-                    f"generations to a team below {markdown.number(threshold)}",
-                    compared["generations"],
-                ),
+                ("best cost of a team", costs),
+                (f"generations to a team below {markdown.number(threshold)}", generations),
             )
             if rows
         ),
-        drawings=drawings,
+        drawings=(_methods(results, bound) if one_scene else generic.cost_drawing(results),),
     )
-
-
-def _matched(
-    results: Results, settings: ReportSettings, what: str, threshold: float
-) -> tuple[Comparison, ...]:
-    """Compare each method with a hall of fame with its counterpart.
-
-    P-values adjusted over the pairs.
-    """
-    by_label = {c.label: c for c in results.with_data}
-
-    def values(condition: ConditionResults) -> FloatArray:
-        return (
-            condition.column("best_cost")
-            if what == "best cost"
-            else measures.generations_to(condition, threshold)
-        )
-
-    rows = [
-        generic.compare_on_common_seeds(
-            by_label[a], by_label[b], f"{a} against {b}", True, values, settings
-        )
-        for a, b in PAIRS
-        if a in by_label and b in by_label
-    ]
-    return tuple(claims.adjusted([row for row in rows if row is not None]))
 
 
 def _claims(
     results: Results,
     settings: ReportSettings,
-    compared: dict[str, tuple[Comparison, ...]],
+    generations: tuple[Comparison, ...],
+    costs: tuple[Comparison, ...],
     threshold: float,
 ) -> tuple[claims.Claim, ...]:
-    reason, found = judging.not_judged(results), []
-    for name, title in (
-        ("generations", f"a team of cost ≤ {markdown.number(threshold)}"),
-        ("best cost", "the end"),
-    ):
-        for comparison in compared[name]:
-            evidence = judging.evidence(comparison, "earlier" if name == "generations" else "lower")
-            verdict = claims.judge_better(reason, comparison, settings.significance)
-            text = (
-                f"Methods with hall of fame and Eq. 10 converge faster, judged by {title}: "
-                f"{comparison.quantity}"
-            )
-            found.append(judging.claim(text, "section 3, Fig. 6", evidence, verdict, reason))
+    judge = judging.judge(results, settings)
+    found = [
+        judge.better(
+            f"Methods with hall of fame and Eq. 10 converge faster, judged by {title}: "
+            f"{row.quantity}",
+            "section 3, Fig. 6",
+            row,
+            word,
+        )
+        for rows, title, word in (
+            (generations, f"a team of cost ≤ {markdown.number(threshold)}", "earlier"),
+            (costs, "the end", "lower"),
+        )
+        for row in rows
+    ]
     slowest = max((float(c.column("cpu_s").max()) for c in results.with_data), default=np.nan)
     solved, done = sum(c.solved for c in results.with_data), sum(c.done for c in results.with_data)
-    within = claims.judge_all(
-        reason, solved if slowest < 10.0 else 0, done, sum(c.planned for c in results.conditions)
+    text, planned = (
+        "A collision-free solution in less than 10 s",
+        sum(c.planned for c in results.conditions),
     )
-    found.append(
-        judging.claim(
-            "A collision-free solution in less than 10 s",
-            "section 3",
-            f"{markdown.share(solved, done)} runs found one; the slowest run took "
-            f"{markdown.number(slowest)} s of CPU",
-            within,
-            reason,
-        )
+    told = (
+        f"{markdown.share(solved, done)} runs found one; the slowest run took "
+        f"{markdown.number(slowest)} s of CPU"
     )
-    return tuple(found)
+    in_time = solved if slowest < 10.0 else 0
+    return (*found, judge.every(text, "section 3", told, in_time, done, planned))
 
 
 def _checks(results: Results, bound: float) -> tuple[tuple[str, str], ...]:
@@ -133,17 +104,14 @@ def _checks(results: Results, bound: float) -> tuple[tuple[str, str], ...]:
         for c in results.with_data
     )
     return (
-        (f"Solved motions that fail: {measures.REFUTED}", measures.rates_text(results, 0)),
-        (f"Solved motions that fail: {measures.TOO_FAST}", measures.rates_text(results, 2)),
+        measures.rates_check(results, measures.REFUTED),
+        measures.rates_check(results, measures.TOO_FAST),
         (
             "Runs whose random initial populations already hold a collision-free pair (so its "
             "first generation says nothing about a method)",
             at_first,
         ),
-        (
-            "Lower bound of a team's cost: straight end-effector paths, least turns of the links",
-            markdown.number(bound),
-        ),
+        (measures.BOUND, markdown.number(bound)),
     )
 
 

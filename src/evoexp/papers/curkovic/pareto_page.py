@@ -42,7 +42,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
         checks=tuple(check for c in drawn for check in _checks(c, fronts[c.label])),
         drawings=(
             *(_drawing(results, c, fronts[c.label]) for c in drawn),
-            measures.convergence_drawing(results),
+            generic.best_drawing(results),
         ),
     )
 
@@ -57,7 +57,7 @@ def _size(front: FrontRow) -> int:
 
 
 def _sizes(fronts: dict[int, list[FrontRow]], population: int) -> FloatArray:
-    """Return how many individuals of a population are on its front, (replicates,)."""
+    """Return the number of individuals on the front of a population, (replicates,)."""
     return np.array(
         [_size(rows[population]) for rows in fronts.values() if population < len(rows)],
         dtype=np.float64,

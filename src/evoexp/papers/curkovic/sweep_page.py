@@ -1,7 +1,4 @@
-"""Curkovic et al. 2013: settings of a method side by side.
-
-The first of a family against each other one of it.
-"""
+"""The page of sweeps over Curkovic et al. 2013: the first of a family against each other one."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -9,14 +6,14 @@ from functools import partial
 import pandas as pd
 
 from evoexp.papers.curkovic import claims, families, measures
-from evoexp.papers.curkovic.families import Tested
+from evoexp.papers.curkovic.families import FamilyComparison
 from evoexp.papers.curkovic.figures import defect_rates
 from evoexp.report import markdown
-from evoexp.report.figures import effects
 from evoexp.report.page import Drawing, Page, Quantity
 from evoexp.report.pages import generic
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results
+from evoexp.report.sweep_figures import A12, WHISKERS, effects_drawing, values_drawing
 
 INTRODUCTION = (
     "Each condition changes one part of a method; all share their seeds. The cost of a team is "
@@ -29,6 +26,12 @@ SHORT = {
     measures.LEAVES: "leave [0, π]",
     measures.TOO_FAST: "too fast (Eq. 2)",
 }
+
+VALUES = (
+    f"Boxes: median and quartiles of the runs that get there, {WHISKERS}, every replicate a point; "
+    "dashed: median of the first condition, where it has one."
+)
+EFFECTS = f"{A12} the first one is better than the other one; dashed: no difference."
 
 
 def page(results: Results, settings: ReportSettings) -> Page:
@@ -61,57 +64,30 @@ def _quantities(results: Results, threshold: float) -> tuple[Quantity, ...]:
 
 
 def _checks(results: Results, bound: float) -> tuple[tuple[str, str], ...]:
-    names = [rate.defect for rate in measures.rates(results.with_data[0])]
-    defects = [
-        (f"Solved motions that fail: {n}", measures.rates_text(results, k))
-        for k, n in enumerate(names)
-    ]
     slowest = "; ".join(
         f"{c.label}: {markdown.number(float(c.column('cpu_s').max()))} s" for c in results.with_data
     )
     return (
-        *defects,
+        *(measures.rates_check(results, defect) for defect in SHORT),
         ("CPU time of the slowest run (the paper accepts 10 s)", slowest),
-        (
-            "Lower bound of a team's cost: straight end-effector paths, least turns of the links",
-            markdown.number(bound),
-        ),
+        (measures.BOUND, markdown.number(bound)),
     )
 
 
 def _drawings(
-    results: Results, settings: ReportSettings, found: Sequence[Tested], threshold: float
+    results: Results, settings: ReportSettings, found: Sequence[FamilyComparison], threshold: float
 ) -> tuple[Drawing, ...]:
     values = {one.measure.name: one.measure.values for one in found if one.measure.converges}
     by_name = {
-        name: tuple(row for one in found if one.measure.name == name for row in one.rows)
+        name: [row for one in found if one.measure.name == name for row in one.rows]
         for name in values
     }
-    shown = results.with_data
+    bound = markdown.number(threshold / settings.threshold_ratio)
     return (
-        Drawing(
-            "values",
-            "Every condition",
-            "Boxes: median and quartiles of the runs that get there, whiskers to the last value "
-            "within 1.5 interquartile ranges, every replicate a point; dashed: median of the "
-            "first condition, where it has one.",
-            partial(effects.values_table, results, values),
-            effects.draw_values,
-            shown,
-        ),
-        Drawing(
-            "effects",
-            "How often the first condition of a family is better",
-            "Vargha and Delaney's A12 with its bootstrap interval: the share of pairs of runs in "
-            "which the first one is better than the other one; dashed: no difference.",
-            partial(effects.effects_table, by_name, settings.significance),
-            effects.draw_effects,
-            shown,
-        ),
-        measures.convergence_drawing(
-            results,
-            f" Threshold {markdown.number(threshold)}, lower bound "
-            f"{markdown.number(threshold / settings.threshold_ratio)}.",
+        values_drawing(results, values, VALUES),
+        effects_drawing(results, settings, by_name, "the first condition of a family", EFFECTS),
+        generic.best_drawing(
+            results, f" Threshold {markdown.number(threshold)}, lower bound {bound}."
         ),
         Drawing(
             "defects",
@@ -119,23 +95,16 @@ def _drawings(
             f"Share of the solved motions, with Wilson's {100 * settings.confidence:g} % interval.",
             partial(_rates, results, settings.confidence),
             defect_rates.draw_rates,
-            shown,
+            results.with_data,
         ),
     )
 
 
 def _rates(results: Results, confidence: float) -> pd.DataFrame:
     """Return the table of defects; without curves only the first of them varies."""
-    rows = [
-        (
-            SHORT[rate.defect],
-            position,
-            c.label,
-            rate.failing,
-            rate.solved,
-            *rate.interval(confidence),
-        )
-        for position, c in enumerate(results.with_data)
-        for rate in measures.rates(c)[: None if families.curved(results) else 1]
-    ]
-    return defect_rates.rates_table(rows)
+    shown = list(SHORT)[: None if families.curved(results) else 1]
+    found = [(position, c, measures.rates(c)) for position, c in enumerate(results.with_data)]
+    return defect_rates.rates_table(
+        [(SHORT[name], k, c.label, rates[name]) for k, c, rates in found for name in shown],
+        confidence,
+    )

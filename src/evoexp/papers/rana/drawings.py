@@ -8,19 +8,19 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from evoexp.papers.rana.figures import spatial_models, spatial_paths
+from evoexp.papers.rana import motions, planar_page
+from evoexp.papers.rana.figures import planar_models, planar_motion, spatial_models, spatial_paths
 from evoexp.report import markdown
-from evoexp.report.figures import convergence, planar_models, planar_motion
+from evoexp.report.figures import convergence
 from evoexp.report.page import Drawing
-from evoexp.report.pages import planar_arms
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
 
 AT, BETWEEN = "term_arm_distance_at_via_points", "term_arm_distance_between_sampled"
 
 
-class Measured(NamedTuple):
-    """A condition, what tells its files apart, and the distances along its motions."""
+class MeasuredMotions(NamedTuple):
+    """A condition, the end of its files' names, and the distances along its motions."""
 
     condition: ConditionResults
     suffix: str
@@ -29,22 +29,22 @@ class Measured(NamedTuple):
     @property
     def planar(self) -> bool:
         """Whether its arms move in a plane."""
-        return bool(self.condition.prepared.problem.assembly.table.planar)
+        return bool(motions.problem(self.condition).assembly.table.planar)
 
     @property
     def margin(self) -> float:
-        """The safety distance."""
-        return float(self.condition.condition.scenario.security_margin)  # type: ignore[attr-defined]
+        """The safety distance [length unit]."""
+        return motions.problem(self.condition).security_margin
 
 
-def measure(condition: ConditionResults, suffix: str, settings: ReportSettings) -> Measured:
-    """Return a condition with its distances."""
-    return Measured(
+def measure(condition: ConditionResults, suffix: str, settings: ReportSettings) -> MeasuredMotions:
+    """Return a condition with the distances along its motions."""
+    return MeasuredMotions(
         condition, suffix, planar_motion.sampled_distances(condition, settings.samples_per_segment)
     )
 
 
-def drawings(one: Measured) -> list[Drawing]:
+def drawings(one: MeasuredMotions) -> list[Drawing]:
     """Return the paper's figures of one condition, without those of its fitness."""
     own = [*(_planar(one) if one.planar else _spatial(one)), _distances(one)]
     return (
@@ -55,13 +55,13 @@ def drawings(one: Measured) -> list[Drawing]:
 
 
 def order(drawing: Drawing) -> tuple[int, str]:
-    """Return what sorts drawings by the number of the paper's figure."""
+    """Return the key that sorts drawings by the number of the paper's figure."""
     return int(re.findall(r"\d+", drawing.stem)[0]), drawing.stem
 
 
-def _planar(one: Measured) -> list[Drawing]:
+def _planar(one: MeasuredMotions) -> list[Drawing]:
     c, suffix = one.condition, one.suffix
-    snapshots, paths = planar_arms.motion_drawings(c, suffix)
+    snapshots, paths = planar_page.motion_drawings(c, suffix)
     return [
         Drawing(
             f"fig_1_arms{suffix}",
@@ -98,17 +98,17 @@ def _planar(one: Measured) -> list[Drawing]:
             title="Fig. 4: snapshots of the motion in operational space",
             caption="The paper notes that where the arms seem to overlap they are there at "
             "different "
-            "instants. " + planar_arms.SNAPSHOTS,
+            "instants. " + planar_page.SNAPSHOTS,
         ),
         paths._replace(
             stem=f"fig_6_paths{suffix}",
             title="Fig. 6: paths in configuration space",
-            caption=f"{planar_arms.PATHS} {_ratio(c)}",
+            caption=f"{planar_page.PATHS} {_ratio(c)}",
         ),
     ]
 
 
-def _spatial(one: Measured) -> list[Drawing]:
+def _spatial(one: MeasuredMotions) -> list[Drawing]:
     c, suffix = one.condition, one.suffix
     paths = partial(spatial_paths.paths_table, c)
     return [
@@ -169,7 +169,7 @@ def _ratio(condition: ConditionResults) -> str:
     return f"Median length over that of the straight line: {markdown.number(median)}."
 
 
-def fitness(results: Results, drawn: Sequence[Measured]) -> Iterator[Drawing]:
+def fitness(results: Results, drawn: Sequence[MeasuredMotions]) -> Iterator[Drawing]:
     """Yield Figs. 5 and 12a: one figure per scene, of all conditions and controls in it."""
     scenes = list(dict.fromkeys(_scene(one.condition) for one in drawn))
     for scene in scenes:
@@ -196,21 +196,21 @@ def _scene(condition: ConditionResults) -> tuple[Any, Any]:
     return condition.condition.robot, condition.condition.scenario
 
 
-def _of(one: Measured) -> str:
+def _of(one: MeasuredMotions) -> str:
     return f" ({one.condition.label})"
 
 
-def _distances(one: Measured) -> Drawing:
+def _distances(one: MeasuredMotions) -> Drawing:
     c, unit = one.condition, one.condition.condition.length_unit
     at, between = float(np.min(c.column(AT))), float(np.min(c.column(BETWEEN)))
-    drawing = planar_arms.distances_drawing(c, one.suffix, one.sampled)
+    drawing = planar_page.distances_drawing(c, one.suffix, one.sampled)
     number = "7" if one.planar else "13"
     return drawing._replace(
         stem=f"fig_{number}_distances{one.suffix}",
         title=f"Fig. {number}: minimum distance between the two arms",
         caption="The paper states that the distance never goes below the safety distance; it "
         "judges "
-        f"via-points only. {planar_arms.DISTANCES} Least over all replicates: "
+        f"via-points only. {planar_page.DISTANCES} Least over all replicates: "
         f"{markdown.number(at)} {unit} at via-points, {markdown.number(between)} {unit} "
         "between them; least clearance of the bodies over the whole motion (exact): "
         f"{markdown.number(float(np.min(c.column('clearance'))))} {unit}.",

@@ -36,8 +36,13 @@ def shares_table(
     return table.assign(printed=table["quantity"].map(dict(printed)).astype("float64"))
 
 
-def draw_shares(table: pd.DataFrame) -> Figure:
-    """Draw one panel per quantity, one row per condition; each panel has its own range."""
+def draw_shares(table: pd.DataFrame, label: str = "share of runs [%]") -> Figure:
+    """Draw one panel per quantity, one row per condition; each panel has its own range.
+
+    Args:
+        table: Of `shares_table`.
+        label: Of the axes.
+    """
     quantities = list(dict.fromkeys(table["quantity"]))
     labels = dict(zip(table["position"], table["condition"], strict=True))
     rows_of = {position: row for row, position in enumerate(sorted(labels))}
@@ -69,7 +74,7 @@ def draw_shares(table: pd.DataFrame) -> Figure:
                 )
             axes.set_xlim(*_range(100 * own[["lower", "upper", "printed"]].to_numpy()))
         axes.xaxis.set_major_locator(style.few_ticks())
-        axes.set_xlabel("share of runs [%]")
+        axes.set_xlabel(label)
         axes.set_title(quantity, fontsize=7.5)
     panels[0].set_yticks(list(rows_of.values()), [labels[position] for position in rows_of])
     panels[0].set_ylim(len(labels) - 0.5, -0.5)

@@ -12,6 +12,7 @@ from evoexp.report.figures import convergence
 from evoexp.report.page import Drawing, Page, Quantity
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results
+from evoexp.report.run_measures import search_seconds
 from evoexp.report.statistics import spread
 from evoexp.store.messages import TERM
 
@@ -40,7 +41,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
         introduction=SCENES if len(scenes) > 1 else "",
         quantities=(
             *base.quantities,
-            quantity(results, "CPU time of the search", "s", pairwise.searching_seconds),
+            quantity(results, "CPU time of the search", "s", search_seconds),
         ),
         tables=pairwise.share_tables(results, settings),
         comparisons=pairwise.comparisons(results, settings),

@@ -1,11 +1,17 @@
 """Least distance of bodies along motions: robots from each other and from what stands around."""
 
+from typing import Any
+
 import pandas as pd
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.curkovic import link_motions
+from evoexp.planners.coevolution.planner import Problem
 from evoexp.report import body_contacts, style
+from evoexp.report.motion_geometry import BodyDistance
 from evoexp.report.results import ConditionResults
 from evoexp.report.rows import groups, rounded
 
@@ -28,29 +34,22 @@ def distances_table(conditions: tuple[ConditionResults, ...], samples: int) -> p
     parts = []
     for position, c in enumerate(conditions):
         prepared, refuted = c.prepared, body_contacts.refuted(c)
-        for replicate, solution in {
-            STRAIGHT: link_motions.straight(prepared),
-            **c.solutions,
-        }.items():
+        scene = c.problem(Problem).scene
+        distance = BodyDistance(scene.model, scene.geometry)
+        solutions = {STRAIGHT: link_motions.straight(prepared), **c.solutions}
+        for replicate, solution in solutions.items():
             found = link_motions.sampled(link_motions.executed(prepared, solution), samples)
             columns = {"condition": c.label, "position": position, "replicate": replicate}
             columns |= {"best": replicate == c.best_replicate, "refuted": replicate in refuted}
-            columns |= {"instant": found.instants}
-            parts.append(
-                pd.DataFrame(
-                    columns | {"distance": body_contacts.distances(prepared.problem.scene, found.q)}
-                )
-            )
+            columns |= {"instant": found.instants, "distance": distance(DEGREE * found.q)}
+            parts.append(pd.DataFrame(columns))
     return rounded(pd.concat(parts, ignore_index=True)).assign(
         length_unit=conditions[0].condition.length_unit
     )
 
 
 def draw_distances(table: pd.DataFrame) -> Figure:
-    """Draw the distance against the instant, a panel per condition.
-
-    Best replicate, range over all, straight line.
-    """
+    """Draw the distance at each instant: best replicate, range over all, straight line."""
     positions = sorted(table["position"].unique())
     columns = min(COLUMNS, len(positions))
     lines = -(-len(positions) // columns)
@@ -60,7 +59,8 @@ def draw_distances(table: pd.DataFrame) -> Figure:
         axes.set_axis_off()
     for axes, (position, rows) in zip(panels, groups(table, "position"), strict=False):
         colour = style.condition_colour(int(position))
-        found = rows[rows["replicate"] != STRAIGHT].groupby("instant")["distance"]
+        of_runs = rows[rows["replicate"] != STRAIGHT]
+        found = of_runs.groupby("instant")["distance"]
         low, high = found.min(), found.max()
         axes.fill_between(low.index, low, high, color=colour, alpha=0.18, linewidth=0)
         for (replicate, best), own in groups(rows, ["replicate", "best"]):
@@ -69,20 +69,11 @@ def draw_distances(table: pd.DataFrame) -> Figure:
             elif best:
                 axes.plot(own["instant"], own["distance"], color=colour)
                 at = own[own["instant"] == own["instant"].round()]
-                axes.plot(
-                    at["instant"],
-                    at["distance"],
-                    "o",
-                    color=colour,
-                    mec="white",
-                    markersize=5,
-                    clip_on=False,
-                )
-        refuted = rows[rows["replicate"] != STRAIGHT].groupby("replicate")["refuted"].first()
-        axes.set_title(
-            f"{rows['condition'].iloc[0]}: {int(refuted.sum())} of {len(refuted)} refuted",
-            fontsize=7.5,
-        )
+                dots: dict[str, Any] = {"color": colour, "mec": "white", "clip_on": False}
+                axes.plot(at["instant"], at["distance"], "o", markersize=5, **dots)
+        refuted = of_runs.groupby("replicate")["refuted"].first()
+        title = f"{rows['condition'].iloc[0]}: {int(refuted.sum())} of {len(refuted)} refuted"
+        axes.set_title(title, fontsize=7.5)
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     panels[0].set_xlim(0.0, table["instant"].max())
     panels[0].set_ylim(bottom=-0.02 * float(table["distance"].max()))
@@ -91,17 +82,11 @@ def draw_distances(table: pd.DataFrame) -> Figure:
             axes.set_ylabel(f"least distance [{table['length_unit'].iloc[0]}]")
         if k >= len(panels) - columns:
             axes.set_xlabel("sampling step (whole: configurations)")
-    axes, grey = panels[0], style.NEUTRAL
-    axes.plot(
-        [],
-        [],
-        color=grey,
-        marker="o",
-        mec="white",
-        ms=5,
-        label="best replicate, dots: configurations",
-    )
-    axes.fill_between([], [], color=grey, alpha=0.18, linewidth=0, label="range over replicates")
-    axes.plot([], [], ":", color=style.FAINT, label="straight line in link angles")
-    style.legend_below(figure, axes, 3)
+    grey, best = style.NEUTRAL, "best replicate, dots: configurations"
+    keys = [
+        style.key(best, color=grey, marker="o", mec="white", ms=5),
+        Patch(color=grey, alpha=0.18, linewidth=0, label="range over replicates"),
+        style.key("straight line in link angles", linestyle=":", color=style.FAINT),
+    ]
+    style.keys_below(figure, keys)
     return figure

@@ -1,7 +1,4 @@
-"""Link angles of a motion against time, and how fast the links turn (Curkovic et al. 2013, Fig.
-
-9 and Eq. 2).
-"""
+"""Angles and speeds of links during a motion (Curkovic et al. 2013, Fig. 9 and Eq. 2)."""
 
 from typing import Any
 
@@ -9,7 +6,6 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from evoexp.papers.curkovic import link_motions
 from evoexp.report import style
@@ -35,21 +31,16 @@ def joints_table(condition: ConditionResults) -> pd.DataFrame:
     for robot, own in enumerate(limits):
         for link, limit in enumerate(own):
             columns = {"robot": robot, "link": link, "instant": found.instants}
-            columns |= {
-                "angle_deg": found.links[:, robot, link],
-                "turn_deg": np.abs(found.speeds[:, robot, link]),
-            }
-            parts.append(pd.DataFrame(columns).assign(limit_deg=limit))
+            columns |= {"angle_deg": found.links[:, robot, link]}
+            columns |= {"turn_deg": np.abs(found.speeds[:, robot, link]), "limit_deg": limit}
+            parts.append(pd.DataFrame(columns))
     table = rounded(pd.concat(parts, ignore_index=True))
     table.insert(3, "at_configuration", table["instant"] == table["instant"].round())
     return table
 
 
 def draw_joints(table: pd.DataFrame) -> Figure:
-    """Draw link angles in their range.
-
-    And beside them the turn per sampling step with its limit.
-    """
+    """Draw link angles in their range, and beside them turns per sampling step with limits."""
     robots = sorted(table["robot"].unique())
     figure = style.figure(1.9 * len(robots) + 1.0)
     panels = figure.subplots(len(robots), 2, sharex=True, squeeze=False)
@@ -62,30 +53,14 @@ def draw_joints(table: pd.DataFrame) -> Figure:
     for axes in panels[-1]:
         axes.set_xlabel("sampling step (whole numbers: configurations)")
         axes.set_xlim(-0.05, table["instant"].max() + 0.05)
-    grey = style.NEUTRAL
-    handles = [
-        *(Line2D([], [], color=grey, linestyle=KINDS[k], label=f"link {k + 1}") for k in range(2)),
-        Line2D(
-            [],
-            [],
-            color=grey,
-            marker="o",
-            mec="white",
-            linestyle="none",
-            ms=5,
-            label="configurations",
-        ),
-        Line2D([], [], color=style.FORBIDDEN, linewidth=0.9, label="range [0, 180°]"),
-        Line2D(
-            [],
-            [],
-            color=style.FORBIDDEN,
-            linewidth=1.2,
-            linestyle=":",
-            label="limit of a link, Eq. 2",
-        ),
+    grey, red = style.NEUTRAL, style.FORBIDDEN
+    keys = [
+        *(style.key(f"link {k + 1}", color=grey, linestyle=kind) for k, kind in enumerate(KINDS)),
+        style.key("configurations", color=grey, marker="o", mec="white", linestyle="none", ms=5),
+        style.key("range [0, 180°]", color=red, linewidth=0.9),
+        style.key("limit of a link, Eq. 2", color=red, linewidth=1.2, linestyle=":"),
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    style.keys_below(figure, keys)
     return figure
 
 
@@ -100,15 +75,8 @@ def _robot(angles: Axes, turns: Axes, table: pd.DataFrame, colour: str) -> None:
         angles.plot(rows["instant"], rows["angle_deg"], color=colour, linestyle=kind)
         turns.plot(rows["instant"], rows["turn_deg"], color=colour, linestyle=kind)
         at = rows[rows["at_configuration"]]
-        angles.plot(
-            at["instant"],
-            at["angle_deg"],
-            "o",
-            color=colour,
-            mec="white",
-            markersize=5,
-            clip_on=False,
-        )
+        dots: dict[str, Any] = {"color": colour, "mec": "white", "clip_on": False}
+        angles.plot(at["instant"], at["angle_deg"], "o", markersize=5, **dots)
         limit = float(rows["limit_deg"].iloc[0])
         turns.axhline(limit, color=style.FORBIDDEN, linewidth=1.2, linestyle=":")
         beside: dict[str, Any] = {"xycoords": turns.get_yaxis_transform(), "fontsize": 6.5}

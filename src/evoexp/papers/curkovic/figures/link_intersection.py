@@ -1,7 +1,4 @@
-"""The intersection test of two links at one configuration (Curkovic et al. 2013, Fig. 7, Eqs.
-
-11 and 12).
-"""
+"""The test of two links for an intersection (Curkovic et al. 2013, Fig. 7, Eqs. 11 and 12)."""
 
 from typing import Any
 
@@ -12,6 +9,8 @@ from matplotlib.patches import Arc
 
 from evoexp.collision.models.link_crossings import closed_form
 from evoexp.numeric.elementary import DEGREE
+from evoexp.papers.curkovic import link_motions
+from evoexp.planners.coevolution.planner import Problem
 from evoexp.report import style
 from evoexp.report.results import ConditionResults
 from evoexp.report.rows import records, rounded
@@ -29,9 +28,8 @@ def intersection_table(condition: ConditionResults) -> pd.DataFrame:
         y_end [length unit], angle_deg (of a link from +x), mu, nu (where P lies on b and on d),
         instant, crossing, length_unit.
     """
-    prepared = condition.prepared
-    problem = prepared.problem
-    one, two = problem.collision.arms
+    problem = condition.problem(Problem)
+    one, two = link_motions.arms(condition.prepared)
     steps = np.linspace(0.0, 1.0, SAMPLES + 1)[:, None, None]
     links = (1.0 - steps) * problem.start + steps * problem.goal  # (samples, robots, 2)
     found = closed_form(one, links[:, 0].T, two, links[:, 1].T)
@@ -60,10 +58,7 @@ def intersection_table(condition: ConditionResults) -> pd.DataFrame:
 
 
 def draw_intersection(table: pd.DataFrame) -> Figure:
-    """Draw the links as the paper's vectors, their angles.
-
-    The bases' distance and the intersection.
-    """
+    """Draw the links as the paper's vectors, their angles, the bases' distance, the crossing."""
     figure = style.figure(4.3, 5.4)
     axes = figure.subplots()
     style.operational_axes(axes, table["length_unit"].iloc[0])

@@ -1,7 +1,4 @@
-"""Methods side by side: convergence with a band above, box plot below (Curkovic et al. 2013, Fig.
-
-6).
-"""
+"""Methods side by side (Curkovic et al. 2013, Fig. 6): convergence above, boxes below."""
 
 import numpy as np
 import pandas as pd

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from evoexp.evolution.pareto import pareto_front
 from evoexp.records import FrontRow
@@ -23,7 +22,7 @@ FRONT, DOMINATED = (
 
 
 def fronts_table(fronts: Sequence[FrontRow], replicate: int, length_unit: str) -> pd.DataFrame:
-    """Return what every individual of every population is worth.
+    """Return the criteria of every individual of every population.
 
     Args:
         fronts: One record per population, of one generation of a replicate.
@@ -50,23 +49,10 @@ def fronts_table(fronts: Sequence[FrontRow], replicate: int, length_unit: str) -
 
 
 def draw_fronts(table: pd.DataFrame) -> Figure:
-    """Draw all pairs of criteria, populations by marker.
-
-    Non-dominated individuals above the others.
-    """
+    """Draw all pairs of criteria; each population has its marker, each front its colour."""
     unit = table["length_unit"].iloc[0]
-    names = dict(
-        zip(
-            CRITERIA,
-            (
-                "C₁ [collisions]",
-                f"C₂ path [{unit}]",
-                "C₃ rotation [rad]",
-                f"C₄ unevenness [{unit}]",
-            ),
-            strict=True,
-        )
-    )
+    words = "C₁ [collisions]", f"C₂ path [{unit}]", "C₃ rotation [rad]", f"C₄ unevenness [{unit}]"
+    names = dict(zip(CRITERIA, words, strict=True))
     figure = style.figure(4.9)
     panels = figure.subplots(2, 3)
     for axes, (x, y) in zip(panels.ravel(), combinations(CRITERIA, 2), strict=True):
@@ -88,21 +74,14 @@ def draw_fronts(table: pd.DataFrame) -> Figure:
             axes.set_xlim(left=-0.2)
         else:
             axes.xaxis.set_major_locator(style.few_ticks())
-    handles = [
-        Line2D(
-            [],
-            [],
-            color=colour,
-            marker=MARKERS[int(population) % len(MARKERS)],
-            linestyle="none",
-            ms=4,
-            label=text,
-        )
-        for population, rows in groups(table, "population")
-        for colour, text in (
-            (FRONT, f"robot {population + 1}: {int(rows['non_dominated'].sum())} non-dominated"),
-            (DOMINATED, f"robot {population + 1}: {int((~rows['non_dominated']).sum())} dominated"),
-        )
-    ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    keys = []
+    for population, rows in groups(table, "population"):
+        own = int(rows["non_dominated"].sum())
+        for colour, word in (
+            (FRONT, f"{own} non-dominated"),
+            (DOMINATED, f"{len(rows) - own} dominated"),
+        ):
+            look = {"color": colour, "marker": MARKERS[int(population) % len(MARKERS)], "ms": 4}
+            keys.append(style.key(f"robot {population + 1}: {word}", linestyle="none", **look))
+    style.keys_below(figure, keys)
     return figure

@@ -15,7 +15,7 @@ from matplotlib.patheffects import withStroke
 from evoexp.condition import Prepared
 from evoexp.papers.curkovic import link_motions
 from evoexp.report import body_contacts, motion_geometry, style
-from evoexp.report.figures.planar_models import draw_arm
+from evoexp.report.figures.arms import draw_arm
 from evoexp.report.results import ConditionResults
 from evoexp.report.rows import groups, records, rounded
 from evoexp.scenarios.obstacles import obstacle_table
@@ -35,9 +35,7 @@ DASHES: Any = (0, (2, 1))
 
 
 def motion_table(condition: ConditionResults) -> pd.DataFrame:
-    """Return the trail of the best replicate's motion.
-
-    And end-effector paths and contacts of all replicates.
+    """Return the trail of the best replicate, and end-effector paths and contacts of all.
 
     Returns:
         Columns element (posture, configuration: links of the best replicate; path: between points
@@ -65,10 +63,7 @@ def motion_table(condition: ConditionResults) -> pd.DataFrame:
 
 
 def draw_motion(table: pd.DataFrame) -> Figure:
-    """Draw the best replicate's motion as a trail of postures.
-
-    And beside it the paths of all replicates.
-    """
+    """Draw the best replicate's motion as a trail of postures, beside it all end-effectors."""
     (left, right), (low, high) = _limits(table)
     figure = style.figure(min(4.6, 3.3 * (high - low) / (right - left)) + 1.0)
     trail, paths = figure.subplots(1, 2, sharex=True, sharey=True)
@@ -94,7 +89,7 @@ def draw_motion(table: pd.DataFrame) -> Figure:
     paths.set_title(f"b  end-effectors, all replicates (n = {path['replicate'].nunique()})")
     trail.set_xlim(left, right)
     trail.set_ylim(low, high)
-    figure.legend(handles=_legend(table, len(contacts)), loc="outside lower center", ncols=4)
+    style.keys_below(figure, _keys(table, len(contacts)), 4)
     return figure
 
 
@@ -108,13 +103,12 @@ def tools_table(conditions: Sequence[ConditionResults]) -> pd.DataFrame:
     parts = []
     for position, c in enumerate(conditions):
         motion = link_motions.executed(c.prepared, c.solutions[c.best_replicate])
-        path, collision = (
-            _path(c.prepared, link_motions.sampled(motion, POINTS)),
-            c.planner.collision,
-        )
-        given = {"condition": c.label, "position": position, "tcp_radius": collision.tcp_radius}
-        path = path.assign(**given, collision_substeps=collision.collision_substeps)
-        parts.append(path.assign(at_configuration=path["instant"] == path["instant"].round()))
+        path = _path(c.prepared, link_motions.sampled(motion, POINTS))
+        model = c.planner.collision
+        given = {"condition": c.label, "position": position, "tcp_radius": model.tcp_radius}
+        given |= {"collision_substeps": model.collision_substeps}
+        at = path["instant"] == path["instant"].round()
+        parts.append(path.assign(**given, at_configuration=at))
     table = rounded(pd.concat(parts, ignore_index=True)).assign(
         length_unit=conditions[0].condition.length_unit
     )
@@ -122,14 +116,9 @@ def tools_table(conditions: Sequence[ConditionResults]) -> pd.DataFrame:
 
 
 def draw_tools(table: pd.DataFrame) -> Figure:
-    """Draw the paths with a circle of the radius at every configuration.
-
-    One panel per number of collision substeps.
-    """
-    radii, tests = (
-        sorted(table["tcp_radius"].unique()),
-        sorted(table["collision_substeps"].unique(), reverse=True),
-    )
+    """Draw the paths with circles at the configurations, a panel per collision substeps."""
+    radii = sorted(table["tcp_radius"].unique())
+    tests = sorted(table["collision_substeps"].unique(), reverse=True)
     unit = table["length_unit"].iloc[0]
     x, y = (table[f"{name}_end"].to_numpy() for name in "xy")
     figure = style.figure(min(4.6, 3.6 * float(np.ptp(y) / np.ptp(x))) + 1.1)
@@ -142,24 +131,12 @@ def draw_tools(table: pd.DataFrame) -> Figure:
             colour = style.condition_colour(radii.index(radius))
             axes.plot(rows["x_end"], rows["y_end"], color=colour)
             for row in records(rows[rows["at_configuration"]]):
-                axes.add_patch(
-                    Circle(
-                        (row.x_end, row.y_end),
-                        radius,
-                        fill=False,
-                        edgecolor=colour,
-                        lw=0.7,
-                        alpha=0.7,
-                    )
-                )
+                look: dict[str, Any] = {"edgecolor": colour, "lw": 0.7, "alpha": 0.7}
+                axes.add_patch(Circle((row.x_end, row.y_end), radius, fill=False, **look))
             _ends(axes, rows)
         for robot, rows in groups(table, "robot"):
-            text: dict[str, Any] = {
-                "xytext": (0, -13),
-                "textcoords": "offset points",
-                "fontsize": 7.5,
-                "ha": "center",
-            }
+            text: dict[str, Any] = {"xytext": (0, -13), "textcoords": "offset points"}
+            text |= {"fontsize": 7.5, "ha": "center"}
             halo = [withStroke(linewidth=2.0, foreground="white")]
             start = (rows["x_end"].iloc[0], rows["y_end"].iloc[0])
             axes.annotate(f"robot {int(robot) + 1}", start, zorder=7, path_effects=halo, **text)
@@ -167,17 +144,15 @@ def draw_tools(table: pd.DataFrame) -> Figure:
             "tested at the configurations" if substeps == 1 else f"tested at {substeps} substeps"
         )
         axes.margins(0.1)
-    handles = [
-        Line2D([], [], color=style.condition_colour(k), label=f"radius {radius:g} {unit}")
+    keys = [
+        style.key(f"radius {radius:g} {unit}", color=style.condition_colour(k))
         for k, radius in enumerate(radii)
     ]
-    figure.legend(
-        handles=[*handles, *_end_handles()], loc="outside lower center", ncols=len(radii) + 2
-    )
+    style.keys_below(figure, [*keys, *_end_keys()])
     return figure
 
 
-def _links(prepared: Prepared, sampled: link_motions.Sampled) -> pd.DataFrame:
+def _links(prepared: Prepared, sampled: link_motions.SampledMotion) -> pd.DataFrame:
     """Return the links of all robots at every sample."""
     assembly = prepared.problem.assembly
     rows = []
@@ -189,7 +164,7 @@ def _links(prepared: Prepared, sampled: link_motions.Sampled) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=LINK).assign(replicate=-1)
 
 
-def _path(prepared: Prepared, sampled: link_motions.Sampled) -> pd.DataFrame:
+def _path(prepared: Prepared, sampled: link_motions.SampledMotion) -> pd.DataFrame:
     """Return the end-effectors at every sample, each row from the one before."""
     links = _links(prepared, sampled)
     tips = links[links["link"] == 1].drop(columns=["x", "y"])
@@ -198,7 +173,7 @@ def _path(prepared: Prepared, sampled: link_motions.Sampled) -> pd.DataFrame:
 
 
 def _contacts(condition: ConditionResults) -> pd.DataFrame:
-    """Return where bodies first touch in the motions that the exact verdict refutes."""
+    """Return the first contacts of bodies in the motions that the exact verdict refutes."""
     rows = []
     for replicate, (instant, pair) in body_contacts.refuted(condition).items():
         x, y = body_contacts.contact(
@@ -209,7 +184,7 @@ def _contacts(condition: ConditionResults) -> pd.DataFrame:
 
 
 def _obstacles(condition: ConditionResults) -> pd.DataFrame:
-    """Return the outlines of what stands around."""
+    """Return the outlines of the obstacles."""
     table = obstacle_table(condition.condition.scenario.obstacles)  # type: ignore[attr-defined]
     rows: list[tuple[Any, ...]] = []
     for k, outline in enumerate(motion_geometry.obstacle_outlines(table)):
@@ -267,44 +242,23 @@ def _limits(table: pd.DataFrame) -> tuple[tuple[float, float], tuple[float, floa
     return found[0], found[1]
 
 
-def _end_handles() -> list[Line2D]:
-    grey = style.NEUTRAL
+def _end_keys() -> list[Line2D]:
+    look: dict[str, Any] = {"linestyle": "none"}
     return [
-        Line2D(
-            [],
-            [],
-            linestyle="none",
-            marker="o",
-            mec=grey,
-            mfc="white",
-            ms=6,
-            label="start of an end-effector",
-        ),
-        Line2D([], [], linestyle="none", marker="x", color=grey, ms=7, mew=1.8, label="its goal"),
+        style.key("start of an end-effector", marker="o", mec=style.NEUTRAL, mfc="white", **look),
+        style.key("its goal", marker="x", color=style.NEUTRAL, ms=7, mew=1.8, **look),
     ]
 
 
-def _legend(table: pd.DataFrame, contacts: int) -> list[Line2D]:
-    grey = style.NEUTRAL
-    handles = [
-        Line2D([], [], color=style.arm_colour(k), linewidth=3, label=f"robot {k + 1}")
-        for k in sorted(table.loc[table["element"] == PATH, "robot"].unique())
+def _keys(table: pd.DataFrame, contacts: int) -> list[Line2D]:
+    grey, red = style.NEUTRAL, style.FORBIDDEN
+    robots = sorted(table.loc[table["element"] == PATH, "robot"].unique())
+    text, cross = f"first contact of bodies (refuted: {contacts})", {"marker": "X", "mec": "white"}
+    contact = style.key(text, linestyle="none", color=red, ms=8, **cross)
+    return [
+        *style.arm_keys(robots, "robot", linewidth=3),
+        style.key("start posture", color=grey, linewidth=2, linestyle=DASHES),
+        style.key("goal posture", color=grey, linewidth=3, marker="o", ms=4),
+        *_end_keys(),
+        *([contact] if contacts else []),
     ]
-    handles.append(Line2D([], [], color=grey, linewidth=2, linestyle=DASHES, label="start posture"))
-    handles.append(Line2D([], [], color=grey, linewidth=3, marker="o", ms=4, label="goal posture"))
-    handles += _end_handles()
-    if contacts:
-        text = f"first contact of bodies (refuted: {contacts})"
-        handles.append(
-            Line2D(
-                [],
-                [],
-                linestyle="none",
-                marker="X",
-                color=style.FORBIDDEN,
-                mec="white",
-                ms=8,
-                label=text,
-            )
-        )
-    return handles

@@ -1,9 +1,5 @@
-"""Drawings of arms in space: their bodies and spheres, two arms with their named points.
+"""Drawings of arms in space: bodies and spheres, named points, motions stage by stage."""
 
-Motions stage by stage.
-"""
-
-import itertools
 from typing import Any
 
 import numpy as np
@@ -12,6 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from evoexp.numeric.elementary import DEGREE, sincos
+from evoexp.papers.rana import motions
 from evoexp.records import FloatArray
 from evoexp.report import motion_geometry, style
 from evoexp.report.results import ConditionResults
@@ -19,29 +16,20 @@ from evoexp.report.rows import groups, records, rounded
 
 STAGES = 5  # panels that a motion is cut into; the sixth holds all of it
 POINT_NAMES = ("p", "q")  # of the arms, as in the paper's Fig. 9
-LINK = ["arm", "link", "x", "y", "z", "x_end", "y_end", "z_end"]
 
 
 def links_table(condition: ConditionResults, q: FloatArray) -> pd.DataFrame:
     """Return all links at every instant of a motion.
 
     Args:
-        condition: Whose robot it is.
+        condition: With the robot.
         q: (nq, instants) [deg].
 
     Returns:
-        Columns instant, arm, link, x, y, z, x_end, y_end, z_end [length unit], length_unit.
+        Columns of `motion_geometry.links_table`, length_unit.
     """
-    rows = [
-        (instant, arm, link, *start[instant], *end[instant])
-        for arm, link, start, end in motion_geometry.joint_positions(
-            condition.prepared.problem.assembly, q
-        )
-        for instant in range(q.shape[1])
-    ]
-    return rounded(pd.DataFrame(rows, columns=["instant", *LINK])).assign(
-        length_unit=condition.condition.length_unit
-    )
+    table = motion_geometry.links_table(motions.problem(condition).assembly, q)
+    return rounded(table).assign(length_unit=condition.condition.length_unit)
 
 
 def arm_table(condition: ConditionResults) -> pd.DataFrame:
@@ -50,12 +38,12 @@ def arm_table(condition: ConditionResults) -> pd.DataFrame:
     Returns:
         Columns of `links_table`, element (link, sphere) and radius; a sphere stands at x, y, z.
     """
-    problem = condition.prepared.problem
+    problem = motions.problem(condition)
     links = links_table(condition, problem.start[:, None])
-    spheres = motion_geometry.sphere_centres(problem.collision, problem.start)[0]
+    spheres = motions.sphere_centres(problem, problem.start)[0]
     first = links[links["arm"] == 0].assign(element="link", radius=np.nan)
     rows = [(0, 0, -1, *centre, *centre) for centre in spheres]
-    added = rounded(pd.DataFrame(rows, columns=["instant", *LINK]))
+    added = rounded(pd.DataFrame(rows, columns=["instant", *motion_geometry.LINK]))
     added = added.assign(
         element="sphere", radius=problem.collision.radius, length_unit=first["length_unit"].iloc[0]
     )
@@ -83,14 +71,14 @@ def draw_arm(table: pd.DataFrame) -> Figure:
 
 
 def two_arms_table(condition: ConditionResults) -> pd.DataFrame:
-    """Return links of all arms at start (instant 0) and goal (instant 1).
+    """Return the links of all arms at start (instant 0) and goal (instant 1), and their reach.
 
-    And how far each reaches around its shoulder.
+    The reach of an arm is the length of its links that move, from its shoulder on.
 
     Returns:
         Columns of `links_table` and reach [length unit].
     """
-    problem = condition.prepared.problem
+    problem = motions.problem(condition)
     table = links_table(condition, np.column_stack([problem.start, problem.goal]))
     lengths = np.sqrt(sum((table[f"{axis}_end"] - table[axis]) ** 2 for axis in "xyz"))
     moving = np.array([link.joint > 0 for link in problem.assembly.links])
@@ -101,10 +89,7 @@ def two_arms_table(condition: ConditionResults) -> pd.DataFrame:
 
 
 def draw_two_arms(table: pd.DataFrame) -> Figure:
-    """Draw the arms at start and goal, and the part of the workspace that they share.
-
-    Seen from above.
-    """
+    """Draw the arms at start and goal, and from above the part of the workspace they share."""
     figure = style.figure(4.3)
     unit = table["length_unit"].iloc[0]
     axes = _space(figure, (1, 2, 1), [table], unit)
@@ -135,31 +120,19 @@ def draw_two_arms(table: pd.DataFrame) -> Figure:
                 linewidth=0,
             )
     style.operational_axes(above, unit)
-    _legend(
-        figure, table, [Line2D([], [], color=style.NEUTRAL, linestyle=(0, (2, 1)), label="goal")]
-    )
+    _legend(figure, table, style.key("goal", color=style.NEUTRAL, linestyle=(0, (2, 1))))
     return figure
 
 
 def snapshots_table(condition: ConditionResults) -> pd.DataFrame:
-    """Return all links at every instant of the best replicate's motion.
-
-    With the stage it belongs to.
+    """Return all links at every instant of the best replicate's motion, stage by stage.
 
     Returns:
-        Columns of `links_table`, stage, first, last (instants of the stage); an instant between two
-        stages belongs to both; the last stage holds all.
+        Columns of `links_table`, stage, first, last (instants of the stage); the last stage holds
+        all instants.
     """
-    q = motion_geometry.configurations(
-        condition.prepared, condition.solutions[condition.best_replicate]
-    )
-    table, last = links_table(condition, q), q.shape[1] - 1
-    cuts = np.unique(np.round(np.linspace(0, last, min(STAGES, last) + 1)).astype(np.int64))
-    parts = [
-        table[table["instant"].between(first, stop)].assign(stage=stage, first=first, last=stop)
-        for stage, (first, stop) in enumerate([*itertools.pairwise(cuts), (0, last)])
-    ]
-    return pd.concat(parts, ignore_index=True)
+    links = links_table(condition, motions.best_motion(condition))
+    return motion_geometry.in_stages(links, STAGES)
 
 
 def draw_snapshots(table: pd.DataFrame) -> Figure:
@@ -187,10 +160,8 @@ def draw_snapshots(table: pd.DataFrame) -> Figure:
                 color=style.arm_colour(arm),
                 linewidth=1.0,
             )
-    dots = Line2D(
-        [], [], color=style.NEUTRAL, linewidth=1.0, linestyle=":", label="trace of the tip"
-    )
-    _legend(figure, table, [dots])
+    dots = style.key("trace of the tip", color=style.NEUTRAL, linewidth=1.0, linestyle=":")
+    _legend(figure, table, dots)
     return figure
 
 
@@ -273,9 +244,7 @@ def _ball(row: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
     return row.x + row.radius * x, row.y + row.radius * y, row.z + row.radius * z
 
 
-def _legend(figure: Figure, table: pd.DataFrame, more: list[Line2D]) -> None:
-    arms = [
-        Line2D([], [], color=style.arm_colour(arm), linewidth=2.4, label=f"arm {arm + 1}")
-        for arm in sorted(table["arm"].unique())
-    ]
-    figure.legend(handles=[*arms, *more], loc="outside lower center", ncols=len(arms) + len(more))
+def _legend(figure: Figure, table: pd.DataFrame, more: Line2D) -> None:
+    """Put the arms and one more entry into a legend below."""
+    arms = style.arm_keys(sorted(table["arm"].unique()), linewidth=2.4)
+    style.keys_below(figure, [*arms, more])

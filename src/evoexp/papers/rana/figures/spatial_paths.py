@@ -5,14 +5,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
+from evoexp.papers.rana import motions
 from evoexp.records import FloatArray
 from evoexp.report import motion_geometry, style
 from evoexp.report.results import ConditionResults
 from evoexp.report.rows import groups, rounded
 
-BEST, OTHERS, STRAIGHT = "best replicate", "replicate", "straight line"
+BEST = "best replicate"
 
 
 def paths_table(condition: ConditionResults) -> pd.DataFrame:
@@ -23,18 +23,8 @@ def paths_table(condition: ConditionResults) -> pd.DataFrame:
         instant, x, y, z (of the tip [length unit]), joint_1_deg, joint_2_deg, … (NaN where an arm
         has fewer joints), length_unit.
     """
-    series = {
-        k: (BEST if k == condition.best_replicate else OTHERS, s)
-        for k, s in condition.solutions.items()
-    }
-    series[-1] = (STRAIGHT, motion_geometry.straight_line(condition.prepared))
-    parts = [
-        _path(condition, solution).assign(series=name, replicate=k)
-        for k, (name, solution) in series.items()
-    ]
-    return rounded(pd.concat(parts, ignore_index=True)).assign(
-        length_unit=condition.condition.length_unit
-    )
+    table = rounded(motions.paths_table(condition, _path, BEST))
+    return table.assign(length_unit=condition.condition.length_unit)
 
 
 def draw_configuration_space(table: pd.DataFrame) -> Figure:
@@ -44,10 +34,11 @@ def draw_configuration_space(table: pd.DataFrame) -> Figure:
     for k, arm in enumerate(arms):
         axes: Any = figure.add_subplot(1, len(arms), k + 1, projection="3d")
         rows = table[table["arm"] == arm]
-        _curves(axes, rows, [f"joint_{j}_deg" for j in (1, 2, 3)], arm)
+        columns = [f"joint_{j}_deg" for j in (1, 2, 3)]
+        motions.draw_paths(axes, rows, columns, BEST, style.arm_colour(arm))
         labels = [f"{style.joint_symbol(arm, j)} [deg]" for j in range(3)]
         _label(axes, labels, f"arm {arm + 1}")
-    _legend(figure, table)
+    style.keys_below(figure, motions.path_keys(table))
     return figure
 
 
@@ -57,22 +48,18 @@ def draw_operational_space(table: pd.DataFrame) -> Figure:
     figure = style.figure(4.2, 5.6)
     axes: Any = figure.add_subplot(projection="3d")
     for arm, rows in groups(table, "arm"):
-        _curves(axes, rows, ["x", "y", "z"], arm)
+        motions.draw_paths(axes, rows, ["x", "y", "z"], BEST, style.arm_colour(arm))
     _label(axes, [f"{name} [{unit}]" for name in "xyz"], "")
     spans = [float(np.ptp(table[name])) for name in "xyz"]
     axes.set_box_aspect([max(span, 0.15 * max(spans)) for span in spans], zoom=1.1)
-    arms = sorted(table["arm"].unique())
-    _legend(
-        figure,
-        table,
-        [Line2D([], [], color=style.arm_colour(a), lw=2.2, label=f"arm {a + 1}") for a in arms],
-    )
+    arms = style.arm_keys(sorted(table["arm"].unique()), lw=2.2)
+    style.keys_below(figure, [*arms, *motions.path_keys(table)], 4)
     return figure
 
 
 def _path(condition: ConditionResults, solution: FloatArray) -> pd.DataFrame:
     """Return one solution's joint angles and tips."""
-    problem = condition.prepared.problem
+    problem = motions.problem(condition)
     q = motion_geometry.configurations(condition.prepared, solution)
     tips = {
         arm: end for arm, _, _, end in motion_geometry.joint_positions(problem.assembly, q)
@@ -86,34 +73,6 @@ def _path(condition: ConditionResults, solution: FloatArray) -> pd.DataFrame:
     return pd.concat(frames, ignore_index=True)
 
 
-def _curves(axes: Any, rows: pd.DataFrame, names: list[str], arm: int) -> None:
-    colour = style.arm_colour(arm)
-    for (series, _), path in groups(rows, ["series", "replicate"]):
-        points = [path[name].to_numpy() for name in names]
-        if series == BEST:
-            axes.plot(*points, color=colour, linewidth=1.8, marker="o", markersize=2.4, zorder=4)
-            axes.plot(
-                *(p[:1] for p in points),
-                "s",
-                color="white",
-                markeredgecolor=style.NEUTRAL,
-                ms=6,
-                zorder=5,
-            )
-            axes.plot(
-                *(p[-1:] for p in points),
-                "*",
-                color="white",
-                markeredgecolor=style.NEUTRAL,
-                ms=10,
-                zorder=5,
-            )
-        elif series == STRAIGHT:
-            axes.plot(*points, ":", color=style.NEUTRAL, linewidth=1.1)
-        else:
-            axes.plot(*points, color=colour, linewidth=0.8, alpha=0.3)
-
-
 def _label(axes: Any, labels: list[str], title: str) -> None:
     axes.set_xlabel(labels[0], labelpad=-2)
     axes.set_ylabel(labels[1], labelpad=-2)
@@ -124,24 +83,3 @@ def _label(axes: Any, labels: list[str], title: str) -> None:
         axis.set_major_locator(style.few_ticks())
     axes.view_init(elev=24.0, azim=-50.0)
     axes.set_box_aspect(None, zoom=0.82)
-
-
-def _legend(figure: Figure, table: pd.DataFrame, more: list[Line2D] | None = None) -> None:
-    count, grey = table.loc[table["replicate"] >= 0, "replicate"].nunique(), style.NEUTRAL
-    handles = [
-        *(more or []),
-        Line2D(
-            [],
-            [],
-            color=grey,
-            linewidth=1.8,
-            marker="o",
-            ms=3,
-            label="best replicate, its via-points",
-        ),
-        Line2D([], [], color=grey, linewidth=0.8, alpha=0.4, label=f"all replicates (n = {count})"),
-        Line2D([], [], color=grey, linewidth=1.1, linestyle=":", label=STRAIGHT),
-        Line2D([], [], color="none", marker="s", mec=grey, mfc="white", ms=6, label="start"),
-        Line2D([], [], color="none", marker="*", mec=grey, mfc="white", ms=10, label="goal"),
-    ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=4 if more else 5)

@@ -1,12 +1,11 @@
 """The page of planar arms with two joints each: convergence, snapshots, paths, distances."""
 
-import re
-from collections.abc import Iterator
 from functools import partial
 
 import pandas as pd
 
-from evoexp.report.figures import planar_motion
+from evoexp.papers.rana.figures import planar_motion
+from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.report.page import Drawing, Page
 from evoexp.report.pages import generic
 from evoexp.report.report_settings import ReportSettings
@@ -25,32 +24,26 @@ DISTANCES = (
 
 
 def page(results: Results, settings: ReportSettings) -> Page:
-    """Return the page; without the drawings of what is not planar."""
+    """Build the page of planar arms, or the generic page if no robot is drawable."""
+    shown = [(c, suffix) for c, suffix in results.suffixed if drawable(c)]
+    if not shown:
+        return generic.page(results, settings)
     base = generic.basis(results, settings)
     drawings = list(base.drawings)
-    for condition, suffix in suffixed(results):
-        if not drawable(condition):
-            continue
+    for condition, suffix in shown:
         drawings += motion_drawings(condition, suffix)
-        if condition.prepared.problem.assembly.num_arms > 1:
+        if condition.problem(Problem).assembly.num_arms > 1:
             sampled = planar_motion.sampled_distances(condition, settings.samples_per_segment)
             drawings.append(distances_drawing(condition, suffix, sampled))
     return base._replace(drawings=tuple(drawings))
 
 
 def drawable(condition: ConditionResults) -> bool:
-    """Whether a condition's robot moves in a plane, its arms having two joints each."""
-    assembly = getattr(condition.prepared.problem, "assembly", None)
-    if assembly is None or not assembly.table.planar:
+    """Return whether a condition's arms move in a plane and have two joints each."""
+    problem = condition.prepared.problem
+    if not isinstance(problem, Problem) or not problem.assembly.table.planar:
         return False
-    return all(stop - first == 2 for first, stop in assembly.arm_slices)
-
-
-def suffixed(results: Results) -> Iterator[tuple[ConditionResults, str]]:
-    """Yield the conditions whose motions are drawn, each with what tells its files apart."""
-    for k, condition in enumerate(results.main):
-        slug = re.sub(r"[^a-z0-9]+", "_", condition.label.lower()).strip("_") or str(k)
-        yield condition, "" if len(results.main) == 1 else f"_{k + 1}_{slug}"
+    return all(stop - first == 2 for first, stop in problem.arm_slices)
 
 
 def motion_drawings(condition: ConditionResults, suffix: str) -> list[Drawing]:

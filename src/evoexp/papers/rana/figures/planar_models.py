@@ -1,7 +1,4 @@
-"""Model drawings of planar arms.
-
-The arms and their angles, via-points, links as touching circles.
-"""
+"""Drawings of the model of planar arms: their angles, via-points, links as touching circles."""
 
 from typing import Any
 
@@ -9,16 +6,18 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Arc, Circle
 from matplotlib.patheffects import withStroke
 
 from evoexp.numeric.elementary import DEGREE, sincos
+from evoexp.papers.rana import motions
 from evoexp.records import FloatArray
 from evoexp.report import motion_geometry, style
+from evoexp.report.figures.arms import draw_arm
 from evoexp.report.results import ConditionResults
 from evoexp.report.rows import groups, records, rounded
 
+ANGLES = ["joint_1_deg", "joint_2_deg"]
 NUMBERED = 5  # every fifth via-point carries its number
 
 
@@ -29,7 +28,7 @@ def arms_table(condition: ConditionResults) -> pd.DataFrame:
         Columns posture, arm, joint, x, y, x_end, y_end [length unit], reference_deg (the direction
         an angle is measured from), angle_deg, length_unit.
     """
-    problem = condition.prepared.problem
+    problem = motions.problem(condition)
     rows = []
     for posture, q in (("start", problem.start), ("goal", problem.goal)):
         for arm, joint, start, end in motion_geometry.joint_positions(problem.assembly, q[:, None]):
@@ -59,27 +58,18 @@ def draw_arms(table: pd.DataFrame) -> Figure:
         axes.annotate(
             f"arm {row.arm + 1}", (row.x, row.y), color=style.arm_colour(row.arm), **below
         )
-    handles = [
-        Line2D([], [], color=style.NEUTRAL, linewidth=3, marker="o", markersize=4, label="start"),
-        Line2D(
-            [],
-            [],
-            color=style.NEUTRAL,
-            linewidth=2,
-            alpha=0.35,
-            linestyle=(0, (2, 1)),
-            label="goal",
-        ),
-    ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=2)
+    grey = style.NEUTRAL
+    start = style.key("start", color=grey, linewidth=3, marker="o", markersize=4)
+    goal = style.key("goal", color=grey, linewidth=2, alpha=0.35, linestyle=(0, (2, 1)))
+    style.keys_below(figure, [start, goal])
     axes.margins(0.12)
     return figure
 
 
 def via_points_table(condition: ConditionResults) -> pd.DataFrame:
-    """Return via-points of the best replicate.
+    """Return the via-points of the best replicate, at the beginning and at the end.
 
-    The best of its initial population, and its final best.
+    At the beginning: the best individual of the initial population.
 
     Returns:
         Columns stage, arm, instant, joint_1_deg, joint_2_deg.
@@ -115,19 +105,12 @@ def draw_via_points(table: pd.DataFrame) -> Figure:
             if final:
                 _numbers(axes, x, y, rows["instant"].to_numpy())
         axes.margins(0.1)
-    handles = [
-        Line2D([], [], color=style.FAINT, linewidth=0.9, marker="s", markersize=3, label=stages[0]),
-        Line2D(
-            [],
-            [],
-            color=style.NEUTRAL,
-            linewidth=0.9,
-            marker="o",
-            markersize=4,
-            label=f"{stages[-1]} (numbers: instants)",
-        ),
+    first, last = stages[0], f"{stages[-1]} (numbers: instants)"
+    keys = [
+        style.key(first, color=style.FAINT, linewidth=0.9, marker="s", markersize=3),
+        style.key(last, color=style.NEUTRAL, linewidth=0.9, marker="o", markersize=4),
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=2)
+    style.keys_below(figure, keys)
     return figure
 
 
@@ -138,22 +121,20 @@ def circles_table(condition: ConditionResults) -> pd.DataFrame:
         Columns element (link, circle, centres, bodies), arm, x, y, x_end, y_end, radius, distance
         [length unit], safety_distance, instant, length_unit.
     """
-    problem = condition.prepared.problem
-    q = motion_geometry.configurations(
-        condition.prepared, condition.solutions[condition.best_replicate]
-    )
-    instant = int(np.argmin(motion_geometry.centre_distances(problem, q)))
+    problem = motions.problem(condition)
+    q = motions.best_motion(condition)
+    instant = int(np.argmin(motions.centre_distances(problem, q)))
     at = q[:, instant]
     rows: list[tuple[object, ...]] = [
         ("link", arm, *start[0, :2], *end[0, :2], np.nan, np.nan)
         for arm, _, start, end in motion_geometry.joint_positions(problem.assembly, at[:, None])
     ]
-    centres = motion_geometry.sphere_centres(problem.collision, at)
+    centres = motions.sphere_centres(problem, at)
     for arm, points in enumerate(centres):
         rows += [("circle", arm, *p[:2], *p[:2], problem.collision.radius, np.nan) for p in points]
     a, b = _closest(centres)
     rows.append(("centres", -1, *a[:2], *b[:2], np.nan, float(np.linalg.norm(a - b))))
-    nearest = motion_geometry.LinkDistance(problem.assembly).nearest(at)
+    nearest = motion_geometry.link_distance(problem.assembly).nearest(DEGREE * at)
     rows.append(
         ("bodies", -1, *nearest.points[0, :2], *nearest.points[1, :2], np.nan, nearest.distance)
     )
@@ -194,20 +175,10 @@ def draw_circles(table: pd.DataFrame) -> Figure:
         )
         axes.plot([row.x, row.x_end], [row.y, row.y_end], zorder=6, label=label, **look)
     safety = table["safety_distance"].iloc[0]
-    axes.plot(
-        [],
-        [],
-        "o",
-        color=style.FAINT,
-        fillstyle="none",
-        label=f"circles of radius r = {radius:g} {unit}",
-    )
-    axes.plot(
-        [],
-        [],
-        " ",
-        label=f"collision below 2r = {2 * radius:g} {unit}; safety distance {safety:g} {unit}",
-    )
+    circles = f"circles of radius r = {radius:g} {unit}"
+    axes.plot([], [], "o", color=style.FAINT, fillstyle="none", label=circles)
+    collision = f"collision below 2r = {2 * radius:g} {unit}; safety distance {safety:g} {unit}"
+    axes.plot([], [], " ", label=collision)
     axes.set_title(f"instant {int(table['instant'].iloc[0])}")
     axes.margins(0.08)
     style.legend_below(figure, axes, 1)
@@ -216,46 +187,13 @@ def draw_circles(table: pd.DataFrame) -> Figure:
 
 def path_table(condition: ConditionResults, solution: FloatArray) -> pd.DataFrame:
     """Return a solution's via-points per arm: columns arm, instant, joint_1_deg, joint_2_deg."""
-    problem = condition.prepared.problem
-    shapes = condition.prepared.planner.shape(problem)
-    parts = np.split(solution, np.cumsum([rows * joints for rows, joints in shapes])[:-1])
     frames = []
-    for arm, (values, shape) in enumerate(zip(parts, shapes, strict=True)):
-        points = values.reshape(shape)
-        columns = {"arm": arm, "instant": np.arange(shape[0])}
-        frames.append(
-            pd.DataFrame(columns | {"joint_1_deg": points[:, 0], "joint_2_deg": points[:, 1]})
-        )
+    shape = condition.planner.shape(motions.problem(condition))
+    parts = np.split(solution, np.cumsum([rows * joints for rows, joints in shape])[:-1])
+    for arm, (values, (rows, joints)) in enumerate(zip(parts, shape, strict=True)):
+        angles = pd.DataFrame(values.reshape(rows, joints)).set_axis(ANGLES, axis="columns")
+        frames.append(pd.DataFrame({"arm": arm, "instant": range(rows)}).join(angles))
     return pd.concat(frames, ignore_index=True)
-
-
-def draw_arm(
-    axes: Axes, arm: int, rows: pd.DataFrame, *, alpha: float = 1.0, dashed: bool = False
-) -> None:
-    """Draw an arm's links, given by rows with x, y, x_end, y_end in order."""
-    x = [*rows["x"], rows["x_end"].iloc[-1]]
-    y = [*rows["y"], rows["y_end"].iloc[-1]]
-    kind = (0, (2, 1)) if dashed else "-"
-    axes.plot(
-        x,
-        y,
-        linestyle=kind,
-        color=style.arm_colour(arm),
-        linewidth=2 if dashed else 3,
-        alpha=alpha,
-        zorder=3 + dashed,
-    )
-    axes.plot(
-        x[:-1],
-        y[:-1],
-        "o",
-        color="white",
-        markeredgecolor=style.arm_colour(arm),
-        alpha=alpha,
-        zorder=4,
-        ms=5,
-    )
-    axes.plot(x[-1], y[-1], "o", color=style.arm_colour(arm), alpha=alpha, markersize=4, zorder=4)
 
 
 def _base(axes: Axes, x: float, y: float) -> None:

@@ -8,18 +8,22 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
+from evoexp.numeric.elementary import DEGREE
+from evoexp.papers.rana import motions
+from evoexp.papers.rana.figures.planar_models import path_table
+from evoexp.papers.rana.motions import STRAIGHT
 from evoexp.records import FloatArray
 from evoexp.report import motion_geometry, style
-from evoexp.report.figures.planar_models import draw_arm, path_table
+from evoexp.report.figures.arms import draw_arm
 from evoexp.report.results import ConditionResults
 from evoexp.report.rows import groups, rounded
+from evoexp.scenarios.obstacles import obstacle_table
 
 STAGES = 5  # panels that a motion is cut into; the sixth holds all of it
 CENTRES, LINKS = "circle centres", "links"
-BEST, AT_VIA_POINTS, STRAIGHT = "best replicate", "best replicate, at via-points", "straight line"
+BEST, AT_VIA_POINTS = "best replicate", "best replicate, at via-points"
 CLOSEST, REFUTED = (
     "closest over the whole motion, every replicate (exact)",
     "refuted: first contact of bodies",
@@ -36,29 +40,22 @@ def snapshots_table(condition: ConditionResults) -> pd.DataFrame:
         holds all. Obstacles are rows of stage −1: arm is −1, link the obstacle, one row per edge of
         its outline.
     """
-    problem = condition.prepared.problem
-    q = motion_geometry.configurations(
-        condition.prepared, condition.solutions[condition.best_replicate]
-    )
-    last = q.shape[1] - 1
-    cuts = np.unique(np.round(np.linspace(0, last, min(STAGES, last) + 1)).astype(np.int64))
-    stages = [*itertools.pairwise(cuts), (0, last)]
-    links = list(motion_geometry.joint_positions(problem.assembly, q))
-    rows = []
-    for stage, (first, stop) in enumerate(stages):
-        for instant in range(first, stop + 1):
-            for arm, link, start, end in links:
-                place = (*start[instant, :2], *end[instant, :2])
-                rows.append((stage, first, stop, instant, arm, link, *place))
-    reach = 2.0 * max(float(np.abs(end - start).sum(axis=1).max()) for _, _, start, end in links)
-    for k, outline in enumerate(
-        motion_geometry.obstacle_outlines(problem.collision.obstacles, reach)
-    ):
-        rows += [(-1, 0, last, 0, -1, k, *a, *b) for a, b in itertools.pairwise(outline)]
+    problem = motions.problem(condition)
+    links = motion_geometry.links_table(problem.assembly, motions.best_motion(condition))
+    table = motion_geometry.in_stages(links.sort_values("instant", kind="stable"), STAGES)
+    spans = (links["x_end"] - links["x"]).abs() + (links["y_end"] - links["y"]).abs()
+    spans += (links["z_end"] - links["z"]).abs()
+    obstacles = obstacle_table(condition.condition.scenario.obstacles)  # type: ignore[attr-defined]
+    outlines = motion_geometry.obstacle_outlines(obstacles, 2.0 * float(spans.max()))
+    last = int(links["instant"].max())
+    rows = [
+        (-1, 0, last, 0, -1, k, *a, *b)
+        for k, outline in enumerate(outlines)
+        for a, b in itertools.pairwise(outline)
+    ]
     names = ["stage", "first", "last", "instant", "arm", "link", "x", "y", "x_end", "y_end"]
-    return rounded(pd.DataFrame(rows, columns=names)).assign(
-        length_unit=condition.condition.length_unit
-    )
+    found = pd.concat([table[names], pd.DataFrame(rows, columns=names)]) if rows else table[names]
+    return rounded(found.reset_index(drop=True)).assign(length_unit=condition.condition.length_unit)
 
 
 def draw_snapshots(table: pd.DataFrame) -> Figure:
@@ -92,35 +89,13 @@ def draw_snapshots(table: pd.DataFrame) -> Figure:
     panels[0, 0].set_xlim(left, right)
     panels[0, 0].set_ylim(low, high)
     arms = sorted(table["arm"].unique())
-    handles = [
-        Line2D([], [], color=style.arm_colour(a), linewidth=3, label=f"arm {a + 1}") for a in arms
+    keys = [
+        *style.arm_keys(arms, linewidth=3),
+        style.key("first instant of a panel", color=style.FAINT, lw=1.4, linestyle=(0, (2, 1))),
+        style.key("last instant of a panel", color=style.NEUTRAL, linewidth=3, marker="o", ms=4),
+        style.key("trace of the tip", color=style.NEUTRAL, linewidth=0.8, linestyle=":"),
     ]
-    dashes = (0, (2, 1))
-    handles.append(
-        Line2D(
-            [],
-            [],
-            color=style.FAINT,
-            linewidth=1.4,
-            linestyle=dashes,
-            label="first instant of a panel",
-        )
-    )
-    handles.append(
-        Line2D(
-            [],
-            [],
-            color=style.NEUTRAL,
-            linewidth=3,
-            marker="o",
-            ms=4,
-            label="last instant of a panel",
-        )
-    )
-    handles.append(
-        Line2D([], [], color=style.NEUTRAL, linewidth=0.8, linestyle=":", label="trace of the tip")
-    )
-    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    style.keys_below(figure, keys, 3)
     return figure
 
 
@@ -131,13 +106,7 @@ def paths_table(condition: ConditionResults) -> pd.DataFrame:
         Columns series (replicate, best, straight line), replicate (−1: none), arm, instant,
         joint_1_deg, joint_2_deg.
     """
-    parts = []
-    for replicate, solution in condition.solutions.items():
-        series = "best" if replicate == condition.best_replicate else "replicate"
-        parts.append(path_table(condition, solution).assign(series=series, replicate=replicate))
-    straight = motion_geometry.straight_line(condition.prepared)
-    parts.append(path_table(condition, straight).assign(series=STRAIGHT, replicate=-1))
-    return pd.concat(parts, ignore_index=True)
+    return motions.paths_table(condition, path_table, "best")
 
 
 def draw_paths(table: pd.DataFrame) -> Figure:
@@ -147,52 +116,10 @@ def draw_paths(table: pd.DataFrame) -> Figure:
     planes = figure.subplots(1, len(arms), squeeze=False)[0]
     for axes, arm in zip(planes, arms, strict=True):
         style.configuration_axes(axes, arm)
-        colour = style.arm_colour(arm)
-        for (series, _), rows in groups(table[table["arm"] == arm], ["series", "replicate"]):
-            x, y = rows["joint_1_deg"].to_numpy(), rows["joint_2_deg"].to_numpy()
-            if series == "best":
-                axes.plot(x, y, color=colour, linewidth=1.8, marker="o", markersize=3, zorder=4)
-                axes.plot(
-                    x[0],
-                    y[0],
-                    "s",
-                    color="white",
-                    markeredgecolor=style.NEUTRAL,
-                    markersize=7,
-                    zorder=5,
-                )
-                axes.plot(
-                    x[-1],
-                    y[-1],
-                    "*",
-                    color="white",
-                    markeredgecolor=style.NEUTRAL,
-                    markersize=11,
-                    zorder=5,
-                )
-            elif series == STRAIGHT:
-                axes.plot(x, y, ":", color=style.NEUTRAL, linewidth=1.1, zorder=3)
-            else:
-                axes.plot(x, y, color=colour, linewidth=0.8, alpha=0.3)
+        rows, colour = table[table["arm"] == arm], style.arm_colour(arm)
+        motions.draw_paths(axes, rows, ["joint_1_deg", "joint_2_deg"], "best", colour)
         axes.margins(0.08)
-    count = table.loc[table["replicate"] >= 0, "replicate"].nunique()
-    grey = style.NEUTRAL
-    handles = [
-        Line2D(
-            [],
-            [],
-            color=grey,
-            linewidth=1.8,
-            marker="o",
-            ms=3,
-            label="best replicate, its via-points",
-        ),
-        Line2D([], [], color=grey, linewidth=0.8, alpha=0.4, label=f"all replicates (n = {count})"),
-        Line2D([], [], color=grey, linewidth=1.1, linestyle=":", label=STRAIGHT),
-        Line2D([], [], color="none", marker="s", mec=grey, mfc="white", ms=7, label="start"),
-        Line2D([], [], color="none", marker="*", mec=grey, mfc="white", ms=11, label="goal"),
-    ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+    style.keys_below(figure, motions.path_keys(table))
     return figure
 
 
@@ -207,19 +134,18 @@ def sampled_distances(condition: ConditionResults, samples: int) -> pd.DataFrame
         Columns replicate (−1: the straight line), instant (a fraction between via-points), centres
         and links: least distances of circle centres and of the links themselves [length unit].
     """
-    prepared = condition.prepared
-    links = motion_geometry.LinkDistance(prepared.problem.assembly)
-    solutions = {-1: motion_geometry.straight_line(prepared), **condition.solutions}
+    problem = motions.problem(condition)
+    links = motion_geometry.link_distance(problem.assembly)
     parts = []
-    for replicate, solution in solutions.items():
-        instants, q = motion_geometry.dense(
-            motion_geometry.configurations(prepared, solution), samples
-        )
-        distances = {
-            "centres": motion_geometry.centre_distances(prepared.problem, q),
-            "links": links(q),
-        }
-        parts.append(pd.DataFrame({"replicate": replicate, "instant": instants, **distances}))
+    for replicate, solution in {
+        -1: motions.straight_line(condition),
+        **condition.solutions,
+    }.items():
+        path = motion_geometry.configurations(condition.prepared, solution)
+        instants, q = motion_geometry.dense(path, samples)
+        columns = {"replicate": replicate, "instant": instants}
+        columns |= {"centres": motions.centre_distances(problem, q), "links": links(DEGREE * q)}
+        parts.append(pd.DataFrame(columns))
     return rounded(pd.concat(parts, ignore_index=True))
 
 
@@ -247,23 +173,15 @@ def distances_table(condition: ConditionResults, sampled: pd.DataFrame) -> pd.Da
             (HIGHEST, every[column].max()),
             (STRAIGHT, straight.set_index("instant")[column]),
         ):
-            columns = {
-                "measure": measure,
-                "series": series,
-                "instant": values.index,
-                "distance": values.to_numpy(),
-            }
-            parts.append(pd.DataFrame(columns))
+            columns = {"measure": measure, "series": series, "instant": values.index}
+            parts.append(pd.DataFrame(columns | {"distance": values.to_numpy()}))
     margin = condition.condition.scenario.security_margin  # type: ignore[attr-defined]
     table = rounded(pd.concat([*parts, *_exact(condition)], ignore_index=True))
     return table.assign(safety_distance=margin, length_unit=condition.condition.length_unit)
 
 
 def _exact(condition: ConditionResults) -> Iterator[pd.DataFrame]:
-    """Yield what the exact certifier found.
-
-    Where the arms of every replicate are closest, and where bodies touch.
-    """
+    """Yield one row per closest approach of two arms, and per contact, found by the certifier."""
     rows = condition.summaries
     between = rows["clearance_pair"].str.count("arm_").eq(2) & rows["clearance_at"].notna()
     for series, kept, at, distance in (
@@ -278,10 +196,7 @@ def _exact(condition: ConditionResults) -> Iterator[pd.DataFrame]:
 
 
 def draw_distances(table: pd.DataFrame) -> Figure:
-    """Draw the least distance between the arms against the instant.
-
-    In the paper's model and between the links.
-    """
+    """Draw the least distance of the arms at each instant: of circle centres, and of the links."""
     figure = style.figure(5.4)
     panels = figure.subplots(2, 1, sharex=True)
     unit, safety = table["length_unit"].iloc[0], float(table["safety_distance"].iloc[0])

@@ -1,0 +1,142 @@
+"""Motions of strings of via-points, and the paper's circles or spheres along them."""
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pinocchio as pin
+from matplotlib.lines import Line2D
+
+from evoexp.numeric.elementary import DEGREE
+from evoexp.planners.via_point_ga.strings import Problem
+from evoexp.records import FloatArray
+from evoexp.report import motion_geometry, style
+from evoexp.report.results import ConditionResults
+from evoexp.report.rows import groups
+
+STRAIGHT, OTHERS = "straight line", "replicate"
+WHITE: dict[str, Any] = {"color": "white", "markeredgecolor": style.NEUTRAL, "zorder": 5}
+
+
+def problem(condition: ConditionResults) -> Problem:
+    """Return the problem of a condition whose planner is Rana & Zalzala's, or a control of it."""
+    return condition.problem(Problem)
+
+
+def best_motion(condition: ConditionResults) -> FloatArray:
+    """Return the configurations of the best replicate's motion, (nq, instants) [deg]."""
+    best = condition.solutions[condition.best_replicate]
+    return motion_geometry.configurations(condition.prepared, best)
+
+
+def straight_line(condition: ConditionResults) -> FloatArray:
+    """Return the solution that goes straight from start to goal, flat [deg]."""
+    found = problem(condition)
+    return motion_geometry.straight_line(condition.planner.shape(found), found.start, found.goal)
+
+
+def paths_table(
+    condition: ConditionResults,
+    table_of: Callable[[ConditionResults, FloatArray], pd.DataFrame],
+    best: str,
+) -> pd.DataFrame:
+    """Return one table of all replicates' solutions and of the straight line.
+
+    Args:
+        condition: With data.
+        table_of: Gives the table of one solution.
+        best: Name of the best replicate's series.
+
+    Returns:
+        The columns of `table_of`, series (best, replicate, straight line) and replicate (−1: none).
+    """
+    parts = [
+        table_of(condition, solution).assign(
+            series=best if k == condition.best_replicate else OTHERS, replicate=k
+        )
+        for k, solution in condition.solutions.items()
+    ]
+    straight = table_of(condition, straight_line(condition))
+    return pd.concat([*parts, straight.assign(series=STRAIGHT, replicate=-1)], ignore_index=True)
+
+
+def draw_paths(axes: Any, rows: pd.DataFrame, columns: list[str], best: str, colour: str) -> None:
+    """Draw the paths of one arm in a plane or in space, the best one with its start and goal.
+
+    Args:
+        axes: With as many dimensions as there are columns.
+        rows: Of `paths_table`.
+        columns: Names of the coordinates.
+        best: Name of the best replicate's series.
+        colour: Of the arm.
+    """
+    for (series, _), path in groups(rows, ["series", "replicate"]):
+        points = [path[name].to_numpy() for name in columns]
+        if series == best:
+            axes.plot(*points, color=colour, linewidth=1.8, marker="o", markersize=2.6, zorder=4)
+            axes.plot(*(p[:1] for p in points), "s", markersize=6.5, **WHITE)
+            axes.plot(*(p[-1:] for p in points), "*", markersize=10.5, **WHITE)
+        elif series == STRAIGHT:
+            axes.plot(*points, ":", color=style.NEUTRAL, linewidth=1.1, zorder=3)
+        else:
+            axes.plot(*points, color=colour, linewidth=0.8, alpha=0.3)
+
+
+def path_keys(table: pd.DataFrame) -> list[Line2D]:
+    """Return the entries of the legend of `draw_paths`."""
+    count, grey = table.loc[table["replicate"] >= 0, "replicate"].nunique(), style.NEUTRAL
+    end: dict[str, Any] = {"color": "none", "mec": grey, "mfc": "white"}
+    best = "best replicate, its via-points"
+    return [
+        style.key(best, color=grey, linewidth=1.8, marker="o", ms=3),
+        style.key(f"all replicates (n = {count})", color=grey, linewidth=0.8, alpha=0.4),
+        style.key(STRAIGHT, color=grey, linewidth=1.1, linestyle=":"),
+        style.key("start", marker="s", ms=6.5, **end),
+        style.key("goal", marker="*", ms=10.5, **end),
+    ]
+
+
+def sphere_centres(found: Problem, q: FloatArray) -> list[FloatArray]:
+    """Return the centres of circles or spheres at one configuration, per arm (spheres, 3).
+
+    Args:
+        found: With the collision model.
+        q: (nq,) [deg].
+    """
+    model, geometry = found.assembly.model, found.collision.geometry
+    data, placements = model.createData(), geometry.createData()
+    pin.updateGeometryPlacements(model, data, geometry, placements, DEGREE * q)
+    centres = np.array([placement.translation for placement in placements.oMg])
+    return [centres[first:stop] for first, stop in found.collision.arm_spheres]
+
+
+def centre_distances(found: Problem, q: FloatArray) -> FloatArray:
+    """Return the least distance of circle centres of two arms, as the paper draws it.
+
+    Args:
+        found: With the collision model.
+        q: (nq, configurations) [deg].
+
+    Returns:
+        (configurations,) [length unit].
+    """
+    clearance = found.collision.clearance(q)
+    return np.asarray(clearance.between_arms + 2.0 * found.collision.radius)
+
+
+def colliding_after(condition: ConditionResults, relaxed: bool) -> int:
+    """Count the collision-free final strings that collide once redistributed (and relaxed)."""
+    own, found = condition.planner, problem(condition)
+    step = own.relaxation_step if relaxed else 0.0
+    operator = own.model_copy(update={"redistribution": True, "relaxation_step": step})
+    solved = condition.summaries.index[condition.summaries["solved"].to_numpy(dtype=bool)]
+    strings: Iterable[FloatArray] = (
+        motion_geometry.configurations(condition.prepared, condition.solutions[int(k)])
+        for k in solved
+    )
+    if not len(solved):
+        return 0
+    rng = np.random.Generator(np.random.PCG64(0))  # the operator draws nothing
+    improved = operator.improve(found, np.stack(list(strings), axis=2), rng)
+    return int(np.count_nonzero(~own.cost(found, improved).feasible))

@@ -8,11 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from evoexp.evolution.best_team import BestTeam, best_team, find_best_team
 from evoexp.evolution.hall_of_fame import (
-    BestTeam,
     Hall,
-    best_team,
-    find_best_team,
+    Teams,
     form_teams,
     gather_teams,
     renew_hall,
@@ -344,18 +343,14 @@ def test_kernels_ignore_padding_and_take_any_number_type(num: int, dtype: type) 
     cost = find_best_team(collisions, own, 13, team)
     best = best_team(w.collisions, w.own)
     assert (cost, team.tolist()) == (best.cost, best.individuals.tolist())
-    teams, hits, costs = (
-        np.empty((num * 13, num), dtype=np.int64),
-        np.empty(num * 13, dtype=np.int64),
-        np.empty(39),
-    )
-    count = gather_teams(collisions, own, front, 13, teams, hits, costs)
-    assert np.array_equal(teams[:count], form_teams(*w).teams)
-    teams, ages = np.zeros((6, num), dtype=np.int64), np.zeros(6, dtype=np.int64)
-    teams[:3], ages[:3] = hall.teams, hall.ages
-    held = renew_hall(collisions, own, front, 13, teams, ages, 3, 2, False, hits[:6], costs[:6])
-    chosen = update_hall(*w, hall, 6, memory=2)
-    for mine, theirs in zip((teams, ages, hits, costs), chosen, strict=True):
+    room = Hall.room(num * 13, num)
+    teams = Teams(room.teams, room.collisions, room.costs)
+    count = gather_teams(collisions, own, front, 13, teams)
+    for mine, theirs in zip(teams, form_teams(*w), strict=True):
+        assert np.array_equal(mine[:count], theirs)
+    renewed = hall.with_room(6)
+    held = renew_hall(collisions, own, front, 13, renewed, 3, 2, False)
+    for mine, theirs in zip(renewed, update_hall(*w, hall, 6, memory=2), strict=True):
         assert np.array_equal(mine[:held], theirs)
 
 

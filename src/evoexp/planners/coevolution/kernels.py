@@ -1,10 +1,13 @@
 """Breeding and measuring co-evolving populations, compiled (Curkovic et al. 2013, section 3)."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from evoexp.collision.models.link_crossing_kernels import link_points
+from evoexp.evolution.best_team import CollisionCounts
 from evoexp.evolution.crossover import cross_single_point
-from evoexp.evolution.hall_of_fame import renew_hall
+from evoexp.evolution.hall_of_fame import Hall, renew_hall
 from evoexp.evolution.mutation import mutate_allele
 from evoexp.evolution.pareto import non_dominated
 from evoexp.evolution.selection import (
@@ -15,10 +18,41 @@ from evoexp.evolution.selection import (
 )
 from evoexp.numeric.compilation import kernel
 from evoexp.objectives.motion_criteria import measure_motions
+from evoexp.records import BoolArray, FloatArray, IntArray
+
+
+class Breeding(NamedTuple):
+    """Settings of selection, cross-over and mutation, as a generation has them.
+
+    Attributes:
+        num_elites: Individuals copied untouched.
+        inverse: Whether weights on the wheel are inverse costs; else differences to the highest.
+        crossover_rate: Probability that a pair is crossed.
+        mutation_rate: Probability that an allele of an individual is mutated (Eq. 10).
+        mutation_step: Largest change of an allele (Eq. 9) [rad].
+        limit: What a mutated allele stays below [rad].
+        symmetric: Whether alleles may decrease, too.
+    """
+
+    num_elites: int
+    inverse: bool
+    crossover_rate: float
+    mutation_rate: float
+    mutation_step: float
+    limit: float
+    symmetric: bool
 
 
 @kernel
-def breed(uniforms, populations, costs, moving, teams, settings, bred):  # type: ignore[no-untyped-def]
+def breed(
+    uniforms: FloatArray,
+    populations: FloatArray,
+    costs: FloatArray,
+    moving: BoolArray,
+    teams: IntArray,
+    breeding: Breeding,
+    bred: FloatArray,
+) -> None:
     """Write the next populations: offspring, then elites, then the members of the hall, unchanged.
 
     Args:
@@ -28,16 +62,14 @@ def breed(uniforms, populations, costs, moving, teams, settings, bred):  # type:
         costs: (robots, individuals).
         moving: (robots,) false for robots that stand still: their populations are copied.
         teams: (teams, robots) members of the hall.
-        settings: num_elites; whether weights are inverse costs; crossover_rate; mutation rate,
-            step, limit, symmetric.
+        breeding: Settings.
         bred: Like populations, written.
     """
-    num_elites, inverse, crossover_rate, rate, step, limit, symmetric = settings
-    size, kept = populations.shape[2], num_elites + len(teams)
-    count = size - kept
+    size, num_elites = populations.shape[2], breeding.num_elites
+    count = size - num_elites - len(teams)
     last = count + 2 * (count // 2)  # behind the numbers of cross-over
     weights, parents = np.empty(size), np.empty(count, dtype=np.int64)
-    chosen = np.empty(num_elites, dtype=np.int64)
+    elites = np.empty(num_elites, dtype=np.int64)
     row = 0
     for robot in range(len(populations)):
         if not moving[robot]:
@@ -45,60 +77,69 @@ def breed(uniforms, populations, costs, moving, teams, settings, bred):  # type:
             continue
         draws, genes, before = uniforms[row], bred[robot], populations[robot]
         row += 1
-        if inverse:
+        # parents by roulette
+        if breeding.inverse:
             inverse_weights(costs[robot], weights)
         else:
             difference_weights(costs[robot], weights)
         spin_roulette(weights, draws[:count], parents)
-        cross_single_point(draws[count:last], before, parents, crossover_rate, genes)
-        mutate_allele(draws[last:], genes, count, rate, step, limit, symmetric)
-        choose_elites(costs[robot], chosen)
+        # single-point cross-over of neighbours
+        cross_single_point(draws[count:last], before, parents, breeding.crossover_rate, genes)
+        # mutation of one allele (Eq. 9)
+        mutate_allele(
+            draws[last:],
+            genes,
+            count,
+            breeding.mutation_rate,
+            breeding.mutation_step,
+            breeding.limit,
+            breeding.symmetric,
+        )
+        # elites and members of the hall, untouched
+        choose_elites(costs[robot], elites)
         for gene in range(len(genes)):
             for k in range(num_elites):
-                genes[gene, count + k] = before[gene, chosen[k]]
+                genes[gene, count + k] = before[gene, elites[k]]
             for k in range(len(teams)):
                 genes[gene, count + num_elites + k] = before[gene, teams[k, robot]]
 
 
 @kernel
-def renew(populations, criteria, collisions, own, settings, teams, ages, num_teams, keys):  # type: ignore[no-untyped-def]
+def renew(
+    populations: FloatArray,
+    criteria: FloatArray,
+    collisions: CollisionCounts,
+    own: FloatArray,
+    hall: Hall,
+    num_teams: int,
+    memory: int,
+    frozen: bool,
+) -> int:
     """Renew the hall of fame from the Pareto fronts of all populations, without copies.
-
-    Return how many teams it holds.
 
     Args:
         populations: (robots, genes, individuals).
         criteria: (robots, criteria, individuals), all minimised.
-        collisions: See `hall_of_fame`.
-        own: Likewise.
-        settings: Memory of the hall (0: no rule), whether it is frozen; see `update_hall`.
-        teams: (depth, robots) places of the members, rewritten.
-        ages: (depth,) rewritten.
-        num_teams: How many teams there are.
-        keys: Collisions and costs of the teams, each (depth,), written.
+        collisions: See `best_team`.
+        own: See `best_team`.
+        hall: See `renew_hall`, as the rest.
+        num_teams: Teams of the hall at present.
+        memory: Of the hall; 0: no such rule.
+        frozen: Whether its teams stay.
+
+    Returns:
+        Number of teams that the hall holds then.
     """
     count = populations.shape[2]
     fronts = np.empty((len(populations), count), dtype=np.bool_)
     for robot in range(len(populations)):
         non_dominated(criteria[robot], count, fronts[robot])
-    drop_copies(populations, teams[:num_teams], fronts)
-    return renew_hall(
-        collisions,
-        own,
-        fronts,
-        count,
-        teams,
-        ages,
-        num_teams,
-        settings[0],
-        settings[1],
-        keys[0],
-        keys[1],
-    )
+    drop_copies(populations, hall.teams[:num_teams], fronts)
+    return int(renew_hall(collisions, own, fronts, count, hall, num_teams, memory, frozen))
 
 
 @kernel
-def drop_copies(populations, teams, fronts):  # type: ignore[no-untyped-def]
+def drop_copies(populations: FloatArray, teams: IntArray, fronts: BoolArray) -> None:
     """Take copies of other members, and of the hall's, off the fronts.
 
     They would fill the hall with one pair.
@@ -106,37 +147,49 @@ def drop_copies(populations, teams, fronts):  # type: ignore[no-untyped-def]
     Args:
         populations: (robots, genes, individuals).
         teams: (teams, robots) members of the hall.
-        fronts: (robots, individuals) bool, changed: of equal genomes the first stays, none if the
-            hall has one.
+        fronts: (robots, individuals) changed: of equal genomes the first stays, none if the hall
+            has one.
     """
     for robot in range(len(populations)):
         genes, front = populations[robot], fronts[robot]
+        # genomes known so far: the hall's, then those that stay on the front
         known = np.empty(len(teams) + genes.shape[1], dtype=np.int64)
         num_known = len(teams)
         for k in range(num_known):
             known[k] = teams[k, robot]
         for member in range(genes.shape[1]):
-            if not front[member]:
-                continue
-            fresh = True
-            for k in range(num_known):
-                same = True
-                for gene in range(len(genes)):
-                    if genes[gene, member] != genes[gene, known[k]]:
-                        same = False
-                        break
-                if same:
-                    fresh = False
-                    break
-            front[member] = fresh
-            if fresh:
+            if front[member]:
+                front[member] = not any_equal(genes, member, known, num_known)
+            if front[member]:
                 known[num_known] = member
                 num_known += 1
 
 
 @kernel
-def measure(populations, starts, goals, arms, weights, paths, points, criteria, own):  # type: ignore[no-untyped-def]
-    """Lay out all paths, and measure what each costs whoever its collaborators are.
+def any_equal(genes: FloatArray, member: int, others: IntArray, num_others: int) -> bool:
+    """Return whether an individual's genome (genes, individuals) equals one of some others'."""
+    for k in range(num_others):
+        gene = 0
+        while gene < len(genes) and genes[gene, member] == genes[gene, others[k]]:
+            gene += 1
+        if gene == len(genes):
+            return True
+    return False
+
+
+@kernel
+def measure(
+    populations: FloatArray,
+    starts: FloatArray,
+    goals: FloatArray,
+    arms: FloatArray,
+    weights: tuple[float, float, float],
+    paths: FloatArray,
+    points: FloatArray,
+    criteria: FloatArray,
+    own: FloatArray,
+) -> None:
+    """Lay out all paths, and measure their costs whoever their collaborators are.
 
     Args:
         populations: (robots, 2 K, individuals) link angles [rad].
@@ -152,9 +205,11 @@ def measure(populations, starts, goals, arms, weights, paths, points, criteria, 
     last = paths.shape[1] - 1
     for r in range(len(populations)):
         path, genes = paths[r], populations[r]
+        # start, genes, goal
         for link in range(2):
             path[0, link], path[last, link] = starts[r, link], goals[r, link]
             for k in range(1, last):
                 path[k, link] = genes[2 * (k - 1) + link]
+        # where the links are (Eq. 11), then Eqs. 6–8
         link_points(path, arms[r, 0], arms[r, 1], arms[r, 2], arms[r, 3], points[r])
         measure_motions(path, points[r], weights, criteria[r, 1:], own[r])

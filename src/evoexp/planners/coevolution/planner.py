@@ -20,19 +20,20 @@ from pydantic import model_validator
 from evoexp.collision.models.link_collision import LinkCollision, LinkCrossings
 from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
+from evoexp.evolution.best_team import best_team
 from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.evolution.crossover import num_single_point_uniforms
-from evoexp.evolution.hall_of_fame import Hall, best_team
+from evoexp.evolution.hall_of_fame import Hall
 from evoexp.evolution.mutation import decayed_rate, num_allele_uniforms
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.motion_criteria import MotionCriteria
 from evoexp.paths.motion import Motion, clamped_cubic, joint_ranges, top_speeds
 from evoexp.planners.coevolution.chromosome_length import SpeedLimit, length_notes
-from evoexp.planners.coevolution.kernels import breed, measure, renew
+from evoexp.planners.coevolution.kernels import Breeding, breed, measure, renew
 from evoexp.planners.coevolution.settings import CoevolutionSettings
 from evoexp.planners.coevolution.teams import Evaluated, Judgement
-from evoexp.planners.planner import PlannerDefaults
-from evoexp.records import FloatArray, Generation
+from evoexp.planners.planner import Candidate, Keeper, PlannerDefaults
+from evoexp.records import BoolArray, FloatArray, Generation
 from evoexp.robots.assembly import Assembly, Robot
 from evoexp.scenarios.link_motion import LinkMotion
 from evoexp.validation import Component, Count
@@ -41,11 +42,12 @@ HALF_TURN = DEGREE * 180.0  # genes live in [0, π)
 
 
 class Problem(NamedTuple):
-    """What `prepare` made of robots and scenario.
+    """Robots and their scenario, prepared.
 
     Attributes:
         assembly: The robots, built.
         collision: The paper's collision model on them.
+        arms: (robots, 4) base x, base y, lengths of both links [length unit].
         start: (robots, 2) absolute link angles [rad].
         goal: (robots, 2) [rad].
         moving: (robots,) false for robots that stand still.
@@ -55,9 +57,10 @@ class Problem(NamedTuple):
 
     assembly: Assembly
     collision: LinkCollision
+    arms: FloatArray
     start: FloatArray
     goal: FloatArray
-    moving: np.ndarray
+    moving: BoolArray
     scene: Scene
     security_margin: float
 
@@ -112,13 +115,11 @@ class Coevolution(PlannerDefaults, Component):
             raise SettingError(
                 "robot", "two robots or more, which evolve together", len(collision.arms)
             )
-        bases, lengths = (np.array([arm[k] for arm in collision.arms]) for k in range(2))
-        start, goal = (DEGREE * ends for ends in scenario.ends(bases, lengths))
-        moving = np.array([r not in scenario.stationary for r in range(len(collision.arms))])
-        bodies = scene(assembly, scenario.obstacles)
-        problem = Problem(
-            assembly, collision, start, goal, moving, bodies, scenario.security_margin
-        )
+        arms = np.array([(*arm.base, *arm.lengths) for arm in collision.arms])
+        start, goal = (DEGREE * ends for ends in scenario.ends(arms[:, :2], arms[:, 2:]))
+        moving = np.array([r not in scenario.stationary for r in range(len(arms))])
+        bodies, margin = scene(assembly, scenario.obstacles), scenario.security_margin
+        problem = Problem(assembly, collision, arms, start, goal, moving, bodies, margin)
         for name, posture in (("q_start", start), ("q_goal", goal)):
             if contact := collision.contact(posture):
                 relative = np.stack([posture[:, 0], posture[:, 1] - posture[:, 0]], axis=1).ravel()
@@ -131,14 +132,14 @@ class Coevolution(PlannerDefaults, Component):
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield the initial populations, then one generation after the other (Fig. 2)."""
-        ga, record = self.ga, _Record(self, problem)
+        ga, keeper = self.ga, Keeper()
         populations = self.sample(problem, rng, ga.population_size)
         hall, waiting = Hall.empty(len(problem.start)), 0
         found = self.evaluated(problem, populations)
-        yield record.generation(0, populations, found)
+        yield self._recorded(keeper, problem, populations, found)
         for index in range(1, ga.num_generations + 1):
             hall = self._renewed(populations, found, hall)
-            waiting = 0 if record.feasible else waiting + 1
+            waiting = 0 if keeper.best.solved else waiting + 1
             if ga.restart_after is not None and waiting >= ga.restart_after:
                 # "If no convergence has occurred, …, the algorithm generates new populations"
                 # (section 3).
@@ -148,25 +149,45 @@ class Coevolution(PlannerDefaults, Component):
                 populations = self._bred(rng, problem, populations, found, hall, index)
                 hall = hall.moved(ga.population_size - hall.num_teams)
             found = self.evaluated(problem, populations)
-            yield record.generation(index, populations, found)
+            yield self._recorded(keeper, problem, populations, found)
+
+    def _recorded(
+        self, keeper: Keeper, problem: Problem, populations: FloatArray, found: Evaluated
+    ) -> Generation:
+        """Keep the best team if it is better, and return the generation's record."""
+        (robots, _, count), best = populations.shape, best_team(found.collisions, found.teamable)
+        if keeper.improves(best.cost):
+            team = best.individuals if best.found else found.costs.argmin(axis=1)
+            solution = self.team_solution(problem, populations, team)
+            keeper.keep(best.cost, Candidate(solution, found.terms_of(team), best.found))
+        return keeper.record(
+            cost_statistics(found.costs.ravel()),
+            found.costs,
+            populations,
+            lowest=best.cost,
+            num_feasible=found.num_feasible,
+            evaluations=robots * count,
+            collision_queries=self.queries(problem, count),
+            criteria=found.criteria if keeper.index + 1 == self.ga.num_generations else None,
+        )
 
     def _renewed(self, populations: FloatArray, found: Evaluated, hall: Hall) -> Hall:
         """Return the hall of fame: members of the Pareto fronts with their best collaborators."""
-        depth = self.ga.num_hall_teams
-        if not depth:
+        ga = self.ga
+        if not ga.num_hall_teams:
             return hall
-        teams, ages = (
-            np.empty((depth, len(populations)), dtype=np.int64),
-            np.empty(depth, dtype=np.int64),
-        )
-        teams[: hall.num_teams], ages[: hall.num_teams] = hall.teams, hall.ages
-        collisions, costs = np.empty(depth, dtype=np.int64), np.empty(depth)
-        rules = self.ga.hall_memory or 0, self.ga.hall_frozen
-        found_keys = found.criteria, found.collisions, found.teamable
+        renewed = hall.with_room(ga.num_hall_teams)
         held = renew(
-            populations, *found_keys, rules, teams, ages, hall.num_teams, (collisions, costs)
+            populations,
+            found.criteria,
+            found.collisions,
+            found.teamable,
+            renewed,
+            hall.num_teams,
+            ga.hall_memory or 0,
+            ga.hall_frozen,
         )
-        return Hall(teams[:held], ages[:held], collisions[:held], costs[:held])
+        return renewed.first(held)
 
     def _bred(
         self,
@@ -177,18 +198,23 @@ class Coevolution(PlannerDefaults, Component):
         hall: Hall,
         index: int,
     ) -> FloatArray:
-        """Return the next populations.
-
-        Offspring, then elites, then the members of the hall, unchanged.
-        """
+        """Return the next populations: offspring, then elites, then the hall's members."""
         ga, bred = self.ga, np.empty_like(populations)
-        rate = decayed_rate(ga.mutation_rate, ga.mutation_decay, index, ga.num_generations)
         count = ga.population_size - ga.num_elites - hall.num_teams
         numbers = count + num_single_point_uniforms(count // 2) + num_allele_uniforms(count)
         uniforms = rng.random((int(np.count_nonzero(problem.moving)), numbers))
-        mutation = rate, DEGREE * ga.mutation_step, HALF_TURN, ga.mutation_direction == "symmetric"
-        settings = ga.num_elites, ga.selection == "inverse", ga.crossover_rate, *mutation
-        breed(uniforms, populations, found.costs, problem.moving, hall.teams, settings, bred)
+        breeding = Breeding(
+            num_elites=ga.num_elites,
+            inverse=ga.selection == "inverse",
+            crossover_rate=ga.crossover_rate,
+            mutation_rate=decayed_rate(
+                ga.mutation_rate, ga.mutation_decay, index, ga.num_generations
+            ),
+            mutation_step=DEGREE * ga.mutation_step,
+            limit=HALF_TURN,
+            symmetric=ga.mutation_direction == "symmetric",
+        )
+        breed(uniforms, populations, found.costs, problem.moving, hall.teams, breeding, bred)
         return bred
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
@@ -202,25 +228,24 @@ class Coevolution(PlannerDefaults, Component):
         return genes
 
     def evaluated(self, problem: Problem, populations: FloatArray) -> Evaluated:
-        """Evaluate populations (robots, 2 K, individuals).
+        """Evaluate everybody of populations against everybody of the other robots (Eq. 4).
 
-        Everybody against everybody of the other robots (Eq. 4).
+        Args:
+            problem: The problem.
+            populations: (robots, 2 K, individuals).
         """
-        collision, robots, count = problem.collision, len(populations), populations.shape[2]
+        collision, objective = problem.collision, self.objective
+        robots, _, count = populations.shape
+        # paths, and C2 … C4 (Eqs. 6–8)
         criteria, own = np.empty((robots, 4, count)), np.empty((robots, count))
-        paths, points = (
-            np.empty((robots, self.num_configurations + 2, rows, count)) for rows in (2, 4)
-        )
-        arms, weights = (
-            np.array([(*arm.base, *arm.lengths) for arm in collision.arms]),
-            self.objective.own_weights,
-        )
-        measure(
-            populations, problem.start, problem.goal, arms, weights, paths, points, criteria, own
-        )
+        paths = np.empty((robots, self.num_configurations + 2, 2, count))
+        points = np.empty((robots, self.num_configurations + 2, 4, count))
+        ends, weights = (problem.start, problem.goal), objective.own_weights
+        measure(populations, *ends, problem.arms, weights, paths, points, criteria, own)
+        # C1 (Eqs. 4, 5): an obstacle is in the way whoever the collaborator is
         lines = [collision.outlines(r, paths[r], points[r]) for r in range(robots)]
         blocked = np.array([collision.with_obstacles(r, lines[r]) for r in range(robots)])
-        hits, sums = [], blocked * count  # an obstacle is in the way whoever the collaborator is
+        hits, sums = [], blocked * count
         for a, b in combinations(range(robots), 2):
             crossings = collision.between(a, lines[a], b, lines[b])
             hits.append(crossings.counts)
@@ -228,16 +253,12 @@ class Coevolution(PlannerDefaults, Component):
             sums[b] += crossings.sums_2
         criteria[:, 0] = sums
         pairs = hits[0][np.newaxis] if len(hits) == 1 else np.array(hits)
-        return Evaluated(
-            self.objective.collision_weight * sums + own, criteria, own, pairs, blocked
-        )
+        return Evaluated(objective.collision_weight * sums + own, criteria, own, pairs, blocked)
 
     def cost(self, problem: Problem, population: FloatArray) -> Judgement:
         """Judge the individuals of the first robot, each by its cheapest collision-free team."""
-        found = self.evaluated(problem, population)
-        count, costs = population.shape[2], np.empty(population.shape[2])
-        for i in range(count):
-            costs[i] = found.cost_of(found.team_of(i))
+        found, count = self.evaluated(problem, population), population.shape[2]
+        costs = np.array([found.cost_of(found.team_of(i)) for i in range(count)])
         return Judgement(costs, found, self.queries(problem, count))
 
     def queries(self, problem: Problem, count: int) -> int:
@@ -323,51 +344,3 @@ class Coevolution(PlannerDefaults, Component):
     def _interpolated(self, q: FloatArray) -> Motion:
         q = np.ascontiguousarray(q)
         return clamped_cubic(q) if self.interpolation == "cubic" else Motion(q)
-
-
-class _Record:
-    """The best team so far, and the records of generations that carry it."""
-
-    def __init__(self, planner: Coevolution, problem: Problem) -> None:
-        self.planner, self.problem = planner, problem
-        self.cost, self.solution = np.inf, np.empty(0)
-        self.terms: dict[str, float] = {}
-        self.evaluations = self.queries = 0
-
-    @property
-    def feasible(self) -> bool:
-        """Whether a collision-free team was found."""
-        return bool(np.isfinite(self.cost))
-
-    def generation(self, index: int, populations: FloatArray, found: Evaluated) -> Generation:
-        """Update the best team and return the generation's record."""
-        planner, (robots, _, count) = self.planner, populations.shape
-        self.evaluations += robots * count
-        self.queries += planner.queries(self.problem, count)
-        best = best_team(found.collisions, found.teamable)
-        if best.cost < self.cost or index == 0:
-            self.cost = best.cost
-            team = (
-                best.individuals
-                if best.found
-                else np.array([int(np.argmin(costs)) for costs in found.costs])
-            )
-            self.solution = planner.team_solution(self.problem, populations, team)
-            self.terms = found.terms_of(team)
-        statistics = cost_statistics(found.costs.ravel())
-        return Generation(
-            index=index,
-            best=self.solution,
-            best_cost=self.cost,
-            best_cost_in_generation=best.cost,
-            mean_cost=statistics.mean,
-            std_cost=statistics.std,
-            num_feasible=found.num_feasible,
-            evaluations=self.evaluations,
-            collision_queries=self.queries,
-            solved=self.feasible,
-            terms=self.terms,
-            costs=found.costs,
-            population=populations,
-            criteria=found.criteria if index == planner.ga.num_generations else None,
-        )

@@ -1,7 +1,7 @@
 """Populations evaluated all against all, and the teams in them (Curkovic et al. 2013, Eqs. 4–8).
 
-A team is one individual of every population: its paths are executed together. What individuals are
-worth on their own and how often they collide stands in `Evaluated`; everything else here reads it.
+A team is one individual of every population: its paths are executed together. `Evaluated` holds the
+costs of individuals and how often they collide; everything else here reads it.
 """
 
 from itertools import combinations
@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.evolution.hall_of_fame import best_team, pair_index
+from evoexp.evolution.best_team import CollisionCounts, best_team, pair_index
 from evoexp.numeric.compilation import kernel
-from evoexp.records import FloatArray
+from evoexp.records import BoolArray, FloatArray, IntArray
 
 
 class Evaluated(NamedTuple):
@@ -28,8 +28,8 @@ class Evaluated(NamedTuple):
     costs: FloatArray
     criteria: FloatArray
     own: FloatArray
-    collisions: np.ndarray
-    blocked: np.ndarray
+    collisions: CollisionCounts
+    blocked: IntArray
 
     @property
     def teamable(self) -> FloatArray:
@@ -41,10 +41,10 @@ class Evaluated(NamedTuple):
         """Individuals of the first robot with a collision-free partner in every population."""
         return int(count_partnered(self.collisions, self.blocked))
 
-    def team_of(self, individual: int) -> np.ndarray:
+    def team_of(self, individual: int) -> IntArray:
         """Return the cheapest collision-free team with an individual of the first robot.
 
-        Else one that collides little.
+        Where there is none, everybody else is who collides least with that individual.
 
         Returns:
             (robots,) index of the member in each population.
@@ -62,19 +62,19 @@ class Evaluated(NamedTuple):
             team[other] = int(np.argmin(self.collisions[other - 1, individual]))
         return team
 
-    def cost_of(self, team: np.ndarray) -> float:
+    def cost_of(self, team: IntArray) -> float:
         """Return the summed own cost of a team (robots,); inf if it collides."""
         if self.collisions_of(team) > 0:
             return np.inf
         return float(sum(self.own[r, i] for r, i in enumerate(team)))
 
-    def collisions_of(self, team: np.ndarray) -> int:
+    def collisions_of(self, team: IntArray) -> int:
         """Return the colliding configurations within a team (robots,) and with obstacles."""
         pairs = enumerate(combinations(range(len(team)), 2))
         hits = sum(int(self.collisions[pair, team[a], team[b]]) for pair, (a, b) in pairs)
         return hits + sum(int(self.blocked[r, i]) for r, i in enumerate(team))
 
-    def terms_of(self, team: np.ndarray) -> dict[str, float]:
+    def terms_of(self, team: IntArray) -> dict[str, float]:
         """Return C1 … C4 of every robot of a team (robots,) by name.
 
         C1 against the team's other robots only.
@@ -111,7 +111,7 @@ class Judgement(NamedTuple):
     collision_queries: int
 
     @property
-    def feasible(self) -> np.ndarray:
+    def feasible(self) -> BoolArray:
         """(individuals,) whether each has a collision-free team."""
         return np.isfinite(self.cost)
 
@@ -121,19 +121,15 @@ class Judgement(NamedTuple):
 
 
 @kernel
-def count_partnered(collisions, blocked):  # type: ignore[no-untyped-def]
+def count_partnered(collisions: CollisionCounts, blocked: IntArray) -> int:
     """The kernel of `Evaluated.num_feasible`."""
     count = 0
     for i in range(blocked.shape[1]):
         partnered = blocked[0, i] == 0
         for other in range(1, len(blocked)):
-            row, usable, found = (
-                collisions[pair_index(len(blocked), 0, other), i],
-                blocked[other],
-                False,
-            )
+            row, found = collisions[pair_index(len(blocked), 0, other), i], False
             for j in range(blocked.shape[1]):
-                found |= (row[j] == 0) & (usable[j] == 0)
+                found |= (row[j] == 0) & (blocked[other, j] == 0)
             partnered &= found
         count += 1 if partnered else 0
     return count

@@ -1,0 +1,201 @@
+"""The cheapest collision-free team of co-evolving populations, exactly.
+
+A team has one individual of every population; for two populations it is a pair. Nothing is random
+and every tie is settled by an order.
+
+Arrays that all functions of teams share, for P ≥ 2 populations of N individuals:
+
+- collisions  # (pairs of populations, ≥ N, ≥ N) integers, pairs in the order (0, 1), (0, 2), …, (1,
+  2), …: how often individual i of the first population of a pair collides with individual j of the
+  second.
+- own  # (P, ≥ N) cost of an individual whoever its collaborators are; inf is allowed, NaN is not.
+  Summed in the order of the populations.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evoexp.numeric.compilation import kernel
+from evoexp.records import FloatArray, IntArray
+
+CollisionCounts = NDArray[np.integer[Any]]  # short integers, where they are many
+
+
+class BestTeam(NamedTuple):
+    """The cheapest team without a collision.
+
+    Attributes:
+        individuals: (P,) index of the member in each population; −1 if there is no such team.
+        cost: Sum of the members' own costs; inf if there is no such team.
+    """
+
+    individuals: IntArray
+    cost: float
+
+    @property
+    def found(self) -> bool:
+        """Whether there is such a team."""
+        return bool(self.cost < np.inf)
+
+
+def best_team(collisions: CollisionCounts, own: FloatArray) -> BestTeam:
+    """Search all teams without a collision for the lowest sum of own costs; exact.
+
+    Of teams with the same sum, the one whose indices come first in lexicographic order, population
+    0 leading. A team of infinite cost is none.
+
+    Raises:
+        ValueError: If the shapes contradict each other.
+    """
+    check_shapes(collisions, own, own.shape)
+    team = np.empty(len(own), dtype=np.int64)
+    cost = find_best_team(collisions, own, own.shape[1], team)
+    return BestTeam(team, float(cost))
+
+
+def check_shapes(
+    collisions: CollisionCounts, own: FloatArray, front_shape: tuple[int, ...]
+) -> None:
+    """Check the arrays of teams, see the module, and the shape (P, N) of their fronts.
+
+    Raises:
+        ValueError: If they contradict each other.
+    """
+    num, count = own.shape
+    enough = collisions.ndim == 3 and min(collisions.shape[1:]) >= count
+    if num < 2 or front_shape != own.shape or not enough or len(collisions) != num * (num - 1) // 2:
+        raise ValueError(
+            f"collisions {collisions.shape}, costs {own.shape} and front {front_shape} do not match"
+        )
+
+
+@kernel
+def pair_index(num: int, first: int, second: int) -> int:
+    """Return the place of populations first < second of `num` in the order of pairs.
+
+    The order is (0, 1), (0, 2), …, (1, 2), ….
+    """
+    return first * (2 * num - first - 1) // 2 + second - first - 1
+
+
+@kernel
+def sort_by_cost(own: FloatArray, count: int) -> IntArray:
+    """Return (P, N) the individuals of each population by own cost, equal ones by index."""
+    order = np.empty((len(own), count), dtype=np.int64)
+    for p in range(len(own)):
+        order[p] = np.argsort(own[p, :count], kind="mergesort")  # stable
+    return order
+
+
+@kernel
+def find_best_team(
+    collisions: CollisionCounts, own: FloatArray, count: int, team: IntArray
+) -> float:
+    """The kernel of `best_team`, for other kernels, on the first `count` individuals.
+
+    Args:
+        collisions: See the module.
+        own: See the module.
+        count: N.
+        team: (P,) written.
+
+    Returns:
+        The team's cost.
+    """
+    if len(own) == 2:
+        return float(find_best_pair(collisions, own, count, team))
+    return float(search_teams(collisions, own, count, team))
+
+
+@kernel
+def find_best_pair(
+    collisions: CollisionCounts, own: FloatArray, count: int, team: IntArray
+) -> float:
+    """`find_best_team` of two populations.
+
+    Rounding is monotone: the lowest sum of an individual is the sum with its cheapest partner.
+    """
+    table, first, second = collisions[0], own[0], own[1]
+    # the cheapest free partner of all of the second, four candidates at a time
+    least, last = np.full(count, np.inf), count - 1
+    for i in range(0, count, 4):
+        k, m, n = min(i + 1, last), min(i + 2, last), min(i + 3, last)
+        rows = table[i], table[k], table[m], table[n]
+        a, b, c, d = first[i], first[k], first[m], first[n]
+        for j in range(count):
+            p, q = a if rows[0][j] == 0 else np.inf, b if rows[1][j] == 0 else np.inf
+            r, s = c if rows[2][j] == 0 else np.inf, d if rows[3][j] == 0 else np.inf
+            p, r, known = q if q < p else p, s if s < r else r, least[j]
+            p = r if r < p else p
+            least[j] = p if p < known else known
+    best = np.inf
+    for j in range(count):
+        best = min(best, least[j] + second[j])
+    # of all pairs with this sum the first
+    team[:] = -1
+    if best < np.inf:
+        team[0] = count
+        for j in range(count):
+            if least[j] + second[j] == best:
+                for i in range(team[0]):
+                    if table[i, j] == 0 and first[i] + second[j] == best:
+                        team[0], team[1] = i, j
+                        break
+    return best
+
+
+@kernel
+def search_teams(collisions: CollisionCounts, own: FloatArray, count: int, team: IntArray) -> float:
+    """`find_best_team` of any number of populations: depth first, the cheapest first, with bounds.
+
+    Bounds are summed in the order of the populations like the costs themselves, so rounding cannot
+    make one too high. Where a bound only equals the best cost, a branch is worth it if its indices
+    come first in lexicographic order.
+    """
+    num, order = len(own), sort_by_cost(own, count)
+    ranks, trial, partial = np.zeros(num, dtype=np.int64), np.full(num, -1), np.zeros(num + 1)
+    team[:] = -1
+    best, level = np.inf, 0
+    while level >= 0:
+        # the next individual of this level, and the least cost that a team with it can have
+        exhausted = ranks[level] == count
+        if not exhausted:
+            trial[level] = order[level, ranks[level]]
+            partial[level + 1] = partial[level] + own[level, trial[level]]
+            bound = partial[level + 1]
+            for p in range(level + 1, num):
+                bound += own[p, order[p, 0]]
+            exhausted = bound > best
+        # back, deeper, or a better team
+        if exhausted:
+            level -= 1
+        elif (bound < best or comes_first(trial, team, level)) and fits(collisions, trial, level):
+            if level < num - 1:
+                level += 1
+                ranks[level] = 0
+                continue
+            best = bound
+            team[:] = trial
+        if level >= 0:
+            ranks[level] += 1
+    return best
+
+
+@kernel
+def comes_first(trial: IntArray, team: IntArray, level: int) -> bool:
+    """Return whether trial (P,), known up to `level`, can still come before a team (P,)."""
+    for p in range(level + 1):
+        if trial[p] != team[p]:
+            return bool(trial[p] < team[p])
+    return level < len(team) - 1
+
+
+@kernel
+def fits(collisions: CollisionCounts, trial: IntArray, level: int) -> bool:
+    """Return whether the member of trial (P,) at `level` collides with none of those before it."""
+    free = True
+    for p in range(level):
+        free &= collisions[pair_index(len(trial), p, level), trial[p], trial[level]] == 0
+    return free

@@ -14,7 +14,9 @@ from evoexp.configuration.experiment import Experiment
 from evoexp.papers.corsepius import claims as task_claims
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius import population_claims as verdicts
+from evoexp.report import judging
 from evoexp.report.claims import CONTRADICTED, INCONCLUSIVE, NOT_JUDGED, REPRODUCED, Claim
+from evoexp.report.judging import Judge
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results, StoredLogs
 from report_samples import REPORT
@@ -60,8 +62,13 @@ def study(effort: Effort) -> dict[str, Claim]:
         }
 
     found = measures.tasks(made_up("corsepius_population", rows), "num_offspring")
-    compared = {metric: verdicts.ratios(found, metric, SETTINGS) for metric in verdicts.METRICS}
-    return {claim.text: claim for claim in verdicts.of_study("", found, compared, SETTINGS)}
+    compared = {
+        metric: verdicts.compare_sizes(found, metric, SETTINGS) for metric in verdicts.METRICS
+    }
+    return {
+        claim.text: claim
+        for claim in verdicts.judge_study(Judge("", 0.05), found, compared, SETTINGS)
+    }
 
 
 def verdict(claims: dict[str, Claim], text: str) -> str:
@@ -160,8 +167,8 @@ def task_rows(having: dict[str, int], free: int = RUNS) -> Callable[[str], dict[
 def judged(
     name: str, rows: Callable[[str], dict[str, object]], monkeypatch: pytest.MonkeyPatch
 ) -> dict[str, str]:
-    monkeypatch.setattr(task_claims, "not_judged", lambda results: "")
-    return {c.text: c.verdict for c in task_claims.of_tasks(made_up(name, rows), SETTINGS)}
+    monkeypatch.setattr(judging, "not_judged", lambda results: "")
+    return {c.text: c.verdict for c in task_claims.judge_tasks(made_up(name, rows), SETTINGS)}
 
 
 def test_a_wall_that_a_subgoal_opens_is_a_local_minimum(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -196,5 +203,5 @@ def test_one_certified_path_is_enough_for_redundant_arms(monkeypatch: pytest.Mon
 
 def test_below_the_papers_budget_nothing_is_judged() -> None:
     results = made_up("corsepius_wall", task_rows({"wall": 0}))._replace(budget="smoke")
-    for claim in task_claims.of_tasks(results, SETTINGS):
+    for claim in task_claims.judge_tasks(results, SETTINGS):
         assert claim.verdict.startswith(NOT_JUDGED)

@@ -1,136 +1,114 @@
-"""What Corsépius 2001 claims of single tasks, judged by their experiments."""
-
-import numpy as np
+"""The claims of Corsépius 2001 on single tasks, judged by their experiments."""
 
 from evoexp.papers.corsepius import measures
-from evoexp.report import claims, markdown
-from evoexp.report.claims import Claim, judge_greater
-from evoexp.report.judging import claim, not_judged
+from evoexp.papers.corsepius.measures import text
+from evoexp.report import claims, judging, markdown
+from evoexp.report.claims import Claim
+from evoexp.report.judging import Judge
 from evoexp.report.proportions import fisher_exact
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
+from evoexp.report.run_measures import counted, solved, success
 
-MANY_JOINTS = 6  # more than these are redundant
+MANY_JOINTS = 6  # arms with more joints are redundant
 TILTS = ("upright", "keep_parallel")
 BALL = "ball"  # the object of the task whose planning time the paper prints
 
 
-def of_tasks(results: Results, settings: ReportSettings) -> tuple[Claim, ...]:
-    """Return the claims that the conditions of an experiment can be judged by."""
-    found: list[Claim] = []
-    for c in results.main:
-        found += [*_free_of_collision(results, c, settings), *_tilt(results, c)]
-        found += _planning_time(c)
-    return (*found, *_redundant(results, settings), *_stuck(results, settings))
+def judge_tasks(results: Results, settings: ReportSettings) -> tuple[Claim, ...]:
+    """Judge the claims that the conditions of an experiment allow to judge."""
+    judge, level, found = judging.judge(results, settings), settings.confidence, results.main
+    single = (
+        (*_free_of_collision(judge, c, level), *_tilt(judge, c), *_planning_time(c)) for c in found
+    )
+    return (
+        *(one for own in single for one in own),
+        *_redundant(judge, found, level),
+        *(
+            one
+            for stuck in found
+            for helped in found
+            for one in _stuck(judge, stuck, helped, level)
+        ),
+    )
 
 
-def _free_of_collision(
-    results: Results, condition: ConditionResults, settings: ReportSettings
-) -> list[Claim]:
+def _free_of_collision(judge: Judge, condition: ConditionResults, level: float) -> list[Claim]:
     """Judge that binary ratings of distances keep the whole motion free."""
-    why, refuted = not_judged(results), measures.refuted(condition)
-    free = measures.certified(condition).having
-    told = f"{markdown.share(free, refuted.total)} solved runs certified; refuted "
-    told += (
-        f"{measures.text(refuted, settings.confidence)}: postures are free, what lies between "
-        "them is not rated"
+    refuted, free = measures.refuted(condition), measures.certified(condition).having
+    told = (
+        f"{markdown.share(free, refuted.total)} solved runs certified; refuted "
+        f"{text(refuted, level)}: postures are free, what lies between them is not rated"
     )
     planned = refuted.total if condition.done == condition.planned else 0
-    verdict = claims.judge_all(why, free, refuted.total, planned)
-    return [claim(f"{condition.label}: paths avoid obstacles", "section 4.3.3", told, verdict, why)]
+    what = f"{condition.label}: paths avoid obstacles"
+    return [judge.every(what, "section 4.3.3", told, free, refuted.total, planned)]
 
 
-def _tilt(results: Results, condition: ConditionResults) -> list[Claim]:
+def _tilt(judge: Judge, condition: ConditionResults) -> list[Claim]:
     """Judge that a grasped object is not tilted."""
-    why, found = not_judged(results), []
-    for term in TILTS:
+    found = []
+    for term in TILTS if condition.solved else ():
         limit = getattr(condition.planner.objective, term)
         if limit is None:
             continue
-        having = measures.solved(condition)
         at, between = (
-            condition.column(f"term_greatest_{term}{part}_deg")[having] for part in ("", "_between")
+            condition.column(f"term_greatest_{term}{part}_deg")[solved(condition)]
+            for part in ("", "_between")
         )
-        if not len(at):
-            continue
-        kept = int(np.count_nonzero(between <= limit.limit))
+        kept = counted(between <= limit.limit)
         told = (
             f"greatest tilt at postures {markdown.number(float(at.max()))}°, between them "
             f"{markdown.number(float(between.max()))}°, limit {limit.limit:g}°; within it all the "
-            f"way: {markdown.share(kept, len(at))} solved runs"
+            f"way: {markdown.share(*kept)} solved runs"
         )
         planned = len(at) if condition.done == condition.planned else 0
-        verdict = claims.judge_all(why, kept, len(at), planned)
-        found.append(
-            claim(
-                f"{condition.label}: the grasped object is not tilted",
-                "section 6",
-                told,
-                verdict,
-                why,
-            )
-        )
+        what = f"{condition.label}: the grasped object is not tilted"
+        found.append(judge.every(what, "section 6", told, *kept, planned))
     return found
 
 
-def _redundant(results: Results, settings: ReportSettings) -> list[Claim]:
-    """Judge that the approach applies to highly redundant arms.
-
-    That it finds a certified path for one.
-    """
-    why, texts, certified = not_judged(results), [], 0
-    for c in results.main:
-        joints = len(c.condition.scenario.q_start)  # type: ignore[attr-defined]
-        if joints > MANY_JOINTS:
-            free = measures.certified(c).having
-            certified += free
-            met = measures.text(measures.success(c), settings.confidence)
-            texts.append(f"{c.label}, {joints} joints: goal met {met}, {free} of them certified")
-    if not texts:
-        return []
+def _redundant(judge: Judge, conditions: tuple[ConditionResults, ...], level: float) -> list[Claim]:
+    """Judge that the approach works for highly redundant arms: it finds a certified path."""
+    arms = [c for c in conditions if measures.num_joints(c) > MANY_JOINTS]
+    free = {c.label: measures.certified(c).having for c in arms}
+    texts = [
+        f"{c.label}, {measures.num_joints(c)} joints: goal met {text(success(c), level)}, "
+        f"{free[c.label]} of them certified"
+        for c in arms
+    ]
     told = f"{'; '.join(texts)} (reproduced: a certified path, in one task at least)"
-    found = claims.REPRODUCED if certified else claims.CONTRADICTED
-    text = "The approach works for highly redundant arms"
-    return [claim(text, "section 6", told, claims.NOT_JUDGED if why else found, why)]
+    verdict = claims.judged(any(free.values()))
+    what = "The approach works for highly redundant arms"
+    return [judge.claim(what, "section 6", told, verdict)] if arms else []
 
 
 def _planning_time(condition: ConditionResults) -> list[Claim]:
     """Set the planning time that the paper prints beside ours."""
     goals = [phase.goal for phase in condition.condition.scenario.phases]  # type: ignore[attr-defined]
-    if len(goals) != 1 or getattr(goals[0], "object", "") != BALL or not condition.solved:
+    if [getattr(goal, "object", "") for goal in goals] != [BALL] or not condition.solved:
         return []
-    seconds, cycles = measures.usual_seconds(condition), measures.cycles(condition)
+    milliseconds = 1e3 * measures.usual_seconds(condition)
+    cycles, shapes = measures.cycles(condition), measures.problem(condition).bodies.num_shapes
     told = (
-        f"here {1e3 * seconds.min():.2g} to {1e3 * seconds.max():.2g} ms of search on one core, "
+        f"here {milliseconds.min():.2g} to {milliseconds.max():.2g} ms of search on one core, "
         f"{cycles.min():.0f} to {cycles.max():.0f} cycles; theirs: a Pentium III, and some 30 000 "
-        f"spheres to this model's {condition.prepared.problem.bodies.num_shapes}"
+        f"spheres to this model's {shapes}"
     )
-    text = f"{condition.label}: planning takes a couple of seconds up to a few minutes"
-    return [Claim(text, "section 5", told, f"{claims.NOT_JUDGED} (another machine, another model)")]
+    what = f"{condition.label}: planning takes a couple of seconds up to a few minutes"
+    return [Claim(what, "section 5", told, f"{claims.NOT_JUDGED} (another machine, another model)")]
 
 
-def _stuck(results: Results, settings: ReportSettings) -> list[Claim]:
-    """Judge that the search gets stuck where a sub-goal shows that there is a way."""
-    why, found = not_judged(results), []
-    for c in results.main:
-        for other in results.main:
-            if not measures.only_subgoals_differ(c, other):
-                continue
-            stuck, helped = measures.success(c), measures.success(other)
-            told = (
-                f"goal met {measures.text(stuck, settings.confidence)}; {other.label}: "
-                f"{measures.text(helped, settings.confidence)}; Fisher's exact p = "
-                f"{markdown.p_value(fisher_exact(helped, stuck))}; ended by stagnation: "
-                f"{measures.text(measures.reasons(c)['stagnation'], settings.confidence)}"
-            )
-            verdict = judge_greater(why, helped, stuck, settings.significance)
-            found.append(
-                claim(
-                    f"{c.label}: the search gets stuck in a local minimum",
-                    "section 6",
-                    told,
-                    verdict,
-                    why,
-                )
-            )
-    return found
+def _stuck(
+    judge: Judge, stuck: ConditionResults, helped: ConditionResults, level: float
+) -> list[Claim]:
+    """Judge that the search gets stuck if the second condition, with a sub-goal, finds a way."""
+    one, two = success(helped), success(stuck)
+    told = (
+        f"goal met {text(two, level)}; {helped.label}: {text(one, level)}; Fisher's exact p = "
+        f"{markdown.p_value(fisher_exact(one, two))}; ended by stagnation: "
+        f"{text(measures.reasons(stuck)['stagnation'], level)}"
+    )
+    what = f"{stuck.label}: the search gets stuck in a local minimum"
+    differ = measures.only_subgoals_differ(stuck, helped)
+    return [judge.greater(what, "section 6", told, one, two)] if differ else []

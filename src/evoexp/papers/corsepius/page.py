@@ -1,7 +1,4 @@
-"""Corsépius 2001: an evolution strategy on postures, task by task. Figs.
-
-2-4, histories, paths, phases.
-"""
+"""Corsépius 2001, Figs. 2–4: an evolution strategy on postures, task by task."""
 
 from functools import partial
 
@@ -15,14 +12,15 @@ from evoexp.papers.corsepius.figures import (
     posture_trap,
     search_scope,
 )
-from evoexp.papers.corsepius.figures.posture_motions import Shown
-from evoexp.report import markdown
+from evoexp.papers.corsepius.figures.posture_motions import ShownPath
+from evoexp.papers.corsepius.measures import text
+from evoexp.report import comparisons, markdown, run_measures
 from evoexp.report.figures import shares
 from evoexp.report.page import Drawing, Page, Quantity, Table
 from evoexp.report.pages import generic
-from evoexp.report.proportions import Proportion
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
+from evoexp.report.run_measures import counted
 from evoexp.report.statistics import spread
 
 INTRODUCTION = (
@@ -34,55 +32,75 @@ INTRODUCTION = (
     "posture of the path is free by the spheres; what lies between postures the exact verdict "
     "tells."
 )
+TASKS = (
+    "task",
+    "goal met",
+    "of these certified",
+    "of these refuted",
+    "ended by",
+    "cycles",
+    "evaluations",
+    "steps",
+)
+PHASES = ("task", "phase", "goal of the phase met, of the runs that began it", "cycles")
+CHECKS = (
+    (
+        "Paths between postures",
+        "are not rated by the paper: what is solved can be refuted; `planner.edge_check` tests "
+        "configurations between a parent and its child: `evoexp run experiment=corsepius_options`",
+    ),
+    (
+        "Times",
+        "the paper: Pentium III class PC; here: one core of this run's machine; the first run of a "
+        "worker process loads the kernels, too",
+    ),
+)
 
 
 def page(results: Results, settings: ReportSettings) -> Page:
-    """Return the page; the generic one where planners are others."""
+    """Build the page of the tasks, or the generic page if another planner was run."""
     if not measures.fits(results) or not results.main:
         return generic.page(results, settings)
+    compared = (("distance to the goal", True, measures.residuals),)
     return Page(
         title=f"Corsépius 2001: {results.experiment or 'stored runs'}",
         introduction=INTRODUCTION,
         quantities=quantities(results),
         tables=tables(results, settings),
-        claims=claims.of_tasks(results, settings),
+        claims=claims.judge_tasks(results, settings),
         checks=checks(results),
-        comparisons=generic.comparisons(
-            results, settings, (("distance to the goal", True, measures.residuals),)
-        ),
+        comparisons=comparisons.comparisons(results, settings, compared),
         drawings=drawings(results, settings),
     )
 
 
 def quantities(results: Results) -> tuple[Quantity, ...]:
     """Return the rows of the table of results."""
-    row, column = partial(generic.quantity, results), generic.by_column
+    row, column = partial(generic.quantity, results), comparisons.by_column
     unit = results.with_data[0].condition.length_unit
-    rows = [
+    tilts = [
+        row(
+            f"greatest tilt {where} postures ({term.replace('_', ' ')})",
+            "deg",
+            column(f"term_greatest_{term}{part}_deg"),
+        )
+        for term in claims.TILTS
+        if any(getattr(c.planner.objective, term) is not None for c in results.with_data)
+        for where, part in (("at", ""), ("between", "_between"))
+    ]
+    return (
         *effort_quantities(results),
         row("length of the path in joint space", "rad", measures.path_lengths),
         row("length over the straight line of its ends", "–", measures.detours),
         row("clearance of the bodies over the whole motion (exact)", unit, column("clearance")),
-    ]
-    for term in ("upright", "keep_parallel"):
-        if any(getattr(c.planner.objective, term) is not None for c in results.with_data):
-            name = term.replace("_", " ")
-            rows.append(
-                row(
-                    f"greatest tilt at postures ({name})",
-                    "deg",
-                    column(f"term_greatest_{term}_deg"),
-                )
-            )
-            between = column(f"term_greatest_{term}_between_deg")
-            rows.append(row(f"greatest tilt between postures ({name})", "deg", between))
-    return tuple(rows)
+        *tilts,
+    )
 
 
 def effort_quantities(results: Results) -> tuple[Quantity, ...]:
-    """Return those rows that the summaries alone give."""
+    """Return the rows that need no log, only summaries."""
     row, unit = partial(generic.quantity, results), results.with_data[0].condition.length_unit
-    column = generic.by_column
+    column = comparisons.by_column
     return (
         row("cycles, all phases", "–", measures.cycles),
         row("evaluations", "–", measures.evaluations),
@@ -90,112 +108,68 @@ def effort_quantities(results: Results) -> tuple[Quantity, ...]:
         row("steps of the path", "–", measures.num_steps),
         row("longest step", "scopes", column("term_longest_step_scopes")),
         row("steps beyond the scope", "–", column("term_oversized_steps")),
-        row("CPU time of its search", "s", measures.search_seconds),
-        row("evaluations per second of search", "1/s", _speed),
+        row("CPU time of its search", "s", run_measures.search_seconds),
+        row("evaluations per second of search", "1/s", run_measures.evaluations_per_second),
     )
-
-
-def _speed(condition: ConditionResults) -> np.ndarray:
-    return np.asarray(measures.evaluations(condition) / measures.search_seconds(condition))
 
 
 def tables(results: Results, settings: ReportSettings) -> tuple[Table, ...]:
-    """Return what became of every task, and of every phase of those that have several."""
+    """Return the tables of tasks, and of the phases of those that have several."""
     level = settings.confidence
     rows = []
     for c in results.with_data:
-        met, refuted, certified = measures.success(c), measures.refuted(c), measures.certified(c)
-        counts = (measures.text(one, level) for one in (met, certified, refuted))
-        rows.append(
-            (c.label, *counts, _reasons(c), *(markdown.spread(spread(v(c))) for v in PER_RUN))
-        )
-    headers = (
-        "task",
-        "goal met",
-        "of these certified",
-        "of these refuted",
-        "ended by",
-        "cycles",
-        "evaluations",
-        "steps",
+        counts = run_measures.success(c), measures.certified(c), measures.refuted(c)
+        ended = (f"{name} {p.having}" for name, p in measures.reasons(c).items() if p.having)
+        per_run = (measures.cycles(c), measures.evaluations(c), measures.num_steps(c))
+        spreads = (markdown.spread(spread(values)) for values in per_run)
+        rows.append((c.label, *(text(one, level) for one in counts), ", ".join(ended), *spreads))
+    note = (
+        f"Shares of runs, in brackets Wilson's {100 * level:g} % interval; of others median "
+        "[quartiles] over all runs."
     )
-    shares = (
-        f"in brackets Wilson's {100 * level:g} % interval; of others median [quartiles] over all "
-        "runs."
-    )
-    found = [Table("Tasks", headers, tuple(rows), f"Shares of runs, {shares}")]
-    phases = tuple(
-        row for c in results.main if len(measures.phase_names(c)) > 1 for row in _phases(c, level)
-    )
-    if phases:
-        columns = ("task", "phase", "goal of the phase met, of the runs that began it", "cycles")
-        found.append(Table("Phases", columns, phases))
-    return tuple(found)
+    phases = tuple(row for c in _phased(results) for row in _phase_rows(c, level))
+    found = Table("Tasks", TASKS, tuple(rows), note), Table("Phases", PHASES, phases)
+    return found if phases else found[:1]
 
 
-PER_RUN = (measures.cycles, measures.evaluations, measures.num_steps)
+def _phased(results: Results) -> tuple[ConditionResults, ...]:
+    """Return the conditions that have several phases."""
+    return tuple(c for c in results.main if len(measures.phase_names(c)) > 1)
 
 
-def checks(results: Results) -> tuple[tuple[str, str], ...]:
-    """Return what is found of models and times."""
-    rows = []
-    for c in measures.by_robot(results.main):
-        bodies = c.prepared.problem.bodies
-        covers = (
-            f"{len(bodies.names)} bodies covered by {bodies.num_shapes} shapes, at most "
-            f"{bodies.inflation:.3g}"
-        )
-        pairs = (
-            f"pairs of bodies: {len(bodies.pairs)} tested, {len(bodies.adjacent)} neighbours or "
-            "disabled, "
-        )
-        pairs += f"{len(bodies.always)} always touch, {len(bodies.never)} never do"
-        text = f"{covers} {c.condition.length_unit} beyond them; {pairs}"
-        rows.append((f"{c.label}: the model of collisions", text))
-    rows.append(("Paths between postures", BETWEEN))
-    rows.append(("Times", TIMES))
-    return tuple(rows)
-
-
-BETWEEN = (
-    "are not rated by the paper: what is solved can be refuted; `planner.edge_check` tests "
-    "configurations between a parent and its child: `evoexp run experiment=corsepius_options`"
-)
-TIMES = (
-    "the paper: Pentium III class PC; here: one core of this run's machine; the first run of a "
-    "worker process loads the kernels, too"
-)
-
-
-def _reasons(condition: ConditionResults) -> str:
-    found = measures.reasons(condition)
-    return ", ".join(
-        f"{name} {proportion.having}" for name, proportion in found.items() if proportion.having
-    )
-
-
-def _phases(condition: ConditionResults, level: float) -> list[tuple[object, ...]]:
+def _phase_rows(condition: ConditionResults, level: float) -> list[tuple[object, ...]]:
+    """Return a row per phase: runs that met its goal, and cycles."""
     table = measures.phase_cycles(condition)
     rows: list[tuple[object, ...]] = []
     for k, name in enumerate(measures.phase_names(condition)):
         own = table[table["phase"] == k]
-        reached = Proportion(int(own["reached"].sum()), len(own))
-        spent = spread(own["cycles"].to_numpy(dtype=np.float64))
+        cycles = markdown.spread(spread(own["cycles"].to_numpy(dtype=np.float64)))
         rows.append(
-            (
-                condition.label,
-                f"{k + 1}  {name}",
-                measures.text(reached, level),
-                markdown.spread(spent),
-            )
+            (condition.label, f"{k + 1}  {name}", text(counted(own["reached"]), level), cycles)
         )
     return rows
+
+
+def checks(results: Results) -> tuple[tuple[str, str], ...]:
+    """Return the rows on collision models and times."""
+    rows = []
+    for c in measures.by_robot(results.main):
+        bodies = measures.problem(c).bodies
+        text = (
+            f"{len(bodies.names)} bodies covered by {bodies.num_shapes} shapes, at most "
+            f"{bodies.inflation:.3g} {c.condition.length_unit} beyond them; pairs of bodies: "
+            f"{len(bodies.pairs)} tested, {len(bodies.adjacent)} neighbours or disabled, "
+            f"{len(bodies.always)} always touch, {len(bodies.never)} never do"
+        )
+        rows.append((f"{c.label}: the model of collisions", text))
+    return (*rows, *CHECKS)
 
 
 def drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
     """Return the figures."""
     main, level = results.main, f"{100 * settings.confidence:g} %"
-    found = (
+    reasons = posture_history.reason_rows(results)
+    return (
         _models(main),
         Drawing(
             "fig_2_scope",
@@ -222,56 +196,41 @@ def drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
             "stop_reasons",
             "Why searches end",
             f"Share of runs, with Wilson's {level} interval.",
-            partial(
-                shares.shares_table, posture_history.reasons_rows(results), {}, settings.confidence
-            ),
+            partial(shares.shares_table, reasons, {}, settings.confidence),
             shares.draw_shares,
             main,
         ),
-        Drawing(
-            "paths",
-            "Paths",
-            PATHS,
-            partial(posture_motions.motions_table, [_shown(c) for c in main]),
-            posture_motions.draw_motions,
-            main,
-        ),
+        _paths("paths", "Paths", PATHS, [_shown(c) for c in main]),
+        *_manoeuvres(results, settings),
+        *_trap(main),
     )
-    return (*found, *_manoeuvres(results, settings), *_trap(main))
+
+
+def _paths(stem: str, title: str, caption: str, shown: list[ShownPath]) -> Drawing:
+    table, draw = partial(posture_motions.motions_table, shown), posture_motions.draw_motions
+    return Drawing(stem, title, caption, table, draw, tuple(one.condition for one in shown))
 
 
 def _manoeuvres(results: Results, settings: ReportSettings) -> list[Drawing]:
     """Return the figures of conditions that have several phases."""
-    main, found = results.main, []
-    several = [c for c in main if len(measures.phase_names(c)) > len(measures.subgoals(c)) + 1]
+    phased, found = _phased(results), []
+    several = [c for c in phased if len(measures.phase_names(c)) > len(measures.subgoals(c)) + 1]
     for c in several:
-        one = Shown(c.label, c, measures.shown_replicate(c), True)
+        one = ShownPath(c.label, c, measures.shown_replicate(c), True)
         stem = "manoeuvre" if len(several) == 1 else f"manoeuvre_{results.position(c.label) + 1}"
-        table = partial(posture_motions.motions_table, [one])
-        found.append(
-            Drawing(
-                stem,
-                "The manoeuvre, phase by phase",
-                PHASES,
-                table,
-                posture_motions.draw_motions,
-                (c,),
-            )
-        )
-    phased = tuple(c for c in main if len(measures.phase_names(c)) > 1)
-    if phased:
-        level = f"{100 * settings.confidence:g} %"
-        caption = (
-            f"Of the runs that began a phase: how many met its goal (Wilson's {level} interval), "
-            "and their cycles."
-        )
-        table = partial(
+        found.append(_paths(stem, "The manoeuvre, phase by phase", MANOEUVRE, [one]))
+    phases = Drawing(
+        "phases",
+        "Phases",
+        "Of the runs that began a phase: how many met its goal (Wilson's "
+        f"{100 * settings.confidence:g} % interval), and their cycles.",
+        partial(
             posture_history.phases_table, results._replace(conditions=phased), settings.confidence
-        )
-        found.append(
-            Drawing("phases", "Phases", caption, table, posture_history.draw_phases, phased)
-        )
-    return found
+        ),
+        posture_history.draw_phases,
+        phased,
+    )
+    return [*found, phases] if phased else found
 
 
 def _trap(main: tuple[ConditionResults, ...]) -> list[Drawing]:
@@ -288,7 +247,7 @@ PATHS = (
     "among all. Lines: the links at every posture of the path, which is the winner's ancestry. "
     "Nobody planned it."
 )
-PHASES = (
+MANOEUVRE = (
     "The same path, one panel per phase. Green: the object while it is held, where the phase "
     "begins and ends."
 )
@@ -316,7 +275,8 @@ def _models(main: tuple[ConditionResults, ...]) -> Drawing:
     )
 
 
-def _shown(condition: ConditionResults) -> Shown:
+def _shown(condition: ConditionResults) -> ShownPath:
+    """Return the run that is drawn of a condition."""
     replicate = measures.shown_replicate(condition)
-    state = "" if measures.solved(condition).any() else ", not solved"
-    return Shown(f"{condition.label}\nrun {replicate}{state}", condition, replicate)
+    state = "" if condition.solved else ", not solved"
+    return ShownPath(f"{condition.label}\nrun {replicate}{state}", condition, replicate)

@@ -6,18 +6,18 @@ from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius import page as whole_page
 from evoexp.papers.corsepius import population_claims as verdicts
 from evoexp.papers.corsepius.figures import population_effort
-from evoexp.papers.corsepius.measures import Task
-from evoexp.papers.corsepius.population_claims import METRICS, RECOMMENDED, Against
-from evoexp.report import markdown
-from evoexp.report.judging import not_judged
+from evoexp.papers.corsepius.measures import Task, text
+from evoexp.papers.corsepius.population_claims import METRICS, RECOMMENDED, SizeComparison
+from evoexp.report import judging, markdown
 from evoexp.report.page import Drawing, Page, Table
 from evoexp.report.pages import generic
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
-from evoexp.report.statistics import Interval, expected_effort, expected_interval
+from evoexp.report.run_measures import solved, success
+from evoexp.report.statistics import expected_effort, expected_interval
 
 SETTING = "num_offspring"
-SCALES = {"cycles": (1.0, ""), "evaluations": (1.0, ""), "CPU time": (1e3, "ms")}
+SCALES = {"cycles": (1.0, ""), "evaluations": (1.0, ""), "CPU time": (1e3, " [ms]")}
 INTRODUCTION = (
     "λ individuals are generated per cycle, of which 5 are selected; all else is equal, seeds "
     "included. Expected running time: the effort of all runs, failed ones included, over the "
@@ -27,72 +27,6 @@ INTRODUCTION = (
     "evaluation, and has a fixed part per cycle, which weighs more where λ is small. A smaller λ "
     "is not only less search per cycle: selection is weaker, too (5 of λ)."
 )
-
-
-def page(results: Results, settings: ReportSettings) -> Page:
-    """Return the page; that of the tasks where no size differs."""
-    if not measures.fits(results) or not results.main:
-        return generic.page(results, settings)
-    found = tuple(task for task in measures.tasks(results, SETTING) if len(task.values) > 1)
-    if not found:
-        return whole_page.page(results, settings)
-    why = not_judged(results)
-    compared = {metric: verdicts.ratios(found, metric, settings) for metric in METRICS}
-    return Page(
-        title=f"Corsépius 2001: {results.experiment or 'stored runs'}",
-        introduction=INTRODUCTION,
-        quantities=whole_page.effort_quantities(results),
-        tables=(_table(found, settings),),
-        claims=verdicts.of_study(why, found, compared, settings),
-        checks=CHECKS,
-        drawings=_drawings(found, compared, settings),
-    )
-
-
-def _table(found: tuple[Task, ...], settings: ReportSettings) -> Table:
-    """Return success and expected running times with their intervals, a row per task and size."""
-    level, rows = settings.confidence, []
-    for task in found:
-        for value, c in zip(task.values, task.conditions, strict=True):
-            shares = (
-                measures.text(one, level) for one in (measures.success(c), measures.refuted(c))
-            )
-            rows.append(
-                (
-                    task.name,
-                    f"{value:g}",
-                    *shares,
-                    *(_expected(c, metric, settings) for metric in METRICS),
-                )
-            )
-    total = sum(c.done for task in found for c in task.conditions)
-    note = (
-        f"In brackets {100 * level:g} % intervals: Wilson's of shares, percentiles of "
-        f"{settings.num_resamples} resamples of seeds for expected running times; {total} runs."
-    )
-    names = (
-        f"expected {metric}{f' [{SCALES[metric][1]}]' if SCALES[metric][1] else ''}"
-        for metric in METRICS
-    )
-    headers = ("task", "λ", "goal met", "of these refuted", *names)
-    return Table("Success and expected running times", headers, tuple(rows), note)
-
-
-def _expected(condition: ConditionResults, metric: str, settings: ReportSettings) -> str:
-    if not condition.solved:
-        return "∞"
-    spent, having = METRICS[metric](condition), measures.solved(condition)
-    scale = SCALES[metric][0]
-    expected = expected_effort(spent, having)
-    interval = expected_interval(spent, having, settings.confidence, settings.num_resamples)
-    low, high = Interval(*(scale * value for value in interval))
-    return f"{_round(scale * expected)} [{_round(low)}, {_round(high)}]"
-
-
-def _round(value: float) -> str:
-    return markdown.number(float(f"{value:.3g}"))
-
-
 CHECKS = (
     (
         "Intervals of ratios",
@@ -110,52 +44,96 @@ CHECKS = (
 )
 
 
+def page(results: Results, settings: ReportSettings) -> Page:
+    """Build the page of sizes, or that of the tasks if no size differs."""
+    if not measures.fits(results) or not results.main:
+        return generic.page(results, settings)
+    found = measures.tasks(results, SETTING)
+    if not found:
+        return whole_page.page(results, settings)
+    compared = {metric: verdicts.compare_sizes(found, metric, settings) for metric in METRICS}
+    judge = judging.judge(results, settings)
+    return Page(
+        title=f"Corsépius 2001: {results.experiment or 'stored runs'}",
+        introduction=INTRODUCTION,
+        quantities=whole_page.effort_quantities(results),
+        tables=(_table(found, settings),),
+        claims=verdicts.judge_study(judge, found, compared, settings),
+        checks=CHECKS,
+        drawings=_drawings(found, compared, settings),
+    )
+
+
+def _table(found: tuple[Task, ...], settings: ReportSettings) -> Table:
+    """Return success and expected running times with their intervals, a row per task and size."""
+    level = settings.confidence
+    rows = tuple(
+        (
+            task.name,
+            f"{value:g}",
+            text(success(c), level),
+            text(measures.refuted(c), level),
+            *(_expected(c, metric, settings) for metric in METRICS),
+        )
+        for task in found
+        for value, c in task.by_value.items()
+    )
+    note = (
+        f"In brackets {100 * level:g} % intervals: Wilson's of shares, percentiles of "
+        f"{settings.num_resamples} resamples of seeds for expected running times; "
+        f"{sum(c.done for task in found for c in task.conditions)} runs."
+    )
+    names = (f"expected {metric}{SCALES[metric][1]}" for metric in METRICS)
+    headers = ("task", "λ", "goal met", "of these refuted", *names)
+    return Table("Success and expected running times", headers, rows, note)
+
+
+def _expected(condition: ConditionResults, metric: str, settings: ReportSettings) -> str:
+    """Return the expected running time with its interval."""
+    if not condition.solved:
+        return "∞"
+    runs = METRICS[metric](condition), solved(condition)
+    interval = expected_interval(*runs, settings.confidence, settings.num_resamples)
+    expected, low, high = (
+        markdown.number(float(f"{SCALES[metric][0] * value:.3g}"))
+        for value in (expected_effort(*runs), *interval)
+    )
+    return f"{expected} [{low}, {high}]"
+
+
 def _drawings(
-    found: tuple[Task, ...], compared: dict[str, list[Against]], settings: ReportSettings
+    found: tuple[Task, ...], compared: dict[str, list[SizeComparison]], settings: ReportSettings
 ) -> tuple[Drawing, ...]:
-    level, names = f"{100 * settings.confidence:g} %", [task.name for task in found]
+    """Return the figures of effort, and of ratios where there are any."""
+    level = f"{100 * settings.confidence:g} %"
     shown = tuple(c for task in found for c in task.conditions)
-    effort = {
-        f"{metric} [{'s' if metric == 'CPU time' else '-'}]": values
-        for metric, values in METRICS.items()
-    }
-    shares = {
-        "goal met": measures.success,
-        "of these: in contact between postures": measures.refuted,
-    }
-    label = "offspring per cycle λ [-]"
-    drawn = [
-        Drawing(
-            "effort",
-            "Success and effort against the size",
-            "a: share of runs that meet the goal; b: of these, the share whose path touches "
-            f"something between two postures; Wilson's {level} intervals. c–e: expected running "
-            f"times, {level} bootstrap intervals; sizes without a success have no point. Dashed: "
-            f"{RECOMMENDED:g}, which the paper recommends.",
-            partial(
-                population_effort.effort_table,
-                found,
-                shares,
-                effort,
-                settings.confidence,
-                settings.num_resamples,
-            ),
-            partial(population_effort.draw_effort, setting=label, marked=RECOMMENDED),
-            shown,
-        )
-    ]
-    if any(compared.values()):
-        caption = (
-            f"Expected running times in units of that of {RECOMMENDED:g}, with intervals on "
-            "common seeds, Bonferroni's over a panel. Above 1: worse. Dotted: as many more "
-            "cycles as there are fewer individuals; above it the increase is over-proportional. "
-            "Where one of the two never succeeds, there is no point."
-        )
-        table = partial(population_effort.ratios_table, compared, names, RECOMMENDED)
-        draw = partial(population_effort.draw_ratios, setting="λ [-]")
-        drawn.append(
-            Drawing(
-                "ratios", f"Effort against that of {RECOMMENDED:g}", caption, table, draw, shown
-            )
-        )
-    return tuple(drawn)
+    units = (f"{metric} [{'s' if metric == 'CPU time' else '-'}]" for metric in METRICS)
+    effort = dict(zip(units, METRICS.values(), strict=True))
+    shares = {"goal met": success, "of these: in contact between postures": measures.refuted}
+    levels = settings.confidence, settings.num_resamples
+    efforts = Drawing(
+        "effort",
+        "Success and effort against the size",
+        "a: share of runs that meet the goal; b: of these, the share whose path touches "
+        f"something between two postures; Wilson's {level} intervals. c–e: expected running "
+        f"times, {level} bootstrap intervals; sizes without a success have no point. Dashed: "
+        f"{RECOMMENDED:g}, which the paper recommends.",
+        partial(population_effort.effort_table, found, shares, effort, *levels),
+        partial(
+            population_effort.draw_effort, setting="offspring per cycle λ [-]", marked=RECOMMENDED
+        ),
+        shown,
+    )
+    names = [task.name for task in found]
+    ratios = Drawing(
+        "ratios",
+        f"Effort against that of {RECOMMENDED:g}",
+        f"Expected running times in units of that of {RECOMMENDED:g}, with intervals on "
+        "common seeds, Bonferroni's over a panel. Above 1: worse. Dotted: as many more "
+        "cycles as there are fewer individuals; above it the increase is over-proportional. "
+        "Where one of the two never succeeds, there is no point.",
+        partial(population_effort.ratios_table, compared, names, RECOMMENDED),
+        partial(population_effort.draw_ratios, setting="λ [-]"),
+        shown,
+    )
+    return (efforts, ratios) if any(compared.values()) else (efforts,)

@@ -1,4 +1,4 @@
-"""Corsépius 2001: settings side by side; per task the first condition against each other one."""
+"""Corsépius 2001: settings side by side, per task the first condition against each other one."""
 
 from functools import partial
 
@@ -7,17 +7,16 @@ import numpy as np
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius import page as whole_page
 from evoexp.papers.corsepius.figures import population_effort, residual_floor
-from evoexp.papers.corsepius.measures import Task
-from evoexp.papers.corsepius.population_claims import METRICS
+from evoexp.papers.corsepius.measures import Task, text
 from evoexp.records import FloatArray
-from evoexp.report import claims, markdown
+from evoexp.report import markdown, sweep_figures
 from evoexp.report.claims import Comparison
-from evoexp.report.figures import effects, shares
+from evoexp.report.comparisons import compared
 from evoexp.report.page import Drawing, Page, Table
-from evoexp.report.pages import generic
 from evoexp.report.proportions import fisher_exact
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
+from evoexp.report.run_measures import grouped, solved, success
 from evoexp.report.statistics import holm, spread
 
 PRINTED_PARENTS = 5.0  # "typical size 5" (section 4.2)
@@ -27,112 +26,91 @@ INTRODUCTION = (
     "expected running times are formed. The paper sweeps nothing; it names the setting as what "
     "scales the algorithm (section 5) or as a next step (section 6)."
 )
+SHARES = (
+    "condition",
+    "goal met",
+    "p",
+    "of these refuted",
+    "p",
+    "steps beyond the scope, of a path",
+)
+NOTE = (
+    "p: against the first condition of the task, Fisher's exact test, Holm over the task's "
+    "conditions."
+)
+FLOOR = (
+    "The goal's tolerance is too small to be met, so every search ends by stagnation: "
+    "how near it came. Points: runs; bars: medians and quartiles. A step has the size of "
+    "the scope, so it seldom lands nearer than some share of it."
+)
+VALUES = f"{sweep_figures.BOXES}; never: runs that do not meet the goal."
+EFFECTS = (
+    f"{sweep_figures.A12} the first condition takes fewer evaluations to the goal than the other "
+    "one; dashed: no difference."
+)
+FirstComparison = tuple[str, str, tuple[Comparison, ...]]
+"""(quantity, first condition of a task, its comparisons with each other one)."""
 
 
 def page(results: Results, settings: ReportSettings) -> Page:
-    """Return the page; that of the tasks where there is nothing to compare."""
+    """Build the page of a sweep, or that of the tasks if there is nothing to compare."""
     if not measures.fits(results) or len(results.main) < 2:
         return whole_page.page(results, settings)
-    compared = comparisons(results, settings)
+    found = comparisons(results, settings)
+    slope = "slope of log residual over log scope {:.2f}; 1: proportional"
     return Page(
         title=f"Corsépius 2001: {results.experiment or 'stored runs'}",
         introduction=INTRODUCTION,
         quantities=whole_page.quantities(results),
         tables=(_table(results, settings),),
-        checks=_checks(results),
-        comparisons=tuple((f"{name}: {first} against …", rows) for name, first, rows in compared),
-        drawings=_drawings(results, settings, compared),
+        checks=tuple(
+            ("Residual floor", slope.format(residual_floor.slope(task)))
+            for task in _scopes(results)
+        ),
+        comparisons=tuple((f"{name}: {first} against …", rows) for name, first, rows in found),
+        drawings=_drawings(results, settings, found),
     )
 
 
 def groups(results: Results) -> tuple[tuple[ConditionResults, ...], ...]:
-    """Return the conditions task by task: those of one robot and one scenario.
-
-    Controls included.
-    """
-    found: dict[str, list[ConditionResults]] = {}
-    for c in results.with_data:
-        key = repr((c.condition.robot.canonical(), c.condition.scenario.canonical()))
-        found.setdefault(key, []).append(c)
-    return tuple(tuple(group) for group in found.values())
+    """Return the conditions by robot and scenario, controls included."""
+    return grouped(results.with_data, measures.scene)
 
 
 def effort(condition: ConditionResults) -> FloatArray:
     """Return the evaluations to the goal of each run, (done,); inf without it."""
-    return np.where(measures.solved(condition), measures.evaluations(condition), np.inf)
+    return np.where(solved(condition), measures.evaluations(condition), np.inf)
 
 
-def comparisons(
-    results: Results, settings: ReportSettings
-) -> list[tuple[str, str, tuple[Comparison, ...]]]:
-    """Return (quantity, first condition, it against each other one).
+def comparisons(results: Results, settings: ReportSettings) -> list[FirstComparison]:
+    """Compare the first condition of every task with each other one.
 
-    P-values adjusted over each task.
+    P-values are adjusted over each task. If no run meets its goal, distances to it are compared.
     """
-    found = []
     reaching = any(c.solved for c in results.main)
-    name, values = (
-        ("evaluations to the goal", effort)
-        if reaching
-        else ("distance to the goal", measures.residuals)
+    name = "evaluations to the goal" if reaching else "distance to the goal"
+    values = effort if reaching else measures.residuals
+    found = (
+        (name, first.label, compared([(first, other) for other in others], values, settings))
+        for first, *others in groups(results)
     )
-    for first, *others in groups(results):
-        rows = [
-            generic.compare_on_common_seeds(first, other, other.label, True, values, settings)
-            for other in others
-        ]
-        adjusted = tuple(claims.adjusted([row for row in rows if row is not None]))
-        if adjusted:
-            found.append((name, first.label, adjusted))
-    return found
+    return [one for one in found if one[2]]
 
 
 def _table(results: Results, settings: ReportSettings) -> Table:
-    """Return what each setting does to success, verdicts and steps."""
+    """Return success, verdicts and oversized steps of every condition."""
     rows, level = [], settings.confidence
-    for group in groups(results):
-        first, *others = group
-        p_values = holm(
-            [fisher_exact(measures.success(first), measures.success(c)) for c in others]
+    for first, *others in groups(results):
+        met, touching = (
+            holm([fisher_exact(count(first), count(c)) for c in others])
+            for count in (success, measures.refuted)
         )
-        contacts = holm(
-            [fisher_exact(measures.refuted(first), measures.refuted(c)) for c in others]
-        )
-        for c, p, touching in zip(group, (None, *p_values), (None, *contacts), strict=True):
-            met, refuted = (
-                measures.text(measures.success(c), level),
-                measures.text(measures.refuted(c), level),
-            )
+        for c, *p_values in zip((first, *others), (None, *met), (None, *touching), strict=True):
+            p_met, p_touching = ("–" if p is None else markdown.p_value(p) for p in p_values)
             beyond = markdown.spread(spread(c.column("term_oversized_steps")))
-            rows.append((c.label, met, _p(p), refuted, _p(touching), beyond))
-    headers = (
-        "condition",
-        "goal met",
-        "p",
-        "of these refuted",
-        "p",
-        "steps beyond the scope, of a path",
-    )
-    note = (
-        "p: against the first condition of the task, Fisher's exact test, Holm over the task's "
-        "conditions."
-    )
-    return Table("Shares of runs", headers, tuple(rows), note)
-
-
-def _checks(results: Results) -> tuple[tuple[str, str], ...]:
-    return tuple(
-        (
-            "Residual floor",
-            f"slope of log residual over log scope {residual_floor.slope(task):.2f}; 1: "
-            "proportional",
-        )
-        for task in _scopes(results)
-    )
-
-
-def _p(p: float | None) -> str:
-    return "–" if p is None else markdown.p_value(p)
+            told = text(success(c), level), p_met, text(measures.refuted(c), level), p_touching
+            rows.append((c.label, *told, beyond))
+    return Table("Shares of runs", SHARES, tuple(rows), NOTE)
 
 
 def _scopes(results: Results) -> tuple[Task, ...]:
@@ -140,109 +118,61 @@ def _scopes(results: Results) -> tuple[Task, ...]:
     if any(len(set(c.planner.scope)) > 1 for c in results.main):  # joint by joint another one
         return ()
     found = measures.tasks(results, "scope", "")
-    return tuple(t for t in found if len(t.values) > 1 and not any(c.solved for c in t.conditions))
+    return tuple(task for task in found if not any(c.solved for c in task.conditions))
 
 
 def _drawings(
-    results: Results,
-    settings: ReportSettings,
-    compared: list[tuple[str, str, tuple[Comparison, ...]]],
+    results: Results, settings: ReportSettings, found: list[FirstComparison]
 ) -> tuple[Drawing, ...]:
-    shown, level = results.with_data, f"{100 * settings.confidence:g} %"
-    drawn = []
-    for task in _scopes(results):
-        caption = (
-            "The goal's tolerance is too small to be met, so every search ends by stagnation: "
-            "how near it came. Points: runs; bars: medians and quartiles. A step has the size of "
-            "the scope, so it seldom lands nearer than some share of it."
+    """Return the figures that the settings in which conditions differ allow."""
+    scopes, parents = _scopes(results), measures.tasks(results, "num_parents")
+    drawn = [
+        Drawing(
+            "floor",
+            "Residual floor",
+            FLOOR,
+            partial(residual_floor.floor_table, task),
+            residual_floor.draw_floor,
+            task.conditions,
         )
-        table = partial(residual_floor.floor_table, task)
-        drawn.append(
-            Drawing(
-                "floor",
-                "Residual floor",
-                caption,
-                table,
-                residual_floor.draw_floor,
-                task.conditions,
-            )
-        )
-    parents = tuple(task for task in measures.tasks(results, "num_parents") if len(task.values) > 1)
+        for task in scopes
+    ]
     if parents:
-        drawn.append(_effort(parents, settings))
-    if any(c.solved for c in shown) and not parents:
+        return (*drawn, _effort(parents, settings))
+    shown = results.with_data
+    if any(c.solved for c in shown):
+        counts = {"goal met": success, "of these: touch between postures": measures.refuted}
         rows = [
             (name, results.position(c.label), c.label, count(c))
-            for name, count in (
-                ("goal met", measures.success),
-                ("of these: touch between postures", measures.refuted),
-            )
+            for name, count in counts.items()
             for c in shown
         ]
-        table = partial(shares.shares_table, rows, {}, settings.confidence)
-        drawn.append(
-            Drawing(
-                "shares",
-                "Shares of runs",
-                f"Wilson's {level} intervals.",
-                table,
-                shares.draw_shares,
-                shown,
-            )
-        )
-    if not parents and not _scopes(results):
-        table = partial(
-            effects.values_table,
-            results._replace(conditions=results.main),
-            {"evaluations to the goal": effort, "steps of the path": measures.num_steps},
-        )
-        drawn.append(
-            Drawing("values", "Every condition", VALUES, table, effects.draw_values, shown)
-        )
-        by_name = {name: rows for name, _, rows in compared}
-        table = partial(effects.effects_table, by_name, settings.significance)
-        drawn.append(
-            Drawing(
-                "effects",
-                f"How often {shown[0].label} is better",
-                EFFECTS,
-                table,
-                effects.draw_effects,
-                shown,
-            )
-        )
+        caption = f"Wilson's {100 * settings.confidence:g} % intervals."
+        drawn.append(sweep_figures.shares_drawing(results, settings, rows, caption))
+    if not scopes:
+        values = {"evaluations to the goal": effort, "steps of the path": measures.num_steps}
+        main = results._replace(conditions=results.main)
+        boxes = sweep_figures.values_drawing(main, values, VALUES)
+        by_name = {name: rows for name, _, rows in found}
+        first = shown[0].label
+        drawn += [
+            boxes._replace(conditions=shown),
+            sweep_figures.effects_drawing(results, settings, by_name, first, EFFECTS),
+        ]
     return tuple(drawn)
 
 
-VALUES = (
-    "Boxes: median and quartiles, whiskers to the last value within 1.5 interquartile ranges, "
-    "every replicate a point; dashed: median of the first condition; never: runs that do not "
-    "meet the goal."
-)
-EFFECTS = (
-    "Vargha and Delaney's A12 with its bootstrap interval: the share of pairs of runs in which "
-    "the first condition takes fewer evaluations to the goal than the other one; dashed: no "
-    "difference."
-)
-
-
 def _effort(found: tuple[Task, ...], settings: ReportSettings) -> Drawing:
-    metrics = {"evaluations [-]": METRICS["evaluations"]}
-    counts = {"goal met": measures.success}
+    """Return the figure of success and effort by the number of parents."""
+    levels = settings.confidence, settings.num_resamples
+    counts, efforts = {"goal met": success}, {"evaluations [-]": measures.evaluations}
     return Drawing(
         "effort",
         "Success and effort against the number of parents",
         "Left: share of runs that meet the goal; right: expected running time, failures counted; "
         f"{100 * settings.confidence:g} % intervals. Dashed: {PRINTED_PARENTS:g}, which the paper "
         "names typical.",
-        partial(
-            population_effort.effort_table,
-            found,
-            counts,
-            metrics,
-            settings.confidence,
-            settings.num_resamples,
-        ),
+        partial(population_effort.effort_table, found, counts, efforts, *levels),
         partial(population_effort.draw_effort, setting="parents μ [-]", marked=PRINTED_PARENTS),
         tuple(c for task in found for c in task.conditions),
     )

@@ -1,7 +1,4 @@
-"""Robots as they are and as they are tested.
-
-Coal's geometry beside the spheres (Corsépius 2001, Figs. 3 and 4).
-"""
+"""Robots beside the spheres or capsules that cover them (Corsépius 2001, Figs. 3 and 4)."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -11,6 +8,7 @@ import pandas as pd
 import pinocchio as pin
 from matplotlib.figure import Figure
 
+from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.figures import solids
 from evoexp.records import FloatArray
 from evoexp.report import style
@@ -19,6 +17,8 @@ from evoexp.report.rows import groups, records, rounded
 
 BODY, COVER = "body", "cover"
 VIEW = (18.0, -55.0)  # [deg]
+KINDS = {solids.BALL: "spheres", solids.ROD: "capsules"}
+NAMES = ["position", "robot", "element", "name", *solids.COLUMNS, "inflation", "length_unit"]
 
 
 def models_table(shown: Sequence[tuple[str, ConditionResults]]) -> pd.DataFrame:
@@ -33,55 +33,44 @@ def models_table(shown: Sequence[tuple[str, ConditionResults]]) -> pd.DataFrame:
     """
     rows: list[tuple[Any, ...]] = []
     for position, (title, c) in enumerate(shown):
-        problem = c.prepared.problem
-        bodies = problem.bodies
-        model, geometry = problem.assembly.model, problem.assembly.geometry
+        problem = measures.problem(c)
+        bodies, model, geometry = problem.bodies, problem.assembly.model, problem.assembly.geometry
         data, placements = model.createData(), geometry.createData()
         pin.updateGeometryPlacements(model, data, geometry, placements, problem.start)
-        joints = [item.parentJoint for item in geometry.geometryObjects]
-        end = bodies.inflation, c.condition.length_unit
-        for item, place in zip(geometry.geometryObjects, placements.oMg, strict=True):
-            rows.append((position, title, BODY, item.name, *_row(item.geometry, place), *end))
+        own = [
+            (BODY, item.name, *(solids.solid(item.geometry, place) or ()))
+            for item, place in zip(geometry.geometryObjects, placements.oMg, strict=True)
+        ]
+        joints = (data.oMi[item.parentJoint] for item in geometry.geometryObjects)
         for name, joint, cover in zip(bodies.names, joints, bodies.covers, strict=True):
-            for start, stop, radius in zip(cover.start, cover.end, cover.radius, strict=True):
-                rows.append(
-                    (
-                        position,
-                        title,
-                        COVER,
-                        name,
-                        *_capsule(data.oMi[joint], start, stop, radius),
-                        *end,
-                    )
-                )
-    names = ["position", "robot", "element", "name", *solids.COLUMNS, "inflation", "length_unit"]
-    return rounded(pd.DataFrame(rows, columns=names))
+            capsules = zip(cover.start, cover.end, cover.radius, strict=True)
+            own += [(COVER, name, *_capsule(joint, *capsule)) for capsule in capsules]
+        end = bodies.inflation, c.condition.length_unit
+        rows += [(position, title, *row, *end) for row in own]
+    return rounded(pd.DataFrame(rows, columns=NAMES))
 
 
 def draw_models(table: pd.DataFrame) -> Figure:
-    """Draw one row per robot: its bodies, and what covers them."""
+    """Draw one row per robot: its bodies, and their covers."""
     robots = list(groups(table, ["position", "robot"]))
     heights = [_height(solids.corners(rows)) for _, rows in robots]
     figure = style.figure(sum(heights))
     grid = figure.add_gridspec(len(robots), 2, height_ratios=heights)
     for (position, robot), rows in robots:
-        points = solids.corners(rows)
-        unit = rows["length_unit"].iloc[0]
-        for k, element in enumerate((BODY, COVER)):
-            own = rows[rows["element"] == element]
+        points, (inflation, unit) = solids.corners(rows), rows[["inflation", "length_unit"]].iloc[0]
+        bodies, covers = (rows[rows["element"] == element] for element in (BODY, COVER))
+        counts = covers["shape"].value_counts()
+        kinds = ", ".join(f"{counts[kind]} {KINDS[kind]}" for kind in KINDS if kind in counts)
+        for k, (own, alpha, title) in enumerate(
+            (
+                (bodies, 0.85, f"{robot}: {len(bodies)} bodies"),
+                (covers, 0.35, f"{kinds}, at most {inflation:.3g} {unit} beyond"),
+            )
+        ):
             axes = solids.space(figure, grid[position, k], points, unit, VIEW)
             for row in records(own):
-                colour = style.arm_colour(0) if element == BODY else style.arm_colour(1)
-                solids.draw_solid(axes, row, colour, 0.85 if element == BODY else 0.35)
-            if element == BODY:
-                axes.set_title(f"{robot}: {len(own)} bodies")
-            else:
-                kinds = {solids.BALL: "spheres", solids.ROD: "capsules"}
-                counts = own["shape"].value_counts()
-                what = ", ".join(
-                    f"{counts[kind]} {name}" for kind, name in kinds.items() if kind in counts
-                )
-                axes.set_title(f"{what}, at most {rows['inflation'].iloc[0]:.3g} {unit} beyond")
+                solids.draw_solid(axes, row, style.arm_colour(k), alpha)
+            axes.set_title(title)
     return figure
 
 
@@ -91,21 +80,12 @@ def _height(points: FloatArray) -> float:
     return float(np.clip(2.0 + 1.6 * z / max(x, y), 2.3, 3.3))
 
 
-def _row(shape: Any, placement: Any) -> tuple[Any, ...]:
-    found = solids.solid(shape, placement)
-    assert found is not None  # a robot has no half-space
-    return found
-
-
-def _capsule(joint: Any, start: Any, stop: Any, radius: float) -> tuple[Any, ...]:
+def _capsule(joint: Any, start: FloatArray, stop: FloatArray, radius: float) -> tuple[Any, ...]:
     """Return a sphere, or a capsule between two points, given in a joint's frame."""
-    along = np.asarray(stop) - np.asarray(start)
+    along, middle = np.asarray(stop) - np.asarray(start), 0.5 * (np.asarray(start) + stop)
     half = 0.5 * float(np.sqrt((along**2).sum()))
-    turn = (
-        np.eye(3)
-        if half == 0.0
-        else pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), along).matrix()
-    )
-    where = joint.act(0.5 * (np.asarray(start) + np.asarray(stop)))
-    shape = solids.BALL if half == 0.0 else solids.ROD
-    return (shape, *where, *(joint.rotation @ turn).ravel(), radius, half, 0.0)
+    shape, turn = solids.BALL, np.eye(3)
+    if half > 0.0:
+        axis = np.array([0.0, 0.0, 1.0])
+        shape, turn = solids.ROD, pin.Quaternion.FromTwoVectors(axis, along).matrix()
+    return (shape, *joint.act(middle), *(joint.rotation @ turn).ravel(), radius, half, 0.0)

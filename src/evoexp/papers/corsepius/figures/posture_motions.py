@@ -1,7 +1,4 @@
-"""Paths of postures in space: stick figures among the obstacles, earlier ones fainter.
-
-Phase by phase.
-"""
+"""Paths of postures in space: stick figures among the obstacles, earlier ones fainter."""
 
 from typing import Any, NamedTuple
 
@@ -9,11 +6,12 @@ import numpy as np
 import pandas as pd
 import pinocchio as pin
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from evoexp.collision.scene import obstacle_shapes
 from evoexp.numeric.elementary import DEGREE
+from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.figures import solids
+from evoexp.planners.posture_es.phases import Problem, Span
 from evoexp.records import FloatArray
 from evoexp.report import motion_geometry, style
 from evoexp.report.results import ConditionResults
@@ -21,19 +19,21 @@ from evoexp.report.rows import groups, records, rounded
 from evoexp.robots.poses import frame_pose
 
 LINK, OBSTACLE, HELD, TIP, GOAL = "link", "obstacle", "held", "tip", "goal"
-PATH = ["x_end", "y_end", "z_end"]
+PLACE, PATH = ["x", "y", "z"], ["x_end", "y_end", "z_end"]
+NAMES = ["panel", "title", "element", "instant", "name", *solids.COLUMNS, *PATH, "length_unit"]
 VIEW = (22.0, -62.0)  # [deg] elevation, azimuth
 FEW = 2  # panels up to which each is drawn from above, too
 PER_LINE = 3  # panels
+ARM, TOOL = style.arm_colour(0), style.arm_colour(1)
 
 
-class Shown(NamedTuple):
-    """One panel, or one panel per phase.
+class ShownPath(NamedTuple):
+    """The run of one panel, or of one panel per phase.
 
     Attributes:
-        title: Over the panel.
-        condition: Whose run.
-        replicate: Which.
+        title: Title of the panel.
+        condition: The condition of the run.
+        replicate: Its replicate.
         by_phase: Whether each phase has a panel of its own.
     """
 
@@ -43,7 +43,7 @@ class Shown(NamedTuple):
     by_phase: bool = False
 
 
-def motions_table(shown: list[Shown]) -> pd.DataFrame:
+def motions_table(shown: list[ShownPath]) -> pd.DataFrame:
     """Return links at every posture, tips, goals, obstacles where they are, objects that are held.
 
     Returns:
@@ -54,24 +54,17 @@ def motions_table(shown: list[Shown]) -> pd.DataFrame:
     rows: list[dict[str, Any]] = []
     panel = 0
     for one in shown:
-        problem = one.condition.prepared.problem
-        nq = len(problem.start)
-        postures = one.condition.solutions[one.replicate].reshape(-1, nq)
-        found = problem.spans(postures)
-        parts = found if one.by_phase else [found[-1]]
-        for number, span in enumerate(parts):
+        problem = measures.problem(one.condition)
+        postures = measures.paths(one.condition)[one.replicate]
+        spans = problem.spans(postures)
+        for number, span in enumerate(spans) if one.by_phase else [(0, spans[-1])]:
             first = span.first if one.by_phase else 0
             title = f"{number + 1}  {span.stage.phase.name}" if one.by_phase else one.title
-            given = {
-                "panel": panel,
-                "title": title,
-                "length_unit": one.condition.condition.length_unit,
-            }
-            for row in _panel(problem, span, postures, first):
-                rows.append(given | row)
+            unit = one.condition.condition.length_unit
+            given = {"panel": panel, "title": title, "length_unit": unit}
+            rows += [given | row for row in _panel(problem, span, postures, first)]
             panel += 1
-    order = ["panel", "title", "element", "instant", "name", *solids.COLUMNS, *PATH, "length_unit"]
-    return rounded(pd.DataFrame(rows).reindex(columns=order))
+    return rounded(pd.DataFrame(rows).reindex(columns=NAMES))
 
 
 def draw_motions(table: pd.DataFrame) -> Figure:
@@ -93,117 +86,90 @@ def draw_motions(table: pd.DataFrame) -> Figure:
             style.operational_axes(plane, unit)
             plane.set_title(f"{title.splitlines()[0]}, from above", fontsize=8)
             _draw(plane, rows, "xy")
-    grey = style.NEUTRAL
-    handles = [
-        Line2D(
-            [],
-            [],
-            color=style.arm_colour(0),
-            linewidth=0.8,
-            alpha=0.4,
-            label="postures, the later the stronger",
-        ),
-        Line2D([], [], color=style.arm_colour(0), linewidth=2.4, label="last posture"),
-        Line2D([], [], color=style.arm_colour(1), linewidth=1.0, label="way of the tool"),
-        Line2D([], [], color="none", marker="*", mec=grey, mfc="white", ms=9, label="goal"),
+    star: dict[str, Any] = {"marker": "*", "mec": style.NEUTRAL, "mfc": "white", "ms": 9}
+    keys = [
+        style.key("postures, the later the stronger", color=ARM, linewidth=0.8, alpha=0.4),
+        style.key("last posture", color=ARM, linewidth=2.4),
+        style.key("way of the tool", color=TOOL, linewidth=1.0),
+        style.key("goal", color="none", **star),
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=4)
+    style.keys_below(figure, keys)
     return figure
 
 
-def _panel(problem: Any, span: Any, postures: FloatArray, first: int) -> list[dict[str, Any]]:
+def tool_places(problem: Problem, postures: FloatArray) -> FloatArray:
+    """Return the place of the tool at some postures (postures, nq) [rad], (postures, 3)."""
+    table = problem.assembly.table
+    return np.array([frame_pose(table, *problem.tool, q)[9:] for q in postures])
+
+
+def _panel(problem: Problem, span: Span, postures: FloatArray, first: int) -> list[dict[str, Any]]:
     """Return the rows of one panel.
 
-    Postures from `first` to the end of the span, things as they are in it.
+    They are the postures from `first` to the end of the span, and things as they are in it.
     """
     own = postures[first : span.last + 1]
-    rows: list[dict[str, Any]] = []
+    rows: list[tuple[str, int, str, list[str], Any]] = []
     for _, link, start, end in motion_geometry.joint_positions(problem.assembly, own.T / DEGREE):
-        for n in range(len(own)):
-            where = dict(zip(("x", "y", "z", *PATH), (*start[n], *end[n]), strict=True))
-            rows.append({"element": LINK, "instant": first + n, "name": str(link)} | where)
-    joint, local = problem.tool
-    for n, q in enumerate(own):
-        tip = frame_pose(problem.assembly.table, joint, local, q)[9:]
-        rows.append(
-            {"element": TIP, "instant": first + n, "name": "tool"}
-            | dict(zip("xyz", tip, strict=True))
-        )
-    rows.append(
-        {"element": GOAL, "instant": span.last, "name": span.stage.phase.name}
-        | dict(zip("xyz", span.stage.target_position, strict=True))
-    )
-    situation = span.stage.situation
-    table = problem.obstacles_in(span.stage)
-    for k, (shape, placement) in enumerate(obstacle_shapes(table)):
-        instants, element = [span.last], OBSTACLE
-        if k == situation.held:
-            instants, element = [first, span.last], HELD
-        for instant in instants:
-            where = placement
-            if element == HELD:
-                pose = frame_pose(problem.assembly.table, joint, situation.grasp, postures[instant])
-                where = pin.SE3(pose[:9].reshape(3, 3), pose[9:])
+        places = np.hstack([start, end])
+        rows += [(LINK, n, str(link), [*PLACE, *PATH], row) for n, row in enumerate(places, first)]
+    tips = tool_places(problem, own)
+    rows += [(TIP, n, "tool", PLACE, place) for n, place in enumerate(tips, first)]
+    target = span.stage.target_position
+    rows.append((GOAL, span.last, span.stage.phase.name, PLACE, target))
+    for k, (shape, placement) in enumerate(obstacle_shapes(problem.obstacles_in(span.stage))):
+        name, held = problem.task.names[k], k == span.stage.situation.held
+        for instant in [first, span.last] if held else [span.last]:
+            where = _held_pose(problem, span, postures[instant]) if held else placement
             found = solids.solid(shape, where)
             if found is not None:
-                given = dict(zip(solids.COLUMNS, found, strict=True))
-                rows.append(
-                    {"element": element, "instant": instant, "name": problem.task.names[k]} | given
-                )
-    return rows
+                rows.append((HELD if held else OBSTACLE, instant, name, solids.COLUMNS, found))
+    return [
+        {"element": element, "instant": instant, "name": name}
+        | dict(zip(names, values, strict=True))
+        for element, instant, name, names, values in rows
+    ]
+
+
+def _held_pose(problem: Problem, span: Span, posture: FloatArray) -> pin.SE3:
+    """Return the pose of the held object at a posture (nq,) [rad]."""
+    joint, _ = problem.tool
+    pose = frame_pose(problem.assembly.table, joint, span.stage.situation.grasp, posture)
+    return pin.SE3(pose[:9].reshape(3, 3), pose[9:])
 
 
 def _points(rows: pd.DataFrame) -> FloatArray:
     """Return points that a panel has to hold."""
-    links = rows[rows["element"] == LINK]
+    links, goal = (rows[rows["element"] == element] for element in (LINK, GOAL))
     solid = rows[rows["element"].isin([OBSTACLE, HELD])]
-    goal = rows[rows["element"] == GOAL]
-    parts = [
-        links[["x", "y", "z"]],
-        links[PATH],
-        goal[["x", "y", "z"]],
-        pd.DataFrame(solids.corners(solid)),
-    ]
-    return np.vstack([part.to_numpy(dtype=np.float64) for part in parts])
+    parts = (part.to_numpy(dtype=np.float64) for part in (links[PLACE], links[PATH], goal[PLACE]))
+    return np.vstack([*parts, solids.corners(solid)])
 
 
 def _draw(axes: Any, rows: pd.DataFrame, names: str) -> None:
     """Draw a panel into axes in space (names xyz) or in the plane (xy)."""
     draw = solids.draw_solid if len(names) == 3 else solids.draw_outline
-    for row in records(rows[rows["element"] == OBSTACLE]):
-        draw(axes, row, style.FAINT, 0.22)
-    sticks = rows[rows["element"] == LINK]
+    sticks, obstacles, held, tip, goal = (
+        rows[rows["element"] == element] for element in (LINK, OBSTACLE, HELD, TIP, GOAL)
+    )
     first, last = sticks["instant"].min(), sticks["instant"].max()
-    for row in records(rows[rows["element"] == HELD]):
+    # obstacles, and the held object: earlier fainter
+    for row in records(obstacles):
+        draw(axes, row, style.FAINT, 0.22)
+    for row in records(held):
         draw(axes, row, style.arm_colour(2), 0.7 if row.instant == last else 0.2)
+    # postures: earlier fainter, joints of the last one
     for instant, links in groups(sticks, "instant"):
         points = [[links[name].iloc[0], *links[f"{name}_end"]] for name in names]
+        shade = 0.12 + 0.4 * (instant - first) / max(1, last - first)
         newest = instant == last
-        shade = 1.0 if newest else 0.12 + 0.4 * (instant - first) / max(1, last - first)
-        axes.plot(
-            *points,
-            color=style.arm_colour(0),
-            linewidth=2.4 if newest else 0.8,
-            alpha=shade,
-            zorder=5,
-        )
+        look = {"linewidth": 2.4, "alpha": 1.0} if newest else {"linewidth": 0.8, "alpha": shade}
+        axes.plot(*points, color=ARM, zorder=5, **look)
         if newest:
-            axes.plot(
-                *points,
-                "o",
-                color="white",
-                markeredgecolor=style.arm_colour(0),
-                markersize=2.6,
-                zorder=6,
-            )
-    tip = rows[rows["element"] == TIP].sort_values("instant")
-    axes.plot(*(tip[name] for name in names), color=style.arm_colour(1), linewidth=1.0, zorder=7)
-    goal = rows[rows["element"] == GOAL]
-    axes.plot(
-        *(goal[name] for name in names),
-        "*",
-        color="white",
-        markeredgecolor=style.NEUTRAL,
-        ms=8,
-        zorder=8,
-    )
+            joint = {"color": "white", "markeredgecolor": ARM, "markersize": 2.6}
+            axes.plot(*points, "o", zorder=6, **joint)
+    # the tool's way and its goal
+    way = tip.sort_values("instant")
+    axes.plot(*(way[name] for name in names), color=TOOL, linewidth=1.0, zorder=7)
+    star = {"color": "white", "markeredgecolor": style.NEUTRAL, "ms": 8, "zorder": 8}
+    axes.plot(*(goal[name] for name in names), "*", **star)

@@ -1,14 +1,11 @@
-"""A local minimum of the search.
-
-Where it gets stuck, the cost around, and the way that a sub-goal opens.
-"""
+"""A local minimum of the search: the stuck runs, the cost around, and the way of a sub-goal."""
 
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import ScalarFormatter
 
@@ -16,50 +13,47 @@ from evoexp.collision.scene import obstacle_shapes
 from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.figures import solids
+from evoexp.papers.corsepius.figures.posture_motions import tool_places
 from evoexp.records import FloatArray
 from evoexp.report import style
 from evoexp.report.results import ConditionResults
 from evoexp.report.rows import groups, records, rounded
+from evoexp.report.run_measures import median_replicate, solved
 from evoexp.report.statistics import BOOTSTRAP_SEED
-from evoexp.robots.poses import frame_pose
 
 TOOL, CELL, ESCAPE, OBSTACLE, GOAL = "tool", "cell", "escape", "obstacle", "goal"
 CELLS = 81  # of the landscape, along each joint
 AROUND = 3.0  # [scopes] the landscape reaches from the posture that is stuck
-BOXES = (
-    0.5,
-    1.0,
-    1.5,
-    2.0,
-    3.0,
-    4.0,
-    6.0,
-    8.0,
-    12.0,
-    16.0,
-    24.0,
-)  # [scopes] half the edges of boxes searched at random
+# [scopes] half the edges of boxes searched at random
+BOXES = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
 SAMPLES = 20_000  # postures in each box
 STUCK, HELPED = "stuck", "helped"
+NAMES = [
+    *("element", "series", "replicate", "order", "value", *solids.COLUMNS),
+    *("x_end", "y_end", "scope_deg"),
+]
+Rows = list[dict[str, object]]
 
 
 def pair(shown: tuple[ConditionResults, ...]) -> tuple[ConditionResults, ConditionResults] | None:
-    """Return a task in which runs get stuck, and the same with sub-goals, solved.
+    """Return a task of one phase in which runs get stuck, and the same with sub-goals, solved.
 
     None without both.
     """
     for helped in shown:
         for stuck in shown:
             different = stuck.solved < stuck.done and helped.solved > 0
-            if different and measures.only_subgoals_differ(stuck, helped):
+            alone = len(measures.phase_names(stuck)) == 1
+            if different and alone and measures.only_subgoals_differ(stuck, helped):
                 return stuck, helped
     return None
 
 
 def trap_table(stuck: ConditionResults, helped: ConditionResults) -> pd.DataFrame:
-    """Return ways of the tools, distances to the goal along them.
+    """Return ways of the tools with distances to the goal, and the cost around a stuck posture.
 
-    And the cost around the median run that is stuck.
+    That posture is the end of the median run that is stuck. The planner's own `cost` judges all
+    postures, by the only phase of the task without sub-goals.
 
     Returns:
         Columns element (tool, cell, escape, obstacle, goal), series (stuck, helped), replicate,
@@ -68,196 +62,142 @@ def trap_table(stuck: ConditionResults, helped: ConditionResults) -> pd.DataFram
         (NaN: infeasible), with the stuck posture and its scope. Escapes: half the edge of a box
         [scopes], the stuck posture's cost, the least one found in the box.
     """
-    problem = stuck.prepared.problem
-    stage = problem.last_stage
-    rows: list[dict[str, object]] = []
+    problem, rows = measures.problem(stuck), list[dict[str, object]]()
     for series, condition in ((STUCK, stuck), (HELPED, helped)):
-        wanted = measures.solved(condition) == (series == HELPED)
+        wanted = solved(condition) == (series == HELPED)
         kept = set(condition.summaries.index[wanted])
         for replicate, q in measures.paths(condition).items():
             if replicate in kept:
-                rows += _tool(problem, stage, series, int(replicate), q)
-    failed = measures.paths(stuck)[measures.median_replicate(stuck, ~measures.solved(stuck))]
+                rows += _way(stuck, series, int(replicate), q)
+    median = median_replicate(stuck, measures.evaluations(stuck), ~solved(stuck))
+    failed = measures.paths(stuck)[median]
     a, b = sorted(int(k) for k in np.argsort(-np.ptp(failed, axis=0), kind="stable")[:2])
-    rows += _cells(problem, stage, failed[-1], a, b)
-    rows += _escape(problem, stage, failed[-1])
-    x, y, z = stage.target_position
-    rows.append({"element": GOAL, "order": 0, "x": x, "y": y, "z": z})
+    rows += [*_cells(stuck, failed[-1], a, b), *_escape(stuck, failed[-1])]
+    stage = problem.last_stage
+    goal = dict(zip("xyz", stage.target_position, strict=True))
+    rows.append({"element": GOAL, "order": 0} | goal)
     for k, (shape, placement) in enumerate(obstacle_shapes(problem.obstacles_in(stage))):
         found = solids.solid(shape, placement)
         if found is not None:
-            rows.append(
-                {"element": OBSTACLE, "order": k} | dict(zip(solids.COLUMNS, found, strict=True))
-            )
-    places = ["x_end", "y_end", "scope_deg"]
-    names = ["element", "series", "replicate", "order", "value", *solids.COLUMNS, *places]
-    table = rounded(pd.DataFrame(rows).reindex(columns=names))
+            given = dict(zip(solids.COLUMNS, found, strict=True))
+            rows.append({"element": OBSTACLE, "order": k} | given)
+    table = rounded(pd.DataFrame(rows).reindex(columns=NAMES))
     return table.assign(joint_x=a + 1, joint_y=b + 1, length_unit=stuck.condition.length_unit)
 
 
-def draw_trap(table: pd.DataFrame) -> Figure:
-    """Draw the ways from above, the landscape, and distances along the paths."""
-    figure = style.figure(6.2)
-    (above, along), (land, escape) = figure.subplots(2, 2)
-    unit = table["length_unit"].iloc[0]
-    for row in records(table[table["element"] == OBSTACLE]):
-        solids.draw_outline(above, row, style.FAINT, 0.35)
-    look = {
-        STUCK: (style.arm_colour(1), "without a sub-goal, stuck"),
-        HELPED: (style.arm_colour(0), "with a sub-goal"),
-    }
-    tools = table[table["element"] == TOOL]
-    for series, (colour, _) in look.items():
-        for _, rows in groups(tools[tools["series"] == series], "replicate"):
-            above.plot(rows["x"], rows["y"], color=colour, linewidth=0.7, alpha=0.45)
-            along.plot(rows["order"], rows["value"], color=colour, linewidth=0.7, alpha=0.45)
-            if series == STUCK:
-                above.plot(
-                    rows["x"].iloc[-1:],
-                    rows["y"].iloc[-1:],
-                    "x",
-                    color=style.FORBIDDEN,
-                    markersize=4,
-                    zorder=5,
-                )
-    goal = table[table["element"] == GOAL]
-    above.plot(
-        goal["x"],
-        goal["y"],
-        "*",
-        color="white",
-        markeredgecolor=style.NEUTRAL,
-        markersize=10,
-        zorder=6,
-    )
-    style.operational_axes(above, unit)
-    above.set_title("a  ways of the tools, from above")
-    along.set_xlabel("posture of the path")
-    along.set_ylabel(f"distance to the goal [{unit}]")
-    along.set_title("b  distance along the paths")
-    along.set_ylim(bottom=0.0)
-    _landscape(figure, land, table)
-    _way_out(escape, table[table["element"] == ESCAPE])
-    handles = [
-        Line2D([], [], color=colour, linewidth=1.6, label=name) for colour, name in look.values()
-    ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=2)
-    return figure
+def _cost(condition: ConditionResults, q: FloatArray) -> FloatArray:
+    """Return the cost of postures q (nq, postures) [rad]; NaN: infeasible."""
+    planner, problem = condition.prepared
+    cost = planner.cost(problem, q).cost
+    return np.where(np.isinf(cost), np.nan, cost)
 
 
-def _landscape(figure: Figure, axes, table: pd.DataFrame) -> None:  # type: ignore[no-untyped-def]
-    cells = table[table["element"] == CELL]
-    wide = cells.pivot(index="y", columns="x", values="value")
-    axes.set_facecolor("#c8c8c8")
-    shown = axes.pcolormesh(
-        wide.columns,
-        wide.index,
-        wide.to_numpy(),
-        cmap="viridis_r",
-        shading="nearest",
-        rasterized=True,
-    )
-    figure.colorbar(shown, ax=axes, label="cost [-]", shrink=0.9)
-    x, y = cells["x_end"].iloc[0], cells["y_end"].iloc[0]
-    axes.plot(x, y, "X", color=style.FORBIDDEN, mec="white", markersize=8)
-    scope = cells["scope_deg"].iloc[0]
-    corner = x - scope, y - scope
-    axes.add_patch(
-        Rectangle(
-            corner, 2 * scope, 2 * scope, fill=False, edgecolor=style.FORBIDDEN, linewidth=1.2
-        )
-    )
-    axes.grid(visible=False)
-    axes.set_xlabel(f"{style.joint_symbol(0, int(table['joint_x'].iloc[0]) - 1)} [deg]")
-    axes.set_ylabel(f"{style.joint_symbol(0, int(table['joint_y'].iloc[0]) - 1)} [deg]")
-    axes.set_title("c  cost around a stuck posture (×), its scope")
-
-
-def _tool(
-    problem: Any, stage: Any, series: str, replicate: int, q: FloatArray
-) -> list[dict[str, object]]:
+def _way(condition: ConditionResults, series: str, replicate: int, q: FloatArray) -> Rows:
     """Return the places of the tool along a path, and its distances to the goal."""
-    distance = problem.judge(stage, q.T).distance
-    joint, local = problem.tool
-    places = [frame_pose(problem.assembly.table, joint, local, posture)[9:] for posture in q]
+    planner, problem = condition.prepared
+    judged = planner.cost(problem, q.T)
+    given = {"element": TOOL, "series": series, "replicate": replicate}
     return [
-        {
-            "element": TOOL,
-            "series": series,
-            "replicate": replicate,
-            "order": n,
-            "x": x,
-            "y": y,
-            "z": z,
-            "value": value,
-        }
-        for n, ((x, y, z), value) in enumerate(zip(places, distance, strict=True))
+        given
+        | {"order": n, "value": abs(judged.named_terms(n)["goal_distance"])}
+        | dict(zip("xyz", place, strict=True))
+        for n, place in enumerate(tool_places(problem, q))
     ]
 
 
-def _way_out(axes, table: pd.DataFrame) -> None:  # type: ignore[no-untyped-def]
-    """Draw the least cost in boxes around the posture that is stuck."""
-    axes.axhline(
-        table["y"].iloc[0],
-        color=style.FORBIDDEN,
-        linewidth=1.0,
-        linestyle=(0, (4, 2)),
-        label="stuck",
-    )
-    axes.plot(table["x"], table["value"], "o-", color=style.arm_colour(0), markersize=4)
-    axes.set_xscale("log", base=2)
-    axes.xaxis.set_major_formatter(ScalarFormatter())
-    axes.set_xlabel("half the edge of the box [scopes]")
-    axes.set_ylabel("least cost found in it [-]")
-    axes.set_title("d  random postures around it")
-    axes.set_ylim(bottom=0.0)
-
-
-def _cells(problem, stage: Any, end: FloatArray, a: int, b: int) -> list[dict[str, object]]:  # type: ignore[no-untyped-def]
+def _cells(condition: ConditionResults, end: FloatArray, a: int, b: int) -> Rows:
     """Return the cost over two joints, the others as at the end of the run that is stuck."""
-    ranges = []
-    for k in (a, b):
-        low, high = problem.limits[k]
-        reach = AROUND * problem.scope[k]
-        ranges.append(np.linspace(max(low, end[k] - reach), min(high, end[k] + reach), CELLS))
-    first, second = (axis.ravel() for axis in np.meshgrid(*ranges, indexing="ij"))
-    q = np.repeat(end[:, None], len(first), axis=1)
-    q[a], q[b] = first, second
-    found = problem.judge(stage, q)
-    cost = np.where(found.feasible, found.cost, np.nan)
-    same = {
-        "x_end": end[a] / DEGREE,
-        "y_end": end[b] / DEGREE,
-        "scope_deg": problem.scope[a] / DEGREE,
-    }
-    return [
-        {"element": CELL, "order": n, "x": x, "y": y, "value": value} | same
-        for n, (x, y, value) in enumerate(zip(first / DEGREE, second / DEGREE, cost, strict=True))
-    ]
+    problem = measures.problem(condition)
+    reach = AROUND * problem.scope
+    low, high = (
+        np.maximum(problem.limits[:, 0], end - reach),
+        np.minimum(problem.limits[:, 1], end + reach),
+    )
+    ranges = [np.linspace(low[k], high[k], CELLS) for k in (a, b)]
+    q = np.repeat(end[:, None], CELLS * CELLS, axis=1)
+    q[a], q[b] = (axis.ravel() for axis in np.meshgrid(*ranges, indexing="ij"))
+    ends = {"x_end": end[a] / DEGREE, "y_end": end[b] / DEGREE}
+    same = {"element": CELL, "scope_deg": problem.scope[a] / DEGREE} | ends
+    cells = zip(q[a] / DEGREE, q[b] / DEGREE, _cost(condition, q), strict=True)
+    return [same | {"order": n, "x": x, "y": y, "value": v} for n, (x, y, v) in enumerate(cells)]
 
 
-def _escape(problem, stage: Any, end: FloatArray) -> list[dict[str, object]]:  # type: ignore[no-untyped-def]
-    """Return the least feasible cost of random postures in boxes around a posture.
-
-    And that posture's own.
-    """
+def _escape(condition: ConditionResults, end: FloatArray) -> Rows:
+    """Return the least cost of random postures in boxes around a posture, and its own cost."""
+    problem = measures.problem(condition)
     rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
     low, high = problem.limits.T
-    own = float(problem.judge(stage, end[:, None]).cost[0])
-    rows: list[dict[str, object]] = []
+    (own,) = _cost(condition, end[:, None])
+    rows: Rows = []
     for n, half in enumerate(BOXES):
         least = np.maximum(end - half * problem.scope, low)
         most = np.minimum(end + half * problem.scope, high)
         q = least[:, None] + (most - least)[:, None] * rng.random((len(end), SAMPLES))
-        found = problem.judge(stage, q)
-        costs = found.cost[found.feasible]
-        rows.append(
-            {
-                "element": ESCAPE,
-                "order": n,
-                "x": half,
-                "y": own,
-                "value": costs.min() if len(costs) else np.nan,
-            }
-        )
+        least_cost = np.fmin.reduce(_cost(condition, q))  # NaN if none is feasible
+        rows.append({"element": ESCAPE, "order": n, "x": half, "y": own, "value": least_cost})
     return rows
+
+
+def draw_trap(table: pd.DataFrame) -> Figure:
+    """Draw the ways from above, distances along the paths, the landscape, and ways out."""
+    figure = style.figure(6.2)
+    (above, along), (land, escape) = figure.subplots(2, 2)
+    tools, cells, escapes, obstacles, goal = (
+        table[table["element"] == element] for element in (TOOL, CELL, ESCAPE, OBSTACLE, GOAL)
+    )
+    unit = table["length_unit"].iloc[0]
+    # ways of both kinds of runs, crosses where they are stuck
+    for row in records(obstacles):
+        solids.draw_outline(above, row, style.FAINT, 0.35)
+    looks = {
+        STUCK: (style.arm_colour(1), "without a sub-goal, stuck"),
+        HELPED: (style.arm_colour(0), "with a sub-goal"),
+    }
+    for series, (colour, _) in looks.items():
+        for _, rows in groups(tools[tools["series"] == series], "replicate"):
+            for axes, x, y in ((above, "x", "y"), (along, "order", "value")):
+                axes.plot(rows[x], rows[y], color=colour, linewidth=0.7, alpha=0.45)
+            if series == STUCK:
+                cross: dict[str, Any] = {"color": style.FORBIDDEN, "markersize": 4, "zorder": 5}
+                above.plot(rows["x"].iloc[-1:], rows["y"].iloc[-1:], "x", **cross)
+    star: dict[str, Any] = {"markeredgecolor": style.NEUTRAL, "markersize": 10, "zorder": 6}
+    above.plot(goal["x"], goal["y"], "*", color="white", **star)
+    style.operational_axes(above, unit)
+    above.set_title("a  ways of the tools, from above")
+    along.set(xlabel="posture of the path", ylabel=f"distance to the goal [{unit}]")
+    along.set_title("b  distance along the paths")
+    along.set_ylim(bottom=0.0)
+    _draw_landscape(figure, land, cells)
+    _draw_ways_out(escape, escapes)
+    keys = [style.key(name, color=colour, linewidth=1.6) for colour, name in looks.values()]
+    style.keys_below(figure, keys)
+    return figure
+
+
+def _draw_landscape(figure: Figure, axes: Axes, cells: pd.DataFrame) -> None:
+    """Draw the cost over two joints, the stuck posture and its scope."""
+    wide = cells.pivot(index="y", columns="x", values="value")
+    axes.set_facecolor("#c8c8c8")
+    look: dict[str, Any] = {"cmap": "viridis_r", "shading": "nearest", "rasterized": True}
+    shown = axes.pcolormesh(wide.columns, wide.index, wide.to_numpy(), **look)
+    figure.colorbar(shown, ax=axes, label="cost [-]", shrink=0.9)
+    x, y, scope, *joints = cells[["x_end", "y_end", "scope_deg", "joint_x", "joint_y"]].iloc[0]
+    axes.plot(x, y, "X", color=style.FORBIDDEN, mec="white", markersize=8)
+    edge: dict[str, Any] = {"fill": False, "edgecolor": style.FORBIDDEN, "linewidth": 1.2}
+    axes.add_patch(Rectangle((x - scope, y - scope), 2 * scope, 2 * scope, **edge))
+    axes.grid(visible=False)
+    labels = (f"{style.joint_symbol(0, int(joint) - 1)} [deg]" for joint in joints)
+    axes.set(**dict(zip(("xlabel", "ylabel"), labels, strict=True)))
+    axes.set_title("c  cost around a stuck posture (×), its scope")
+
+
+def _draw_ways_out(axes: Axes, escapes: pd.DataFrame) -> None:
+    """Draw the least cost in boxes around the posture that is stuck."""
+    look: dict[str, Any] = {"color": style.FORBIDDEN, "linewidth": 1.0, "linestyle": (0, (4, 2))}
+    axes.axhline(escapes["y"].iloc[0], label="stuck", **look)
+    axes.plot(escapes["x"], escapes["value"], "o-", color=style.arm_colour(0), markersize=4)
+    axes.set_xscale("log", base=2)
+    axes.xaxis.set_major_formatter(ScalarFormatter())
+    axes.set(xlabel="half the edge of the box [scopes]", ylabel="least cost found in it [-]")
+    axes.set_title("d  random postures around it")
+    axes.set_ylim(bottom=0.0)

@@ -1,7 +1,6 @@
-"""How near a search gets before it stagnates, and what that costs, against its local scope.
+"""How near a search gets before it stagnates, against its local scope (Corsépius 2001, Fig. 2)."""
 
-Corsépius 2001, Fig. 2.
-"""
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,10 +11,10 @@ from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.measures import Task
 from evoexp.report import style
 from evoexp.report.figures.boxes import JITTER
-from evoexp.report.rows import records
 from evoexp.report.statistics import spread
 
 RESIDUAL, CYCLES, POINT = "residual", "cycles", "point"
+NAMES = ["quantity", "scope", "median", "lower", "upper", "runs"]
 
 
 def floor_table(task: Task) -> pd.DataFrame:
@@ -27,12 +26,12 @@ def floor_table(task: Task) -> pd.DataFrame:
         length_unit.
     """
     rows: list[tuple[object, ...]] = []
-    for scope, c in zip(task.values, task.conditions, strict=True):
+    for scope, c in task.by_value.items():
         for name, values in ((RESIDUAL, measures.residuals(c)), (CYCLES, measures.cycles(c))):
             found = spread(values)
             rows.append((name, scope, found.median, found.lower, found.upper, c.done))
         rows += [(POINT, scope, value, value, value, 1) for value in measures.residuals(c)]
-    table = pd.DataFrame(rows, columns=["quantity", "scope", "median", "lower", "upper", "runs"])
+    table = pd.DataFrame(rows, columns=NAMES)
     return table.assign(slope=slope(task), length_unit=task.conditions[0].condition.length_unit)
 
 
@@ -51,52 +50,33 @@ def slope(task: Task) -> float:
 
 def draw_floor(table: pd.DataFrame) -> Figure:
     """Draw residuals with every run, and cycles, against the scope."""
-    figure = style.figure(3.1)
-    left, right = figure.subplots(1, 2)
-    unit = table["length_unit"].iloc[0]
+    figure, (left, right) = style.row_of_panels(3.1, 2)
+    colour, unit = style.arm_colour(0), table["length_unit"].iloc[0]
+    # every run, beside its scope by a low-discrepancy jitter
     points = table[table["quantity"] == POINT]
     beside = np.exp2(JITTER * (2.0 * ((np.arange(len(points)) * 0.618034) % 1.0) - 1.0))
-    left.plot(
-        points["scope"] * beside,
-        points["median"],
-        "o",
-        color=style.arm_colour(0),
-        ms=2.2,
-        alpha=0.35,
-        mec="none",
+    look: dict[str, Any] = {"color": colour, "ms": 2.2, "alpha": 0.35, "mec": "none"}
+    left.plot(points["scope"] * beside, points["median"], "o", **look)
+    # medians and quartiles
+    residuals, cycles = (
+        table[table["quantity"] == quantity].sort_values("scope") for quantity in (RESIDUAL, CYCLES)
     )
-    for axes, quantity in ((left, RESIDUAL), (right, CYCLES)):
-        own = table[table["quantity"] == quantity].sort_values("scope")
-        axes.plot(
-            own["scope"],
-            own["median"],
-            "o-",
-            color=style.arm_colour(0),
-            markersize=4.5,
-            linewidth=1.1,
-        )
-        for row in records(own):
-            axes.vlines(row.scope, row.lower, row.upper, color=style.arm_colour(0), linewidth=1.6)
+    for axes, own in ((left, residuals), (right, cycles)):
+        x = own["scope"]
+        axes.plot(x, own["median"], "o-", color=colour, markersize=4.5, linewidth=1.1)
+        axes.vlines(x, own["lower"], own["upper"], color=colour, linewidth=1.6)
         axes.set_xscale("log")
         axes.xaxis.set_minor_locator(NullLocator())
-        axes.set_xticks(list(own["scope"]), [f"{scope:g}" for scope in own["scope"]])
+        axes.set_xticks(list(x), [f"{scope:g}" for scope in x])
         axes.set_xlabel("scope of a joint [rad]")
-    own = table[table["quantity"] == RESIDUAL].sort_values("scope")
-    middle = len(own) // 2
-    line = own["median"].iloc[middle] * own["scope"] / own["scope"].iloc[middle]
-    left.plot(
-        own["scope"],
-        line,
-        ":",
-        color=style.NEUTRAL,
-        linewidth=1.1,
-        label="proportional to the scope",
-    )
+    # a proportional line through the middle
+    x, middle = residuals["scope"], len(residuals) // 2
+    line = residuals["median"].iloc[middle] * x / x.iloc[middle]
+    left.plot(x, line, ":", color=style.NEUTRAL, linewidth=1.1, label="proportional to the scope")
     left.set_yscale("log")
-    left.set_ylabel(f"distance to the goal at the end [{unit}]")
-    left.set_title(f"a  residual (slope {table['slope'].iloc[0]:.2f})")
+    title = f"a  residual (slope {table['slope'].iloc[0]:.2f})"
+    left.set(ylabel=f"distance to the goal at the end [{unit}]", title=title)
     left.legend(loc="upper left")
-    right.set_ylabel("cycles until it stagnates [-]")
+    right.set(ylabel="cycles until it stagnates [-]", title="b  cycles")
     right.set_ylim(bottom=0)
-    right.set_title("b  cycles")
     return figure

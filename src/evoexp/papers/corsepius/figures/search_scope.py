@@ -1,112 +1,82 @@
-"""The local search scope: boxes of offspring along a path, the tool's places one step away.
+"""The local search scope: boxes along a path, and the tool's reach (Corsépius 2001, Fig. 2)."""
 
-Corsépius 2001, Fig. 2.
-"""
+from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from scipy.spatial import ConvexHull
 
 from evoexp.numeric.elementary import DEGREE
-from evoexp.records import FloatArray
+from evoexp.papers.corsepius import measures
+from evoexp.papers.corsepius.figures.posture_motions import tool_places
 from evoexp.report import style
 from evoexp.report.results import ConditionResults
 from evoexp.report.rows import groups, records, rounded
 from evoexp.report.statistics import BOOTSTRAP_SEED
-from evoexp.robots.poses import frame_pose
 
 POSTURE, REACH, TOOL = "posture", "reach", "tool"
 FACTORS = (2.0, 1.0, 0.5)  # of the scope, whose reach is drawn
 STEPS = 3000  # random ones whose hull is drawn
+NAMES = ["element", "order", "x", "y", "half_x", "half_y", "factor"]
 
 
 def scope_table(condition: ConditionResults, replicate: int) -> pd.DataFrame:
-    """Return a path in the plane of its two liveliest joints.
+    """Return a path in the plane of its two liveliest joints, and the tool's reach at the start.
 
-    And hulls of the tool's places one step from the start.
+    The reach is told by hulls of the tool's places after one random step.
 
     Returns:
         Columns element (posture, reach, tool), order, x, y (joint angles [deg] of postures, places
         of the others), half_x, half_y (scope [deg] of the two joints), factor (of the scope),
         joint_x, joint_y (from 1), length_unit.
     """
-    problem = condition.prepared.problem
-    q = condition.solutions[replicate].reshape(-1, len(problem.start))
+    problem, q = measures.problem(condition), measures.paths(condition)[replicate]
     moved = np.abs(np.diff(q, axis=0)).sum(axis=0)
     a, b = sorted(int(k) for k in np.argsort(-moved, kind="stable")[:2])
-    half_x, half_y = problem.scope[[a, b]] / DEGREE
-    rows: list[dict[str, object]] = [
-        {"element": POSTURE, "order": n, "x": x, "y": y, "half_x": half_x, "half_y": half_y}
-        for n, (x, y) in enumerate(q[:, [a, b]] / DEGREE)
-    ]
-
-    joint, local = problem.tool
-
-    def tool(posture: FloatArray) -> FloatArray:
-        return frame_pose(problem.assembly.table, joint, local, posture)[9:11]
-
+    half = problem.scope[[a, b]] / DEGREE
     rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
     steps = 2.0 * rng.random((STEPS, len(problem.start))) - 1.0
+    parts = [(POSTURE, q[:, [a, b]] / DEGREE, *half, np.nan)]
     for factor in FACTORS:
         reached = problem.start + factor * problem.scope * steps
-        places = np.array([tool(p) for p in np.clip(reached, *problem.limits.T)])
-        hull = ConvexHull(places).vertices
-        rows += [
-            {"element": REACH, "order": n, "x": x, "y": y, "factor": factor}
-            for n, (x, y) in enumerate(places[hull])
-        ]
-    rows += [
-        {"element": TOOL, "order": n, "x": x, "y": y} for n, (x, y) in enumerate(tool(p) for p in q)
+        places = tool_places(problem, np.clip(reached, *problem.limits.T))[:, :2]
+        parts.append((REACH, places[ConvexHull(places).vertices], np.nan, np.nan, factor))
+    parts.append((TOOL, tool_places(problem, q)[:, :2], *(np.nan,) * 3))
+    rows = [
+        (element, n, x, y, *rest)
+        for element, points, *rest in parts
+        for n, (x, y) in enumerate(points)
     ]
-    names = ["element", "order", "x", "y", "half_x", "half_y", "factor"]
-    table = pd.DataFrame(rows).reindex(columns=names)
-    return rounded(table).assign(
-        joint_x=a + 1, joint_y=b + 1, length_unit=condition.condition.length_unit
-    )
+    table = rounded(pd.DataFrame(rows, columns=NAMES))
+    return table.assign(joint_x=a + 1, joint_y=b + 1, length_unit=condition.condition.length_unit)
 
 
 def draw_scope(table: pd.DataFrame) -> Figure:
     """Draw the boxes, and the places that the tool can reach."""
-    figure = style.figure(3.4)
-    left, right = figure.subplots(1, 2)
-    path = table[table["element"] == POSTURE]
-    last = max(1, len(path) - 1)
+    figure, (left, right) = style.row_of_panels(3.4, 2)
+    path, reach, tool = (table[table["element"] == element] for element in (POSTURE, REACH, TOOL))
+    blue, last = style.arm_colour(0), max(1, len(path) - 1)
     for row in records(path):
-        corner = row.x - row.half_x, row.y - row.half_y
-        shade = 0.10 + 0.12 * row.order / last
-        box = Rectangle(
-            corner,
-            2 * row.half_x,
-            2 * row.half_y,
-            facecolor=style.arm_colour(0),
-            alpha=shade,
-            linewidth=0,
-        )
-        left.add_patch(box)
-    left.plot(path["x"], path["y"], "o-", color=style.arm_colour(0), markersize=2.8, linewidth=1.0)
-    _ends(left, path)
-    left.set_xlabel(f"{style.joint_symbol(0, int(table['joint_x'].iloc[0]) - 1)} [deg]")
-    left.set_ylabel(f"{style.joint_symbol(0, int(table['joint_y'].iloc[0]) - 1)} [deg]")
-    left.set_title("a  boxes of offspring along a path")
+        corner, size = (row.x - row.half_x, row.y - row.half_y), (2 * row.half_x, 2 * row.half_y)
+        look: dict[str, Any] = {"facecolor": blue, "alpha": 0.10 + 0.12 * row.order / last}
+        left.add_patch(Rectangle(corner, *size, linewidth=0, **look))
+    left.plot(path["x"], path["y"], "o-", color=blue, markersize=2.8, linewidth=1.0)
+    _draw_ends(left, path)
+    x, y = (
+        f"{style.joint_symbol(0, int(table[name].iloc[0]) - 1)} [deg]"
+        for name in ("joint_x", "joint_y")
+    )
+    left.set(xlabel=x, ylabel=y, title="a  boxes of offspring along a path")
     left.set_aspect("equal", adjustable="datalim")
-    for k, (factor, rows) in enumerate(
-        sorted(groups(table[table["element"] == REACH], "factor"), reverse=True)
-    ):
-        colour = style.ARM_COLOURS[(1, 0, 2)[k]]
-        rows = rows.sort_values("order")
-        right.fill(
-            rows["x"],
-            rows["y"],
-            facecolor=colour,
-            edgecolor=colour,
-            alpha=0.25,
-            label=f"{factor:g} × scope",
-        )
-    tool = table[table["element"] == TOOL]
+    for k, (factor, rows) in enumerate(sorted(groups(reach, "factor"), reverse=True)):
+        colour, hull = style.ARM_COLOURS[(1, 0, 2)[k]], rows.sort_values("order")
+        both: dict[str, Any] = {"facecolor": colour, "edgecolor": colour, "alpha": 0.25}
+        right.fill(hull["x"], hull["y"], label=f"{factor:g} × scope", **both)
     right.plot(tool["x"], tool["y"], color=style.NEUTRAL, linewidth=1.0, label="way of the tool")
-    _ends(right, tool)
+    _draw_ends(right, tool)
     style.operational_axes(right, table["length_unit"].iloc[0])
     right.set_aspect("equal", adjustable="datalim")
     right.set_title("b  the tool, one step from the start")
@@ -114,7 +84,8 @@ def draw_scope(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _ends(axes, path: pd.DataFrame) -> None:  # type: ignore[no-untyped-def]
-    look = {"color": "white", "markeredgecolor": style.NEUTRAL, "linestyle": "none"}
+def _draw_ends(axes: Axes, path: pd.DataFrame) -> None:
+    """Draw the start and the end of a path."""
+    look: dict[str, Any] = {"color": "white", "markeredgecolor": style.NEUTRAL, "linestyle": "none"}
     axes.plot(path["x"].iloc[:1], path["y"].iloc[:1], "s", markersize=6, label="start", **look)
     axes.plot(path["x"].iloc[-1:], path["y"].iloc[-1:], "*", markersize=9, label="end", **look)

@@ -1,7 +1,4 @@
-"""Bodies and obstacles in space.
-
-Rows of a table that say what and where they are, and their surfaces.
-"""
+"""Bodies and obstacles in space: a row of a table for each, and their surfaces drawn."""
 
 from typing import Any
 
@@ -25,9 +22,8 @@ AROUND, ALONG = 12, 4  # pieces of a round surface, and of each of its ends
 def solid(shape: Any, placement: Any) -> tuple[Any, ...] | None:
     """Return one row of `COLUMNS` for a coal shape and its placement (`pin.SE3`).
 
-    None for a half-space.
-
-    A mesh, or what else has no row of its own, is the box around it.
+    A mesh, or another shape without a row of its own, is the box around it. A half-space has no
+    row: None.
     """
     where = np.asarray(placement.translation, dtype=np.float64)
     turn = np.asarray(placement.rotation, dtype=np.float64)
@@ -47,54 +43,46 @@ def solid(shape: Any, placement: Any) -> tuple[Any, ...] | None:
     return (name, *where, *turn.ravel(), *size)
 
 
+def _read(row: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return rotation (3, 3), size (3,) and place (3,) of a row of `COLUMNS`."""
+    turn, size, place = (
+        np.array([getattr(row, name) for name in names], dtype=np.float64)
+        for names in (TURN, SIZES, "xyz")
+    )
+    return turn.reshape(3, 3), size, place
+
+
 def draw_solid(axes: Any, row: Any, colour: str, alpha: float) -> None:
     """Draw a row of `COLUMNS`."""
-    turn = np.array([getattr(row, name) for name in TURN]).reshape(3, 3)
-    place = np.array([row.x, row.y, row.z])
-    size = np.array([getattr(row, name) for name in SIZES])
+    turn, size, place = _read(row)
     if row.shape == BRICK:
         faces = [corners * size @ turn.T + place for corners in _FACES]
-        axes.add_collection3d(
-            Poly3DCollection(
-                faces, facecolor=colour, edgecolor=colour, alpha=alpha, linewidth=0.5, zorder=1
-            )
-        )
+        look = {"facecolor": colour, "edgecolor": colour, "alpha": alpha, "linewidth": 0.5}
+        axes.add_collection3d(Poly3DCollection(faces, zorder=1, **look))
         return
-    x, y, z = np.einsum("ij,jkl->ikl", turn, _grid(row.shape, size)) + place[:, None, None]
-    axes.plot_surface(
-        x, y, z, color=colour, alpha=alpha, linewidth=0, shade=True, antialiased=False
-    )
+    surface = np.einsum("ij,jkl->ikl", turn, _grid(row.shape, size)) + place[:, None, None]
+    smooth = {"linewidth": 0, "shade": True, "antialiased": False}
+    axes.plot_surface(*surface, color=colour, alpha=alpha, **smooth)
 
 
 def draw_outline(axes: Any, row: Any, colour: str, alpha: float) -> None:
     """Draw a row of `COLUMNS` as seen along z, in plane axes."""
-    turn = np.array([getattr(row, name) for name in TURN]).reshape(3, 3)
-    size = np.array([getattr(row, name) for name in SIZES])
-    points = (
-        np.vstack(_FACES) * size if row.shape == BRICK else _grid(row.shape, size).reshape(3, -1).T
-    )
-    seen = (points @ turn.T)[:, :2] + (row.x, row.y)
-    axes.fill(
-        *seen[ConvexHull(seen).vertices].T,
-        facecolor=colour,
-        edgecolor=colour,
-        alpha=alpha,
-        linewidth=0.5,
-    )
+    turn, size, place = _read(row)
+    brick = row.shape == BRICK
+    points = np.vstack(_FACES) * size if brick else _grid(row.shape, size).reshape(3, -1).T
+    seen = (points @ turn.T)[:, :2] + place[:2]
+    look = {"facecolor": colour, "edgecolor": colour, "alpha": alpha, "linewidth": 0.5}
+    axes.fill(*seen[ConvexHull(seen).vertices].T, **look)
 
 
 def corners(table: pd.DataFrame) -> FloatArray:
     """Return points (points, 3) that reach as far along x, y and z as all solids of a table."""
     found = [np.empty((0, 3))]
-    for _, row in table.iterrows():
-        turn = row[TURN].to_numpy(dtype=np.float64).reshape(3, 3)
-        size, place = (
-            row[SIZES].to_numpy(dtype=np.float64),
-            row[["x", "y", "z"]].to_numpy(dtype=np.float64),
-        )
-        reach = (
-            np.abs(turn) @ size if row["shape"] == BRICK else size[0] + np.abs(turn[:, 2]) * size[1]
-        )
+    for row in table.itertuples(index=False):
+        turn, size, place = _read(row)
+        reach = size[0] + np.abs(turn[:, 2]) * size[1]
+        if row.shape == BRICK:
+            reach = np.abs(turn) @ size
         found += [place[None] - reach, place[None] + reach]
     return np.vstack(found)
 
@@ -105,7 +93,7 @@ def space(
     """Return axes in space, with equal scales, that hold some points.
 
     Args:
-        figure: Where they are put.
+        figure: The figure that they are put into.
         place: As `add_subplot` takes it.
         points: (points, 3).
         unit: Of lengths.
@@ -113,9 +101,8 @@ def space(
     """
     axes: Any = figure.add_subplot(place, projection="3d")
     low, high = points.min(axis=0), points.max(axis=0)
-    pad = 0.04 * float((high - low).max()) + 0.5 * np.maximum(
-        0.0, 0.35 * float((high - low).max()) - (high - low)
-    )
+    widest = float((high - low).max())
+    pad = 0.04 * widest + 0.5 * np.maximum(0.0, 0.35 * widest - (high - low))
     for name, least, greatest in zip("xyz", low - pad, high + pad, strict=True):
         getattr(axes, f"set_{name}lim")(least, greatest)
         getattr(axes, f"set_{name}label")(f"{name} [{unit}]", labelpad=-7, fontsize=7)
@@ -134,14 +121,9 @@ def _grid(shape: str, size: FloatArray) -> FloatArray:
     """Return the surface of a round solid, (3, along, around)."""
     radius, height = _profile(shape, size[0], size[1])
     turned = np.linspace(0.0, 2.0 * np.pi, AROUND + 1)
-    level = np.ones_like(turned)
-    return np.array(
-        [
-            np.outer(radius, np.cos(turned)),
-            np.outer(radius, np.sin(turned)),
-            np.outer(height, level),
-        ]
-    )
+    circle = np.cos(turned), np.sin(turned), np.ones_like(turned)
+    profiles = zip((radius, radius, height), circle, strict=True)
+    return np.array([np.outer(profile, around) for profile, around in profiles])
 
 
 def _profile(shape: str, radius: float, half: float) -> tuple[FloatArray, FloatArray]:

@@ -9,12 +9,38 @@ import os
 import re
 from collections import Counter
 
+import pytest
+
 from evoexp.condition import Condition
 from evoexp.configuration import expansions
 from evoexp.configuration.experiment import Experiment
 from evoexp.configuration.search_path import options
 
 KINDS = range(66)  # numbers of all kinds of conditions; `test_shipped` checks how many there are
+EXAMPLES = (  # (experiment, number of its condition): every planner, and its rarer parts
+    ("rana_obstacles", 0),
+    ("rana_planar", 1),  # random search
+    ("curkovic_motion", 1),  # cubic splines
+    ("lavoie_7dof", 0),
+    ("lavoie_coding", 1),  # binary
+    ("corsepius_ball", 0),
+    ("corsepius_pick_and_place", 0),
+    ("chen_mission", 0),  # two stages: both planners of Chen & Zalzala
+    ("chen_path", 4),  # elitism
+    ("chen_placement", 3),  # a reference
+)
+Kind = int | tuple[str, int]
+KIND_EXAMPLES = [  # as parameters: the examples always, all kinds with --all
+    *(pytest.param(example, id=f"{example[0]} {example[1]}") for example in EXAMPLES),
+    *(pytest.param(number, marks=pytest.mark.matrix) for number in KINDS),
+]
+
+
+def of_kind(kind: Kind, budget: str) -> Condition:
+    """Return the condition of an example, or that of a kind's number."""
+    if isinstance(kind, tuple):
+        return expanded(kind[0], budget).conditions[kind[1]].condition
+    return kinds_of_conditions(budget)[kind]
 
 
 @functools.cache

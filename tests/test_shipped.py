@@ -14,11 +14,12 @@ from evoexp.batch.reproduction import fingerprint, same_fingerprint
 from evoexp.cli import main
 from evoexp.condition import Condition
 from evoexp.shipped import Shipped
-from shipped_conditions import KINDS, expanded, kinds_of_conditions, shipped_conditions
+from shipped_conditions import EXAMPLES, KINDS, expanded, kinds_of_conditions, shipped_conditions
 
 ROOT = Path(__file__).parents[1]
 TABLE = shipped.shipped()
 BUDGETS = ("paper", "smoke")
+MATRIX = pytest.mark.matrix
 UPDATE = "then run scripts/update-shipped and commit the table"
 
 
@@ -38,6 +39,7 @@ def nowhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "outputs"
 
 
+@pytest.mark.matrix
 def test_every_shipped_condition_is_in_the_table_and_nothing_else() -> None:
     assert len(TABLE) == len(set(TABLE))
     hashes = {row[:3]: row.condition_id for row in TABLE}
@@ -51,6 +53,7 @@ def test_every_shipped_condition_is_in_the_table_and_nothing_else() -> None:
     )
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("budget", BUDGETS)
 def test_kinds_of_conditions_are_as_many_as_tests_are_collected_for(budget: str) -> None:
     assert len(kinds_of_conditions(budget)) == len(KINDS), "correct KINDS in shipped_conditions.py"
@@ -59,6 +62,18 @@ def test_kinds_of_conditions_are_as_many_as_tests_are_collected_for(budget: str)
 def condition_of(row: Shipped) -> Condition:
     found = dict(expanded(row.experiment, row.budget).conditions)
     return found[row.label]
+
+
+def is_example(row: Shipped) -> bool:
+    """Whether a row is of an experiment that the examples are taken from."""
+    return row.experiment in dict(EXAMPLES)
+
+
+SMOKE = [
+    pytest.param(row, id=f"{row.experiment}: {row.label}", marks=() if is_example(row) else MATRIX)
+    for row in TABLE
+    if row.budget == "smoke"
+]
 
 
 def check_digest(row: Shipped) -> None:
@@ -74,7 +89,7 @@ def check_digest(row: Shipped) -> None:
     )
 
 
-@pytest.mark.parametrize("row", rows("smoke"))
+@pytest.mark.parametrize("row", SMOKE)
 def test_smoke_digests(row: Shipped) -> None:
     check_digest(row)
 

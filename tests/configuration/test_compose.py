@@ -21,10 +21,12 @@ from evoexp.configuration.experiment import Experiment
 from evoexp.configuration.overrides import collect
 from evoexp.configuration.search_path import description, find, options
 from evoexp.errors import EvoexpError, SettingError, UnknownOption, UnknownSetting
-from shipped_conditions import KINDS, expanded, kinds_of_conditions
+from matrix import examples
+from shipped_conditions import EXAMPLES, KIND_EXAMPLES, Kind, expanded, of_kind
 
 PLAIN = ("experiment=rana_obstacles",)  # one condition
 BUDGETS = ("paper", "quick", "smoke")
+EXPERIMENTS = examples(options("experiment"), lambda name: name in dict(EXAMPLES))
 
 
 def ids(*overrides: str, multirun: bool = False, only: tuple[str, ...] = ()) -> dict[str, str]:
@@ -54,7 +56,7 @@ def write_experiment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callabl
     return write
 
 
-@pytest.mark.parametrize("experiment", options("experiment"))
+@pytest.mark.parametrize("experiment", EXPERIMENTS)
 @pytest.mark.parametrize("budget", ["paper", "smoke"])
 def test_every_experiment_composes_at_every_budget(experiment: str, budget: str) -> None:
     found = expanded(experiment, budget)
@@ -65,12 +67,12 @@ def test_every_experiment_composes_at_every_budget(experiment: str, budget: str)
         assert len(condition.id) == 64
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_every_kind_of_condition_can_be_prepared(kind: int) -> None:
-    kinds_of_conditions("paper")[kind].prepare()
+@pytest.mark.parametrize("kind", KIND_EXAMPLES)
+def test_every_kind_of_condition_can_be_prepared(kind: Kind) -> None:
+    of_kind(kind, "paper").prepare()
 
 
-@pytest.mark.parametrize("experiment", options("experiment"))
+@pytest.mark.parametrize("experiment", EXPERIMENTS)
 def test_a_quick_budget_has_the_conditions_of_the_papers(experiment: str) -> None:
     paper = expanded(experiment, "paper")
     label, condition = paper.conditions[0]
@@ -99,7 +101,7 @@ def test_settings_are_as_hydra_itself_sets_them(words: tuple[str, ...]) -> None:
     assert composed.config == by_hydra
 
 
-@pytest.mark.parametrize("experiment", options("experiment"))
+@pytest.mark.parametrize("experiment", EXPERIMENTS)
 def test_an_experiment_file_says_how_it_is_run_and_what_it_is(experiment: str) -> None:
     lines = Path(find("experiment", experiment).path).read_text().splitlines()
     assert lines[1] == f"# evoexp run experiment={experiment}"

@@ -7,7 +7,11 @@ from evoexp.configuration.search_path import options
 from evoexp.report import parameters
 from evoexp.report.parameters import Parameter, option, overridden
 from evoexp.report.results import ConditionResults, Results
+from matrix import examples
 from report_samples import expand
+from shipped_conditions import EXAMPLES
+
+EXPERIMENTS = examples(options("experiment"), lambda name: name in dict(EXAMPLES))
 
 
 def of(
@@ -44,7 +48,7 @@ def test_units_and_sources_come_from_the_comments() -> None:
     assert rows["num_replicates"].value == "20"
 
 
-@pytest.mark.parametrize("name", options("experiment"))
+@pytest.mark.parametrize("name", EXPERIMENTS)
 def test_every_number_of_the_shipped_experiments_has_a_source(name: str) -> None:
     rows = of(name=name)
     numbers = [row for row in rows.values() if any(character.isdigit() for character in row.value)]

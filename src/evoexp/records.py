@@ -1,4 +1,4 @@
-"""What is written, and nothing else: the only schema of logs and tables.
+"""The records that are written: the only schema of logs and tables.
 
 Records are flat. Quantities carry their unit in the name (`cpu_s`) unless the unit belongs to the
 scene, which then names it (`length_unit`). Costs are minimised; `inf` means infeasible or not
@@ -38,21 +38,15 @@ class Generation(NamedTuple):
     # (individuals,), with a leading axis for co-evolving populations, whose best cost is a team's
     costs: FloatArray
     population: FloatArray  # any shape
-    criteria: FloatArray | None = (
-        None  # (populations, criteria, individuals), of generations whose front is recorded
-    )
+    # (populations, criteria, individuals), of generations whose front is recorded
+    criteria: FloatArray | None = None
     # of the last generation: why the planner ends, if not because its generations are used up
     stop_reason: str = ""
-    arrays: Mapping[str, NDArray[Any]] | None = (
-        None  # of references: attached to the log as <name>.npy
-    )
+    arrays: Mapping[str, NDArray[Any]] | None = None  # of references: attached as <name>.npy
 
 
 class GenerationRow(NamedTuple):
-    """One generation as it is read back from a log.
-
-    What was recorded of `Generation`, and its link of the chain.
-    """
+    """One generation as it is read back from a log, with its link of the chain."""
 
     index: int  # type: ignore[assignment]  # a tuple has a method of this name
     best_cost: float
@@ -76,10 +70,7 @@ class SolutionRow(NamedTuple):
 
 
 class FrontRow(NamedTuple):
-    """What one population is worth in one generation.
-
-    Its front are those that no other dominates.
-    """
+    """Criteria of one population in one generation; a front holds those that no other dominates."""
 
     generation: int
     population: int
@@ -99,9 +90,8 @@ class ReplicateSummary(NamedTuple):
     evaluations: int
     collision_queries: int
     solved: bool  # by the paper's own collision model
-    certified: (
-        bool | None
-    )  # by the exact certifier, over the whole motion; None: undecided, or there is no motion
+    # by the exact certifier, over the whole motion; None: undecided, or there is no motion
+    certified: bool | None
     certified_margin: bool | None  # the same of the clearance that the scenario requires
     # [length_unit] least distance of the bodies over the motion; 0 in contact, NaN without motion
     clearance: float

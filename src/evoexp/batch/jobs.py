@@ -1,7 +1,4 @@
-"""Replicates as tasks: a description goes out, what became of it comes back.
-
-All that a worker process loads.
-"""
+"""Replicates as tasks of worker processes: a `Job` goes out, an `Outcome` comes back."""
 
 import contextlib
 import functools
@@ -45,10 +42,10 @@ class Outcome(NamedTuple):
     Attributes:
         condition_id: 64 hex digits.
         replicate: Its index.
-        reason: Why it failed, in one line; empty when done.
+        reason: Reason of a failure, in one line; empty when done.
         traceback: Of the failure.
         content: The finished log; dropped once it is written.
-        wall_s: How long it took.
+        wall_s: Duration [s].
         summary: The row that the log holds; None for a failed one.
     """
 
@@ -67,11 +64,10 @@ class Outcome(NamedTuple):
 
 
 def run_jobs(jobs: Sequence[Job]) -> list[Outcome]:
-    """Run some replicates, here, one after the other; a failure is an outcome.
+    """Run replicates in this process, one after the other; a failure is an outcome.
 
     Returns:
-        Their outcomes; of fewer than were asked for if they take longer than `LONGEST_TASK_S`, of
-        one at least.
+        Their outcomes, one at least; no further replicate begins after `LONGEST_TASK_S`.
     """
     outcomes: list[Outcome] = []
     begun = time.perf_counter()
@@ -82,11 +78,8 @@ def run_jobs(jobs: Sequence[Job]) -> list[Outcome]:
         try:
             keep_all(job.files)
             condition = _condition(job.condition_json)
-            (content, summary), reason, trace = (
-                run_replicate(condition, job.replicate, job.condition_json),
-                "",
-                "",
-            )
+            content, summary = run_replicate(condition, job.replicate, job.condition_json)
+            reason = trace = ""
         except Exception as error:
             content, summary, trace = b"", None, traceback.format_exc()
             reason = f"{type(error).__name__}: {error}".splitlines()[0]
@@ -98,10 +91,7 @@ def run_jobs(jobs: Sequence[Job]) -> list[Outcome]:
 
 
 def load(config_jsons: Sequence[bytes], files: Sequence[bytes] = ()) -> None:
-    """Load what some conditions need, code and compiled kernels.
-
-    What is wrong with one is said by its jobs.
-    """
+    """Load the code and the compiled kernels of conditions; their jobs report what fails."""
     keep_all(files)
     for config_json in config_jsons:
         with contextlib.suppress(Exception):
@@ -110,8 +100,5 @@ def load(config_jsons: Sequence[bytes], files: Sequence[bytes] = ()) -> None:
 
 @functools.lru_cache(maxsize=64)
 def _condition(config_json: bytes) -> Condition:
-    """Return the condition of a canonical form.
-
-    Checking it takes as long as a short run, hence once per process.
-    """
+    """Build a condition once per process: checking it takes as long as a short run."""
     return Condition.from_json(config_json)

@@ -1,6 +1,6 @@
-"""What worker processes are forked with: importing this loads whatever all of them need.
+"""The libraries that worker processes are forked with: importing this module loads them.
 
-So does the first call of a kernel: numba sets up its tables then, which takes a third of a second.
+One kernel is called as well: at the first call numba sets up its tables for a third of a second.
 """
 
 import coal  # noqa: F401

@@ -1,7 +1,4 @@
-"""The one loop: a planner yields generations, a log takes them.
-
-The certifier judges the best motion.
-"""
+"""The one loop: a planner yields generations, a log takes them, the certifier judges the best."""
 
 import hashlib
 import time
@@ -23,8 +20,8 @@ def run_replicate(condition: Condition, index: int, config_json: bytes | None = 
     Args:
         condition: What to run.
         index: Of the replicate.
-        config_json: The condition's canonical form, where it is at hand; making it takes as long as
-            a short run.
+        config_json: The condition's canonical form, if the caller has it; making it takes as long
+            as a short run.
     """
     cpu, wall = time.process_time(), time.perf_counter()
     rng = condition.rng(index)
@@ -56,8 +53,7 @@ def run_replicate(condition: Condition, index: int, config_json: bytes | None = 
         solved=last.solved,
         **verdict._asdict(),
         length_unit=condition.length_unit,
-        terms=last.terms
-        | planner.evaluate(problem, last.best),  # the log's own say what the search went through
+        terms=last.terms | planner.evaluate(problem, last.best),
         digest="",
         certificate_s=certified - evolved,
         cpu_s=time.process_time() - cpu,

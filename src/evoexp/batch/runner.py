@@ -1,6 +1,4 @@
-"""Runs the missing replicates of conditions.
-
-Fans them out, writes what comes back, resumes what was cut off.
+"""Runs the missing replicates of conditions in worker processes and stores their logs.
 
 Descriptions go out and bytes come back; only the calling process writes. A finished log is the only
 mark of completion, so an interrupted batch is resumed by asking for it again.
@@ -40,11 +38,11 @@ _NUMBER = re.compile(r"-?\d+(\.\d+)?([eE][-+]?\d+)?")
 
 
 class Batch:
-    """All replicates that some conditions shall have.
+    """All replicates that are asked for, of any number of conditions.
 
     Attributes:
         runs: One run directory per distinct condition.
-        jobs: What is missing, condition by condition.
+        jobs: The missing replicates, condition by condition.
     """
 
     def __init__(
@@ -58,7 +56,7 @@ class Batch:
         Args:
             conditions: (condition, number of replicates, notes for the manifest of a new run); one
                 may occur twice.
-            settings: How to fan out.
+            settings: Number of workers, and where they run.
             outputs: Root of all outputs.
         """
         self._settings, self._outputs = settings, outputs
@@ -85,9 +83,9 @@ class Batch:
             condition.prepare()
 
     def run(self) -> Generator[Outcome, None, None]:
-        """Run what is missing; yield every outcome once it is stored.
+        """Run the missing replicates; yield every outcome once it is stored.
 
-        Closing the iterator keeps what is finished.
+        Closing the iterator keeps the finished replicates.
 
         Raises:
             Busy: If another process writes one of the runs.
@@ -138,8 +136,10 @@ class Batch:
                 )
         for key, contents in by_run.items():
             self.runs[key].write_logs(contents)
-            if len(self._finished[key]) == self._wanted[key][1]:  # now, while the workers go on
-                with contextlib.suppress(CorruptLog):  # an older log's damage is said at the end
+            if len(self._finished[key]) == self._wanted[key][1]:  # while the workers go on
+                with contextlib.suppress(
+                    CorruptLog
+                ):  # damage of an older log is reported at the end
                     self._summarise(key)
         return [outcome._replace(content=b"") for outcome in outcomes]
 
@@ -199,11 +199,9 @@ class _Bundles:
             yield bundle
 
     def took(self, outcomes: Sequence[Outcome]) -> None:
-        """Note what came back; what came before counts half from now on.
+        """Note the outcomes of a task; jobs that it did not begin wait again.
 
-        So that slow first jobs are soon forgotten.
-
-        What a task did not begin is to wait again.
+        Earlier times count half from now on, so that slow first jobs are soon forgotten.
         """
         left = self._bundles.pop((outcomes[0].condition_id, outcomes[0].replicate))[len(outcomes) :]
         for job in reversed(left):
@@ -217,9 +215,9 @@ class _Bundles:
 
 
 def _run_alone(job: Job) -> Outcome:
-    """Run one job in a process of its own.
+    """Run one job in a process of its own, and once more if that dies.
 
-    Where that dies, once more (who had brought the pool down is not known).
+    Which job had brought the pool down is not known.
     """
     trace = ""
     for _ in range(2):
@@ -242,14 +240,14 @@ def _compile(config_jsons: Iterable[bytes]) -> None:
         with contextlib.suppress(Exception):
             condition = Condition.from_json(text)
             planner, problem = condition.prepare()
-            # A reference takes long, and compiles mostly what the planner beside it compiles.
+            # A reference takes long, and mostly needs the kernels of the planner beside it.
             if condition.is_reference:
                 planner = planner.planner
             for generation in itertools.islice(planner.evolve(problem, condition.rng(0)), 2):
                 planner.evaluate(problem, generation.best)
                 motion = planner.motion(problem, generation.best)
                 judge_motion(planner, problem, motion)
-                # A motion that touches nothing as well: its closest approach is sought.
+                # A motion that touches nothing needs the kernels of the closest approach.
                 if motion is not None:
                     judge_motion(planner, problem, Motion(np.repeat(motion.q[:1], 2, axis=0)))
             note_compiled(kind, modules)

@@ -1,7 +1,4 @@
-"""Worker processes: silent when Ctrl-C reaches all processes of a terminal.
-
-And gone when their parent is.
-"""
+"""Worker processes that ignore Ctrl-C and end soon after their parent."""
 
 import gc
 import multiprocessing
@@ -22,7 +19,7 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 WATCH_S = 1.0  # [s] between two looks whether the parent is alive
 
-# Whoever interrupts a batch gives up what is in flight on purpose; joblib tells that as a mistake.
+# Whoever interrupts a batch gives up running tasks on purpose; joblib warns of them.
 _GIVEN_UP = r"\d+ tasks (which were still being processed|have been successfully executed)"
 warnings.filterwarnings("ignore", _GIVEN_UP, UserWarning)
 
@@ -32,20 +29,18 @@ _SERVED = "forkserver"  # the name of this way to start processes
 _NUM_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(2**26), "MALLOC_TRIM_THRESHOLD_": str(2**28)}
 _ENVIRONMENT = dict.fromkeys(_NUM_THREADS, "1") | _MEMORY
-"""Of workers: their libraries compute in one thread, as the replicates keep all cores busy.
+"""Environment of workers: one thread per library, as the replicates keep all cores busy.
 
-And (where the C library is glibc) memory that one generation gives back serves the next, instead of
-being fetched page by page from the system.
+With glibc, memory freed by one generation serves the next, instead of being fetched page by page
+from the system.
 """
 
 
 def start_server() -> None:
-    """Let a process of its own load what every worker needs, from now on.
+    """Start a server process that loads all common libraries, and from which workers are forked.
 
-    Workers are then forked from it at once.
-
-    For processes that are evoexp's own: it changes how all of joblib's workers start. Without it,
-    or where processes cannot be forked, each worker loads everything by itself, later.
+    Only for processes that are evoexp's own: it changes how all of joblib's workers start. Without
+    it, or where processes cannot be forked, each worker loads everything by itself, later.
     """
     if num_cores() == 1 or _SERVED not in multiprocessing.get_all_start_methods():
         return
@@ -61,9 +56,7 @@ def num_cores() -> int:
 
 
 def in_workers(num_workers: int, tasks: Iterable[Any], ordered: bool = False) -> Iterator[Any]:
-    """Run delayed calls in worker processes, from now on.
-
-    Yield what they return, as it comes or in order.
+    """Start delayed calls in worker processes; yield their results, in order or as they come.
 
     Raises:
         TerminatedWorkerError: If a worker dies.
@@ -85,9 +78,7 @@ def in_workers(num_workers: int, tasks: Iterable[Any], ordered: bool = False) ->
 
 @contextmanager
 def loading(num_workers: int, load: Callable[..., None], *arguments: Any) -> Iterator[None]:
-    """Have worker processes load what they will need, while the body does something else.
-
-    Wait for them at its end.
+    """Call `load` in every worker while the body runs; wait for the workers at its end.
 
     A worker that dies meanwhile is no error: whoever gives work to workers starts new ones.
     """
@@ -105,10 +96,7 @@ def loading(num_workers: int, load: Callable[..., None], *arguments: Any) -> Ite
 
 
 def _load(load: Callable[..., None], *arguments: Any) -> None:
-    """Load, and keep what is there now from being searched for garbage.
-
-    Every worker searches once per second.
-    """
+    """Load, then exempt everything loaded from the garbage collector's searches."""
     load(*arguments)
     gc.freeze()
 
@@ -120,9 +108,7 @@ def leave_with_parent(parent: int, served: bool) -> None:
 
 def _watch(parent: int, served: bool) -> None:
     origin = multiprocessing.parent_process()
-    if (
-        served and origin is not None
-    ):  # our process's parent is the server, which lives as long as we do
+    if served and origin is not None:  # the parent process is the server, which lives as long
         origin.join()
     else:
         while os.getppid() == parent:
@@ -132,10 +118,7 @@ def _watch(parent: int, served: bool) -> None:
 
 @contextmanager
 def _children_ignore_interrupts() -> Iterator[None]:
-    """Start processes that ignore Ctrl-C from their first instruction on.
-
-    A process inherits what is ignored.
-    """
+    """Let processes that start meanwhile inherit that Ctrl-C is ignored."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -148,7 +131,7 @@ def _children_ignore_interrupts() -> Iterator[None]:
 
 @contextmanager
 def _environment_of_workers() -> Iterator[None]:
-    """Start processes with that environment."""
+    """Let processes that start meanwhile inherit the environment of workers."""
     before = {name: os.environ.get(name) for name in _ENVIRONMENT}
     os.environ.update(_ENVIRONMENT)
     try:

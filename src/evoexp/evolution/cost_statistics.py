@@ -1,7 +1,4 @@
-"""What a generation's costs say.
-
-Kept in one pass of ordered sums, so that the numbers are the same everywhere.
-"""
+"""Best, mean and deviation of a generation's costs, by ordered sums: the same bits everywhere."""
 
 from typing import NamedTuple
 
@@ -12,7 +9,7 @@ from evoexp.records import FloatArray
 
 
 class CostStatistics(NamedTuple):
-    """Of the costs of one generation.
+    """Statistics of the costs of one generation.
 
     Attributes:
         best: Index of the lowest cost, the first among equals.
@@ -31,8 +28,9 @@ def cost_statistics(costs: FloatArray) -> CostStatistics:
 
 
 @kernel
-def summarise(costs):  # type: ignore[no-untyped-def]
-    """The kernel of `cost_statistics`, for other kernels."""
+def summarise(costs: FloatArray) -> tuple[int, float, float]:
+    """The kernel of `cost_statistics`, for other kernels: best, mean, standard deviation."""
+    # the best, and the sum of the finite costs
     best, count, total = 0, 0, 0.0
     for k in range(len(costs)):
         if costs[k] < costs[best]:
@@ -42,6 +40,7 @@ def summarise(costs):  # type: ignore[no-untyped-def]
             total += costs[k]
     if count == 0:
         return best, np.nan, np.nan
+    # the deviation, by squares of differences to the mean
     mean = total / count
     squares = 0.0
     for k in range(len(costs)):

@@ -3,29 +3,24 @@
 import numpy as np
 
 from evoexp.numeric.compilation import kernel
-from evoexp.records import FloatArray
+from evoexp.records import FloatArray, IntArray
 
 
 def num_uniforms(num_arms: int, num_pairs: int) -> int:
-    """Return how many uniform numbers `site_crossover` takes.
-
-    Per pair one to decide, and a site per arm.
-    """
+    """Count the uniform numbers of `site_crossover`: per pair a decision, and a site per arm."""
     return num_pairs * (1 + num_arms)
 
 
 def site_crossover(
     rng: np.random.Generator,
     population: FloatArray,
-    parents: np.ndarray,
-    arm_slices: np.ndarray,
+    parents: IntArray,
+    arm_slices: IntArray,
     rate: float,
     max_distance: float,
     out: FloatArray,
 ) -> None:
-    """Cross strings at one site per arm, where the parents are close.
-
-    Rana & Zalzala 1995, section 3.4b.
+    """Cross strings at one site per arm, where the parents are close (Rana & Zalzala, 3.4b).
 
     Parents 2k and 2k + 1 form a pair; an odd last one stays alone. A pair is crossed with
     probability `rate`, and only if at the sites chosen in both arms' portions the two parents'
@@ -46,12 +41,20 @@ def site_crossover(
 
 
 @kernel
-def cross_at_sites(uniforms, population, parents, arm_slices, rate, max_distance, out):  # type: ignore[no-untyped-def]
+def cross_at_sites(
+    uniforms: FloatArray,
+    population: FloatArray,
+    parents: IntArray,
+    arm_slices: IntArray,
+    rate: float,
+    max_distance: float,
+    out: FloatArray,
+) -> None:
     """The kernel of `site_crossover`, for other kernels."""
-    num_points, num_arms = population.shape[1], len(arm_slices)
-    num_offspring = len(parents)
+    num_points, num_arms, num_offspring = population.shape[1], len(arm_slices), len(parents)
+    # mates and sites of every pair; a site beyond the end leaves a copy
     mates = parents.copy()
-    sites = np.full((num_arms, num_offspring), num_points)  # beyond the end: a copy
+    sites = np.full((num_arms, num_offspring), num_points)
     for pair in range(num_offspring // 2):
         draw = uniforms[pair * (1 + num_arms) :]
         first, second = parents[2 * pair], parents[2 * pair + 1]
@@ -70,6 +73,7 @@ def cross_at_sites(uniforms, population, parents, arm_slices, rate, max_distance
         mates[2 * pair], mates[2 * pair + 1] = second, first
         if not close:
             sites[:, 2 * pair : 2 * pair + 2] = num_points
+    # every child: its own parent before the site, the mate from the site on
     for arm in range(num_arms):
         site = sites[arm]
         for j in range(arm_slices[arm, 0], arm_slices[arm, 1]):
@@ -81,15 +85,12 @@ def cross_at_sites(uniforms, population, parents, arm_slices, rate, max_distance
 
 
 def num_single_point_uniforms(num_pairs: int) -> int:
-    """Return how many uniform numbers `single_point_crossover` takes.
-
-    Per pair a decision and a site.
-    """
+    """Count the uniform numbers of `single_point_crossover`: per pair a decision and a site."""
     return 2 * num_pairs
 
 
 def single_point_crossover(
-    rng: np.random.Generator, genomes: FloatArray, parents: np.ndarray, rate: float, out: FloatArray
+    rng: np.random.Generator, genomes: FloatArray, parents: IntArray, rate: float, out: FloatArray
 ) -> None:
     """Cut pairs of parents at one site and exchange what follows (Curkovic et al. 2013, section 3).
 
@@ -106,30 +107,27 @@ def single_point_crossover(
     Raises:
         ValueError: If the offspring do not fit.
     """
-    if (
-        genomes.ndim != 2
-        or out.ndim != 2
-        or len(out) != len(genomes)
-        or out.shape[1] < len(parents)
-    ):
+    two = genomes.ndim == out.ndim == 2
+    if not (two and len(out) == len(genomes) and out.shape[1] >= len(parents)):
         raise ValueError(f"{len(parents)} offspring of {genomes.shape} do not fit {out.shape}")
-    cross_single_point(
-        rng.random(num_single_point_uniforms(len(parents) // 2)), genomes, parents, rate, out
-    )
+    uniforms = rng.random(num_single_point_uniforms(len(parents) // 2))
+    cross_single_point(uniforms, genomes, parents, rate, out)
 
 
 @kernel
-def cross_single_point(uniforms, genomes, parents, rate, out):  # type: ignore[no-untyped-def]
+def cross_single_point(
+    uniforms: FloatArray, genomes: FloatArray, parents: IntArray, rate: float, out: FloatArray
+) -> None:
     """The kernel of `single_point_crossover`, for other kernels; per pair: decision, site."""
+    # copies; an unsigned index, as numba would test a signed one for counting from the end
     num_genes, num_offspring = len(genomes), len(parents)
     for gene in range(num_genes):
         source, target = genomes[gene], out[gene]
         for k in range(num_offspring):
-            target[k] = source[
-                np.uint64(parents[k])
-            ]  # numba would look whether it counts from the end
+            target[k] = source[np.uint64(parents[k])]
     if num_genes < 2:
         return
+    # pairs exchange their genes from the site on
     for pair in range(num_offspring // 2):
         if uniforms[2 * pair] < rate:
             first, second = 2 * pair, 2 * pair + 1

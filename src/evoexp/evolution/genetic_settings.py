@@ -16,7 +16,7 @@ class GeneticSettings(Component):
         num_generations: Generations after the initial one.
         num_elites: Best individuals copied untouched into the next generation.
         crossover_rate: Probability that a pair of parents is crossed.
-        mutation_rate: Probability of a mutation; what is mutated is the planner's.
+        mutation_rate: Probability of a mutation, of whatever the planner mutates.
     """
 
     component: ClassVar[str] = "genetic"
@@ -42,8 +42,5 @@ class GeneticSettings(Component):
 
     @property
     def num_evaluations(self) -> int:
-        """Evaluations of a whole run.
-
-        The initial population, then the offspring of every generation.
-        """
+        """Evaluations of a whole run: the initial population, then all offspring."""
         return self.population_size + self.num_generations * self.num_offspring

@@ -7,10 +7,7 @@ from evoexp.records import FloatArray
 
 
 def num_allele_uniforms(count: int) -> int:
-    """Return how many uniform numbers `allele_mutation` takes.
-
-    Per individual a decision, a gene and an amount.
-    """
+    """Count the uniform numbers of `allele_mutation`: per individual decision, gene, amount."""
     return 3 * count
 
 
@@ -23,9 +20,7 @@ def allele_mutation(
     limit: float,
     symmetric: bool,
 ) -> None:
-    """Change at most one allele of each individual by a random amount, in place (Curkovic et al.
-
-    2013, Eq. 9).
+    """Change at most one allele of each individual at random (Curkovic et al. 2013, Eq. 9).
 
     With probability `rate` one gene, each equally likely, gets q + r with r uniform in (0, step],
     as printed, or in [−step, step) in the symmetric reading. The change is made only if the result
@@ -33,11 +28,11 @@ def allele_mutation(
 
     Args:
         rng: Source of `num_allele_uniforms` uniform numbers, whatever the rate.
-        genomes: (genes, ≥ count), changed.
-        count: Individuals; what lies behind them is left alone.
+        genomes: (genes, ≥ count), changed in place.
+        count: Individuals that may change; those behind them do not.
         rate: Probability in [0, 1].
         step: Largest change, > 0, in the units of the genes.
-        limit: What a mutated gene stays below, in the units of the genes.
+        limit: Upper bound of a mutated gene, in the units of the genes.
         symmetric: Whether genes may decrease, too.
 
     Raises:
@@ -45,17 +40,21 @@ def allele_mutation(
     """
     if genomes.ndim != 2 or not len(genomes) or not 0 <= count <= genomes.shape[1]:
         raise ValueError(f"genomes are (genes, at least {count} individuals), were {genomes.shape}")
-    mutate_allele(
-        rng.random(num_allele_uniforms(count)), genomes, count, rate, step, limit, symmetric
-    )
+    uniforms = rng.random(num_allele_uniforms(count))
+    mutate_allele(uniforms, genomes, count, rate, step, limit, symmetric)
 
 
 @kernel
-def mutate_allele(uniforms, genomes, count, rate, step, limit, symmetric):  # type: ignore[no-untyped-def]
-    """The kernel of `allele_mutation`, for other kernels.
-
-    Per individual: decision, gene, amount.
-    """
+def mutate_allele(
+    uniforms: FloatArray,
+    genomes: FloatArray,
+    count: int,
+    rate: float,
+    step: float,
+    limit: float,
+    symmetric: bool,
+) -> None:
+    """The kernel of `allele_mutation`, for other kernels; uniforms: decision, gene, amount."""
     num_genes = len(genomes)
     for k in range(count):
         if not uniforms[3 * k] < rate:
@@ -69,14 +68,14 @@ def mutate_allele(uniforms, genomes, count, rate, step, limit, symmetric):  # ty
 
 
 @kernel
-def decayed_rate(rate, decay, generation, num_generations):  # type: ignore[no-untyped-def]
+def decayed_rate(rate: float, decay: float, generation: int, num_generations: int) -> float:
     """Return the mutation rate of a generation (Curkovic et al. 2013, Eq. 10: 1 − 0.9 t/G).
 
     It is rate − decay · t/G, in [0, 1]; for kernels and for Python alike.
 
     Args:
         rate: At generation 0.
-        decay: What it has lost at generation G.
+        decay: Difference of the rates at generations 0 and G.
         generation: t.
         num_generations: G; if 0, the rate does not fall.
     """

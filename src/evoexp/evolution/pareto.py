@@ -1,15 +1,13 @@
-"""Pareto dominance: which individuals no other is better than in every respect."""
+"""Pareto dominance: the individuals that no other one surpasses in every respect."""
 
 import numpy as np
 
 from evoexp.numeric.compilation import kernel
-from evoexp.records import FloatArray
+from evoexp.records import BoolArray, FloatArray
 
 
-def pareto_front(criteria: FloatArray) -> np.ndarray:
-    """Return which individuals are not dominated (Curkovic et al.
-
-    2013, section 3: the front of four criteria).
+def pareto_front(criteria: FloatArray) -> BoolArray:
+    """Mark the individuals that are not dominated (Curkovic et al. 2013, section 3).
 
     One dominates another if it is no worse in every criterion and better in at least one. Exact
     ties are all kept. An individual with a NaN neither dominates nor is on the front.
@@ -31,23 +29,25 @@ def pareto_front(criteria: FloatArray) -> np.ndarray:
 
 
 @kernel
-def non_dominated(criteria, count, out):  # type: ignore[no-untyped-def]
-    """The kernel of `pareto_front`, for other kernels: of the first `count` individuals.
+def non_dominated(criteria: FloatArray, count: int, out: BoolArray) -> None:
+    """The kernel of `pareto_front`, for other kernels, on the first `count` individuals.
 
-    Writes out (≥ count,) bool.
+    Dominance is transitive, so only those not dominated so far are compared with all. Four criteria
+    per pass stay in registers; where fewer are left, the last is repeated, which changes nothing.
 
-    Whom a dominated individual dominates, its own dominator dominates too: only those not dominated
-    so far are compared with all. Four criteria per pass stay in registers; where fewer are left the
-    last is repeated: no matter.
+    Args:
+        criteria: (criteria, ≥ count).
+        count: Individuals.
+        out: (≥ count,) written.
     """
     last = len(criteria) - 1
     dominated = np.zeros(count, dtype=np.int64)
-    verdicts = np.empty(
-        count, dtype=np.int64
-    )  # on i beside j: bit 0 better in some criterion, bit 1 worse in some
+    # on i beside j: bit 0 better in some criterion, bit 1 worse in some
+    verdicts = np.empty(count, dtype=np.int64)
+    # a NaN keeps an individual off the front
     for m in range(last + 1):
         for i in range(count):
-            dominated[i] |= 1 if criteria[m, i] != criteria[m, i] else 0  # NaN
+            dominated[i] |= 1 if criteria[m, i] != criteria[m, i] else 0
     for j in range(count):
         if dominated[j] != 0:
             continue

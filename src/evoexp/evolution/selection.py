@@ -1,12 +1,12 @@
-"""Selection: which members of a population become parents, and which stay."""
+"""Selection: the members of a population that become parents, and those that stay."""
 
 import numpy as np
 
 from evoexp.numeric.compilation import kernel
-from evoexp.records import FloatArray
+from evoexp.records import FloatArray, IntArray
 
 
-def roulette(rng: np.random.Generator, weights: FloatArray, count: int) -> np.ndarray:
+def roulette(rng: np.random.Generator, weights: FloatArray, count: int) -> IntArray:
     """Draw parents with probabilities proportional to their weights (Goldberg 1989).
 
     Args:
@@ -22,22 +22,22 @@ def roulette(rng: np.random.Generator, weights: FloatArray, count: int) -> np.nd
     return chosen
 
 
-def elites(costs: FloatArray, count: int) -> np.ndarray:
+def elites(costs: FloatArray, count: int) -> IntArray:
     """Return the indices of the lowest costs, best first; among equals the lower index wins."""
     chosen = np.empty(count, dtype=np.int64)
     choose_elites(costs, chosen)
     return chosen
 
 
-def distinct(rng: np.random.Generator, num: int, count: int) -> np.ndarray:
+def distinct(rng: np.random.Generator, num: int, count: int) -> IntArray:
     """Draw `count` distinct indices out of 0 … num − 1, in random order.
 
     The head of a Fisher–Yates shuffle.
 
     Args:
         rng: Source of `count` uniform numbers.
-        num: How many there are.
-        count: How many to draw, at most `num`.
+        num: Number of indices.
+        count: Number of draws, at most `num`.
     """
     slots = np.arange(num)
     shuffle_head(rng.random(count), slots)
@@ -45,8 +45,9 @@ def distinct(rng: np.random.Generator, num: int, count: int) -> np.ndarray:
 
 
 @kernel
-def spin_roulette(weights, uniforms, chosen):  # type: ignore[no-untyped-def]
+def spin_roulette(weights: FloatArray, uniforms: FloatArray, chosen: IntArray) -> None:
     """The kernel of `roulette`, for other kernels; writes one index per uniform number."""
+    # the wheel: sums of weights up to each individual
     num = len(weights)
     wheel = np.empty(num)
     total = 0.0
@@ -55,8 +56,9 @@ def spin_roulette(weights, uniforms, chosen):  # type: ignore[no-untyped-def]
         wheel[k] = total
     for i in range(len(uniforms)):
         if total > 0.0:
+            # the first k with wheel[k] > pointer, by bisection
             pointer = uniforms[i] * total
-            low, high = 0, num - 1  # the first k with wheel[k] > pointer
+            low, high = 0, num - 1
             while low < high:
                 middle = (low + high) // 2
                 if wheel[middle] > pointer:
@@ -71,11 +73,8 @@ def spin_roulette(weights, uniforms, chosen):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def choose_elites(costs, chosen):  # type: ignore[no-untyped-def]
-    """The kernel of `elites`, for other kernels: insertion into a short list.
-
-    A later equal cost stays behind.
-    """
+def choose_elites(costs: FloatArray, chosen: IntArray) -> None:
+    """The kernel of `elites`, for other kernels: insertion; a later equal cost stays behind."""
     count, filled = len(chosen), 0
     for k in range(len(costs)):
         if filled == count and (count == 0 or not costs[k] < costs[chosen[count - 1]]):
@@ -89,11 +88,8 @@ def choose_elites(costs, chosen):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def shuffle_head(uniforms, slots):  # type: ignore[no-untyped-def]
-    """The kernel of `distinct`, for other kernels.
-
-    The first len(uniforms) of `slots` are the draw.
-    """
+def shuffle_head(uniforms: FloatArray, slots: IntArray) -> None:
+    """The kernel of `distinct`, for other kernels: the head of `slots` is the draw."""
     num = len(slots)
     for k in range(len(uniforms)):
         other = k + min(int(uniforms[k] * (num - k)), num - k - 1)
@@ -101,7 +97,7 @@ def shuffle_head(uniforms, slots):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def inverse_weights(costs, out):  # type: ignore[no-untyped-def]
+def inverse_weights(costs: FloatArray, out: FloatArray) -> None:
     """Weigh individuals by 1/cost for the roulette wheel (Curkovic et al. 2013, methods I–VIII).
 
     A cost of inf or NaN weighs 0. If any cost is 0, only those of cost 0 can be drawn: they weigh
@@ -121,11 +117,11 @@ def inverse_weights(costs, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def difference_weights(costs, out):  # type: ignore[no-untyped-def]
+def difference_weights(costs: FloatArray, out: FloatArray) -> None:
     """Weigh individuals by how far they are below the highest finite cost.
 
     A cost that is not finite weighs 0. If all finite costs are equal, each of them weighs 1: they
-    are equally likely, and what is infeasible is still not drawn.
+    are equally likely, and an infeasible individual is still not drawn.
 
     Args:
         costs: (individuals,).

@@ -1,7 +1,4 @@
-"""How long a chromosome must be for the speed of the end-effector (Curkovic et al. 2013, Eqs.
-
-2 and 3).
-"""
+"""The length of a chromosome that a speed limit asks for (Curkovic et al. 2013, Eqs. 2 and 3)."""
 
 import math
 from collections.abc import Sequence
@@ -10,10 +7,8 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.records import FloatArray
 from evoexp.validation import Positive, Settings
 
-PRINTED_STEPS = (
-    11.5,
-    23.0,
-)  # [deg] section 2: the "angles calculated", for l1 = l2 = 0.25 m, 5 m/s, 0.01 s
+# [deg] section 2: the "angles calculated", for l1 = l2 = 0.25 m, 5 m/s, 0.01 s
+PRINTED_STEPS = (11.5, 23.0)
 # [-] section 2: the "resulting chromosome length", from boundary to boundary of the half-plane
 PRINTED_LENGTH = 32
 HALF_TURN = 180.0  # [deg]
@@ -31,9 +26,7 @@ class SpeedLimit(Settings):
     sampling_time: Positive
 
     def greatest_steps(self, lengths: Sequence[float]) -> tuple[float, float]:
-        """Return how far either link may turn from one configuration to the next, alone (Eq.
-
-        2) [deg].
+        """Return the largest turn of either link alone between two configurations (Eq. 2) [deg].
 
         Args:
             lengths: Of the two links [length unit].
@@ -43,17 +36,15 @@ class SpeedLimit(Settings):
 
 
 def needed_length(turn: float, greatest_step: float) -> int:
-    """Return the chromosome's length for a turn of a link (Eq.
+    """Return the chromosome's length for a turn of a link (Eq. 3): the next even number.
 
-    3), two genes per configuration: the next even number.
+    A configuration has two genes.
 
     Args:
         turn: From the start to the goal [deg].
         greatest_step: Δφ1,max of Eq. 2 [deg].
     """
-    genes = math.ceil(
-        2.0 * turn / greatest_step * (1.0 - 1e-12)
-    )  # 1e-12: a whole number of steps stays whole
+    genes = math.ceil(2.0 * turn / greatest_step * (1.0 - 1e-12))  # a whole number stays whole
     return max(2, genes + genes % 2)
 
 
@@ -64,9 +55,7 @@ def length_notes(
     goal: FloatArray,
     chromosome_length: int,
 ) -> list[str]:
-    """Return what Eqs. 2 and 3 ask for, what the paper prints, and what this chromosome violates.
-
-    Line by line.
+    """Compare this chromosome, line by line, with Eqs. 2 and 3 and with the paper's numbers.
 
     Args:
         limit: Of the speed.
@@ -80,11 +69,8 @@ def length_notes(
     for r, links in enumerate(lengths):
         first, second = limit.greatest_steps(links)
         turn = float(abs(goal[r] - start[r]).max()) / DEGREE
-        asked, worst, step = (
-            needed_length(turn, first),
-            needed_length(HALF_TURN, first),
-            turn / segments,
-        )
+        asked, worst = needed_length(turn, first), needed_length(HALF_TURN, first)
+        step = turn / segments
         verdict = f"violates it {step / first:.3g} times over" if step > first else "is within it"
         notes += [
             f"robot {r + 1}: Eq. 2 allows steps of {first:.2f} and {second:.2f} deg "

@@ -1,8 +1,8 @@
 """Co-evolving populations, one per robot (Curkovic, Jerbic & Stipancic 2013).
 
 An individual is a path of one robot: K configurations of two absolute link angles between start and
-goal, which are given. What it is worth depends on all individuals of the other robots' populations.
-The answer is a team: one individual of every population, free of collision with each other. Nothing
+goal, which are given. Its cost depends on all individuals of the other robots' populations. The
+answer is a team: one individual of every population, free of collision with each other. Nothing
 here knows how many robots there are.
 
 A population is an array (robots, 2 K, individuals) [rad]: the angles of configuration 1, of
@@ -73,9 +73,9 @@ class Coevolution(PlannerDefaults, Component):
     Attributes:
         chromosome_length: L, even: two link angles for each of K = L/2 configurations between start
             and goal [-].
-        interpolation: What is executed between configurations: straight lines in the joint angles,
-            or a cubic spline that starts and ends at rest (Fig. 9). The verdict judges that; the
-            search looks at the configurations.
+        interpolation: The curve that is executed between configurations: straight lines in the
+            joint angles, or a cubic spline that starts and ends at rest (Fig. 9). The verdict
+            judges that curve, the search only the configurations.
         speed_limit: Of the end-effector (Eqs. 2, 3); no part of the search.
         ga: Populations, generations, rates, hall of fame.
         objective: Weights of C1 … C4.
@@ -284,24 +284,19 @@ class Coevolution(PlannerDefaults, Component):
         return np.concatenate(parts)
 
     def motion(self, problem: Problem, solution: FloatArray) -> Motion:
-        """Return the joint-space motion of a solution.
-
-        From configuration to configuration in equal times.
-        """
+        """Return the joint-space motion of a solution, configurations in equal times."""
         absolute = self._curve(problem, solution).q
         relative = absolute.reshape(len(absolute), -1, 2).copy()
         relative[:, :, 1] -= relative[:, :, 0]  # the models' joints turn against the link before
         return self._interpolated(relative.reshape(absolute.shape))
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
-        """Return the criteria of every robot of one team.
-
-        And what the executed curve asks of its joints.
+        """Return the criteria of every robot of one team, and the demands of the executed curve.
 
         Returns:
-            C1 … C4 (C1 against the team's other robots only), how far the curve leaves the range
-            [0, π] of link angles, and the largest turn of a link per sampling step, at the curve's
-            fastest instant.
+            C1 … C4 (C1 against the team's other robots only), the distance by which the curve
+            leaves the range [0, π] of link angles, and the largest turn of a link per sampling
+            step, at the curve's fastest instant.
 
         Raises:
             ValueError: If the solution has another size than robots × (K + 2) × 2.
@@ -320,7 +315,7 @@ class Coevolution(PlannerDefaults, Component):
         return terms
 
     def notes(self, problem: Problem) -> list[str]:
-        """Return what Eqs. 2 and 3 say of the chromosome's length, line by line."""
+        """Compare the chromosome's length with Eqs. 2 and 3, line by line."""
         lengths = [arm.lengths for arm in problem.collision.arms]
         return length_notes(
             self.speed_limit, lengths, problem.start, problem.goal, self.chromosome_length
@@ -337,7 +332,7 @@ class Coevolution(PlannerDefaults, Component):
         return solution.reshape(shape)
 
     def _curve(self, problem: Problem, solution: FloatArray) -> Motion:
-        """Return what is executed, in absolute link angles [rad]."""
+        """Return the executed curve, in absolute link angles [rad]."""
         paths = DEGREE * self._paths(problem, solution)
         return self._interpolated(paths.transpose(1, 0, 2).reshape(paths.shape[1], -1))
 

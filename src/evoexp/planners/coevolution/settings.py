@@ -12,9 +12,7 @@ _FLOOR_GUARD = 1e-9  # [-] 0.29 × 100 is 28.999999999999996
 
 
 class CoevolutionSettings(Component):
-    """Settings of co-evolving populations, the same for each of them (Curkovic et al.
-
-    2013, section 3).
+    """Settings of co-evolving populations, the same for each (Curkovic et al. 2013, section 3).
 
     Attributes:
         population_size: Individuals per population and generation [-].
@@ -22,8 +20,8 @@ class CoevolutionSettings(Component):
         crossover_rate: Probability that a pair of parents is crossed [-].
         mutation_rate: Probability that one allele of an individual is mutated, at the first
             generation [-].
-        mutation_decay: What `mutation_rate` has lost at the last generation (Eq. 10) [-]; 0: it is
-            constant.
+        mutation_decay: Difference of `mutation_rate` between the first and the last generation
+            (Eq. 10) [-]; 0: it is constant.
         mutation_step: Largest change of an allele (Eq. 9) [deg].
         mutation_direction: `one_sided` as Eq. 9 is printed (alleles only grow), or `symmetric`.
         selection: Weight on the roulette wheel: the `inverse` of the cost, or its `difference` to
@@ -105,8 +103,5 @@ class CoevolutionSettings(Component):
 
     @property
     def num_offspring(self) -> int:
-        """Individuals of a population that are new in a generation.
-
-        Beside the elites and a full hall.
-        """
+        """Individuals of a population that are new beside the elites and a full hall."""
         return self.population_size - self.num_elites - self.num_hall_teams

@@ -2,8 +2,8 @@
 
 An individual is one string per arm: N + 1 configurations from start to goal; the i-th via-points of
 all arms belong to the same instant. Configuration space is in degrees, angles are not wrapped.
-Nothing here knows how many arms there are, how many joints they have, or whether they move in a
-plane or in space: that is the collision model's business.
+The number of arms, their joints, and whether they move in a plane or in space matter to the
+collision model only.
 
 A population is an array (nq, N + 1, individuals), individuals innermost. A solution is flat: arm by
 arm, instant by instant, joint by joint (arms × (N + 1) × joints) [deg], start and goal included.
@@ -169,10 +169,7 @@ class ViaPointGa(PlannerDefaults, Component):
         )
 
     def motion(self, problem: Problem, solution: FloatArray) -> Motion:
-        """Return the joint-space motion of a solution.
-
-        From via-point to via-point in equal times, straight.
-        """
+        """Return the joint-space motion of a solution: straight, via-points in equal times."""
         return Motion(np.ascontiguousarray(DEGREE * self._strings_of(problem, solution).T))
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:

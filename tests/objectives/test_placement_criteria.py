@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from evoexp.errors import SettingError
-from evoexp.objectives.placement_criteria import Avoidance, Model, PlacementCriteria
+from evoexp.objectives.placement_criteria import Avoidance, PlacementCriteria
+from evoexp.objectives.placement_kernels import Model, Task
 from references.placement_numpy import LENGTHS, pinocchio_posture
 
 ANYTHING = np.array([[-np.inf, np.inf]] * 6)
@@ -27,7 +28,7 @@ def model(
 ) -> Model:
     objective = PlacementCriteria(**(PLAIN | weights))  # type: ignore[arg-type]
     table = np.array(avoided, dtype=np.float64).reshape(-1, 5)
-    return Model(np.array([*LENGTHS, 5.0, 1.4, *force]), objective.weights, table, limits)
+    return Model(Task(*LENGTHS, 5.0, 1.4, *force), objective.weights, table, limits)
 
 
 @settings(max_examples=60, deadline=None)
@@ -78,7 +79,7 @@ def test_singular_and_infeasible_postures_are_capped_and_never_nan() -> None:
     assert np.isfinite(out).all()
     assert out[:5].max() == 250.0
     assert (out[0][out[5] < 0] == 250.0).all()
-    upright = Model(np.array([*LENGTHS, 5.0, 2.5, 0.0, -5.0]), *found[1:])
+    upright = Model(Task(*LENGTHS, 5.0, 2.5, 0.0, -5.0), *found[1:])
     branch, own, _ = upright.posture(90.0, 0.0)  # stretched out: det(J Jᵀ) is 0
     assert branch >= 0
     assert (own[4], own[0]) == (250.0, 250.0)

@@ -219,7 +219,7 @@ class Postures:
         return min(feasible, default=self.criteria.greatest), bool(feasible)
 
     def _measured(self, one: float, two: float, sign: float) -> tuple[float, bool]:
-        lengths, (x_e, y_e), force = self.model.task[:3], self.model.task[3:5], self.model.task[5:]
+        lengths, (x_e, y_e), force = np.split(np.array(self.model.task), [3, 5])
         sine = (y_e - lengths[0] * np.sin(one) - lengths[1] * np.sin(one + two)) / lengths[2]
         if abs(sine) > 1.0:
             return 0.0, False

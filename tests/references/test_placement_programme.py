@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from evoexp.objectives.placement_criteria import Model
+from evoexp.objectives.placement_kernels import Model
 from evoexp.references.placement_model import Directions, directions_of
 from evoexp.references.placement_polish import descend, polish
 from evoexp.references.placement_programme import HEIGHT, MARGINS, OBJECTIVE, Programme, measure
@@ -106,7 +106,7 @@ def test_many_costs_at_once_are_the_planners(case: str) -> None:
 
 def many_costs(model: Directions, x: np.ndarray) -> np.ndarray:
     costs, across, up = np.empty(x.shape[1]), np.empty(x.shape), np.empty(x.shape)
-    costs_of(np.ascontiguousarray(x), *model[:5], across, up, costs)
+    costs_of(np.ascontiguousarray(x), model, across, up, costs)
     return costs
 
 
@@ -117,7 +117,7 @@ def test_the_subgradient_method_is_the_slow_one(case: str) -> None:
     steps = 0.3 / np.sqrt(np.arange(1.0, 41.0))
     x = np.resize(np.array(starts), (LANES, 3)).T.copy()
     ends, costs = np.empty(x.shape), np.empty(LANES)
-    slide(x, steps, *model[:5], ends, costs)
+    slide(x, steps, model, ends, costs)
     for k, start in enumerate(starts):
         end, least = slow.slide(model, start, steps)
         assert costs[k] == pytest.approx(
@@ -194,8 +194,6 @@ def test_a_polished_minimum_meets_its_conditions_and_others_are_refused() -> Non
 def test_rows_of_what_is_measured() -> None:
     model = directions("torque_norm")
     values, slopes = np.empty(MARGINS), np.empty((MARGINS, 3))
-    measure(
-        np.array([0.1, 0.2, 0.3]), model.numbers(), model.avoided, model.bounds(), values, slopes
-    )
+    measure(np.array([0.1, 0.2, 0.3]), model, model.bounds(), values, slopes)
     assert values[OBJECTIVE] == pytest.approx(slow.smooth(model, np.array([0.1, 0.2, 0.3])))
     assert values[HEIGHT] == pytest.approx(slow.height(model, np.array([0.1, 0.2, 0.3])))

@@ -1,17 +1,12 @@
 """Settings of the criteria of a mobile arm's posture (Chen & Zalzala 1995, section 3.1)."""
 
-from typing import Annotated, ClassVar, NamedTuple, Self
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from evoexp.errors import SettingError
-from evoexp.objectives.placement_kernels import (
-    RESULTS,
-    measure_both,
-    measure_branches,
-    measure_postures,
-)
+from evoexp.objectives.placement_kernels import Weights
 from evoexp.records import FloatArray
 from evoexp.validation import Component, NonNegative, NonNegativeCount, Positive, Rate, Settings
 
@@ -33,9 +28,7 @@ class Avoidance(Settings):
 
 
 class PlacementCriteria(Component):
-    """What a posture costs: E of Eq.
-
-    14, at most `greatest`, which is also the cost of an infeasible posture.
+    """Weights of E of Eq. 14, which is at most `greatest`, the cost of an infeasible posture.
 
     Attributes:
         torque_norm_weight: ε, of ‖τ‖² (Eq. 10).
@@ -68,10 +61,10 @@ class PlacementCriteria(Component):
         return self
 
     @property
-    def weights(self) -> FloatArray:
-        """ε, λ, δ, α1, α2, α3, E_m; see `placement_kernels.measure_posture`."""
+    def weights(self) -> Weights:
+        """All weights, as the kernels take them."""
         plain = self.torque_norm_weight, self.torque_max_weight, self.manipulability_weight
-        return np.array([*plain, *self.torque_weights, self.greatest])
+        return Weights(*plain, *self.torque_weights, self.greatest)
 
     def avoided(self, obstacles: FloatArray) -> FloatArray:
         """Return the terms of Eq. 12 as a table for the kernels, (n, 5).
@@ -89,50 +82,3 @@ class PlacementCriteria(Component):
                 raise SettingError(f"objective.avoidances[{k}].obstacle", must, one.obstacle)
             rows.append([one.weight, one.link, one.place, *obstacles[one.obstacle]])
         return np.array(rows, dtype=np.float64).reshape(len(rows), 5)
-
-
-class Model(NamedTuple):
-    """What criteria are computed from; see `placement_kernels.measure_posture`.
-
-    Attributes:
-        task: (7,) l1, l2, l3, X_e, Y_e, F_x, F_y.
-        weights: (7,) ε, λ, δ, α1, α2, α3, E_m.
-        avoided: (n, 5) γ, link, place, X_o, Y_o.
-        limits: (6, 2) of joint angles [deg] and torques.
-    """
-
-    task: FloatArray
-    weights: FloatArray
-    avoided: FloatArray
-    limits: FloatArray
-
-    def measure(self, angles: FloatArray) -> FloatArray:
-        """Return criteria and branch of postures θ1, θ2 (2, individuals) [deg].
-
-        (CRITERIA + 1, individuals).
-        """
-        angles = np.ascontiguousarray(angles, dtype=np.float64)
-        if angles.ndim != 2 or len(angles) != 2:
-            raise ValueError(f"angles must have shape (2, individuals), was {angles.shape}")
-        out = np.empty((6, angles.shape[1]))
-        measure_postures(angles, angles.shape[1], *self, out)
-        return out
-
-    def measure_branches(self, angles: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return E and θ3 [deg] of postures θ1, θ2 (2, individuals) [deg], each (2, individuals).
-
-        By branch.
-        """
-        angles = np.ascontiguousarray(angles, dtype=np.float64)
-        costs, theta_3 = np.empty(angles.shape), np.empty(angles.shape)
-        measure_branches(angles, *self, costs, theta_3)
-        return costs, theta_3
-
-    def posture(self, theta_1: float, theta_2: float) -> tuple[int, FloatArray, FloatArray]:
-        """Return the better branch (−1.
-
-        Neither is feasible), and all numbers of it and of the other one (RESULTS,).
-        """
-        own, other = np.empty(RESULTS), np.empty(RESULTS)
-        branch = measure_both(float(theta_1), float(theta_2), *self, own, other)
-        return int(branch), own, other

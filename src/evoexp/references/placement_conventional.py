@@ -1,4 +1,4 @@
-"""Conventional optimisers from many starts: where they end, and how often that is not the optimum.
+"""Conventional optimisers from many starts: their ends, and how often these miss the optimum.
 
 "Calculus based methods are local in scope and easy to get stuck in local minima" (Chen & Zalzala
 1995, section 1).
@@ -23,24 +23,22 @@ MOST_TRIES = 1000  # places looked at per start
 
 
 class PlacementConventional(Reference):
-    """What local methods end at, each from the same starts.
-
-    Feasible postures spread evenly over all of them.
+    """Ends of local methods, all from the same starts: feasible postures, evenly spread.
 
     Arrays, one row per start: `starts` (starts, 3): θ1, θ2, θ3 [deg]; `newton` (of minimax problems
-    `bounded`) and `subgradient`, each (starts, 3): θ1, θ2 [deg], E of where the method ended; inf
-    where it broke a limit or left the target.
+    `bounded`) and `subgradient`, each (starts, 3): θ1, θ2 [deg] and E at the end; E is inf where
+    the method broke a limit or left the target.
 
     - newton: sequential quadratic programming (scipy's SLSQP).
     - subgradient: see `placement_subgradient`.
-    - bounded: the same, the greatest torque as a variable above all torques; on E itself, which has
-      kinks, rounding would decide where it ends.
+    - bounded: the same, with the greatest torque as a variable above all torques; on E itself,
+      which has kinks, rounding would decide the end.
 
-    Terms: `<method>_evaluations`: of E per start; derivatives of `newton` and `bounded` are exact
-    and not counted.
+    Terms: `<method>_evaluations`, of E per start; the exact derivatives of `newton` and `bounded`
+    are not counted.
 
     Attributes:
-        num_starts: Starts.
+        num_starts: Number of starts.
         num_steps: Steps of the subgradient method.
         first_step: Length of its first one; the k-th is shorter by √k [rad].
     """
@@ -56,26 +54,25 @@ class PlacementConventional(Reference):
         model = directions_of(problem.model, problem.angle_limits)
         starts, places = self._starts(problem, model)
         programme = Programme(model)
+        method = "bounded" if programme.minimax else "newton"
         ends = {
-            "bounded" if programme.minimax else "newton": [descend(programme, x) for x in starts]
+            method: [descend(programme, x) for x in starts],
+            "subgradient": self._slide(model, starts),
         }
-        ends["subgradient"] = self._slide(model, starts)
         arrays = {
             name: np.array([_row(model, programme, end) for end in found])
             for name, found in ends.items()
         }
         every = np.concatenate(list(arrays.values()))
-        best = min(
-            every, key=lambda row: (round(float(row[2]), 6), *row[:2])
-        )  # of mirror images always the same
+        # of mirror images always the same
+        best = min(every, key=lambda row: (round(float(row[2]), 6), *row[:2]))
         spent = {name: sum(end.evaluations for end in found) for name, found in ends.items()}
         terms = {f"{name}_evaluations": total / self.num_starts for name, total in spent.items()}
         solved = bool(np.isfinite(best[2]))
         solution = best[:2].copy()
         cost = float(problem.model.posture(*solution)[1][0])  # at the angles that are kept
-        return Truth(
-            solution, cost, solved, sum(spent.values()), terms, arrays | {"starts": places}
-        )
+        arrays["starts"] = places
+        return Truth(solution, cost, solved, sum(spent.values()), terms, arrays)
 
     def _starts(self, problem: Any, model: Directions) -> tuple[list[FloatArray], FloatArray]:
         """Return feasible postures as directions, and as θ1, θ2, θ3 [deg] (starts, 3)."""
@@ -90,7 +87,7 @@ class PlacementConventional(Reference):
             rows = np.stack([*np.repeat(pairs[:, :, None], 2, axis=2), theta_3.T], axis=2).reshape(
                 -1, 3
             )
-            found += list(rows[(problem.model.weights[6] > costs.T).ravel()])
+            found += list(rows[(problem.model.weights.greatest > costs.T).ravel()])
             if len(found) >= self.num_starts:
                 break
         else:
@@ -106,29 +103,12 @@ class PlacementConventional(Reference):
         steps = self.first_step / np.sqrt(np.arange(1.0, self.num_steps + 1.0))
         x = np.pad(np.column_stack(starts), ((0, 0), (0, -len(starts) % LANES)), mode="edge")
         ends, costs = np.empty(x.shape), np.empty(x.shape[1])
-        slide(
-            x,
-            steps,
-            model.lengths,
-            model.target,
-            model.force,
-            model.weights,
-            model.avoided,
-            ends,
-            costs,
-        )
+        slide(x, steps, model, ends, costs)
         evaluations = 7 * self.num_steps
         return [End(ends[:, k].copy(), float(costs[k]), evaluations) for k in range(len(starts))]
 
 
 def _row(model: Directions, programme: Programme, end: End) -> FloatArray:
-    """Return θ1, θ2 [deg] and E of an end.
-
-    E is inf where the end is no posture that was asked for.
-    """
-    return np.array(
-        [
-            *np.round(model.theta(end.x), DIGITS),
-            end.cost if programme.is_legal(end.x, 1e-6) else np.inf,
-        ]
-    )
+    """Return θ1, θ2 [deg] and E of an end; E is inf where the end breaks a constraint."""
+    cost = end.cost if programme.is_legal(end.x, 1e-6) else np.inf
+    return np.array([*np.round(model.theta(end.x), DIGITS), cost])

@@ -33,13 +33,6 @@ class PlacementLandscape(Reference):
         best = int(np.argmin(found[0]))
         cost = np.where(feasible, found[0], np.nan).reshape(self.num_angles, self.num_angles)
         arrays = {"theta_1": one, "theta_2": two, "cost": cost}
-        share_feasible = float(np.count_nonzero(feasible)) / pairs.shape[1]
-        terms = {"share_feasible": share_feasible}
-        return Truth(
-            pairs[:, best].copy(),
-            float(found[0, best]),
-            bool(feasible[best]),
-            pairs.shape[1],
-            terms,
-            arrays,
-        )
+        terms = {"share_feasible": float(np.count_nonzero(feasible)) / pairs.shape[1]}
+        solution, lowest = pairs[:, best].copy(), float(found[0, best])
+        return Truth(solution, lowest, bool(feasible[best]), pairs.shape[1], terms, arrays)

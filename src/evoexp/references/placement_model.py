@@ -1,4 +1,4 @@
-"""The task of a mobile arm's posture once more, over absolute link angles: for optimisers.
+"""The task of a mobile arm's posture over absolute link angles, for optimisers.
 
 x = (φ1, φ2, φ3) [rad] are the directions of the three links; one equation ties them: the
 end-effector's height.
@@ -8,15 +8,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.objectives.placement_criteria import Model
+from evoexp.objectives.placement_kernels import Model
 from evoexp.records import FloatArray
 
-INSIDE = 1e-11  # [rad], of torques [-]: what is on a limit stays within it in spite of rounding
+INSIDE = 1e-11  # [rad], of torques [-]: on a limit, in spite of rounding, is within it
 TURN = 360.0  # [deg]
 
 
 class Directions(NamedTuple):
-    """What criteria over the links' directions are computed from.
+    """Task, weights and limits of the criteria over the links' directions.
 
     Attributes:
         lengths: (3,) l1, l2, l3.
@@ -36,21 +36,15 @@ class Directions(NamedTuple):
     joint_limits: FloatArray
     torque_limits: FloatArray
 
-    def numbers(self) -> FloatArray:
-        """Return lengths, target, force and weights in one row, (13,)."""
-        return np.concatenate([self.lengths, self.target, self.force, self.weights])
-
     def bounds(self) -> FloatArray:
-        """Return the limits that there are, (m, 3); see `placement_programme.measure`."""
-        rows = []
-        for k, (least, greatest) in enumerate(
-            np.concatenate([self.joint_limits, self.torque_limits])
-        ):
-            rows += [
-                (float(k), sign, limit)
-                for sign, limit in ((1.0, least), (-1.0, greatest))
-                if np.isfinite(limit)
-            ]
+        """Return the finite limits, (m, 3); see `placement_programme.measure`."""
+        limits = np.concatenate([self.joint_limits, self.torque_limits])
+        rows = [
+            (float(k), sign, limit)
+            for k, (least, greatest) in enumerate(limits)
+            for sign, limit in ((1.0, least), (-1.0, greatest))
+            if np.isfinite(limit)
+        ]
         return np.array(rows, dtype=np.float64).reshape(len(rows), 3)
 
     def theta(self, x: FloatArray) -> FloatArray:
@@ -69,14 +63,15 @@ def directions_of(model: Model, angle_limits: FloatArray) -> Directions:
     """Return the criteria of a planner's model.
 
     Args:
-        model: See `placement_criteria`.
-        angle_limits: (2, 2) of the planner's genes [deg]; they limit θ1 and θ2 where they leave out
-            anything.
+        model: The planner's model.
+        angle_limits: (2, 2) of the planner's genes [deg]; a range of less than a turn limits θ1 or
+            θ2.
     """
-    task, joints = model.task, model.limits[:3].copy()
+    task, joints = np.array(model.task), model.limits[:3].copy()
     for k, (least, greatest) in enumerate(angle_limits):
         if greatest - least < TURN:
             joints[k] = max(least, joints[k, 0]), min(greatest, joints[k, 1])
     inside = INSIDE * np.array([1.0, -1.0])
     limits = np.radians(joints) + inside, model.limits[3:] + inside
-    return Directions(task[:3], task[3:5], task[5:7], model.weights[:6], model.avoided, *limits)
+    weights = np.array(model.weights[:6])
+    return Directions(task[:3], task[3:5], task[5:7], weights, model.avoided, *limits)

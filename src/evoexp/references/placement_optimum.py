@@ -1,14 +1,11 @@
-"""The best posture there is: a dense search over all angles.
-
-Then every promising local minimum polished.
-"""
+"""The best posture: a dense search over all angles, then every promising minimum polished."""
 
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field
 
-from evoexp.objectives.placement_criteria import Model
+from evoexp.objectives.placement_kernels import Model
 from evoexp.records import FloatArray
 from evoexp.references.placement_model import TURN, directions_of
 from evoexp.references.placement_polish import descend, polish
@@ -40,10 +37,9 @@ class PlacementOptimum(Reference):
         """Search, polish, and judge the best by the planner's own kernels."""
         model, cap = (
             directions_of(problem.model, problem.angle_limits),
-            float(problem.model.weights[6]),
+            problem.model.weights.greatest,
         )
-        programme, ends = Programme(model), []
-        exact: list[FloatArray] = []
+        programme, ends, exact = Programme(model), list[FloatArray](), list[FloatArray]()
         evaluations = 2 * self.num_angles * self.num_angles
         for x in lowest(model, problem.angle_limits, self.num_angles, cap, self.num_polished):
             end = descend(programme, x)
@@ -58,23 +54,26 @@ class PlacementOptimum(Reference):
             return Truth(
                 problem.angle_limits.mean(axis=1), cap, False, evaluations, {"num_minima": 0.0}
             )
-        best, cost = minima[0, :2].copy(), float(minima[0, 2])
-        return Truth(
-            best, cost, True, evaluations, {"num_minima": float(len(minima))}, {"minima": minima}
+        best, cost, count = (
+            minima[0, :2].copy(),
+            float(minima[0, 2]),
+            {"num_minima": float(len(minima))},
         )
+        return Truth(best, cost, True, evaluations, count, {"minima": minima})
 
 
 def _is_among(known: list[FloatArray], theta: FloatArray) -> bool:
-    """Return whether θ1 and θ2 are those of something known."""
+    """Return whether θ1 and θ2 are those of a known minimum."""
     return any(
         np.abs((theta - other[:2] + TURN / 2) % TURN - TURN / 2).max() <= SAME for other in known
     )
 
 
 def _distinct(model: Model, found: list[FloatArray]) -> FloatArray:
-    """Return distinct feasible minima θ1, θ2, E (minima, 3), the lowest first.
+    """Return distinct feasible minima, the lowest first: θ1, θ2, and E by the planner's kernels.
 
-    By the planner's own kernels.
+    Returns:
+        (minima, 3).
     """
     rows: list[FloatArray] = []
     measured = [(theta, model.posture(*theta)) for theta in found]

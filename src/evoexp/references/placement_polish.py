@@ -1,7 +1,4 @@
-"""Local optimisation of a mobile arm's posture.
-
-Sequential quadratic programming, then Newton on its conditions.
-"""
+"""Local optimisation of a mobile arm's posture: quadratic programming, then Newton's method."""
 
 from typing import Any, NamedTuple
 
@@ -15,12 +12,12 @@ MOST_STEPS = 12  # of Newton's method; it takes three or four
 
 
 class End(NamedTuple):
-    """Where an optimiser ended.
+    """The end of an optimiser's way.
 
     Attributes:
         x: (3,) directions of the links [rad].
         cost: E there, without any cap.
-        evaluations: Of the cost.
+        evaluations: Evaluations of the cost.
     """
 
     x: FloatArray
@@ -29,10 +26,7 @@ class End(NamedTuple):
 
 
 def descend(programme: Programme, x: FloatArray, most_steps: int = 200) -> End:
-    """Minimise E from x by sequential quadratic programming (scipy's SLSQP).
-
-    The minimax term as a bound t.
-    """
+    """Minimise E from x by sequential quadratic programming (SLSQP), a minimax term by t."""
     from scipy import optimize  # takes long to load
 
     minimize: Any = optimize.minimize  # whose overloads no callable of ours fits
@@ -50,9 +44,8 @@ def descend(programme: Programme, x: FloatArray, most_steps: int = 200) -> End:
 def polish(programme: Programme, x: FloatArray) -> End | None:
     """Return the local minimum near the end of `descend`, to rounding.
 
-    Newton on the Karush–Kuhn–Tucker conditions.
-
-    The conditions that hold with equality are taken from x; None where Newton does not converge.
+    Newton's method solves the Karush–Kuhn–Tucker conditions; the margins that are 0 at x stay 0.
+    The result is None where the method does not converge.
     """
     z = programme.start(x)
     values, slopes = programme.measured(z)
@@ -77,7 +70,7 @@ def polish(programme: Programme, x: FloatArray) -> End | None:
 
 
 def _jacobian(function: Any, y: FloatArray) -> FloatArray:
-    """Return derivatives by central differences: Newton's steps need no more digits."""
+    """Return derivatives by central differences, precise enough for Newton's steps."""
     h = 1e-5
     columns = [
         (function(y + h * unit) - function(y - h * unit)) / (2.0 * h) for unit in np.eye(len(y))

@@ -1,10 +1,8 @@
-"""A mobile arm's posture as a smooth programme, compiled.
-
-What is minimised, what binds, and all derivatives.
+"""A mobile arm's posture as a smooth programme, compiled: objective, constraints, derivatives.
 
 z = (φ1, φ2, φ3) [rad] are the directions of the three links; one equation ties them: the
 end-effector's height. The minimax term is a bound: z = (φ1, φ2, φ3, t), t above every |α τ|.
-Nothing is shared with the planner's own kernels, which know joint angles only.
+Nothing is shared with the planner's own kernels, which use joint angles.
 """
 
 from typing import Any
@@ -16,27 +14,22 @@ from evoexp.numeric.elementary import sincos
 from evoexp.records import FloatArray
 from evoexp.references.placement_model import Directions
 
-OBJECTIVE, HEIGHT, MARGINS = (
-    0,
-    1,
-    2,
-)  # rows of what is measured: what is minimised, must be 0, must not be negative
+# rows: the objective, the height (which must be 0), then margins (which must not be negative)
+OBJECTIVE, HEIGHT, MARGINS = range(3)
 TORQUE_BOUNDS = 6  # margins of the minimax term: t − α τ and t + α τ
 
 
 class Programme:
-    """Least smooth(x) + λ t, t above every |α τ|, height 0, margins not negative.
-
-    T is left out where λ is 0.
+    """Minimise smooth(x) + λ t, t above every |α τ|, height 0, no margin negative; no t if λ is 0.
 
     Attributes:
-        minimax: Whether there is t.
+        minimax: Whether t is a variable.
         num_margins: Number of margins.
     """
 
     def __init__(self, model: Directions) -> None:
         """Take the criteria."""
-        self._numbers, self._avoided, self._bounds = model.numbers(), model.avoided, model.bounds()
+        self._model, self._bounds = model, model.bounds()
         self.minimax = bool(model.weights[1])
         self.num_margins = TORQUE_BOUNDS * self.minimax + len(self._bounds)
         self._values = np.empty(MARGINS + self.num_margins)
@@ -44,15 +37,13 @@ class Programme:
         self._where = b""
 
     def measured(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the objective, the height and the margins at z,.
+        """Return objective, height and margins at z, (2 + margins,), and their derivatives.
 
-        2 + margins,), and their derivatives (…, len(z.
-
-        Both arrays are used again: they hold until the next call.
+        Both arrays, the latter (2 + margins, len(z)), are valid until the next call.
         """
         where = z.tobytes()
         if where != self._where:
-            measure(z, self._numbers, self._avoided, self._bounds, self._values, self._slopes)
+            measure(z, self._model, self._bounds, self._values, self._slopes)
             self._where = where
         return self._values, self._slopes
 
@@ -73,7 +64,7 @@ class Programme:
         return bool(abs(values[HEIGHT]) < tolerance and (values[MARGINS:] > -tolerance).all())
 
     def constraints(self) -> list[dict[str, Any]]:
-        """Return what binds in the words of `scipy.optimize.minimize`."""
+        """Return the constraints in the form of `scipy.optimize.minimize`."""
         height, margins = slice(HEIGHT, MARGINS), slice(MARGINS, None)
         kinds = [("eq", height), ("ineq", margins)][: 1 + (self.num_margins > 0)]
         return [
@@ -87,69 +78,72 @@ class Programme:
 
 
 @kernel
-def measure(z, numbers, avoided, bounds, values, slopes):  # type: ignore[no-untyped-def]
+def measure(
+    z: FloatArray, model: Directions, bounds: FloatArray, values: FloatArray, slopes: FloatArray
+) -> None:
     """Measure the programme at one place.
 
     Args:
         z: (3,) or, with t, (4,).
-        numbers: (13,) l1, l2, l3, X_e, Y_e, F_x, F_y, ε, λ, δ, α1, α2, α3; see
-            `placement_model.Directions`.
-        avoided: (n, 5) γ, link, place, X_o, Y_o of Eq. 12.
-        bounds: (m, 3) what is limited (0, 1, 2: a joint angle; 3, 4, 5: a torque), 1.0 or −1.0:
-            from below or above, the limit.
-        values: (2 + margins,) written: what is minimised, the height, the margins.
+        model: The criteria.
+        bounds: (m, 3) the limited quantity (0, 1, 2: a joint angle; 3, 4, 5: a torque), 1.0 or
+            −1.0: from below or above, the limit.
+        values: (2 + margins,) written: objective, height, margins.
         slopes: (2 + margins, len(z)) written: their derivatives.
     """
-    epsilon, delta = numbers[7], numbers[9]
+    epsilon, lam, delta = model.weights[0], model.weights[1], model.weights[2]
+    f_x, f_y, avoided = model.force[0], model.force[1], model.avoided
+    # links; derivatives of every torque from the k-th joint inwards
     across, up, torques, turns = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for k in range(3):
         s, c = sincos(z[k])
-        across[k], up[k] = numbers[k] * c, numbers[k] * s
-        turns[k] = (
-            -numbers[5] * across[k] - numbers[6] * up[k]
-        )  # of every torque from the k-th joint inwards
+        across[k], up[k] = model.lengths[k] * c, model.lengths[k] * s
+        turns[k] = -f_x * across[k] - f_y * up[k]
+    # torques, norm, manipulability
     slopes[:, :] = 0.0
     jx, jy, xx, yy, xy, total = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(2, -1, -1):
         jx, jy = jx - up[k], jy + across[k]
-        torques[k] = jx * numbers[5] + jy * numbers[6]  # Eq. 8
+        torques[k] = jx * f_x + jy * f_y  # Eq. 8
         total += epsilon * torques[k] * torques[k]
         xx, yy, xy = xx + jx * jx, yy + jy * jy, xy + jx * jy
     determinant = xx * yy - xy * xy
     if delta != 0.0:
         total += delta / determinant
+    # their derivatives, by sums over the joints up to the k-th
     reach, sum_x, sum_y, sum_torques = jy, 0.0, 0.0, 0.0
     for k in range(3):
-        sum_x, sum_y, sum_torques = (
-            sum_x + jx,
-            sum_y + jy,
-            sum_torques + torques[k],
-        )  # of joints up to the k-th
+        sum_x, sum_y, sum_torques = sum_x + jx, sum_y + jy, sum_torques + torques[k]
         slopes[0, k] = 2.0 * epsilon * sum_torques * turns[k]
         if delta != 0.0:
-            of_xx, of_yy, of_xy = (
-                -2.0 * sum_x * across[k],
-                -2.0 * sum_y * up[k],
-                -sum_y * across[k] - sum_x * up[k],
-            )
-            slopes[0, k] -= (
-                delta * (of_xx * yy + xx * of_yy - 2.0 * xy * of_xy) / (determinant * determinant)
-            )
+            of_xx, of_yy = -2.0 * sum_x * across[k], -2.0 * sum_y * up[k]
+            of_xy = -sum_y * across[k] - sum_x * up[k]
+            of_determinant = of_xx * yy + xx * of_yy - 2.0 * xy * of_xy
+            slopes[0, k] -= delta * of_determinant / (determinant * determinant)
         jx, jy = jx + up[k], jy - across[k]
+    # obstacles, height, minimax term, margins
     for n in range(len(avoided)):
-        total += _avoid(avoided[n], numbers[3] - reach, across, up, slopes[0])
-    values[0], values[1] = total, up[0] + up[1] + up[2] - numbers[4]
+        total += _avoid(avoided[n], model.target[0] - reach, across, up, slopes[0])
+    values[0], values[1] = total, up[0] + up[1] + up[2] - model.target[1]
     for k in range(3):
         slopes[1, k] = across[k]
     if len(z) == 4:
-        values[0] += numbers[8] * z[3]
-        slopes[0, 3] = numbers[8]
-    _measure_margins(z, numbers[10:], bounds, torques, turns, values, slopes)
+        values[0] += lam * z[3]
+        slopes[0, 3] = lam
+    _measure_margins(z, model.weights[3:], bounds, torques, turns, values, slopes)
 
 
 @kernel
-def _measure_margins(z, alphas, bounds, torques, turns, values, slopes):  # type: ignore[no-untyped-def]
-    """Measure what must not be negative, and its derivatives where they are not 0.
+def _measure_margins(
+    z: FloatArray,
+    alphas: FloatArray,
+    bounds: FloatArray,
+    torques: FloatArray,
+    turns: FloatArray,
+    values: FloatArray,
+    slopes: FloatArray,
+) -> None:
+    """Measure the margins, and their derivatives where they are not 0.
 
     Args:
         z: As of `measure`, and so are `bounds`, `values` and `slopes`.
@@ -157,6 +151,7 @@ def _measure_margins(z, alphas, bounds, torques, turns, values, slopes):  # type
         torques: (3,).
         turns: (3,) derivative by each direction of every torque from its joint inwards.
     """
+    # t above every weighted torque and its negative
     row = 2
     if len(z) == 4:
         for sign in (-1.0, 1.0):
@@ -166,6 +161,7 @@ def _measure_margins(z, alphas, bounds, torques, turns, values, slopes):  # type
                 for j in range(k, 3):
                     slopes[row, j] = sign * alphas[k] * turns[j]
                 row += 1
+    # limits
     for m in range(len(bounds)):
         k, sign = int(bounds[m, 0]), bounds[m, 1]
         if k < 3:
@@ -181,8 +177,10 @@ def _measure_margins(z, alphas, bounds, torques, turns, values, slopes):  # type
 
 
 @kernel
-def _avoid(one, platform, across, up, slope):  # type: ignore[no-untyped-def]
-    """Return one term of Eq. 12; its derivatives are added to `slope`.
+def _avoid(
+    one: FloatArray, platform: float, across: FloatArray, up: FloatArray, slope: FloatArray
+) -> float:
+    """Return one term of Eq. 12, and add its derivatives to `slope`.
 
     Args:
         one: (5,) γ, link, place, X_o, Y_o.
@@ -201,4 +199,5 @@ def _avoid(one, platform, across, up, slope):  # type: ignore[no-untyped-def]
         slope[k] -= (
             2.0 * one[0] * (dx * (1.0 - share) * up[k] + dy * share * across[k]) / (square * square)
         )
-    return one[0] / square
+    term: float = one[0] / square
+    return term

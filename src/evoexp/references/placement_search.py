@@ -1,21 +1,20 @@
-"""A dense search for postures, compiled.
+"""A dense search for postures, compiled: E over all θ1 and θ2, and its local minima.
 
-E over all θ1 and θ2, both values of θ3, and its local minima.
-
-Over directions, as all of this room: nothing is shared with the planner's own kernels.
+It is written over directions, as all references are: nothing is shared with the planner's own
+kernels.
 """
 
 import numpy as np
 
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import asin, sin
-from evoexp.records import FloatArray
+from evoexp.records import BoolArray, FloatArray
 from evoexp.references.placement_model import TURN, Directions
 from evoexp.references.placement_programme import MARGINS, measure
 from evoexp.references.placement_subgradient import costs_of
 
 PI, WHOLE = 3.141592653589793, 6.283185307179586  # [rad]
-ON_LIMIT = 1e-9  # [rad], of torques [-]: what breaks a limit by less is on it
+ON_LIMIT = 1e-9  # [rad], of torques [-]: a posture that breaks a limit by less is on it
 
 
 def lowest(
@@ -30,8 +29,8 @@ def lowest(
         model: The criteria.
         angle_limits: (2, 2) of θ1 and θ2 [deg].
         num_angles: Values of either angle.
-        cap: What costs as much is no minimum.
-        count: Of minima, at most.
+        cap: A minimum costs less.
+        count: Number of minima, at most.
     """
     share = np.arange(num_angles) / num_angles
     angles = np.radians(angle_limits[:, :1] + (angle_limits[:, 1:] - angle_limits[:, :1]) * share)
@@ -47,9 +46,7 @@ def lowest(
 
 
 def search(model: Directions, angles: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return E, without any cap, over a grid of angles.
-
-    And the sine of the third link's direction that it takes.
+    """Return E, without any cap, over a grid of angles, and the sine of the third link's direction.
 
     Args:
         model: The criteria.
@@ -57,33 +54,35 @@ def search(model: Directions, angles: FloatArray) -> tuple[FloatArray, FloatArra
 
     Returns:
         E (2, n, n): branch (0: the third link points to +x), θ1, θ2; inf where the target is out of
-        reach or a limit is broken. Sines (n, n): beyond ±1 where it is out of reach.
+        reach or a limit is broken. Sines (n, n): beyond ±1 where the target is out of reach.
     """
     num = angles.shape[1]
     costs, sines = np.full((2, num, num), np.inf), np.empty((num, num))
-    parts = model.lengths, model.target, model.force, model.weights, model.avoided
-    _search(np.ascontiguousarray(angles), *parts, model.numbers(), model.bounds(), costs, sines)
+    _search(np.ascontiguousarray(angles), model, model.bounds(), costs, sines)
     return costs, sines
 
 
 @kernel
-def _search(angles, lengths, target, force, weights, avoided, numbers, bounds, costs, sines):  # type: ignore[no-untyped-def]
-    """Do what `search` says, row by row; what is out of reach is not measured.
+def _search(
+    angles: FloatArray, model: Directions, bounds: FloatArray, costs: FloatArray, sines: FloatArray
+) -> None:
+    """Search row by row, see `search`; postures out of reach are not measured.
 
     Args:
         angles: (2, n) [rad].
-        lengths: As of `costs_of`, and so are the next four.
-        numbers: As of `placement_programme.measure`, and so is `bounds`.
+        model: The criteria.
+        bounds: See `placement_programme.measure`.
         costs: (2, n, n) written where the target is in reach.
         sines: (n, n) written.
     """
-    num = angles.shape[1]
+    num, lengths, target = angles.shape[1], model.lengths, model.target
     kept, upward = np.empty(num, dtype=np.int64), np.empty(num)
     x, across, up, found = np.empty((3, num)), np.empty((3, num)), np.empty((3, num)), np.empty(num)
     z = np.empty(3)
     values, slopes = np.empty(MARGINS + len(bounds)), np.empty((MARGINS + len(bounds), 3))
     for i in range(num):
         one, left, count = angles[0, i], target[1] - lengths[0] * sin(angles[0, i]), 0
+        # which angles θ2 are in reach
         for j in range(num):
             sines[i, j] = (left - lengths[1] * sin(one + angles[1, j])) / lengths[2]
         for j in range(num):
@@ -93,13 +92,14 @@ def _search(angles, lengths, target, force, weights, avoided, numbers, bounds, c
             x[0, n], x[1, n], upward[n] = one, one + angles[1, kept[n]], sines[i, kept[n]]
         for n in range(count):
             upward[n] = asin(upward[n])
+        # both branches, E and limits
         for branch in range(2):
             for n in range(count):
                 x[2, n] = PI - upward[n] if branch else upward[n]
-            costs_of(x, lengths, target, force, weights, avoided, across, up, found[:count])
+            costs_of(x, model, across, up, found[:count])
             for n in range(count * (len(bounds) > 0)):
                 z[0], z[1], z[2] = x[0, n], x[1, n], _wrapped(x[1, n], x[2, n])
-                measure(z, numbers, avoided, bounds, values, slopes)
+                measure(z, model, bounds, values, slopes)
                 for row in range(MARGINS, len(values)):
                     found[n] = np.inf if values[row] < -ON_LIMIT else found[n]
             for n in range(count):
@@ -107,12 +107,10 @@ def _search(angles, lengths, target, force, weights, avoided, numbers, bounds, c
 
 
 @kernel
-def _wrapped(before, after):  # type: ignore[no-untyped-def]
-    """Return a link's direction in turns so that the joint's angle to the link before is in [−π.
-
-    Π) [rad].
-    """
-    return after - WHOLE * np.floor((after - before + PI) / WHOLE)
+def _wrapped(before: float, after: float) -> float:
+    """Return a link's direction, its angle to the link before turned into [−π, π) [rad]."""
+    turned: float = after - WHOLE * np.floor((after - before + PI) / WHOLE)
+    return turned
 
 
 def _directions(one: float, two: float, sine: float, branch: int) -> FloatArray:
@@ -122,14 +120,16 @@ def _directions(one: float, two: float, sine: float, branch: int) -> FloatArray:
 
 
 @kernel
-def mark_minima(costs, in_reach, turns, cap, least):  # type: ignore[no-untyped-def]
-    """Mark what is not above anything around it.
+def mark_minima(
+    costs: FloatArray, in_reach: BoolArray, turns: BoolArray, cap: float, least: BoolArray
+) -> None:
+    """Mark the places that are not above any place around them.
 
     Args:
         costs: (2, n, n) branch, θ1, θ2.
         in_reach: (n, n).
         turns: (2,) whether the first value of θ1 and of θ2 follows the last one.
-        cap: What costs as much is no minimum.
+        cap: A minimum costs less.
         least: (2, n, n) written where it is true.
     """
     num = costs.shape[1]

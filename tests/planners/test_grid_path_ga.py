@@ -91,13 +91,11 @@ def test_paths_without_a_common_node_are_crossed_where_they_are_near() -> None:
     table = np.zeros((4, size + 1), dtype=np.int32)
     for row, path in zip(table, (lower, upper), strict=False):
         row[: len(path) + 1] = [len(path), *map(index, path)]
-    arrays = [np.zeros(n, dtype=np.int32) for n in (size, 3 * size + 3, size, size, size + 1)]
-    scratch = (arrays[0], arrays[1], np.zeros((2, size + 1), dtype=np.int32), *arrays[2:])
     draws = Block(rng(1).random(64), np.zeros(1, dtype=np.int64))
+    scratch, pair = kernels.Scratch.of(size), (table[2], table[3])
     for reach, crossed in ((0, False), (2, True)):
-        done = kernels.cross(
-            draws, problem.world, (table[0], table[1]), (True, reach), (table[2], table[3]), scratch
-        )
+        breeding = kernels.Breeding(True, 2.0, 1.0, reach, 0.0)
+        done = kernels.cross(draws, problem.world, (table[0], table[1]), breeding, pair, scratch)
         assert done is crossed
     for child in table[2:]:
         assert faults(problem, child, revisits=False) == []
@@ -182,7 +180,7 @@ def test_walks_whose_moves_weigh_no_whole_numbers_take_the_longer_way() -> None:
 def test_large_grids_work_out_fronts_as_they_go() -> None:
     own = planner(population_size=6, mutation_rate=1.0, num_generations=2)
     problem = own.prepare(robot(), scenario(np.zeros((50, 50), dtype=bool)))
-    assert len(problem.world[6]) == 0
+    assert len(problem.world.fronts) == 0
     last = list(own.evolve(problem, rng(0)))[-1]
     assert all(faults(problem, path, revisits=False) == [] for path in last.population)
 

@@ -1,39 +1,31 @@
-"""Generations that kernels compute some at a time, while they are yielded one by one.
+"""Generations that are computed several per call of a kernel, and yielded one by one.
 
-Between kernels that take some ten microseconds, calling them would be a third of the time.
+With kernels that take some ten microseconds per generation, a call for each would be a third of the
+time.
 """
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.evolution.scaled_settings import ScaledGenetic
-from evoexp.numeric.random_stream import Draws
+from evoexp.numeric.random_stream import Block, Draws
+from evoexp.planners.planner import Candidate, Keeper
 from evoexp.records import FloatArray, Generation
 
-# what kernels note of a generation: index of the best, mean and deviation of costs, how many are
-# feasible
-RECORD = 4
-
-
-class Found(NamedTuple):
-    """An individual as it is recorded, see `records.Generation`."""
-
-    best: FloatArray
-    terms: dict[str, float]
-    solved: bool
+SUMMARY = 4  # of a generation: index of the best, mean and deviation of costs, number of feasible
 
 
 class Stretches(ABC):
-    """The generations of one run.
-
-    The last ones are kept, generation g at place g modulo `num_places`.
+    """The generations of one run; generation g is at place g modulo `num_places`.
 
     Attributes:
-        num_places: As many as are computed at a time, and the one they go on from.
-        records: (places, RECORD).
+        num_places: Generations computed per call, and the one before them.
+        summaries: (places, SUMMARY).
         costs: (places, individuals).
     """
 
@@ -44,44 +36,35 @@ class Stretches(ABC):
 
         Args:
             ga: Its settings.
-            stretch: Generations that are computed at a time, at most.
-            block: Uniform numbers that are drawn at once, at least.
+            stretch: Generations computed per call, at most.
+            block: Uniform numbers drawn at once, at least.
         """
         self.num_places = min(stretch, ga.num_generations) + 1
-        self.records = np.empty((self.num_places, RECORD))
+        self.summaries = np.empty((self.num_places, SUMMARY))
         self._ga, self._known, self._draws = ga, -1, Draws(block)
 
     def generations(self, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield the initial population, then every generation."""
-        ga, best_cost, found = self._ga, np.inf, Found(np.empty(0), {}, False)
+        ga, keeper = self._ga, Keeper()
         for index in range(ga.num_generations + 1):
             place = self._place(index, rng)
-            individual, mean, std, num_feasible = self.records[place].tolist()
-            costs = self.costs[place]
-            lowest = float(costs[int(individual)])
-            if lowest < best_cost:
-                best_cost, found = lowest, self.found(place, int(individual))
-            yield Generation(
-                index=index,
-                best=found.best,
-                best_cost=best_cost,
-                best_cost_in_generation=lowest,
-                mean_cost=mean,
-                std_cost=std,
+            best, mean, std, num_feasible = self.summaries[place].tolist()
+            individual, costs = int(best), self.costs[place]
+            lowest = float(costs[individual])
+            if keeper.improves(lowest):
+                keeper.keep(lowest, self.candidate(place, individual))
+            yield keeper.record(
+                CostStatistics(individual, mean, std),
+                costs,
+                self.population(place, index == ga.num_generations),
+                lowest=lowest,
                 num_feasible=int(num_feasible),
-                evaluations=ga.population_size + index * ga.num_offspring,
+                evaluations=ga.num_offspring if index else ga.population_size,
                 collision_queries=0,
-                solved=found.solved,
-                terms=found.terms,
-                costs=costs,
-                population=self.population(place, index == ga.num_generations),
             )
 
     def _place(self, index: int, rng: np.random.Generator) -> int:
-        """Return the place of a generation.
-
-        Computing it and some that follow it first if need be.
-        """
+        """Return the place of a generation; it is computed if need be, with some that follow it."""
         if index == 0:
             self.begin(rng)
             self._known = 0
@@ -98,19 +81,17 @@ class Stretches(ABC):
         """Draw and judge the initial population, at place 0."""
 
     @abstractmethod
-    def go_on(self, draws: tuple[np.ndarray, np.ndarray], first: int, last: int) -> int:
-        """Compute the generations after `first` up to `last`.
+    def go_on(self, draws: Block, first: int, last: int) -> int:
+        """Compute the generations after `first` up to `last`, as far as the draws suffice.
 
-        Return the one reached, as far as the draws suffice.
+        Returns:
+            The last generation that was computed.
         """
 
     @abstractmethod
-    def found(self, place: int, individual: int) -> Found:
-        """Return what is recorded of an individual."""
+    def candidate(self, place: int, individual: int) -> Candidate:
+        """Return an individual as it is recorded."""
 
     @abstractmethod
-    def population(self, place: int, is_last: bool) -> np.ndarray:
-        """Return the population at a place.
-
-        Of the last generation, which is hashed, nothing but its individuals.
-        """
+    def population(self, place: int, is_last: bool) -> NDArray[Any]:
+        """Return the population at a place; the last one is hashed and holds individuals alone."""

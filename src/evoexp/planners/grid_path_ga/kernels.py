@@ -1,34 +1,137 @@
 """Generations of paths over a grid, compiled (Chen & Zalzala 1995, section 2.3).
 
-A population is a table of paths (individuals, nodes + 1), each row as `paths.grid_walks` says, and
-of their lengths, mean unsafenesses and costs (3, individuals). Many generations are one call;
-settings travel as plain tuples.
+A path is a row of a table, see `paths.grid_walks`.
 """
+
+from typing import NamedTuple
+
+import numpy as np
 
 from evoexp.evolution.cost_statistics import summarise
 from evoexp.evolution.remainder import choose_by_remainders, num_remainder_uniforms
 from evoexp.evolution.scaling import scale_costs
 from evoexp.evolution.selection import choose_elites
 from evoexp.numeric.compilation import borrowed, kernel
-from evoexp.numeric.random_stream import draw, draw_index, draw_many, used_up
+from evoexp.numeric.random_stream import Block, draw, draw_index, draw_many, used_up
 from evoexp.paths.grid_walks import erase_loops, measure_path, walk
-from evoexp.paths.grids import Moves, spread_front
+from evoexp.paths.grids import Moves, NodeArray, StepArray, spread_front
+from evoexp.records import FloatArray, IntArray
 
 RESULTS = 3
 DISTANCE, UNSAFENESS, COST = range(RESULTS)
 NOT_CONNECTED, CONNECTED = -1, -2
 
 
+class World(NamedTuple):
+    """A grid and its fields.
+
+    Attributes:
+        neighbours: (nodes, moves), see `grids.Grid`.
+        num_moves: Moves that a front makes; they come first.
+        coordinates: (nodes, dimensions).
+        kinds: See `grids.Grid`.
+        unsafeness: (nodes,).
+        potentials: (≥ greatest number of steps + 1,) toward a target after so many steps.
+        fronts: (nodes, nodes) steps to every node from every other; (0, nodes) on large grids.
+    """
+
+    neighbours: NodeArray
+    num_moves: int
+    coordinates: NodeArray
+    kinds: NodeArray
+    unsafeness: FloatArray
+    potentials: FloatArray
+    fronts: StepArray
+
+
+class Breeding(NamedTuple):
+    """Settings of the operators.
+
+    Attributes:
+        erase: Whether loops are erased.
+        multiple: Copies that the best one expects, in units of the mean.
+        crossover_rate: Probability per pair.
+        reach: How far apart two nodes may be, in every coordinate, to cross paths there [cell].
+        mutation_rate: Probability per path.
+    """
+
+    erase: bool
+    multiple: float
+    crossover_rate: float
+    reach: int
+    mutation_rate: float
+
+
+class Population(NamedTuple):
+    """One generation; or all of several, with a first axis of places.
+
+    Attributes:
+        paths: (individuals, nodes + 1).
+        results: (3, individuals) lengths, mean unsafenesses, costs.
+    """
+
+    paths: NodeArray
+    results: FloatArray
+
+
+class Scratch(NamedTuple):
+    """Scratch of the operators.
+
+    Attributes:
+        place: (nodes,) places in a path.
+        joined: (3 nodes + 3,) a path of several pieces.
+        sites: (2, nodes + 1) places where two paths meet.
+        steps: (nodes,) of a front.
+        queue: (nodes,) of a front.
+        walked: (nodes + 1,) a walk.
+    """
+
+    place: NodeArray
+    joined: NodeArray
+    sites: NodeArray
+    steps: NodeArray
+    queue: NodeArray
+    walked: NodeArray
+
+    @classmethod
+    def of(cls, nodes: int) -> "Scratch":
+        """Return scratch for a grid of so many nodes."""
+        shapes = nodes, 3 * nodes + 3, (2, nodes + 1), nodes, nodes, nodes + 1
+        return cls(*(np.zeros(shape, dtype=np.int32) for shape in shapes))
+
+
+class Memory(NamedTuple):
+    """Scratch of a generation.
+
+    Attributes:
+        parents: (offspring,) indices of individuals.
+        elites: (elites,) likewise.
+        expected: (individuals,) expected numbers of copies.
+        order: (individuals,) order in which remainders are scanned.
+        scratch: Of the operators.
+    """
+
+    parents: IntArray
+    elites: IntArray
+    expected: FloatArray
+    order: IntArray
+    scratch: Scratch
+
+
 @kernel
-def measure(path, world, weights, results, k):  # type: ignore[no-untyped-def]
+def measure(
+    path: NodeArray, world: World, weights: tuple[float, float], results: FloatArray, k: int
+) -> None:
     """Write D, S and C = ε D + λ S of a path (Eqs. 1 to 3) into column k of `results`."""
-    distance, mean = measure_path(path, world[3], world[4])
+    distance, mean = measure_path(path, world.kinds, world.unsafeness)
     results[DISTANCE, k], results[UNSAFENESS, k] = distance, mean
     results[COST, k] = weights[0] * distance + weights[1] * mean
 
 
 @kernel
-def measure_all(paths, world, weights, results):  # type: ignore[no-untyped-def]
+def measure_all(
+    paths: NodeArray, world: World, weights: tuple[float, float], results: FloatArray
+) -> None:
     """Write D, S and C of all paths of a population."""
     paths, world, results = borrowed((paths, world, results))
     for k in range(len(paths)):
@@ -36,86 +139,108 @@ def measure_all(paths, world, weights, results):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def evolve(draws, generations, world, weights, breeding, tables, memory, records):  # type: ignore[no-untyped-def]
-    """Go on from one generation to another; what each is worth is noted beside it.
+def evolve(
+    draws: Block,
+    first: int,
+    last: int,
+    world: World,
+    weights: tuple[float, float],
+    breeding: Breeding,
+    table: Population,
+    memory: Memory,
+    summaries: FloatArray,
+) -> int:
+    """Go on from one generation to another.
 
     Args:
-        draws: See `evoexp.numeric.random_stream`.
-        generations: The present one, and the one to reach.
-        world: See `advance`, and so are `weights`, `breeding` and `memory`.
-        tables: Paths (places, individuals, nodes + 1) and results (places, 3, individuals) of some
-            generations; number g has place g modulo the number of places.
-        records: (places, 4) see `record`.
+        draws: Uniform numbers.
+        first: The present generation.
+        last: The generation to reach.
+        world: Grid and fields.
+        weights: ε and λ of Eq. 1.
+        breeding: Settings of the operators.
+        table: Some generations; number g is at place g modulo the number of places.
+        memory: Scratch.
+        summaries: (places, 4) written, see `summarise_results`.
 
     Returns:
         The generation reached: an earlier one if the draws did not suffice. Then it is to go on
         there with more.
     """
-    draws, world, tables, memory, records = borrowed((draws, world, tables, memory, records))
-    paths, results = tables
-    first, last = generations
+    draws, world, table, memory, summaries = borrowed((draws, world, table, memory, summaries))
+    paths, results = table.paths, table.results
     for generation in range(first, last):
-        before, own, other = draws[1][0], generation % len(paths), (generation + 1) % len(paths)
-        population, following = (paths[own], results[own]), (paths[other], results[other])
+        before, own = draws.taken[0], generation % len(paths)
+        other = (generation + 1) % len(paths)
+        population = Population(paths[own], results[own])
+        following = Population(paths[other], results[other])
         if not advance(draws, world, weights, breeding, population, following, memory):
-            draws[1][0] = before
+            draws.taken[0] = before
             return generation
-        record(results[other], records[other])
+        summarise_results(results[other], summaries[other])
     return last
 
 
 @kernel
-def record(results, out):  # type: ignore[no-untyped-def]
-    """Note in `out` (4,) index of the best, mean and deviation of the costs.
-
-    And the number of paths: all are valid.
-    """
+def summarise_results(results: FloatArray, out: FloatArray) -> None:
+    """Write index of the best, mean and deviation of the costs, number of paths: all are valid."""
     out[0], out[1], out[2] = summarise(results[COST])
     out[3] = results.shape[1]
 
 
 @kernel
-def advance(draws, world, weights, breeding, population, following, memory):  # type: ignore[no-untyped-def]
+def advance(
+    draws: Block,
+    world: World,
+    weights: tuple[float, float],
+    breeding: Breeding,
+    population: Population,
+    following: Population,
+    memory: Memory,
+) -> bool:
     """Write the population that follows another: its offspring, then the elites, best first.
 
     Args:
-        draws: See `evoexp.numeric.random_stream`.
-        world: (neighbours, moves of a front, coordinates, kinds, unsafeness, potentials, fronts);
-            `fronts` (nodes, nodes) holds the steps to every node from every other, or nothing.
+        draws: Uniform numbers.
+        world: Grid and fields.
         weights: ε and λ of Eq. 1.
-        breeding: Whether loops are erased; multiple of the scaling; crossover's rate and reach;
-            mutation's rate.
-        population: Paths (individuals, nodes + 1) and results (3, individuals).
-        following: The same, written.
-        memory: (parents (offspring,), elites (elites,), expected copies and order of the scan
-            (individuals,)), scratch of `cross`.
+        breeding: Settings of the operators.
+        population: The present one.
+        following: Written.
+        memory: Scratch.
 
     Returns:
         Whether the draws sufficed; if not, what is written is not complete.
     """
-    erase, multiple, crossover_rate, reach, mutation_rate = breeding
-    (paths, results), (children, values) = population, following
-    (parents, elites, expected, order), scratch = memory
+    paths, results, children, values = (
+        population.paths,
+        population.results,
+        following.paths,
+        following.results,
+    )
+    parents, elites, scratch = memory.parents, memory.elites, memory.scratch
     num, count = len(paths), len(parents)
+    # parents by linear scaling and stochastic remainders
     choose_elites(results[COST], elites)
-    scale_costs(results[COST], count, multiple, expected)
+    scale_costs(results[COST], count, breeding.multiple, memory.expected)
     choosing = draw_many(draws, num_remainder_uniforms(num, count))
     if used_up(draws):
         return False
-    choose_by_remainders(choosing, expected, order, parents)
+    choose_by_remainders(choosing, memory.expected, memory.order, parents)
     for first in range(0, count, 2):
+        # crossover of a pair
         crossed = False
-        if first + 1 < count and draw(draws) < crossover_rate:
-            pair = paths[parents[first]], paths[parents[first + 1]]
-            crossed = cross(
-                draws, world, pair, (erase, reach), (children[first], children[first + 1]), scratch
-            )
+        if first + 1 < count and draw(draws) < breeding.crossover_rate:
+            one, two = paths[parents[first]], paths[parents[first + 1]]
+            pair = (children[first], children[first + 1])
+            crossed = cross(draws, world, (one, two), breeding, pair, scratch)
+        # mutation of both, costs of the changed ones
         for k in range(first, min(first + 2, count)):
             changed = crossed
             if not crossed:
                 copy_path(paths[parents[k]], children[k])
-            if draw(draws) < mutation_rate:
-                mutate(draws, world, erase, children[k], scratch)
+            if draw(draws) < breeding.mutation_rate:
+                mutate(draws, world, breeding.erase, children[k], scratch)
                 changed = True
             if used_up(draws):
                 return False
@@ -124,6 +249,7 @@ def advance(draws, world, weights, breeding, population, following, memory):  # 
             else:
                 for row in range(RESULTS):
                     values[row, k] = results[row, parents[k]]
+    # elites
     for e in range(len(elites)):
         copy_path(paths[elites[e]], children[count + e])
         for row in range(RESULTS):
@@ -132,7 +258,7 @@ def advance(draws, world, weights, breeding, population, following, memory):  # 
 
 
 @kernel
-def copy_paths(paths, out):  # type: ignore[no-untyped-def]
+def copy_paths(paths: NodeArray, out: NodeArray) -> None:
     """Copy paths into another table, whatever the width of either."""
     paths, out = borrowed((paths, out))
     for k in range(len(paths)):
@@ -140,15 +266,22 @@ def copy_paths(paths, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def copy_path(path, out):  # type: ignore[no-untyped-def]
-    """Copy a path; what stands behind its last node stays."""
+def copy_path(path: NodeArray, out: NodeArray) -> None:
+    """Copy a path; the rest of the row stays as it is."""
     for k in range(path[0] + 1):
         out[k] = path[k]
 
 
 @kernel
-def cross(draws, world, parents, settings, children, scratch):  # type: ignore[no-untyped-def]
-    """Exchange the remainders of two paths at a node that both pass, or at two nodes that are near.
+def cross(
+    draws: Block,
+    world: World,
+    parents: tuple[NodeArray, NodeArray],
+    breeding: Breeding,
+    children: tuple[NodeArray, NodeArray],
+    scratch: Scratch,
+) -> bool:
+    """Exchange the remainders of two paths at a common node, or at two nodes that are near.
 
     "If the path pair have coincident points, then select one randomly as the crossover site and
     exchange the remainder of the two paths"; if not, a pair of nodes at most `reach` apart (in
@@ -156,58 +289,58 @@ def cross(draws, world, parents, settings, children, scratch):  # type: ignore[n
     Start and goal, which all paths have in common, are no sites.
 
     Args:
-        draws: See `evoexp.numeric.random_stream`.
-        world: See `advance`.
+        draws: Uniform numbers.
+        world: Grid and fields.
         parents: Two paths.
-        settings: Whether loops are erased; reach.
+        breeding: Settings of the operators.
         children: Two paths, written if the parents are crossed.
-        scratch: Places in a path (nodes,), a path (3 nodes + 3,), sites (2, nodes + 1), steps of a
-            front and its queue (nodes,), a walk (nodes + 1,).
+        scratch: Scratch.
 
     Returns:
-        Whether they are: there may be no site.
+        Whether they are crossed: there may be no site.
     """
     one, two = parents
-    place, joined, sites = scratch[0], scratch[1], scratch[2]
+    place, joined, sites, erase = scratch.place, scratch.joined, scratch.sites, breeding.erase
+    # at a common node
     count = coincident_sites(one, two, place, sites)
     if count > 0:
         site = draw_index(draws, count)
         i, j = sites[0, site], sites[1, site]
-        if settings[0]:
+        if erase:
             exchange_without_loops(one, two, i, j, sites[:, :count], children[0])
             exchange_without_loops(two, one, j, i, sites[::-1, :count], children[1])
         else:
             settle(joined, _join(one, i, -1, two, j + 1, joined), False, children[0], place)
             settle(joined, _join(two, j, -1, one, i + 1, joined), False, children[1], place)
         return True
-    i, j = near_sites(draws, world[2], one, two, settings[1])
+    # at two near nodes
+    i, j = near_sites(draws, world.coordinates, one, two, breeding.reach)
     if i == 0:
         return False
-    link = connection(draws, world[0], one[i], two[j])
+    link = connection(draws, world.neighbours, one[i], two[j])
     if link == NOT_CONNECTED:
         return False
-    settle(joined, _join(one, i, link, two, j, joined), settings[0], children[0], place)
-    settle(joined, _join(two, j, link, one, i, joined), settings[0], children[1], place)
+    settle(joined, _join(one, i, link, two, j, joined), erase, children[0], place)
+    settle(joined, _join(two, j, link, one, i, joined), erase, children[1], place)
     return True
 
 
 @kernel
-def exchange_without_loops(head, tail, i, j, sites, child):  # type: ignore[no-untyped-def]
-    """Write the head of a path up to its node i and the tail of another behind its node j.
+def exchange_without_loops(
+    head: NodeArray, tail: NodeArray, i: int, j: int, sites: NodeArray, child: NodeArray
+) -> None:
+    """Write a path's head up to node i and another's tail behind node j, without loops.
 
-    Without loops.
-
-    Neither path has loops, so a loop begins in the head and ends in the tail: at a site. Erasing
-    loops one by one leaves the head up to the first node at which any node of the tail comes back
-    to it, and the tail from there.
+    Neither path has loops, so a loop begins in the head and ends in the tail, at a site. Erasing
+    loops one by one leaves the head up to the first node that the tail passes, too, and the tail
+    from there.
 
     Args:
         head: A path without loops.
         tail: Another one.
         i: Place of a node in the head.
         j: Place of the same node in the tail.
-        sites: (2, sites) places in `head` and in `tail` of all nodes that both have, but start and
-            goal.
+        sites: (2, sites) places in `head` and in `tail` of all common nodes but start and goal.
         child: Written.
     """
     least, behind = i, j
@@ -224,10 +357,11 @@ def exchange_without_loops(head, tail, i, j, sites, child):  # type: ignore[no-u
 
 
 @kernel
-def _join(head, i, link, tail, j, joined):  # type: ignore[no-untyped-def]
-    """Write the head of a path up to i, a node between if `link` is one, another's tail from j.
+def _join(head: NodeArray, i: int, link: int, tail: NodeArray, j: int, joined: NodeArray) -> int:
+    """Write the head of a path up to i, the node `link` if it is one, another's tail from j.
 
-    Return how many.
+    Returns:
+        The number of nodes written.
     """
     count = i
     for k in range(1, i + 1):
@@ -242,12 +376,13 @@ def _join(head, i, link, tail, j, joined):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def coincident_sites(one, two, place, sites):  # type: ignore[no-untyped-def]
-    """Write where two paths pass the same node, start and goal left out, into `sites` (2.
-
-    Nodes + 1); return how often.
+def coincident_sites(one: NodeArray, two: NodeArray, place: NodeArray, sites: NodeArray) -> int:
+    """Write the places of common nodes but start and goal into `sites` (2, nodes + 1).
 
     Of a node that the first path passes several times, the last time counts.
+
+    Returns:
+        The number of sites.
     """
     for k in range(2, one[0]):
         place[one[k]] = k
@@ -255,32 +390,34 @@ def coincident_sites(one, two, place, sites):  # type: ignore[no-untyped-def]
     for k in range(2, two[0]):
         known = place[two[k]]
         known = known if (known >= 2) & (known < one[0]) else 0
-        sites[0, count], sites[1, count] = (
-            known,
-            k,
-        )  # kept by counting it: a branch would be guessed wrong often
+        sites[0, count], sites[1, count] = known, k  # kept by counting it, without a branch
         count += (known > 0) & (one[known] == two[k])
     return count
 
 
 @kernel
-def near_sites(draws, coordinates, one, two, reach):  # type: ignore[no-untyped-def]
+def near_sites(
+    draws: Block, coordinates: NodeArray, one: NodeArray, two: NodeArray, reach: int
+) -> tuple[int, int]:
     """Draw a pair of nodes of two paths that are at most `reach` apart in every coordinate.
 
-    (0, 0) if there is none.
-
     Args:
-        draws: See `evoexp.numeric.random_stream`.
+        draws: Uniform numbers.
         coordinates: (nodes, dimensions).
         one: A path.
         two: A path.
         reach: [cell].
+
+    Returns:
+        Their places in both paths; (0, 0) if there is no such pair.
     """
+    # how many pairs there are
     num = 0
     for k in range(2, two[0]):
         num += _count_near(coordinates, one, two[k], reach)
     if num == 0:
         return 0, 0
+    # one of them
     left = draw_index(draws, num)
     for k in range(2, two[0]):
         here = _count_near(coordinates, one, two[k], reach)
@@ -295,7 +432,7 @@ def near_sites(draws, coordinates, one, two, reach):  # type: ignore[no-untyped-
 
 
 @kernel
-def _count_near(coordinates, path, node, reach):  # type: ignore[no-untyped-def]
+def _count_near(coordinates: NodeArray, path: NodeArray, node: int, reach: int) -> int:
     count = 0
     for i in range(2, path[0]):
         count += _near(coordinates, path[i], node, reach)
@@ -303,7 +440,7 @@ def _count_near(coordinates, path, node, reach):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _near(coordinates, one, two, reach):  # type: ignore[no-untyped-def]
+def _near(coordinates: NodeArray, one: int, two: int, reach: int) -> bool:
     near = True
     for axis in range(coordinates.shape[1]):
         near &= abs(coordinates[one, axis] - coordinates[two, axis]) <= reach
@@ -311,16 +448,16 @@ def _near(coordinates, one, two, reach):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def connection(draws, neighbours, one, two):  # type: ignore[no-untyped-def]
+def connection(draws: Block, neighbours: NodeArray, one: int, two: int) -> int:
     """Return a node between two others, drawn among all that moves join to both.
 
-    Moves have two directions.
-
-    `CONNECTED` if a move joins the two themselves, `NOT_CONNECTED` if there is no such node.
+    Returns:
+        The node; `CONNECTED` if a move joins the two themselves, `NOT_CONNECTED` if there is none.
     """
+    # how many nodes are between
     count = 0
     for move in range(neighbours.shape[1]):
-        between = neighbours[one, move]
+        between: int = neighbours[one, move]
         if between == two:
             return CONNECTED
         if between >= 0:
@@ -328,6 +465,7 @@ def connection(draws, neighbours, one, two):  # type: ignore[no-untyped-def]
                 count += neighbours[between, again] == two
     if count == 0:
         return NOT_CONNECTED
+    # one of them
     left = draw_index(draws, count)
     for move in range(neighbours.shape[1]):
         between = neighbours[one, move]
@@ -341,24 +479,25 @@ def connection(draws, neighbours, one, two):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def mutate(draws, world, erase, path, scratch):  # type: ignore[no-untyped-def]
-    """Replace what lies between two nodes of a path, drawn at random.
-
-    By a random walk from one to the other.
-    """
-    neighbours, num_moves, _, _, _, potentials, fronts = world
-    place, joined, _, steps, queue, walked = scratch
+def mutate(draws: Block, world: World, erase: bool, path: NodeArray, scratch: Scratch) -> None:
+    """Replace the piece between two nodes of a path, drawn at random, by a random walk."""
+    neighbours, potentials, fronts = world.neighbours, world.potentials, world.fronts
+    joined, walked, place = scratch.joined, scratch.walked, scratch.place
+    # two different nodes
     count = path[0]
     first = draw_index(draws, count) + 1
     second = draw_index(draws, count - 1) + 1
     second += second >= first
     low, high = min(first, second), max(first, second)
     ends = (path[low], path[high])
+    # a walk from one to the other
     if len(fronts) > 0:
         walk(draws, Moves(neighbours, potentials, fronts[ends[1]]), ends, erase, walked, place)
     else:
-        spread_front(neighbours, num_moves, path[high : high + 1], steps, queue)
-        walk(draws, Moves(neighbours, potentials, steps), ends, erase, walked, place)
+        target = path[high : high + 1]
+        spread_front(neighbours, world.num_moves, target, scratch.steps, scratch.queue)
+        walk(draws, Moves(neighbours, potentials, scratch.steps), ends, erase, walked, place)
+    # head, walk and tail
     last = low - 1
     for k in range(1, low):
         joined[k] = path[k]
@@ -372,11 +511,8 @@ def mutate(draws, world, erase, path, scratch):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def settle(nodes, count, erase, path, place):  # type: ignore[no-untyped-def]
-    """Write a path that was put together.
-
-    Without its loops if these are erased or if it would not fit otherwise.
-    """
+def settle(nodes: NodeArray, count: int, erase: bool, path: NodeArray, place: NodeArray) -> None:
+    """Write a joined path, without its loops if these are erased or if it is too long with them."""
     if erase or count > len(path) - 1:
         erase_loops(nodes, count, path, place)
     else:

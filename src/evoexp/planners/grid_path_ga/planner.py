@@ -1,11 +1,10 @@
 """Safe paths over a grid by a genetic algorithm on paths of any length.
 
-Chen & Zalzala 1995, section 2.
-
-Every individual is a path of neighbouring nodes from start to goal. It is valid by construction:
-random walks make moves that the grid permits, and crossover and mutation put such walks together.
-Its cost is its length and the mean unsafeness of its nodes, which a wave front from obstacles
-tells.
+Chen & Zalzala 1995, section 2. Every individual is a path of neighbouring nodes from start to goal.
+It is valid by construction: random walks make permitted moves, and crossover and mutation join such
+walks.
+Its cost is the weighted sum of its length and the mean unsafeness of its nodes, which a wave front
+from the obstacles gives.
 
 A population is a table of whole numbers, see `paths.grid_walks`; a solution is flat: the
 coordinates of its nodes, x, y[, z] of one after the other, as many as there are.
@@ -21,40 +20,47 @@ from evoexp.collision.models.potential_fields import Fields, PotentialFields
 from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
 from evoexp.evolution.scaled_settings import ScaledGenetic
-from evoexp.numeric.random_stream import Draws
+from evoexp.numeric.random_stream import Block, Draws
 from evoexp.objectives.path_cost import PathCost
 from evoexp.paths.grid_walks import walk_each
-from evoexp.paths.grids import UNREACHED, Moves, spread_front
+from evoexp.paths.grids import UNREACHED, Moves, NodeArray, StepArray, spread_front
 from evoexp.paths.motion import Motion
 from evoexp.paths.walkers import LANES, WORDS, Choices, Walkers, choice_table
 from evoexp.planners.grid_path_ga import kernels
-from evoexp.planners.grid_path_ga.kernels import COST, DISTANCE, RESULTS, UNSAFENESS
-from evoexp.planners.planner import PlannerDefaults
-from evoexp.planners.stretches import Found, Stretches
-from evoexp.records import FloatArray, Generation
+from evoexp.planners.grid_path_ga.kernels import (
+    COST,
+    DISTANCE,
+    RESULTS,
+    UNSAFENESS,
+    Breeding,
+    Memory,
+    Population,
+    Scratch,
+    World,
+)
+from evoexp.planners.planner import Candidate, PlannerDefaults
+from evoexp.planners.stretches import Stretches
+from evoexp.records import BoolArray, FloatArray, Generation
 from evoexp.robots.floor_platform import FloorPlatform
 from evoexp.scenarios.grid_motion import GridMotion
 from evoexp.validation import Component, NonNegativeCount
 
-FEW_NODES = 2048  # of grids so small the steps between all nodes are worked out once: at most 8 MB
+FEW_NODES = 2048  # the steps between all nodes of smaller grids are worked out once: at most 8 MB
 STRETCH = 8  # generations that are computed in one call of a kernel, at most
 BLOCK = 16384  # uniform numbers drawn at once, at least
-STEPS_PER_WALK = (
-    3.5  # as a multiple of the fewest: for so many steps random words are drawn at first
-)
-# (a multiple of `WORDS`) are drawn whenever these do not suffice; what is left at the end is lost
-FEW_WORDS = 512
+STEPS_PER_WALK = 3.5  # times the fewest: random words for so many steps are drawn at first
+FEW_WORDS = 512  # (a multiple of `WORDS`) drawn whenever these do not suffice; a rest is lost
 
 
 class Problem(NamedTuple):
-    """What `prepare` made of robot and scenario.
+    """Robot and scenario, prepared for the search.
 
     Attributes:
         fields: Grid, unsafeness, potentials.
         moves: The moves of walks to the goal, and their weights.
         choices: The same as a table, see `walkers.choice_table`.
         ends: Indices of start and goal.
-        world: What the kernels of a generation need, see `kernels.advance`.
+        world: Grid and fields, as the kernels take them.
         scene: The bodies themselves, for the exact verdict on a motion.
         security_margin: Clearance that the task requires [length unit].
     """
@@ -63,22 +69,22 @@ class Problem(NamedTuple):
     moves: Moves
     choices: Choices
     ends: tuple[int, int]
-    world: tuple[Any, ...]
+    world: World
     scene: Scene
     security_margin: float
 
 
 class Judgement(NamedTuple):
-    """Paths judged.
+    """Judged paths.
 
     Attributes:
         results: (3, individuals) length, mean unsafeness, cost.
         num_nodes: (individuals,).
-        collision_queries: None: which nodes and moves are free is known before.
+        collision_queries: 0: free nodes and moves are known before.
     """
 
     results: FloatArray
-    num_nodes: np.ndarray
+    num_nodes: NodeArray
     collision_queries: int = 0
 
     @property
@@ -87,7 +93,7 @@ class Judgement(NamedTuple):
         return np.asarray(self.results[COST])
 
     @property
-    def feasible(self) -> np.ndarray:
+    def feasible(self) -> BoolArray:
         """(individuals,) true: paths are valid by construction."""
         return np.isfinite(self.cost)
 
@@ -100,10 +106,9 @@ class GridPathGa(PlannerDefaults, Component):
     """The algorithm of Chen & Zalzala, section 2.3.
 
     Attributes:
-        revisits: Whether a path may pass a node again; if not, loops are erased wherever they
-            arise.
-        crossover_reach: How far apart two nodes may be, in every coordinate, to cross paths there
-            that have no node in common [cell].
+        revisits: Whether a path may pass a node again; if not, all loops are erased.
+        crossover_reach: Greatest difference of two nodes, in every coordinate, at which paths
+            without a common node may be crossed [cell].
         ga: Population, generations, rates; `mutation_rate` is per path.
         objective: Weights of Eq. 1.
         collision: The potential fields.
@@ -122,7 +127,7 @@ class GridPathGa(PlannerDefaults, Component):
         """Work out the fields, and check that the goal can be reached.
 
         Raises:
-            SettingError: If it cannot, or start or goal is no place to be, or the parts do not fit.
+            SettingError: If it cannot, start or goal is blocked, or robot and grid do not fit.
         """
         return _prepared(self.collision, robot, scenario)
 
@@ -131,7 +136,7 @@ class GridPathGa(PlannerDefaults, Component):
         return _Search(self, problem).generations(rng)
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> np.ndarray:
-        """Return random paths as the initial population has them, (count, longest + 1)."""
+        """Return random paths as in the initial population, (count, longest + 1)."""
         paths = np.empty((count, problem.fields.grid.num_nodes + 1), dtype=np.int32)
         if len(problem.choices[0]):
             self._fill(problem, rng, paths)
@@ -139,7 +144,7 @@ class GridPathGa(PlannerDefaults, Component):
             self._fill_one_by_one(problem, rng, paths)
         return trimmed(paths)
 
-    def _fill(self, problem: Problem, rng: np.random.Generator, paths: np.ndarray) -> None:
+    def _fill(self, problem: Problem, rng: np.random.Generator, paths: NodeArray) -> None:
         """Let walkers fill a table of paths."""
         walkers = Walkers(problem.choices, problem.ends, not self.revisits, paths)
         steps = STEPS_PER_WALK * len(paths) * problem.moves.steps[problem.ends[0]]
@@ -149,9 +154,9 @@ class GridPathGa(PlannerDefaults, Component):
             num_words = FEW_WORDS
 
     def _fill_one_by_one(
-        self, problem: Problem, rng: np.random.Generator, paths: np.ndarray
+        self, problem: Problem, rng: np.random.Generator, paths: NodeArray
     ) -> None:
-        """Fill a table of paths where moves weigh such that there is no table of choices."""
+        """Fill a table of paths where the weights of moves allow no table of choices."""
         draws, complete = Draws(BLOCK), 0
         place = np.zeros(problem.fields.grid.num_nodes, dtype=np.int32)
         arguments = problem.moves, problem.ends, not self.revisits
@@ -184,12 +189,10 @@ class GridPathGa(PlannerDefaults, Component):
         return Motion(np.ascontiguousarray(self._nodes(problem, solution)))
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
-        """Return D, S and cost of a path, and what is wrong with it.
-
-        The cost is inf if anything is.
+        """Return D, S and cost of a path, and the numbers of its faults; with faults it costs inf.
 
         Raises:
-            SettingError: If it has fewer than two nodes, or one that is none of the grid's.
+            SettingError: If it has fewer than two nodes, or a node outside the grid.
         """
         nodes, own = self._nodes(problem, solution), problem.fields.grid
         last = np.array(own.free.shape) - 3
@@ -219,10 +222,7 @@ class GridPathGa(PlannerDefaults, Component):
         return named_terms(results[:, 0], len(nodes)) | faults | {"cost": cost}
 
     def shape(self, problem: Problem) -> tuple[Any, ...]:
-        """Return the documented shape of a solution.
-
-        Any number of nodes of two or three coordinates.
-        """
+        """Return the documented shape of a solution: any number of nodes, each its coordinates."""
         return (..., (problem.fields.grid.free.ndim,))
 
     def _nodes(self, problem: Problem, solution: FloatArray) -> FloatArray:
@@ -233,61 +233,56 @@ class _Search(Stretches):
     """One run, and memory for its kernels."""
 
     def __init__(self, planner: GridPathGa, problem: Problem) -> None:
-        ga, nodes = planner.ga, problem.fields.grid.num_nodes
+        ga, nodes, size = planner.ga, problem.fields.grid.num_nodes, planner.ga.population_size
         super().__init__(ga, STRETCH, BLOCK)
         self._planner, self._problem = planner, problem
-        self._paths = np.empty((self.num_places, ga.population_size, nodes + 1), dtype=np.int32)
-        self._results = np.empty((self.num_places, RESULTS, ga.population_size))
-        self.costs = self._results[:, COST]
-        count = ga.num_offspring
-        parents, elites = np.empty(count, dtype=np.int64), np.empty(ga.num_elites, dtype=np.int64)
-        choosing = (
-            parents,
-            elites,
-            np.empty(ga.population_size),
-            np.empty(ga.population_size, dtype=np.int64),
+        self._table = Population(
+            np.empty((self.num_places, size, nodes + 1), dtype=np.int32),
+            np.empty((self.num_places, RESULTS, size)),
         )
-        integers = [
-            np.zeros(size, dtype=np.int32)
-            for size in (nodes, 3 * nodes + 3, nodes, nodes, nodes + 1)
-        ]
-        place, joined, steps, queue, walked = integers
-        sites = np.zeros((2, nodes + 1), dtype=np.int32)
-        memory = choosing, (place, joined, sites, steps, queue, walked)
-        rates = ga.scaling_multiple, ga.crossover_rate, planner.crossover_reach, ga.mutation_rate
+        self.costs = self._table.results[:, COST]
+        memory = Memory(
+            np.empty(ga.num_offspring, dtype=np.int64),
+            np.empty(ga.num_elites, dtype=np.int64),
+            np.empty(size),
+            np.empty(size, dtype=np.int64),
+            Scratch.of(nodes),
+        )
+        breeding = Breeding(
+            not planner.revisits,
+            ga.scaling_multiple,
+            ga.crossover_rate,
+            planner.crossover_reach,
+            ga.mutation_rate,
+        )
         self._world = problem.world, planner.objective.weights
-        tables = self._paths, self._results
-        self._arguments = (
-            *self._world,
-            (not planner.revisits, *rates),
-            tables,
-            memory,
-            self.records,
-        )
+        self._arguments = *self._world, breeding, self._table, memory, self.summaries
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw and measure the initial population."""
-        drawn = self._planner.sample(self._problem, rng, self._paths.shape[1])
-        self._paths[0, :, : drawn.shape[1]] = drawn
-        kernels.measure_all(self._paths[0], *self._world, self._results[0])
-        kernels.record(self._results[0], self.records[0])
+        paths, results = self._table.paths[0], self._table.results[0]
+        drawn = self._planner.sample(self._problem, rng, len(paths))
+        paths[:, : drawn.shape[1]] = drawn
+        kernels.measure_all(paths, *self._world, results)
+        kernels.summarise_results(results, self.summaries[0])
 
-    def go_on(self, draws: tuple[np.ndarray, np.ndarray], first: int, last: int) -> int:
+    def go_on(self, draws: Block, first: int, last: int) -> int:
         """Compute generations."""
-        return int(kernels.evolve(draws, (first, last), *self._arguments))
+        return int(kernels.evolve(draws, first, last, *self._arguments))
 
-    def found(self, place: int, individual: int) -> Found:
+    def candidate(self, place: int, individual: int) -> Candidate:
         """Return a path, which is valid, and its terms."""
-        paths, results = self._paths[place], self._results[place]
+        paths, results = self._table.paths[place], self._table.results[place]
         terms = named_terms(results[:, individual], paths[individual, 0])
-        return Found(self._planner.solution(self._problem, paths, individual), terms, True)
+        return Candidate(self._planner.solution(self._problem, paths, individual), terms, True)
 
-    def population(self, place: int, is_last: bool) -> np.ndarray:
-        """Return the paths; of the last generation without what stands behind them."""
-        return trimmed(self._paths[place]) if is_last else self._paths[place]
+    def population(self, place: int, is_last: bool) -> NodeArray:
+        """Return the paths; of the last generation without the rest of each row."""
+        paths: NodeArray = self._table.paths[place]
+        return trimmed(paths) if is_last else paths
 
 
-def trimmed(paths: np.ndarray) -> np.ndarray:
+def trimmed(paths: NodeArray) -> NodeArray:
     """Return a copy of paths as wide as the longest one; zeros stand behind the others."""
     out = np.zeros((len(paths), int(paths[:, 0].max()) + 1), dtype=np.int32)
     kernels.copy_paths(paths, out)
@@ -296,7 +291,7 @@ def trimmed(paths: np.ndarray) -> np.ndarray:
 
 @functools.lru_cache(maxsize=32)
 def _prepared(collision: PotentialFields, robot: FloorPlatform, scenario: GridMotion) -> Problem:
-    """Prepare what many planners share that differ in weights and rates alone."""
+    """Prepare a problem, kept for planners that differ in weights and rates alone."""
     if robot.dimensions != len(scenario.size):
         raise SettingError(
             "robot.dimensions", f"as many as the grid has ({len(scenario.size)})", robot.dimensions
@@ -318,21 +313,18 @@ def _prepared(collision: PotentialFields, robot: FloorPlatform, scenario: GridMo
             "between"
         )
         raise SettingError("scenario.goal", must, list(scenario.goal))
-    world: tuple[Any, ...] = (
+    world = World(
         own.neighbours,
         fields.num_moves,
         own.coordinates,
         own.kinds,
         fields.unsafeness,
         fields.potentials,
+        _fronts(fields),
     )
-    ends = start, goal
-    bodies = scene(robot.build(), scenario.bodies())
     moves = Moves(own.neighbours, fields.potentials, steps)
-    world += (_fronts(fields),)
-    return Problem(
-        fields, moves, choice_table(*moves), ends, world, bodies, scenario.security_margin
-    )
+    bodies, margin = scene(robot.build(), scenario.bodies()), scenario.security_margin
+    return Problem(fields, moves, choice_table(*moves), (start, goal), world, bodies, margin)
 
 
 def named_terms(results: FloatArray, num_nodes: Any) -> dict[str, float]:
@@ -341,11 +333,8 @@ def named_terms(results: FloatArray, num_nodes: Any) -> dict[str, float]:
     return named | {"num_nodes": float(num_nodes)}
 
 
-def _fronts(fields: Fields) -> np.ndarray:
-    """Return the steps to every node from every other, (nodes, nodes), of small grids.
-
-    Else (0, nodes).
-    """
+def _fronts(fields: Fields) -> StepArray:
+    """Return the steps between all nodes (nodes, nodes); (0, nodes) on large grids."""
     nodes = fields.grid.num_nodes
     fronts = np.empty((nodes if nodes <= FEW_NODES else 0, nodes), dtype=np.int16)
     queue, source = np.empty(nodes, dtype=np.int32), np.empty(1, dtype=np.int32)

@@ -1,8 +1,8 @@
 """Docking postures of a mobile arm (Chen & Zalzala 1995, sections 3 and 4.2).
 
-A genetic algorithm over θ1 and θ2 in binary code; θ3 and the platform's place X_p follow from where
-the end-effector shall be (Eqs. 17 and 18). θ3 has two values, both are evaluated and the better one
-is kept. The cost is E of Eq. 14; infeasible postures cost E_m, the paper's fitness is f = E_m − E.
+A genetic algorithm over θ1 and θ2 in binary code; θ3 and the platform's place X_p follow from the
+end-effector's target (Eqs. 17 and 18). Both values of θ3 are evaluated and the better one is kept.
+The cost is E of Eq. 14; infeasible postures cost E_m. The paper's fitness is f = E_m − E.
 
 A population is an array (2, individuals) of strings of bits, a number per angle. A solution is
 flat: θ1, θ2 [deg].
@@ -18,14 +18,15 @@ from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
 from evoexp.evolution.scaled_settings import ScaledGenetic
 from evoexp.numeric.elementary import DEGREE
-from evoexp.objectives.placement_criteria import Model, PlacementCriteria
-from evoexp.objectives.placement_kernels import PLATFORM, THETA_3, TORQUE
+from evoexp.numeric.random_stream import Block
+from evoexp.objectives.placement_criteria import PlacementCriteria
+from evoexp.objectives.placement_kernels import PLATFORM, THETA_3, TORQUE, Model, Task
 from evoexp.paths.motion import Motion
 from evoexp.planners.placement_ga import kernels
-from evoexp.planners.placement_ga.kernels import GENES, ROWS
-from evoexp.planners.planner import PlannerDefaults
-from evoexp.planners.stretches import Found, Stretches
-from evoexp.records import FloatArray, Generation
+from evoexp.planners.placement_ga.kernels import GENES, ROWS, Breeding, Coding, Memory, Population
+from evoexp.planners.planner import Candidate, PlannerDefaults
+from evoexp.planners.stretches import Stretches
+from evoexp.records import BoolArray, FloatArray, Generation, IntArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.mobile_arm import MobileArm
 from evoexp.scenarios.docking import Docking
@@ -33,19 +34,19 @@ from evoexp.validation import Component
 
 NAMES = ("torque_norm", "torque_max", "obstacle", "manipulability")  # E1, E2, Σ γ E_obs, E_man
 BRANCHES = ("", "other_")
-FIRST_CRITERION = GENES  # row of the costs, which the other criteria and the branch follow
+FIRST_CRITERION = GENES  # row of the costs; the other criteria and the branch follow it
 STRETCH = 16  # generations that are computed in one call of a kernel, at most
 BLOCK = 8192  # uniform numbers drawn at once, at least
 
 
 class Problem(NamedTuple):
-    """What `prepare` made of robot and scenario.
+    """Robot and scenario, prepared for the search.
 
     Attributes:
         assembly: The robot, built.
-        model: What the criteria are computed from.
+        model: Task, weights and limits of the criteria.
         angle_limits: (2, 2) of the genes θ1, θ2 [deg].
-        scene: The bodies themselves, for the exact verdict on a posture; links against links, too.
+        scene: The bodies themselves, links against links too, for the exact verdict on a posture.
         security_margin: Clearance that the task requires [length unit].
     """
 
@@ -57,7 +58,7 @@ class Problem(NamedTuple):
 
 
 class Judgement(NamedTuple):
-    """A population judged.
+    """A judged population.
 
     Attributes:
         cost: (individuals,) E of Eq. 14; E_m where infeasible.
@@ -66,7 +67,7 @@ class Judgement(NamedTuple):
     """
 
     cost: FloatArray
-    feasible: np.ndarray
+    feasible: BoolArray
     terms: FloatArray
     collision_queries: int = 0
 
@@ -111,7 +112,7 @@ class PlacementGa(PlannerDefaults, Component):
                 "lengths together)"
             )
             raise SettingError("scenario.target", must, list(scenario.target))
-        task = np.array([*robot.link_lengths, *scenario.target, *scenario.force])
+        task = Task(*robot.link_lengths, *scenario.target, *scenario.force)
         avoided = self.objective.avoided(scenario.obstacle_points())
         model = Model(task, self.objective.weights, avoided, robot.limits)
         assembly, limits = robot.build(), np.array([self.angle_range] * GENES)
@@ -138,21 +139,18 @@ class PlacementGa(PlannerDefaults, Component):
     def _judged(self, problem: Problem, population: np.ndarray) -> FloatArray:
         rows = np.empty((ROWS, population.shape[1]))
         strings = np.ascontiguousarray(population, dtype=np.int64)
-        kernels.judge(strings, self.coded(problem), tuple(problem.model), population.shape[1], rows)
+        kernels.judge(strings, self.strings_of(problem), problem.model, population.shape[1], rows)
         return rows
 
-    def coded(self, problem: Problem) -> tuple[int, bool, FloatArray]:
-        """Return what kernels decode strings by.
-
-        Bits per gene, whether they are Gray codes, limits [deg].
-        """
-        return self.bits_per_gene, self.coding == "gray", problem.angle_limits
+    def strings_of(self, problem: Problem) -> Coding:
+        """Return the meaning of strings, as the kernels take it."""
+        return Coding(self.bits_per_gene, self.coding == "gray", problem.angle_limits)
 
     def motion(self, problem: Problem, solution: FloatArray) -> Motion | None:
         """Return the posture of a solution as a motion that stays there; None if it is infeasible.
 
-        The answer of the algorithm is a posture: how to get there is another question. Its bodies
-        are judged all the same, by their exact distances.
+        The algorithm finds a posture, and no way to it. The bodies of the posture are judged by
+        their exact distances.
         """
         branch, own, _ = problem.model.posture(*_two(solution))
         if branch < 0:
@@ -161,30 +159,24 @@ class PlacementGa(PlannerDefaults, Component):
         return Motion(np.stack([q, q]))
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
-        """Return everything about both values of θ3.
+        """Return all numbers of both values of θ3, those of the worse one as `other_…`.
 
-        The better one plain, the other one as `other_…`.
-
-        `branch` is 0 where the third link points to +x, 1 to −x, −1 where no θ3 is feasible. What
-        cannot be reached is NaN, its criteria and its cost are E_m.
+        `branch` is 0 where the third link points to +x, 1 to −x, −1 where no θ3 is feasible. Out of
+        reach, θ3, X_p and the torques are NaN, criteria and cost E_m.
 
         Raises:
             ValueError: If the solution has another size than 2.
         """
         branch, *both = problem.model.posture(*_two(solution))
-        named = {
-            "branch": float(branch),
-            "theta_1_deg": float(solution[0]),
-            "theta_2_deg": float(solution[1]),
-        }
+        one, two = solution.tolist()
+        named = {"branch": float(branch), "theta_1_deg": one, "theta_2_deg": two}
         for prefix, numbers in zip(BRANCHES, both, strict=True):
-            named |= {f"{prefix}cost": float(numbers[0])}
-            named |= {f"{prefix}{name}": float(numbers[1 + k]) for k, name in enumerate(NAMES)}
-            named |= {
-                f"{prefix}theta_3_deg": float(numbers[THETA_3]),
-                f"{prefix}platform_x": float(numbers[PLATFORM]),
-            }
-            named |= {f"{prefix}torque_{k + 1}": float(numbers[TORQUE + k]) for k in range(3)}
+            values = numbers.tolist()
+            criteria = zip(("cost", *NAMES), values, strict=False)
+            named |= {f"{prefix}{name}": value for name, value in criteria}
+            named[f"{prefix}theta_3_deg"] = values[THETA_3]
+            named[f"{prefix}platform_x"] = values[PLATFORM]
+            named |= {f"{prefix}torque_{k + 1}": values[TORQUE + k] for k in range(3)}
         return named
 
     def shape(self, problem: Problem) -> tuple[tuple[()], ...]:
@@ -199,41 +191,41 @@ class _Search(Stretches):
         ga, size = planner.ga, planner.ga.population_size
         super().__init__(ga, STRETCH, BLOCK)
         self._planner, self._problem = planner, problem
-        self._strings = np.empty((self.num_places, GENES, size), dtype=np.int64)
-        self._rows = np.empty((self.num_places, ROWS, size))
-        self.costs = self._rows[:, FIRST_CRITERION]
-        parents, elites = (
+        self._table = Population(
+            np.empty((self.num_places, GENES, size), dtype=np.int64),
+            np.empty((self.num_places, ROWS, size)),
+        )
+        self.costs = self._table.rows[:, FIRST_CRITERION]
+        memory = Memory(
             np.empty(ga.num_offspring, dtype=np.int64),
             np.empty(ga.num_elites, dtype=np.int64),
+            np.empty(size),
+            np.empty(size, dtype=np.int64),
         )
-        memory = np.empty(size), np.empty(size, dtype=np.int64), parents, elites
-        rates = ga.scaling_multiple, ga.crossover_rate, ga.mutation_rate
-        self._judging = planner.coded(problem), tuple(problem.model)
-        self._arguments = (rates, *self._judging, (self._strings, self._rows), memory, self.records)
+        breeding = Breeding(ga.scaling_multiple, ga.crossover_rate, ga.mutation_rate)
+        self._judging = planner.strings_of(problem), problem.model
+        self._arguments = breeding, *self._judging, self._table, memory, self.summaries
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw and judge the initial population."""
-        size = self._strings.shape[2]
-        self._strings[0] = self._planner.sample(self._problem, rng, size)
-        kernels.judge(self._strings[0], *self._judging, size, self._rows[0])
-        kernels.record(self._rows[0], self.records[0])
+        strings, rows = self._table.strings[0], self._table.rows[0]
+        strings[:] = self._planner.sample(self._problem, rng, strings.shape[1])
+        kernels.judge(strings, *self._judging, strings.shape[1], rows)
+        kernels.summarise_rows(rows, self.summaries[0])
 
-    def go_on(self, draws: tuple[np.ndarray, np.ndarray], first: int, last: int) -> int:
+    def go_on(self, draws: Block, first: int, last: int) -> int:
         """Compute generations."""
-        return int(kernels.evolve(draws, (first, last), *self._arguments))
+        return int(kernels.evolve(draws, first, last, *self._arguments))
 
-    def found(self, place: int, individual: int) -> Found:
-        """Return angles, criteria and whether they are feasible."""
-        angles, own = (
-            self._rows[place, :GENES, individual].copy(),
-            self._rows[place, FIRST_CRITERION:, individual],
-        )
-        _, *criteria, branch = own.tolist()
-        return Found(angles, dict(zip(NAMES, criteria, strict=True)), branch >= 0.0)
+    def candidate(self, place: int, individual: int) -> Candidate:
+        """Return angles, criteria and whether the posture is feasible."""
+        angles = self._table.rows[place, :GENES, individual].copy()
+        _, *criteria, branch = self._table.rows[place, FIRST_CRITERION:, individual].tolist()
+        return Candidate(angles, dict(zip(NAMES, criteria, strict=True)), branch >= 0.0)
 
-    def population(self, place: int, is_last: bool) -> np.ndarray:
+    def population(self, place: int, is_last: bool) -> IntArray:
         """Return the strings."""
-        return np.asarray(self._strings[place])
+        return np.asarray(self._table.strings[place])
 
 
 def _two(solution: FloatArray) -> tuple[float, float]:

@@ -21,18 +21,23 @@ from evoexp.records import Generation
 
 LAST = 10  # generations of the smoke budget
 REPLICATE = 1
-LABELLED = [
-    labelled
-    for name in ("rana_planar", "rana_obstacles")
-    for labelled in compose.expand([f"experiment={name}", "budget=smoke"])[0].conditions
-]
+LABELS = {
+    "via-point GA": "rana_planar",
+    "random search": "rana_planar",
+    "rana_obstacles": "rana_obstacles",
+}
 
 Change = Callable[[Iterator[Generation], np.random.Generator], Iterator[Generation]]
 
 
-@pytest.fixture(params=LABELLED, ids=lambda labelled: labelled.label)
+def labelled(label: str) -> Condition:
+    words = [f"experiment={LABELS[label]}", "budget=smoke"]
+    return compose.expand(words, only=[label])[0].conditions[0].condition
+
+
+@pytest.fixture(params=LABELS, scope="module")
 def condition(request: pytest.FixtureRequest) -> Condition:
-    return request.param.condition
+    return labelled(request.param)
 
 
 def one_ulp_more(values: Any, index: Any) -> None:
@@ -158,7 +163,7 @@ def test_a_longer_run(condition: Condition, tmp_path: Path) -> None:
 
 
 def test_the_command_says_it_in_another_process(tmp_path: Path) -> None:
-    path = record_changed(LABELLED[0].condition, tmp_path, nudged_at(3))
+    path = record_changed(labelled("via-point GA"), tmp_path, nudged_at(3))
     command = [sys.executable, "-m", "evoexp", "reproduce", str(path)]
     environment = os.environ | {"COLUMNS": "120", "EVOEXP_OUTPUTS": str(tmp_path / "none")}
     done = subprocess.run(

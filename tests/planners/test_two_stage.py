@@ -10,7 +10,7 @@ from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import SettingError
-from evoexp.planners.planner import judge_motion
+from evoexp.planners.planner import Keeper, judge_motion
 from evoexp.robots.floor_manipulator import FloorManipulator
 from evoexp.store.log_reader import read_log
 
@@ -74,7 +74,8 @@ def test_another_docking_place_has_another_goal(
     planner, problem, solution = found
     scenario = condition.scenario.model_copy(update={"task_origin": (23.2, 26.0)})
     moved = problem._replace(scenario=scenario)
-    last = list(planner._drive(moved, condition.rng(0), last_of(planner, problem, condition)))[-1]
+    docked = last_of(planner, problem, condition)
+    *_, last = planner._drive(moved, condition.rng(0), Keeper(), docked)
     assert last.best[-2:].tolist() == [28.0, 26.0]
     blocked = problem._replace(
         scenario=condition.scenario.model_copy(update={"task_origin": (18.0, 23.0)})

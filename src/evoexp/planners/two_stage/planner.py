@@ -1,15 +1,12 @@
-"""A mission in two stages: where to dock and in which posture, then a safe path there.
+"""A mission in two stages: a docking place and posture, then a safe path to it.
 
-Chen & Zalzala 1995.
-
-The first stage is the placement search of section 3, the second the path search of section 2, whose
-goal is the node nearest to the docking place that the first one chose. What they find is one
-motion: along the path from node to node, to the docking place itself, then from the travel posture
-to the one that was found.
+Chen & Zalzala 1995. The first stage is the placement search of section 3, the second the path
+search of section 2, whose goal is the node nearest to the docking place of the first. The motion
+follows the path from node to node, goes on to the docking place itself, and then turns the arm from
+the travel posture to the posture of the first stage.
 
 A solution is flat: θ1, θ2 [deg], then the coordinates of the path's nodes. Its cost is E (Eq. 14) +
-C (Eq. 1). While the first stage is at work there is no path, and the cost is inf; the costs of its
-individuals are their E.
+C (Eq. 1). In the first stage there is no path: the cost of the plan is inf, the individuals cost E.
 """
 
 from collections.abc import Generator, Iterator
@@ -19,11 +16,14 @@ import numpy as np
 
 from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
+from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion
 from evoexp.planners.grid_path_ga.planner import GridPathGa
+from evoexp.planners.grid_path_ga.planner import Problem as PathProblem
 from evoexp.planners.placement_ga.planner import PlacementGa
-from evoexp.planners.planner import Judgement, PlannerDefaults
+from evoexp.planners.placement_ga.planner import Problem as PlacementProblem
+from evoexp.planners.planner import Candidate, Judgement, Keeper, PlannerDefaults
 from evoexp.records import FloatArray
 from evoexp.records import Generation as Record
 from evoexp.robots.floor_manipulator import NUM_JOINTS, FloorManipulator
@@ -36,7 +36,7 @@ PATH = ("distance", "unsafeness", "num_nodes")
 
 
 class Problem(NamedTuple):
-    """What `prepare` made of robot and scenario.
+    """Robot and scenario, prepared for both stages.
 
     Attributes:
         robot: The description; parts of it solve the stages.
@@ -49,8 +49,8 @@ class Problem(NamedTuple):
 
     robot: FloorManipulator
     scenario: Mission
-    placement: Any
-    path: Any
+    placement: PlacementProblem
+    path: PathProblem
     scene: Scene
     security_margin: float
 
@@ -85,59 +85,40 @@ class TwoStage(PlannerDefaults, Component):
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Record]:
         """Yield the generations of both stages; their indices go on counting."""
-        docked = yield from self._place(problem, rng)
-        yield from self._drive(problem, rng, docked)
+        keeper = Keeper()
+        docked = yield from self._place(problem, rng, keeper)
+        yield from self._drive(problem, rng, keeper, docked)
 
-    def _place(self, problem: Problem, rng: np.random.Generator) -> Generator[Record, None, Record]:
-        """Search the docking posture; return the last generation."""
-        start = problem.scenario.grid.start
-        last: Record | None = None
-        terms, cost, best = {}, None, np.empty(0)
+    def _place(
+        self, problem: Problem, rng: np.random.Generator, keeper: Keeper
+    ) -> Generator[Record, None, Record]:
+        """Search the docking posture; return the placement search's last generation."""
+        no_path, angles = dict.fromkeys(PATH, 0.0) | {"sub_path": 1.0}, np.empty(0)
         for last in self.placement.evolve(problem.placement, rng):
-            if last.best_cost != cost:
-                terms = (
-                    self._posture_terms(problem, last.best)
-                    | dict.fromkeys(PATH, 0.0)
-                    | {"sub_path": 1.0}
-                )
-                cost, best = last.best_cost, np.concatenate([last.best, start])
-            yield last._replace(
-                best=best,
-                best_cost=np.inf,
-                best_cost_in_generation=np.inf,
-                solved=False,
-                terms=terms,
-                costs=last.costs[None, :],
-            )
-        assert last is not None, "a planner yields its initial population at least"
+            if last.best is not angles:
+                angles, terms = last.best, self._posture_terms(problem, last.best) | no_path
+                plan = np.concatenate([angles, problem.scenario.grid.start])
+                keeper.keep(np.inf, Candidate(plan, terms, False))
+            yield _recorded(keeper, last, self.placement.num_evaluations(last.index), np.inf)
         return last
 
     def _drive(
-        self, problem: Problem, rng: np.random.Generator, docked: Record
+        self, problem: Problem, rng: np.random.Generator, keeper: Keeper, docked: Record
     ) -> Iterator[Record]:
         """Search the path to the docking place that was found."""
         posture = self._posture_terms(problem, docked.best) | {"sub_path": 2.0}
-        terms, path, best = posture, np.empty(0), np.empty(0)
-        for found in self.path.evolve(self._path_problem(problem, docked.best), rng):
-            if found.best is not path:
-                path, best = found.best, np.concatenate([docked.best, found.best])
-                terms = posture | {name: found.terms[name] for name in PATH}
-            yield found._replace(
-                index=docked.index + 1 + found.index,
-                best=best,
-                best_cost=docked.best_cost + found.best_cost,
-                best_cost_in_generation=docked.best_cost + found.best_cost_in_generation,
-                evaluations=docked.evaluations + found.evaluations,
-                solved=docked.solved and found.solved,
-                terms=terms,
-                costs=found.costs[None, :],
-            )
+        path_problem, nodes = self._path_problem(problem, docked.best), np.empty(0)
+        for found in self.path.evolve(path_problem, rng):
+            if found.best is not nodes:
+                nodes, terms = found.best, posture | {name: found.terms[name] for name in PATH}
+                plan = np.concatenate([docked.best, nodes])
+                solved = docked.solved and found.solved
+                keeper.keep(docked.best_cost + found.best_cost, Candidate(plan, terms, solved))
+            lowest = docked.best_cost + found.best_cost_in_generation
+            yield _recorded(keeper, found, self.path.num_evaluations(found.index), lowest)
 
-    def _path_problem(self, problem: Problem, angles: FloatArray) -> Any:
-        """Return the problem of the second stage.
-
-        As prepared, or with the node nearest to another docking place.
-        """
+    def _path_problem(self, problem: Problem, angles: FloatArray) -> PathProblem:
+        """Return the second stage's problem, its goal the node nearest to the docking place."""
         grid = problem.scenario.grid
         node = tuple(int(np.floor(value + 0.5)) for value in self.docking_place(problem, angles))
         if node == grid.goal:
@@ -147,10 +128,7 @@ class TwoStage(PlannerDefaults, Component):
         )
 
     def docking_place(self, problem: Problem, angles: FloatArray) -> FloatArray:
-        """Return where on the floor (2,) the platform stands in a posture (θ1.
-
-        Θ2) [length unit].
-        """
+        """Return the platform's place on the floor (2,) in a posture (θ1, θ2) [length unit]."""
         x, y = problem.scenario.task_origin
         return np.array([x + self.placement.evaluate(problem.placement, angles)["platform_x"], y])
 
@@ -186,10 +164,7 @@ class TwoStage(PlannerDefaults, Component):
         raise _no_population()
 
     def motion(self, problem: Problem, solution: FloatArray) -> Motion | None:
-        """Return the whole motion, (nodes + 2, 5) in equal times.
-
-        None if the posture is infeasible.
-        """
+        """Return the motion, (nodes + 2, 5) in equal times; None without a feasible posture."""
         angles, nodes = self._parts(solution)
         posture = self.placement.motion(problem.placement, angles)
         if posture is None:
@@ -201,9 +176,7 @@ class TwoStage(PlannerDefaults, Component):
         return Motion(q)
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
-        """Return the terms of posture and path, the last leg from node to docking place.
-
-        And the cost of both.
+        """Return the terms of posture and path, the last leg to the docking place, and the cost.
 
         Raises:
             SettingError: If there is no path, or it leaves the grid.
@@ -216,10 +189,7 @@ class TwoStage(PlannerDefaults, Component):
         return posture | path | both | {"cost": posture["posture_cost"] + both["path_cost"]}
 
     def shape(self, problem: Problem) -> tuple[Any, ...]:
-        """Return the documented shape of a solution.
-
-        Θ1 and θ2, then any number of nodes, in pairs.
-        """
+        """Return the documented shape of a solution: θ1 and θ2, then nodes, all in pairs."""
         return (..., (ANGLES,))
 
     def _parts(self, solution: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -229,3 +199,16 @@ class TwoStage(PlannerDefaults, Component):
 
 def _no_population() -> SettingError:
     return SettingError("planner", "one with a single population", TwoStage.component)
+
+
+def _recorded(keeper: Keeper, found: Record, evaluations: int, lowest: float) -> Record:
+    """Return the mission's record of a stage's generation, whose best plan costs `lowest`."""
+    return keeper.record(
+        CostStatistics(0, found.mean_cost, found.std_cost),
+        found.costs[None, :],
+        found.population,
+        lowest=lowest,
+        num_feasible=found.num_feasible,
+        evaluations=evaluations,
+        collision_queries=0,
+    )

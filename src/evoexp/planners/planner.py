@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from evoexp.collision.certifier.certificate import Certificate, certificate
 from evoexp.collision.scene import Part, Scene
-from evoexp.evolution.cost_statistics import CostStatistics
+from evoexp.evolution.cost_statistics import CostStatistics, cost_statistics
 from evoexp.paths.motion import Motion
-from evoexp.records import FloatArray, Generation
+from evoexp.records import BoolArray, FloatArray, Generation
 
 Reproducibility = Literal["bits", "environment"]
 Shape = tuple[Any, ...]  # of a solution: one tuple per part; a leading ... stands for any number
@@ -38,6 +38,26 @@ class Judgement(Protocol):
 
     def named_terms(self, individual: int) -> dict[str, float]:
         """Return the paper's own terms of one individual."""
+
+
+class JudgementArrays(NamedTuple):
+    """A `Judgement` as plain arrays.
+
+    Attributes:
+        cost: (individuals,) lower is better; inf: infeasible.
+        feasible: (individuals,) whether the planner's own model accepts each.
+        collision_queries: Configurations that the algorithm asks for.
+        terms: Name → (individuals,) of the planner's own terms.
+    """
+
+    cost: FloatArray
+    feasible: BoolArray
+    collision_queries: int
+    terms: Mapping[str, NDArray[Any]]
+
+    def named_terms(self, individual: int) -> dict[str, float]:
+        """Return the terms of one individual."""
+        return {name: float(values[individual]) for name, values in self.terms.items()}
 
 
 class Listing(NamedTuple):
@@ -87,7 +107,10 @@ class Planner(Protocol):
         """Generations after the initial one, at most."""
 
     def num_evaluations(self, index: int) -> int:
-        """Return how many individuals generation `index` (0: the initial one) evaluates."""
+        """Return how many individuals of a population generation `index` evaluates, 0 the initial.
+
+        A planner that starts anew after a failed attempt says so of each attempt.
+        """
 
     def sample(self, problem: Any, rng: np.random.Generator, count: int) -> FloatArray:
         """Draw `count` individuals as the initial population is drawn, individuals last."""
@@ -235,6 +258,33 @@ class Keeper:
     def keep(self, cost: float, best: Candidate) -> None:
         """Keep a solution and its cost as the best so far."""
         self.cost, self.best = cost, best
+
+    def record_judged(
+        self, planner: Planner, problem: Any, population: FloatArray, judgement: Judgement
+    ) -> Generation:
+        """Keep the best individual of a generation if it improves, and return the record.
+
+        Args:
+            planner: The planner, which makes a solution of the best individual.
+            problem: Its problem.
+            population: Individuals last, all of them new in this generation.
+            judgement: Of this population.
+        """
+        statistics, feasible = cost_statistics(judgement.cost), judgement.feasible
+        k = statistics.best
+        lowest = float(judgement.cost[k])
+        if self.improves(lowest):
+            solution = planner.solution(problem, population, k)
+            self.keep(lowest, Candidate(solution, judgement.named_terms(k), bool(feasible[k])))
+        return self.record(
+            statistics,
+            judgement.cost,
+            population,
+            lowest=lowest,
+            num_feasible=int(np.count_nonzero(feasible)),
+            evaluations=len(judgement.cost),
+            collision_queries=judgement.collision_queries,
+        )
 
     def record(
         self,

@@ -5,8 +5,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from evoexp.evolution.cost_statistics import cost_statistics
-from evoexp.planners.planner import Candidate, Keeper
+from evoexp.planners.planner import Keeper
 from evoexp.planners.wrapped_planner import WrappedPlanner
 from evoexp.records import Generation
 
@@ -27,21 +26,6 @@ class RandomSearch(WrappedPlanner):
         """Yield one generation of new samples after the other."""
         planner, keeper = self.planner, Keeper()
         for index in range(planner.num_generations + 1):
-            count = planner.num_evaluations(index)
-            population = planner.sample(problem, rng, count)
+            population = planner.sample(problem, rng, planner.num_evaluations(index))
             judged = planner.cost(problem, population)
-            statistics, feasible = cost_statistics(judged.cost), judged.feasible
-            k = statistics.best
-            lowest = float(judged.cost[k])
-            if keeper.improves(lowest):
-                solution = planner.solution(problem, population, k)
-                keeper.keep(lowest, Candidate(solution, judged.named_terms(k), bool(feasible[k])))
-            yield keeper.record(
-                statistics,
-                judged.cost,
-                population,
-                lowest=lowest,
-                num_feasible=int(np.count_nonzero(feasible)),
-                evaluations=count,
-                collision_queries=judged.collision_queries,
-            )
+            yield keeper.record_judged(planner, problem, population, judged)

@@ -217,6 +217,10 @@ class Coevolution(PlannerDefaults, Component):
         breed(uniforms, populations, found.costs, problem.moving, hall.teams, breeding, bred)
         return bred
 
+    def num_evaluations(self, index: int) -> int:
+        """Return the size of each population: elites are judged again, by other collaborators."""
+        return self.ga.population_size
+
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
         """Return populations of uniform genes, (robots, 2 K, count).
 

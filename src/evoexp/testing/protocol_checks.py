@@ -1,0 +1,117 @@
+"""Checks of the whole planner: its members, its identity, its randomness."""
+
+import inspect
+import pickle
+from typing import Any, get_args
+
+import numpy as np
+
+from evoexp.condition import Condition
+from evoexp.planners.planner import Planner, Reproducibility
+from evoexp.testing.evolution_record import demand, evolution, finished
+from evoexp.validation import Component
+
+OF_ONE_SEARCH = ("sample", "cost", "solution", "improve", "num_evaluations", "num_generations")
+"""Members that a planner may lack if it lacks `sample`: a reference, or a plan of several searches.
+
+No control can repeat such a planner at equal evaluations.
+"""
+
+
+def is_one_search(condition: Condition) -> bool:
+    """Return whether individuals of the planner can be drawn and judged."""
+    return hasattr(condition.planner, "sample") and not condition.is_reference
+
+
+def every_member_is_there(condition: Condition) -> None:
+    """A planner has every member of the protocol `Planner`, with the same parameters."""
+    planner = condition.planner
+    demand(
+        isinstance(planner, Component),
+        condition,
+        "a planner must be a Component, so that a configuration can name it",
+        type(planner).__name__,
+    )
+    spared = () if is_one_search(condition) else OF_ONE_SEARCH
+    names = [name for name in _members() if name not in spared]
+    missing = [name for name in names if not hasattr(planner, name)]
+    demand(
+        not missing,
+        condition,
+        "a planner must have every member of evoexp.planners.planner.Planner (PlannerDefaults "
+        "gives the usual answers)",
+        f"without {', '.join(missing)}",
+    )
+    for name in names:
+        wanted = getattr(Planner, name, None)
+        if inspect.isfunction(wanted):
+            _same_parameters(condition, name, wanted, getattr(planner, name))
+    known: Any = planner
+    for name, values in (
+        ("reproducibility", get_args(Reproducibility)),
+        ("is_reference", (False, True)),
+    ):
+        must = f"{name} must be one of {', '.join(map(repr, values))}"
+        demand(getattr(known, name) in values, condition, must, repr(getattr(known, name)))
+    must = "revision must be a whole number, at least 1"
+    demand(type(known.revision) is int and known.revision > 0, condition, must, known.revision)
+
+
+def _members() -> list[str]:
+    """Return the names of the protocol's members."""
+    annotated = [name for name in Planner.__annotations__ if not name.startswith("_")]
+    written = [name for name in vars(Planner) if not name.startswith("_")]
+    return list(dict.fromkeys([*annotated, *written]))
+
+
+def _same_parameters(condition: Condition, name: str, wanted: Any, given: Any) -> None:
+    """Demand that a method can be called as the protocol calls it."""
+    expected = list(inspect.signature(wanted).parameters)[1:]
+    demand(callable(given), condition, f"{name} must be a method", type(given).__name__)
+    try:
+        inspect.signature(given).bind(*expected)
+    except TypeError:
+        must = f"{name} must take ({', '.join(expected)})"
+        demand(False, condition, must, f"{name}{inspect.signature(given)}")
+
+
+def a_condition_survives_its_json(condition: Condition) -> None:
+    """A condition read back from its canonical form, or unpickled, is the same with one hash."""
+    forms = {
+        "from its JSON": Condition.from_json(condition.to_json()),
+        "from a pickle": pickle.loads(pickle.dumps(condition)),
+    }
+    for how, again in forms.items():
+        must = f"a condition read back {how} must be equal and have the same hash"
+        demand(again == condition and again.id == condition.id, condition, must, again.id[:12])
+
+
+def the_same_seed_gives_the_same_bits(condition: Condition) -> None:
+    """A replicate run twice has one digest; another replicate has another one."""
+    first, other = finished(condition, 0), finished(condition, 1)
+    again = finished.__wrapped__(condition, 0)
+    must = "two runs of one replicate must agree in every bit (keep nothing from run to run)"
+    was = f"{first.summary.digest} and {again.summary.digest}"
+    demand(first.summary.digest == again.summary.digest, condition, must, was)
+    must = "another replicate must use its own random numbers and so give other bits"
+    was = f"one digest, {first.summary.digest}"
+    demand(other.summary.digest != first.summary.digest, condition, must, was)
+
+
+def randomness_comes_from_the_given_generator(condition: Condition) -> None:
+    """Only `rng` is drawn from, only while the planner evolves, and never kept."""
+    must = "random numbers must come from rng, never from a global generator"
+    demand(not evolution(condition).global_randomness, condition, must, "another state of it")
+    must = "evolve must draw its random numbers from rng"
+    drawn = evolution(condition).has_drawn or condition.is_reference
+    demand(drawn, condition, must, "a generator that nobody drew from")
+    planner, problem = condition.prepare()
+    rng = condition.rng(0)
+    generations = planner.evolve(problem, rng)
+    next(generations)
+    state = rng.bit_generator.state
+    for call in (planner.motion, planner.evaluate):
+        call(problem, np.array(evolution(condition).last.best))
+    must = "motion and evaluate must not draw from a generator that evolve was given"
+    demand(rng.bit_generator.state == state, condition, must, "another state of it")
+    generations.close()

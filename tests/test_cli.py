@@ -110,7 +110,7 @@ def test_ctrl_c_is_exit_code_130(
 
     monkeypatch.setattr(list_, "main", interrupted)
     assert main(["list"]) == 130
-    assert capsys.readouterr().err.startswith("evoexp: interrupted; what was finished is kept")
+    assert capsys.readouterr().err.startswith("evoexp: interrupted; finished replicates are kept")
 
 
 def test_a_reader_that_closes_the_pipe_is_no_error(tmp_path: Path) -> None:

@@ -115,7 +115,11 @@ def test_contents(wheel: Path) -> None:
         for path in SOURCE.rglob("*")
         if path.suffix in (".py", ".typed")
     }
-    assets = {path.relative_to(SOURCE.parent).as_posix() for path in (SOURCE / "assets").iterdir()}
+    assets = {
+        path.relative_to(SOURCE.parent).as_posix()
+        for path in (SOURCE / "assets").rglob("*")
+        if path.is_file() and path.suffix != ".pyc"
+    }
     conf = {
         f"evoexp/{path.relative_to(ROOT).as_posix()}"
         for path in (ROOT / "conf").rglob("*")

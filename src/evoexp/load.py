@@ -2,6 +2,7 @@
 
 import re
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple
@@ -9,7 +10,7 @@ from typing import NamedTuple
 import pandas as pd
 
 from evoexp.configuration import expansions
-from evoexp.configuration.search_path import options
+from evoexp.configuration.search_path import is_file, options, searched_first
 from evoexp.errors import NothingStored, UnknownHash, UnknownOption
 from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
 from evoexp.store.tables import read_generations, read_summaries
@@ -35,30 +36,38 @@ def load(
     budget: str = "paper",
     multirun: bool = False,
     outputs: Path | str | None = None,
+    config_dir: Sequence[Path | str] = (),
 ) -> Frames:
     """Load results: `evoexp.load("rana_planar")`, `evoexp.load("9a95c3")`.
 
     Args:
-        what: Name of an experiment, or any unique prefix of a run's hash.
-        overrides: Of the experiment, as on the command line.
-        budget: Of the experiment.
+        what: Name or file of an experiment, or any unique prefix of a run's hash.
+        overrides: Changes of the experiment, as on the command line.
+        budget: Name of the experiment's budget.
         multirun: Whether overrides with commas are swept over.
         outputs: Root of the outputs; by default `EVOEXP_OUTPUTS` or `outputs`.
+        config_dir: Folders of options that are searched before all others.
 
     Returns:
         Frames whose column `label` names the condition as the figures do; a hash is its own label.
 
     Raises:
         UnknownOption: If `what` is neither.
-        UnknownHash: If it is a hash of nothing that is stored.
+        UnknownHash: If no stored run has this hash.
         AmbiguousHash: If several runs begin with it.
         NothingStored: If nothing of it has been run.
     """
     root = Path(outputs) if outputs is not None else outputs_root()
-    if what in options("experiment"):
-        experiments = expansions.expand(
-            [f"experiment={what}", f"budget={budget}", *overrides], multirun=multirun
+    with searched_first(map(str, config_dir)):
+        known = options("experiment")
+        experiments = (
+            expansions.expand(
+                [f"experiment={what}", f"budget={budget}", *overrides], multirun=multirun
+            )
+            if what in known or is_file(what)
+            else []
         )
+    if experiments:
         labels = [(c.label, c.condition.id) for e in experiments for c in e.conditions]
         runs = [
             RunDirectory(root, condition_id)
@@ -70,20 +79,20 @@ def load(
                 f"{what}: nothing stored in {root}; run it: evoexp run experiment={what}"
             )
     else:
-        run = _run(root, what)
+        run = _run(root, what, known)
         runs, labels = [run], [(run.hash12, run.condition_id)]
     return Frames(
         _labelled(read_generations(runs), labels), _labelled(read_summaries(runs), labels)
     )
 
 
-def _run(outputs: Path, what: str) -> RunDirectory:
+def _run(outputs: Path, what: str, experiments: Sequence[str]) -> RunDirectory:
     try:
         return resolve(outputs, what)
     except UnknownHash:
         if re.fullmatch("[0-9a-fA-F]{1,64}", what):
             raise
-        raise UnknownOption("experiment or hash", what, options("experiment")) from None
+        raise UnknownOption("experiment or hash", what, experiments) from None
 
 
 def _labelled(frame: pd.DataFrame, labels: list[tuple[str, str]]) -> pd.DataFrame:

@@ -12,7 +12,7 @@ from command_samples import SMALL, Evoexp
 
 from evoexp import shipped
 from evoexp.collision.certifier.certificate import Certificate
-from evoexp.commands.evaluate import flatten
+from evoexp.commands.given_motion import flatten
 from evoexp.configuration import compose
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory

@@ -116,9 +116,9 @@ def test_a_damaged_run_is_refused_by_show(refused: Callable[..., str], stored: P
 def test_show(evoexp: Evoexp, stored: Path, width: int) -> None:
     for run in find_runs(stored):
         run.write_failure(7, "ArithmeticError: [/] is told to fail", "Traceback …")
-        said = evoexp("show", run.condition_id[:5].upper())
+        said = evoexp("show", run.condition_id[:5].upper(), "--all")
         assert said.code == 0
-        assert said.out.startswith(f"condition {run.condition_id}\n")
+        assert said.out.startswith(f"condition    {run.condition_id}\n")
         assert "population_size: 8" in said.out
         assert "  label: " in said.out
         assert "command: evoexp run experiment=rana_planar budget=smoke" in said.out
@@ -133,7 +133,7 @@ def test_show(evoexp: Evoexp, stored: Path, width: int) -> None:
 def test_digests_are_whole(evoexp: Evoexp, stored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "140")
     run = find_runs(stored)[0]
-    out = evoexp("show", run.hash12).out
+    out = evoexp("show", run.hash12, "--all").out
     assert all(digest in out for digest in read_summaries(run)["digest"])
 
 
@@ -162,13 +162,13 @@ def test_a_shipped_condition_that_never_ran_here(
     said = evoexp("show", one_shipped.condition_id[:6])
     assert said.code == 0
     assert said.out.startswith(
-        f"condition {one_shipped.condition_id}\nshipped as rana_planar, random search, budget smoke"
+        f"condition    {one_shipped.condition_id}\nshipped as   rana_planar, random search, smoke\n"
     )
     assert (
         "not run here; run it: evoexp run experiment=rana_planar budget=smoke --only 'random "
         "search'\n" in said.out
     )
-    assert "_target_: random_search" in said.out
+    assert "\ncontrol      random_search()\n" in said.out
     assert not outputs.exists()
 
 

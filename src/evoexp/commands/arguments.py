@@ -2,12 +2,18 @@
 
 import argparse
 import re
+from collections.abc import Sequence
+from pathlib import Path
 
 
-def add_experiment_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments that choose conditions: overrides, `-m`, `--only`, `--config-dir`."""
+def add_experiment_arguments(parser: argparse.ArgumentParser) -> argparse.Action:
+    """Add the arguments that choose conditions: overrides, `-m`, `--only`, `--config-dir`.
+
+    Returns:
+        The overrides, for commands that take other words among them.
+    """
     add_config_dir_argument(parser)
-    parser.add_argument(
+    words = parser.add_argument(
         "overrides",
         nargs="*",
         metavar="KEY=VALUE",
@@ -23,6 +29,20 @@ def add_experiment_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--only", type=_labels, default=(), metavar="LABEL,...", help="only these conditions"
     )
+    return words
+
+
+def folder_words(config_dir: Sequence[str]) -> list[str]:
+    """Return the words that give the same folders of options when a command is typed again."""
+    return [word for folder in config_dir for word in ("--config-dir", folder)]
+
+
+def is_override(word: str) -> bool:
+    """Return whether a word of a command changes a configuration: `a.b=c`, `+a.b=c`, `~a.b`.
+
+    A file of such a name, if there is one, is a file.
+    """
+    return ("=" in word or word.startswith(("~", "+"))) and not Path(word).exists()
 
 
 def add_config_dir_argument(parser: argparse.ArgumentParser) -> None:

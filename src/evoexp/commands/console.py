@@ -1,7 +1,11 @@
-"""What commands print on: readable at any width, exact when piped."""
+"""The console that commands print on: readable at any width, exact when piped; and JSON."""
 
+import json
+import math
 import os
 import sys
+from collections.abc import Mapping
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
@@ -10,9 +14,9 @@ PIPED_WIDTH = 160  # columns of a table in a pipe, where nobody has to read it o
 
 
 class _Console(Console):
-    """Goes on in silence where the reader of a pipe has left.
+    """A console that goes on in silence when the reader of a pipe has left.
 
-    The work and its exit code are the same.
+    The command does the rest of its work, and its exit code is the same.
     """
 
     def on_broken_pipe(self) -> None:
@@ -40,3 +44,21 @@ def add_columns(table: Table, *names: str, right: bool = False) -> None:
     """Add columns whose cells are folded where the terminal is too narrow, never cut."""
     for name in names:
         table.add_column(name, justify="right" if right else "left", overflow="fold")
+
+
+def print_json(value: Any) -> None:
+    """Print valid JSON: numbers that are not finite, which JSON does not have, become null."""
+    print(json.dumps(_plain(value), indent=2, allow_nan=False))
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as JSON has it; scalars of numpy as Python's, anything else as text."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if hasattr(value, "dtype") and hasattr(value, "item"):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value if isinstance(value, bool | int | float | str | None) else str(value)

@@ -1,87 +1,135 @@
-"""`evoexp list`: what can be run, and what has been."""
+"""`evoexp list`: the experiments that can be run, and the runs that are stored."""
 
 import argparse
+from typing import Any
 
-import pandas as pd
+import numpy as np
 from rich.table import Table
 from rich.text import Text
 
 from evoexp import shipped
-from evoexp.commands.console import add_columns, add_hash_column, new_table, plain_console
+from evoexp.commands.arguments import add_config_dir_argument
+from evoexp.commands.console import (
+    add_columns,
+    add_hash_column,
+    new_table,
+    plain_console,
+    print_json,
+)
 from evoexp.commands.hashes import stored_runs
-from evoexp.configuration.search_path import description, options
+from evoexp.configuration.search_path import description, find, options
 from evoexp.errors import EvoexpError
 from evoexp.store.run_directory import RunDirectory, outputs_root
-from evoexp.store.tables import read_summaries
+from evoexp.store.summaries import summary_table
+
+EXPERIMENT_KEYS = ("name", "description", "origin", "path")
+RUN_KEYS = (
+    "hash",
+    "experiment",
+    "label",
+    "budget",
+    "changed",
+    "done",
+    "failed",
+    "solved",
+    "median_best_cost",
+    "damage",
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the command's arguments: none."""
+    """Declare the command's arguments."""
+    add_config_dir_argument(parser)
+    parser.add_argument(
+        "--json",
+        action="store_true",
+        help=f"print JSON: experiments ({', '.join(EXPERIMENT_KEYS)}) and runs "
+        f"({', '.join(RUN_KEYS)})",
+    )
 
 
 def main(arguments: argparse.Namespace) -> int:
     """Print both lists."""
+    experiments = [_experiment(name) for name in options("experiment")]
+    runs = [_run(name, run) for name, run in stored_runs(outputs_root())]
+    if arguments.json:
+        print_json({"experiments": experiments, "runs": runs})
+        return 0
     console = plain_console()
-    console.print(_experiments())
-    runs = stored_runs(outputs_root())
+    console.print(_experiment_table(experiments))
     if runs:
-        console.print(_runs(runs))
+        console.print(_run_table(runs))
     else:
         console.print(f"no runs stored in {outputs_root()}", soft_wrap=True)
     return 0
 
 
-def _experiments() -> Table:
+def _experiment(name: str) -> dict[str, Any]:
+    found = find("experiment", name)
+    return dict(
+        zip(EXPERIMENT_KEYS, (name, description(name), found.origin, found.path), strict=True)
+    )
+
+
+def _experiment_table(experiments: list[dict[str, Any]]) -> Table:
     table = new_table("experiments")
-    add_columns(table, "run experiment=", "what it is")
-    for name in options("experiment"):
-        table.add_row(name, description(name))
+    add_columns(table, "run experiment=", "description", "from")
+    for each in experiments:
+        table.add_row(each["name"], each["description"], each["origin"])
     return table
 
 
-def _runs(runs: list[tuple[str, RunDirectory | EvoexpError]]) -> Table:
+def _run(name: str, run: RunDirectory | EvoexpError) -> dict[str, Any]:
+    """Return the entry of a stored run; of a damaged one little but the damage."""
+    row: dict[str, Any] = dict.fromkeys(RUN_KEYS) | {"hash": name, "changed": False}
+    try:
+        if isinstance(run, EvoexpError):
+            raise run
+        rows = summary_table(run).select(["status", "solved", "best_cost"]).to_pylist()
+    except EvoexpError as error:
+        return row | {"damage": str(error)}
+    done = [each for each in rows if each["status"] == "done"]
+    return (
+        row
+        | {"hash": run.condition_id, "done": len(done), "failed": len(rows) - len(done)}
+        | {"solved": sum(bool(each["solved"]) for each in done)}
+        | {"median_best_cost": np.median([each["best_cost"] for each in done]) if done else None}
+        | _named(run)
+    )
+
+
+def _run_table(runs: list[dict[str, Any]]) -> Table:
     table = new_table(f"runs stored in {outputs_root()}")
     add_hash_column(table)
     add_columns(table, "condition")
     add_columns(table, "done", "failed", "solved", "median\nbest cost", right=True)
-    for name, run in runs:
-        try:
-            if isinstance(run, EvoexpError):
-                raise run
-            rows = read_summaries(run)
-        except EvoexpError as error:
-            table.add_row(name, Text(str(error), "red"), "–", "–", "–", "–")
+    for run in runs:
+        if run["damage"]:
+            table.add_row(run["hash"][:12], Text(run["damage"], "red"), "–", "–", "–", "–")
             continue
-        done = rows[rows["status"] == "done"]
-        cost = done["best_cost"].median() if len(done) else pd.NA
+        names = [run[name] or "?" for name in ("experiment", "label", "budget")]
+        known = any(run[name] for name in ("experiment", "label", "budget"))
+        text = ", ".join(names) + (" (changed)" if run["changed"] else "")
+        cost = run["median_best_cost"]
         table.add_row(
-            name,
-            _named(run),
-            str(len(done)),
-            str(len(rows) - len(done)),
-            str(int(done["solved"].sum())),
-            "–" if pd.isna(cost) else f"{cost:.4g}",
+            run["hash"][:12],
+            text if known else "(no manifest)",
+            *(str(run[name]) for name in ("done", "failed", "solved")),
+            "–" if cost is None else f"{cost:.4g}",
         )
     return table
 
 
-def _named(run: RunDirectory) -> str:
-    """Return a run's condition as it was asked for: experiments share conditions."""
+def _named(run: RunDirectory) -> dict[str, Any]:
+    """Return experiment, label and budget of a run as it was asked for: experiments share runs."""
     try:
         notes = run.manifest()
     except EvoexpError:
         notes = {}
-    rows = [row for row in shipped.shipped() if row.condition_id == run.condition_id]
-    asked = [
-        row
-        for row in rows
-        if (row.experiment, row.label) == (notes.get("experiment"), notes.get("label"))
-    ]
-    if found := asked or rows:
-        return f"{found[0].experiment}, {found[0].label}, {found[0].budget}"
-    if not notes:
-        return "(no manifest)"
-    return (
-        f"{notes.get('experiment', '?')}, {notes.get('label', '?')}, {notes.get('budget', '?')} "
-        "(changed)"
-    )
+    table, asked = shipped.shipped(), (notes.get("experiment"), notes.get("label"))
+    rows = [row for row in table if row.condition_id == run.condition_id]
+    if rows:
+        row = next((row for row in rows if (row.experiment, row.label) == asked), rows[0])
+        return {"experiment": row.experiment, "label": row.label, "budget": row.budget}
+    names = {name: notes.get(name) for name in ("experiment", "label", "budget")}
+    return names | {"changed": any(row.experiment == asked[0] for row in table)}

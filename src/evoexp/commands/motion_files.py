@@ -1,4 +1,4 @@
-"""Which motions a command is about: stored replicates, logs, or a motion of the user's own."""
+"""The motions that a command shows or writes: of stored replicates, of logs, or out of a file."""
 
 import argparse
 import math
@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from evoexp import shipped
-from evoexp.commands.evaluate import flatten, motion_file, read_motion, shape_text
+from evoexp.commands.arguments import add_config_dir_argument, is_override
+from evoexp.commands.given_motion import fitting_motions, is_motion
 from evoexp.commands.hashes import with_candidates
-from evoexp.configuration import expansions
 from evoexp.errors import (
     EvoexpError,
     MotionFileError,
@@ -28,7 +28,8 @@ MANY = 4  # motions on one page
 
 
 def add_motion_arguments(parser: argparse.ArgumentParser, ending: str) -> None:
-    """Declare what chooses motions, how fast they are, and where they go."""
+    """Declare the arguments that choose motions, their speed, and the file to write."""
+    add_config_dir_argument(parser)
     parser.add_argument(
         "what",
         nargs="+",
@@ -65,14 +66,14 @@ def add_motion_arguments(parser: argparse.ArgumentParser, ending: str) -> None:
 
 
 def recordings(arguments: argparse.Namespace) -> list[Recording]:
-    """Return the motions that the arguments choose, in their order.
+    """Return the motions that the arguments choose, in the order of the words.
 
     Raises:
         EvoexpError: One line says what is wrong.
     """
     words: list[str] = arguments.what
     limits = speed_limits(arguments)
-    if any("=" in word for word in words):
+    if any(is_override(word) or is_motion(word) for word in words):
         return _own(words, arguments.only, limits)
     if len(words) > MANY:
         raise MotionFileError(f"motions: at most {MANY} go together, got {len(words)}")
@@ -99,19 +100,11 @@ def single(arguments: argparse.Namespace) -> Recording:
 
 
 def output_path(arguments: argparse.Namespace, found: list[Recording], ending: str) -> Path:
-    """Return where the file goes."""
+    """Return the path of the file to write."""
     if arguments.output is not None:
         return Path(arguments.output)
-    files = [
-        word
-        for word in arguments.what
-        if "=" not in word and any("=" in other for other in arguments.what)
-    ]
-    names = (
-        [f"{r.condition_id[:12]}-{r.heading.replicate:04d}" for r in found]
-        if not files
-        else [Path(files[0]).stem]
-    )
+    given = [Path(word).stem for word in arguments.what if is_motion(word)]
+    names = given or [f"{r.condition_id[:12]}-{r.heading.replicate:04d}" for r in found]
     return outputs_root() / FOLDER / ("+".join(names) + ending)
 
 
@@ -195,22 +188,9 @@ def _titles(runs: list[RunDirectory]) -> dict[str, str]:
 
 
 def _own(words: list[str], only: str, limits: SpeedLimits) -> list[Recording]:
-    """Return a motion of the user's own in every condition that it fits."""
-    overrides, path = motion_file(words)
-    values = read_motion(path)
-    found: list[Recording] = []
-    misfits: list[str] = []
-    for experiment in expansions.expand(overrides, only=(only,) if only else ()):
-        for label, condition in experiment.conditions:
-            planner, problem = condition.prepare()
-            shape = planner.shape(problem)
-            solution = flatten(values, shape)
-            if solution is None:
-                misfits.append(f"{label}: {shape_text(shape)}")
-            elif len(found) < MANY:
-                found.append(record(condition, solution, Heading(f"{path.name} · {label}"), limits))
-    if not found:
-        raise MotionFileError(
-            f"{path}: must be {'; '.join(dict.fromkeys(misfits))} (start and goal included)"
-        )
-    return found
+    """Return the motion of a file in every condition that it fits, in the first `MANY` of them."""
+    path, fitting = fitting_motions(words, only=(only,) if only else ())
+    return [
+        record(each.condition, each.solution, Heading(f"{path.name} · {each.label}"), limits)
+        for each in fitting[:MANY]
+    ]

@@ -9,13 +9,14 @@ from pathlib import Path
 
 from rich.console import Console
 
-from evoexp.commands.arguments import add_experiment_arguments
+from evoexp.commands.arguments import add_experiment_arguments, folder_words, is_override
 from evoexp.condition import Condition
 from evoexp.configuration import expansions
 from evoexp.configuration.experiment import Experiment
-from evoexp.configuration.search_path import options
+from evoexp.configuration.search_path import is_file, options
 from evoexp.errors import SettingError, UnknownOption
 from evoexp.report import build
+from evoexp.shipped import shipped
 from evoexp.store.run_directory import outputs_root, resolve
 
 MAX_NAMED = 4  # runs whose hashes a report's name spells out
@@ -29,30 +30,25 @@ _SILENT = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    add_experiment_arguments(parser)
-    for action in parser._actions:
-        if action.dest == "overrides":
-            action.metavar, action.nargs = "EXPERIMENT | HASH ... [KEY=VALUE ...]", "+"
-            action.help = (
-                "an experiment and overrides as for run, or prefixes of the hashes of stored runs"
-            )
+    words = add_experiment_arguments(parser)
+    words.metavar, words.nargs = "EXPERIMENT | HASH ... [KEY=VALUE ...]", "+"
+    words.help = "an experiment and overrides as for run, or prefixes of the hashes of stored runs"
 
 
 def main(arguments: argparse.Namespace) -> int:
     """Draw; exit code 0."""
-    names = [word for word in arguments.overrides if "=" not in word and not word.startswith("~")]
-    overrides = [word for word in arguments.overrides if word not in names]
     console = Console()
-    for page in _pages(names, overrides, arguments.multirun, arguments.only):
+    for page in _pages(arguments):
         console.print(f"report: {page}", highlight=False, soft_wrap=True)
     return 0
 
 
-def _pages(
-    names: Sequence[str], overrides: Sequence[str], multirun: bool, only: Sequence[str]
-) -> list[Path]:
-    known = options("experiment")
-    if names and not any(name in known for name in names):
+def _pages(arguments: argparse.Namespace) -> list[Path]:
+    """Draw the report of every experiment that is named, or one of all runs that are named."""
+    multirun, only, known = arguments.multirun, arguments.only, options("experiment")
+    overrides = [word for word in arguments.overrides if is_override(word)]
+    names = [word for word in arguments.overrides if word not in overrides]
+    if names and not any(name in known or is_file(name) for name in names):
         for name in names:
             if not _HASH.fullmatch(name):
                 raise UnknownOption("experiment", name, known)
@@ -62,12 +58,15 @@ def _pages(
         return [_of_runs(names)]
     chosen = [f"experiment={','.join(names)}"] if names else []
     for name in names:
-        if name not in known:
+        if name not in known and not is_file(name):
             raise UnknownOption("experiment", name, known)
     experiments = expansions.expand(
         [*chosen, *overrides], multirun=multirun or len(names) > 1, only=only
     )
-    return [of_experiment(experiment, overrides, multirun, only) for experiment in experiments]
+    return [
+        of_experiment(experiment, overrides, multirun, only, arguments.config_dir)
+        for experiment in experiments
+    ]
 
 
 def of_experiment(
@@ -75,6 +74,7 @@ def of_experiment(
     overrides: Sequence[str],
     multirun: bool = False,
     only: Sequence[str] = (),
+    config_dir: Sequence[str] = (),
 ) -> Path:
     """Draw the report of one experiment; `run` ends with it, too.
 
@@ -83,15 +83,19 @@ def of_experiment(
         overrides: As typed; `experiment=` among them is not looked at.
         multirun: Whether `-m` was given.
         only: The labels of `--only`.
+        config_dir: The folders of `--config-dir`.
 
     Returns:
         Path of its `index.md`.
     """
+    file = [word.split("=")[1] for word in overrides if word.startswith("experiment=")]
     words = [experiment.name] if experiment.name in options("experiment") else []
+    words = file if any(map(is_file, file)) else words
     words += [f"budget={experiment.budget}"] if experiment.budget != "paper" else []
     words += [word for word in overrides if word.split("=")[0] not in _SILENT]
     words += ["--only", ",".join(only)] if only else []
     words += ["-m"] if multirun else []
+    words += folder_words(config_dir)
     request = build.Request(
         experiment.report_name,
         experiment.name,
@@ -109,9 +113,6 @@ def _of_runs(prefixes: Sequence[str]) -> Path:
     name = "+".join(found)
     if len(found) > MAX_NAMED:
         name = f"{len(found)}_runs+{hashlib.sha256(name.encode()).hexdigest()[:8]}"
-    settings = expansions.expand([f"experiment={options('experiment')[0]}", "report=paper"])[
-        0
-    ].report
-    return build.report(
-        build.Request(name, "", "", tuple(found.items())), settings, outputs_root(), None
-    )
+    plain = expansions.expand([f"experiment={shipped()[0].experiment}", "report=paper"])[0]
+    request = build.Request(name, "", "", tuple(found.items()))
+    return build.report(request, plain.report, outputs_root(), None)

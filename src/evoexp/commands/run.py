@@ -12,7 +12,7 @@ from rich.table import Table
 
 from evoexp.batch.jobs import Outcome
 from evoexp.batch.runner import Batch
-from evoexp.commands.arguments import add_experiment_arguments
+from evoexp.commands.arguments import add_experiment_arguments, folder_words
 from evoexp.commands.console import add_columns, add_hash_column, new_table, plain_console
 from evoexp.commands.progress import BatchProgress
 from evoexp.configuration import expansions
@@ -56,7 +56,11 @@ def main(arguments: argparse.Namespace) -> int:
                 from evoexp.commands.report import of_experiment  # pandas
 
                 page = of_experiment(
-                    experiment, arguments.overrides, arguments.multirun, arguments.only
+                    experiment,
+                    arguments.overrides,
+                    arguments.multirun,
+                    arguments.only,
+                    arguments.config_dir,
                 )
                 console.print(f"report: {page}", soft_wrap=True)
     finally:
@@ -66,11 +70,11 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _command(arguments: argparse.Namespace) -> str:
-    """Return the command as it could be typed again."""
+    """Return the command as it can be typed again."""
+    swept = ["-m"] if arguments.multirun else []
     only = ["--only", ",".join(arguments.only)] if arguments.only else []
-    return shlex.join(
-        ["evoexp", "run", *(["-m"] if arguments.multirun else []), *arguments.overrides, *only]
-    )
+    words = [*swept, *arguments.overrides, *only, *folder_words(arguments.config_dir)]
+    return shlex.join(["evoexp", "run", *words])
 
 
 def _run(batch: Batch, console: Console) -> list[Outcome]:
@@ -94,7 +98,7 @@ def _run(batch: Batch, console: Console) -> list[Outcome]:
 
 
 def _notes(experiment: Experiment, label: str, command: str) -> dict[str, Any]:
-    """What a new run's manifest says of why it was made; no part of its identity."""
+    """Return the notes that a new run's manifest keeps of its origin; no part of its identity."""
     return {
         "experiment": experiment.name,
         "budget": experiment.budget,
@@ -105,7 +109,7 @@ def _notes(experiment: Experiment, label: str, command: str) -> dict[str, Any]:
 
 
 def summary_table(experiment: Experiment) -> Table:
-    """Return one row per condition: what is there, and how good."""
+    """Return a table of the conditions: replicates done, solved, cost and time."""
     table = new_table(experiment.report_name)
     add_columns(table, "condition")
     add_hash_column(table)

@@ -1,121 +1,166 @@
-"""`evoexp show`: one stored run."""
+"""`evoexp show`: a condition before it is run, a stored run, or somebody's log."""
 
 import argparse
-import json
+import itertools
+import shlex
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
-import pandas as pd
 import yaml
 from rich.console import Console
 from rich.table import Table
-from rich.text import Text
 
 from evoexp import shipped
-from evoexp.commands.console import add_columns, new_table, plain_console
+from evoexp.commands.arguments import add_experiment_arguments, folder_words, is_override
+from evoexp.commands.console import (
+    add_columns,
+    add_hash_column,
+    new_table,
+    plain_console,
+    print_json,
+)
+from evoexp.commands.fact_screen import compact, screen, typed_parts
+from evoexp.commands.facts import KEYS, composed_facts, log_facts, stored_facts
 from evoexp.commands.hashes import with_candidates
-from evoexp.condition import Condition
+from evoexp.commands.replicate_table import replicate_table
 from evoexp.configuration import expansions
-from evoexp.errors import AmbiguousHash, EvoexpError, UnknownHash
-from evoexp.store.log_reader import array_names, read_array
+from evoexp.configuration.experiment import Experiment
+from evoexp.configuration.search_path import options
+from evoexp.errors import AmbiguousHash, SettingError, UnknownHash
 from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
-from evoexp.store.tables import read_summaries
+
+MAX_CHANGES = 6  # settings per row of a table of conditions
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
-    parser.add_argument("hash", metavar="HASH", help="any unique prefix of a run's hash")
+    words = add_experiment_arguments(parser)
+    words.metavar, words.nargs = "HASH | LOG.mcap | KEY=VALUE", "+"
+    words.help = (
+        "any unique prefix of a run's hash, a replicate's log, or an experiment with overrides as "
+        "for run, which is composed and not run"
+    )
+    parser.add_argument(
+        "--all", action="store_true", help="all settings, replicates and the whole manifest, too"
+    )
+    keys = "; ".join(f"{key}: {value}" for key, value in KEYS.items())
+    parser.add_argument(
+        "--json",
+        action="store_true",
+        help=f"print JSON, one object or a list of them. Keys: {keys}",
+    )
 
 
 def main(arguments: argparse.Namespace) -> int:
-    """Print configuration, replicates and environment."""
+    """Print one screen per condition; a table where an experiment has several."""
+    run: RunDirectory | None = None
+    experiments: list[Experiment] = []
+    if any(map(is_override, arguments.overrides)):
+        experiments = expansions.expand(
+            arguments.overrides, multirun=arguments.multirun, only=arguments.only
+        )
+        swept, folders = (["-m"] if arguments.multirun else []), folder_words(arguments.config_dir)
+        words = ["evoexp", "run", *swept, *arguments.overrides, *folders]
+        found = [
+            composed_facts(experiment, label, shlex.join([*words, "--only", label]))
+            for experiment in experiments
+            for label, _ in experiment.conditions
+        ]
+    elif len(arguments.overrides) > 1:
+        raise SettingError("show", "given one hash or log", " ".join(arguments.overrides))
+    elif (path := Path(arguments.overrides[0])).suffix == ".mcap" or path.is_file():
+        found = [log_facts(path)]
+    else:
+        run, facts = _by_hash(arguments.overrides[0])
+        found = [facts]
+    if arguments.json:
+        print_json(found if len(found) > 1 else found[0])
+        return 0
     console = plain_console()
+    if len(found) > 1 and not arguments.all:
+        for experiment in experiments:
+            console.print(_conditions(experiment, found))
+        console.print("one condition on a screen: --only LABEL", soft_wrap=True)
+        return 0
+    for facts in found:
+        for line in screen(facts, console.width):
+            console.print(line, soft_wrap=True)
+        if arguments.all:
+            _print_all(console, facts, run)
+    return 0
+
+
+def _by_hash(prefix: str) -> tuple[RunDirectory | None, dict[str, Any]]:
+    """Return the run and the facts that a hash names: of a stored run, or a shipped condition.
+
+    Raises:
+        UnknownHash: If nothing has this hash.
+        AmbiguousHash: If several shipped conditions begin with it.
+    """
     try:
-        run = resolve(outputs_root(), arguments.hash)
+        run = resolve(outputs_root(), prefix)
+        return run, stored_facts(run)
     except UnknownHash as error:
-        return _show_shipped(console, arguments.hash, error)
-    config, replicates, manifest = json.loads(run.config_json()), _replicates(run), run.manifest()
-    _print_head(console, run.condition_id)
-    _print_config(console, config)
-    _print_notes(console, run.config_json())
-    console.print(replicates)
-    _print_arrays(console, run)
-    _print_config(console, {"manifest": {k: v for k, v in manifest.items() if k != "condition"}})
-    return 0
+        rows = shipped.find(prefix)
+        if len(rows) > 1:
+            raise AmbiguousHash(prefix, [row.condition_id[:12] for row in rows]) from None
+        if not rows and prefix in options("experiment"):
+            raise UnknownHash(f"{error}; did you mean 'experiment={prefix}'?") from None
+        if not rows:
+            raise with_candidates(error, outputs_root()) from None
+    row = rows[0]
+    words = [f"experiment={row.experiment}", f"budget={row.budget}"]
+    experiment = expansions.expand(words, only=[row.label])[0]
+    return None, composed_facts(experiment, row.label, row.command)
 
 
-def _show_shipped(console: Console, prefix: str, error: UnknownHash) -> int:
-    found = shipped.find(prefix)
-    if len(found) > 1:
-        raise AmbiguousHash(prefix, [row.condition_id[:12] for row in found])
-    if not found:
-        raise with_candidates(error, outputs_root())
-    row = found[0]
-    _print_head(console, row.condition_id)
-    console.print(f"not run here; run it: {row.command}", soft_wrap=True)
-    experiment = expansions.expand(
-        [f"experiment={row.experiment}", f"budget={row.budget}"], only=[row.label]
-    )[0]
-    text = experiment.conditions[0].condition.to_json()
-    _print_config(console, json.loads(text))
-    _print_notes(console, text)
-    return 0
+def _print_all(console: Console, facts: Mapping[str, Any], run: RunDirectory | None) -> None:
+    """Print settings as YAML, the table of replicates and the manifest."""
+    _print_yaml(console, {"settings": facts["settings"]})
+    if run is not None:
+        console.print(replicate_table(run))
+        manifest = {k: v for k, v in run.manifest().items() if k != "condition"}
+        _print_yaml(console, {"manifest": manifest})
 
 
-def _print_head(console: Console, condition_id: str) -> None:
-    console.print(f"condition {condition_id}", soft_wrap=True)
-    for row in shipped.shipped():
-        if row.condition_id == condition_id:
-            console.print(
-                f"shipped as {row.experiment}, {row.label}, budget {row.budget}", soft_wrap=True
-            )
-
-
-def _print_config(console: Console, config: dict[str, Any]) -> None:
+def _print_yaml(console: Console, data: Mapping[str, Any]) -> None:
     text = yaml.safe_dump(
-        config, sort_keys=False, default_flow_style=None, allow_unicode=True, width=110
+        dict(data), sort_keys=False, default_flow_style=None, allow_unicode=True, width=110
     )
     console.print(text, soft_wrap=True)
 
 
-def _print_notes(console: Console, config_json: bytes) -> None:
-    """Print what a planner has to say of its own settings, if it has."""
-    try:
-        planner, problem = Condition.from_json(config_json).prepare()
-    except (
-        EvoexpError
-    ) as error:  # stored by another revision of the code: the run can be shown all the same
-        console.print(f"notes: {error}", soft_wrap=True)
-        return
-    for note in planner.notes(problem):
-        console.print(f"note: {note}", soft_wrap=True)
-
-
-def _print_arrays(console: Console, run: RunDirectory) -> None:
-    """Print the arrays that references attach to their logs."""
-    for path in (run.log_path(k) for k in sorted(run.completed())[:1]):
-        for name in array_names(path):
-            shape = " × ".join(map(str, read_array(path, name).shape))
-            console.print(f"array: {name} ({shape}), attached to {path.name}", soft_wrap=True)
-
-
-def _replicates(run: RunDirectory) -> Table:
-    table = new_table(f"replicates in {run.path}")
-    add_columns(table, "#", right=True)
-    add_columns(table, "status")
-    add_columns(
-        table, "best cost", "solved", "certified", "clearance", "evaluations", "CPU s", right=True
-    )
-    add_columns(table, "digest, or why it failed")
-    for row in read_summaries(run).to_dict("records"):
-        if row["status"] == "done":
-            verdict = [
-                "–" if pd.isna(row[name]) else str(row[name]) for name in ("solved", "certified")
-            ]
-            numbers = [f"{row['clearance']:.4g}", str(row["evaluations"]), f"{row['cpu_s']:.3f}"]
-            cells = [f"{row['best_cost']:.6g}", *verdict, *numbers]
-            table.add_row(str(row["replicate"]), "done", *cells, str(row["digest"]))
-        else:
-            table.add_row(
-                str(row["replicate"]), Text("failed", "red"), *6 * ["–"], str(row["stop_reason"])
-            )
+def _conditions(experiment: Experiment, found: list[dict[str, Any]]) -> Table:
+    """Return a table of an experiment's conditions and the settings in which they differ."""
+    by_id = {facts["condition"]: facts for facts in found}
+    rows = [(label, by_id[condition.id]) for label, condition in experiment.conditions]
+    settings = [dict(_leaves(typed_parts(facts["settings"]))) for _, facts in rows]
+    names = list(dict.fromkeys(itertools.chain.from_iterable(settings)))
+    differing = [name for name in names if len({str(each.get(name)) for each in settings}) > 1]
+    table = new_table(experiment.report_name)
+    add_columns(table, "condition")
+    add_hash_column(table)
+    add_columns(table, "done", right=True)
+    add_columns(table, "settings in which they differ")
+    for (label, facts), values in zip(rows, settings, strict=True):
+        given = [f"{name}={compact(values[name])}" for name in differing if name in values]
+        more = [f"… {len(given) - MAX_CHANGES} more"] if len(given) > MAX_CHANGES else []
+        result = facts["result"]
+        done = f"{result['done']} of {result['planned']}" if result else "–"
+        changes = "\n".join([*given[:MAX_CHANGES], *more])
+        table.add_row(label, facts["condition"][:12], done, changes)
     return table
+
+
+def _leaves(value: Any, name: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield every setting by its dotted name; lists of scalars are one setting."""
+    if isinstance(value, dict):
+        for key, item in value.items():
+            if key != "revision":
+                yield from _leaves(item, f"{name}.{key}".lstrip("."))
+    elif isinstance(value, list) and any(isinstance(item, dict | list) for item in value):
+        for k, item in enumerate(value):
+            yield from _leaves(item, f"{name}.{k}")
+    else:
+        yield name, value

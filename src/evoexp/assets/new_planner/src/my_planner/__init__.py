@@ -1,0 +1,1 @@
+"""my_planner: a planner for evoexp."""

@@ -1,0 +1,89 @@
+"""The commands by name, and the parsers that read their words."""
+
+import argparse
+import importlib
+from types import ModuleType
+from typing import Any, NoReturn
+
+from evoexp.errors import nearest
+from evoexp.version import __version__
+
+COMMANDS = {
+    "run": "run an experiment: its missing replicates, then its report",
+    "report": "draw an experiment's figures and tables again, from outputs alone",
+    "reproduce": "run stored replicates again: MATCH, or the first generation that differs",
+    "evaluate": "judge a given motion by an experiment's criteria",
+    "view": "write a motion as an offline page that plays it",
+    "play": "write a motion as a log that plays in Foxglove",
+    "export": "write a motion as a joint trajectory for a robot or MoveIt",
+    "list": "list experiments and stored runs",
+    "show": "show a condition, before or after it is run: identity, origin, result, verdict",
+    "new": "write a package with a planner of your own, to begin with",
+    "completion": "print a script with which the shell completes commands",
+}
+
+
+class CommandParser(argparse.ArgumentParser):
+    """Says in one line which word is wrong.
+
+    Takes no abbreviated options, whose meaning changes when options are added.
+    """
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(allow_abbrev=False, **settings)
+
+    def error(self, message: str) -> NoReturn:
+        """Exit with code 2 and one line that names the choices."""
+        choices = {
+            text: action.choices
+            for action in self._actions
+            for text in (*action.option_strings, action.dest)
+        }
+        option = message.removeprefix("argument ").split(":")[0]
+        if "invalid choice" in message and choices.get(option) and option != "command":
+            word, known = message.split("'")[1], list(choices[option] or ())
+            message = (
+                f"{option}: must be one of {', '.join(known)}, was '{word}'{nearest(word, known)}"
+            )
+        elif "invalid choice" in message:
+            word = message.split("'")[1]
+            message = (
+                f"no command '{word}'{nearest(word, COMMANDS)} (commands: {', '.join(COMMANDS)})"
+            )
+        elif "unrecognized arguments" in message:
+            words = message.split(": ", 1)[1].split(" ")
+            word = next((word for word in words if word.startswith("-")), words[0])
+            known = [text for action in self._actions for text in action.option_strings]
+            message = f"no option '{word}'{nearest(word, known)} (options: {', '.join(known)})"
+        self.exit(2, f"evoexp: {message}\n")
+
+
+def command_module(name: str) -> ModuleType:
+    """Import the module of a command."""
+    return importlib.import_module(f"evoexp.commands.{'list_' if name == 'list' else name}")
+
+
+def command_parser(name: str) -> CommandParser:
+    """Return the parser of one command; its module is imported."""
+    summary = COMMANDS[name]
+    parser = CommandParser(prog=f"evoexp {name}", description=f"{summary[0].upper()}{summary[1:]}.")
+    command_module(name).add_arguments(parser)
+    return parser
+
+
+def whole_parser(*, with_arguments: bool = False) -> CommandParser:
+    """Return the parser of all commands.
+
+    Args:
+        with_arguments: Whether the arguments of every command are added; all are imported then.
+    """
+    parser = CommandParser(
+        prog="evoexp", description="A laboratory for evolutionary robot motion planning."
+    )
+    parser.add_argument("--version", action="version", version=f"evoexp {__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", parser_class=CommandParser)
+    for name, summary in COMMANDS.items():
+        command = commands.add_parser(name, help=summary, add_help=with_arguments)
+        if with_arguments:
+            command_module(name).add_arguments(command)
+    return parser

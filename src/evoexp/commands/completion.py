@@ -1,0 +1,70 @@
+"""`evoexp completion`: a script with which the shell completes commands, options and overrides."""
+
+import argparse
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from evoexp.commands.arguments import add_config_dir_argument
+from evoexp.commands.command_parser import whole_parser
+from evoexp.configuration.search_path import groups, options
+from evoexp.errors import SettingError
+
+SHELLS = ("bash", "zsh")
+LINES = {
+    "bash": "evoexp completion bash > ~/.local/share/bash-completion/completions/evoexp",
+    "zsh": "evoexp completion zsh > ~/.zfunc/_evoexp, with fpath+=~/.zfunc in ~/.zshrc",
+}
+"""The line to type once, per shell."""
+SINGLE = ("num_replicates", "seed")  # settings of no group
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    lines = "; ".join(f"{shell}: {line}" for shell, line in LINES.items())
+    parser.add_argument(
+        "shell",
+        choices=(*SHELLS, "options"),
+        help=f"to be typed once, for {lines}. `options GROUP` prints the names that the scripts "
+        "offer behind GROUP=",
+    )
+    parser.add_argument("group", nargs="?", metavar="GROUP", help="experiment, robot, …")
+    add_config_dir_argument(parser)
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Print a script, or the options of a group."""
+    if arguments.shell == "options":
+        for name in options(arguments.group) if arguments.group in groups() else ():
+            print(name)
+        return 0
+    if arguments.group is not None:
+        raise SettingError("completion", f"{arguments.shell} alone", arguments.group)
+    print(script(arguments.shell))
+    return 0
+
+
+def script(shell: str) -> str:
+    """Return the script of a shell."""
+    import shtab  # only this command needs it
+
+    parser: Any = whole_parser(with_arguments=True)
+    commands = next(action for action in parser._actions if action.dest == "command")
+    for command in commands.choices.values():
+        for action in command._actions:
+            if action.dest == "config_dir":
+                action.complete = shtab.DIRECTORY
+            elif action.type is Path:
+                action.complete = shtab.FILE
+            elif not action.option_strings and action.nargs in ("*", "+"):
+                action.complete = dict.fromkeys(SHELLS, "_evoexp_words")
+    keys = " ".join(f"{name}=" for name in (*groups(), *SINGLE))
+    words = _asset(f"words.{shell}").replace("GROUPS", keys)
+    preamble: Any = {shell: words}
+    text = str(shtab.complete(parser, shell, preamble=preamble))
+    return text + (_asset("no_space.bash") if shell == "bash" else "")
+
+
+def _asset(name: str) -> str:
+    path = resources.files("evoexp").joinpath("assets/completion", name)
+    return path.read_text(encoding="utf-8")

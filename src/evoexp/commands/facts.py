@@ -1,0 +1,223 @@
+"""The facts about a condition that `show` prints: identity, origin, environment, result, verdict.
+
+Every function returns one mapping with the keys of `KEYS`; `show --json` prints it as it is.
+"""
+
+import hashlib
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import orjson
+
+from evoexp import shipped
+from evoexp.attachments import PREFIX, keep_all
+from evoexp.condition import Condition
+from evoexp.configuration.experiment import Experiment
+from evoexp.errors import EvoexpError
+from evoexp.records import flatten
+from evoexp.registry import COMPONENTS, registered
+from evoexp.store.log_reader import array_names, read_array, read_log
+from evoexp.store.manifest import differences, environment
+from evoexp.store.run_directory import RunDirectory, outputs_root
+from evoexp.store.summaries import summary_table
+from evoexp.validation import TARGET
+
+KEYS = {
+    "condition": "hash, 64 hex digits",
+    "shipped_as": "names of the condition in shipped experiments: experiment, label, budget",
+    "components": "component, revision, installed_revision, package",
+    "origin": "experiment, label, budget, command, options taken, log, code",
+    "environment": "versions, platform, cpu, differences from the environment here; null: not run",
+    "result": "replicates planned, done, failed; costs, effort; null: not run here",
+    "verdict": "replicates certified, refuted, undecided, without motion; clearance; null: not run",
+    "settings": "the canonical form of the condition",
+    "notes": "remarks of the planner",
+}
+"""Key → its value, in the order of the screen."""
+
+
+def composed_facts(experiment: Experiment, label: str, command: str) -> dict[str, Any]:
+    """Return the facts about one condition of an experiment, whether it was run here or not.
+
+    Args:
+        experiment: The experiment.
+        label: Of the condition.
+        command: That runs it.
+    """
+    condition = next(each.condition for each in experiment.conditions if each.label == label)
+    origin = {
+        "experiment": experiment.name,
+        "label": label,
+        "budget": experiment.budget,
+        "command": command,
+        "options": experiment.option_names(label),
+    }
+    run = RunDirectory(outputs_root(), condition.id)
+    rows = summary_table(run).to_pylist() if run.completed() or run.failed() else []
+    planned = condition.num_replicates(experiment.num_replicates)
+    around = run.manifest() if rows else None
+    return _facts(condition.to_json(), origin, around, rows, planned)
+
+
+def stored_facts(run: RunDirectory) -> dict[str, Any]:
+    """Return the facts about a stored run."""
+    manifest = run.manifest()
+    names = ("experiment", "label", "budget", "command", "options")
+    origin = {name: manifest[name] for name in names if name in manifest}
+    origin |= {"code": manifest.get("git"), "directory": str(run.path)}
+    config_json = run.config_json()
+    found = _facts(config_json, origin, manifest, summary_table(run).to_pylist(), None)
+    if arrays := [_shapes(run.log_path(k)) for k in sorted(run.completed())[:1]]:
+        found["result"]["arrays"] = arrays[0]
+    return found
+
+
+def log_facts(path: Path) -> dict[str, Any]:
+    """Return the facts about a replicate's log, wherever it comes from.
+
+    Raises:
+        CorruptLog: If the log cannot be trusted.
+    """
+    log = read_log(path)
+    keep_all(data for name, data in log.attachments.items() if name.startswith(PREFIX))
+    rows = [flatten(log.summary)]
+    found = _facts(log.config_json, {"log": str(path)}, log.environment, rows, None)
+    found["origin"]["replicate"] = log.replicate
+    found["result"] |= {
+        "digest": log.summary.digest,
+        "generations": len(log.generations) - 1,
+        "stop_reason": log.summary.stop_reason,
+        "arrays": _shapes(path),
+    }
+    return found
+
+
+def _facts(
+    config_json: bytes,
+    origin: dict[str, Any],
+    around: Mapping[str, Any] | None,
+    rows: Sequence[dict[str, Any]],
+    planned: int | None,
+) -> dict[str, Any]:
+    """Return the facts of all keys.
+
+    Args:
+        config_json: Canonical form of the condition.
+        origin: Where the condition comes from.
+        around: Environment or manifest in which the replicates were run; None: none were.
+        rows: Summaries of the replicates.
+        planned: How many there shall be; None: unknown.
+    """
+    config = orjson.loads(config_json)
+    condition_id = hashlib.sha256(config_json).hexdigest()
+    stored = None if around is None else {k: around.get(k) for k in ("versions", "platform", "cpu")}
+    if stored is not None:
+        stored["differences"] = [str(each) for each in differences(stored, environment())]
+    return {
+        "condition": condition_id,
+        "shipped_as": [
+            {"experiment": row.experiment, "label": row.label, "budget": row.budget}
+            for row in shipped.shipped()
+            if row.condition_id == condition_id
+        ],
+        "components": list(_components(config)),
+        "origin": origin,
+        "environment": stored,
+        "result": _result(rows, planned) if rows else None,
+        "verdict": _verdict([row for row in rows if row["status"] == "done"]) if rows else None,
+        "settings": config,
+        "notes": _notes(config_json),
+    }
+
+
+def _components(config: Any) -> Iterator[dict[str, Any]]:
+    """Yield every component once, with its revision here and as stored, and its package."""
+    known: dict[str, dict[str, Any]] = {}
+    for name, revision in _named(config):
+        registration = registered(COMPONENTS, name)
+        known.setdefault(
+            name,
+            {
+                "component": name,
+                "revision": revision,
+                "installed_revision": registration and registration.load().revision,
+                "package": registration and registration.package,
+            },
+        )
+    yield from known.values()
+
+
+def _named(config: Any) -> Iterator[tuple[str, Any]]:
+    """Yield name and revision of all components in plain configuration data."""
+    if isinstance(config, dict):
+        if TARGET in config:
+            yield str(config[TARGET]), config.get("revision")
+        config = list(config.values())
+    for value in config if isinstance(config, list) else ():
+        yield from _named(value)
+
+
+def _result(rows: Sequence[dict[str, Any]], planned: int | None) -> dict[str, Any]:
+    """Return counts, costs and effort of replicates."""
+    done = [row for row in rows if row["status"] == "done"]
+    failed = [row for row in rows if row["status"] != "done"]
+    best = min(done, key=lambda row: row["best_cost"], default=None)
+    return {
+        "planned": planned,
+        "done": len(done),
+        "failed": len(failed),
+        "failures": [
+            {"replicate": row["replicate"], "reason": row["stop_reason"]} for row in failed
+        ],
+        "solved": sum(bool(row["solved"]) for row in done),
+        "best_cost": best and best["best_cost"],
+        "best_replicate": best and best["replicate"],
+        "median_cost": _median(done, "best_cost"),
+        "median_evaluations": _median(done, "evaluations"),
+        "median_collision_queries": _median(done, "collision_queries"),
+        "median_cpu_s": _median(done, "cpu_s"),
+    }
+
+
+def _median(rows: Sequence[dict[str, Any]], name: str) -> float | None:
+    return float(np.median([row[name] for row in rows])) if rows else None
+
+
+def _verdict(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return how many motions the exact certifier accepts, and the closest approach of all."""
+    moved = [row for row in rows if not math.isnan(row["clearance"])]
+    nearest = min(moved, key=lambda row: row["clearance"], default=None)
+    near = nearest or {}
+    touching = [row for row in moved if row["refuted_at"] is not None]
+    return {
+        "certified": sum(row["certified"] is True for row in moved),
+        "refuted": sum(row["certified"] is False for row in moved),
+        "undecided": sum(row["certified"] is None for row in moved),
+        "without_motion": len(rows) - len(moved),
+        "certified_margin": sum(row["certified_margin"] is True for row in moved),
+        "clearance": near.get("clearance"),
+        "clearance_replicate": near.get("replicate"),
+        "clearance_pair": near.get("clearance_pair"),
+        "contacts": [
+            {key: row[key] for key in ("replicate", "refuted_at", "refuted_pair")}
+            for row in touching
+        ],
+        "length_unit": rows[0]["length_unit"] if rows else None,
+    }
+
+
+def _shapes(path: Path) -> dict[str, list[int]]:
+    """Return name → shape of the arrays that references attach to a log."""
+    return {name: list(read_array(path, name).shape) for name in array_names(path)}
+
+
+def _notes(config_json: bytes) -> list[str]:
+    """Return the planner's remarks on its settings, or the reason why there can be none."""
+    try:
+        planner, problem = Condition.from_json(config_json).prepare()
+    except EvoexpError as error:  # of another revision, or a package that is not installed
+        return [str(error)]
+    return list(planner.notes(problem))

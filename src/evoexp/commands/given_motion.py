@@ -1,0 +1,162 @@
+"""A motion out of a file, for commands that take one: told from the overrides, read, fitted."""
+
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from evoexp.commands.arguments import is_override
+from evoexp.condition import Condition
+from evoexp.configuration import expansions
+from evoexp.errors import MotionFileError
+from evoexp.records import FloatArray
+
+ENDINGS = (".json", ".npy")
+LARGEST = float(np.finfo(np.float64).max)
+MAX_DEPTH = 16  # nested lists; no planner's shape comes near
+
+
+class FittingMotion(NamedTuple):
+    """A motion file in a condition whose shape of solutions it has.
+
+    Attributes:
+        label: Of the condition.
+        condition: The condition.
+        planner: Its planner.
+        problem: Its problem.
+        solution: The motion as a flat solution.
+    """
+
+    label: str
+    condition: Condition
+    planner: Any
+    problem: Any
+    solution: FloatArray
+
+
+def is_motion(word: str) -> bool:
+    """Return whether a word of a command is the name of a motion file."""
+    return word.endswith(ENDINGS) and not is_override(word)
+
+
+def fitting_motions(
+    words: Sequence[str], *, multirun: bool = False, only: Sequence[str] = ()
+) -> tuple[Path, list[FittingMotion]]:
+    """Read the motion file among some words, and fit it into the conditions that the others choose.
+
+    Args:
+        words: One motion file, and overrides as `run` takes them.
+        multirun: Whether values with commas are swept over.
+        only: Labels of the conditions to keep.
+
+    Returns:
+        The file, and the conditions whose shape the motion has.
+
+    Raises:
+        MotionFileError: If there is not one file, if it cannot be read, or if it fits no condition.
+    """
+    files = [word for word in words if is_motion(word) or Path(word).exists()]
+    overrides = [word for word in words if word not in files]
+    if len(files) != 1:
+        found = " ".join(files) or "none"
+        raise MotionFileError(
+            f"motion file: one is needed (.json or .npy), got {len(files)}: {found}"
+        )
+    path = Path(files[0])
+    values = read_motion(path)
+    fitting, misfits = [], []
+    for experiment in expansions.expand(overrides, multirun=multirun, only=only):
+        for label, condition in experiment.conditions:
+            planner, problem = condition.prepare()
+            shape = planner.shape(problem)
+            solution = flatten(values, shape)
+            if solution is None:
+                misfits.append(f"{label}: {shape_text(shape)}")
+            else:
+                fitting.append(FittingMotion(label, condition, planner, problem, solution))
+    if not fitting:
+        plain = all("numbers" in text for text in misfits)
+        included = "" if plain else " (start and goal included)"
+        raise MotionFileError(
+            f"{path}: must be {'; '.join(dict.fromkeys(misfits))}{included}, "
+            f"was {_shape_of(values)}"
+        )
+    return path, fitting
+
+
+def read_motion(path: Path) -> Any:
+    """Read a motion as nested lists, or as an array from `.npy`.
+
+    Raises:
+        MotionFileError: If the file is missing, of another kind, or holds anything but finite
+            numbers.
+    """
+    try:
+        if path.suffix == ".npy":
+            with open(path, "rb") as file:
+                values: Any = np.lib.format.read_array(file, allow_pickle=False).tolist()
+        elif path.suffix == ".json":
+            values = json.loads(path.read_text())
+        else:
+            raise MotionFileError(f"{path}: a motion file ends in .json or .npy")
+    except OSError as error:
+        raise MotionFileError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except (ValueError, EOFError, RecursionError, MemoryError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise MotionFileError(f"{path}: is no {path.suffix[1:]} of numbers: {reason}") from None
+    if wrong := _not_finite(values, ""):
+        raise MotionFileError(f"{path}: must hold nested lists of finite numbers, {wrong}")
+    return values
+
+
+def flatten(values: list[Any], shape: Any) -> FloatArray | None:
+    """Return a motion as a flat solution of a planner's documented shape, None if it does not fit.
+
+    A shape that begins with an ellipsis is that of any number of equal parts.
+    """
+    if len(shape) and shape[0] is ...:
+        shape = tuple(shape[1:]) * (len(values) if isinstance(values, list) else 0)
+    if len(values) != len(shape):
+        return None
+    parts = []
+    for part, expected in zip(values, shape, strict=True):
+        try:
+            array = np.asarray(part, dtype=np.float64)
+        except ValueError:  # ragged
+            return None
+        if array.shape != tuple(expected):
+            return None
+        parts.append(array.ravel())
+    return np.concatenate(parts)
+
+
+def shape_text(shape: Any) -> str:
+    """Say a planner's documented shape."""
+    if len(shape) and shape[0] is ...:
+        return f"any number × {shape_text(shape[1:]).removeprefix('1 × ')}"
+    if not any(shape):
+        return f"{len(shape)} numbers"
+    parts = [" × ".join(map(str, part)) for part in shape]
+    if len(set(parts)) == 1:
+        return f"{len(parts)} × {parts[0]}"
+    return f"{len(parts)} lists: {', '.join(parts)}"
+
+
+def _shape_of(values: Any) -> str:
+    try:
+        return " × ".join(map(str, np.asarray(values, dtype=np.float64).shape))
+    except ValueError:
+        return f"a ragged list of {len(values)}"
+
+
+def _not_finite(values: Any, place: str) -> str:
+    """Return the first entry that is no finite number, and its place; nothing if there is none."""
+    if isinstance(values, list) and place.count("[") <= MAX_DEPTH:
+        found = (_not_finite(value, f"{place}[{k}]") for k, value in enumerate(values))
+        return next(filter(None, found), "")
+    if place and type(values) in (int, float) and abs(values) < math.inf and abs(values) <= LARGEST:
+        return ""
+    return f"was {str(values)[:40]} at {place or 'its top'}"

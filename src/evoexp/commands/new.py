@@ -1,0 +1,90 @@
+"""`evoexp new`: a package to begin with, of a planner of one's own."""
+
+import argparse
+import keyword
+import re
+from importlib import resources
+from importlib.resources.abc import Traversable
+from importlib.util import find_spec
+from pathlib import Path
+
+from evoexp.configuration.search_path import options
+from evoexp.errors import EvoexpError, SettingError
+from evoexp.registry import COMPONENTS, names
+from evoexp.store.files import write_files
+
+TEMPLATE = "my_planner"  # stands in the files for the name, and `MyPlanner` for the class
+GROUPS = ("experiment", "planner", "ga")  # that the package adds an option to
+
+
+class PackageExists(EvoexpError):
+    """A directory or an installed module that has the name of the new package."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.add_argument("kind", choices=("planner",), help="a planner with options and tests")
+    parser.add_argument(
+        "name", metavar="NAME", help="of the package: lower-case letters, digits and _"
+    )
+    parser.add_argument(
+        "--directory",
+        type=Path,
+        default=Path(),
+        metavar="DIR",
+        help="where to write the folder NAME; by default here",
+    )
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Write the package and say what to type next."""
+    name = arguments.name
+    root = arguments.directory / name
+    _check(name, root)
+    template = resources.files("evoexp").joinpath("assets/new_planner")
+    files = {root / _named(path, name): _named(text, name) for path, text in _read(template)}
+    for path in files:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    write_files({path: text.encode() for path, text in files.items()})
+    print(f"{root}: {len(files)} files")
+    print(f"install it: pip install -e {root}")
+    print(f"run it:     evoexp run experiment={name} budget=smoke")
+    return 0
+
+
+def _check(name: str, root: Path) -> None:
+    """Refuse a name that cannot be, or that something has already.
+
+    Raises:
+        SettingError: If the name is no name of a package, or evoexp has a component or an option of
+            this name.
+        PackageExists: If a directory or a module has it.
+    """
+    if not re.fullmatch("[a-z][a-z0-9]*(_[a-z0-9]+)*", name) or keyword.iskeyword(name):
+        must = "a word of lower-case letters, digits and _ that begins with a letter"
+        raise SettingError("NAME", must, name)
+    known = {*names(COMPONENTS), *(option for group in GROUPS for option in options(group))}
+    if name in known or name == "evoexp":
+        raise SettingError("NAME", "a new name: a component or an option has this one", name)
+    if root.exists():
+        raise PackageExists(f"{root}: is there already; choose another NAME or --directory")
+    if find_spec(name) is not None:
+        raise PackageExists(f"{name}: a module of this name is installed; choose another NAME")
+
+
+def _read(directory: Traversable, inside: str = "") -> list[tuple[str, str]]:
+    """Return (path, text) of all files of the template, in alphabetical order."""
+    found = []
+    for each in sorted(directory.iterdir(), key=lambda each: each.name):
+        path = f"{inside}{each.name}"
+        if each.is_dir():
+            found += _read(each, f"{path}/") if each.name != "__pycache__" else []
+        else:
+            found.append((path, each.read_text(encoding="utf-8")))
+    return found
+
+
+def _named(text: str, name: str) -> str:
+    """Return text of the template with the names of a new package."""
+    words = name.replace("_", " ").title().replace(" ", "")
+    return text.replace(TEMPLATE, name).replace("MyPlanner", words)

@@ -1,0 +1,120 @@
+"""`evoexp new planner` writes a package that is found, runs, and keeps a planner's obligations."""
+
+import ast
+import re
+import tomllib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from command_samples import Evoexp, exit_code
+
+from evoexp.configuration.search_path import origin
+from evoexp.testing import CHECKS, Check, conditions
+from guests import on_path, write_distribution
+from test_house import NUMBER, SOURCE
+
+Refused = Callable[..., str]
+NAME = "lambda_search"
+
+
+@pytest.fixture(scope="module")
+def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    directory = tmp_path_factory.mktemp("guests")
+    assert exit_code("new", "planner", NAME, "--directory", str(directory)) == 0
+    return directory / NAME
+
+
+@pytest.fixture(scope="module")
+def installed(package: Path) -> Iterator[None]:
+    """Have the package on the path with the entry points that its pyproject.toml declares."""
+    points = tomllib.loads((package / "pyproject.toml").read_text())["project"]["entry-points"]
+    groups = {group.removeprefix("evoexp."): names for group, names in points.items()}
+    write_distribution(package / "src", NAME, "0.1.0", **groups)
+    with on_path(package / "src"):
+        yield
+
+
+def test_the_files_have_the_new_name_everywhere(package: Path) -> None:
+    for path in (path for path in package.rglob("*") if path.is_file()):
+        assert "my_planner" not in f"{path}{path.read_text()}"
+        assert "MyPlanner" not in path.read_text()
+    for path in ("README.md", "pyproject.toml", f"src/{NAME}/planner.py", f"tests/test_{NAME}.py"):
+        assert (package / path).is_file()
+    for group in ("experiment", "ga", "planner"):
+        assert (package / f"src/{NAME}/conf/{group}/{NAME}.yaml").is_file()
+
+
+def test_the_planner_is_short(package: Path) -> None:
+    text = (package / f"src/{NAME}/planner.py").read_text()
+    left_out: set[int] = set()  # imports and docstrings
+    for node in ast.walk(ast.parse(text)):
+        is_docstring = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+        if is_docstring or isinstance(node, ast.Import | ast.ImportFrom):
+            left_out |= set(range(node.lineno, (node.end_lineno or 0) + 1))
+    lines = [line.strip() for k, line in enumerate(text.splitlines(), 1) if k not in left_out]
+    assert 40 < len([line for line in lines if line and not line.startswith("#")]) <= 60
+
+
+def test_every_number_has_unit_and_source(package: Path) -> None:
+    for path in package.rglob("*.yaml"):
+        for line in path.read_text().splitlines():
+            code, _, comment = line.partition("#")
+            value = re.sub(r"\"[^\"]*\"|=\S*", "", code.partition(":")[2])
+            assert not NUMBER.search(value) or SOURCE.match("#" + comment), f"{path.name}: {line}"
+
+
+@pytest.mark.usefixtures("installed")
+def test_its_options_come_from_the_package(evoexp: Evoexp) -> None:
+    assert origin("experiment", NAME) == f"{NAME} 0.1.0"
+    assert f"{NAME} 0.1.0" in evoexp("list").out
+
+
+@pytest.mark.usefixtures("installed")
+@pytest.mark.parametrize("check", CHECKS, ids=lambda check: check.__name__)
+@pytest.mark.parametrize("label", ["λ = 4", "λ = 16", "random search"])
+def test_it_keeps_a_planners_obligations(check: Check, label: str) -> None:
+    found = conditions(f"experiment={NAME}")
+    assert len(found) == 3
+    check(found[label])
+
+
+@pytest.mark.usefixtures("installed")
+def test_its_options_are_found_by_their_folder_too(evoexp: Evoexp, package: Path) -> None:
+    conf = package / f"src/{NAME}/conf"
+    said = evoexp(
+        "show", f"experiment={NAME}", "--only", "λ = 4", "--config-dir", str(conf), "--json"
+    )
+    assert f'"origin": "{conf}"' in said.out
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("My_planner", "a word of lower-case letters, digits and _ that begins with a letter"),
+        ("4arms", "a word of lower-case letters"),
+        ("my-planner", "a word of lower-case letters"),
+        ("my__planner", "a word of lower-case letters"),
+        ("class", "a word of lower-case letters"),
+        ("a/b", "a word of lower-case letters"),
+        ("", "a word of lower-case letters"),
+        ("coevolution", "a new name: a component or an option has this one"),
+        ("rana", "a new name: a component or an option has this one"),
+        ("evoexp", "a new name"),
+        ("json", "json: a module of this name is installed; choose another NAME"),
+    ],
+)
+def test_names_that_cannot_be(refused: Refused, tmp_path: Path, name: str, message: str) -> None:
+    assert message in refused("new", "planner", name, "--directory", str(tmp_path))
+    assert [path.name for path in tmp_path.iterdir()] == []
+
+
+def test_what_is_there_stays(refused: Refused, tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    said = refused("new", "planner", "mine", "--directory", str(tmp_path))
+    assert said == f"{tmp_path}/mine: is there already; choose another NAME or --directory"
+    assert list((tmp_path / "mine").iterdir()) == []
+
+
+def test_other_kinds_are_refused(refused: Refused) -> None:
+    assert refused("new", "robot", "mine") == "kind: must be one of planner, was 'robot'"

@@ -2,16 +2,23 @@ from pathlib import Path
 
 import pytest
 
+from evoexp.condition import Condition
 from evoexp.configuration import compose, expansions
 from evoexp.configuration.search_path import options
 from evoexp.report import parameters
 from evoexp.report.parameters import Parameter, option, overridden
 from evoexp.report.results import ConditionResults, Results
+from evoexp.shipped import Option
 from matrix import examples
 from report_samples import expand
 from shipped_conditions import EXAMPLES
 
 EXPERIMENTS = examples(options("experiment"), lambda name: name in dict(EXAMPLES))
+
+
+def nobodys(label: str, condition: Condition, options: tuple[Option, ...] = ()) -> ConditionResults:
+    """Return a condition that nobody ran."""
+    return ConditionResults(label, condition, 20, None, {}, None, {}, options)  # type: ignore[arg-type]
 
 
 def of(
@@ -20,7 +27,7 @@ def of(
     """Return the parameters of a condition that nobody ran, by name."""
     experiment = expansions.expand([f"experiment={name}", f"budget={budget}", *overrides])[0]
     text, condition = experiment.conditions[label]
-    found = ConditionResults(text, condition, experiment.num_replicates, None, {}, None, {})  # type: ignore[arg-type]
+    found = nobodys(text, condition, experiment.options[text])
     rows = parameters.parameters(Results(name, budget, (found,)), found)
     assert len({row.name for row in rows}) == len(rows)
     return {row.name: row for row in rows}
@@ -83,12 +90,39 @@ def test_another_option_than_the_experiments_own_is_recognised() -> None:
     assert rows["scenario.q_start[0]"].source.startswith("paper: Tab. 2")
 
 
-def test_options_are_recognised_without_an_experiment() -> None:
+def test_options_that_nothing_records_are_those_that_settings_are_most_like() -> None:
     condition = compose.expand(["experiment=rana_three_arms"])[0].conditions[0].condition
-    found = ConditionResults("", condition, 20, None, {}, None, {})  # type: ignore[arg-type]
+    found = nobodys("", condition)
     rows = {row.name: row for row in parameters.parameters(Results("", "", (found,)), found)}
-    assert rows["robot"].source == "conf/robot/three_planar_2r.yaml"
+    assert rows["robot"].source == "most like conf/robot/three_planar_2r.yaml"
     assert rows["robot.arms[2].base_position"].unit == "unit"
+
+
+def test_the_option_that_was_taken_is_named_though_another_one_is_alike(tmp_path: Path) -> None:
+    experiment = expansions.expand(["experiment=rana_planar"])[0]
+    label, condition = experiment.conditions[0]
+    (tmp_path / "ga").mkdir()
+    shipped = next(each for each in experiment.options[label] if each.group == "ga")
+    mine = tmp_path / "ga" / "mine.yaml"
+    mine.write_text(Path(shipped.path).read_text().replace("paper: Tab. 1, pop", "mine: pop"))
+    taken = shipped._replace(name="mine", origin="my-planner 0.3", path=str(mine))
+    others = tuple(each for each in experiment.options[label] if each.group != "ga")
+    for each, unit_source in ((taken, "mine: population"), (taken._replace(path=""), None)):
+        found = nobodys(label, condition, (*others, each))
+        rows = parameters.parameters(Results("rana_planar", "paper", (found,)), found)
+        named = {row.name: row for row in rows}
+        assert named["ga"].source == "my-planner 0.3: ga/mine.yaml"
+        assert named["ga.population_size"].source == (unit_source or named["ga"].source)
+        assert named["planner"].source == "conf/planner/rana_planar.yaml"
+
+
+def test_an_option_takes_in_shipped_ones_from_elsewhere(tmp_path: Path) -> None:
+    (tmp_path / "ga").mkdir()
+    own = tmp_path / "ga" / "own.yaml"
+    own.write_text("defaults:\n  - rana_planar\n  - _self_\npopulation_size: 7  # [-] mine\n")
+    entries = option(own)
+    assert entries["population_size"] == (7, "", "mine")
+    assert entries["crossover_rate"].source.startswith("paper: Tab. 1")
 
 
 def test_a_control_is_a_component_of_its_own() -> None:
@@ -115,6 +149,6 @@ def test_an_option_file_is_read_with_its_comments(tmp_path: Path) -> None:
 
 
 def test_planned_replicates_are_those_without_a_cap() -> None:
-    assert parameters.planned_replicates("rana_planar") == 20
-    assert parameters.planned_replicates("") == 20
+    assert parameters.planned_replicates(Results("rana_planar", "smoke", ())) == 20
+    assert parameters.planned_replicates(Results("", "", ())) == 20
     assert expand("rana_planar").num_replicates == 2

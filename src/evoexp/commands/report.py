@@ -102,6 +102,7 @@ def of_experiment(
         experiment.budget,
         experiment.conditions,
         shlex.join(words),
+        experiment.options,
     )
     return build.report(request, experiment.report, outputs_root(), experiment.num_replicates)
 

@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,6 +12,7 @@ from evoexp.report.page import Drawing
 from evoexp.report.pages import page_of
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import gather
+from evoexp.shipped import Option
 from evoexp.store.files import write_files
 from evoexp.version import __version__
 
@@ -19,7 +20,7 @@ INDEX = "index.md"
 
 
 class Request(NamedTuple):
-    """What a report is asked for.
+    """The conditions of a report, and the words that ask for it.
 
     Attributes:
         report_name: Directory under `reports`.
@@ -28,6 +29,7 @@ class Request(NamedTuple):
         conditions: (label, condition) in the order of the experiment.
         arguments: What was asked for, as words of the command line: "rana_planar budget=smoke";
             derived if empty.
+        options: Label → the options that were taken; None: those that the runs' manifests name.
     """
 
     report_name: str
@@ -35,6 +37,7 @@ class Request(NamedTuple):
     budget: str
     conditions: Sequence[tuple[str, Condition]]
     arguments: str = ""
+    options: Mapping[str, tuple[Option, ...]] | None = None
 
     @property
     def words(self) -> str:
@@ -80,6 +83,7 @@ def report(
         request.experiment,
         request.budget,
         request.hint,
+        request.options,
     )
     page = page_of(found, settings)
     directory = outputs / "reports" / request.report_name

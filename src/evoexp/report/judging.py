@@ -87,7 +87,7 @@ def not_judged(results: Results) -> str:
     """Return why claims are not to be judged; empty if they are."""
     if results.budget != "paper":
         return f"budget {results.budget or 'unknown'}"
-    planned = planned_replicates(results.experiment)
+    planned = planned_replicates(results)
     if any(c.planned < c.condition.num_replicates(planned) for c in results.conditions):
         return "fewer replicates than planned"
     own = {

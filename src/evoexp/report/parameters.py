@@ -1,8 +1,8 @@
-"""Parameters of conditions with unit and source, as the comments of the shipped options state them.
+"""Parameters of conditions with unit and source, as the comments of their option files state them.
 
-A condition does not know which options it was composed of, so each of its components is compared
-with all shipped options of its group: the one that agrees in most settings is named, and settings
-that differ from it are overrides.
+An experiment records the option that each group of a condition was taken from; a setting that
+differs from its option is an override. Logs without that record have each component compared with
+the shipped options of its group, and the table names the one that it is most like.
 """
 
 import functools
@@ -16,17 +16,18 @@ import yaml
 from evoexp.attachments import FILE, SHA256, keep
 from evoexp.condition import PARTS
 from evoexp.report.results import WRAPPED, ConditionResults, Results
-from evoexp.shipped import config_directory
+from evoexp.shipped import Option, config_directory
 from evoexp.validation import TARGET
 
 OVERRIDE = "override"
+_CAPS = {"num_replicates": "max_replicates", "ga.num_generations": "max_generations"}
 _COMMENT = re.compile(r"#\s*(?:\[(?P<unit>[^\]]*)\])?\s*(?P<source>.*)")
 _REFERENCE = re.compile(r"\$\{(\w+)\}")
 _SHARED = re.compile(r"\$\{(\w+\.[\w.]+)\}")  # one setting of another group
 
 
 class Entry(NamedTuple):
-    """One value of an option file, and what its comment says."""
+    """One value of an option file with the unit and the source that its comment names."""
 
     value: Any
     unit: str
@@ -52,50 +53,50 @@ class Parameter(NamedTuple):
 def parameters(results: Results, condition: ConditionResults) -> list[Parameter]:
     """Return all settings of one condition, its seed and its number of replicates."""
     config = {part: getattr(condition.condition, part).canonical() for part in PARTS}
-    preferred = _choices(results.experiment)
+    taken = {each.group: each for each in condition.options}
     found: list[Parameter] = []
     for part, value in config.items():
         if WRAPPED in value:  # a control or a reference around the planner
             outer = {key: v for key, v in value.items() if key != WRAPPED}
-            found += _component(
-                "reference" if condition.is_reference else "control", outer, preferred
-            )
+            around = "reference" if condition.is_reference else "control"
+            found += _component(around, outer, taken)
             value = value[WRAPPED]
-        found += _component(part, value, preferred)
+        found += _component(part, value, taken)
     root = option(config_directory() / "config.yaml")
     found.append(_parameter("seed", condition.condition.seed, root.get("seed"), OVERRIDE))
-    planned = Entry(planned_replicates(results.experiment), *root["num_replicates"][1:])
-    if not condition.is_reference:  # which has one, whatever is planned
+    if not condition.is_reference:  # which has one replicate, however many are planned
+        planned = Entry(planned_replicates(results), *root["num_replicates"][1:])
         found.append(_parameter("num_replicates", condition.planned, planned, OVERRIDE))
-    return [_capped(parameter, results.budget) for parameter in found]
+    budget = _file("budget", results.budget, taken)
+    caps = option(budget) if budget else {}
+    return [_capped(parameter, results.budget, caps) for parameter in found]
 
 
-def planned_replicates(experiment: str) -> int:
+def planned_replicates(results: Results) -> int:
     """Return the number of replicates that an experiment has without any cap or override."""
-    path = config_directory() / "experiment" / f"{experiment}.yaml"
-    own = yaml.safe_load(path.read_text()).get("num_replicates") if path.is_file() else None
-    return int(
-        own
-        if own is not None
-        else option(config_directory() / "config.yaml")["num_replicates"].value
-    )
+    taken = {each.group: each for c in results.conditions for each in c.options}
+    path = _file("experiment", results.experiment, taken)
+    own = yaml.safe_load(path.read_text()).get("num_replicates") if path else None
+    default = option(config_directory() / "config.yaml")["num_replicates"].value
+    return int(default if own is None else own)
+
+
+def _file(group: str, name: str, taken: dict[str, Option]) -> Path | None:
+    """Return the file of the option taken of a group, or the shipped one; None: there is none."""
+    shipped = config_directory() / group / f"{name}.yaml"
+    path = Path(taken[group].path) if group in taken else shipped
+    return path if path.is_file() else None
 
 
 def overridden(found: Iterable[Parameter]) -> list[str]:
-    """Return the names of settings that are no longer the paper's.
-
-    Another seed is as good as any.
-    """
+    """Return the names of settings that are no longer the paper's; any seed is as good as its."""
     changed = (p for p in found if p.source == OVERRIDE or p.source.startswith("budget"))
     return [p.name for p in changed if p.name != "seed"]
 
 
 @functools.cache
 def option(path: Path) -> dict[str, Entry]:
-    """Return the values of an option file with their comments, by dotted key.
-
-    Its defaults filled in.
-    """
+    """Return the values of an option file, its defaults filled in, with comments, by dotted key."""
     text = path.read_text()
     node = yaml.compose(text)
     entries: dict[str, Entry] = {}
@@ -113,19 +114,20 @@ def option(path: Path) -> dict[str, Entry]:
 def _taken_in(base: Any, path: Path, entries: dict[str, Entry]) -> dict[str, Entry]:
     """Return the entries of an option that another one takes in.
 
-    `name`, `name@part` or `/group@part: name`.
+    Args:
+        base: An item of its defaults: `name`, `name@part` or `/group@part: name`.
+        path: Of the option that takes it in.
+        entries: Found so far; of a part that a group was taken in for, the group goes.
     """
     key, name = next(iter(base.items())) if isinstance(base, dict) else ("", str(base))
-    name, _, part = name.partition("@")
+    group, _, part = key.removeprefix("/").partition("@")
     if key:
-        group, _, part = key.removeprefix("/").partition("@")
-        entries.pop(part, None)  # what stood there was taken from a group
-        return {
-            f"{part}.{own}": entry
-            for own, entry in option(path.parents[1] / group / f"{name}.yaml").items()
-        }
-    prefix = f"{part}." if part else ""
-    return {prefix + own: entry for own, entry in option(path.parent / f"{name}.yaml").items()}
+        entries.pop(part, None)
+    else:
+        group, (name, _, part) = path.parent.name, name.partition("@")
+    beside = path.parents[1] / group / f"{name}.yaml"  # else it is a shipped one
+    found = option(beside if beside.is_file() else config_directory() / group / f"{name}.yaml")
+    return {f"{part}.{own}" if part else own: entry for own, entry in found.items()}
 
 
 def _leaves(node: Any, prefix: str) -> Iterator[tuple[str, Any]]:
@@ -150,71 +152,56 @@ def _comment(lines: list[str], node: Any) -> tuple[str, str]:
     return "" if unit == "-" else unit, match["source"].strip()
 
 
-def _component(
-    group: str, config: dict[str, Any], preferred: dict[str, str]
-) -> Iterator[Parameter]:
+def _component(group: str, config: dict[str, Any], taken: dict[str, Option]) -> Iterator[Parameter]:
     """Yield the settings of one component, and of the groups that its option takes in."""
-    name, entries = _option_of(group, config, preferred.get(group))
-    revision = config.get("revision")
-    where = f"conf/{group}/{name}.yaml" if name else OVERRIDE
-    yield Parameter(group, f"{config[TARGET]}, revision {revision}", "", where)
+    if group in taken:
+        path = _file(group, "", taken)
+        where, entries = taken[group].source, option(path) if path else {}
+    else:
+        where, entries = _most_like(group, config)
+    otherwise = OVERRIDE if entries else where  # of a setting that the option does not have
+    yield Parameter(group, f"{config[TARGET]}, revision {config.get('revision')}", "", where)
     for key, value in config.items():
-        if key in (TARGET, "revision"):
-            continue
-        yield from _setting(group, key, value, entries, preferred)
+        if key not in (TARGET, "revision"):
+            yield from _setting(group, key, value, entries, otherwise, taken)
 
 
 def _setting(
-    group: str, key: str, value: Any, entries: dict[str, Entry], preferred: dict[str, str]
+    group: str,
+    key: str,
+    value: Any,
+    entries: dict[str, Entry],
+    otherwise: str,
+    taken: dict[str, Option],
 ) -> Iterator[Parameter]:
     """Yield a setting; of a component in a component its settings."""
     reference = _REFERENCE.fullmatch(str(entries[key].value)) if key in entries else None
     if reference and isinstance(value, dict):
-        yield from _component(reference[1], value, preferred)
+        yield from _component(reference[1], value, taken)
     elif isinstance(value, dict) and TARGET in value:
         for name, item in value.items():
             if name not in (TARGET, "revision"):
-                yield from _setting(group, f"{key}.{name}", item, entries, preferred)
+                yield from _setting(group, f"{key}.{name}", item, entries, otherwise, taken)
     else:
         for path, leaf in _flat(value, key):
-            yield _parameter(f"{group}.{path}", leaf, entries.get(path), OVERRIDE)
+            yield _parameter(f"{group}.{path}", leaf, entries.get(path), otherwise)
 
 
-def _option_of(
-    group: str, config: dict[str, Any], preferred: str | None
-) -> tuple[str, dict[str, Entry]]:
-    """Return name and entries of the shipped option that is nearest to a component."""
+def _most_like(group: str, config: dict[str, Any]) -> tuple[str, dict[str, Entry]]:
+    """Name the shipped option that agrees with a component in most settings, with its entries."""
     leaves = dict(_flat(config, ""))
-    best: tuple[tuple[int, bool], str, dict[str, Entry]] = ((-(10**9), False), "", {})
+    found: list[tuple[int, str, dict[str, Entry]]] = []
     for path in sorted((config_directory() / group).glob("*.yaml")):
         entries = option(path)
         if TARGET not in entries or entries[TARGET].value != config[TARGET]:
             continue
-        agreeing = sum(
-            _same(value, entries[key].value) for key, value in leaves.items() if key in entries
-        )
-        lacking = sum(
-            key not in leaves
-            for key, entry in entries.items()
-            if not _REFERENCE.match(str(entry.value))
-        )
-        score = (agreeing - lacking, path.stem == preferred)
-        if score > best[0]:
-            best = (score, path.stem, entries)
-    return best[1:]
-
-
-@functools.cache
-def _choices(experiment: str) -> dict[str, str]:
-    """Return the option that an experiment file chooses for every group."""
-    path = config_directory() / "experiment" / f"{experiment}.yaml"
-    if not experiment or not path.is_file():
-        return {}
-    chosen = {}
-    for entry in yaml.safe_load(path.read_text()).get("defaults", ()):
-        for key, name in entry.items() if isinstance(entry, dict) else ():
-            chosen[key.removeprefix("override ").lstrip("/")] = name
-    return chosen
+        agreeing = sum(_same(leaves[key], entries[key].value) for key in leaves.keys() & entries)
+        lacking = entries.keys() - leaves.keys()
+        lacking_values = [key for key in lacking if not _REFERENCE.match(str(entries[key].value))]
+        where = f"most like conf/{group}/{path.name}"
+        found.append((agreeing - len(lacking_values), where, entries))
+    _, where, entries = max(found, key=lambda each: each[0], default=(0, OVERRIDE, {}))
+    return where, entries
 
 
 def _flat(value: Any, prefix: str) -> Iterator[tuple[str, Any]]:
@@ -239,16 +226,10 @@ def _parameter(name: str, value: Any, entry: Entry | None, otherwise: str) -> Pa
     return Parameter(name, _text(value), entry.unit, source)
 
 
-def _capped(parameter: Parameter, budget: str) -> Parameter:
+def _capped(parameter: Parameter, budget: str, caps: dict[str, Entry]) -> Parameter:
     """Name the budget where it, and no override, made a setting what it is."""
-    path = config_directory() / "budget" / f"{budget}.yaml"
-    if parameter.source != OVERRIDE or not budget or not path.is_file():
-        return parameter
-    key = {"num_replicates": "max_replicates", "ga.num_generations": "max_generations"}.get(
-        parameter.name
-    )
-    caps = option(path)
-    if key in caps and str(caps[key].value) == parameter.value:
+    key = _CAPS.get(parameter.name)
+    if parameter.source == OVERRIDE and key in caps and str(caps[key].value) == parameter.value:
         return parameter._replace(source=f"budget {budget}")
     return parameter
 

@@ -2,7 +2,7 @@
 
 import functools
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -15,6 +15,7 @@ from evoexp.errors import NothingStored
 from evoexp.paths.motion import Motion
 from evoexp.records import FloatArray
 from evoexp.report.statistics import Spread, spread
+from evoexp.shipped import ORIGIN, Option, config_directory
 from evoexp.store.log_reader import read_array, read_log, read_solution
 from evoexp.store.messages import TERM
 from evoexp.store.run_directory import RunDirectory
@@ -104,6 +105,7 @@ class ConditionResults(NamedTuple):
         failures: Replicate → why it failed.
         logs: What the logs of the finished replicates hold.
         code: Version, commit and dirty flag of the code that created the run.
+        options: The option that was taken of each group; empty where nothing records it.
     """
 
     label: str
@@ -113,6 +115,7 @@ class ConditionResults(NamedTuple):
     failures: dict[int, str]
     logs: StoredLogs
     code: dict[str, Any]
+    options: tuple[Option, ...] = ()
 
     @property
     def generations(self) -> pd.DataFrame:
@@ -303,6 +306,7 @@ def gather(
     experiment: str,
     budget: str,
     command: str,
+    options: Mapping[str, tuple[Option, ...]] | None = None,
 ) -> Results:
     """Read what is stored.
 
@@ -312,14 +316,16 @@ def gather(
         num_replicates: Planned for every condition; None: as many as each one has.
         experiment: Its name.
         budget: Its name.
-        command: What helps where nothing is stored.
+        command: The command that helps where nothing is stored.
+        options: Label → options that were taken; None: those that the runs' manifests name.
 
     Raises:
         NothingStored: If no replicate of any condition is there, done or failed.
         CorruptLog: If a log cannot be trusted.
     """
     found = tuple(
-        _read(outputs, label, condition, num_replicates) for label, condition in conditions
+        _read(outputs, label, condition, num_replicates, (options or {}).get(label))
+        for label, condition in conditions
     )
     if not any(condition.done or condition.failed for condition in found):
         raise NothingStored(
@@ -329,7 +335,11 @@ def gather(
 
 
 def _read(
-    outputs: Path, label: str, condition: Condition, num_replicates: int | None
+    outputs: Path,
+    label: str,
+    condition: Condition,
+    num_replicates: int | None,
+    options: tuple[Option, ...] | None,
 ) -> ConditionResults:
     run = RunDirectory(outputs, condition.id)
     stored = run.completed() | run.failed()
@@ -356,6 +366,7 @@ def _read(
         dict(zip(map(int, failed.index), map(str, failed["stop_reason"]), strict=True)),
         StoredLogs(run, [int(k) for k in done.index], best),
         _code(run) if stored else {},
+        _recorded_options(run) if options is None and stored else options or (),
     )
 
 
@@ -365,8 +376,19 @@ def _best_replicate(done: pd.DataFrame) -> int:
     )
 
 
+def _recorded_options(run: RunDirectory) -> tuple[Option, ...]:
+    """Return the options that a run's manifest names; only shipped ones have files to be read."""
+    recorded: dict[str, dict[str, str]] = run.manifest().get("options") or {}
+    found = []
+    for group, each in recorded.items():
+        shipped = config_directory() / group / f"{each['name']}.yaml"
+        path = str(shipped) if each["origin"] == ORIGIN else ""
+        found.append(Option(group, each["name"], each["origin"], path))
+    return tuple(found)
+
+
 def _code(run: RunDirectory) -> dict[str, Any]:
-    """Return which code created a run, as its manifest notes it."""
+    """Return version and commit of the code that created a run, from its manifest."""
     manifest = run.manifest()
     git = manifest.get("git") or {}
     version = manifest.get("versions", {}).get("evoexp")

@@ -101,8 +101,9 @@ def not_judged(results: Results, condition: ConditionResults) -> str:
     """Return why claims are not judged on a condition; empty if they are."""
     if results.budget != "paper":
         return f"budget {results.budget or 'unknown'}"
-    if condition.planned < planned_replicates(results.experiment):
-        return f"{condition.planned} of {planned_replicates(results.experiment)} replicates planned"
+    planned = planned_replicates(results)
+    if condition.planned < planned:
+        return f"{condition.planned} of {planned} replicates planned"
     changed = overridden(parameters(results, condition))
     return f"overridden: {', '.join(changed)}" if changed else ""
 

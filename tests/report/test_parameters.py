@@ -16,9 +16,11 @@ from shipped_conditions import EXAMPLES
 EXPERIMENTS = examples(options("experiment"), lambda name: name in dict(EXAMPLES))
 
 
-def nobodys(label: str, condition: Condition, options: tuple[Option, ...] = ()) -> ConditionResults:
+def nobodys(
+    label: str, condition: Condition, options: tuple[Option, ...] = (), planned: int = 20
+) -> ConditionResults:
     """Return a condition that nobody ran."""
-    return ConditionResults(label, condition, 20, None, {}, None, {}, options)  # type: ignore[arg-type]
+    return ConditionResults(label, condition, planned, None, {}, None, {}, options)  # type: ignore[arg-type]
 
 
 def of(
@@ -27,7 +29,7 @@ def of(
     """Return the parameters of a condition that nobody ran, by name."""
     experiment = expansions.expand([f"experiment={name}", f"budget={budget}", *overrides])[0]
     text, condition = experiment.conditions[label]
-    found = nobodys(text, condition, experiment.options[text])
+    found = nobodys(text, condition, experiment.options[text], experiment.num_replicates)
     rows = parameters.parameters(Results(name, budget, (found,)), found)
     assert len({row.name for row in rows}) == len(rows)
     return {row.name: row for row in rows}

@@ -8,7 +8,7 @@ import os
 import pytest
 from hypothesis import settings
 
-EXHAUSTIVE = "EVOEXP_EXHAUSTIVE"  # set where larger counts are asked for; see `counts`
+EXHAUSTIVE = "EVOEXP_EXHAUSTIVE"  # set where larger counts are asked for; see `matrix.counts`
 
 settings.register_profile("evoexp", deadline=None, derandomize=True, database=None)
 settings.register_profile(

@@ -1,5 +1,6 @@
 """Parameters of tests: some always, all with ./scripts/test --all."""
 
+import os
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -25,3 +26,8 @@ def first(count: int, values: Iterable[Any]) -> list[Any]:
     known = list(values)
     early = known[:count]
     return examples(known, lambda value: any(value is one for one in early))
+
+
+def counts(few: int, many: int) -> int:
+    """Return the number of cases of a test: many with ./scripts/test --exhaustive, else few."""
+    return many if "EVOEXP_EXHAUSTIVE" in os.environ else few

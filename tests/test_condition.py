@@ -203,11 +203,11 @@ def test_components_in_the_wrong_place_are_refused(config: dict[str, Any]) -> No
     robot, scenario, planner = config["robot"], config["scenario"], config["planner"]
     assert (
         refusal(config | {"robot": scenario})
-        == "robot: must be one that via_point_ga takes, a Robot, was 'arm_motion'"
+        == "robot: must be one that via_point_ga takes (Robot), was 'arm_motion'"
     )
     assert (
         refusal(config | {"scenario": robot})
-        == "scenario: must be one that via_point_ga takes, a ArmMotion, was 'arms'"
+        == "scenario: must be one that via_point_ga takes (ArmMotion), was 'arms'"
     )
     assert refusal(config | {"planner": robot}) == "planner: must be a planner, was 'arms'"
     search = {"_target_": "random_search", "revision": 1}

@@ -184,7 +184,7 @@ def _check_roles(robot: Component, scenario: Component, planner: Component) -> N
         for part, value in (("robot", robot), ("scenario", scenario)):
             kind = hints.get(part, Any)
             if isinstance(kind, type) and not isinstance(value, kind):
-                must = f"one that {inner.component} takes, a {kind.__name__}"
+                must = f"one that {inner.component} takes ({kind.__name__})"
                 raise SettingError(part, must, value.component)
 
 

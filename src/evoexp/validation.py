@@ -5,7 +5,7 @@ file or from the `config.json` of a log) checks every type and range and names t
 by its path; nothing is coerced but whole numbers into float fields and lists into tuples.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from typing import Annotated, Any, ClassVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -109,8 +109,9 @@ def settings_error(
         field: Dotted path of the settings, as it was typed.
     """
     first = error.errors(include_url=False)[0]
-    path, here = field, settings
+    path, here, kinds = field, settings, {kind}
     for part in first["loc"]:
+        kinds = _inner(kinds, part)
         if isinstance(part, int) and isinstance(here, list | tuple):
             path, here = f"{path}[{part}]", here[part] if part < len(here) else {}
         elif isinstance(part, int):  # one value in the place of a list
@@ -118,11 +119,16 @@ def settings_error(
         elif part in _members(here) or part == first["loc"][-1]:
             path, here = _join(path, part), _members(here).get(part, {})
         # else: the tag of a union, which nobody typed
+        if isinstance(here, Mapping) and here and any(issubclass(k, Component) for k in kinds):
+            return SettingError(path, f"a component, given by its {TARGET}", here)
     if first["type"] == "extra_forbidden":
-        return UnknownSetting(path, _known(kind, first["loc"][:-1]))
+        return UnknownSetting(path, {name for each in kinds for name in each.model_fields})
     if first["type"] == "missing":
         return SettingError(path, "given", None)
     must, hint = _must(first)
+    if first["type"] == "model_type" and not any(issubclass(k, Component) for k in kinds):
+        names = {name for each in kinds for name in each.model_fields}
+        must = f"a mapping of {', '.join(sorted(names))}"
     return SettingError(path, must, first["input"], hint)
 
 
@@ -133,19 +139,22 @@ def _members(value: Any) -> Mapping[str, Any]:
     )
 
 
-def _known(kind: type[Settings], location: Sequence[int | str]) -> set[str]:
-    """Return the names of the settings that there are at a location, as pydantic gives it."""
-    kinds = {kind}
-    for part in location:
-        inner = {
-            own
-            for each in kinds
-            if part in each.model_fields
-            for own in _settings_in(each.model_fields[part].annotation)
-        }
-        tagged = {each for each in kinds if part in _tags(each)}
-        kinds = inner or tagged or kinds  # an index leaves the kinds as they are
-    return {name for each in kinds for name in each.model_fields}
+def _inner(kinds: set[type[Settings]], part: int | str) -> set[type[Settings]]:
+    """Return the classes of settings one step down a location, as pydantic gives it.
+
+    Args:
+        kinds: The classes of settings above.
+        part: Name of a field, index in a list, or tag of a union.
+    """
+    inner = {
+        own
+        for each in kinds
+        if part in each.model_fields
+        for own in _settings_in(each.model_fields[str(part)].annotation)
+    }
+    tagged = {each for each in kinds if part in _tags(each)}
+    is_leaf = any(part in each.model_fields for each in kinds)
+    return inner if is_leaf else tagged or kinds
 
 
 def _settings_in(annotation: Any) -> Iterator[type[Settings]]:
@@ -180,7 +189,7 @@ _MUST = {
     "union_tag_not_found": "given with its {discriminator}",
     "model_type": "a {class_name}",
     "model_attributes_type": "a mapping",
-    "is_instance_of": "a {class}",
+    "is_instance_of": "a component that is a {class}",
 }
 
 

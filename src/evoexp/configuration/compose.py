@@ -6,6 +6,7 @@ the chosen options; settings are assigned to copies of these (see `assignment`).
 """
 
 import copy
+import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -113,7 +114,7 @@ def parse(text: str) -> Override:
         SettingError: If it is none.
     """
     key, _, typed = text.partition("=")
-    if key == EXPERIMENT and is_file(typed) and Path(typed).is_file():  # whatever its name
+    if key == EXPERIMENT and is_file(typed) and os.path.isfile(typed):  # whatever its name
         return Override("", key, (Value(typed, typed),), False, text)
     parser = OverridesParser.create()
     try:

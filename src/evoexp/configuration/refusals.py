@@ -78,8 +78,13 @@ def unresolved(error: Exception, config: Mapping[str, Any]) -> SettingError:
     field = str(getattr(error, "full_key", None) or "")
     if field not in found:
         field = next((key for key, value in found.items() if value in text), next(iter(found), ""))
-    must = f"a value, or the name of another setting in ${{…}} ({_first_line(error)})"
-    return SettingError(field or "seed", must, found.get(field))
+    if name := re.search(r"(?:key|variable) '([^']+)' not found", text):
+        reason = f"there is no '{name[1]}'"
+    else:
+        is_circle = isinstance(error, RecursionError) or "recursi" in text.lower()
+        reason = "it leads round in a circle" if is_circle else "it cannot be read"
+    must = f"a value, or the name of another setting in ${{…}} ({reason})"
+    return SettingError(field, must, found.get(field))
 
 
 def _first_line(error: Exception) -> str:

@@ -120,13 +120,13 @@ def find(group: str, name: str) -> Option:
         UnknownOption: If there is none of this name; lists those that there are.
     """
     if group == EXPERIMENT and is_file(name):
-        if not Path(name).is_file():
+        if not os.path.isfile(name):
             raise SettingError(EXPERIMENT, "the path of a file, or the name of an experiment", name)
         return Option(group, Path(name).stem, name, str(Path(name).resolve()))
-    for folder in folders() if Path(name).name == name else ():
-        path = folder.path / group / f"{name}.yaml"
-        if path.is_file():
-            return Option(group, name, folder.origin, str(path))
+    for folder in folders() if os.path.basename(name) == name else ():
+        path = os.path.join(folder.path, group, f"{name}.yaml")
+        if os.path.isfile(path):  # of any text at all, also one that is too long for a path
+            return Option(group, name, folder.origin, path)
     raise UnknownOption(group, name, options(group))
 
 

@@ -8,12 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.sphere_kernels import clearances
+from evoexp.collision.models.sphere_kernels import SphereTables, clearances
 from evoexp.evolution.cost_statistics import summarise
 from evoexp.evolution.crossover import cross_at_sites
 from evoexp.evolution.selection import choose_elites, shuffle_head, spin_roulette
 from evoexp.evolution.succession import succeed_rows
 from evoexp.numeric.compilation import kernel
+from evoexp.numeric.named_tuples import named
 from evoexp.objectives.string_fitness import StringTerms, count_collisions, fill_wheel, weigh
 from evoexp.paths.interpolation import interpolate
 from evoexp.paths.lengths import measure_paths
@@ -92,7 +93,23 @@ class Judging(NamedTuple):
 
     substeps: int
     weights: tuple[float, float, float]
-    tables: Any
+    tables: SphereTables
+
+
+class Settings(NamedTuple):
+    """Settings of a whole generation.
+
+    Attributes:
+        counts: Sizes.
+        breeding: Of section 3.4 (a), (b), (d).
+        smoothing: Of section 3.4 (c).
+        judging: Of Eqs. 2–7.
+    """
+
+    counts: Counts
+    breeding: Breeding
+    smoothing: Smoothing
+    judging: Judging
 
 
 class Memory(NamedTuple):
@@ -103,7 +120,7 @@ class Memory(NamedTuple):
         costs: (individuals,) of the population.
         collisions: (individuals,) of the population.
         offspring: Strings.
-        terms: Fields of `StringTerms`, of the offspring.
+        terms: Of the offspring.
         elites: Places of the elites, best first.
     """
 
@@ -111,45 +128,44 @@ class Memory(NamedTuple):
     costs: FloatArray
     collisions: FloatArray
     offspring: FloatArray
-    terms: tuple[FloatArray, ...]
+    terms: StringTerms
     elites: IntArray
 
 
 @kernel
 def advance(
-    uniforms: FloatArray, arm_slices: IntArray, settings: tuple[Any, ...], arrays: tuple[Any, ...]
+    uniforms: FloatArray,
+    arm_slices: IntArray,
+    plain_settings: tuple[Any, ...],
+    plain_memory: tuple[Any, ...],
 ) -> tuple[int, float, float, int]:
     """Replace a population by the next one.
-
-    `settings` and `arrays` are nested plain tuples: numba takes 2 µs to read a named one.
 
     Args:
         uniforms: Random numbers of the whole generation, in the order in which they are used.
         arm_slices: (arms, 2) rows of each arm.
-        settings: Fields of `Counts`, of `Breeding`, of `Smoothing` and of `Judging`.
-        arrays: Fields of `Memory`.
+        plain_settings: `Settings`, made plain.
+        plain_memory: `Memory`, made plain.
 
     Returns:
         Index of the best, mean and standard deviation of the finite costs, number of collision-free
         individuals.
     """
-    counts, breeding = Counts(*settings[0]), Breeding(*settings[1])
-    smoothing, judging = Smoothing(*settings[2]), Judging(*settings[3])
-    memory = Memory(*arrays)
+    settings, memory = named(Settings, plain_settings), named(Memory, plain_memory)
+    counts, elites = settings.counts, memory.elites
     population, costs, offspring = memory.population, memory.costs, memory.offspring
-    collisions, terms = memory.collisions, StringTerms(*memory.terms)
+    collisions, terms = memory.collisions, memory.terms
     # elites: the lowest costs
-    choose_elites(costs, memory.elites)
+    choose_elites(costs, elites)
     # (a) reproduction, (b) cross-over, and (d) mutation before (c): a new trajectory, too, is
     # redistributed and relaxed once
-    breed(uniforms, counts, arm_slices, breeding, population, costs, offspring)
+    breed(uniforms, counts, arm_slices, settings.breeding, population, costs, offspring)
     # (c) redistribution and relaxation
-    smooth(offspring, counts.offspring, arm_slices, smoothing)
+    smooth(offspring, counts.offspring, arm_slices, settings.smoothing)
     # Eqs. 2–7
-    judge(offspring, arm_slices, judging, terms)
+    judge(offspring, arm_slices, settings.judging, terms)
     # succession: the elites stand behind the offspring, untouched and not evaluated again
-    count, elites = counts.offspring, memory.elites
-    rows = population.shape[0] * population.shape[1]
+    count, rows = counts.offspring, population.shape[0] * population.shape[1]
     succeed_rows(population.reshape((rows, -1)), offspring.reshape((rows, -1)), count, elites)
     succeed_rows(costs.reshape((1, -1)), terms.cost.reshape((1, -1)), count, elites)
     succeed_rows(collisions.reshape((1, -1)), terms.collisions.reshape((1, -1)), count, elites)

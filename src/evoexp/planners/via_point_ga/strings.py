@@ -10,6 +10,7 @@ from evoexp.collision.scene import Scene
 from evoexp.evolution import crossover
 from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.numeric.elementary import DEGREE
+from evoexp.numeric.named_tuples import plain
 from evoexp.objectives.string_fitness import StringTerms
 from evoexp.paths.walk import num_uniforms, walk
 from evoexp.paths.workspace import Redistribution
@@ -170,14 +171,13 @@ class Strings:
         ga, counts = self.planner.ga, self.counts
         offspring = self.empty(ga.num_offspring)
         judged, elites = self._unjudged(offspring, ga.num_offspring), np.empty(ga.num_elites, int)
-        memory = kernels.Memory(population, costs, hits, offspring, tuple(judged.terms), elites)
-        named = self.counts, self.breeding, self.smoothing, self.judging
-        settings, arrays = tuple(tuple(each) for each in named), tuple(memory)
+        memory = plain(kernels.Memory(population, costs, hits, offspring, judged.terms, elites))
+        settings = plain(kernels.Settings(self.counts, self.breeding, self.smoothing, self.judging))
         num_drawn = sum(counts) + counts.new * (1 + self.num_uniforms)
         while True:
             uniforms = rng.random(num_drawn)
             best, mean, std, num_feasible = kernels.advance(
-                uniforms, self.problem.arm_slices, settings, arrays
+                uniforms, self.problem.arm_slices, settings, memory
             )
             yield JudgedGeneration(judged, CostStatistics(best, mean, std), num_feasible)
 

@@ -4,7 +4,6 @@ import pytest
 from evoexp.report.claims import (
     CONTRADICTED,
     INCONCLUSIVE,
-    NOT_JUDGED,
     REPRODUCED,
     Comparison,
     adjusted,
@@ -14,39 +13,52 @@ from evoexp.report.claims import (
     judge_better,
     judge_better_than_all,
 )
+from evoexp.report.judging import Judge
+from evoexp.report.proportions import Proportion
 
 LOW, HIGH = np.arange(12.0), np.arange(12.0) + 20.0
 
 
 @pytest.mark.parametrize(
-    ("reason", "holds", "done", "planned", "verdict"),
+    ("holds", "done", "planned", "verdict"),
     [
-        ("budget smoke", 2, 2, 2, NOT_JUDGED),
-        ("", 20, 20, 20, REPRODUCED),
-        ("", 19, 20, 20, CONTRADICTED),
-        ("", 0, 20, 20, CONTRADICTED),
-        ("", 3, 4, 20, CONTRADICTED),  # one counter-example is enough
-        ("", 4, 4, 20, INCONCLUSIVE),  # but only all runs reproduce
-        ("", 0, 0, 20, INCONCLUSIVE),
-        ("", 0, 0, 0, INCONCLUSIVE),
+        (20, 20, 20, REPRODUCED),
+        (19, 20, 20, CONTRADICTED),
+        (0, 20, 20, CONTRADICTED),
+        (3, 4, 20, CONTRADICTED),  # one counter-example is enough
+        (4, 4, 20, INCONCLUSIVE),  # but only all runs reproduce
+        (0, 0, 20, INCONCLUSIVE),
+        (0, 0, 0, INCONCLUSIVE),
     ],
 )
-def test_a_claim_about_every_run(
-    reason: str, holds: int, done: int, planned: int, verdict: str
-) -> None:
-    assert judge_all(reason, holds, done, planned) == verdict
+def test_a_claim_about_every_run(holds: int, done: int, planned: int, verdict: str) -> None:
+    assert judge_all(holds, done, planned) == verdict
+
+
+def test_a_claim_that_is_not_judged_names_the_reason() -> None:
+    for reason, verdict in (("budget smoke", "not judged (budget smoke)"), ("", REPRODUCED)):
+        judge = Judge(reason, 0.05)
+        better = compare("cost", LOW, HIGH, True, 0.95, 50)
+        found = [
+            judge.every("", "", "", 2, 2, 2),
+            judge.majority("", "", "", 2, 3),
+            judge.better("", "", better, "lower"),
+            judge.better_than_all("", "", "", [better]),
+            judge.greater("", "", "", Proportion(20, 20), Proportion(0, 20)),
+        ]
+        assert [claim.verdict for claim in found] == [verdict] * 5
+        assert "lower in 100 % of pairs of runs" in found[2].evidence
 
 
 def test_a_claim_about_being_better() -> None:
     better, worse = (compare("cost", a, b, True, 0.95, 50) for a, b in ((LOW, HIGH), (HIGH, LOW)))
     same = compare("cost", LOW, LOW, True, 0.95, 50)
-    assert judge_better("", better, 0.05) == REPRODUCED
-    assert judge_better("", worse, 0.05) == CONTRADICTED
-    assert judge_better("", same, 0.05) == INCONCLUSIVE
-    assert judge_better("", better, 1e-9) == INCONCLUSIVE
-    assert judge_better("", None, 0.05) == INCONCLUSIVE
-    assert judge_better("budget quick", better, 0.05) == NOT_JUDGED
-    assert judge_better("", better._replace(better=same.better), 0.05) == INCONCLUSIVE
+    assert judge_better(better, 0.05) == REPRODUCED
+    assert judge_better(worse, 0.05) == CONTRADICTED
+    assert judge_better(same, 0.05) == INCONCLUSIVE
+    assert judge_better(better, 1e-9) == INCONCLUSIVE
+    assert judge_better(None, 0.05) == INCONCLUSIVE
+    assert judge_better(better._replace(better=same.better), 0.05) == INCONCLUSIVE
 
 
 def test_a_comparison_knows_which_way_is_better() -> None:
@@ -89,8 +101,7 @@ def test_a_comparison_says_who_is_better() -> None:
     ],
 )
 def test_a_claim_about_being_better_than_each(comparisons: list[Comparison], verdict: str) -> None:
-    assert judge_better_than_all("", comparisons, 0.05) == verdict
-    assert judge_better_than_all("budget smoke", comparisons, 0.05) == NOT_JUDGED
+    assert judge_better_than_all(comparisons, 0.05) == verdict
 
 
 @pytest.mark.parametrize(
@@ -106,8 +117,7 @@ def test_a_claim_about_being_better_than_each(comparisons: list[Comparison], ver
 def test_a_claim_about_the_best_setting(
     comparisons: list[Comparison], best_median: bool, verdict: str
 ) -> None:
-    assert judge_best("", comparisons, best_median, 0.05) == verdict
-    assert judge_best("fewer replicates", comparisons, best_median, 0.05) == NOT_JUDGED
+    assert judge_best(comparisons, best_median, 0.05) == verdict
 
 
 def test_p_values_are_adjusted_over_all_comparisons() -> None:

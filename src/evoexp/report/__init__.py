@@ -1,4 +1,1 @@
-"""Report: reads outputs only; results, statistics, claims and figures.
-
-Never imports batch or planners.
-"""
+"""The report of stored runs: results, statistics, claims and figures, from the outputs alone."""

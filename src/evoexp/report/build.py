@@ -1,4 +1,4 @@
-"""Builds a report: the one place of it that writes files."""
+"""Builds a report; no other module of it writes files."""
 
 import hashlib
 import json
@@ -66,8 +66,8 @@ def report(
     """Write a report and return the path of its `index.md`.
 
     Args:
-        request: What it is of.
-        settings: How it is drawn.
+        request: Names its conditions.
+        settings: Formats and levels.
         outputs: Root of all outputs.
         num_replicates: Planned for every condition; None: as many as each one has.
 

@@ -1,7 +1,4 @@
-"""Verdicts on what a paper claims, computed from results.
-
-Below the paper's budget nothing is judged.
-"""
+"""Verdicts on the claims of papers, computed from results."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -30,7 +27,7 @@ REPRODUCED, CONTRADICTED, INCONCLUSIVE, NOT_JUDGED = (
 
 
 class Claim(NamedTuple):
-    """A claim, and what the results say of it.
+    """A claim of a paper with our evidence and verdict.
 
     Attributes:
         text: The claim in our words.
@@ -49,7 +46,7 @@ class Comparison(NamedTuple):
     """One quantity of two conditions on their common seeds.
 
     Attributes:
-        quantity: What is compared.
+        quantity: Its name, or that of the pair in a table of one quantity.
         num_seeds: Replicates that both have.
         median_difference: Of first minus second.
         test: Signed-rank test of the pairs.
@@ -70,10 +67,7 @@ class Comparison(NamedTuple):
     better: Effect
 
     def says(self, significance: float) -> int:
-        """Return 1 if the first is significantly better, −1 if it is significantly worse.
-
-        0 if neither.
-        """
+        """Return 1 if the first is significantly better, −1 if significantly worse, else 0."""
         if self.p_adjusted >= significance or self.better.a12 == 0.5:
             return 0
         return 1 if self.better.a12 > 0.5 else -1
@@ -84,11 +78,10 @@ def judged(holds: bool | None) -> str:
     return {True: REPRODUCED, False: CONTRADICTED, None: INCONCLUSIVE}[holds]
 
 
-def judge_all(not_judged: str, holds: int, done: int, planned: int) -> str:
+def judge_all(holds: int, done: int, planned: int) -> str:
     """Judge a claim about every run.
 
     Args:
-        not_judged: Why it is not to be judged; empty: judge it.
         holds: Finished runs in which it holds.
         done: Finished runs.
         planned: Runs that were planned.
@@ -96,56 +89,43 @@ def judge_all(not_judged: str, holds: int, done: int, planned: int) -> str:
     Returns:
         One counter-example contradicts; all planned runs are needed to reproduce.
     """
-    if not_judged:
-        return NOT_JUDGED
     if holds < done:
         return CONTRADICTED
     return REPRODUCED if 0 < planned <= done else INCONCLUSIVE
 
 
-def judge_better(not_judged: str, comparison: Comparison | None, significance: float) -> str:
+def judge_better(comparison: Comparison | None, significance: float) -> str:
     """Judge a claim that the first condition of a comparison is better than the second.
 
     Args:
-        not_judged: Why it is not to be judged; empty: judge it.
         comparison: None where there is nothing to compare.
         significance: Below this adjusted p-value a difference counts.
     """
-    if not_judged:
-        return NOT_JUDGED
     if comparison is None:
         return INCONCLUSIVE
     return {1: REPRODUCED, -1: CONTRADICTED}.get(comparison.says(significance), INCONCLUSIVE)
 
 
-def judge_better_than_all(
-    not_judged: str, comparisons: Sequence[Comparison], significance: float
-) -> str:
+def judge_better_than_all(comparisons: Sequence[Comparison], significance: float) -> str:
     """Judge a claim that one condition is better than each of several others.
 
     Args:
-        not_judged: Why it is not to be judged; empty: judge it.
         comparisons: Of that condition with each other one.
         significance: Below this adjusted p-value a difference counts.
 
     Returns:
         Contradicted by one that is significantly better, reproduced if all are significantly worse.
     """
-    if not_judged:
-        return NOT_JUDGED
     found = [comparison.says(significance) for comparison in comparisons]
     if -1 in found:
         return CONTRADICTED
     return REPRODUCED if found and 0 not in found else INCONCLUSIVE
 
 
-def judge_best(
-    not_judged: str, comparisons: Sequence[Comparison], best_median: bool, significance: float
-) -> str:
+def judge_best(comparisons: Sequence[Comparison], best_median: bool, significance: float) -> str:
     """Judge a claim that one of several settings is the best.
 
     Args:
-        not_judged: Why it is not to be judged; empty: judge it.
         comparisons: Of that setting with each other one.
         best_median: Whether no other setting has a better median.
         significance: Below this adjusted p-value a difference counts.
@@ -155,8 +135,6 @@ def judge_best(
         one other setting at least is significantly worse: neighbours of a best setting are about as
         good, so not all need be.
     """
-    if not_judged:
-        return NOT_JUDGED
     found = [comparison.says(significance) for comparison in comparisons]
     if -1 in found:
         return CONTRADICTED
@@ -184,10 +162,8 @@ def compare(
     test, unpaired = signed_rank(first, second), rank_sum(first, second)
     sign = -1.0 if lower_is_better else 1.0
     better = effect(sign * first, sign * second, confidence, num_resamples)
-    differences = np.zeros(len(first))
-    np.subtract(
-        first, second, out=differences, where=first != second
-    )  # two infinite costs do not differ
+    differences = np.zeros(len(first))  # two infinite costs do not differ
+    np.subtract(first, second, out=differences, where=first != second)
     median = quantile(differences, 0.5)
     return Comparison(
         quantity, len(first), median, test, test.p_value, unpaired, unpaired.p_value, better
@@ -195,10 +171,7 @@ def compare(
 
 
 def adjusted(comparisons: list[Comparison]) -> list[Comparison]:
-    """Return comparisons with p-values adjusted by Holm over all of them.
-
-    Each of both tests a family.
-    """
+    """Return comparisons with p-values adjusted by Holm; either test is a family of its own."""
     paired = holm([comparison.test.p_value for comparison in comparisons])
     unpaired = holm([comparison.unpaired.p_value for comparison in comparisons])
     found = zip(comparisons, paired, unpaired, strict=True)
@@ -206,7 +179,6 @@ def adjusted(comparisons: list[Comparison]) -> list[Comparison]:
 
 
 def judge_greater(
-    not_judged: str,
     one: Proportion,
     two: Proportion,
     significance: float,
@@ -215,14 +187,11 @@ def judge_greater(
     """Judge a claim that a proportion is greater than another one, by Fisher's exact test.
 
     Args:
-        not_judged: Why it is not to be judged; empty: judge it.
         one: Said to be greater.
         two: Of other runs.
         significance: Below this two-sided p-value a difference counts.
         p_adjusted: That of the test where it is one of several; None: it stands alone.
     """
-    if not_judged:
-        return NOT_JUDGED
     p_value = fisher_exact(one, two) if p_adjusted is None else p_adjusted
     if not one.total or not two.total or p_value >= significance:
         return INCONCLUSIVE

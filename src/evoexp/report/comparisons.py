@@ -48,10 +48,7 @@ def comparisons(
 
 
 def _beside(first: Condition, control: Condition) -> bool:
-    """Whether a control wraps this very planner in the same scene.
-
-    Equal evaluations and common seeds.
-    """
+    """Return whether a control wraps this very planner in the same scene, with its seeds."""
     return control._replace(planner=getattr(control.planner, WRAPPED)) == first
 
 

@@ -17,10 +17,10 @@ def render(page: Page, results: Results, settings: ReportSettings, command: str)
     """Return the page as Markdown; the same results give the same text.
 
     Args:
-        page: What it consists of.
-        results: What it was drawn from.
+        page: Its parts.
+        results: The results that it was drawn from.
         settings: Levels and formats.
-        command: What makes it.
+        command: The command that makes it.
     """
     parts = [
         f"# {page.title}\n",
@@ -57,7 +57,7 @@ def _made_by(results: Results, command: str) -> str:
 
 
 def _incomplete(results: Results) -> str:
-    """Say what is missing; empty where nothing is."""
+    """Name the replicates that are missing; empty if none is."""
     missing = [
         f"{c.label}: {c.done} of {c.planned} replicates done, {c.failed} failed"
         for c in results.conditions
@@ -183,10 +183,7 @@ def _figure(drawing: Drawing, settings: ReportSettings) -> str:
 
 
 def _parameters(results: Results) -> str:
-    """One row per setting; where conditions differ.
-
-    One value per group of conditions that agree.
-    """
+    """Return one row per setting, and one per value where conditions differ in it."""
     by_name: dict[str, dict[Parameter, list[str]]] = {}
     for condition in results.conditions:
         for parameter in parameters(results, condition):

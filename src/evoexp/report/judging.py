@@ -25,15 +25,14 @@ class Judge(NamedTuple):
 
     def claim(self, text: str, source: str, evidence: str, verdict: str) -> Claim:
         """Make a claim whose verdict the caller has found."""
-        return claim(
-            text, source, evidence, claims.NOT_JUDGED if self.reason else verdict, self.reason
-        )
+        reason = f"{claims.NOT_JUDGED} ({self.reason})"
+        return Claim(text, source, evidence, reason if self.reason else verdict)
 
     def every(
         self, text: str, source: str, evidence: str, holds: int, done: int, planned: int
     ) -> Claim:
         """Make a claim about every run; see `claims.judge_all`."""
-        verdict = claims.judge_all(self.reason, holds, done, planned)
+        verdict = claims.judge_all(holds, done, planned)
         return self.claim(text, source, evidence, verdict)
 
     def majority(self, text: str, source: str, evidence: str, holds: int, done: int) -> Claim:
@@ -53,7 +52,7 @@ class Judge(NamedTuple):
             word: Of the one that is better: "lower", "earlier".
             told: The evidence; its {} stands for the comparison in words.
         """
-        verdict = claims.judge_better(self.reason, row, self.significance)
+        verdict = claims.judge_better(row, self.significance)
         words = evidence(row, word) if row else "nothing to compare"
         return self.claim(text, source, told.replace("{}", words), verdict)
 
@@ -61,7 +60,7 @@ class Judge(NamedTuple):
         self, text: str, source: str, evidence: str, rows: Sequence[Comparison]
     ) -> Claim:
         """Make a claim that one condition is better than each of several others."""
-        verdict = claims.judge_better_than_all(self.reason, rows, self.significance)
+        verdict = claims.judge_better_than_all(rows, self.significance)
         return self.claim(text, source, evidence, verdict)
 
     def greater(
@@ -74,7 +73,7 @@ class Judge(NamedTuple):
         p_adjusted: float | None = None,
     ) -> Claim:
         """Make a claim that proportion `one` is greater than `two`; see `claims.judge_greater`."""
-        verdict = claims.judge_greater(self.reason, one, two, self.significance, p_adjusted)
+        verdict = claims.judge_greater(one, two, self.significance, p_adjusted)
         return self.claim(text, source, evidence, verdict)
 
 
@@ -99,11 +98,6 @@ def not_judged(results: Results) -> str:
     if any(c.condition._replace(seed=seed).id not in own for c in results.conditions):
         return "settings overridden"
     return ""
-
-
-def claim(text: str, source: str, evidence: str, verdict: str, reason: str) -> Claim:
-    """Return a claim; its verdict names the reason why it is not judged."""
-    return Claim(text, source, evidence, f"{verdict} ({reason})" if reason else verdict)
 
 
 def evidence(comparison: Comparison, better: str) -> str:

@@ -1,4 +1,4 @@
-"""What a page consists of, before it is written."""
+"""The parts of a page, before it is written."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
@@ -19,7 +19,7 @@ class Drawing(NamedTuple):
     Attributes:
         stem: Of its files.
         title: Heading; names the paper's figure.
-        caption: What the paper states and what is found.
+        caption: The statement of the paper, and our finding.
         table: Gives the data.
         draw: Draws the data.
         conditions: Whose results it shows.
@@ -34,10 +34,7 @@ class Drawing(NamedTuple):
 
 
 class Quantity(NamedTuple):
-    """A row of the table of results.
-
-    A quantity of a finished replicate, median and quartiles per condition.
-    """
+    """A row of the table of results: median and quartiles of a quantity, per condition."""
 
     name: str
     unit: str
@@ -68,7 +65,7 @@ class Page(NamedTuple):
         introduction: One paragraph.
         quantities: The table of results.
         claims: With verdicts; empty where there is no paper to judge.
-        checks: (what, finding): known defects and checks of the scene, shown at every budget.
+        checks: (title, finding): known defects and checks of the scene, shown at every budget.
         comparisons: Of conditions on common seeds, by heading.
         drawings: The figures.
         tables: Of its own, shown behind the table of results.

@@ -227,7 +227,7 @@ def _parameter(name: str, value: Any, entry: Entry | None, otherwise: str) -> Pa
 
 
 def _capped(parameter: Parameter, budget: str, caps: dict[str, Entry]) -> Parameter:
-    """Name the budget where it, and no override, made a setting what it is."""
+    """Name the budget as the source of a setting if it set the value, and no override did."""
     key = _CAPS.get(parameter.name)
     if parameter.source == OVERRIDE and key in caps and str(caps[key].value) == parameter.value:
         return parameter._replace(source=f"budget {budget}")

@@ -8,7 +8,7 @@ from evoexp.report.statistics import Interval, wilson
 
 
 class Proportion(NamedTuple):
-    """How many of some runs have a property.
+    """A count of runs that have a property.
 
     Attributes:
         having: Runs that have it.
@@ -38,9 +38,7 @@ class Proportion(NamedTuple):
 
 
 def newcombe(one: Proportion, two: Proportion, confidence: float) -> Interval:
-    """Return an interval of the difference `one` − `two` (Newcombe 1998, method 10.
-
-    From Wilson's intervals).
+    """Return an interval of the difference `one` − `two` (Newcombe 1998, method 10).
 
     Args:
         one: Of some runs; without any the interval is [−1, 1].
@@ -57,10 +55,7 @@ def newcombe(one: Proportion, two: Proportion, confidence: float) -> Interval:
 
 
 def fisher_exact(one: Proportion, two: Proportion) -> float:
-    """Return the two-sided p-value of Fisher's exact test.
-
-    Tables at most as likely as the one that was found.
-    """
+    """Return the two-sided p of Fisher's exact test: all tables at most as likely as this one."""
     count, total = one.having + two.having, one.total + two.total
     least, greatest = max(0, count - two.total), min(count, one.total)
     ways = [

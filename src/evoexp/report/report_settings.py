@@ -1,4 +1,4 @@
-"""How reports are written; no part of any identity."""
+"""Settings of reports; they are no part of any identity."""
 
 from typing import Annotated, Literal
 

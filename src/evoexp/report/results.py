@@ -1,4 +1,4 @@
-"""What the outputs hold of the conditions that a report is asked for."""
+"""Stored results of the conditions that a report is asked for."""
 
 import functools
 import re
@@ -28,7 +28,7 @@ WRAPPED = (
 
 
 class Verdicts(NamedTuple):
-    """How many motions of a condition's finished replicates the exact certifier judged, and how.
+    """Counts of the exact verdicts on the motions of a condition's finished replicates.
 
     Attributes:
         judged: Motions.
@@ -48,7 +48,7 @@ class Verdicts(NamedTuple):
 
 
 class StoredLogs:
-    """What the logs of some finished replicates hold, each part read when it is first asked for.
+    """The content of the logs of some finished replicates, each part read at its first use.
 
     A page that draws no convergence reads no generation; thousands of logs are looked at one by
     one, and only the columns stay.
@@ -99,8 +99,8 @@ class ConditionResults(NamedTuple):
 
     Attributes:
         label: Its name in figures.
-        condition: What was run.
-        planned: Number of replicates; what is stored beyond is not looked at.
+        condition: The condition that was run.
+        planned: Number of replicates; those stored beyond it are not looked at.
         summaries: One row per finished replicate, indexed by replicate, in order.
         failures: Replicate → why it failed.
         logs: What the logs of the finished replicates hold.
@@ -214,18 +214,16 @@ class ConditionResults(NamedTuple):
 
     @property
     def is_control(self) -> bool:
-        """Whether this is a control: a planner that stands beside the paper's."""
+        """Return whether this is a control: a planner that stands beside the paper's."""
         return hasattr(self.condition.planner, WRAPPED) and not self.is_reference
 
     @property
     def is_reference(self) -> bool:
-        """Whether this is a reference: a truth that stands beside the planners."""
+        """Return whether this is a reference: a truth that stands beside the planners."""
         return self.condition.is_reference
 
     def array(self, name: str) -> NDArray[Any]:
-        """Return an array that the best replicate attached to its log.
-
-        A reference has one replicate.
+        """Return an array attached to the log of the best replicate, of a reference the only one.
 
         Raises:
             KeyError: If there is none of this name.
@@ -265,15 +263,12 @@ class Results(NamedTuple):
 
     @property
     def main(self) -> tuple[ConditionResults, ...]:
-        """Those with data that are no controls and no references.
-
-        Controls where there is nothing else.
-        """
+        """Conditions with data without controls and references; controls if there are no others."""
         return tuple(c for c in self.evolved if not c.is_control) or self.evolved
 
     @property
     def evolved(self) -> tuple[ConditionResults, ...]:
-        """Those with data that are no references; references where there is nothing else."""
+        """Conditions with data without references; references if there are no others."""
         return tuple(c for c in self.with_data if not c.is_reference) or self.with_data
 
     @property
@@ -308,7 +303,7 @@ def gather(
     command: str,
     options: Mapping[str, tuple[Option, ...]] | None = None,
 ) -> Results:
-    """Read what is stored.
+    """Read the stored results of some conditions.
 
     Args:
         outputs: Root of all outputs.

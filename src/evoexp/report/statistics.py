@@ -1,9 +1,7 @@
-"""Statistics over replicates.
+"""Statistics over replicates, whose unit is the seed.
 
-The seed is the unit, and replicates of two conditions with one index share a seed.
-
-Costs may be infinite (infeasible). Medians, ranks and effect sizes stay defined then; nothing here
-takes a mean.
+Replicates of two conditions with one index share a seed. Costs may be infinite (infeasible);
+medians, ranks and effect sizes are defined all the same, and nothing here takes a mean.
 """
 
 import functools
@@ -80,10 +78,8 @@ class Effect(NamedTuple):
 def quantile(values: FloatArray, share: float) -> float:
     """Return a quantile by linear interpolation of order statistics.
 
-    NaN is ignored, ±inf is a value.
-
     Args:
-        values: (n,).
+        values: (n,); NaN is ignored, ±inf is a value.
         share: In [0, 1].
     """
     ordered = np.sort(values[~np.isnan(values)])
@@ -117,12 +113,10 @@ def wilson(successes: int, trials: int, confidence: float) -> Interval:
 
 
 def signed_rank(x: FloatArray, y: FloatArray) -> SignedRank:
-    """Test whether paired values differ (Wilcoxon 1945).
-
-    Equal pairs are left out, ties share their mean rank.
+    """Test whether paired values differ (Wilcoxon 1945); ties share their mean rank.
 
     Args:
-        x: (pairs,); infinite values are compared as such.
+        x: (pairs,); infinite values are compared as such, equal pairs are left out.
         y: (pairs,).
     """
     differing = x != y
@@ -136,9 +130,7 @@ def signed_rank(x: FloatArray, y: FloatArray) -> SignedRank:
 
 
 def rank_sum(x: FloatArray, y: FloatArray) -> RankSum:
-    """Test whether values of two samples differ (Mann and Whitney 1947).
-
-    Ties share their mean rank.
+    """Test whether two samples differ (Mann and Whitney 1947); ties share their mean rank.
 
     Args:
         x: (n,); infinite values are compared as such.
@@ -182,23 +174,20 @@ def effect(x: FloatArray, y: FloatArray, confidence: float, num_resamples: int) 
         return Effect(math.nan, Interval(math.nan, math.nan))
     wins = (x[:, None] > y) + 0.5 * (x[:, None] == y)  # (pairs, pairs)
     weights = _weights(len(x), num_resamples)
-    resampled = ((weights @ wins) * weights).sum(axis=1) / len(
-        x
-    ) ** 2  # multiples of 1/2 are exact in any order
+    # multiples of 1/2 are exact in any order
+    resampled = ((weights @ wins) * weights).sum(axis=1) / len(x) ** 2
     return Effect(vargha_delaney(x, y), _percentiles(resampled, confidence))
 
 
 def expected_effort(effort: FloatArray, solved: np.ndarray) -> float:
-    """Return the expected running time (Hansen et al.
-
-    2009): all effort spent, over the runs that succeeded.
+    """Return the expected running time (Hansen et al. 2009): all effort over all successes.
 
     Args:
         effort: (runs,) of every run, failed ones included.
         solved: (runs,) whether it succeeded.
 
     Returns:
-        What a success costs where failed runs are started again; inf if there is none.
+        The cost of a success if failed runs are started again; inf if there is none.
     """
     having = int(np.count_nonzero(solved))
     return float(np.sum(effort)) / having if having else math.inf
@@ -228,10 +217,8 @@ def effort_ratio(
 ) -> Interval:
     """Return the percentile interval of the ratio of two expected running times, one over two.
 
-    On common seeds.
-
-    Resamples in which neither succeeds say nothing and are left out; without any the interval is
-    [0, inf].
+    Both are of the same seeds. Resamples in which neither succeeds are left out; if none is left,
+    the interval is [0, inf].
 
     Args:
         one: Effort and success of every run, (runs,) each.
@@ -297,9 +284,8 @@ def _normal_p(ranks: np.ndarray, doubled: int) -> float:
 
 def _exact_rank_sum_p(ranks: np.ndarray, size: int, doubled: int) -> float:
     """Two-sided p over all choices of `size` of the ranks."""
-    choices = np.zeros(
-        (size + 1, int(ranks.sum()) + 1)
-    )  # (how many are chosen, their sum): number of ways
+    # number of ways to choose so many ranks of such a sum
+    choices = np.zeros((size + 1, int(ranks.sum()) + 1))
     choices[0, 0] = 1.0
     for k, rank in enumerate(ranks):
         for chosen in range(min(k + 1, size), 0, -1):
@@ -318,8 +304,6 @@ def _normal_rank_sum_p(ranks: np.ndarray, size: int, doubled: int) -> float:
 
 
 def _two_sided(deviation: float, variance: float) -> float:
-    """Probability that a normal deviate is as far from its mean.
-
-    Erfc keeps the far tail, where cdf gives 0.
-    """
+    """Return the probability that a normal deviate is as far from its mean."""
+    # erfc keeps the far tail, where a distribution function rounds to 1
     return math.erfc(abs(deviation) / math.sqrt(2.0 * variance)) if variance else 1.0

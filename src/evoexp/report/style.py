@@ -1,7 +1,4 @@
-"""How figures look: one place for sizes, fonts and colours.
-
-No pyplot, no global state left behind.
-"""
+"""The look of figures: sizes, fonts, colours and legends; it leaves no global state behind."""
 
 import io
 from collections.abc import Callable, Iterable, Sequence
@@ -60,9 +57,8 @@ _RC: dict[str, Any] = {
 }
 
 
-_METADATA: dict[
-    str, dict[str, Any]
-] = {  # nothing that changes from one day, or one machine, to the next
+# nothing that changes from one day, or one machine, to the next
+_METADATA: dict[str, dict[str, Any]] = {
     "svg": {"Date": None, "Creator": "evoexp"},
     "png": {"Software": "evoexp"},
     "pdf": {"CreationDate": None, "Creator": "evoexp", "Producer": None},
@@ -130,15 +126,13 @@ def few_ticks() -> MaxNLocator:
 def operational_axes(axes: Axes, unit: str) -> None:
     """Set up axes as a plane of the operational space."""
     axes.set_aspect("equal", adjustable="box")
-    axes.set_xlabel(f"x [{unit}]")
-    axes.set_ylabel(f"y [{unit}]")
+    axes.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]")
 
 
 def configuration_axes(axes: Axes, arm: int) -> None:
     """Set up axes as an arm's plane of joint angles [deg]."""
-    axes.set_xlabel(f"{joint_symbol(arm, 0)} [deg]")
-    axes.set_ylabel(f"{joint_symbol(arm, 1)} [deg]")
-    axes.set_title(f"arm {arm + 1}")
+    x, y = (f"{joint_symbol(arm, joint)} [deg]" for joint in (0, 1))
+    axes.set(xlabel=x, ylabel=y, title=f"arm {arm + 1}")
     axes.set_aspect("equal", adjustable="datalim")  # lengths of paths are Euclidean in degrees
 
 

@@ -1,4 +1,4 @@
-"""What Curkovic et al. 2013 claim about settings, judged by sweeps over them."""
+"""Claims of Curkovic et al. 2013 about settings, judged by sweeps over them."""
 
 from collections.abc import Callable, Sequence
 
@@ -81,7 +81,7 @@ def _depth(judge: Judge, results: Results, found: Sequence[FamilyComparison]) ->
             f"A hall of at most {first.label} of the population is the best, judged by "
             f"{one.measure.name}"
         )
-        verdict = claims.judge_best("", one.rows, own <= min(medians), judge.significance)
+        verdict = claims.judge_best(one.rows, own <= min(medians), judge.significance)
         judged.append(judge.claim(text, "section 3", evidence, verdict))
     return judged
 

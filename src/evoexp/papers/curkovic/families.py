@@ -16,7 +16,7 @@ class Family(NamedTuple):
     """Conditions that are compared with each other.
 
     Attributes:
-        name: Of what comes first in the comparisons.
+        name: Of the first ones in the comparisons.
         pairs: (first, other).
     """
 

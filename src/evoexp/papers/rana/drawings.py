@@ -28,7 +28,7 @@ class MeasuredMotions(NamedTuple):
 
     @property
     def planar(self) -> bool:
-        """Whether its arms move in a plane."""
+        """Return whether its arms move in a plane."""
         return bool(motions.problem(self.condition).assembly.table.planar)
 
     @property

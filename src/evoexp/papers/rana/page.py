@@ -154,7 +154,7 @@ def _claims(
     own = f"{c.label} against "
     best = next((rows[0] for heading, rows in comparisons if heading.startswith(own)), None)
     told = _evidence(best) if best else "no random search beside it"
-    verdict = claims.judge_better("", best, settings.significance)
+    verdict = claims.judge_better(best, settings.significance)
     return [*found, judge.claim(text, "section 5", told, verdict)]
 
 

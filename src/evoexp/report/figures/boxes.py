@@ -18,9 +18,14 @@ def draw_box(
     colour: str,
     orientation: Literal["horizontal", "vertical"] = "horizontal",
 ) -> None:
-    """Draw median, quartiles and whiskers.
+    """Draw median, quartiles and whiskers of the finite ones of some values.
 
-    To the last value within 1.5 interquartile ranges) of finite values (n,.
+    Args:
+        axes: To draw on.
+        position: Of the box along the axis of conditions.
+        values: (n,); whiskers reach to the last one within 1.5 interquartile ranges.
+        colour: Of the box.
+        orientation: Direction in which values grow.
     """
     values = values[np.isfinite(values)]
     if not len(values):

@@ -19,9 +19,7 @@ DASH_DOTTED = (0, (5, 1.5, 1, 1.5))
 
 
 def cost_table(results: Results) -> pd.DataFrame:
-    """Return median and quartiles of best and average cost over replicates.
-
-    Per condition and generation.
+    """Return median and quartiles of best and average costs, per condition and generation.
 
     Returns:
         Columns condition, position, quantity, generation, evaluations, median, lower, upper,
@@ -32,10 +30,7 @@ def cost_table(results: Results) -> pd.DataFrame:
 
 
 def fitness_table(results: Results) -> pd.DataFrame:
-    """Return the same of the paper's fitness.
-
-    Of conditions whose objective turns a cost into one.
-    """
+    """Return the same columns as `cost_table`, with the fitness of the planner's objective."""
     parts = [_condition(results, c, c.planner.objective) for c in results.evolved]
     return pd.concat(parts, ignore_index=True)
 
@@ -77,18 +72,14 @@ def draw_best(table: pd.DataFrame) -> Figure:
             color=style.condition_colour(position),
             label=label,
         )
-    axes.set_xlim(0, max(1, int(best[across].max())))
-    axes.set_xlabel(across)
-    axes.set_ylabel("best cost so far (median)")
+    limits = (0, max(1, int(best[across].max())))
+    axes.set(xlim=limits, xlabel=across, ylabel="best cost so far (median)")
     style.legend_below(figure, axes, 3)
     return figure
 
 
 def draw_fitness(table: pd.DataFrame) -> Figure:
-    """Draw best and average fitness against generations.
-
-    Over the whole range, and where the best ones are.
-    """
+    """Draw best and average fitness over the whole range, and the best ones from near by."""
     figure = style.figure(4.1)
     whole, close = figure.subplots(1, 2)
     for axes in (whole, close):
@@ -138,16 +129,11 @@ def _condition(results: Results, condition: ConditionResults, objective: Any) ->
 
 def _references(results: Results) -> list[pd.DataFrame]:
     """Return the costs of references, which have no generations, one row each."""
-    shown = [
-        c
+    beside: dict[str, Any] = {"quantity": REFERENCE, "generation": 0, "evaluations": 0.0}
+    return [
+        _condition(results, c, None).iloc[:1].assign(**beside)
         for c in results.references
         if c not in results.evolved and np.isfinite(c.column("best_cost")).all()
-    ]
-    return [
-        _condition(results, c, None)
-        .iloc[:1]
-        .assign(quantity=REFERENCE, generation=0, evaluations=0.0)
-        for c in shown
     ]
 
 
@@ -164,22 +150,15 @@ def _curves(axes: Axes, table: pd.DataFrame, columns: tuple[str, ...]) -> None:
                 curve[across], curve["lower"], curve["upper"], color=colour, alpha=0.18, linewidth=0
             )
             axes.plot(curve[across], curve["median"], linestyle=kind, color=colour, label=label)
-    axes.set_xlim(0, max(1, int(table[across].max())))
-    axes.set_xlabel(across)
+    axes.set(xlim=(0, max(1, int(table[across].max()))), xlabel=across)
     if across == "generation":
         _evaluations_above(axes, table)
 
 
 def _across(table: pd.DataFrame) -> str:
-    """Return the common axis: generations where all conditions spend the same in each.
-
-    Else evaluations.
-    """
-    return (
-        "generation"
-        if table.groupby("generation")["evaluations"].nunique().max() == 1
-        else "evaluations"
-    )
+    """Return the common axis: generations if they cost all conditions the same, or evaluations."""
+    spent = table.groupby("generation")["evaluations"].nunique()
+    return "generation" if spent.max() == 1 else "evaluations"
 
 
 def _counts(curve: pd.DataFrame) -> str:

@@ -1,7 +1,4 @@
-"""Ablations: one quantity of every condition side by side.
-
-And how much better the first condition is.
-"""
+"""Sweeps: quantities of all conditions side by side, and effect sizes of the first one."""
 
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
@@ -143,9 +140,8 @@ def draw_effects(table: pd.DataFrame) -> Figure:
             markersize=5,
             label=f"adjusted p ≥ {level:g}",
         )
-        axes.set_xlim(-0.03, 1.03)
-        axes.set_title(textwrap.fill(quantity, WRAPPED))
-        axes.set_xlabel("A12: the first condition is better")
+        label = "A12: the first condition is better"
+        axes.set(xlim=(-0.03, 1.03), title=textwrap.fill(quantity, WRAPPED), xlabel=label)
     panels[0].set_yticks(range(len(labels)), [f"against {label}" for label in labels])
     panels[0].set_ylim(len(labels) - 0.5, -0.5)
     style.legend_below(figure, panels[0], 2)

@@ -1,4 +1,4 @@
-"""How many runs of every condition have a property, with intervals: one panel per property."""
+"""Shares of runs of all conditions with their intervals, one panel per property."""
 
 from collections.abc import Mapping, Sequence
 

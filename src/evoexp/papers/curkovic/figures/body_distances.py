@@ -1,4 +1,4 @@
-"""Least distance of bodies along motions: robots from each other and from what stands around."""
+"""Least distances of bodies along motions: of robots from each other and from obstacles."""
 
 from typing import Any
 

@@ -82,8 +82,8 @@ def draw_methods(table: pd.DataFrame) -> Figure:
         axes.set_ylabel("best C₂ + C₃ + C₄ of a team")
     above.set_title("a  mean ± standard deviation of the best collision-free team so far")
     below.set_title("b  at the end of each run")
+    below.set(xlim=(-0.6, len(labels) - 0.4))
     below.set_xticks(range(len(labels)), labels)
-    below.set_xlim(-0.6, len(labels) - 0.4)
     style.legend_below(figure, above, 5)
     return figure
 

@@ -87,8 +87,7 @@ def draw_motion(table: pd.DataFrame) -> Figure:
         )
     trail.set_title(f"a  motion of replicate {best}")
     paths.set_title(f"b  end-effectors, all replicates (n = {path['replicate'].nunique()})")
-    trail.set_xlim(left, right)
-    trail.set_ylim(low, high)
+    trail.set(xlim=(left, right), ylim=(low, high))
     style.keys_below(figure, _keys(table, len(contacts)), 4)
     return figure
 

@@ -86,8 +86,7 @@ def draw_snapshots(table: pd.DataFrame) -> Figure:
         axes.set_title(
             f"all instants {first}–{last}" if k == len(stages) - 1 else f"instants {first}–{last}"
         )
-    panels[0, 0].set_xlim(left, right)
-    panels[0, 0].set_ylim(low, high)
+    panels[0, 0].set(xlim=(left, right), ylim=(low, high))
     arms = sorted(table["arm"].unique())
     keys = [
         *style.arm_keys(arms, linewidth=3),
@@ -207,8 +206,7 @@ def draw_distances(table: pd.DataFrame) -> Figure:
     for axes, measure in zip(panels, (CENTRES, LINKS), strict=True):
         _distances(axes, table[table["measure"] == measure], safety, unit)
         axes.set_title(titles[measure])
-        axes.set_ylabel(f"least distance [{unit}]")
-        axes.set_xlim(0, table["instant"].max())
+        axes.set(ylabel=f"least distance [{unit}]", xlim=(0, table["instant"].max()))
         axes.set_ylim(bottom=0)
     panels[1].xaxis.set_major_locator(MaxNLocator(integer=True, nbins=12))
     panels[1].set_xlabel("instant (whole numbers: via-points)")

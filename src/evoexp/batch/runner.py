@@ -111,35 +111,30 @@ class Batch:
                     self._summarise(key)
 
     def _missing(self) -> list[Job]:
+        """Return the jobs of missing replicates; references, which take longest, come first."""
         jobs = []
-        first = sorted(
-            self._wanted.items(), key=lambda item: not item[1][0].is_reference
-        )  # the longest replicates
-        for key, (condition, count, _) in first:
+        ordered = sorted(self._wanted.items(), key=lambda item: not item[1][0].is_reference)
+        for key, (condition, count, _) in ordered:
             config_json, done = condition.to_json(), self.runs[key].completed()
-            files = tuple(condition.files().values())
-            jobs += [
-                Job(key, config_json, index, files) for index in range(count) if index not in done
-            ]
+            files, missing = tuple(condition.files().values()), set(range(count)) - set(done)
+            jobs += [Job(key, config_json, index, files) for index in sorted(missing)]
         return jobs
 
     def _store(self, outcomes: Sequence[Outcome]) -> list[Outcome]:
+        """Write failures and logs, and the table of a condition as soon as it is complete."""
         by_run: dict[str, dict[int, bytes]] = {}
         for outcome in outcomes:
+            key, replicate = outcome.condition_id, outcome.replicate
             if outcome.summary is None:
-                run = self.runs[outcome.condition_id]
-                run.write_failure(outcome.replicate, outcome.reason, outcome.traceback)
+                self.runs[key].write_failure(replicate, outcome.reason, outcome.traceback)
             else:
-                by_run.setdefault(outcome.condition_id, {})[outcome.replicate] = outcome.content
-                self._finished.setdefault(outcome.condition_id, {})[outcome.replicate] = (
-                    outcome.summary
-                )
+                by_run.setdefault(key, {})[replicate] = outcome.content
+                self._finished.setdefault(key, {})[replicate] = outcome.summary
         for key, contents in by_run.items():
             self.runs[key].write_logs(contents)
-            if len(self._finished[key]) == self._wanted[key][1]:  # while the workers go on
-                with contextlib.suppress(
-                    CorruptLog
-                ):  # damage of an older log is reported at the end
+            if len(self._finished[key]) == self._wanted[key][1]:
+                # now, while the workers go on; damage of an older log is reported at the end
+                with contextlib.suppress(CorruptLog):
                     self._summarise(key)
         return [outcome._replace(content=b"") for outcome in outcomes]
 

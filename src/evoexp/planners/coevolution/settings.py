@@ -53,47 +53,40 @@ class CoevolutionSettings(Component):
     restart_after: Count | None
 
     @model_validator(mode="after")
-    def _rate_stays_a_probability(self) -> Self:
-        if self.mutation_decay > self.mutation_rate:
-            raise SettingError(
+    def _settings_agree(self) -> Self:
+        no_hall, no_rule = self.hall_depth == 0.0, "null where there is no hall (hall_depth is 0)"
+        most = self.population_size - self.num_hall_teams
+        for wrong, field, must in (
+            (
+                self.mutation_decay > self.mutation_rate,
                 "mutation_decay",
                 f"at most mutation_rate ({self.mutation_rate})",
-                self.mutation_decay,
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _hall_is_one(self) -> Self:
-        if self.hall_depth > 0.0 and self.num_hall_teams == 0:
-            must = "0, or large enough for one pair (at least 1/population_size)"
-            raise SettingError("hall_depth", must, self.hall_depth)
-        if self.hall_depth == 0.0 and self.hall_memory is not None:
-            raise SettingError(
-                "hall_memory", "null where there is no hall (hall_depth is 0)", self.hall_memory
-            )
-        if self.hall_depth == 0.0 and self.hall_frozen:
-            raise SettingError(
-                "hall_frozen", "false where there is no hall (hall_depth is 0)", self.hall_frozen
-            )
-        if self.hall_frozen and self.hall_memory is not None:
-            raise SettingError(
-                "hall_memory", "null where the hall is frozen (hall_frozen)", self.hall_memory
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _copies_fit(self) -> Self:
-        if self.num_elites > self.population_size:
-            raise SettingError(
-                "num_elites", f"at most population_size ({self.population_size})", self.num_elites
-            )
-        if self.num_offspring < 0:
-            most = self.population_size - self.num_hall_teams
-            raise SettingError(
+            ),
+            (
+                not no_hall and self.num_hall_teams == 0,
+                "hall_depth",
+                "0, or large enough for one pair (at least 1/population_size)",
+            ),
+            (no_hall and self.hall_memory is not None, "hall_memory", no_rule),
+            (no_hall and self.hall_frozen, "hall_frozen", no_rule.replace("null", "false")),
+            (
+                self.hall_frozen and self.hall_memory is not None,
+                "hall_memory",
+                "null where the hall is frozen (hall_frozen)",
+            ),
+            (
+                self.num_elites > self.population_size,
+                "num_elites",
+                f"at most population_size ({self.population_size})",
+            ),
+            (
+                self.num_offspring < 0,
                 "num_elites",
                 f"at most population_size less the hall's teams ({most})",
-                self.num_elites,
-            )
+            ),
+        ):
+            if wrong:
+                raise SettingError(field, must, getattr(self, field))
         return self
 
     @property

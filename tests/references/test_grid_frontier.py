@@ -64,6 +64,7 @@ def test_no_path_is_below_the_bound_and_the_best_known_is_a_path(
     everything = [cost(own, problem, path) for path in all_simple_paths(problem)]
     assert truth.terms["lower_bound"] <= min(everything) + 1e-12
     assert truth.cost >= min(everything) - 1e-12
+    assert truth.cost <= truth.arrays["frontier"][:, 4].min(), "the best of the paths it found"
     if truth.terms["bound_is_reached"]:
         assert truth.cost == pytest.approx(min(everything))
 

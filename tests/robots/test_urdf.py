@@ -135,6 +135,29 @@ def written(tmp_path: Path, change: Any) -> Path:
     return file
 
 
+def test_the_base_frame_stands_at_the_base_pose(tmp_path: Path) -> None:
+    """The file's root is turned and moved away from the base: the arm stands where it stood."""
+    root = (
+        '<link name="root"/><joint name="mount" type="fixed"><parent link="root"/>'
+        '<child link="base_link"/><origin xyz="0.3 -0.2 0.5" rpy="0.4 -0.7 1.1"/></joint></robot>'
+    )
+    mounted = written(tmp_path, lambda text: text.replace("</robot>", root))
+    placed = ("robot.base_position=[1,2,3]", "robot.base_rotation=[10,20,30]")
+    found = condition(*placed, "robot.base_frame=base_link", path=mounted).robot.build()  # type: ignore[attr-defined]
+    plain = condition(*placed).robot.build()  # type: ignore[attr-defined]
+    q, poses = np.full(6, 0.3), []
+    for assembly in (found, plain):
+        tool = assembly.tools[0]
+        local = local_pose(assembly.table, tool.joint, tool.rotation, tool.position)
+        poses.append(frame_pose(assembly.table, tool.joint - 1, local, q))
+        placements = assembly.geometry.createData()
+        data = assembly.model.createData()
+        pin.updateGeometryPlacements(assembly.model, data, assembly.geometry, placements, q)
+        poses.append(np.array([placement.homogeneous for placement in placements.oMg]))
+    assert poses[0] == pytest.approx(poses[2], abs=1e-12)
+    assert poses[1] == pytest.approx(poses[3], abs=1e-12)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

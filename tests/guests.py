@@ -1,5 +1,6 @@
 """Distributions made by tests: metadata with entry points in a folder that is put on the path."""
 
+import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -44,3 +45,6 @@ def on_path(*directories: Path) -> Iterator[None]:
         finally:
             patch.undo()
             registry.clear()
+            for name, module in list(sys.modules.items()):  # another test may write another one
+                if str(getattr(module, "__file__", None)).startswith(tuple(map(str, directories))):
+                    del sys.modules[name]

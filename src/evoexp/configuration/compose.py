@@ -47,7 +47,13 @@ from evoexp.configuration.overrides import (
     single_values,
     sweep,
 )
-from evoexp.configuration.refusals import HEADER, chosen, uncomposed, unparsed, unresolved
+from evoexp.configuration.refusals import (
+    chosen,
+    uncomposed,
+    unparsed,
+    unresolved,
+    without_header,
+)
 from evoexp.configuration.search_path import (
     EXPERIMENT,
     file_directories,
@@ -191,7 +197,7 @@ class _Composer:
             try:
                 self._known[key] = self._by_hydra(words, file)
             except _COMPOSER as error:
-                raise uncomposed(error, names) from None
+                raise uncomposed(error, names, file) from None
         return self._known[key]
 
     def _by_hydra(self, words: list[str], file: Option | None) -> Composed:
@@ -202,9 +208,12 @@ class _Composer:
         config: Any = OmegaConf.to_container(composed, resolve=False)
         del config["hydra"]
         if config.get(EXPERIMENT) is not None:
-            raise SettingError(EXPERIMENT, f"a file that begins with '{HEADER}'", taken[EXPERIMENT])
+            raise without_header(taken[EXPERIMENT])
         if unknown := config.keys() - {*groups(), *SCALARS, "conditions"}:
             raise UnknownSetting(min(map(str, unknown)), [*groups(), *SCALARS, "conditions"])
+        for group in groups():
+            if not isinstance(config.get(group, {}), dict):
+                raise SettingError(group, "a mapping of settings", config[group])
         named = ((group, taken.get(group)) for group in groups() if group != EXPERIMENT)
         options = tuple(find(group, name) for group, name in named if name)
         return Composed(config, options if file is None else (file, *options))

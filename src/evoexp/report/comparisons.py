@@ -8,7 +8,7 @@ from evoexp.condition import Condition
 from evoexp.records import FloatArray
 from evoexp.report.claims import Comparison, adjusted, compare
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import WRAPPED, ConditionResults, Results
+from evoexp.report.results import ConditionResults, Results, wrapped
 
 Values = Callable[[ConditionResults], FloatArray]
 
@@ -49,7 +49,7 @@ def comparisons(
 
 def _beside(first: Condition, control: Condition) -> bool:
     """Return whether a control wraps this very planner in the same scene, with its seeds."""
-    return control._replace(planner=getattr(control.planner, WRAPPED)) == first
+    return control._replace(planner=wrapped(control.planner)) == first
 
 
 def compared(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from evoexp.condition import Condition, Prepared
 from evoexp.errors import NothingStored
 from evoexp.paths.motion import Motion
+from evoexp.planners.wrapped_planner import WrappedPlanner
 from evoexp.records import FloatArray
 from evoexp.report.statistics import Spread, spread
 from evoexp.shipped import ORIGIN, Option, config_directory
@@ -25,6 +26,11 @@ Kind = TypeVar("Kind")
 WRAPPED = (
     "planner"  # the field of a control (random search) that holds the planner it stands beside
 )
+
+
+def wrapped(planner: Any) -> Any:
+    """Return the planner that a control or a reference stands beside; of others themselves."""
+    return planner.planner if isinstance(planner, WrappedPlanner) else planner
 
 
 class Verdicts(NamedTuple):
@@ -210,12 +216,12 @@ class ConditionResults(NamedTuple):
     @property
     def planner(self) -> Any:
         """The paper's planner; of a control or a reference the one that it stands beside."""
-        return getattr(self.condition.planner, WRAPPED, self.condition.planner)
+        return wrapped(self.condition.planner)
 
     @property
     def is_control(self) -> bool:
         """Return whether this is a control: a planner that stands beside the paper's."""
-        return hasattr(self.condition.planner, WRAPPED) and not self.is_reference
+        return isinstance(self.condition.planner, WrappedPlanner) and not self.is_reference
 
     @property
     def is_reference(self) -> bool:

@@ -10,7 +10,7 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion, cubic_motion, top_speeds
 from evoexp.records import FloatArray
 from evoexp.report import motion_geometry
-from evoexp.report.results import WRAPPED
+from evoexp.report.results import wrapped
 
 
 class SampledMotion(NamedTuple):
@@ -83,7 +83,7 @@ def speed_limits(prepared: Prepared) -> FloatArray:
     Returns:
         (robots, 2) [deg].
     """
-    limit = getattr(prepared.planner, WRAPPED, prepared.planner).speed_limit
+    limit = wrapped(prepared.planner).speed_limit
     return np.array([limit.greatest_steps(arm.lengths) for arm in arms(prepared)])
 
 

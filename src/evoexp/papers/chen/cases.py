@@ -7,9 +7,7 @@ import numpy as np
 
 from evoexp.planners.placement_ga.planner import PlacementGa
 from evoexp.records import FloatArray
-from evoexp.report.proportions import Proportion
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.run_measures import counted, grouped
+from evoexp.report.kit import ConditionResults, Proportion, Results, counted, grouped
 
 METHODS = {
     "newton": "Newton-type",

@@ -8,14 +8,20 @@ import pandas as pd
 from evoexp.papers.chen.figures import field_grids
 from evoexp.papers.chen.printed_grids import MISSING, SURPLUS, WRONG, compare, printed, rows_of
 from evoexp.planners.grid_path_ga.planner import GridPathGa
-from evoexp.report import claims, judging
-from evoexp.report.claims import Claim
-from evoexp.report.judging import Judge
-from evoexp.report.page import Drawing, Page
-from evoexp.report.pages import generic
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.rows import groups, records
+from evoexp.report.kit import (
+    Claim,
+    ConditionResults,
+    Drawing,
+    Judge,
+    Page,
+    ReportSettings,
+    Results,
+    claims,
+    generic,
+    groups,
+    judging,
+    records,
+)
 
 PRINT = "chen_fig_1.txt"
 NAMES = ("(a) potential toward the goal", "(b) potential of obstacles")

@@ -6,11 +6,7 @@ from evoexp.papers.chen import cases as case_results
 from evoexp.papers.chen import placement_page
 from evoexp.papers.chen.cases import Case
 from evoexp.papers.chen.figures import landscapes
-from evoexp.report import markdown
-from evoexp.report.page import Drawing, Page, Table
-from evoexp.report.pages import generic
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import Results
+from evoexp.report.kit import Drawing, Page, ReportSettings, Results, Table, generic, markdown
 
 INTRODUCTION = (
     "E over θ1 and θ2, at the better θ3 of each pair; white: no posture reaches the target. The "

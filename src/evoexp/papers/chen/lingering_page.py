@@ -10,11 +10,7 @@ from evoexp.papers.chen.figures import grid_paths, lingering
 from evoexp.papers.chen.figures.grid_paths import EXACT, MEDIAN, Line, Panel
 from evoexp.papers.chen.path_measures import Group
 from evoexp.planners.grid_path_ga.planner import Problem
-from evoexp.report import markdown
-from evoexp.report.page import Drawing, Page
-from evoexp.report.pages import generic
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import Results
+from evoexp.report.kit import Drawing, Page, ReportSettings, Results, generic, markdown
 
 INTRODUCTION = (
     "The unsafeness of a path is the mean over its nodes (Eq. 3): every further step in a safe "

@@ -11,12 +11,18 @@ from evoexp.papers.chen.figures import missions
 from evoexp.papers.chen.figures.missions import DOCKED, TRAVEL, Mission
 from evoexp.planners.two_stage.planner import Problem, TwoStage
 from evoexp.records import FloatArray
-from evoexp.report import markdown, run_measures
-from evoexp.report.page import Drawing, Page
-from evoexp.report.pages import generic
-from evoexp.report.proportions import Proportion
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
+from evoexp.report.kit import (
+    ConditionResults,
+    Drawing,
+    Page,
+    Proportion,
+    ReportSettings,
+    Results,
+    by_column,
+    generic,
+    markdown,
+    run_measures,
+)
 
 INTRODUCTION = (
     "Two searches, one motion: the placement search (section 3) chooses docking place and "
@@ -33,7 +39,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
     found = results.with_data
     if not found or not all(isinstance(c.planner, TwoStage) for c in found):
         return generic.page(results, settings)
-    row, column = partial(generic.quantity, results), generic.by_column
+    row, column = partial(generic.quantity, results), by_column
     clearance = "clearance of the bodies over the whole motion (exact)"
     drawing = Drawing(
         "mission",

@@ -5,12 +5,20 @@ import numpy as np
 from evoexp.papers.chen import path_measures as measures
 from evoexp.papers.chen.path_measures import MUCH, NEAR, Group
 from evoexp.records import FloatArray
-from evoexp.report import claims, judging, markdown
-from evoexp.report.claims import Claim, Comparison
-from evoexp.report.judging import Judge, evidence
-from evoexp.report.pages import generic
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
+from evoexp.report.kit import (
+    Claim,
+    Comparison,
+    ConditionResults,
+    Judge,
+    ReportSettings,
+    Results,
+    by_column,
+    claims,
+    compared,
+    evidence,
+    judging,
+    markdown,
+)
 
 SOURCE = "section 4.1, Fig. 2"
 DISTANCE, UNSAFENESS = "term_distance", "term_unsafeness"
@@ -128,4 +136,4 @@ def _compared(
     first: ConditionResults, second: ConditionResults, column: str, settings: ReportSettings
 ) -> tuple[Comparison, ...]:
     """Compare two conditions in a column; empty if they have no common seed."""
-    return generic.compared([(first, second)], generic.by_column(column), settings)
+    return compared([(first, second)], by_column(column), settings)

@@ -7,9 +7,7 @@ import numpy as np
 from evoexp.papers.chen.routes import Route, inside_points, routes
 from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.records import FloatArray
-from evoexp.report import run_measures
-from evoexp.report.proportions import Proportion
-from evoexp.report.results import ConditionResults, Results
+from evoexp.report.kit import ConditionResults, Proportion, Results, run_measures
 
 Weights = tuple[float, float]
 NEAR = 0.05  # [-] "nearly shortest": a length within 5 % of the shortest one

@@ -11,13 +11,21 @@ from evoexp.papers.chen.figures import grid_costs, grid_paths
 from evoexp.papers.chen.figures.grid_paths import EXACT, FAINT, MEDIAN, Line, Panel
 from evoexp.papers.chen.path_measures import Group
 from evoexp.papers.chen.routes import Route
-from evoexp.report import markdown, run_measures
-from evoexp.report.claims import Comparison
-from evoexp.report.page import Drawing, Page, Quantity
-from evoexp.report.pages import generic
-from evoexp.report.pages.generic import Values
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
+from evoexp.report.kit import (
+    Comparison,
+    ConditionResults,
+    Drawing,
+    Page,
+    Quantity,
+    ReportSettings,
+    Results,
+    Values,
+    by_column,
+    compared,
+    generic,
+    markdown,
+    run_measures,
+)
 
 INTRODUCTION = (
     "Individuals are paths from node to node, of any length, valid by construction. The cost is "
@@ -61,7 +69,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
 
 def quantities(results: Results, groups: tuple[Group, ...]) -> tuple[Quantity, ...]:
     """Return the rows of the table of results."""
-    row, column = partial(generic.quantity, results), generic.by_column
+    row, column = partial(generic.quantity, results), by_column
     group_of = {c.label: group for group in groups for c in group.all}
     above = "cost above the best path known (below 0: better than it)"
 
@@ -150,11 +158,11 @@ def comparisons(
     groups: tuple[Group, ...], settings: ReportSettings
 ) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
     """Compare the costs of the first condition of each weighting with those of its others."""
-    values = generic.by_column("best_cost")
+    values = by_column("best_cost")
     found = (
         (
             f"cost: {group.main.label} against …",
-            generic.compared([(group.main, c) for c in group.conditions[1:]], values, settings),
+            compared([(group.main, c) for c in group.conditions[1:]], values, settings),
         )
         for group in groups
     )

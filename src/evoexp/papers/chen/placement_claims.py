@@ -3,13 +3,19 @@
 import numpy as np
 
 from evoexp.papers.chen.cases import CLOSE, METHODS, Case
-from evoexp.report import claims, judging, markdown
-from evoexp.report.claims import Claim
-from evoexp.report.judging import Judge
-from evoexp.report.pages import generic
-from evoexp.report.proportions import Proportion, fisher_exact
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import Results
+from evoexp.report.kit import (
+    Claim,
+    Judge,
+    Proportion,
+    ReportSettings,
+    Results,
+    by_column,
+    claims,
+    compared,
+    fisher_exact,
+    judging,
+    markdown,
+)
 
 ROUNDED = 0.005  # half a unit in the last place of the printed numbers
 PAPER_S = 2.0  # [s] "2 seconds", on a Sun Sparc station
@@ -74,8 +80,8 @@ def _against_search(judge: Judge, cases: list[Case], settings: ReportSettings) -
         if own is not None and case.search is not None
     }
     texts = {own.label: text for text, (own, _) in pairs.items()}
-    costs = generic.by_column("best_cost")
-    rows = generic.compared(pairs.values(), costs, settings, named=lambda c, _: texts[c.label])
+    costs = by_column("best_cost")
+    rows = compared(pairs.values(), costs, settings, named=lambda c, _: texts[c.label])
     return [judge.better(row.quantity, "section 1", row, "lower E") for row in rows]
 
 

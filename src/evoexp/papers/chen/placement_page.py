@@ -7,12 +7,17 @@ import numpy as np
 from evoexp.papers.chen import cases, placement_claims
 from evoexp.papers.chen.cases import CLOSE, Case
 from evoexp.papers.chen.figures import placements
-from evoexp.report import markdown
-from evoexp.report.page import Drawing, Page, Table
-from evoexp.report.pages import generic
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.statistics import spread
+from evoexp.report.kit import (
+    ConditionResults,
+    Drawing,
+    Page,
+    ReportSettings,
+    Results,
+    Table,
+    generic,
+    markdown,
+    spread,
+)
 
 INTRODUCTION = (
     "Two angles of a three-link arm on a platform are searched; θ3 (the better of its two "

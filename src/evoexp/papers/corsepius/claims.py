@@ -2,13 +2,20 @@
 
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.measures import text
-from evoexp.report import claims, judging, markdown
-from evoexp.report.claims import Claim
-from evoexp.report.judging import Judge
-from evoexp.report.proportions import fisher_exact
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.run_measures import counted, solved, success
+from evoexp.report.kit import (
+    Claim,
+    ConditionResults,
+    Judge,
+    ReportSettings,
+    Results,
+    claims,
+    counted,
+    fisher_exact,
+    judging,
+    markdown,
+    solved,
+    success,
+)
 
 MANY_JOINTS = 6  # arms with more joints are redundant
 TILTS = ("upright", "keep_parallel")

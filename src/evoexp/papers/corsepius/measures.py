@@ -8,11 +8,18 @@ import pandas as pd
 from evoexp.planners.posture_es.phases import Problem
 from evoexp.planners.posture_es.planner import PostureEs
 from evoexp.records import FloatArray
-from evoexp.report.comparisons import by_column
-from evoexp.report.proportions import Proportion
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.run_measures import counted, grouped, median_replicate, search_seconds, solved
-from evoexp.report.statistics import quantile
+from evoexp.report.kit import (
+    ConditionResults,
+    Proportion,
+    Results,
+    by_column,
+    counted,
+    grouped,
+    median_replicate,
+    quantile,
+    search_seconds,
+    solved,
+)
 
 REASONS = ("goal", "stagnation", "cap")  # why a search ends
 

@@ -14,14 +14,23 @@ from evoexp.papers.corsepius.figures import (
 )
 from evoexp.papers.corsepius.figures.posture_motions import ShownPath
 from evoexp.papers.corsepius.measures import text
-from evoexp.report import comparisons, markdown, run_measures
 from evoexp.report.figures import shares
-from evoexp.report.page import Drawing, Page, Quantity, Table
-from evoexp.report.pages import generic
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.run_measures import counted
-from evoexp.report.statistics import spread
+from evoexp.report.kit import (
+    ConditionResults,
+    Drawing,
+    Page,
+    Quantity,
+    ReportSettings,
+    Results,
+    Table,
+    by_column,
+    comparisons,
+    counted,
+    generic,
+    markdown,
+    run_measures,
+    spread,
+)
 
 INTRODUCTION = (
     "An individual is a posture. Every cycle random steps within a local scope of a few parents "
@@ -76,7 +85,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
 
 def quantities(results: Results) -> tuple[Quantity, ...]:
     """Return the rows of the table of results."""
-    row, column = partial(generic.quantity, results), comparisons.by_column
+    row, column = partial(generic.quantity, results), by_column
     unit = results.with_data[0].condition.length_unit
     tilts = [
         row(
@@ -100,7 +109,7 @@ def quantities(results: Results) -> tuple[Quantity, ...]:
 def effort_quantities(results: Results) -> tuple[Quantity, ...]:
     """Return the rows that need no log, only summaries."""
     row, unit = partial(generic.quantity, results), results.with_data[0].condition.length_unit
-    column = comparisons.by_column
+    column = by_column
     return (
         row("cycles, all phases", "–", measures.cycles),
         row("evaluations", "–", measures.evaluations),

@@ -8,15 +8,22 @@ import numpy as np
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.measures import Task
 from evoexp.records import FloatArray
-from evoexp.report import claims, markdown
-from evoexp.report.claims import Claim
-from evoexp.report.comparisons import Values
-from evoexp.report.judging import Judge
-from evoexp.report.proportions import fisher_exact
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults
-from evoexp.report.run_measures import solved, success
-from evoexp.report.statistics import Interval, effort_ratio, expected_effort, holm
+from evoexp.report.kit import (
+    Claim,
+    ConditionResults,
+    Interval,
+    Judge,
+    ReportSettings,
+    Values,
+    claims,
+    effort_ratio,
+    expected_effort,
+    fisher_exact,
+    holm,
+    markdown,
+    solved,
+    success,
+)
 
 RECOMMENDED = 100.0  # individuals (section 5)
 REASONABLE = (

@@ -8,13 +8,21 @@ from evoexp.papers.corsepius import population_claims as verdicts
 from evoexp.papers.corsepius.figures import population_effort
 from evoexp.papers.corsepius.measures import Task, text
 from evoexp.papers.corsepius.population_claims import METRICS, RECOMMENDED, SizeComparison
-from evoexp.report import judging, markdown
-from evoexp.report.page import Drawing, Page, Table
-from evoexp.report.pages import generic
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.run_measures import solved, success
-from evoexp.report.statistics import expected_effort, expected_interval
+from evoexp.report.kit import (
+    ConditionResults,
+    Drawing,
+    Page,
+    ReportSettings,
+    Results,
+    Table,
+    expected_effort,
+    expected_interval,
+    generic,
+    judging,
+    markdown,
+    solved,
+    success,
+)
 
 SETTING = "num_offspring"
 SCALES = {"cycles": (1.0, ""), "evaluations": (1.0, ""), "CPU time": (1e3, " [ms]")}

@@ -9,15 +9,24 @@ from evoexp.papers.corsepius import page as whole_page
 from evoexp.papers.corsepius.figures import population_effort, residual_floor
 from evoexp.papers.corsepius.measures import Task, text
 from evoexp.records import FloatArray
-from evoexp.report import markdown, sweep_figures
-from evoexp.report.claims import Comparison
-from evoexp.report.comparisons import compared
-from evoexp.report.page import Drawing, Page, Table
-from evoexp.report.proportions import fisher_exact
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.run_measures import grouped, solved, success
-from evoexp.report.statistics import holm, spread
+from evoexp.report.kit import (
+    Comparison,
+    ConditionResults,
+    Drawing,
+    Page,
+    ReportSettings,
+    Results,
+    Table,
+    compared,
+    fisher_exact,
+    grouped,
+    holm,
+    markdown,
+    solved,
+    spread,
+    success,
+    sweep_figures,
+)
 
 PRINTED_PARENTS = 5.0  # "typical size 5" (section 4.2)
 INTRODUCTION = (

@@ -6,12 +6,18 @@ import numpy as np
 
 from evoexp.papers.lavoie import measures
 from evoexp.papers.lavoie.measures import Percentage
-from evoexp.report import claims, markdown
-from evoexp.report.claims import Claim
-from evoexp.report.judging import Judge
-from evoexp.report.proportions import Proportion, fisher_exact, newcombe
-from evoexp.report.results import ConditionResults
-from evoexp.report.run_measures import counted, solved
+from evoexp.report.kit import (
+    Claim,
+    ConditionResults,
+    Judge,
+    Proportion,
+    claims,
+    counted,
+    fisher_exact,
+    markdown,
+    newcombe,
+    solved,
+)
 
 SOURCE = "section 5, Fig. 3"
 ELSEWHERE = (

@@ -8,10 +8,15 @@ from evoexp.paths.motion import Motion
 from evoexp.planners.planner import judge_motion
 from evoexp.planners.redundant_ga.planner import RedundantGa
 from evoexp.records import FloatArray
-from evoexp.report import body_contacts
-from evoexp.report.proportions import Proportion
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.run_measures import counted, search_seconds, solved
+from evoexp.report.kit import (
+    ConditionResults,
+    Proportion,
+    Results,
+    body_contacts,
+    counted,
+    search_seconds,
+    solved,
+)
 
 PRINTED_RUNS = 1000  # section 5: "a thousand experiments were conducted for each simulation"
 Contact = tuple[float, str]

@@ -8,13 +8,22 @@ from evoexp.papers.lavoie.figures import attempts, error_distribution, reaching_
 from evoexp.papers.lavoie.figures.reaching_motions import ShownMotion
 from evoexp.papers.lavoie.measures import RefutedMotions
 from evoexp.planners.redundant_ga.planner import Problem
-from evoexp.report import body_contacts, judging, markdown, run_measures
-from evoexp.report.claims import Claim
-from evoexp.report.page import Drawing, Page, Quantity
-from evoexp.report.pages import generic
-from evoexp.report.proportions import Proportion
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
+from evoexp.report.kit import (
+    Claim,
+    ConditionResults,
+    Drawing,
+    Page,
+    Proportion,
+    Quantity,
+    ReportSettings,
+    Results,
+    body_contacts,
+    by_column,
+    generic,
+    judging,
+    markdown,
+    run_measures,
+)
 
 INTRODUCTION = (
     "A genetic algorithm searches the posture A at the end of the first sub-path (SP1, tip near "
@@ -87,7 +96,7 @@ def quantities(results: Results) -> tuple[Quantity, ...]:
     """Return the rows of the table of results."""
     row, unit = partial(generic.quantity, results), results.with_data[0].condition.length_unit
     cost, _, evaluations, queries = generic.quantities(results)
-    column = generic.by_column
+    column = by_column
     tests = "tests of a link against an ellipse per second of search"
     return (
         row("position error of SP2 (runs without a solution: ∞)", unit, measures.errors),

@@ -8,16 +8,23 @@ import numpy as np
 from evoexp.papers.lavoie import measures
 from evoexp.papers.lavoie.claims import percentages
 from evoexp.papers.lavoie.measures import RefutedMotions
-from evoexp.report import judging, markdown
-from evoexp.report.claims import Claim
-from evoexp.report.judging import Judge, evidence
-from evoexp.report.pages import generic
-from evoexp.report.pages.generic import Values
-from evoexp.report.proportions import Proportion, fisher_exact
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.run_measures import grouped, success
-from evoexp.report.statistics import holm
+from evoexp.report.kit import (
+    Claim,
+    ConditionResults,
+    Judge,
+    Proportion,
+    ReportSettings,
+    Results,
+    Values,
+    compared,
+    evidence,
+    fisher_exact,
+    grouped,
+    holm,
+    judging,
+    markdown,
+    success,
+)
 
 QUESTION = "our question"
 Group = tuple[ConditionResults, ...]
@@ -70,7 +77,7 @@ def _precision(judge: Judge, results: Results, settings: ReportSettings) -> list
     for group in groups_but_for(results, "stop_cost_sp2"):
         own = sorted(group, key=lambda c: -float(c.planner.stop_cost_sp2))
         steps = [(small, large) for large, small in itertools.pairwise(own)]
-        rows = generic.compared(steps, measures.errors, settings, named=_against)
+        rows = compared(steps, measures.errors, settings, named=_against)
         medians = (f"{_median(c, measures.errors)} below {c.planner.stop_cost_sp2:g}" for c in own)
         told = "; ".join(f"{row.quantity}: {evidence(row, 'smaller')}" for row in rows)
         told = (
@@ -116,7 +123,7 @@ def _coding(judge: Judge, results: Results, settings: ReportSettings) -> list[Cl
             ("position error", measures.errors, "smaller"),
             ("evaluations to a solution", measures.effort, "fewer"),
         ):
-            row = next(iter(generic.compared([pair], values, settings)), None)
+            row = next(iter(compared([pair], values, settings)), None)
             told = f"median {' against '.join(_median(c, values) for c in pair)}; {{}}"
             text = (
                 f"Real coding performs better than binary coding, judged by {what}: "

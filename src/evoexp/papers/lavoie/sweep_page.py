@@ -7,15 +7,21 @@ from evoexp.papers.lavoie import measures, sweep_claims
 from evoexp.papers.lavoie import page as whole_page
 from evoexp.papers.lavoie.figures import stopping
 from evoexp.papers.lavoie.measures import RefutedMotions
-from evoexp.report import sweep_figures
-from evoexp.report.claims import Comparison
-from evoexp.report.page import Drawing, Page
-from evoexp.report.pages import generic
-from evoexp.report.pages.generic import Values
-from evoexp.report.proportions import Proportion, newcombe
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.run_measures import grouped, success
+from evoexp.report.kit import (
+    Comparison,
+    ConditionResults,
+    Drawing,
+    Page,
+    Proportion,
+    ReportSettings,
+    Results,
+    Values,
+    comparisons,
+    grouped,
+    newcombe,
+    success,
+    sweep_figures,
+)
 
 INTRODUCTION = (
     "Each condition changes one part of the first one of its arm; all share their seeds. A run "
@@ -85,7 +91,7 @@ def compared(results: Results, settings: ReportSettings) -> tuple[ArmComparison,
         ArmComparison(
             measure,
             first,
-            generic.compared([(first, other) for other in others], measure.values, settings),
+            comparisons.compared([(first, other) for other in others], measure.values, settings),
         )
         for measure in quantities
         for first, *others in arms(results)

@@ -10,8 +10,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
 from evoexp.papers.chen.printed_grids import BLOCKED, MISSING, SURPLUS, WRONG
-from evoexp.report import style
-from evoexp.report.rows import groups, records
+from evoexp.report.kit import groups, records, style
 
 NAMES = {
     WRONG: "another number is printed (below, small)",

@@ -8,10 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from evoexp.papers.chen.path_measures import Group, gaps
-from evoexp.report import style
-from evoexp.report.results import ConditionResults
-from evoexp.report.rows import groups as grouped
-from evoexp.report.statistics import spread
+from evoexp.report.kit import ConditionResults, spread, style
+from evoexp.report.kit import groups as grouped
 
 AVERAGE = "average of a generation"
 EXACT, BOUND = "best path known", "no path costs less"

@@ -9,8 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from evoexp.records import FloatArray
-from evoexp.report import style
-from evoexp.report.rows import groups
+from evoexp.report.kit import groups, style
 
 OBSTACLE = "obstacle"
 FAINT, MEDIAN, EXACT = "all runs", "run of median cost", "best path known (reference)"

@@ -11,8 +11,7 @@ from matplotlib.ticker import MultipleLocator
 
 from evoexp.papers.chen.cases import Case
 from evoexp.records import FloatArray
-from evoexp.report import style
-from evoexp.report.rows import groups, rounded
+from evoexp.report.kit import groups, rounded, style
 
 GRID, RUN, PAPER, OPTIMUM, MINIMUM = "grid", "GA, runs", "paper", "optimum", "other local minima"
 LOOKS: dict[str, dict[str, Any]] = {

@@ -6,9 +6,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from evoexp.report import style
-from evoexp.report.results import ConditionResults
-from evoexp.report.rows import groups
+from evoexp.report.kit import ConditionResults, groups, style
 
 
 def places_table(shown: Sequence[tuple[str, ConditionResults, np.ndarray]]) -> pd.DataFrame:

@@ -10,8 +10,7 @@ from matplotlib.patches import Rectangle
 
 from evoexp.papers.chen.figures.grid_paths import OBSTACLE, draw_obstacle
 from evoexp.records import FloatArray
-from evoexp.report import style
-from evoexp.report.rows import groups
+from evoexp.report.kit import groups, style
 
 PATH, TRAVEL, DOCKED, TARGET, BODY, FORCE = (
     "path",

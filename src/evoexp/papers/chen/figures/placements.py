@@ -10,9 +10,7 @@ from matplotlib.patches import FancyBboxPatch
 
 from evoexp.papers.chen.cases import CLOSE, METHODS, Case
 from evoexp.records import FloatArray
-from evoexp.report import style
-from evoexp.report.rows import groups, records, rounded
-from evoexp.report.statistics import quantile
+from evoexp.report.kit import groups, quantile, records, rounded, style
 
 RUNS = ("GA", "GA, elitism", "random search")
 ORDER = (*RUNS, *METHODS.values())  # which tells colours

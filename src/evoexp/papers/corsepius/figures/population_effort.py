@@ -11,13 +11,16 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import NullFormatter, NullLocator
 
 from evoexp.papers.corsepius.measures import Task
-from evoexp.report import style
-from evoexp.report.comparisons import Values
-from evoexp.report.proportions import Proportion
-from evoexp.report.results import ConditionResults
-from evoexp.report.rows import groups
-from evoexp.report.run_measures import solved
-from evoexp.report.statistics import expected_effort, expected_interval
+from evoexp.report.kit import (
+    ConditionResults,
+    Proportion,
+    Values,
+    expected_effort,
+    expected_interval,
+    groups,
+    solved,
+    style,
+)
 
 SHARE, EFFORT, RATIO = "share", "effort", "ratio"
 NUMBERS = "abcdef"

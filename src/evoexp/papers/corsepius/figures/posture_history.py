@@ -9,12 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from evoexp.papers.corsepius import measures
-from evoexp.report import style
-from evoexp.report.proportions import Proportion
-from evoexp.report.results import Results
-from evoexp.report.rows import groups, records
-from evoexp.report.run_measures import counted
-from evoexp.report.statistics import quantile
+from evoexp.report.kit import Proportion, Results, counted, groups, quantile, records, style
 
 DISTANCE, COST = "distance to the goal", "cost"
 PER_LINE = 3  # panels

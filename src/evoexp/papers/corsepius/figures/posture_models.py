@@ -11,9 +11,7 @@ from matplotlib.figure import Figure
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.figures import solids
 from evoexp.records import FloatArray
-from evoexp.report import style
-from evoexp.report.results import ConditionResults
-from evoexp.report.rows import groups, records, rounded
+from evoexp.report.kit import ConditionResults, groups, records, rounded, style
 
 BODY, COVER = "body", "cover"
 VIEW = (18.0, -55.0)  # [deg]

@@ -13,9 +13,7 @@ from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.figures import solids
 from evoexp.planners.posture_es.phases import Problem, Span
 from evoexp.records import FloatArray
-from evoexp.report import motion_geometry, style
-from evoexp.report.results import ConditionResults
-from evoexp.report.rows import groups, records, rounded
+from evoexp.report.kit import ConditionResults, groups, motion_geometry, records, rounded, style
 from evoexp.robots.poses import frame_pose
 
 LINK, OBSTACLE, HELD, TIP, GOAL = "link", "obstacle", "held", "tip", "goal"

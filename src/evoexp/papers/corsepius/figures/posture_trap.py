@@ -15,11 +15,16 @@ from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.figures import solids
 from evoexp.papers.corsepius.figures.posture_motions import tool_places
 from evoexp.records import FloatArray
-from evoexp.report import style
-from evoexp.report.results import ConditionResults
-from evoexp.report.rows import groups, records, rounded
-from evoexp.report.run_measures import median_replicate, solved
-from evoexp.report.statistics import BOOTSTRAP_SEED
+from evoexp.report.kit import (
+    BOOTSTRAP_SEED,
+    ConditionResults,
+    groups,
+    median_replicate,
+    records,
+    rounded,
+    solved,
+    style,
+)
 
 TOOL, CELL, ESCAPE, OBSTACLE, GOAL = "tool", "cell", "escape", "obstacle", "goal"
 CELLS = 81  # of the landscape, along each joint

@@ -9,9 +9,8 @@ from matplotlib.ticker import NullLocator
 
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.measures import Task
-from evoexp.report import style
 from evoexp.report.figures.boxes import JITTER
-from evoexp.report.statistics import spread
+from evoexp.report.kit import spread, style
 
 RESIDUAL, CYCLES, POINT = "residual", "cycles", "point"
 NAMES = ["quantity", "scope", "median", "lower", "upper", "runs"]

@@ -12,10 +12,7 @@ from scipy.spatial import ConvexHull
 from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.figures.posture_motions import tool_places
-from evoexp.report import style
-from evoexp.report.results import ConditionResults
-from evoexp.report.rows import groups, records, rounded
-from evoexp.report.statistics import BOOTSTRAP_SEED
+from evoexp.report.kit import BOOTSTRAP_SEED, ConditionResults, groups, records, rounded, style
 
 POSTURE, REACH, TOOL = "posture", "reach", "tool"
 FACTORS = (2.0, 1.0, 0.5)  # of the scope, whose reach is drawn

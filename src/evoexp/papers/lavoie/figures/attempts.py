@@ -5,10 +5,7 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure
 
-from evoexp.report import style
-from evoexp.report.results import Results
-from evoexp.report.rows import groups, records
-from evoexp.report.run_measures import counted
+from evoexp.report.kit import Results, counted, groups, records, style
 
 NAMES = [
     *("position", "condition", "attempts", "having", "total"),

@@ -9,11 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from evoexp.report import style
-from evoexp.report.pages.generic import Values
-from evoexp.report.proportions import Proportion
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.rows import groups, records
+from evoexp.report.kit import ConditionResults, Proportion, Results, Values, groups, records, style
 
 FOUND, PRINTED = "found", "printed"
 NAMES = [

@@ -13,9 +13,15 @@ from matplotlib.patheffects import withStroke
 from evoexp.numeric.elementary import DEGREE
 from evoexp.planners.redundant_ga.planner import Problem
 from evoexp.records import FloatArray
-from evoexp.report import body_contacts, motion_geometry, style
-from evoexp.report.results import ConditionResults
-from evoexp.report.rows import groups, records, rounded
+from evoexp.report.kit import (
+    ConditionResults,
+    body_contacts,
+    groups,
+    motion_geometry,
+    records,
+    rounded,
+    style,
+)
 
 ELLIPSE, BOX, TARGET, LINK, TOUCHING, CONTACT = (
     "ellipse",

@@ -6,11 +6,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from evoexp.report import style
-from evoexp.report.pages.generic import Values
-from evoexp.report.results import Results
-from evoexp.report.rows import groups
-from evoexp.report.statistics import spread
+from evoexp.report.kit import Results, Values, groups, spread, style
 
 ERROR, EFFORT = "position error", "evaluations"
 BESIDE = 0.012  # [-] of the axis by which series are set apart

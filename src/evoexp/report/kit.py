@@ -1,0 +1,98 @@
+"""All parts of a report's page, to be imported from here by the papers and by guests.
+
+A page is a function (`Results`, `ReportSettings`) → `Page`, named by an entry point `evoexp.pages`.
+It reads `Results`: columns of summaries, generations, solutions, and the answers of the planner's
+protocol (`ConditionResults.evaluate`, `motion`, `problem`). Its parts are:
+
+- `Table`, `Quantity` (of `generic.quantity`), `Claim` (of a `Judge`, see `judging.judge`),
+  `Comparison` (of `compared`) and `Drawing`, each with its words in `markdown`;
+- a `Drawing` is two functions: results → table (columns by `records`, `groups`, `rounded`), and
+  table → figure (`style`); `sweep_figures` has those that all sweeps share;
+- the seed is the unit of all statistics: `spread`, `Proportion`, `fisher_exact`, `holm`, ….
+"""
+
+from evoexp.report import (
+    body_contacts,
+    claims,
+    comparisons,
+    judging,
+    markdown,
+    motion_geometry,
+    run_measures,
+    style,
+    sweep_figures,
+)
+from evoexp.report.claims import Claim, Comparison
+from evoexp.report.comparisons import Values, by_column, compared
+from evoexp.report.judging import Judge, evidence
+from evoexp.report.page import Drawing, Page, Quantity, Table
+from evoexp.report.pages import generic
+from evoexp.report.proportions import Proportion, fisher_exact, newcombe
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results import ConditionResults, Results
+from evoexp.report.rows import groups, records, rounded
+from evoexp.report.run_measures import (
+    counted,
+    grouped,
+    median_replicate,
+    search_seconds,
+    solved,
+    success,
+)
+from evoexp.report.statistics import (
+    BOOTSTRAP_SEED,
+    Interval,
+    effort_ratio,
+    expected_effort,
+    expected_interval,
+    holm,
+    quantile,
+    spread,
+)
+
+__all__ = [
+    "BOOTSTRAP_SEED",
+    "Claim",
+    "Comparison",
+    "ConditionResults",
+    "Drawing",
+    "Interval",
+    "Judge",
+    "Page",
+    "Proportion",
+    "Quantity",
+    "ReportSettings",
+    "Results",
+    "Table",
+    "Values",
+    "body_contacts",
+    "by_column",
+    "claims",
+    "compared",
+    "comparisons",
+    "counted",
+    "effort_ratio",
+    "evidence",
+    "expected_effort",
+    "expected_interval",
+    "fisher_exact",
+    "generic",
+    "grouped",
+    "groups",
+    "holm",
+    "judging",
+    "markdown",
+    "median_replicate",
+    "motion_geometry",
+    "newcombe",
+    "quantile",
+    "records",
+    "rounded",
+    "run_measures",
+    "search_seconds",
+    "solved",
+    "spread",
+    "style",
+    "success",
+    "sweep_figures",
+]

@@ -130,7 +130,7 @@ def test_the_longer_arm_is_compared_with_the_shorter_one() -> None:
     assert (below_1.verdict, below_2.verdict) == (REPRODUCED, INCONCLUSIVE)
     assert "Fisher's exact p = 4.1e−10" in below_1.evidence
     alone = results._replace(conditions=results.conditions[:1])
-    assert claims.more_joints_are_better(judge(alone, SETTINGS), alone.conditions, 0.95) == []
+    assert list(claims.more_joints_are_better(judge(alone, SETTINGS), alone.conditions, 0.95)) == []
 
 
 def test_motions_in_contact_contradict() -> None:

@@ -1,5 +1,6 @@
 """Chen & Zalzala 1995, Fig. 1: two numerical potential fields, and the slips of their print."""
 
+from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
@@ -72,22 +73,25 @@ def _compared(condition: ConditionResults) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def _claims(judge: Judge, table: pd.DataFrame) -> list[Claim]:
+def _claims(judge: Judge, table: pd.DataFrame) -> Iterator[Claim]:
     """Judge that each field is printed as the wave front computes it."""
-    found = []
     for name, own in groups(table, "field"):
         total = int((own["slip"] != SURPLUS).sum())
         same, wrong, missing, surplus = (
             int((own["slip"] == slip).sum()) for slip in ("", WRONG, MISSING, SURPLUS)
         )
-        told = (
-            f"{same} of {total} nodes as printed; {wrong} with another number, {missing} left "
-            f"out, {surplus} tokens too many (reproduced: every node that is printed, but for "
-            "single slips of the print: at most one in a hundred)"
+        yield judge.claim(
+            text=f"The wave front gives Fig. 1{name}",
+            source="Fig. 1",
+            evidence=(
+                f"{same} of {total} nodes as printed; {wrong} with another number, {missing} "
+                "left "
+                f"out, {surplus} tokens too many (reproduced: every node that is printed, but "
+                "for "
+                "single slips of the print: at most one in a hundred)"
+            ),
+            verdict=claims.judged(same >= 0.99 * total),
         )
-        verdict = claims.judged(same >= 0.99 * total)
-        found.append(judge.claim(f"The wave front gives Fig. 1{name}", "Fig. 1", told, verdict))
-    return found
 
 
 def _slips(table: pd.DataFrame) -> list[tuple[str, str]]:

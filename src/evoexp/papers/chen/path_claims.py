@@ -43,15 +43,20 @@ def _nearly_shortest(judge: Judge, groups: tuple[Group, ...]) -> Claim:
     first = groups[0].main
     excess = _excess(first, groups)
     near = int(np.count_nonzero(excess <= 100.0 * NEAR))
-    told = (
-        f"median length {markdown.number(float(np.median(first.column(DISTANCE))))}, "
-        f"{np.median(excess):.1f} % above the shortest "
-        f"{markdown.number(measures.shortest(groups))} (Dijkstra); "
-        f"{markdown.share(near, first.done)} runs within {100 * NEAR:g} % (reproduced: more than "
-        "half of the runs)"
+    return judge.majority(
+        text=f"{first.label}: without safety a nearly shortest path is obtained",
+        source=SOURCE,
+        evidence=(
+            f"median length {markdown.number(float(np.median(first.column(DISTANCE))))}, "
+            f"{np.median(excess):.1f} % above the shortest "
+            f"{markdown.number(measures.shortest(groups))} (Dijkstra); "
+            f"{markdown.share(near, first.done)} runs within {100 * NEAR:g} % (reproduced: more "
+            "than "
+            "half of the runs)"
+        ),
+        holds=near,
+        done=first.done,
     )
-    text = f"{first.label}: without safety a nearly shortest path is obtained"
-    return judge.majority(text, SOURCE, told, near, first.done)
 
 
 def _compromise(judge: Judge, settings: ReportSettings, groups: tuple[Group, ...]) -> list[Claim]:
@@ -61,11 +66,6 @@ def _compromise(judge: Judge, settings: ReportSettings, groups: tuple[Group, ...
     a, b, c = (group.main for group in groups)
     safer = _compared(b, a, UNSAFENESS, settings)
     shorter = _compared(b, c, DISTANCE, settings)
-    told = "; ".join(
-        f"against {other.label}: {evidence(row, word)}"
-        for other, word, rows in ((a, "safer", safer), (c, "shorter", shorter))
-        for row in rows
-    )
     excess = _excess(c, groups)
     longer = int(np.count_nonzero(excess > 100.0 * MUCH))
     much = (
@@ -74,10 +74,14 @@ def _compromise(judge: Judge, settings: ReportSettings, groups: tuple[Group, ...
     )
     return [
         judge.better_than_all(
-            f"{b.label}: a compromise, safer than {a.label} and shorter than {c.label}",
-            SOURCE,
-            told,
-            claims.adjusted([*safer, *shorter]),
+            text=f"{b.label}: a compromise, safer than {a.label} and shorter than {c.label}",
+            source=SOURCE,
+            evidence="; ".join(
+                f"against {other.label}: {evidence(row, word)}"
+                for other, word, rows in ((a, "safer", safer), (c, "shorter", shorter))
+                for row in rows
+            ),
+            rows=claims.adjusted([*safer, *shorter]),
         ),
         judge.better(
             f"{c.label}: a very safe path, safer than {b.label}",
@@ -114,18 +118,31 @@ def _decreases(judge: Judge, group: Group) -> Claim:
     first, last = rows.first(), rows.last()
     lower = last["best_cost"] < first["best_cost"]
     holds = int((lower & (last["mean_cost"] <= 1.05 * last["best_cost_in_generation"])).sum())
-    told = (
-        f"in {markdown.share(holds, c.done)} runs the best cost falls and the last generation's "
-        "average is within 5 % of its best (reproduced: all of them)"
+    return judge.every(
+        text=f"{c.label}: path costs decrease and converge with generations",
+        source=SOURCE,
+        evidence=(
+            f"in {markdown.share(holds, c.done)} runs the best cost falls and the last "
+            "generation's "
+            "average is within 5 % of its best (reproduced: all of them)"
+        ),
+        holds=holds,
+        done=c.done,
+        planned=c.planned,
     )
-    text = f"{c.label}: path costs decrease and converge with generations"
-    return judge.every(text, SOURCE, told, holds, c.done, c.planned)
 
 
 def _better_than_random(judge: Judge, settings: ReportSettings, group: Group) -> list[Claim]:
-    text = f"{group.name}: the genetic algorithm is better than random walks at equal evaluations"
     return [
-        judge.better(text, "section 5", next(iter(rows), None), "lower cost")
+        judge.better(
+            text=(
+                f"{group.name}: the genetic algorithm is better than random walks at equal "
+                "evaluations"
+            ),
+            source="section 5",
+            row=next(iter(rows), None),
+            word="lower cost",
+        )
         for c in group.conditions
         if c.is_control
         for rows in (_compared(group.main, c, "best_cost", settings),)

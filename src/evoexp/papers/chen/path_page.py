@@ -1,5 +1,6 @@
 """Chen & Zalzala 1995, Fig. 2: safe paths over a grid, beside the truth; routes, gaps, controls."""
 
+from collections.abc import Iterator
 from functools import partial
 from itertools import pairwise
 
@@ -138,9 +139,8 @@ def _truth_text(group: Group) -> str:
     )
 
 
-def _same_problem(groups: tuple[Group, ...]) -> list[tuple[str, str]]:
+def _same_problem(groups: tuple[Group, ...]) -> Iterator[tuple[str, str]]:
     """Return a row per two neighbouring weightings with λ > 0: how near they are as problems."""
-    rows = []
     for one, two in pairwise(groups):
         if one.truth is None or two.truth is None or 0.0 in (*one.weights, *two.weights):
             continue
@@ -150,8 +150,7 @@ def _same_problem(groups: tuple[Group, ...]) -> list[tuple[str, str]]:
             f"only λ/ε matters: {ratios[0]:.0f} and {ratios[1]:.0f} cells; the best path "
             f"known is {'the same one' if same else 'another one'}"
         )
-        rows.append((f"{one.name} and {two.name} are nearly the same problem", text))
-    return rows
+        yield (f"{one.name} and {two.name} are nearly the same problem", text)
 
 
 def comparisons(

@@ -1,5 +1,7 @@
 """The claims of Chen & Zalzala 1995 on docking postures, judged by exact optima and controls."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from evoexp.papers.chen.cases import CLOSE, METHODS, Case
@@ -32,11 +34,11 @@ def judge_cases(results: Results, cases: list[Case], settings: ReportSettings) -
     )
 
 
-def _value(judge: Judge, case: Case) -> list[Claim]:
+def _value(judge: Judge, case: Case) -> Iterator[Claim]:
     """Judge the number that the paper prints of its best posture."""
     printed = case.printed
     if printed is None or np.isnan(printed.value):
-        return []
+        return
     exact = case.measured(case.optimal_angles)
     best = exact[printed.term]
     told = f"at the exact optimum {markdown.number(best)}"
@@ -50,24 +52,32 @@ def _value(judge: Judge, case: Case) -> list[Claim]:
         told += "; where the obstacle stands is not printed, (5.2, 0) is assumed"
         agrees = agrees or None
     name = printed.term.replace("_", " ")
-    text = f"{case.name}: the best posture has a {name} of {printed.value:g}"
-    return [judge.claim(text, f"section 4.2, {printed.figure}", told, claims.judged(agrees))]
+    yield judge.claim(
+        text=f"{case.name}: the best posture has a {name} of {printed.value:g}",
+        source=f"section 4.2, {printed.figure}",
+        evidence=told,
+        verdict=claims.judged(agrees),
+    )
 
 
-def _angles(judge: Judge, case: Case) -> list[Claim]:
+def _angles(judge: Judge, case: Case) -> Iterator[Claim]:
     """Judge that the printed angles are near the optimum."""
     printed = case.printed
     if printed is None or printed.angles is None:
-        return []
+        return
     cost = case.measured(printed.angles)["cost"]
     gap = float(case.gaps(np.array([cost]))[0])
-    told = f"E = {cost:.6g} there, {case.least:.6g} at the optimum: {100 * gap:.2g} % above it"
-    text = (
-        f"{case.name}: (θ1, θ2) = ({printed.angles[0]:g}, {printed.angles[1]:g})° is at or "
-        "near the optimum"
-    ).replace("-", "−")
-    verdict = claims.judged(gap <= CLOSE[1])
-    return [judge.claim(text, f"section 4.2, {printed.figure}", told, verdict)]
+    yield judge.claim(
+        text=(
+            f"{case.name}: (θ1, θ2) = ({printed.angles[0]:g}, {printed.angles[1]:g})° is at or "
+            "near the optimum"
+        ).replace("-", "−"),
+        source=f"section 4.2, {printed.figure}",
+        evidence=(
+            f"E = {cost:.6g} there, {case.least:.6g} at the optimum: {100 * gap:.2g} % above it"
+        ),
+        verdict=claims.judged(gap <= CLOSE[1]),
+    )
 
 
 def _against_search(judge: Judge, cases: list[Case], settings: ReportSettings) -> list[Claim]:
@@ -85,21 +95,24 @@ def _against_search(judge: Judge, cases: list[Case], settings: ReportSettings) -
     return [judge.better(row.quantity, "section 1", row, "lower E") for row in rows]
 
 
-def _against_conventional(judge: Judge, case: Case, settings: ReportSettings) -> list[Claim]:
+def _against_conventional(judge: Judge, case: Case, settings: ReportSettings) -> Iterator[Claim]:
     """Judge that conventional methods get stuck, and that the genetic algorithm does better."""
-    found = []
     for method, ends in case.ends().items():
         at_best = case.within(ends[:, 2], CLOSE[1])
         stuck = Proportion(at_best.total - at_best.having, at_best.total)
-        told = (
-            f"{stuck.having} of {stuck.total} starts end more than {100 * CLOSE[1]:g} % above "
-            f"the optimum ({markdown.percent(stuck.interval(settings.confidence))})"
-        )
         text, verdict = f"{case.name}: the {method} method gets stuck", stuck.having > 0
-        found.append(judge.claim(text, "sections 1 and 4.2", told, claims.judged(verdict)))
+        yield judge.claim(
+            text=text,
+            source="sections 1 and 4.2",
+            evidence=(
+                f"{stuck.having} of {stuck.total} starts end more than {100 * CLOSE[1]:g} % "
+                "above "
+                f"the optimum ({markdown.percent(stuck.interval(settings.confidence))})"
+            ),
+            verdict=claims.judged(verdict),
+        )
         if case.elitist is not None:
-            found.append(_better(judge, case, method, at_best))
-    return found
+            yield _better(judge, case, method, at_best)
 
 
 def _better(judge: Judge, case: Case, method: str, at_best: Proportion) -> Claim:
@@ -110,17 +123,23 @@ def _better(judge: Judge, case: Case, method: str, at_best: Proportion) -> Claim
     key = next(key for key, name in METHODS.items() if name == method)
     each = float(case.conventional.column(f"term_{key}_evaluations")[0])
     effort = case.elitist.column("evaluations").mean()
-    told = (
-        f"within {100 * CLOSE[1]:g} % of the optimum: {100 * own.share:.0f} % of runs with "
-        f"elitism, {100 * at_best.share:.0f} % of starts, p = "
-        f"{markdown.p_value(fisher_exact(own, at_best))}; a run takes "
-        f"{effort:.0f} evaluations, a start {each:.0f} (and exact derivatives, but for the "
-        f"subgradient): per success {_per(effort, own.share)} against {_per(each, at_best.share)}"
+    return judge.greater(
+        text=(
+            f"{case.name}: a run of the genetic algorithm is better than a start of the {method} "
+            "method"
+        ),
+        source="abstract",
+        evidence=(
+            f"within {100 * CLOSE[1]:g} % of the optimum: {100 * own.share:.0f} % of runs with "
+            f"elitism, {100 * at_best.share:.0f} % of starts, p = "
+            f"{markdown.p_value(fisher_exact(own, at_best))}; a run takes "
+            f"{effort:.0f} evaluations, a start {each:.0f} (and exact derivatives, but for the "
+            f"subgradient): per success {_per(effort, own.share)} against "
+            f"{_per(each, at_best.share)}"
+        ),
+        one=own,
+        two=at_best,
     )
-    text = (
-        f"{case.name}: a run of the genetic algorithm is better than a start of the {method} method"
-    )
-    return judge.greater(text, "abstract", told, own, at_best)
 
 
 def _per(effort: float, share: float) -> str:
@@ -128,14 +147,19 @@ def _per(effort: float, share: float) -> str:
     return f"{effort / share:.0f}" if share else "∞"
 
 
-def _seconds(judge: Judge, case: Case) -> list[Claim]:
+def _seconds(judge: Judge, case: Case) -> Iterator[Claim]:
     """Judge that the minimax problem takes seconds."""
     if case.name != "minimax torque" or case.plain is None:
-        return []
+        return
     seconds = float(np.median(case.plain.column("cpu_s")))
-    told = f"{1000 * seconds:.1f} ms of this machine per run (median), verdict and log included"
-    text = (
-        f"{case.name}: solved in {PAPER_S:g} seconds (the subgradient algorithm of Pin & "
-        "Culioli: 15 minutes)"
+    yield judge.claim(
+        text=(
+            f"{case.name}: solved in {PAPER_S:g} seconds (the subgradient algorithm of Pin & "
+            "Culioli: 15 minutes)"
+        ),
+        source="section 4.2 A",
+        evidence=(
+            f"{1000 * seconds:.1f} ms of this machine per run (median), verdict and log included"
+        ),
+        verdict=claims.judged(seconds <= PAPER_S),
     )
-    return [judge.claim(text, "section 4.2 A", told, claims.judged(seconds <= PAPER_S))]

@@ -1,5 +1,6 @@
 """Chen & Zalzala 1995, Figs. 3–8: docking postures by five criteria, exact optima, controls."""
 
+from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
@@ -112,9 +113,8 @@ def _shares(case: Case, costs: np.ndarray) -> str:
     return f"({', '.join(shares)})"
 
 
-def _posture_rows(case: Case) -> list[tuple[str, ...]]:
+def _posture_rows(case: Case) -> Iterator[tuple[str, ...]]:
     """Return the numbers of the exact optimum and of the paper's angles."""
-    rows = []
     shown = {"exact optimum": case.optimal_angles, "paper's angles": case.printed_angles}
     for name, angles in shown.items():
         if angles is None:
@@ -132,8 +132,7 @@ def _posture_rows(case: Case) -> list[tuple[str, ...]]:
             ),
             f"{found['cost']:.6g}",
         )
-        rows.append(tuple(cell.replace("-", "−") for cell in row))
-    return rows
+        yield tuple(cell.replace("-", "−") for cell in row)
 
 
 def _checks(case: Case) -> list[tuple[str, str]]:

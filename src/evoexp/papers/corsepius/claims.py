@@ -1,5 +1,7 @@
 """The claims of Corsépius 2001 on single tasks, judged by their experiments."""
 
+from collections.abc import Iterator
+
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.measures import text
 from evoexp.report.kit import (
@@ -40,21 +42,25 @@ def judge_tasks(results: Results, settings: ReportSettings) -> tuple[Claim, ...]
     )
 
 
-def _free_of_collision(judge: Judge, condition: ConditionResults, level: float) -> list[Claim]:
+def _free_of_collision(judge: Judge, condition: ConditionResults, level: float) -> Iterator[Claim]:
     """Judge that binary ratings of distances keep the whole motion free."""
     refuted, free = measures.refuted(condition), measures.certified(condition).having
-    told = (
-        f"{markdown.share(free, refuted.total)} solved runs certified; refuted "
-        f"{text(refuted, level)}: postures are free, what lies between them is not rated"
-    )
     planned = refuted.total if condition.done == condition.planned else 0
-    what = f"{condition.label}: paths avoid obstacles"
-    return [judge.every(what, "section 4.3.3", told, free, refuted.total, planned)]
+    yield judge.every(
+        text=f"{condition.label}: paths avoid obstacles",
+        source="section 4.3.3",
+        evidence=(
+            f"{markdown.share(free, refuted.total)} solved runs certified; refuted "
+            f"{text(refuted, level)}: postures are free, what lies between them is not rated"
+        ),
+        holds=free,
+        done=refuted.total,
+        planned=planned,
+    )
 
 
-def _tilt(judge: Judge, condition: ConditionResults) -> list[Claim]:
+def _tilt(judge: Judge, condition: ConditionResults) -> Iterator[Claim]:
     """Judge that a grasped object is not tilted."""
-    found = []
     for term in TILTS if condition.solved else ():
         limit = getattr(condition.planner.objective, term)
         if limit is None:
@@ -71,11 +77,12 @@ def _tilt(judge: Judge, condition: ConditionResults) -> list[Claim]:
         )
         planned = len(at) if condition.done == condition.planned else 0
         what = f"{condition.label}: the grasped object is not tilted"
-        found.append(judge.every(what, "section 6", told, *kept, planned))
-    return found
+        yield judge.every(what, "section 6", told, *kept, planned)
 
 
-def _redundant(judge: Judge, conditions: tuple[ConditionResults, ...], level: float) -> list[Claim]:
+def _redundant(
+    judge: Judge, conditions: tuple[ConditionResults, ...], level: float
+) -> Iterator[Claim]:
     """Judge that the approach works for highly redundant arms: it finds a certified path."""
     arms = [c for c in conditions if measures.num_joints(c) > MANY_JOINTS]
     free = {c.label: measures.certified(c).having for c in arms}
@@ -84,17 +91,20 @@ def _redundant(judge: Judge, conditions: tuple[ConditionResults, ...], level: fl
         f"{free[c.label]} of them certified"
         for c in arms
     ]
-    told = f"{'; '.join(texts)} (reproduced: a certified path, in one task at least)"
-    verdict = claims.judged(any(free.values()))
-    what = "The approach works for highly redundant arms"
-    return [judge.claim(what, "section 6", told, verdict)] if arms else []
+    if arms:
+        yield judge.claim(
+            text="The approach works for highly redundant arms",
+            source="section 6",
+            evidence=f"{'; '.join(texts)} (reproduced: a certified path, in one task at least)",
+            verdict=claims.judged(any(free.values())),
+        )
 
 
-def _planning_time(condition: ConditionResults) -> list[Claim]:
+def _planning_time(condition: ConditionResults) -> Iterator[Claim]:
     """Set the planning time that the paper prints beside ours."""
     goals = [phase.goal for phase in condition.condition.scenario.phases]  # type: ignore[attr-defined]
     if [getattr(goal, "object", "") for goal in goals] != [BALL] or not condition.solved:
-        return []
+        return
     milliseconds = 1e3 * measures.usual_seconds(condition)
     cycles, shapes = measures.cycles(condition), measures.problem(condition).bodies.num_shapes
     told = (
@@ -103,19 +113,25 @@ def _planning_time(condition: ConditionResults) -> list[Claim]:
         f"spheres to this model's {shapes}"
     )
     what = f"{condition.label}: planning takes a couple of seconds up to a few minutes"
-    return [Claim(what, "section 5", told, f"{claims.NOT_JUDGED} (another machine, another model)")]
+    yield Claim(what, "section 5", told, f"{claims.NOT_JUDGED} (another machine, another model)")
 
 
 def _stuck(
     judge: Judge, stuck: ConditionResults, helped: ConditionResults, level: float
-) -> list[Claim]:
+) -> Iterator[Claim]:
     """Judge that the search gets stuck if the second condition, with a sub-goal, finds a way."""
     one, two = success(helped), success(stuck)
-    told = (
-        f"goal met {text(two, level)}; {helped.label}: {text(one, level)}; Fisher's exact p = "
-        f"{markdown.p_value(fisher_exact(one, two))}; ended by stagnation: "
-        f"{text(measures.reasons(stuck)['stagnation'], level)}"
-    )
-    what = f"{stuck.label}: the search gets stuck in a local minimum"
     differ = measures.only_subgoals_differ(stuck, helped)
-    return [judge.greater(what, "section 6", told, one, two)] if differ else []
+    if differ:
+        yield judge.greater(
+            text=f"{stuck.label}: the search gets stuck in a local minimum",
+            source="section 6",
+            evidence=(
+                f"goal met {text(two, level)}; {helped.label}: {text(one, level)}; Fisher's "
+                "exact p = "
+                f"{markdown.p_value(fisher_exact(one, two))}; ended by stagnation: "
+                f"{text(measures.reasons(stuck)['stagnation'], level)}"
+            ),
+            one=one,
+            two=two,
+        )

@@ -1,5 +1,6 @@
 """Corsépius 2001, Figs. 2–4: an evolution strategy on postures, task by task."""
 
+from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
@@ -146,17 +147,13 @@ def _phased(results: Results) -> tuple[ConditionResults, ...]:
     return tuple(c for c in results.main if len(measures.phase_names(c)) > 1)
 
 
-def _phase_rows(condition: ConditionResults, level: float) -> list[tuple[object, ...]]:
+def _phase_rows(condition: ConditionResults, level: float) -> Iterator[tuple[object, ...]]:
     """Return a row per phase: runs that met its goal, and cycles."""
     table = measures.phase_cycles(condition)
-    rows: list[tuple[object, ...]] = []
     for k, name in enumerate(measures.phase_names(condition)):
         own = table[table["phase"] == k]
         cycles = markdown.spread(spread(own["cycles"].to_numpy(dtype=np.float64)))
-        rows.append(
-            (condition.label, f"{k + 1}  {name}", text(counted(own["reached"]), level), cycles)
-        )
-    return rows
+        yield (condition.label, f"{k + 1}  {name}", text(counted(own["reached"]), level), cycles)
 
 
 def checks(results: Results) -> tuple[tuple[str, str], ...]:

@@ -153,12 +153,16 @@ def _unless(against: object, favour: object) -> str:
 def _no_faster(judge: Judge, metric: str, rows: list[SizeComparison]) -> Claim:
     """Judge that nothing larger is faster, on any task."""
     says = [row.says for row in rows]
-    told = (
-        f"expected {metric} in units of those of 100 (of which λ): less for {_ratios(rows, -1)}. "
-        f"More for {_ratios(rows, 1)} (reproduced: none is faster, one at least is slower)"
+    return judge.claim(
+        text=f"Larger populations do not plan faster, on any task: {metric}",
+        source=SOURCE,
+        evidence=(
+            f"expected {metric} in units of those of 100 (of which λ): less for "
+            f"{_ratios(rows, -1)}. "
+            f"More for {_ratios(rows, 1)} (reproduced: none is faster, one at least is slower)"
+        ),
+        verdict=_unless(-1 in says, 1 in says),
     )
-    text = f"Larger populations do not plan faster, on any task: {metric}"
-    return judge.claim(text, SOURCE, told, _unless(-1 in says, 1 in says))
 
 
 def _not_necessarily(judge: Judge, metric: str, rows: list[SizeComparison]) -> Claim:
@@ -166,26 +170,33 @@ def _not_necessarily(judge: Judge, metric: str, rows: list[SizeComparison]) -> C
     says = {name: [row.says for row in rows if row.task == name] for name in (r.task for r in rows)}
     never = [name for name, own in says.items() if min(own) >= 0]
     slower = [name for name in never if max(says[name]) > 0]
-    told = (
-        f"of {len(says)} tasks nothing larger than 100 is faster on {len(never)}: "
-        f"{', '.join(never) or '–'}; something larger is slower on {len(slower)} of them "
-        "(reproduced: on one at least)"
+    return judge.claim(
+        text=f"Larger populations do not necessarily plan faster: {metric}",
+        source=SOURCE,
+        evidence=(
+            f"of {len(says)} tasks nothing larger than 100 is faster on {len(never)}: "
+            f"{', '.join(never) or '–'}; something larger is slower on {len(slower)} of them "
+            "(reproduced: on one at least)"
+        ),
+        verdict=_unless(not never, slower),
     )
-    text = f"Larger populations do not necessarily plan faster: {metric}"
-    return judge.claim(text, SOURCE, told, _unless(not never, slower))
 
 
 def _over_proportional(judge: Judge, metric: str, rows: list[SizeComparison]) -> Claim:
     """Judge that on every task every smaller population costs over-proportionally more."""
     says = [row.says for row in rows]
     exceeds = "100/λ" if metric == "cycles" else "1: time goes with evaluations"
-    told = (
-        f"over-proportional: the ratio exceeds {exceeds}. It does for {_ratios(rows, 1)}. It is "
-        f"below for {_ratios(rows, -1)}. Not certain: {says.count(0)} of {len(rows)} "
-        "(reproduced: everywhere)"
+    return judge.claim(
+        text=f"Smaller populations increase planning times over-proportionally: {metric}",
+        source=SOURCE,
+        evidence=(
+            f"over-proportional: the ratio exceeds {exceeds}. It does for {_ratios(rows, 1)}. It "
+            "is "
+            f"below for {_ratios(rows, -1)}. Not certain: {says.count(0)} of {len(rows)} "
+            "(reproduced: everywhere)"
+        ),
+        verdict=_unless(-1 in says, says and 0 not in says),
     )
-    text = f"Smaller populations increase planning times over-proportionally: {metric}"
-    return judge.claim(text, SOURCE, told, _unless(-1 in says, says and 0 not in says))
 
 
 def _converges_less(judge: Judge, found: tuple[Task, ...], settings: ReportSettings) -> Claim:
@@ -198,13 +209,16 @@ def _converges_less(judge: Judge, found: tuple[Task, ...], settings: ReportSetti
         f"{name} {value:g}: {markdown.share(*success(c))} for {markdown.share(*success(own))}"
         for name, value, c, own in clear
     )
-    told = (
-        f"goal met less often than with 100 in {less} of {len(pairs)} cases, more often in "
-        f"{len(clear) - less} (Fisher's exact tests, Holm): {'; '.join(texts) or '–'} "
-        "(reproduced: never more often, less often somewhere)"
+    return judge.claim(
+        text="Smaller populations reduce convergence",
+        source=SOURCE,
+        evidence=(
+            f"goal met less often than with 100 in {less} of {len(pairs)} cases, more often in "
+            f"{len(clear) - less} (Fisher's exact tests, Holm): {'; '.join(texts) or '–'} "
+            "(reproduced: never more often, less often somewhere)"
+        ),
+        verdict=_unless(len(clear) > less, less),
     )
-    verdict = _unless(len(clear) > less, less)
-    return judge.claim("Smaller populations reduce convergence", SOURCE, told, verdict)
 
 
 def _reasonable(judge: Judge, metric: str, found: tuple[Task, ...], values: Values) -> Claim:
@@ -216,9 +230,12 @@ def _reasonable(judge: Judge, metric: str, found: tuple[Task, ...], values: Valu
         if RECOMMENDED in efforts and np.isfinite(efforts[best]):
             factors[task.name] = efforts[RECOMMENDED] / efforts[best], best
     texts = (f"{name} {_short(factor)} (best: {b:g})" for name, (factor, b) in factors.items())
-    told = (
-        f"effort of 100 over that of the best size: {', '.join(texts) or '–'} "
-        f"(reproduced: at most {REASONABLE:g} everywhere; our reading)"
+    return judge.claim(
+        text=f"100 individuals are reasonable: {metric}",
+        source=SOURCE,
+        evidence=(
+            f"effort of 100 over that of the best size: {', '.join(texts) or '–'} "
+            f"(reproduced: at most {REASONABLE:g} everywhere; our reading)"
+        ),
+        verdict=_unless(any(factor > REASONABLE for factor, _ in factors.values()), factors),
     )
-    verdict = _unless(any(factor > REASONABLE for factor, _ in factors.values()), factors)
-    return judge.claim(f"100 individuals are reasonable: {metric}", SOURCE, told, verdict)

@@ -1,6 +1,6 @@
 """The claims of Lavoie & Boudreau 2001, judged by their experiment; sweeps judge some of them."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -69,34 +69,42 @@ def _percentage(
         f"ours − printed {100 * (own.share - theirs.share):+.1f} "
         f"[{100 * low:+.1f}, {100 * high:+.1f}]"
     ).replace("-", "−")
-    told = (
-        f"{measures.text(own, level)}; the printed one lies {place}, its own thousand runs give "
-        f"[{100 * their_own.low:.1f}, {100 * their_own.high:.1f}]; {difference} points "
-        f"(reproduced: 0 within the {100 * level:g} % interval of the difference by "
-        "Newcombe; both are samples)"
+    return judge.claim(
+        text=(
+            f"{condition.label}: a position error below {printed.bound:g} in "
+            f"{100 * theirs.share:.1f} "
+            "% of runs"
+        ),
+        source=SOURCE,
+        evidence=(
+            f"{measures.text(own, level)}; the printed one lies {place}, its own thousand runs "
+            "give "
+            f"[{100 * their_own.low:.1f}, {100 * their_own.high:.1f}]; {difference} points "
+            f"(reproduced: 0 within the {100 * level:g} % interval of the difference by "
+            "Newcombe; both are samples)"
+        ),
+        verdict=judge_equal(own, theirs, level),
     )
-    text = (
-        f"{condition.label}: a position error below {printed.bound:g} in {100 * theirs.share:.1f} "
-        "% of runs"
-    )
-    return judge.claim(text, SOURCE, told, judge_equal(own, theirs, level))
 
 
 def more_joints_are_better(
     judge: Judge, conditions: Sequence[ConditionResults], level: float
-) -> list[Claim]:
+) -> Iterator[Claim]:
     """Judge that the arm of ten joints does better than that of seven, where both were run."""
     by_joints = {measures.num_joints(c): c for c in conditions}
-    found = []
     for bound in measures.BOUNDS if {7, 10} <= set(by_joints) else ():
         ten, seven = (measures.below(by_joints[joints], bound) for joints in (10, 7))
-        told = (
-            f"{measures.text(ten, level)} against {measures.text(seven, level)}; Fisher's exact p "
-            f"= {markdown.p_value(fisher_exact(ten, seven))}, two-sided"
+        yield judge.greater(
+            text=(f"The arm of ten joints does better than that of seven: errors below {bound:g}"),
+            source=SOURCE,
+            evidence=(
+                f"{measures.text(ten, level)} against {measures.text(seven, level)}; Fisher's "
+                "exact p "
+                f"= {markdown.p_value(fisher_exact(ten, seven))}, two-sided"
+            ),
+            one=ten,
+            two=seven,
         )
-        text = f"The arm of ten joints does better than that of seven: errors below {bound:g}"
-        found.append(judge.greater(text, SOURCE, told, ten, seven))
-    return found
 
 
 def no_start_needed(judge: Judge, condition: ConditionResults) -> Claim:
@@ -116,12 +124,18 @@ def free_of_collision(
     """Judge that accepted motions touch nothing."""
     certified = condition.summaries["certified"].eq(True).fillna(False).to_numpy(dtype=bool)
     free = counted(np.asarray(solved(condition) & certified)).having
-    told = (
-        f"{markdown.share(free, refuted.total)} certified; refuted {measures.text(refuted, level)}"
-    )
     planned = condition.planned if condition.solved == condition.done else 0
-    text = f"{condition.label}: accepted motions avoid the obstacles"
-    return judge.every(text, "sections 3 and 4", told, free, refuted.total, planned)
+    return judge.every(
+        text=f"{condition.label}: accepted motions avoid the obstacles",
+        source="sections 3 and 4",
+        evidence=(
+            f"{markdown.share(free, refuted.total)} certified; refuted "
+            f"{measures.text(refuted, level)}"
+        ),
+        holds=free,
+        done=refuted.total,
+        planned=planned,
+    )
 
 
 def judged_elsewhere() -> list[Claim]:

@@ -1,5 +1,6 @@
 """Lavoie & Boudreau 2001, Figs. 1–3: arms of seven and ten joints reach into a box."""
 
+from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
@@ -220,9 +221,8 @@ def _drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]
     )
 
 
-def _solutions(results: Results) -> list[Drawing]:
+def _solutions(results: Results) -> Iterator[Drawing]:
     """Return the figures of each arm's median solution, and of its median refuted one."""
-    found = []
     for stem, title, caption, only_refuted in (
         ("fig_2_solution", "Fig. 2: solutions", SOLUTIONS, False),
         ("refuted", "What the tested positions let through", THROUGH, True),
@@ -234,8 +234,7 @@ def _solutions(results: Results) -> list[Drawing]:
                 errors = measures.errors(c)
                 shown.append(_solution(c, run_measures.median_replicate(c, errors, rows)))
         if shown:
-            found.append(_postures(stem, title, caption, shown))
-    return found
+            yield _postures(stem, title, caption, shown)
 
 
 def _postures(stem: str, title: str, caption: str, shown: list[ShownMotion]) -> Drawing:

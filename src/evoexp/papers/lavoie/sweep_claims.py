@@ -1,6 +1,7 @@
 """The claims of Lavoie & Boudreau 2001 that sweeps over settings judge, and our own questions."""
 
 import itertools
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -71,9 +72,8 @@ def _success(judge: Judge, results: Results, settings: ReportSettings) -> list[C
     return [one for c in conditions for one in percentages(judge, c, settings.confidence)]
 
 
-def _precision(judge: Judge, results: Results, settings: ReportSettings) -> list[Claim]:
+def _precision(judge: Judge, results: Results, settings: ReportSettings) -> Iterator[Claim]:
     """Judge that smaller stopping values give smaller errors, step by step."""
-    judged = []
     for group in groups_but_for(results, "stop_cost_sp2"):
         own = sorted(group, key=lambda c: -float(c.planner.stop_cost_sp2))
         steps = [(small, large) for large, small in itertools.pairwise(own)]
@@ -85,14 +85,17 @@ def _precision(judge: Judge, results: Results, settings: ReportSettings) -> list
             "value is significantly better)"
         )
         most = own[0].planner.ga.num_generations
-        text = f"A smaller stopping value gives a better precision: at most {most} generations"
-        judged.append(judge.better_than_all(text, "section 6", told, rows))
-    return judged
+        yield judge.better_than_all(
+            text=(f"A smaller stopping value gives a better precision: at most {most} generations"),
+            source="section 6",
+            evidence=told,
+            rows=rows,
+        )
 
 
-def _generations(judge: Judge, results: Results, settings: ReportSettings) -> list[Claim]:
+def _generations(judge: Judge, results: Results, settings: ReportSettings) -> Iterator[Claim]:
     """Judge that more generations are needed at the smallest stopping value."""
-    judged, level = [], settings.confidence
+    level = settings.confidence
     least = min(c.planner.stop_cost_sp2 for c in results.main)
     for group in groups_but_for(results, "ga", "num_generations"):
         few, *_, many = sorted(group, key=lambda c: int(c.planner.ga.num_generations))
@@ -100,20 +103,25 @@ def _generations(judge: Judge, results: Results, settings: ReportSettings) -> li
             continue
         attempts = (f"{c.column('term_attempts').mean():.2f}" for c in (many, few))
         spent = (_median(c, measures.effort) for c in (many, few))
-        told = (
-            f"runs with a solution: {measures.text(success(many), level)} with at most "
-            f"{many.planner.ga.num_generations} generations, {measures.text(success(few), level)} "
-            f"with {few.planner.ga.num_generations}; {_fisher(success(many), success(few))}; mean "
-            f"attempts {' and '.join(attempts)}, median evaluations {' and '.join(spent)}"
+        yield judge.greater(
+            text=f"More generations find more solutions where the search stops below {least:g}",
+            source="section 6",
+            evidence=(
+                f"runs with a solution: {measures.text(success(many), level)} with at most "
+                f"{many.planner.ga.num_generations} generations, "
+                f"{measures.text(success(few), level)} "
+                f"with {few.planner.ga.num_generations}; "
+                f"{_fisher(success(many), success(few))}; "
+                "mean "
+                f"attempts {' and '.join(attempts)}, median evaluations {' and '.join(spent)}"
+            ),
+            one=success(many),
+            two=success(few),
         )
-        text = f"More generations find more solutions where the search stops below {least:g}"
-        judged.append(judge.greater(text, "section 6", told, success(many), success(few)))
-    return judged
 
 
-def _coding(judge: Judge, results: Results, settings: ReportSettings) -> list[Claim]:
+def _coding(judge: Judge, results: Results, settings: ReportSettings) -> Iterator[Claim]:
     """Judge real against binary coding."""
-    judged = []
     for group in groups_but_for(results, "ga"):
         coded = {c.planner.ga.component: c for c in group}
         if not {"real_genetic", "binary_genetic"} <= set(coded):
@@ -124,47 +132,55 @@ def _coding(judge: Judge, results: Results, settings: ReportSettings) -> list[Cl
             ("evaluations to a solution", measures.effort, "fewer"),
         ):
             row = next(iter(compared([pair], values, settings)), None)
-            told = f"median {' against '.join(_median(c, values) for c in pair)}; {{}}"
-            text = (
-                f"Real coding performs better than binary coding, judged by {what}: "
-                f"{_against(*pair)}"
+            yield judge.better(
+                text=(
+                    f"Real coding performs better than binary coding, judged by {what}: "
+                    f"{_against(*pair)}"
+                ),
+                source="section 2",
+                row=row,
+                word=word,
+                told=f"median {' against '.join(_median(c, values) for c in pair)}; {{}}",
             )
-            judged.append(judge.better(text, "section 2", row, word, told))
-    return judged
 
 
 def _blindness(
     judge: Judge, results: Results, settings: ReportSettings, refuted: dict[str, RefutedMotions]
-) -> list[Claim]:
+) -> Iterator[Claim]:
     """Judge that the scene is not trivial: an arm that ignores obstacles meets them."""
-    judged = []
     for group in groups_but_for(results, "collision", "blind"):
         seeing, blind = sorted(group, key=lambda c: bool(c.planner.collision.blind))
         one, two = refuted[blind.label].anywhere, refuted[seeing.label].anywhere
-        text = f"An arm that ignores obstacles collides: {_against(blind, seeing)}"
-        judged.append(judge.greater(text, QUESTION, _shares(one, two, settings), one, two))
-    return judged
+        yield judge.greater(
+            text=f"An arm that ignores obstacles collides: {_against(blind, seeing)}",
+            source=QUESTION,
+            evidence=_shares(one, two, settings),
+            one=one,
+            two=two,
+        )
 
 
-def _chance(judge: Judge, results: Results, settings: ReportSettings) -> list[Claim]:
+def _chance(judge: Judge, results: Results, settings: ReportSettings) -> Iterator[Claim]:
     """Judge evolution against random search."""
-    judged = []
     for control in (c for c in results.with_data if c.is_control):
         for own in (c for c in results.with_data if not c.is_control and _wrapped_by(control, c)):
             one, two = success(own), success(control)
             spent = (f"{c.spread('evaluations').median:.0f}" for c in (own, control))
-            told = (
-                f"runs with a solution: {_shares(one, two, settings)}; median evaluations "
-                f"{' against '.join(spent)}"
+            yield judge.greater(
+                text=f"Evolution finds what chance does not: {_against(own, control)}",
+                source=QUESTION,
+                evidence=(
+                    f"runs with a solution: {_shares(one, two, settings)}; median evaluations "
+                    f"{' against '.join(spent)}"
+                ),
+                one=one,
+                two=two,
             )
-            text = f"Evolution finds what chance does not: {_against(own, control)}"
-            judged.append(judge.greater(text, QUESTION, told, one, two))
-    return judged
 
 
 def _positions(
     judge: Judge, results: Results, settings: ReportSettings, refuted: dict[str, RefutedMotions]
-) -> list[Claim]:
+) -> Iterator[Claim]:
     """Judge that chords, and more positions with chords, leave fewer contacts between positions."""
     pairs: list[Group] = []  # (coarse, fine)
     least = min(int(c.planner.collision.num_positions) for c in results.main)
@@ -179,19 +195,17 @@ def _positions(
     # contacts of either condition, and the tests of all pairs as one family
     counts = [tuple(refuted[c.label].anywhere for c in pair) for pair in pairs]
     p_values = holm([fisher_exact(one, two) for one, two in counts])
-    judged = []
     for (coarse, fine), (one, two), p in zip(pairs, counts, p_values, strict=True):
         told = f"{_shares(two, one, settings)}; adjusted (Holm) {markdown.p_value(p)}"
         text = f"Fewer accepted motions touch an obstacle: {_against(fine, coarse)}"
-        judged.append(judge.greater(text, QUESTION, told, one, two, p))
+        yield judge.greater(text, QUESTION, told, one, two, p)
     for (_, fine), (_, two) in zip(pairs, counts, strict=True):
         positions = fine.planner.collision.num_positions
         if positions > least:
             told = f"refuted: {measures.text(two, settings.confidence)} (reproduced: none)"
             text = f"M = {positions} removes contacts altogether: {fine.label}"
             runs = two.total - two.having, two.total, fine.solved
-            judged.append(judge.every(text, QUESTION, told, *runs))
-    return judged
+            yield judge.every(text, QUESTION, told, *runs)
 
 
 def _wrapped_by(control: ConditionResults, other: ConditionResults) -> bool:

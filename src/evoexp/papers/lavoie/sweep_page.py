@@ -1,5 +1,6 @@
 """Lavoie & Boudreau 2001: settings side by side, the first condition of an arm against each."""
 
+from collections.abc import Iterator
 from functools import partial
 from typing import NamedTuple
 
@@ -123,12 +124,11 @@ def _checks(
     return (*rows, *([] if _paths_differ(results) else _weak_evidence(results, settings)))
 
 
-def _weak_evidence(results: Results, settings: ReportSettings) -> list[tuple[str, str]]:
+def _weak_evidence(results: Results, settings: ReportSettings) -> Iterator[tuple[str, str]]:
     """Count the settings of each arm that agree with a printed percentage.
 
     The more settings agree, the less agreement says about any of them.
     """
-    found = []
     for own in arms(results):
         for printed in (one for one in measures.printed(own[0]) if one.bound == BOUND):
             intervals = {
@@ -146,8 +146,7 @@ def _weak_evidence(results: Results, settings: ReportSettings) -> list[tuple[str
                 f"{max(c.done for c in own)} runs each). Agreement with Fig. 3 is weak evidence "
                 "for a setting as long as others agree as well"
             )
-            found.append((what, text))
-    return found
+            yield (what, text)
 
 
 def _paths_differ(results: Results) -> bool:

@@ -1,7 +1,5 @@
 """Costs of paths over a grid (Chen & Zalzala 1995, Fig. 2): by generation, and above the best."""
 
-from typing import Any
-
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -58,8 +56,14 @@ def _curve(axes: Axes, line: pd.DataFrame, colour: str, *, dashed: bool) -> None
     """Draw a median, and its quartiles unless it is dashed."""
     label, x = str(line["condition"].iloc[0]), line["generation"]
     if dashed:
-        look: dict[str, Any] = {"color": colour, "linestyle": "--", "linewidth": 0.9}
-        axes.plot(x, line["median"], label=f"{label}, average", **look)
+        axes.plot(
+            x,
+            line["median"],
+            label=f"{label}, average",
+            color=colour,
+            linestyle="--",
+            linewidth=0.9,
+        )
         return
     axes.plot(x, line["median"], color=colour, label=label)
     axes.fill_between(x, line["lower"], line["upper"], color=colour, alpha=0.18, linewidth=0)

@@ -88,8 +88,13 @@ def draw_routes(table: pd.DataFrame) -> Figure:
     figure, panels = _panels(table, 3.1)
     for axes, kind, line in _lines(panels, table):
         text, share = line[["text", "share"]].iloc[0]
-        look = {"color": style.condition_colour(names.index(kind)), "linewidth": 0.8 + 3.2 * share}
-        axes.plot(line["x"], line["y"], label=text, **look)
+        axes.plot(
+            line["x"],
+            line["y"],
+            label=text,
+            color=style.condition_colour(names.index(kind)),
+            linewidth=0.8 + 3.2 * share,
+        )
     for axes in panels:
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.24), ncols=2, fontsize=6.5)
     return figure
@@ -98,8 +103,9 @@ def draw_routes(table: pd.DataFrame) -> Figure:
 def draw_obstacle(axes: Axes, x: pd.Series, y: pd.Series) -> None:
     """Draw an obstacle between two corners."""
     (x0, x1), (y0, y1) = x, y
-    look: dict[str, Any] = {"facecolor": "#bbbbbb", "edgecolor": style.NEUTRAL}
-    axes.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, **look))
+    axes.add_patch(
+        Rectangle((x0, y0), x1 - x0, y1 - y0, facecolor="#bbbbbb", edgecolor=style.NEUTRAL)
+    )
 
 
 def _lines(panels: list[Axes], table: pd.DataFrame) -> Iterator[tuple[Axes, str, pd.DataFrame]]:

@@ -95,8 +95,15 @@ def _draw_costs(figure: Figure, axes: Axes, wide: pd.DataFrame, widest: float) -
     costs = wide.to_numpy()
     least = float(np.nanmin(costs))
     norm = LogNorm(vmin=least, vmax=least * widest)
-    look: dict[str, Any] = {"cmap": "viridis_r", "shading": "nearest", "rasterized": True}
-    image = axes.pcolormesh(wide.columns, wide.index, costs, norm=norm, **look)
+    image = axes.pcolormesh(
+        wide.columns,
+        wide.index,
+        costs,
+        norm=norm,
+        cmap="viridis_r",
+        shading="nearest",
+        rasterized=True,
+    )
     ticks = [least * tick for tick in TICKS[widest]]
     bar = figure.colorbar(image, ax=axes, extend="max", shrink=0.8)
     bar.set_ticks(ticks, labels=[f"{tick:.3g}" for tick in ticks])

@@ -100,22 +100,40 @@ def _draw_side(axes: Axes, rows: pd.DataFrame) -> None:
     """Draw the platform, both postures of the arm, the target and the force."""
     (radius, height), unit = _pair(rows, BODY), str(rows["unit"].iloc[0])
     middle, _ = _pair(rows, DOCKED)
-    look: dict[str, Any] = {"facecolor": "#dddddd", "edgecolor": style.NEUTRAL}
-    axes.add_patch(Rectangle((middle - radius, 0.0), 2.0 * radius, height, **look))
+    axes.add_patch(
+        Rectangle(
+            (middle - radius, 0.0),
+            2.0 * radius,
+            height,
+            facecolor="#dddddd",
+            edgecolor=style.NEUTRAL,
+        )
+    )
     for name, colour, pattern in ((TRAVEL, style.FAINT, "--"), (DOCKED, style.ARM_COLOURS[1], "-")):
         arm: dict[str, Any] = {"marker": "o", "markersize": 3.5, "color": colour, "label": name}
         joints = rows[rows["kind"] == name]
         axes.plot(joints["a"], joints["b"], pattern, **arm)
     (x, z), (fx, fz) = _pair(rows, TARGET), _pair(rows, FORCE)
-    cross: dict[str, Any] = {"color": style.NEUTRAL, "markersize": 7, "zorder": 4}
-    axes.plot(x, z, "x", label="where the end-effector shall be", **cross)
+    axes.plot(
+        x,
+        z,
+        "x",
+        label="where the end-effector shall be",
+        color=style.NEUTRAL,
+        markersize=7,
+        zorder=4,
+    )
     size = np.hypot(fx, fz) or 1.0
     arrow = {"arrowstyle": "-|>", "color": style.FORBIDDEN}
     tail = x - 0.6 * fx / size, z - 0.6 * fz / size
     axes.annotate("F", (x, z), tail, arrowprops=arrow, ha="center", fontsize=7.5)
     axes.axhline(0.0, color=style.NEUTRAL, linewidth=1.0)
-    axes.set_aspect("equal", adjustable="datalim")
-    axes.set(xlabel=f"x [{unit}]", ylabel=f"height z [{unit}]")
+    axes.set(
+        adjustable="datalim",
+        aspect="equal",
+        xlabel=f"x [{unit}]",
+        ylabel=f"height z [{unit}]",
+    )
     axes.margins(0.1)
 
 

@@ -75,8 +75,12 @@ def draw_fitness(table: pd.DataFrame) -> Figure:
         below, above = (0.08, 1.0) if lower_is_better else (1.0, 0.08)
         if np.isfinite([far, optimum]).all():
             axes.set_ylim(optimum - below * far, optimum + above * far)
-        axes.set_xlim(0, max(1, int(rows["generation"].max())))
-        axes.set(xlabel="generation", ylabel=f"{quantity} [-]", title=rows["case"].iloc[0])
+        axes.set(
+            xlim=(0, max(1, int(rows["generation"].max()))),
+            xlabel="generation",
+            ylabel=f"{quantity} [-]",
+            title=rows["case"].iloc[0],
+        )
     style.legend_below(figure, places[0], 4)
     return figure
 
@@ -109,18 +113,25 @@ def draw_gaps(table: pd.DataFrame) -> Figure:
             x = np.sort(np.maximum(np.nan_to_num(own["gap"].to_numpy(), posinf=np.inf), LEAST_GAP))
             share = np.arange(1, len(x) + 1) / len(x)
             finite = np.isfinite(x)
-            look: dict[str, Any] = {
-                "color": _colour(method),
-                "linestyle": "-" if method in RUNS else (0, (4, 1.5)),
-                "label": f"{method} (n = {len(x)})",
-            }
             heights = np.append(share[finite], finite.mean())
-            axes.step(np.append(x[finite], 1e2), heights, where="post", **look)
+            axes.step(
+                np.append(x[finite], 1e2),
+                heights,
+                where="post",
+                color=_colour(method),
+                linestyle="-" if method in RUNS else (0, (4, 1.5)),
+                label=f"{method} (n = {len(x)})",
+            )
         for close in CLOSE:
             axes.axvline(close, color=style.FAINT, linewidth=0.8, linestyle=":")
-        axes.set(xscale="log", xlim=(LEAST_GAP, 10.0), ylim=(0.0, 1.02))
-        axes.set(xlabel="gap E / E* − 1 [-]", ylabel="share with a smaller gap")
-        axes.set_title(rows["case"].iloc[0])
+        axes.set(
+            xscale="log",
+            xlim=(LEAST_GAP, 10.0),
+            ylim=(0.0, 1.02),
+            xlabel="gap E / E* − 1 [-]",
+            ylabel="share with a smaller gap",
+            title=rows["case"].iloc[0],
+        )
     style.legend_of_all(figure, places, 3)
     return figure
 
@@ -178,7 +189,6 @@ def draw_postures(table: pd.DataFrame) -> Figure:
     """Draw one panel per criterion: three postures, the force, the obstacle."""
     figure, places = _panels(table, 2.6)
     looks = (style.NEUTRAL, 3.4), (style.ARM_COLOURS[0], 1.7), (style.ARM_COLOURS[1], 1.1)
-    cross: dict[str, Any] = {"color": style.FORBIDDEN, "ms": 7, "mec": "white", "zorder": 8}
     blue = style.ARM_COLOURS[2]
     arrow = {"arrowstyle": "-|>", "color": blue, "linewidth": 1.4}
     for axes, (_, rows) in zip(places, groups(table, "panel"), strict=False):
@@ -189,7 +199,16 @@ def draw_postures(table: pd.DataFrame) -> Figure:
             if len(own):
                 _draw_posture(axes, own, posture, colour, width)
         for row in records(rows[rows["element"] == "obstacle"]):
-            axes.plot(row.x, row.y, "X", label="obstacle", **cross)
+            axes.plot(
+                row.x,
+                row.y,
+                "X",
+                label="obstacle",
+                color=style.FORBIDDEN,
+                ms=7,
+                mec="white",
+                zorder=8,
+            )
         for row in records(rows[rows["element"] == "force"]):
             axes.annotate("", (row.x_end, row.y_end), (row.x, row.y), arrowprops=arrow, zorder=7)
             axes.plot([], [], color=blue, label="force F")
@@ -206,10 +225,16 @@ def _draw_posture(axes: Axes, rows: pd.DataFrame, label: str, colour: str, width
     axes.plot(x, y, "o-", color=colour, linewidth=width, ms=3.0, mfc="white", label=label, zorder=5)
     for row in records(rows[rows["element"] == "platform"]):
         height = row.y_end - row.y
-        look: dict[str, Any] = {"fill": False, "edgecolor": colour, "linewidth": 0.6 * width}
         ends = f"round,pad=0,rounding_size={0.499 * height}"
         box = FancyBboxPatch(
-            (row.x, row.y), row.x_end - row.x, height, boxstyle=ends, zorder=4, **look
+            (row.x, row.y),
+            row.x_end - row.x,
+            height,
+            boxstyle=ends,
+            zorder=4,
+            fill=False,
+            edgecolor=colour,
+            linewidth=0.6 * width,
         )
         axes.add_patch(box)
 

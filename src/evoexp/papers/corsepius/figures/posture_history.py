@@ -114,9 +114,16 @@ def _draw_curves(axes: Axes, table: pd.DataFrame, by: str, names: list[str]) -> 
         )
         axes.fill_between(x, curve["lower"], curve["upper"], color=colour, alpha=0.2, linewidth=0)
         axes.plot(x, median, color=colour)
-        look: dict[str, Any] = {"fontsize": 6, "color": colour, "va": "center", "ha": "left"}
         at = (x.iloc[-1], median.iloc[-1])
-        axes.annotate(f" {curve['begun'].iloc[0]}", at, annotation_clip=False, **look)
+        axes.annotate(
+            f" {curve['begun'].iloc[0]}",
+            at,
+            annotation_clip=False,
+            fontsize=6,
+            color=colour,
+            va="center",
+            ha="left",
+        )
     axes.set(yscale="log", xlim=(0, max(1, int(table["cycle"].max()))))
     axes.xaxis.set_major_locator(MaxNLocator(nbins=4, integer=True))
 
@@ -163,10 +170,13 @@ def draw_phases(table: pd.DataFrame) -> Figure:
         start = f"{row.condition}: " if several else ""
         labels.append(f"{start}{row.order + 1}  {row.phase}")
     left.set_yticks(range(len(labels)), labels)
-    left.set(ylim=(len(labels) - 0.5, -0.5), xlim=(-3, 103), title="a  goal of the phase met")
-    left.set_xlabel("share of the runs that began it [%]")
-    right.set_xlim(left=0)
-    right.set(xlabel="cycles (median, quartiles)", title="b  cycles")
+    left.set(
+        ylim=(len(labels) - 0.5, -0.5),
+        xlim=(-3, 103),
+        title="a  goal of the phase met",
+        xlabel="share of the runs that began it [%]",
+    )
+    right.set(xlim=(0, None), xlabel="cycles (median, quartiles)", title="b  cycles")
     return figure
 
 

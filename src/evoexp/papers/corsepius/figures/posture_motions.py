@@ -84,12 +84,11 @@ def draw_motions(table: pd.DataFrame) -> Figure:
             style.operational_axes(plane, unit)
             plane.set_title(f"{title.splitlines()[0]}, from above", fontsize=8)
             _draw(plane, rows, "xy")
-    star: dict[str, Any] = {"marker": "*", "mec": style.NEUTRAL, "mfc": "white", "ms": 9}
     keys = [
         style.key("postures, the later the stronger", color=ARM, linewidth=0.8, alpha=0.4),
         style.key("last posture", color=ARM, linewidth=2.4),
         style.key("way of the tool", color=TOOL, linewidth=1.0),
-        style.key("goal", color="none", **star),
+        style.key("goal", color="none", marker="*", mec=style.NEUTRAL, mfc="white", ms=9),
     ]
     style.keys_below(figure, keys)
     return figure
@@ -164,10 +163,15 @@ def _draw(axes: Any, rows: pd.DataFrame, names: str) -> None:
         look = {"linewidth": 2.4, "alpha": 1.0} if newest else {"linewidth": 0.8, "alpha": shade}
         axes.plot(*points, color=ARM, zorder=5, **look)
         if newest:
-            joint = {"color": "white", "markeredgecolor": ARM, "markersize": 2.6}
-            axes.plot(*points, "o", zorder=6, **joint)
+            axes.plot(*points, "o", zorder=6, color="white", markeredgecolor=ARM, markersize=2.6)
     # the tool's way and its goal
     way = tip.sort_values("instant")
     axes.plot(*(way[name] for name in names), color=TOOL, linewidth=1.0, zorder=7)
-    star = {"color": "white", "markeredgecolor": style.NEUTRAL, "ms": 8, "zorder": 8}
-    axes.plot(*(goal[name] for name in names), "*", **star)
+    axes.plot(
+        *(goal[name] for name in names),
+        "*",
+        color="white",
+        markeredgecolor=style.NEUTRAL,
+        ms=8,
+        zorder=8,
+    )

@@ -1,7 +1,5 @@
 """A local minimum of the search: the stuck runs, the cost around, and the way of a sub-goal."""
 
-from typing import Any
-
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -163,15 +161,31 @@ def draw_trap(table: pd.DataFrame) -> Figure:
             for axes, x, y in ((above, "x", "y"), (along, "order", "value")):
                 axes.plot(rows[x], rows[y], color=colour, linewidth=0.7, alpha=0.45)
             if series == STUCK:
-                cross: dict[str, Any] = {"color": style.FORBIDDEN, "markersize": 4, "zorder": 5}
-                above.plot(rows["x"].iloc[-1:], rows["y"].iloc[-1:], "x", **cross)
-    star: dict[str, Any] = {"markeredgecolor": style.NEUTRAL, "markersize": 10, "zorder": 6}
-    above.plot(goal["x"], goal["y"], "*", color="white", **star)
+                above.plot(
+                    rows["x"].iloc[-1:],
+                    rows["y"].iloc[-1:],
+                    "x",
+                    color=style.FORBIDDEN,
+                    markersize=4,
+                    zorder=5,
+                )
+    above.plot(
+        goal["x"],
+        goal["y"],
+        "*",
+        color="white",
+        markeredgecolor=style.NEUTRAL,
+        markersize=10,
+        zorder=6,
+    )
     style.operational_axes(above, unit)
     above.set_title("a  ways of the tools, from above")
-    along.set(xlabel="posture of the path", ylabel=f"distance to the goal [{unit}]")
-    along.set_title("b  distance along the paths")
-    along.set_ylim(bottom=0.0)
+    along.set(
+        xlabel="posture of the path",
+        ylabel=f"distance to the goal [{unit}]",
+        title="b  distance along the paths",
+        ylim=(0.0, None),
+    )
     _draw_landscape(figure, land, cells)
     _draw_ways_out(escape, escapes)
     keys = [style.key(name, color=colour, linewidth=1.6) for colour, name in looks.values()]
@@ -182,27 +196,48 @@ def draw_trap(table: pd.DataFrame) -> Figure:
 def _draw_landscape(figure: Figure, axes: Axes, cells: pd.DataFrame) -> None:
     """Draw the cost over two joints, the stuck posture and its scope."""
     wide = cells.pivot(index="y", columns="x", values="value")
-    axes.set_facecolor("#c8c8c8")
-    look: dict[str, Any] = {"cmap": "viridis_r", "shading": "nearest", "rasterized": True}
-    shown = axes.pcolormesh(wide.columns, wide.index, wide.to_numpy(), **look)
+    shown = axes.pcolormesh(
+        wide.columns,
+        wide.index,
+        wide.to_numpy(),
+        cmap="viridis_r",
+        shading="nearest",
+        rasterized=True,
+    )
     figure.colorbar(shown, ax=axes, label="cost [-]", shrink=0.9)
     x, y, scope, *joints = cells[["x_end", "y_end", "scope_deg", "joint_x", "joint_y"]].iloc[0]
     axes.plot(x, y, "X", color=style.FORBIDDEN, mec="white", markersize=8)
-    edge: dict[str, Any] = {"fill": False, "edgecolor": style.FORBIDDEN, "linewidth": 1.2}
-    axes.add_patch(Rectangle((x - scope, y - scope), 2 * scope, 2 * scope, **edge))
+    axes.add_patch(
+        Rectangle(
+            (x - scope, y - scope),
+            2 * scope,
+            2 * scope,
+            fill=False,
+            edgecolor=style.FORBIDDEN,
+            linewidth=1.2,
+        )
+    )
     axes.grid(visible=False)
-    labels = (f"{style.joint_symbol(0, int(joint) - 1)} [deg]" for joint in joints)
-    axes.set(**dict(zip(("xlabel", "ylabel"), labels, strict=True)))
-    axes.set_title("c  cost around a stuck posture (×), its scope")
+    first, second = (f"{style.joint_symbol(0, int(joint) - 1)} [deg]" for joint in joints)
+    title = "c  cost around a stuck posture (×), its scope"
+    axes.set(xlabel=first, ylabel=second, title=title, facecolor="#c8c8c8")
 
 
 def _draw_ways_out(axes: Axes, escapes: pd.DataFrame) -> None:
     """Draw the least cost in boxes around the posture that is stuck."""
-    look: dict[str, Any] = {"color": style.FORBIDDEN, "linewidth": 1.0, "linestyle": (0, (4, 2))}
-    axes.axhline(escapes["y"].iloc[0], label="stuck", **look)
+    axes.axhline(
+        escapes["y"].iloc[0],
+        label="stuck",
+        color=style.FORBIDDEN,
+        linewidth=1.0,
+        linestyle=(0, (4, 2)),
+    )
     axes.plot(escapes["x"], escapes["value"], "o-", color=style.arm_colour(0), markersize=4)
     axes.set_xscale("log", base=2)
     axes.xaxis.set_major_formatter(ScalarFormatter())
-    axes.set(xlabel="half the edge of the box [scopes]", ylabel="least cost found in it [-]")
-    axes.set_title("d  random postures around it")
-    axes.set_ylim(bottom=0.0)
+    axes.set(
+        xlabel="half the edge of the box [scopes]",
+        ylabel="least cost found in it [-]",
+        title="d  random postures around it",
+        ylim=(0.0, None),
+    )

@@ -1,7 +1,5 @@
 """How near a search gets before it stagnates, against its local scope (Corsépius 2001, Fig. 2)."""
 
-from typing import Any
-
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
@@ -54,8 +52,15 @@ def draw_floor(table: pd.DataFrame) -> Figure:
     # every run, beside its scope by a low-discrepancy jitter
     points = table[table["quantity"] == POINT]
     beside = np.exp2(JITTER * (2.0 * ((np.arange(len(points)) * 0.618034) % 1.0) - 1.0))
-    look: dict[str, Any] = {"color": colour, "ms": 2.2, "alpha": 0.35, "mec": "none"}
-    left.plot(points["scope"] * beside, points["median"], "o", **look)
+    left.plot(
+        points["scope"] * beside,
+        points["median"],
+        "o",
+        color=colour,
+        ms=2.2,
+        alpha=0.35,
+        mec="none",
+    )
     # medians and quartiles
     residuals, cycles = (
         table[table["quantity"] == quantity].sort_values("scope") for quantity in (RESIDUAL, CYCLES)
@@ -76,6 +81,5 @@ def draw_floor(table: pd.DataFrame) -> Figure:
     title = f"a  residual (slope {table['slope'].iloc[0]:.2f})"
     left.set(ylabel=f"distance to the goal at the end [{unit}]", title=title)
     left.legend(loc="upper left")
-    right.set(ylabel="cycles until it stagnates [-]", title="b  cycles")
-    right.set_ylim(bottom=0)
+    right.set(ylabel="cycles until it stagnates [-]", title="b  cycles", ylim=(0, None))
     return figure

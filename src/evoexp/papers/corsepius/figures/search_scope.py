@@ -58,25 +58,38 @@ def draw_scope(table: pd.DataFrame) -> Figure:
     blue, last = style.arm_colour(0), max(1, len(path) - 1)
     for row in records(path):
         corner, size = (row.x - row.half_x, row.y - row.half_y), (2 * row.half_x, 2 * row.half_y)
-        look: dict[str, Any] = {"facecolor": blue, "alpha": 0.10 + 0.12 * row.order / last}
-        left.add_patch(Rectangle(corner, *size, linewidth=0, **look))
+        left.add_patch(
+            Rectangle(
+                corner, *size, linewidth=0, facecolor=blue, alpha=0.10 + 0.12 * row.order / last
+            )
+        )
     left.plot(path["x"], path["y"], "o-", color=blue, markersize=2.8, linewidth=1.0)
     _draw_ends(left, path)
     x, y = (
         f"{style.joint_symbol(0, int(table[name].iloc[0]) - 1)} [deg]"
         for name in ("joint_x", "joint_y")
     )
-    left.set(xlabel=x, ylabel=y, title="a  boxes of offspring along a path")
-    left.set_aspect("equal", adjustable="datalim")
+    left.set(
+        xlabel=x,
+        ylabel=y,
+        title="a  boxes of offspring along a path",
+        adjustable="datalim",
+        aspect="equal",
+    )
     for k, (factor, rows) in enumerate(sorted(groups(reach, "factor"), reverse=True)):
         colour, hull = style.ARM_COLOURS[(1, 0, 2)[k]], rows.sort_values("order")
-        both: dict[str, Any] = {"facecolor": colour, "edgecolor": colour, "alpha": 0.25}
-        right.fill(hull["x"], hull["y"], label=f"{factor:g} × scope", **both)
+        right.fill(
+            hull["x"],
+            hull["y"],
+            label=f"{factor:g} × scope",
+            facecolor=colour,
+            edgecolor=colour,
+            alpha=0.25,
+        )
     right.plot(tool["x"], tool["y"], color=style.NEUTRAL, linewidth=1.0, label="way of the tool")
     _draw_ends(right, tool)
     style.operational_axes(right, table["length_unit"].iloc[0])
-    right.set_aspect("equal", adjustable="datalim")
-    right.set_title("b  the tool, one step from the start")
+    right.set(title="b  the tool, one step from the start", adjustable="datalim", aspect="equal")
     style.legend_below(figure, right, 6)
     return figure
 

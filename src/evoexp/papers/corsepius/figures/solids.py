@@ -57,12 +57,16 @@ def draw_solid(axes: Any, row: Any, colour: str, alpha: float) -> None:
     turn, size, place = _read(row)
     if row.shape == BRICK:
         faces = [corners * size @ turn.T + place for corners in _FACES]
-        look = {"facecolor": colour, "edgecolor": colour, "alpha": alpha, "linewidth": 0.5}
-        axes.add_collection3d(Poly3DCollection(faces, zorder=1, **look))
+        axes.add_collection3d(
+            Poly3DCollection(
+                faces, zorder=1, facecolor=colour, edgecolor=colour, alpha=alpha, linewidth=0.5
+            )
+        )
         return
     surface = np.einsum("ij,jkl->ikl", turn, _grid(row.shape, size)) + place[:, None, None]
-    smooth = {"linewidth": 0, "shade": True, "antialiased": False}
-    axes.plot_surface(*surface, color=colour, alpha=alpha, **smooth)
+    axes.plot_surface(
+        *surface, color=colour, alpha=alpha, linewidth=0, shade=True, antialiased=False
+    )
 
 
 def draw_outline(axes: Any, row: Any, colour: str, alpha: float) -> None:
@@ -71,8 +75,13 @@ def draw_outline(axes: Any, row: Any, colour: str, alpha: float) -> None:
     brick = row.shape == BRICK
     points = np.vstack(_FACES) * size if brick else _grid(row.shape, size).reshape(3, -1).T
     seen = (points @ turn.T)[:, :2] + place[:2]
-    look = {"facecolor": colour, "edgecolor": colour, "alpha": alpha, "linewidth": 0.5}
-    axes.fill(*seen[ConvexHull(seen).vertices].T, **look)
+    axes.fill(
+        *seen[ConvexHull(seen).vertices].T,
+        facecolor=colour,
+        edgecolor=colour,
+        alpha=alpha,
+        linewidth=0.5,
+    )
 
 
 def corners(table: pd.DataFrame) -> FloatArray:

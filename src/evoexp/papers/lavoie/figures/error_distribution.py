@@ -61,8 +61,11 @@ def draw_distribution(table: pd.DataFrame) -> Figure:
             _curve(axes, rows, greatest, style.condition_colour(int(position)), str(condition))
         for position, rows in groups(printed, "position"):
             _points(axes, rows, style.condition_colour(int(position)))
-        axes.set(xlim=(0.0, greatest), xlabel=f"x [{table['length_unit'].iloc[0]}]")
-        axes.set_ylabel("P(position error < x)")
+        axes.set(
+            xlim=(0.0, greatest),
+            xlabel=f"x [{table['length_unit'].iloc[0]}]",
+            ylabel="P(position error < x)",
+        )
     whole.set(ylim=(-0.02, 1.03), title="a  whole range")
     low = min([0.93, *printed["lower"]])
     near = low - 0.1 * (1.0 - low), 1.0 + 0.1 * (1.0 - low)
@@ -77,8 +80,9 @@ def _curve(axes: Axes, rows: pd.DataFrame, greatest: float, colour: str, name: s
     """Draw one arm's steps on to the right end, and their band."""
     rows = pd.concat([rows, rows.iloc[[-1]].assign(error=greatest)], ignore_index=True)
     x, label = rows["error"], f"{name} (n = {int(rows['total'].iloc[0])})"
-    band: dict[str, Any] = {"step": "post", "color": colour, "alpha": 0.22, "linewidth": 0}
-    axes.fill_between(x, rows["lower"], rows["upper"], **band)
+    axes.fill_between(
+        x, rows["lower"], rows["upper"], step="post", color=colour, alpha=0.22, linewidth=0
+    )
     axes.step(x, rows["share"], where="post", color=colour, label=label)
 
 
@@ -86,19 +90,30 @@ def _points(axes: Axes, rows: pd.DataFrame, colour: str) -> None:
     """Draw the printed points of one arm with the intervals of the paper's own sample."""
     name = f"printed, {rows['condition'].iloc[0]} (their n = {int(rows['total'].iloc[0])})"
     axes.vlines(rows["error"], rows["lower"], rows["upper"], color=colour, linewidth=1.0, zorder=4)
-    look: dict[str, Any] = {"color": "white", "mec": colour, "mew": 1.4, "ms": 5, "zorder": 5}
-    axes.plot(rows["error"], rows["share"], "D", label=name, **look)
+    axes.plot(
+        rows["error"],
+        rows["share"],
+        "D",
+        label=name,
+        color="white",
+        mec=colour,
+        mew=1.4,
+        ms=5,
+        zorder=5,
+    )
 
 
 def _label(axes: Axes, row: Any, greatest: bool) -> None:
     """Write a printed percentage above its point if it is the greatest at its x, else below."""
     left = row.error > 0.7 * axes.get_xlim()[1]
-    look: dict[str, Any] = {
-        "xytext": (-6 if left else 7, 4 if greatest else -10),
-        "textcoords": "offset points",
-        "ha": "right" if left else "left",
-        "color": style.condition_colour(row.position),
-        "fontsize": 7.5,
-        "path_effects": [withStroke(linewidth=2.5, foreground="white")],
-    }
-    axes.annotate(f"{100 * row.share:.1f} %", (row.error, row.share), zorder=6, **look)
+    axes.annotate(
+        f"{100 * row.share:.1f} %",
+        (row.error, row.share),
+        zorder=6,
+        xytext=(-6 if left else 7, 4 if greatest else -10),
+        textcoords="offset points",
+        ha="right" if left else "left",
+        color=style.condition_colour(row.position),
+        fontsize=7.5,
+        path_effects=[withStroke(linewidth=2.5, foreground="white")],
+    )

@@ -1,6 +1,6 @@
 """Arms reaching into a box of ellipses (Lavoie & Boudreau 2001, Figs. 1 and 2)."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -154,16 +154,14 @@ def _links(
     ]
 
 
-def _contacts(one: ShownMotion) -> list[tuple[Any, ...]]:
+def _contacts(one: ShownMotion) -> Iterator[tuple[Any, ...]]:
     """Return the places at which bodies touch, and the postures at which they do."""
-    rows = []
     for instant, pair in one.contacts:
         assert one.replicate is not None, "only motions touch"
         solution, q = one.condition.solutions[one.replicate], one.condition.motion(one.replicate)
         place = body_contacts.contact(one.condition.prepared, solution, instant, pair)
-        rows.append((CONTACT, pair, 1 + int(instant >= 1.0), instant, -1, *place, *place, *NO_SIZE))
-        rows += _links(one, TOUCHING, np.array([instant]), q.at(instant)[:, None])
-    return rows
+        yield (CONTACT, pair, 1 + int(instant >= 1.0), instant, -1, *place, *place, *NO_SIZE)
+        yield from _links(one, TOUCHING, np.array([instant]), q.at(instant)[:, None])
 
 
 def _span(rows: pd.DataFrame) -> tuple[float, float]:
@@ -176,8 +174,11 @@ def _draw_scene(axes: Axes, rows: pd.DataFrame) -> None:
     """Draw ellipses, box and targets."""
     for row in records(rows[rows["element"] == ELLIPSE]):
         size = 2 * row.semi_a, 2 * row.semi_b
-        look: dict[str, Any] = {"facecolor": style.FAINT, "lw": 0, "zorder": 2}
-        axes.add_patch(Ellipse((row.x, row.y), *size, angle=row.angle_deg, **look))
+        axes.add_patch(
+            Ellipse(
+                (row.x, row.y), *size, angle=row.angle_deg, facecolor=style.FAINT, lw=0, zorder=2
+            )
+        )
     for row in records(rows[rows["element"] == BOX]):
         size = row.x_end - row.x, row.y_end - row.y
         edge: dict[str, Any] = INSIDE | {"fill": False, "edgecolor": style.FAINT, "zorder": 1}
@@ -231,8 +232,15 @@ def _draw_joints(axes: Axes, x: list[float], y: list[float], sub_path: int, name
     axes.plot(x[:-1], y[:-1], "o", color="white", mec=colour, ms=3.6, mew=0.9, zorder=7)
     if named:
         place: dict[str, Any] = {"xytext": (-4, 5), "textcoords": "offset points", "ha": "right"}
-        look: dict[str, Any] = {"fontsize": 8, "color": colour, "path_effects": [HALO]}
-        axes.annotate(("start", "A", "B")[sub_path], (x[-1], y[-1]), zorder=10, **place, **look)
+        axes.annotate(
+            ("start", "A", "B")[sub_path],
+            (x[-1], y[-1]),
+            zorder=10,
+            **place,
+            fontsize=8,
+            color=colour,
+            path_effects=[HALO],
+        )
 
 
 def _colour(sub_path: int) -> str:

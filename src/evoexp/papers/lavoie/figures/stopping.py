@@ -1,7 +1,5 @@
 """Precision against the value at which a search stops (Lavoie & Boudreau 2001, section 6)."""
 
-from typing import Any
-
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
@@ -59,10 +57,15 @@ def draw_stopping(table: pd.DataFrame) -> Figure:
             )
             colour = style.condition_colour(k)
             axes.vlines(x, rows["lower"], rows["upper"], color=colour, linewidth=1.2)
-            look: dict[str, Any] = {"color": colour, "markersize": 4.5, "linewidth": 1.0}
-            axes.plot(x, rows["median"], "o-", label=name, **look)
-        axes.set_ylim(bottom=0.0)
-        axes.set(xlabel="stopping value of SP2 (objective) [-]", ylabel=label, title=title)
+            axes.plot(
+                x, rows["median"], "o-", label=name, color=colour, markersize=4.5, linewidth=1.0
+            )
+        axes.set(
+            ylim=(0.0, None),
+            xlabel="stopping value of SP2 (objective) [-]",
+            ylabel=label,
+            title=title,
+        )
         axes.set_xticks(sorted(table["stop_cost"].unique()))
     panels[0].invert_xaxis()
     style.legend_below(figure, panels[0], 2)

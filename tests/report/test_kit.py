@@ -1,0 +1,27 @@
+"""The kit of a page: it offers what pages use, and pages take it from there."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+import evoexp
+from evoexp.report import kit
+
+PAPERS = Path(evoexp.__file__).parent / "papers"
+SOURCES = {path: path.read_text() for path in sorted(PAPERS.rglob("*.py"))}
+
+
+@pytest.mark.parametrize("name", kit.__all__)
+def test_all_that_is_offered_is_there_and_used(name: str) -> None:
+    assert hasattr(kit, name)
+    assert any(re.search(rf"\b{name}\b", text) for text in SOURCES.values())
+
+
+@pytest.mark.parametrize("paper", ["chen", "corsepius", "lavoie"])
+def test_pages_take_the_parts_of_a_report_from_the_kit(paper: str) -> None:
+    own = {path: text for path, text in SOURCES.items() if PAPERS / paper in path.parents}
+    assert own
+    for path, text in own.items():
+        for module in re.findall(r"^from (evoexp\.report\S*) import", text, re.MULTILINE):
+            assert module == "evoexp.report.kit" or module.startswith("evoexp.report.figures"), path

@@ -35,7 +35,7 @@ SLIPS = {
 INTRODUCTION = (
     "Wave fronts over a grid (section 2.1): from the goal, whose potential is 0, and from "
     "obstacles and the boundary, which is a ring of nodes outside the grid. The potential of "
-    "obstacles is what the paper calls the unsafeness of a node. Obstacles of Fig. 1 are taken "
+    "obstacles is the paper's unsafeness of a node. Obstacles of Fig. 1 are taken "
     "from both printed grids together; all other numbers are computed."
 )
 

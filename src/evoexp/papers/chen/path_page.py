@@ -185,8 +185,8 @@ def drawings(groups: tuple[Group, ...], found: list[Route]) -> tuple[Drawing, ..
             "fig_2_costs",
             "Fig. 2: path cost against generations",
             "Best so far: median and quartiles of the runs; dashed: average of a generation. "
-            "Random search draws as many random walks. Dotted and dash-dotted: what the "
-            "reference knows.",
+            "Random search draws as many random walks. Dotted and dash-dotted: cost of "
+            "the best path known, and the bound below which no path is.",
             partial(grid_costs.costs_table, groups),
             grid_costs.draw_costs,
             shown,

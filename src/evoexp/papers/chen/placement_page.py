@@ -39,7 +39,7 @@ RESULTS = (
     "conventional, by start",
 )
 NOTE = (
-    "Paper: what it prints of its best posture; where it prints angles, E at these. GA and "
+    "Paper: the printed number of its best posture, and E at the printed angles. GA and "
     "random search: median [quartiles] of the best E of a run; in brackets shares of runs (for "
     "conventional methods: of starts) within 0.1 % and 1 % of the optimum."
 )
@@ -191,7 +191,7 @@ def _drawings(cases: list[Case]) -> tuple[Drawing, ...]:
         "gaps",
         "Gaps to the exact optimum",
         "Share of runs, or of starts of a conventional method (dashed), that end closer to "
-        "the optimum than x; dotted: 0.1 % and 1 %. What is below 1e-6 is drawn there; "
+        "the optimum than x; dotted: 0.1 % and 1 %. Smaller gaps than 1e-6 are drawn as 1e-6; "
         "plateaus on the right are local minima.",
         partial(placements.gaps_table, exact),
         placements.draw_gaps,

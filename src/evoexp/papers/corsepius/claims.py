@@ -51,7 +51,7 @@ def _free_of_collision(judge: Judge, condition: ConditionResults, level: float) 
         source="section 4.3.3",
         evidence=(
             f"{markdown.share(free, refuted.total)} solved runs certified; refuted "
-            f"{text(refuted, level)}: postures are free, what lies between them is not rated"
+            f"{text(refuted, level)}: postures are free, motions between them are not rated"
         ),
         holds=free,
         done=refuted.total,

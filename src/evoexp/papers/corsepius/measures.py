@@ -145,7 +145,7 @@ def path_lengths(condition: ConditionResults) -> FloatArray:
 def detours(condition: ConditionResults) -> FloatArray:
     """Return each path's length over the straight distance of its ends, (done,).
 
-    NaN where it ends as it began.
+    It is NaN if the path ends where it began.
     """
     straight = np.array([np.sqrt(((q[-1] - q[0]) ** 2).sum()) for q in paths(condition).values()])
     found = np.full(len(straight), np.nan)
@@ -186,7 +186,7 @@ def by_robot(conditions: tuple[ConditionResults, ...]) -> tuple[ConditionResults
 
 
 def phase_cycles(condition: ConditionResults) -> pd.DataFrame:
-    """Return how every run went in every phase that it began.
+    """Count the cycles of every run in every phase that it began.
 
     Returns:
         Columns replicate, phase (from 0), cycles, reached.

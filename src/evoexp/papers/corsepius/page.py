@@ -39,8 +39,8 @@ INTRODUCTION = (
     "first one that meets the goal. The cost is a sum of weighted terms in configuration and "
     "work space; lower is better. A run without a winner ends by stagnation or at its cap of "
     "cycles, and its path is that of the best posture. Solved: the goal is met, and every "
-    "posture of the path is free by the spheres; what lies between postures the exact verdict "
-    "tells."
+    "posture of the path is free by the spheres; the exact verdict judges the motion between "
+    "postures, too."
 )
 TASKS = (
     "task",
@@ -56,7 +56,7 @@ PHASES = ("task", "phase", "goal of the phase met, of the runs that began it", "
 CHECKS = (
     (
         "Paths between postures",
-        "are not rated by the paper: what is solved can be refuted; `planner.edge_check` tests "
+        "are not rated by the paper: solved paths can be refuted; `planner.edge_check` tests "
         "configurations between a parent and its child: `evoexp run experiment=corsepius_options`",
     ),
     (
@@ -192,8 +192,8 @@ def drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
             "history",
             "Approach to the goal",
             "Best so far against cycles: median and quartiles of the runs that began the phase; "
-            "one that has ended keeps its last value. What is best goes by cost, so a distance "
-            "may grow. At the curves: how many runs.",
+            "one that has ended keeps its last value. The best posture is that of the least "
+            "cost, so its distance may grow. At the curves: numbers of runs.",
             partial(posture_history.history_table, results),
             posture_history.draw_history,
             main,
@@ -272,7 +272,7 @@ def _models(main: tuple[ConditionResults, ...]) -> Drawing:
     shown = [(c.label if len(found) > 1 else "the robot", c) for c in found]
     return Drawing(
         "fig_3_4_models",
-        "Figs. 3 and 4: robots, and what stands for them",
+        "Figs. 3 and 4: robots, and the shapes that cover them",
         "Left: the bodies, by which the exact verdict judges. Right: the spheres or capsules "
         "that cover them, by which the search does; the paper's sets have 10⁵ to 10⁶ spheres.",
         partial(posture_models.models_table, shown),

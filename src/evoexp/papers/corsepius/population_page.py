@@ -29,7 +29,7 @@ SCALES = {"cycles": (1.0, ""), "evaluations": (1.0, ""), "CPU time": (1e3, " [ms
 INTRODUCTION = (
     "λ individuals are generated per cycle, of which 5 are selected; all else is equal, seeds "
     "included. Expected running time: the effort of all runs, failed ones included, over the "
-    "number of runs that met the goal: what a success costs if one starts again after every "
+    "number of runs that met the goal: the price of a success if one starts again after every "
     "failure. Cycles stand for planning time on as many processors as individuals, evaluations "
     "for time on one; CPU time is that of the search here, at the median run's price of an "
     "evaluation, and has a fixed part per cycle, which weighs more where λ is small. A smaller λ "

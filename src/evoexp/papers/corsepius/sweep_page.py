@@ -32,8 +32,8 @@ PRINTED_PARENTS = 5.0  # "typical size 5" (section 4.2)
 INTRODUCTION = (
     "Conditions of one task differ in one setting and share their seeds. Effort of a run that "
     "does not meet its goal counts as infinite where runs are compared, and as spent where "
-    "expected running times are formed. The paper sweeps nothing; it names the setting as what "
-    "scales the algorithm (section 5) or as a next step (section 6)."
+    "expected running times are formed. The paper sweeps nothing; it says that the setting "
+    "scales the algorithm (section 5) or is a next step (section 6)."
 )
 SHARES = (
     "condition",

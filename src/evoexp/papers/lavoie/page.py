@@ -37,9 +37,9 @@ INTRODUCTION = (
 )
 ACCEPTED = "Accepted motions that touch an obstacle between tested positions (exact verdict)"
 REMOVED = (
-    "What removes it",
+    "Remedies",
     "more positions M, and chords from one position to the next: `evoexp run "
-    "experiment=lavoie_sweeps_positions`; what an arm blind to obstacles does: `evoexp run "
+    "experiment=lavoie_sweeps_positions`; an arm blind to obstacles: `evoexp run "
     "experiment=lavoie_controls`",
 )
 CHECKS = (
@@ -225,7 +225,7 @@ def _solutions(results: Results) -> Iterator[Drawing]:
     """Return the figures of each arm's median solution, and of its median refuted one."""
     for stem, title, caption, only_refuted in (
         ("fig_2_solution", "Fig. 2: solutions", SOLUTIONS, False),
-        ("refuted", "What the tested positions let through", THROUGH, True),
+        ("refuted", "Contacts between tested positions", THROUGH, True),
     ):
         shown = []
         for c in results.with_data:

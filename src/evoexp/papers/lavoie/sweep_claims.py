@@ -167,7 +167,7 @@ def _chance(judge: Judge, results: Results, settings: ReportSettings) -> Iterato
             one, two = success(own), success(control)
             spent = (f"{c.spread('evaluations').median:.0f}" for c in (own, control))
             yield judge.greater(
-                text=f"Evolution finds what chance does not: {_against(own, control)}",
+                text=f"Evolution finds more solutions than chance: {_against(own, control)}",
                 source=QUESTION,
                 evidence=(
                     f"runs with a solution: {_shares(one, two, settings)}; median evaluations "

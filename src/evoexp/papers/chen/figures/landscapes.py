@@ -63,7 +63,7 @@ def _points(case: Case) -> dict[str, FloatArray]:
 def draw_landscape(table: pd.DataFrame) -> Figure:
     """Draw E in colours, one column per criterion: the whole landscape, and around the best.
 
-    No posture is feasible where it is white.
+    White: no posture is feasible.
     """
     panels = [rows for _, rows in groups(table, "panel")]
     figure = style.figure(7.4)

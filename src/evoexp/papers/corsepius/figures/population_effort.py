@@ -164,7 +164,7 @@ def _draw_series(axes: Axes, table: pd.DataFrame, count: int, marked: float) -> 
 
 
 def _look(position: int) -> dict[str, Any]:
-    """Return how the series of a task looks."""
+    """Return colour, line and marker of a task's series."""
     return {
         "color": style.condition_colour(position),
         "linestyle": (0, (4, 1.5)) if position % 2 else "-",

@@ -135,7 +135,7 @@ def _ordered(table: pd.DataFrame) -> list[str]:
 
 
 def phases_table(results: Results, confidence: float) -> pd.DataFrame:
-    """Return how each phase went, over all conditions with several.
+    """Return success and cycles of each phase, over all conditions with several.
 
     Returns:
         Columns position, condition, order, phase, begun, reached, share, lower, upper (of those

@@ -41,7 +41,8 @@ Rows = list[dict[str, object]]
 def pair(shown: tuple[ConditionResults, ...]) -> tuple[ConditionResults, ConditionResults] | None:
     """Return a task of one phase in which runs get stuck, and the same with sub-goals, solved.
 
-    None without both.
+    Returns:
+        (without sub-goals, with sub-goals); None if either is missing.
     """
     for helped in shown:
         for stuck in shown:

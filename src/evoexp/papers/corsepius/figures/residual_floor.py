@@ -35,7 +35,7 @@ def floor_table(task: Task) -> pd.DataFrame:
 def slope(task: Task) -> float:
     """Return the slope of the median residual over the scope, both as logarithms.
 
-    NaN of fewer than two scopes.
+    It is NaN if there are fewer than two scopes.
     """
     medians = np.array([spread(measures.residuals(c)).median for c in task.conditions])
     if len(medians) < 2 or not (medians > 0.0).all():

@@ -107,7 +107,7 @@ def test_ctrl_c_keeps_what_is_finished_and_the_same_command_goes_on(
     assert process.returncode == 130
     assert (
         err
-        == "evoexp: interrupted; what was finished is kept, the same command goes on from there\n"
+        == "evoexp: interrupted; finished replicates are kept, the same command runs the others\n"
     )
     assert re.search(r"^replicates: \d+ of 12 done, 0 failed, ETA \d+ (s|min)$", out, re.MULTILINE)
     assert "\x1b" not in out, "plain lines in a pipe"

@@ -159,7 +159,7 @@ def test_an_infeasible_posture_is_told_as_such() -> None:
         ),
         (
             ["robot=planar_7r"],
-            "robot: must be what placement_ga takes, a MobileArm, was 'planar_chain'",
+            "robot: must be one that placement_ga takes (MobileArm), was 'planar_chain'",
         ),
         (
             ["reference=placement_optimum", "reference.num_angles=7"],

@@ -265,7 +265,7 @@ def test_the_arm_of_ten_joints_stands_before_the_moved_box() -> None:
         (("ga=rana_planar",), "ga: must be a SelectiveSettings"),
         (
             ("scenario=rana_planar",),
-            "scenario: must be what redundant_ga takes, a PickAndPlace, was 'arm_motion'",
+            "scenario: must be one that redundant_ga takes (PickAndPlace), was 'arm_motion'",
         ),
         (
             ("planner.success=maybe",),

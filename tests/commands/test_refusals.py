@@ -148,7 +148,8 @@ OPTIONS = f"(options: {EXPERIMENTS})"
         ("experiment=rana_planar", "experiment: must be given once"),
         (
             "ga.mutation_rate=${nothing}",
-            "ga.mutation_rate: must be a value, or the name of another setting in ${…} (there is",
+            "ga.mutation_rate: must be a value, or the name of another setting in ${…} (there is "
+            "no 'nothing')",
         ),
         ("~robot", "robot: must be given, was '~robot'"),
         (

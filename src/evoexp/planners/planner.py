@@ -113,7 +113,11 @@ class Planner(Protocol):
         """
 
     def sample(self, problem: Any, rng: np.random.Generator, count: int) -> FloatArray:
-        """Draw `count` individuals as the initial population is drawn, individuals last."""
+        """Draw `count` individuals as the initial population is drawn, individuals last.
+
+        Raises:
+            SettingError: If the planner has several populations, one after the other.
+        """
 
     def cost(self, problem: Any, population: FloatArray) -> Judgement:
         """Judge a population as `sample` returns it."""

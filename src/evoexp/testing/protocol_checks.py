@@ -1,5 +1,6 @@
 """Checks of the whole planner: its members, its identity, its randomness."""
 
+import functools
 import inspect
 import pickle
 from typing import Any, get_args
@@ -7,20 +8,22 @@ from typing import Any, get_args
 import numpy as np
 
 from evoexp.condition import Condition
+from evoexp.errors import SettingError
 from evoexp.planners.planner import Planner, Reproducibility
 from evoexp.testing.evolution_record import demand, evolution, finished
 from evoexp.validation import Component
 
-OF_ONE_SEARCH = ("sample", "cost", "solution", "improve", "num_evaluations", "num_generations")
-"""Members that a planner may lack if it lacks `sample`: a reference, or a plan of several searches.
 
-No control can repeat such a planner at equal evaluations.
-"""
-
-
-def is_one_search(condition: Condition) -> bool:
-    """Return whether individuals of the planner can be drawn and judged."""
-    return hasattr(condition.planner, "sample") and not condition.is_reference
+@functools.lru_cache(maxsize=8)
+def has_one_population(condition: Condition) -> bool:
+    """Return whether individuals can be drawn and judged: not of references and plans of stages."""
+    planner, problem = condition.prepare()
+    try:
+        return (
+            not condition.is_reference and planner.sample(problem, condition.rng(0), 1) is not None
+        )
+    except SettingError:  # a planner of several stages refuses
+        return False
 
 
 def every_member_is_there(condition: Condition) -> None:
@@ -32,8 +35,7 @@ def every_member_is_there(condition: Condition) -> None:
         "a planner must be a Component, so that a configuration can name it",
         type(planner).__name__,
     )
-    spared = () if is_one_search(condition) else OF_ONE_SEARCH
-    names = [name for name in _members() if name not in spared]
+    names = _members()
     missing = [name for name in names if not hasattr(planner, name)]
     demand(
         not missing,

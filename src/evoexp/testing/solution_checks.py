@@ -11,7 +11,7 @@ from evoexp.paths.motion import Motion
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.testing.evolution_record import demand, evolution
-from evoexp.testing.protocol_checks import is_one_search
+from evoexp.testing.protocol_checks import has_one_population
 
 TOLERANCE = 1e-9  # [-] of numbers that pass through another unit on their way
 OF_THE_SEARCH = {"attempts", "sub_path", "phase", "cycles", "idle_cycles"}
@@ -67,7 +67,7 @@ def _size(parts: Any) -> int:
 
 def samples_are_judged_alike(condition: Condition) -> None:
     """Individuals are drawn from `rng` alone, and judged alike alone, together, and twice."""
-    if not is_one_search(condition):
+    if not has_one_population(condition):
         return
     found = evolution(condition)
     planner, problem = found.planner, found.problem
@@ -95,7 +95,7 @@ def samples_are_judged_alike(condition: Condition) -> None:
 
 def recorded_costs_are_those_of_the_population(condition: Condition) -> None:
     """`cost` gives the recorded costs, where populations are recorded as they are drawn."""
-    if not is_one_search(condition):
+    if not has_one_population(condition):
         return
     found = evolution(condition)
     drawn = found.planner.sample(found.problem, condition.rng(0), NUM_SAMPLES)
@@ -172,7 +172,7 @@ def pieces_cover_the_motion(condition: Condition) -> None:
 
 def the_local_operator_leaves_its_argument_alone(condition: Condition) -> None:
     """`improve` returns None, or another population of the same shape."""
-    if not is_one_search(condition):
+    if not has_one_population(condition):
         return
     found = evolution(condition)
     drawn = found.planner.sample(found.problem, condition.rng(0), NUM_SAMPLES)

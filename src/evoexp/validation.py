@@ -119,7 +119,9 @@ def settings_error(
         elif part in _members(here) or part == first["loc"][-1]:
             path, here = _join(path, part), _members(here).get(part, {})
         # else: the tag of a union, which nobody typed
-        if isinstance(here, Mapping) and here and any(issubclass(k, Component) for k in kinds):
+        unknown = first["type"] == "extra_forbidden" and part == first["loc"][-1]
+        component = any(issubclass(k, Component) for k in kinds)
+        if isinstance(here, Mapping) and here and component and not unknown:
             return SettingError(path, f"a component, given by its {TARGET}", here)
     if first["type"] == "extra_forbidden":
         return UnknownSetting(path, {name for each in kinds for name in each.model_fields})

@@ -119,7 +119,7 @@ def test_run_list_show_reproduce_report(
     found = compose.expand(WORDS)[0].conditions[0].condition
     assert found.id[:12] in said("list")
     shown = said("show", found.id[:12])
-    assert "array: table (3 × 3), attached to 0000.mcap" in shown
+    assert "array table: 3 × 3" in shown
     assert "1 of 1 MATCH" in said("reproduce", found.id[:12])
     monkeypatch.setenv("DISTURBED", "1e-10")
     assert "DIVERGES at generation 0" in said("reproduce", found.id[:12], code=1)

@@ -55,8 +55,9 @@ class Source(NamedTuple):
 class ContentLocator(caching._CacheLocator):
     """Tells numba where the kernels of a module are kept: a folder named by the module's key."""
 
-    def __init__(self, module: str) -> None:
+    def __init__(self, module: str, py_file: str) -> None:
         """Name the folder; nothing is written before a kernel is saved."""
+        self._py_file = py_file  # numba names it where a function cannot be kept
         self._path = cache_root() / "kernels" / module / module_key(module)[:16]
 
     @classmethod
@@ -65,7 +66,7 @@ class ContentLocator(caching._CacheLocator):
         module = py_func.__module__
         if _file_of(module) is None or not _is_ours(module):
             return None
-        return cls(module)
+        return cls(module, py_file)
 
     def get_cache_path(self) -> str:
         """Return the folder."""

@@ -64,3 +64,9 @@ def stored(stored_once: Path, outputs: Path) -> Path:
     """Return a copy of those outputs for this test."""
     shutil.copytree(stored_once, outputs)
     return outputs
+
+
+@pytest.fixture
+def wide_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have lines of 160 columns, wherever tests run."""
+    monkeypatch.setenv("COLUMNS", "160")

@@ -156,6 +156,7 @@ def one_shipped(monkeypatch: pytest.MonkeyPatch) -> Shipped:
     return row
 
 
+@pytest.mark.usefixtures("wide_terminal")
 def test_a_shipped_condition_that_never_ran_here(
     evoexp: Evoexp, outputs: Path, one_shipped: Shipped
 ) -> None:
@@ -198,6 +199,7 @@ def test_an_ambiguous_shipped_hash_lists_the_candidates(
         assert refused(command, "abc") == "hash: 'abc' is ambiguous: abc0abc0abc0, abc1abc1abc1"
 
 
+@pytest.mark.usefixtures("wide_terminal")
 def test_show_says_what_the_chromosomes_length_violates(evoexp: Evoexp, outputs: Path) -> None:
     condition = (
         compose.expand(["experiment=curkovic_methods"], only=["V"])[0].conditions[0].condition

@@ -187,7 +187,8 @@ def _core(item: Any) -> tuple[_Core, FloatArray, FloatArray]:
 def _reach(core: _Core, rotation: FloatArray, translation: FloatArray) -> tuple[float, float]:
     """Return the greatest distances of a body's points from its joint's origin and z axis.
 
-    From the corners of the core or of a box around it, or from a ball around it, whichever is less.
+    Both come from the corners of the core or of a box around it, or from a ball around it,
+    whichever gives less.
     """
     a, b, c = core.size
     ball = np.inf

@@ -1,6 +1,4 @@
-"""A scene: a robot's exact bodies and what stands around it, as coal shapes.
-
-With the pairs that must not touch.
+"""A scene: a robot's exact bodies and the obstacles as coal shapes, with the pairs to be watched.
 
 `Scene` holds coal's shapes, which have the last word, and the same bodies as plain arrays, from
 which the kernels of the certifier bound their distances. It is read-only: one scene serves many
@@ -61,10 +59,7 @@ class Scene(NamedTuple):
         return self.names[one], self.names[two]
 
     def nearest_pair(self, q: FloatArray) -> tuple[str, str]:
-        """Return the names of the two bodies that are closest, or deepest in each other.
-
-        At q (nq,) [rad].
-        """
+        """Return the names of the two bodies that are closest, or overlap most, at q (nq,)."""
         data, placements = self.model.createData(), self.geometry.createData()
         pin.computeDistances(self.model, data, self.geometry, placements, q)
         distances = [result.min_distance for result in placements.distanceResults]
@@ -102,9 +97,8 @@ def scene(
     bodies = list(assembly.geometry.geometryObjects)
     arms = assembly.body_arms
     for k, (arm, item) in enumerate(zip(arms, bodies, strict=True)):
-        own = (
-            item.name != f"link_{k}"
-        )  # bodies that have names of their own keep them, and are not counted
+        # bodies that have names of their own keep them, and are not counted
+        own = item.name != f"link_{k}"
         counts[arm] += not own
         name = item.name if own else f"arm_{arm + 1}_link_{counts[arm]}"
         geometry.addGeometryObject(
@@ -125,9 +119,7 @@ def scene(
 
 
 def geometry_scene(model: Any, geometry: Any, table: KinematicTable | None = None) -> Scene:
-    """Return a scene of any convex coal shapes or meshes on a model.
-
-    With the collision pairs of the geometry model.
+    """Return the scene of a geometry model: any convex coal shapes or meshes, and its pairs.
 
     Args:
         model: A `pin.Model` whose joints have one coordinate each.
@@ -174,9 +166,9 @@ def obstacle_shapes(table: ObstacleTable) -> list[tuple[Any, Any]]:
 
 
 def _size(model: Any, bodies: BodyTable) -> float:
-    """Return how far bodies reach from the world's origin at the neutral configuration.
+    """Return the bodies' greatest reach from the world's origin at the neutral configuration.
 
-    1 if there is nothing.
+    Without bodies it is 1.
     """
     data = model.createData()
     pin.forwardKinematics(model, data, pin.neutral(model))

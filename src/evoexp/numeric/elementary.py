@@ -72,10 +72,7 @@ _C = (
 
 @inlined
 def _reduce(x: float) -> tuple[float, int]:
-    """Return r in [−π/4, π/4] and an integer n (modulo 4) with x = r + n π/2.
-
-    Two-term Cody-Waite.
-    """
+    """Return r in [−π/4, π/4] and an integer n (modulo 4) with x = r + n π/2 (Cody & Waite)."""
     t = x * _TWO_OVER_PI + _ROUND
     n = t - _ROUND
     return (x - n * _HALF_PI_HI) - n * _HALF_PI_LO, _bits(t)
@@ -93,7 +90,7 @@ def _sin_polynomial(r: float) -> float:
 
 @inlined
 def _cos_polynomial(r: float) -> float:
-    """Return cos r for |r| ≤ π/4 (k_cos.c); what 1 − r²/2 loses is added back."""
+    """Return cos r for |r| ≤ π/4 (k_cos.c); the rounding error of 1 − r²/2 is added back."""
     z = r * r
     w = z * z
     p = (_C[0] + z * _C[1]) + w * ((_C[2] + z * _C[3]) + w * (_C[4] + z * _C[5]))
@@ -199,9 +196,9 @@ def atan2(y: float, x: float) -> float:
 
 @inlined
 def _asin_core(x: float) -> tuple[float, float]:
-    """Return s and asin s − s, where s = |x| ≤ 1/2, or above s = sqrt((1 − |x|)/2).
+    """Return s and asin s − s, where s = |x| ≤ 1/2; above that s = sqrt((1 − |x|)/2).
 
-    |asin x| = π/2 − 2 asin s.
+    There |asin x| = π/2 − 2 asin s.
     """
     x = abs(x)
     folded = 0.5 * (1.0 - x)
@@ -218,7 +215,7 @@ def _asin_core(x: float) -> tuple[float, float]:
 def asin(x: float) -> float:
     """Return the arcsine of x, an angle in [−π/2, π/2] [rad]; relative error ≤ 3e-16.
 
-    NaN for |x| > 1.
+    It is NaN for |x| > 1.
     """
     x = x * 1.0
     s, excess = _asin_core(x)
@@ -231,7 +228,7 @@ def asin(x: float) -> float:
 def acos(x: float) -> float:
     """Return the arccosine of x, an angle in [0, π] [rad]; relative error ≤ 2.4e-16.
 
-    NaN for |x| > 1.
+    It is NaN for |x| > 1.
     """
     x = x * 1.0
     s, excess = _asin_core(x)
@@ -263,7 +260,7 @@ _X = (
 def log(x: float) -> float:
     """Return the natural logarithm of x [-]; relative error ≤ 1.6e-16.
 
-    −inf for ±0, NaN for x < 0, inf for inf.
+    It is −inf for ±0, NaN for x < 0, inf for inf.
     """
     tiny = x < 2.0**-1022
     bits = _bits(x * 2.0**54 if tiny else x * 1.0)
@@ -287,7 +284,7 @@ def log(x: float) -> float:
 def exp(x: float) -> float:
     """Return e to the power x [-]; relative error ≤ 1.5e-16 (subnormal results: the last bit).
 
-    Inf above 709.79.
+    It is inf above 709.79.
     """
     x = 710.0 if x > 710.0 else x * 1.0
     x = -746.0 if x < -746.0 else x
@@ -329,10 +326,7 @@ def pow_int(x: float, n: int) -> float:
 
 @kernel
 def fill_standard_normal(rng: np.random.Generator, out: NDArray[np.float64]) -> None:
-    """Fill out  # (n,) float64 with standard normal deviates.
-
-    See `standard_normal`, for use inside kernels.
-    """
+    """Fill out (n,) with standard normal deviates; the kernel of `standard_normal`."""
     rng = borrowed(rng)
     num_pairs = (out.size + 1) // 2
     pairs = np.empty(2 * num_pairs)
@@ -352,11 +346,9 @@ def fill_standard_normal(rng: np.random.Generator, out: NDArray[np.float64]) -> 
 
 
 def standard_normal(rng: np.random.Generator, size: int | tuple[int, ...]) -> NDArray[np.float64]:
-    """Draw standard normal deviates from the generator's `random()` stream alone.
+    """Draw standard normal deviates, the same bits everywhere, from `random()` alone.
 
-    The same bits everywhere.
-
-    Marsaglia & Bray 1964, the polar method. (numpy's `Generator.normal` calls libm, which differs
+    The polar method of Marsaglia & Bray 1964. (numpy's `Generator.normal` calls libm, which differs
     between machines.)
 
     Args:

@@ -1,6 +1,6 @@
-"""Criteria of a robot's motion in the plane (Curkovic et al. 2013, Eqs.
+"""Criteria of a robot's motion in the plane, for whole populations (Curkovic et al. 2013).
 
-6–8), for whole populations.
+C2, C3 and C4 are those of Eqs. 6–8.
 """
 
 from typing import ClassVar
@@ -43,7 +43,7 @@ def measure_motions(
     criteria: FloatArray,
     own: FloatArray,
 ) -> None:
-    """C2, C3, C4 of every individual.
+    """Measure C2, C3, C4 of every individual, and their weighted sum.
 
     Args:
         angles: (configurations, 2, ≥ individuals) absolute link angles [rad], start and goal

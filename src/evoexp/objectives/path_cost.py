@@ -1,7 +1,4 @@
-"""The cost of a path over a grid.
-
-Its length, and how unsafe its nodes are on average (Chen & Zalzala 1995, Eq. 1).
-"""
+"""The cost of a path over a grid: its length and mean unsafeness (Chen & Zalzala 1995, Eq. 1)."""
 
 from typing import ClassVar, Self
 

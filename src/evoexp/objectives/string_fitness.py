@@ -1,6 +1,6 @@
-"""Fitness of strings of via-points: short, even and free of collisions (Rana & Zalzala 1995, Eqs.
+"""Fitness of strings of via-points: short, even and free of collisions.
 
-2–7).
+Rana & Zalzala 1995, Eqs. 2–7.
 """
 
 from typing import ClassVar, NamedTuple
@@ -33,7 +33,7 @@ class StringTerms(NamedTuple):
 class StringFitness(Component):
     """Weights of Eq. 7, read with the sign that punishes collisions.
 
-    F = C_max − [k1 ΣC + k2 ΣC + k3 C5].
+    F = C_max − (k1 ΣC + k2 ΣC + k3 C5).
 
     Attributes:
         length_weight: k1 [1/deg].
@@ -73,7 +73,7 @@ def weigh(
     collisions: FloatArray,
     cost: FloatArray,
 ) -> None:
-    """The bracket of Eq. 7 for every individual.
+    """Write the bracket of Eq. 7 for every individual.
 
     Args:
         weights: k1, k2, k3.
@@ -93,7 +93,7 @@ def weigh(
 
 @kernel
 def fill_wheel(fitness_offset: float, costs: FloatArray, weights: FloatArray) -> None:
-    """The kernel of `roulette_weights`, for other kernels."""
+    """Run the kernel of `roulette_weights`."""
     for k in range(len(costs)):
         fitness = fitness_offset - costs[k]
         weights[k] = fitness if fitness > 0.0 else 0.0

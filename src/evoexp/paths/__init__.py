@@ -1,4 +1,1 @@
-"""Geometry of strings of via-points, as compiled kernels over whole populations.
-
-Lanes innermost.
-"""
+"""Geometry of strings of via-points as kernels over whole populations, motions, and grids."""

@@ -1,4 +1,4 @@
-"""Arc length of the splines: speeds at equidistant samples and their running integral, in one pass.
+"""Arc length of the splines: speeds at equidistant samples and their running integral.
 
 The length between the samples j and j + 1 is that of the cubic through four speeds,
 
@@ -36,25 +36,14 @@ def advance_pair(
     u0: float,
     h: float,
 ) -> None:
-    """Write four speeds of a two-joint arm from sample `s` on.
-
-    And the four lengths that they complete.
-    """
+    """Write four speeds of a two-joint arm from sample `s` on, and four lengths."""
     u1, u2, u3 = u0 + h, u0 + 2.0 * h, u0 + 3.0 * h
     for lane in range(count):
-        a0, m0, a1, m1 = (
-            w[knot + lane],
-            w[knot + ROW + lane],
-            w[knot + R2 + lane],
-            w[knot + R3 + lane],
-        )
+        a0, m0 = w[knot + lane], w[knot + ROW + lane]
+        a1, m1 = w[knot + R2 + lane], w[knot + R3 + lane]
         x0, x1, x2 = a1 - a0 - 2.0 * m0 - m1, 6.0 * m0, 3.0 * (m1 - m0)
-        a0, m0, a1, m1 = (
-            w[other + lane],
-            w[other + ROW + lane],
-            w[other + R2 + lane],
-            w[other + R3 + lane],
-        )
+        a0, m0 = w[other + lane], w[other + ROW + lane]
+        a1, m1 = w[other + R2 + lane], w[other + R3 + lane]
         y0, y1, y2 = a1 - a0 - 2.0 * m0 - m1, 6.0 * m0, 3.0 * (m1 - m0)
         p3, p2, p1, L = w[s - R6 + lane], w[s - R4 + lane], w[s - R2 + lane], w[s - R3 + lane]
         x, y = x0 + u0 * (x1 + u0 * x2), y0 + u0 * (y1 + u0 * y2)
@@ -83,7 +72,7 @@ def advance_pair(
 def root(q0: float, q1: float, q2: float, q3: float, q4: float, u: float) -> float:
     """Return the speed at u from the coefficients of its square.
 
-    Which rounding may turn negative near zero.
+    Rounding may make the square negative near zero.
     """
     square = q0 + u * (q1 + u * (q2 + u * (q3 + u * q4)))
     return np.sqrt(square if square > 0.0 else 0.0)  # type: ignore[no-any-return]
@@ -93,9 +82,9 @@ def root(q0: float, q1: float, q2: float, q3: float, q4: float, u: float) -> flo
 def advance(
     w: FloatArray, q: np.uint64, s: np.uint64, count: np.uint64, u0: float, h: float
 ) -> None:
-    """As `advance_pair` for any number of joints.
+    """Write four speeds and lengths of an arm of any number of joints, as `advance_pair`.
 
-    From the coefficients of the squared speed at row `q`.
+    The coefficients of the squared speed stand at row `q`.
     """
     u1, u2, u3 = u0 + h, u0 + 2.0 * h, u0 + 3.0 * h
     for lane in range(count):
@@ -179,9 +168,9 @@ def integrate_speed(
     samples: np.uint64,
     work: np.uint64,
 ) -> None:
-    """Fill the rows of speed and length of all samples.
+    """Fill the rows of speed and length of all samples of one arm.
 
-    For one arm whose knots stand at the scratch's beginning.
+    Its knots stand at the beginning of the scratch.
     """
     pitch = (N + U1) * R2
     h = 1.0 / np.float64(S)

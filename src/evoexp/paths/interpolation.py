@@ -29,7 +29,7 @@ def interpolate_linear(via_points: FloatArray, substeps: int) -> FloatArray:
 
 @kernel
 def interpolate(via_points: FloatArray, substeps: int, out: FloatArray) -> None:
-    """The kernel of `interpolate_linear`, for other kernels; writes (nq, N · s, lanes)."""
+    """Run the kernel of `interpolate_linear`; `out` is (nq, N · s, lanes)."""
     nq, num_points, lanes = via_points.shape
     for joint in range(nq):
         j = np.uint64(joint)

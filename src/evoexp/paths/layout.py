@@ -1,6 +1,4 @@
-"""How strings of via-points lie in memory.
-
-And the checks that keep a kernel from writing outside it.
+"""The layout of strings of via-points in memory, and checks that protect the memory beside them.
 
 `via_points  # (nq, N + 1, lanes)` is float64, C-contiguous, individuals (lanes) innermost and
 padded to a multiple of eight; point 0 is the start, point N the goal. The joints of arm a are the
@@ -36,10 +34,7 @@ def check_shape(name: str, array: NDArray[Any], shape: tuple[int, ...]) -> None:
 
 
 def check_via_points(via_points: NDArray[np.float64]) -> None:
-    """Raise ValueError unless `via_points` (nq, N + 1.
-
-    Lanes) is laid out as the kernels need it.
-    """
+    """Raise ValueError unless `via_points` (nq, N + 1, lanes) has the layout that kernels need."""
     check_array("via_points", via_points, np.float64, 3)
     nq, num_points, lanes = via_points.shape
     if nq < 1 or num_points < 2:
@@ -54,9 +49,9 @@ def check_via_points(via_points: NDArray[np.float64]) -> None:
 
 
 def check_arm_slices(arm_slices: NDArray[np.int64], nq: int, max_joints: int | None = None) -> None:
-    """Raise ValueError unless every row of `arm_slices` (arms.
+    """Raise ValueError unless the rows of `arm_slices` (arms, 2) are slices of 0..nq.
 
-    2) is a slice of 0..nq with 1..max_joints joints.
+    Each must hold 1..max_joints joints.
     """
     check_array("arm_slices", arm_slices, np.int64, 2)
     if arm_slices.shape[1] != 2:
@@ -73,7 +68,8 @@ def check_arm_slices(arm_slices: NDArray[np.int64], nq: int, max_joints: int | N
 def padded(num_lanes: int, lanes: int) -> int:
     """Return `num_lanes` rounded up to a multiple of eight.
 
-    Raise ValueError unless 1 <= num_lanes <= lanes.
+    Raises:
+        ValueError: Unless 1 <= num_lanes <= lanes.
     """
     if not 1 <= num_lanes <= lanes:
         raise ValueError(f"num_lanes: must be 1..{lanes}, was {num_lanes}")

@@ -1,4 +1,4 @@
-"""How long strings of via-points are, and how uneven (Rana & Zalzala 1995, Eqs. 2–5)."""
+"""Lengths and unevenness of strings of via-points (Rana & Zalzala 1995, Eqs. 2–5)."""
 
 import numpy as np
 
@@ -34,7 +34,7 @@ def path_lengths(
 def measure_paths(
     via_points: FloatArray, arm_slices: IntArray, lengths: FloatArray, unevenness: FloatArray
 ) -> None:
-    """The kernel of `path_lengths`, for other kernels."""
+    """Run the kernel of `path_lengths`."""
     num, lanes = via_points.shape[1] - 1, via_points.shape[2]
     steps = np.empty((num, lanes))
     for arm in range(len(arm_slices)):

@@ -9,9 +9,7 @@ from evoexp.records import FloatArray
 
 
 class Motion(NamedTuple):
-    """Configurations passed at instants 0, 1, ….
-
-    Each reached from the one before along a straight line or a cubic.
+    """Configurations passed at instants 0, 1, …, along straight lines or cubics between them.
 
     Time t is counted in instants: segment i covers [i, i + 1], on which u = t − i runs from 0 to 1.
 
@@ -103,11 +101,10 @@ def cubic_motion(coefficients: FloatArray) -> Motion:
 def spline_motion(spline: Any) -> Motion:
     """Return the motion of a `scipy.interpolate.CubicSpline` over (nq,) values.
 
-    Its knots become the instants.
+    Every knot becomes an instant.
     """
-    widths = np.diff(
-        spline.x
-    )  # scipy counts powers of (x − knot), highest first: (4, segments, nq)
+    widths = np.diff(spline.x)
+    # scipy counts powers of (x − knot), highest first: (4, segments, nq)
     powers = np.stack([spline.c[3 - p] * (widths**p)[:, None] for p in range(4)], axis=1)
     return cubic_motion(powers)
 
@@ -115,8 +112,8 @@ def spline_motion(spline: Any) -> Motion:
 def clamped_cubic(q: FloatArray) -> Motion:
     """Return the cubic spline through configurations q (instants, nq) that starts and ends at rest.
 
-    Two times continuously differentiable, and as smooth as "a polynomial of the third order to
-    ensure second order derivability" (Curkovic et al. 2013, Fig. 9) can be.
+    It is two times continuously differentiable, and as smooth as "a polynomial of the third order
+    to ensure second order derivability" (Curkovic et al. 2013, Fig. 9) can be.
 
     Raises:
         ValueError: If there are fewer than two configurations.
@@ -129,15 +126,11 @@ def clamped_cubic(q: FloatArray) -> Motion:
 
 
 def joint_ranges(motion: Motion) -> FloatArray:
-    """Return the least and the greatest value of every joint over the whole motion, (nq, 2).
-
-    Exact but for rounding.
-    """
+    """Return every joint's least and greatest value (nq, 2), exact but for rounding."""
     c0, c1, c2, c3 = motion.polynomials.transpose(1, 0, 2)  # each (segments, nq)
     values = [motion.q]
-    if (
-        motion.coefficients is not None
-    ):  # where 3 c3 u² + 2 c2 u + c1 = 0, by the formula that loses no digits
+    if motion.coefficients is not None:
+        # the zeros of 3 c3 u² + 2 c2 u + c1, by the formula that loses no digits
         root = -(c2 + np.copysign(np.sqrt(np.maximum(c2 * c2 - 3.0 * c1 * c3, 0.0)), c2))
         for above, below in ((root, 3.0 * c3), (c1, root)):
             u = np.divide(above, below, out=np.zeros_like(above), where=below != 0.0)
@@ -148,14 +141,10 @@ def joint_ranges(motion: Motion) -> FloatArray:
 
 
 def top_speeds(motion: Motion) -> FloatArray:
-    """Return the greatest |dq/dt| of every joint over the whole motion, (nq,) per instant.
-
-    Exact but for rounding.
-    """
+    """Return the greatest |dq/dt| of every joint (nq,) per instant, exact but for rounding."""
     _, c1, c2, c3 = motion.polynomials.transpose(1, 0, 2)
-    u = np.divide(
-        -c2, 3.0 * c3, out=np.zeros_like(c2), where=c3 != 0.0
-    )  # where the acceleration vanishes
+    # the zero of the acceleration
+    u = np.divide(-c2, 3.0 * c3, out=np.zeros_like(c2), where=c3 != 0.0)
     instants = np.zeros_like(c1), np.ones_like(c1), np.minimum(np.maximum(u, 0.0), 1.0)
     speeds = np.concatenate([np.abs(c1 + u * (2.0 * c2 + 3.0 * u * c3)) for u in instants])
     return np.asarray(speeds.max(axis=0))

@@ -1,6 +1,4 @@
-"""Redistribution: via-points moved to equal arc length along the spline through them.
-
-Rana & Zalzala 1995, Sect. 3.3.
+"""Redistribution of via-points to equal arc length (Rana & Zalzala 1995, section 3.3).
 
 Per arm and block of 64 lanes: fit the splines, integrate the speed (`arc_length`), then find for
 the targets L·i/N their segment (every segment is entered in the bucket of the first target at or
@@ -46,9 +44,7 @@ from evoexp.paths.workspace import (
 )
 from evoexp.records import FloatArray, IntArray
 
-_LONGEST = (
-    1e300  # a path that is longer has overflowed (garbage in a padded lane0) and stays as it is
-)
+_LONGEST = 1e300  # a longer path has overflowed (garbage in a padded lane) and stays as it is
 
 
 @kernel
@@ -64,10 +60,8 @@ def enter_segments(
 ) -> None:
     """Write to row i of `entered` the last segment that begins at or before target i.
 
-    Or an earlier one or 0.
-
-    Also writes the origin of L, the path's length and its N-th part's reciprocal to the work rows
-    5, 6 and 7.
+    A row may also hold an earlier segment, or 0. The origin of L, the path's length and the
+    reciprocal of its N-th part are written to the work rows 5, 6 and 7.
     """
     end = samples + ROW + N * S * R2
     n = np.float64(N)
@@ -122,15 +116,11 @@ def find_samples(
 
 @kernel
 def gather(w: FloatArray, base: np.uint64, work: np.uint64, count: np.uint64, at: Offsets) -> None:
-    """Copy four consecutive rows, each lane0 from its own place, to the work rows 1..4."""
+    """Copy four consecutive rows, each lane from its own place, to the work rows 1..4."""
     for lane in range(count):
         f = base + at[lane]
-        x0, x1, x2, x3 = (
-            w[f],
-            w[f + ROW],
-            w[f + R2],
-            w[f + R3],
-        )  # all loads first: a store could alias
+        # all loads first: a store could alias
+        x0, x1, x2, x3 = w[f], w[f + ROW], w[f + R2], w[f + R3]
         w[work + ROW + lane] = x0
         w[work + R2 + lane] = x1
         w[work + R3 + lane] = x2
@@ -141,10 +131,7 @@ def gather(w: FloatArray, base: np.uint64, work: np.uint64, count: np.uint64, at
 def find_parameters(
     w: FloatArray, S: np.uint64, count: np.uint64, work: np.uint64, at: Offsets
 ) -> None:
-    """Replace the target lengths by u in [0, 1] within their segments.
-
-    From the gathered speeds and lengths.
-    """
+    """Replace the target lengths by u in [0, 1] within their segments, from the gathered rows."""
     h = 1.0 / np.float64(S)
     mask = S - U1
     for lane in range(count):
@@ -173,17 +160,13 @@ def evaluate(
     work: np.uint64,
     count: np.uint64,
 ) -> None:
-    """Move point i of one joint to the spline's value at u, except on paths without length.
+    """Move point i of one joint to the spline's value at u.
 
-    Or overflowed ones.
+    Paths without length and paths that overflowed keep it.
     """
     for lane in range(count):
-        a0, m0, a1, m1 = (
-            w[work + ROW + lane],
-            w[work + R2 + lane],
-            w[work + R3 + lane],
-            w[work + R4 + lane],
-        )
+        a0, m0 = w[work + ROW + lane], w[work + R2 + lane]
+        a1, m1 = w[work + R3 + lane], w[work + R4 + lane]
         u = w[work + lane]
         x = a0 + u * ((a1 - a0 - 2.0 * m0 - m1) + u * (3.0 * m0 + u * (m1 - m0)))
         old = via_points[joint, i, lane0 + lane]
@@ -245,10 +228,8 @@ def redistribute_arms(
     blocks = (groups + np.uint64(7)) >> U3
     size = ((groups + blocks - U1) // blocks) << U3
     for arm in range(arm_slices.shape[0]):
-        first, joints = (
-            np.uint64(arm_slices[arm, 0]),
-            np.uint64(arm_slices[arm, 1] - arm_slices[arm, 0]),
-        )
+        first = np.uint64(arm_slices[arm, 0])
+        joints = np.uint64(arm_slices[arm, 1]) - first
         pitch = (N + U1) * R2
         samples = joints * pitch + R6
         work = samples + (N * S + np.uint64(2)) * R2

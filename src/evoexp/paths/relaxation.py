@@ -9,9 +9,10 @@ from evoexp.records import FloatArray
 
 @kernel
 def relax_points(via_points: FloatArray, delta: float, num_lanes: int) -> None:
-    """See `relax`; two loops per point.
+    """Run the kernel of `relax`.
 
-    Because one that reads and writes neighbouring rows does not vectorise.
+    There are two loops per point, because one that reads and writes neighbouring rows does not
+    vectorise.
     """
     middle = np.empty(num_lanes)
     for j in range(via_points.shape[0]):
@@ -26,10 +27,8 @@ def relax_points(via_points: FloatArray, delta: float, num_lanes: int) -> None:
 def relax(via_points: FloatArray, delta: float, num_lanes: int) -> None:
     """Move every via-point by `delta` toward the middle of its neighbours, in place and in order.
 
-    One sweep.
-
-    Point i sees point i−1 as already moved: the loop of Rana & Zalzala 1995, Eqs 8 and 9, as it is
-    written. The ends stay. delta = 0 changes nothing.
+    This is one sweep of the loop of Rana & Zalzala 1995, Eqs. 8 and 9, as it is written: point i
+    sees point i − 1 as already moved. The ends stay. delta = 0 changes nothing.
 
     Args:
         via_points: Paths.  # (nq, N + 1, lanes)

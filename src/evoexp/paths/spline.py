@@ -24,10 +24,7 @@ def fit_spline(
     w: FloatArray,
     knots: np.uint64,
 ) -> None:
-    """Copy one joint's coordinates to the scratch w at `knots` and solve for m beside them.
-
-    Thomas algorithm.
-    """
+    """Copy one joint's coordinates to `knots` in w and solve for m (Thomas algorithm)."""
     pivot = pivots[0]
     for lane in range(count):
         a, a_next = via_points[joint, 0, lane0 + lane], via_points[joint, 1, lane0 + lane]
@@ -59,12 +56,8 @@ def fit_spline(
 def square_speed(w: FloatArray, knot: np.uint64, out: np.uint64, count: np.uint64) -> None:
     """Write the five coefficients of s'(u)² of one joint on the segment that begins at `knot`."""
     for lane in range(count):
-        a0, m0, a1, m1 = (
-            w[knot + lane],
-            w[knot + ROW + lane],
-            w[knot + R2 + lane],
-            w[knot + R3 + lane],
-        )
+        a0, m0 = w[knot + lane], w[knot + ROW + lane]
+        a1, m1 = w[knot + R2 + lane], w[knot + R3 + lane]
         b0, b1, b2 = a1 - a0 - 2.0 * m0 - m1, 6.0 * m0, 3.0 * (m1 - m0)
         w[out + lane] = b0 * b0
         w[out + ROW + lane] = 2.0 * b0 * b1
@@ -79,15 +72,11 @@ def add_square_speed(
 ) -> None:
     """Write to `out` the coefficients at `given` plus those of one joint more.
 
-    In place would not vectorise.
+    Written in place, the loop would not vectorise.
     """
     for lane in range(count):
-        a0, m0, a1, m1 = (
-            w[knot + lane],
-            w[knot + ROW + lane],
-            w[knot + R2 + lane],
-            w[knot + R3 + lane],
-        )
+        a0, m0 = w[knot + lane], w[knot + ROW + lane]
+        a1, m1 = w[knot + R2 + lane], w[knot + R3 + lane]
         b0, b1, b2 = a1 - a0 - 2.0 * m0 - m1, 6.0 * m0, 3.0 * (m1 - m0)
         w[out + lane] = w[given + lane] + b0 * b0
         w[out + ROW + lane] = w[given + ROW + lane] + 2.0 * b0 * b1
@@ -105,9 +94,9 @@ def square_speeds(
     work: np.uint64,
     count: np.uint64,
 ) -> np.uint64:
-    """Return where the coefficients of |s'(u)|² over all joints of an arm were written.
+    """Write the coefficients of |s'(u)|² over all joints of an arm; return their row.
 
-    `work`, or eight rows on.
+    It is `work`, or eight rows on.
     """
     here, there = work, work + U2 * R4
     square_speed(w, knot, here, count)

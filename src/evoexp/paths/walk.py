@@ -1,7 +1,4 @@
-"""New strings of via-points by a random walk from start to goal.
-
-Rana & Zalzala 1995, section 3.3.
-"""
+"""New strings of via-points by a random walk to the goal (Rana & Zalzala 1995, section 3.3)."""
 
 import numpy as np
 
@@ -11,10 +8,7 @@ from evoexp.records import FloatArray, IntArray
 
 
 def num_uniforms(arm_slices: np.ndarray, num_via_points: int) -> int:
-    """Return how many uniform numbers one string takes.
-
-    Per step an angle fewer than the arm has joints.
-    """
+    """Return the number of uniform numbers of one string: N − 1 times the arm's joints less one."""
     return int(sum((num_via_points - 1) * (stop - first - 1) for first, stop in arm_slices))
 
 
@@ -68,9 +62,10 @@ def walk_strings(
     step: float,
     max_turn: float,
 ) -> bool:
-    """The kernel of `walk`, for other kernels.
+    """Run the kernel of `walk`.
 
-    Returns false, and writes nothing, if the arrays do not fit.
+    Returns:
+        False, with nothing written, if the arrays do not fit.
     """
     num = via_points.shape[1] - 1
     needed = 0
@@ -118,13 +113,12 @@ def _turn(
     taken: int,
     max_turn: float,
 ) -> float:
-    """Turn the hyperspherical angles of a direction, the azimuth first.
+    """Turn the hyperspherical angles of a direction; return the factor to unit length.
 
-    Return what scales it to a unit vector.
-
-    The angle of coordinate k stands between the axis k and what the coordinates before it make up,
-    of length `below`. Turning it takes (below, direction[k]) around; the coordinates before keep
-    their proportions. A direction straight along a later axis has azimuth 0.
+    The azimuth is turned first. The angle of coordinate k stands between the axis k and the vector
+    of the coordinates before it, of length `below`. Turning it takes (below, direction[k]) around;
+    the coordinates before keep their proportions. A direction straight along a later axis has
+    azimuth 0.
     """
     x = direction[first]
     if stop - first == 1:

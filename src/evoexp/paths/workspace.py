@@ -1,6 +1,4 @@
-"""What redistribution needs besides the via-points.
-
-The constant factor of the splines and scratch memory.
+"""The constant factor of the splines and the scratch memory of redistribution.
 
 The scratch is one flat array of rows of 64 lanes; a kernel addresses it as `floats[base + r * ROW +
 lane]` with a constant r. Only with such constant distances does LLVM see that rows do not overlap
@@ -32,9 +30,7 @@ EndCondition = Literal["natural", "clamped"]
 
 
 class Redistribution(NamedTuple):
-    """Settings, constant factor and scratch of `redistribute`.
-
-    One per thread, made by `prepare_redistribution`.
+    """Settings, constant factor and scratch of `redistribute`, for one thread.
 
     Attributes:
         num_via_points: N; a path has the N + 1 points 0..N.
@@ -58,7 +54,7 @@ class Redistribution(NamedTuple):
 def spline_pivots(num_segments: int, end_condition: EndCondition) -> FloatArray:
     """Return the reciprocal pivots (N + 1,) of the system for m.
 
-    A sixth of a cubic spline's second derivatives.
+    m is a sixth of a cubic spline's second derivatives.
 
     Inside, m[i−1] + 4 m[i] + m[i+1] = a[i−1] − 2 a[i] + a[i+1]. Clamped ends (slope zero) add the
     first equation 2 m[0] + m[1] = a[1] − a[0] and the last, m[N−1] + 2 m[N] = a[N−1] − a[N].

@@ -1,4 +1,1 @@
-"""Robots: descriptions that build a Pinocchio model with coal geometry.
-
-And the kinematic table derived from it.
-"""
+"""Robots: descriptions that build a Pinocchio model, coal geometry and a kinematic table."""

@@ -21,10 +21,7 @@ class Arms(Robot):
 
     @classmethod
     def read_files(cls, settings: dict[str, Any], field: str) -> dict[str, Any]:
-        """Return settings whose `path` and `srdf`, where given.
-
-        Are those of all arms out of a URDF.
-        """
+        """Return settings in which a given `path` and `srdf` count for all arms out of a URDF."""
         settings = dict(settings)
         given = {name: settings.pop(name) for name in ("path", "srdf") if name in settings}
         shared = {name: path for name, path in given.items() if path is not None}

@@ -1,7 +1,4 @@
-"""What a robot description builds.
-
-One Pinocchio model, one configuration vector, arms as slices of it.
-"""
+"""The product of a robot description: one Pinocchio model, with the arms as slices of q."""
 
 from typing import Any, NamedTuple
 
@@ -15,10 +12,7 @@ from evoexp.validation import Component
 
 
 class Link(NamedTuple):
-    """A straight link: a line segment, thickened by a radius, that moves with one joint.
-
-    A tool has no length.
-    """
+    """A line segment, thickened by a radius, that moves with one joint; a tool has no length."""
 
     arm: int
     joint: int  # index of the Pinocchio joint that moves it; 0: it stands still
@@ -71,10 +65,7 @@ class Assembly(NamedTuple):
 
 
 class Robot(Component):
-    """Base of every robot description: gives its arms.
-
-    Building them together is the same for all.
-    """
+    """Base of every robot description: names its arms, which are built together."""
 
     def chains(self) -> tuple["Chain", ...]:
         """Return the arms, in the order of their slices of q."""
@@ -127,9 +118,7 @@ class Chain(Robot):
         raise NotImplementedError
 
     def append_bodies(self, model: Any, arm: int, first_joint: int, links: list[Link]) -> list[Any]:
-        """Return the bodies as `pin.GeometryObject`.
-
-        The links themselves, unless an arm has others.
+        """Return the bodies as `pin.GeometryObject`: the links, unless an arm has others.
 
         Args:
             model: With the arm's joints.
@@ -142,7 +131,7 @@ class Chain(Robot):
     def tool(self, model: Any, first_joint: int, links: list[Link]) -> Tool:
         """Return the tool's frame: at the end of the last link, turned as its joint.
 
-        Unless an arm has another.
+        An arm with another tool overrides this.
         """
         return Tool(links[-1].joint, np.eye(3), links[-1].end)
 
@@ -152,10 +141,7 @@ class Chain(Robot):
 
 
 def link_capsule(link: Link, name: str) -> Any:
-    """Return a link as a `pin.GeometryObject` with a coal capsule from its start to its end.
-
-    A tool with a sphere.
-    """
+    """Return a link as a `pin.GeometryObject`: a coal capsule along it, or a sphere for a tool."""
     if link.is_tool:
         return pin.GeometryObject(
             name, link.joint, 0, pin.SE3(np.eye(3), link.start), coal.Sphere(link.radius)
@@ -167,9 +153,7 @@ def link_capsule(link: Link, name: str) -> Any:
 def sphere_geometry(
     assembly: Assembly, centres: FloatArray, joints: np.ndarray, radii: FloatArray
 ) -> Any:
-    """Return spheres fixed to joints as a `pin.GeometryModel`.
-
-    The papers' own collision models, in coal.
+    """Return spheres fixed to joints as a `pin.GeometryModel`, the papers' own collision models.
 
     Args:
         assembly: The robot.

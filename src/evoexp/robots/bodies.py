@@ -16,7 +16,7 @@ Point3 = tuple[float, float, float]
 
 
 class Body(Settings):
-    """What all bodies have.
+    """Base of all bodies.
 
     Attributes:
         name: By which contacts and verdicts speak of it.
@@ -92,10 +92,7 @@ def body_geometry(body: Body, field: str) -> tuple[Any, Any]:
 
 
 def placed(position: Point3, angles: Point3) -> Any:
-    """Return the `pin.SE3` of a position and roll, pitch, yaw [deg] about fixed axes x, y, z.
-
-    In this order.
-    """
+    """Return the `pin.SE3` of a position and roll, pitch, yaw [deg] about fixed axes."""
     (sr, cr), (sp, cp), (sy, cy) = (sincos(DEGREE * angle) for angle in angles)
     rotation: FloatArray = np.array(
         [

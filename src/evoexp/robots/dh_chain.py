@@ -1,7 +1,4 @@
-"""An arm given by its Denavit–Hartenberg table, with bodies on its links.
-
-Corsépius 2001, section 4.1.
-"""
+"""An arm given by its Denavit–Hartenberg table, with bodies on its links (Corsépius 2001, 4.1)."""
 
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -33,10 +30,7 @@ class DhJoint(Settings):
     kind: Literal["revolute", "prismatic"] = "revolute"
 
     def behind(self) -> Any:
-        """Return the `pin.SE3` from the frame that the joint moves to the next joint's frame.
-
-        A, α, d, θ at q = 0.
-        """
+        """Return the `pin.SE3` from the joint's moved frame to the next joint's, at q = 0."""
         a, alpha, d, theta = self.dh
         s, c = sincos(DEGREE * theta)
         sa, ca = sincos(DEGREE * alpha)
@@ -45,9 +39,7 @@ class DhJoint(Settings):
 
 
 class DhChain(Chain):
-    """Joints one behind the other, each about (or along) the z axis of the frame before.
-
-    As ⁰T₁ ¹T₂ … ⁿ⁻¹Tₙ.
+    """Joints in a row, each about or along the z axis of the frame before: ⁰T₁ ¹T₂ … ⁿ⁻¹Tₙ.
 
     Body frames: a body of joint k is given in the frame k of the table, which moves with joint k (a
     body of joint 0 in the base's).

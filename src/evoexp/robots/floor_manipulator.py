@@ -1,7 +1,4 @@
-"""A platform that moves over a floor, with an arm of three links upright on it.
-
-Chen & Zalzala 1995, both examples.
-"""
+"""A platform that moves over a floor, with an arm of three links on it (Chen & Zalzala 1995)."""
 
 from typing import ClassVar
 
@@ -21,7 +18,7 @@ NUM_JOINTS = 5
 class FloorManipulator(Robot):
     """Prismatic joints along x and y, then three revolute ones in the upright plane through x.
 
-    Q = (x, y, θ1, θ2, θ3).
+    The configuration is q = (x, y, θ1, θ2, θ3).
 
     Positive angles lift a link that points to +x. The platform is an upright cylinder; the arm's
     first joint stands in the middle of its top.

@@ -53,10 +53,7 @@ class PlanarChain(Chain):
         return self
 
     def append_to(self, model: Any, arm: int) -> list[Link]:
-        """Add one revolute joint per link.
-
-        A tool is one link more, of no length, on the last joint.
-        """
+        """Add one revolute joint per link; a tool is a link of no length on the last joint."""
         parent = 0
         s, c = sincos(DEGREE * self.base_angle)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

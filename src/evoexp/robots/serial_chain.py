@@ -1,7 +1,4 @@
-"""An arm in space, given joint by joint.
-
-Where each joint stands behind the one before, and its axis.
-"""
+"""An arm in space, given joint by joint: its place behind the joint before, and its axis."""
 
 from typing import Annotated, Any, ClassVar, Literal, Self
 

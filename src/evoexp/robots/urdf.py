@@ -1,6 +1,4 @@
-"""A robot of one's own, out of a URDF.
-
-Its joints, limits and collision bodies, primitives and meshes.
+"""A robot out of a user's URDF: its joints, limits and collision bodies, primitives and meshes.
 
 The files are read once, at the door: a configuration holds the hashes of their contents, which
 travel with it (`evoexp.attachments`). Where they lay and what they were called is no part of any
@@ -265,7 +263,7 @@ def _mesh(name: str, urdf: Path, field: str) -> bytes:
 
 
 def _plain(content: bytes, places: dict[str, str]) -> str:
-    """Return a URDF without what is only seen, its meshes where they lie now."""
+    """Return a URDF without visual elements, with the present paths of its meshes."""
     root = ET.fromstring(content)
     for link in root.iterfind("link"):
         for visual in link.findall("visual"):

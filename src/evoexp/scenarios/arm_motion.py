@@ -12,7 +12,7 @@ from evoexp.validation import Component, NonNegative, Vector
 
 
 class ArmMotion(Component):
-    """Start and goal of every arm, and what stands around.
+    """Start and goal of every arm, and the obstacles around them.
 
     Attributes:
         q_start: Configuration of every arm at the start, arm by arm [deg].

@@ -1,7 +1,4 @@
-"""Where the end-effector of a mobile arm shall be, what load it carries there.
-
-And what stands around.
-"""
+"""A place and a load for the end-effector of a mobile arm, and the obstacles around it."""
 
 from typing import ClassVar
 

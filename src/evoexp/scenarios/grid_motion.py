@@ -18,9 +18,7 @@ POST = 0.02  # [cell] thickness of bodies that span one node: a box has some
 
 
 class GridMotion(Component):
-    """A path is wanted over a grid whose nodes are one length unit apart.
-
-    Chen & Zalzala 1995, section 2.
+    """A path over a grid whose nodes are one length unit apart (Chen & Zalzala 1995, section 2).
 
     Attributes:
         size: How many nodes there are along x, y[, z].
@@ -100,10 +98,8 @@ class GridMotion(Component):
     def bodies(self) -> tuple[BoxObstacle, ...]:
         """Return obstacles as boxes that span the centres of their nodes.
 
-        And stand on the floor in two dimensions.
-
-        They are not grown by half a cell: then they would touch the moves past their corners, which
-        are permitted.
+        In two dimensions the boxes stand on the floor. They are not grown by half a cell: then they
+        would touch the moves past their corners, which are permitted.
         """
         half = len(self.size)
         found = [(corners[:half], corners[half:]) for corners in self.obstacles]
@@ -126,9 +122,7 @@ class GridMotion(Component):
 
 
 def blocks(nodes: np.ndarray) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
-    """Return blocks of nodes (lower corner, upper corner) that together cover a set.
-
-    And nothing else.
+    """Return blocks of nodes (lower corner, upper corner) that together cover exactly a set.
 
     Blocks may overlap. Where blocks meet, a slit of one cell may stay open between the bodies that
     span their centres; it leads nowhere, because paths go over free nodes.

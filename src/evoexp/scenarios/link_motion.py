@@ -1,9 +1,8 @@
 """Planar robots of two links that move from one posture to another.
 
-Angles of links are absolute, from +x.
-
-A posture is given by its two link angles or, as in Curkovic et al. 2013, by where the end-effector
-is; of the two elbows that reach it, the one asked for is taken.
+Angles of links are absolute, from +x. A posture is given by its two link angles or, as in Curkovic
+et al. 2013, by the place of the end-effector; the setting `elbow` chooses between the two elbows
+that reach it.
 """
 
 from typing import Annotated, ClassVar, Literal, Self
@@ -74,7 +73,7 @@ class Posture(Settings):
 
 
 class LinkMotion(Component):
-    """Start and goal of every robot, and what stands around.
+    """Start and goal of every robot, and the obstacles around them.
 
     Attributes:
         q_start: Posture of every robot at the start.
@@ -137,9 +136,8 @@ def _reach(
         least, most = abs(first - second), first + second
         must = f"{least:g} to {most:g} away from the robot's base"
         raise SettingError(field, must, f"{float(np.sqrt(squared)):g} away")
-    bend = -side * acos(
-        cosine
-    )  # of the second link against the first: an elbow on the left bends to the right
+    # of the second link against the first: an elbow on the left bends to the right
+    bend = -side * acos(cosine)
     sine_bend = -side * np.sqrt(max(0.0, 1.0 - cosine * cosine))
     one = atan2(float(y), float(x)) - atan2(second * sine_bend, first + second * cosine)
     return np.array([one, one + bend]) / DEGREE

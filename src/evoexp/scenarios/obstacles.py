@@ -19,7 +19,7 @@ SPHERE, BOX, CAPSULE, CYLINDER, HALF_SPACE, ELLIPSE = range(6)
 
 
 class NamedObstacle(Settings):
-    """What all obstacles have.
+    """Base of all obstacles.
 
     Attributes:
         name: By which contacts, objects and verdicts speak of it; without one it is `obstacle_1`
@@ -80,7 +80,7 @@ class HalfSpaceObstacle(NamedObstacle):
 class EllipseObstacle(NamedObstacle):
     """An ellipse in the plane with its inside.
 
-    In space an ellipsoid whose third semi-axis, along z, is the second one.
+    In space it is an ellipsoid whose third semi-axis, along z, is the second one.
 
     The third semi-axis decides nothing for links that move in the plane of the centre: in a plane
     of symmetry of a convex body, distances are those of its section.

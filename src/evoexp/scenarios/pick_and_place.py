@@ -12,9 +12,7 @@ Point2 = tuple[float, float]
 
 
 class PickAndPlace(Component):
-    """Start posture, via point and goal point of one planar arm's tip.
-
-    Lavoie & Boudreau 2001, section 4.
+    """Start posture, via point and goal point of a planar arm's tip (Lavoie & Boudreau 2001, 4).
 
     Attributes:
         q_start: Posture at the start, joint angles relative to the link before [rad].

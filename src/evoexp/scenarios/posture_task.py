@@ -1,6 +1,4 @@
-"""What an arm shall do among obstacles.
-
-A start posture, and phases that each end where a goal is met.
+"""A task of an arm among obstacles: a start posture, and phases that each end at a goal.
 
 A task of one phase is a reaching task; manoeuvres such as pick-and-place are a list of them
 (Corsépius 2001, section 4.3: fitness functions and termination criteria together make a manoeuvre).
@@ -62,8 +60,8 @@ AnyGoal = Annotated[PointGoal | PoseGoal | SurfaceGoal | ShiftGoal, Field(discri
 class Phase(Settings):
     """One manoeuvre.
 
-    What is controlled is the tool's frame, or, while an object is held, the object's: its centre,
-    its own axes.
+    The controlled frame is the tool's or, while an object is held, the object's: its centre, its
+    own axes.
 
     Attributes:
         name: For reports.

@@ -1,4 +1,1 @@
-"""What is kept: run directories, self-contained logs, derived tables.
-
-And the digests that compare them.
-"""
+"""The store: run directories, self-contained logs, derived tables, and digests to compare them."""

@@ -1,6 +1,4 @@
-"""The bytes of an MCAP, checked as a whole before anything in them is believed.
-
-Then walked record by record.
+"""The bytes of an MCAP: checked as a whole before they are used, then walked record by record.
 
 mcap's own readers check neither the summary section nor that the file ends where it should, and
 cost ten times as much.

@@ -1,7 +1,4 @@
-"""The chain of digests that tells whether two runs did the same.
-
-And since which generation they did not.
-"""
+"""The chain of digests, which tells from which generation on two runs differ."""
 
 import ctypes
 from collections.abc import Callable
@@ -14,9 +11,7 @@ from numpy.typing import NDArray
 
 
 class Chain:
-    """xxh3-128 chain over a replicate.
-
-    Link_g = xxh3_128(link_{g-1} ‖ costs ‖ best ‖ generator state).
+    """xxh3-128 chain over a replicate: link_g = xxh3_128(link_{g-1} ‖ costs ‖ best ‖ state).
 
     The generator is only read, never drawn from.
     """
@@ -91,7 +86,7 @@ def state_bytes(bit_generator: np.random.PCG64) -> bytes:
 def state_reader(bit_generator: np.random.PCG64) -> Callable[[], bytes]:
     """Return a function that gives `state_bytes` of this generator.
 
-    Ten times faster where numpy's layout is known.
+    Where numpy's layout is known, it takes a tenth of the time.
 
     numpy publishes the address of the state but not its layout, so the layout is tried on a
     generator of our own first.

@@ -14,7 +14,7 @@ _SUFFIX = ".tmp"
 def write_files(contents: Mapping[Path, bytes]) -> None:
     """Write files, each atomically and durably.
 
-    Temporary file, fsync, rename, and then fsync of the directory.
+    Each goes through a temporary file, fsync and rename; then the directory is synced.
 
     No file is renamed before its bytes are on the disk: a name always means a whole file. A batch
     is cheaper than its files one by one: they are synced at once, which the disk answers together,
@@ -51,10 +51,7 @@ def _write_all(paths: Sequence[Path], contents: Sequence[bytes]) -> None:
 
 @cache
 def _threads() -> ThreadPoolExecutor:
-    """Return the threads that write, which stay.
-
-    Starting them takes as long as syncing two files.
-    """
+    """Return the threads that write; they stay, as starting them takes as long as two files."""
     return ThreadPoolExecutor(NUM_THREADS, "write")
 
 
@@ -69,7 +66,7 @@ def _write(path: Path, content: bytes) -> None:
 def sync_directory(path: Path) -> None:
     """Make renames and new names in a directory durable.
 
-    Where the system cannot open directories, do nothing.
+    Nothing is done where the system cannot open directories.
     """
     with suppress(PermissionError):  # Windows
         descriptor = os.open(path, os.O_RDONLY)

@@ -42,10 +42,7 @@ _TICK = 1_000_000_000  # [ns] the synthetic clock: one second per generation
 
 
 class _Pending(NamedTuple):
-    """What is kept of a generation that waits to be encoded.
-
-    Nothing of the planner's memory, which is large.
-    """
+    """The part of a generation that waits to be encoded, without views of the planner's memory."""
 
     row: dict[str, Any]
     costs: bytes
@@ -61,10 +58,7 @@ class Finished(NamedTuple):
 
 
 class ContentDigest:
-    """xxh3-128 over (topic, schema, encoding, log_time, sequence, data) of every message.
-
-    In the order written.
-    """
+    """xxh3-128 over (topic, schema, encoding, log_time, sequence, data) of the messages."""
 
     def __init__(self) -> None:
         """Start with no message."""
@@ -80,7 +74,7 @@ class ContentDigest:
 
 
 def channel_identity(topic: str, schema_name: str, message_encoding: str) -> bytes:
-    """Return what a channel contributes to the digest of each of its messages."""
+    """Return the channel's part in the digest of each of its messages."""
     return "\0".join((topic, schema_name, message_encoding, "")).encode()
 
 
@@ -95,10 +89,7 @@ def array_file(array: NDArray[Any]) -> bytes:
 
 
 class _Channel:
-    """A channel of the log: its id, its identity in the content digest.
-
-    And how many messages it has.
-    """
+    """A channel of the log: its id, its part in the content digest, its number of messages."""
 
     def __init__(
         self, writer: Writer, topic: str, record: type, terms: tuple[str, ...] = ()
@@ -212,7 +203,7 @@ class Log:
         self._pending.clear()
 
     def write_front(self, front: FrontRow) -> None:
-        """Append what a population of the generation last written is worth."""
+        """Append the front of a population of the generation last written."""
         self._flush()
         self._add(FRONT_TOPIC, FrontRow, front.generation, encode_front(front))
 

@@ -131,7 +131,7 @@ def read_summary(source: Source) -> ReplicateSummary:
 
 @contextmanager
 def _indexed(source: Source) -> Iterator[tuple[Container, "_Index"]]:
-    """Open a log of a run by its index; what cannot be read in the body is a damaged log."""
+    """Open a log of a run by its index; a body that cannot be read is a damaged log."""
     container, name = _open(source)
     with unreadable_is_corrupt(name):
         index = _index(container)
@@ -140,9 +140,7 @@ def _indexed(source: Source) -> Iterator[tuple[Container, "_Index"]]:
 
 
 def read_solution(source: Source) -> SolutionRow:
-    """Return a log's last solution, the best of the replicate.
-
-    Only the chunk that holds it is decompressed.
+    """Return a log's last solution, the best of the replicate; only its chunk is decompressed.
 
     Raises:
         CorruptLog: As `read_log`, except that the content digest is not compared.
@@ -193,9 +191,7 @@ def decode_array(data: bytes) -> NDArray[Any]:
 
 
 def generation_columns(source: Source) -> dict[str, NDArray[Any]]:
-    """Return the records on /generation, without their chain, as one array per field and term.
-
-    Each (generations,).
+    """Return the records on /generation, without their chain, as arrays (generations,) by name.
 
     A term that a generation does not have is NaN there.
 
@@ -268,9 +264,9 @@ def _metadata(container: Container, index: _Index, record: str, name: str) -> di
 
 
 def _run(container: Container, index: _Index, name: str) -> dict[str, str]:
-    """Return the metadata that says whose log this is.
+    """Return the metadata of a log's condition and replicate.
 
-    Or raise for a foreign one or one of another version.
+    A log of another program or version is refused.
     """
     if written.RUN not in index.metadata:
         raise CorruptLog(

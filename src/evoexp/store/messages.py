@@ -1,6 +1,6 @@
-"""Records as JSON and back: flat, fixed key order.
+"""Records as JSON and back, flat and with a fixed order of keys.
 
-And the non-finite numbers that JSON has no word for kept exactly.
+The non-finite numbers, for which JSON has no word, are kept exactly.
 
 A non-finite number is written as null and named in `nonfinite`, a key that is there only when
 needed: `{"best_cost": "inf"}` for a field, `{"values": {"3": "nan"}}` for an element of an array.
@@ -38,18 +38,13 @@ _JSON_TYPES: dict[Any, dict[str, Any]] = {
 
 @cache
 def field_types(record: type) -> dict[str, Any]:
-    """Return a record's fields and their types in order, without `terms`.
-
-    Which becomes one field per term.
-    """
+    """Return a record's fields and their types in order; `terms` become a field each."""
     return {name: kind for name, kind in get_type_hints(record).items() if name != "terms"}
 
 
 @cache
 def json_schema(record: type, terms: tuple[str, ...] = ()) -> bytes:
-    """Return the JSON Schema of a record's messages, in the subset that Foxglove reads.
-
-    One type per field.
+    """Return the JSON Schema of a record's messages, one type per field, as Foxglove reads it.
 
     Any number may be null, which JSON Schema could only say with a union type; see the module's
     first lines.
@@ -63,7 +58,7 @@ def json_schema(record: type, terms: tuple[str, ...] = ()) -> bytes:
 
 
 def generation_row(generation: Generation, terms: Iterable[tuple[str, str]]) -> dict[str, Any]:
-    """Return what is recorded of a generation as plain values, for `encode_generation`.
+    """Return the recorded part of a generation as plain values, for `encode_generation`.
 
     Args:
         generation: What the planner yielded; its arrays are left out.
@@ -163,12 +158,10 @@ def decode_front(data: bytes) -> FrontRow:
 def _encode_with_array(row: dict[str, Any], name: str) -> bytes:
     array = row[name]
     finite = math.isfinite(row.get("cost", 0.0))
-    if (
-        array.size and finite
-    ):  # argmin and argmax stop at NaN; cheaper than np.isfinite for arrays this short
-        finite = math.isfinite(array.item(array.argmin())) and math.isfinite(
-            array.item(array.argmax())
-        )
+    # argmin and argmax stop at NaN; cheaper than np.isfinite for arrays this short
+    if array.size and finite:
+        least, greatest = array.item(array.argmin()), array.item(array.argmax())
+        finite = math.isfinite(least) and math.isfinite(greatest)
     return orjson.dumps(row if finite else _flagged(row), option=orjson.OPT_SERIALIZE_NUMPY)
 
 

@@ -1,7 +1,4 @@
-"""The directory of one condition, `runs/<hash12>/`.
-
-Where it is, what is finished in it, and who may write.
-"""
+"""The directory of one condition, `runs/<hash12>/`: its place, its finished parts, its lock."""
 
 import hashlib
 import json
@@ -28,9 +25,7 @@ class StoreError(EvoexpError):
 
 
 class RunDirectory:
-    """One condition's run: `config.json`, `manifest.json`, `replicates/`, `summary.parquet`.
-
-    `.lock`.
+    """The directory of one condition's run, its files and its lock.
 
     Reading needs no lock. Every writing method is for the one process that holds `lock()`.
 
@@ -97,9 +92,9 @@ class RunDirectory:
     def _missing_files(
         self, config_json: bytes, manifest: Mapping[str, Any], files: Mapping[str, bytes]
     ) -> dict[Path, bytes]:
-        """Return what `create` is to write, the configuration behind the files that it refers to.
+        """Return the files that `create` writes, and make their directories.
 
-        Make directories.
+        The configuration comes behind the files that it refers to.
         """
         if hashlib.sha256(config_json).hexdigest() != self.condition_id:
             raise ValueError(f"config_json: is not of condition {self.hash12}")
@@ -133,16 +128,13 @@ class RunDirectory:
             )
 
     def config_json(self) -> bytes:
-        """Return the canonical form of the condition, checked.
-
-        The files that it refers to are kept.
-        """
+        """Return the canonical form of the condition, checked, and keep the files it refers to."""
         self.check()
         keep_all(path.read_bytes() for path in sorted((self.path / PREFIX).glob("*")))
         return (self.path / "config.json").read_bytes()
 
     def manifest(self) -> dict[str, Any]:
-        """Return what was noted when the run was created.
+        """Return the manifest that was written when the run was created.
 
         Raises:
             StoreError: `manifest.json` is missing or damaged.
@@ -236,9 +228,7 @@ def lock_all(runs: Iterable[RunDirectory]) -> Iterator[None]:
 def create_all(
     runs: Iterable[tuple[RunDirectory, bytes, Mapping[str, Any], Mapping[str, bytes]]],
 ) -> None:
-    """Create several runs as `RunDirectory.create` does, given its arguments.
-
-    Cheaper than one by one.
+    """Create several runs as `RunDirectory.create` does, given its arguments, in one batch.
 
     Raises:
         StoreError: A directory is damaged or belongs to another condition; no file is then written.

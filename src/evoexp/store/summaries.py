@@ -21,9 +21,8 @@ Stamps = dict[str, list[int]]  # file name → size [B], modification time [ns]
 
 _VERSION = 2  # of the table's columns; another one is rebuilt
 _KEY = b"evoexp"
-_KNOWN: dict[
-    Path, tuple[tuple[int, int, int], pa.Table]
-] = {}  # tables that this process wrote or read
+# tables that this process wrote or read
+_KNOWN: dict[Path, tuple[tuple[int, int, int], pa.Table]] = {}
 _PLAIN: dict[Any, pa.DataType] = {
     str: pa.string(),
     int: pa.int64(),
@@ -39,7 +38,7 @@ def write_summary(
 ) -> pa.Table:
     """Bring `summary.parquet` up to date with the logs and failures of a run.
 
-    Whose lock the caller holds.
+    The caller must hold the run's lock.
 
     Rows of files that did not change since the table was written are taken from it.
 
@@ -106,18 +105,13 @@ def _current(run: RunDirectory) -> pa.Table:
     try:
         with run.lock():
             return write_summary(run)
-    except (
-        Busy,
-        OSError,
-    ):  # somebody writes the run, or it may only be read: the rows are the same
+    except (Busy, OSError):
+        # another process writes the run, or it may only be read: the rows are the same
         return _build(run, stored, stamps)
 
 
 def _stamps(run: RunDirectory) -> Stamps:
-    """Return what tells whether the files behind the table changed.
-
-    In the order of the replicates.
-    """
+    """Return size and time of the files behind the table, in the order of the replicates."""
     paths = {replicate: run.log_path(replicate) for replicate in run.completed()}
     paths |= {replicate: run.failure_path(replicate) for replicate in run.failed()}
     stamps: Stamps = {}
@@ -155,7 +149,7 @@ def _stored(run: RunDirectory) -> pa.Table | None:
 
 
 def _stamp(path: Path) -> tuple[int, int, int]:
-    """Return what tells whether a file is another one or was written again."""
+    """Return the identity, size and time of a file, which change when it is written again."""
     status = path.stat()
     return status.st_ino, status.st_size, status.st_mtime_ns
 
@@ -194,7 +188,7 @@ def _table(rows: Sequence[Mapping[str, Any]], schema: pa.Schema) -> pa.Table:
 def _column(values: list[Any], kind: pa.DataType) -> pa.Array:
     """Return values, None where there is none, as a column.
 
-    `pa.array` would load pandas, a third of a second.
+    `pa.array` would load pandas, which takes a third of a second.
     """
     given = np.array([value is not None for value in values], dtype=np.bool_)
     buffers = [None if given.all() else pa.py_buffer(np.packbits(given, bitorder="little"))]

@@ -65,10 +65,8 @@ def read_generations(runs: Runs, replicates: Collection[int] | None = None) -> p
     kinds |= dict.fromkeys(
         sorted({name for columns in parts for name in columns} - set(kinds)), np.float64
     )
-    for (
-        name,
-        kind,
-    ) in kinds.items():  # a column leaves the parts when it is in the frame: nothing is there twice
+    # a column leaves the parts when it is in the frame: nothing is there twice
+    for name, kind in kinds.items():
         pieces = (columns.pop(name, None) for columns in parts)
         filled = (
             np.full(length, np.nan) if piece is None else piece

@@ -1,7 +1,4 @@
-"""Distances by coal at Pinocchio's placements, which decide every verdict.
-
-Besides the distances: searches that use nothing else.
-"""
+"""Distances by coal at Pinocchio's placements, which decide every verdict, and searches by them."""
 
 import threading
 from typing import Any, NamedTuple

@@ -1,7 +1,7 @@
-"""Bodies covered by spheres or capsules: what the fast kernels test in place of coal's shapes.
+"""Covers of bodies by spheres or capsules, which the fast kernels test in place of coal's shapes.
 
-A cover contains its body, so whatever coal sees touching, the cover sees, too. What it adds is its
-inflation: how far the cover reaches beyond the body at most, bounded from above for every body.
+A cover contains its body, so it touches whatever the body touches. Its inflation is the greatest
+distance by which it reaches beyond the body, bounded from above for every body.
 """
 
 from itertools import product
@@ -124,7 +124,11 @@ def capsule_cover(item: Any) -> Cover:
 class _Solid(NamedTuple):
     """A convex body in its own frame.
 
-    The box around it, and bounds (points, 3) → (points,) of signed distances.
+    Attributes:
+        low: (3,) least corner of the box around it.
+        high: (3,) greatest corner.
+        near: Function (points, 3) → (points,), at most the signed distance.
+        far: The same, at least the signed distance.
     """
 
     low: FloatArray
@@ -186,10 +190,7 @@ def _exact(half: FloatArray, distance: Any) -> _Solid:
 
 
 def _lattices(edges: FloatArray) -> list[tuple[int, ...]]:
-    """Return numbers of cells along the three edges, of cells about as long as wide.
-
-    From coarse to fine.
-    """
+    """Return numbers of cells along the edges, from coarse to fine, for cells near to cubes."""
     found: set[tuple[int, ...]] = set()
     size, most = float(edges.max()), 0
     while most <= MOST_SPHERES:
@@ -223,9 +224,9 @@ def _cylinder_distance(points: FloatArray, radius: float, half: float) -> FloatA
 
 
 def _ellipsoid_bound(points: FloatArray, half: FloatArray) -> FloatArray:
-    """Return upper bounds of signed distances.
+    """Return upper bounds of the signed distances of points from an ellipsoid.
 
-    Outside by the way to the middle, inside by the thinnest axis.
+    Outside, the bound is the way toward the middle; inside, it follows from the thinnest axis.
     """
     scale = np.sqrt(((points / half) ** 2).sum(axis=1))
     away = np.sqrt((points**2).sum(axis=1))

@@ -1,8 +1,8 @@
 """A robot's bodies as the fast kernels test them, and the pairs of bodies worth testing.
 
-Two models: sphere sets, generated from the bodies' coal geometry (Corsépius 2001, section 5), and
-one capsule per body. Both cover the bodies, so a posture that is free by the model is free on
-coal's geometry.
+There are two models: sphere sets, generated from the bodies' coal geometry (Corsépius 2001, section
+5), and one capsule per body. Both cover the bodies, so a posture that is free by the model is free
+on coal's geometry.
 """
 
 from typing import Any, ClassVar, NamedTuple

@@ -1,6 +1,6 @@
-"""The collision model of Curkovic et al.
+"""The collision model of Curkovic et al. 2013 on a robot among static obstacles.
 
-2013 on a robot: links as lines, or as envelopes, among static obstacles.
+Links are lines, or have envelopes.
 """
 
 from typing import Any, ClassVar, NamedTuple
@@ -62,7 +62,7 @@ class LinkCrossings(Component):
 
 
 class LinkCollision(NamedTuple):
-    """Planar robots of two links, and what stands around them.
+    """Planar robots of two links, and the obstacles around them.
 
     Attributes:
         arms: Base and link lengths of every robot.
@@ -84,7 +84,7 @@ class LinkCollision(NamedTuple):
         return self.half_width > 0.0 or self.tcp_radius > 0.0
 
     def outlines(self, robot: int, path: FloatArray, points: FloatArray) -> FloatArray:
-        """Return what is tested of a population's paths, (configurations, 4 | 8, N).
+        """Return the tested points or outlines of a population's paths, (configurations, 4 | 8, N).
 
         Args:
             robot: Whose population.
@@ -98,11 +98,11 @@ class LinkCollision(NamedTuple):
         return self._enveloped(robot).outlines(path[1:-1]) if self.enveloped else points[1:-1]
 
     def of_configurations(self, robot: int, q: FloatArray) -> FloatArray:
-        """Return the same of configurations (K, 2, N) as they are."""
+        """Return the points or outlines of configurations (K, 2, N), (K, 4 | 8, N)."""
         return self._enveloped(robot).outlines(q) if self.enveloped else self.arms[robot].points(q)
 
     def contact(self, posture: FloatArray) -> str:
-        """Return what touches what at link angles (robots, 2) [rad]; empty if nothing does."""
+        """Return the first contact at link angles (robots, 2) [rad] in words; empty if none."""
         lines = [
             self.of_configurations(r, np.ascontiguousarray(angles.reshape(1, 2, 1)))
             for r, angles in enumerate(posture)
@@ -138,7 +138,8 @@ class LinkCollision(NamedTuple):
 def _pairs_of_joints(assembly: Assembly) -> list[tuple[int, int]]:
     """Return first and one-past-last joint of every robot.
 
-    Which must have two and turn in the plane.
+    Raises:
+        SettingError: If a robot is no planar arm of two links.
     """
     slices = [(int(first), int(stop)) for first, stop in assembly.arm_slices]
     flat = assembly.table.planar and all(stop - first == 2 for first, stop in slices)

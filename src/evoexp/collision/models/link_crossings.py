@@ -37,9 +37,7 @@ class Arm(NamedTuple):
     lengths: tuple[float, float]
 
     def points(self, q: FloatArray) -> FloatArray:
-        """Return elbows and tips, (K, 4, N).
-
-        Elbow x, elbow y, tip x, tip y [length unit of the scene].
+        """Return elbows and tips (K, 4, N): elbow x, y, tip x, y [length unit of the scene].
 
         Args:
             q: (K, 2, N) angles of the links from +x [rad].
@@ -55,7 +53,7 @@ class Arm(NamedTuple):
 
 
 class Crossings(NamedTuple):
-    """In how many configurations individuals collide.
+    """Numbers of configurations in which individuals collide.
 
     Attributes:
         counts: (N1, N2) of each pair.
@@ -96,9 +94,9 @@ def update_crossings(
     changed_1: BoolArray,
     changed_2: BoolArray,
 ) -> None:
-    """Count anew, in place, the pairs of which at least one individual changed.
+    """Count anew, in place, the pairs of which an individual changed, to the same counts.
 
-    The result is `count_crossings`'.
+    The result is that of `count_crossings`.
 
     Args:
         crossings: Of the points before, altered.
@@ -120,12 +118,11 @@ def update_crossings(
 def path_configurations(
     genes: FloatArray, start: FloatArray, goal: FloatArray, collision_substeps: int
 ) -> FloatArray:
-    """Return where a path is tested.
+    """Return the configurations at which a path is tested.
 
-    The path start → genes → goal, straight in joint angles, cut into equal parts.
-
-    Start and goal themselves are left out: they are checked before any search. With one substep
-    these are the genes.
+    The path start → genes → goal, straight in joint angles, is cut into equal parts. Start and goal
+    themselves are left out: they are checked before any search. With one substep the configurations
+    are the genes.
 
     Args:
         genes: (K, 2, N) [rad].
@@ -173,9 +170,9 @@ class ClosedForm(NamedTuple):
 
 
 def closed_form(one: Arm, q_1: FloatArray, two: Arm, q_2: FloatArray) -> ClosedForm:
-    """Intersect links in the space of their angles: Curkovic et al. 2013, Eqs 11–12 and Fig.
+    """Intersect all four pairs of links in the space of their angles.
 
-    7, for all four pairs.
+    Curkovic et al. 2013, Eqs. 11–12 and Fig. 7.
 
     With the arms' link vectors u1, u2 and v1, v2 and the bases d apart, link i of arm 1 begins w =
     d + Σ v − Σ u away from link j of arm 2 (sums over the links before), and
@@ -199,18 +196,14 @@ def closed_form(one: Arm, q_1: FloatArray, two: Arm, q_2: FloatArray) -> ClosedF
     Raises:
         ValueError: If the shapes differ or are not (2, n).
     """
-    q_1, q_2 = (
-        np.ascontiguousarray(q_1, dtype=np.float64),
-        np.ascontiguousarray(q_2, dtype=np.float64),
-    )
+    q_1, q_2 = (np.ascontiguousarray(q, dtype=np.float64) for q in (q_1, q_2))
     if q_1.ndim != 2 or q_1.shape[0] != 2 or q_1.shape != q_2.shape:
         raise ValueError(
             f"q_1 and q_2 must both have shape (2, n), were {q_1.shape} and {q_2.shape}"
         )
     dx, dy = two.base[0] - one.base[0], two.base[1] - one.base[1]
-    lengths = np.array(
-        [*one.lengths, *two.lengths, np.sqrt(dx * dx + dy * dy)]
-    )  # of u1, u2, v1, v2, d
+    # of u1, u2, v1, v2, d
+    lengths = np.array([*one.lengths, *two.lengths, np.sqrt(dx * dx + dy * dy)])
     angles = np.empty((5, q_1.shape[1]))
     angles[:2], angles[2:4], angles[4] = q_1, q_2, atan2(dy, dx)
     shape = (4, q_1.shape[1])
@@ -229,6 +222,7 @@ def _intersect(
             for b in range(5):
                 turn = angle[b, n] - angle[a, n]
                 sines[a, b], cosines[a, b] = sincos(turn)
+        # w of every pair: across and along either link
         for i in range(2):
             for j in range(2):
                 pair, v = 2 * i + j, 2 + j
@@ -237,28 +231,22 @@ def _intersect(
                 along_i = length[4] * cosines[i, 4]
                 along_j = length[4] * cosines[v, 4]
                 if j == 1:
-                    across_i, along_i = (
-                        across_i + length[2] * sines[i, 2],
-                        along_i + length[2] * cosines[i, 2],
-                    )
-                    across_j, along_j = (
-                        across_j + length[2] * sines[v, 2],
-                        along_j + length[2] * cosines[v, 2],
-                    )
+                    across_i += length[2] * sines[i, 2]
+                    along_i += length[2] * cosines[i, 2]
+                    across_j += length[2] * sines[v, 2]
+                    along_j += length[2] * cosines[v, 2]
                 if i == 1:
-                    across_i, along_i = (
-                        across_i - length[0] * sines[i, 0],
-                        along_i - length[0] * cosines[i, 0],
-                    )
-                    across_j, along_j = (
-                        across_j - length[0] * sines[v, 0],
-                        along_j - length[0] * cosines[v, 0],
-                    )
+                    across_i -= length[0] * sines[i, 0]
+                    along_i -= length[0] * cosines[i, 0]
+                    across_j -= length[0] * sines[v, 0]
+                    along_j -= length[0] * cosines[v, 0]
+                # lines that cross
                 if abs(sines[i, v]) > PARALLEL and length[i] > 0.0 and length[v] > 0.0:
                     mu[pair, n] = -across_j / (length[i] * sines[i, v])
                     nu[pair, n] = -across_i / (length[v] * sines[i, v])
                     crossing[pair, n] = 0.0 <= mu[pair, n] <= 1.0 and 0.0 <= nu[pair, n] <= 1.0
                     continue
+                # parallel lines, or a point
                 mu[pair, n] = nu[pair, n] = np.nan
                 reach = PARALLEL * (length[0] + length[1] + length[2] + length[3] + length[4])
                 if length[i] > 0.0:  # in the frame of link i, link j runs from `along_i` on
@@ -279,15 +267,13 @@ def _update(
     *members: IntArray,
 ) -> None:
     rows, others, columns = members
-    base_1, base_2 = (
-        (float(one.base[0]), float(one.base[1])),
-        (float(two.base[0]), float(two.base[1])),
-    )
+    base_1 = float(one.base[0]), float(one.base[1])
+    base_2 = float(two.base[0]), float(two.base[1])
     if not kernels.crossings(base_1, points_1, rows, others, base_2, points_2, columns, *found):
         raise ValueError("points and bases must be finite and below 1e150")
 
 
-# ----------------------------------------------------------------- for whoever counts pairs of arms
+# -------------------------------------------------------------- shared with link_envelopes
 
 
 def no_crossings(num_1: int, num_2: int) -> Crossings:
@@ -308,9 +294,7 @@ def changed_members(
     changed_1: BoolArray,
     changed_2: BoolArray,
 ) -> tuple[IntArray, IntArray, IntArray]:
-    """Return the changed and the unchanged individuals of population 1.
-
-    And the changed ones of population 2.
+    """Return the changed and unchanged individuals of population 1, and the changed ones of 2.
 
     Raises:
         ValueError: If counts or flags have another shape than the populations.

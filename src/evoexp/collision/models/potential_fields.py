@@ -1,8 +1,7 @@
 """Numerical potential fields over a grid by wave fronts: toward the goal, and away from obstacles.
 
-Chen & Zalzala 1995, section 2.1, after Barraquand & Latombe 1991. The potential of the obstacles is
-what the paper calls the unsafeness of a node; it is the model of collision that its paths are
-planned with.
+Chen & Zalzala 1995, section 2.1, after Barraquand & Latombe 1991. The paper calls the potential of
+the obstacles the unsafeness of a node; it is the collision model by which its paths are planned.
 """
 
 from itertools import pairwise
@@ -18,7 +17,7 @@ from evoexp.validation import Component, Count, Positive, Vector
 
 
 class Fields(NamedTuple):
-    """What the fields of an occupancy grid are.
+    """The potential fields of an occupancy grid.
 
     Attributes:
         grid: Its free nodes and permitted moves; nodes that are too unsafe are not free.
@@ -34,21 +33,15 @@ class Fields(NamedTuple):
 
     @property
     def num_moves(self) -> int:
-        """How many of the grid's moves the front of a goal makes."""
+        """Number of the grid's moves that the front of a goal makes."""
         return self.grid.moves_within(self.neighbourhood)
 
     def steps_to(self, node: int) -> np.ndarray:
-        """Return how many steps every node (nodes,) is away from one.
-
-        `grids.UNREACHED` where it cannot be reached.
-        """
+        """Return the steps from every node to one (nodes,); `grids.UNREACHED` without a way."""
         return front(self.grid, np.array([node]), self.neighbourhood)
 
     def goal_field(self, node: int) -> FloatArray:
-        """Return the potential of every node (nodes,) toward a goal.
-
-        NaN where the goal cannot be reached from.
-        """
+        """Return the potential of every node toward a goal (nodes,); NaN without a way."""
         steps = self.steps_to(node)
         return np.where(steps == UNREACHED, np.nan, self.potentials[steps])
 
@@ -106,9 +99,8 @@ class PotentialFields(Component):
 
     def _unsafeness(self, blocked: np.ndarray) -> FloatArray:
         """Return the unsafeness of every node, in the shape of the grid."""
-        sources = np.pad(
-            blocked, 1, constant_values=True
-        )  # "obstacles (including the natural boundaries)"
+        # "obstacles (including the natural boundaries)"
+        sources = np.pad(blocked, 1, constant_values=True)
         everywhere = grid(np.zeros(sources.shape, dtype=bool))
         starts = np.flatnonzero(np.pad(sources, 1))
         steps = everywhere.inner(front(everywhere, starts, self.neighbourhood))

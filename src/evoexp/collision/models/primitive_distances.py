@@ -1,12 +1,10 @@
-"""Distances of spheres in encounters.
-
-A configuration of the batch in which a body is near an obstacle or another body.
+"""Distances of spheres in encounters of a body with an obstacle or with another body.
 
 Everything here is seen from the obstacle's frame or from the other body's frame: then the shapes of
-one side are constants, and of the other side one rigid motion per encounter is all that has to be
-gathered. A batch of encounters lives in one flat array, `work`: its rows are `WIDTH` values apart,
-encounters innermost. (One array, because LLVM gives up vector code when it would have to check
-several arrays for overlaps.)
+one side are constants, and only one rigid motion per encounter must be gathered for the other side.
+A batch of encounters lives in one flat array, `work`: its rows are `WIDTH` values apart, encounters
+innermost. (One array, because LLVM gives up vector code when it would have to check several arrays
+for overlaps.)
 
 A sphere, a capsule and a box are one shape: a box (with edges of length 0 where needed), thickened
 by a radius.
@@ -106,7 +104,7 @@ def spheres_to_boxes(
 def spheres_to_cylinders(
     width: int, runs: IntArray, spheres: FloatArray, first: int, stop: int, work: FloatArray
 ) -> None:
-    """The same for cylinders."""
+    """Lower VALUE to the signed distances of a body's spheres to cylinders."""
     for i in range(runs[first, 0], runs[stop - 1, 1]):
         lx, ly, lz, radius = spheres[i, 0], spheres[i, 1], spheres[i, 2], spheres[i, 3]
         for n in range(width):
@@ -137,7 +135,7 @@ def spheres_to_cylinders(
 def spheres_to_half_spaces(
     width: int, runs: IntArray, spheres: FloatArray, first: int, stop: int, work: FloatArray
 ) -> None:
-    """The same for half-spaces, z ≤ 0 in their frames."""
+    """Lower VALUE to the signed distances of a body's spheres to half-spaces, z ≤ 0."""
     for i in range(runs[first, 0], runs[stop - 1, 1]):
         lx, ly, lz, radius = spheres[i, 0], spheres[i, 1], spheres[i, 2], spheres[i, 3]
         for n in range(width):
@@ -175,9 +173,7 @@ def spheres_to_spheres(
     other_stop: int,
     work: FloatArray,
 ) -> None:
-    """Lower VALUE to the distances of one run of constant spheres from the spheres at CENTERS.
-
-    Less both radii.
+    """Lower VALUE to the distances of a run of constant spheres from the spheres at CENTERS.
 
     Args:
         width: Encounters.
@@ -219,9 +215,9 @@ def spheres_to_spheres(
 
 @kernel
 def _three_squares(width: int, spheres: FloatArray, i: int, o: np.uint64, work: FloatArray) -> None:
-    """Lower OUTSIDE to the squared distances of one moved centre from three fixed ones.
+    """Lower OUTSIDE to the squared distances of a moved centre from three fixed ones.
 
-    Held in registers.
+    The fixed ones are held in registers.
     """
     ax, ay, az = spheres[i, 0], spheres[i, 1], spheres[i, 2]
     bx, by, bz = spheres[i + 1, 0], spheres[i + 1, 1], spheres[i + 1, 2]

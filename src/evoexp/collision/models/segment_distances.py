@@ -26,13 +26,13 @@ def _clamped(value: float, least: float, most: float) -> float:
 
 @kernel
 def _beyond(value: float, half: float) -> float:
-    """How far a coordinate lies outside ±half, with sign."""
+    """Return the signed distance of a coordinate outside ±half; 0 inside."""
     return value - min(max(value, -half), half)
 
 
 @kernel
 def _inverse(value: float) -> float:
-    """1 / value, and 0 where that means nothing."""
+    """Return 1 / value; 0 for values so small that the quotient would overflow."""
     tiny = abs(value) < TINY
     return (0.0 if tiny else 1.0) / (1.0 if tiny else value)
 
@@ -50,7 +50,7 @@ def _slope(
     b: float,
     c: float,
 ) -> float:
-    """Of half the squared distance of the point p + t u from a box."""
+    """Return the slope of half the squared distance of the point p + t u from a box."""
     return (
         ux * _beyond(px + t * ux, a) + uy * _beyond(py + t * uy, b) + uz * _beyond(pz + t * uz, c)
     )
@@ -60,7 +60,7 @@ def _slope(
 def _narrowed(
     t: float, slope: float, low: float, low_slope: float, high: float, high_slope: float
 ) -> tuple[float, float, float, float]:
-    """A bracket of the zero of a rising slope, narrowed by one more value of it."""
+    """Return a bracket of the zero of a rising slope, narrowed by one more value of the slope."""
     rises = slope <= 0.0 and t > low
     falls = slope >= 0.0 and t < high
     return (
@@ -73,7 +73,7 @@ def _narrowed(
 
 @kernel
 def _crossing(p: float, u: float, inverse: float, half: float) -> tuple[float, float, float, float]:
-    """Where a coordinate p + t u enters and leaves ±half; the kinks of the slope."""
+    """Return the two t at which p + t u meets ±half, and those at which it enters and leaves."""
     one, two = (-half - p) * inverse, (half - p) * inverse
     within = np.inf if abs(p) <= half else -np.inf
     enter = -within if inverse == 0.0 else min(one, two)
@@ -85,10 +85,8 @@ def _crossing(p: float, u: float, inverse: float, half: float) -> tuple[float, f
 def segment_to_boxes(width: int, radius: float, work: FloatArray) -> None:
     """Lower VALUE to the signed distances of the segments at STARTS, AXES to thickened boxes.
 
-    Less a radius.
-
-    Where a segment enters a box, it is the signed distance of the middle of the part inside: not
-    above 0.
+    The segments have a radius. Where a segment enters a box, the distance is that of the middle of
+    the part inside: not above 0.
     """
     for n in range(width):
         s, e, k = STARTS + U(n), AXES + U(n), CORE + U(n)
@@ -140,7 +138,7 @@ def _cylinder_slope(
     radius: float,
     half: float,
 ) -> tuple[float, float]:
-    """Slope and curvature of half the squared distance of the point p + t u from a cylinder."""
+    """Return slope and curvature of half the squared distance of p + t u from a cylinder."""
     x, y, e = px + t * ux, py + t * uy, _beyond(pz + t * uz, half)
     along, flat = x * ux + y * uy, ux * ux + uy * uy
     rho = np.sqrt(x * x + y * y)
@@ -157,9 +155,9 @@ def _cylinder_slope(
 
 @kernel
 def segment_to_cylinders(width: int, radius: float, work: FloatArray) -> None:
-    """The same for cylinders; core: radius, half the length.
+    """Lower VALUE to the signed distances of the segments at STARTS, AXES to cylinders.
 
-    No vector code: the searches differ in length.
+    This is no vector code, because the searches differ in length.
     """
     for n in range(width):
         s, e, k = STARTS + U(n), AXES + U(n), CORE + U(n)
@@ -178,9 +176,9 @@ def segment_to_cylinders(width: int, radius: float, work: FloatArray) -> None:
 def _beside_cylinder(
     px: float, py: float, pz: float, ux: float, uy: float, uz: float, radius: float, half: float
 ) -> float:
-    """The place t in [0, 1] where p + t u is nearest to a cylinder.
+    """Return the t in [0, 1] at which p + t u is nearest to a cylinder.
 
-    Inside, the middle of the part inside.
+    Where the segment enters the cylinder, t is the middle of the part inside.
     """
     flat = ux * ux + uy * uy
     still = max(abs(ux), abs(uy)) < TINY
@@ -234,7 +232,7 @@ def _zero_of_slope(
 
 @kernel
 def segment_to_half_spaces(width: int, radius: float, work: FloatArray) -> None:
-    """The same for half-spaces: the lower end counts; exact on both sides of the boundary."""
+    """Lower VALUE to the signed distances of the segments' lower ends to half-spaces."""
     for n in range(width):
         z, w, best = (
             work[STARTS + U(2) * W + U(n)],
@@ -275,10 +273,7 @@ def segment_to_points(
 def segments_to_point(
     width: int, point: FloatArray, inverse: float, both: float, work: FloatArray
 ) -> None:
-    """Lower VALUE to the distance of one constant point from the segments at STARTS, AXES.
-
-    Less `both`.
-    """
+    """Lower VALUE to the distance of a constant point from the segments, less `both`."""
     cx, cy, cz = point[0], point[1], point[2]
     for n in range(width):
         s, e = STARTS + U(n), AXES + U(n)
@@ -296,14 +291,12 @@ def segments_to_point(
 def segment_to_segments(
     width: int, capsule: FloatArray, other: float, both: float, work: FloatArray
 ) -> None:
-    """Lower VALUE to the distance of one constant segment from the segments at STARTS, AXES.
+    """Lower VALUE to the distance of a constant segment from those at STARTS, AXES, less `both`.
 
-    Less `both`.
-
-    The common perpendicular's foot, clamped to the first segment, is projected to the second,
-    clamped, and back: the least of a convex function of two places. It comes from cross products,
-    whose errors stay harmless when the segments are nearly parallel; for parallel ones any foot
-    serves.
+    The foot of the common perpendicular, clamped to the first segment, is projected to the second,
+    clamped, and back: that is the least of a convex function of two places (Ericson 2005, section
+    5.1.9). It comes from cross products, whose errors stay harmless when the segments are nearly
+    parallel; for parallel ones any foot serves.
 
     Args:
         width: Encounters.

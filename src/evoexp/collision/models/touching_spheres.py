@@ -18,9 +18,9 @@ from evoexp.validation import Component, Count, Positive
 
 
 class TouchingSpheres(Component):
-    """The collision model of Rana & Zalzala.
+    """The collision model of Rana & Zalzala: spheres on every link that moves.
 
-    Spheres on every link that moves (section 4.1 leaves out the columns).
+    Section 4.1 leaves out the columns.
 
     Attributes:
         spheres_per_link: Centres at equal distances from joint to joint, both ends included.

@@ -153,14 +153,16 @@ def forward_kinematics(table: KinematicTable, q: FloatArray) -> tuple[FloatArray
         raise ValueError(f"q must have shape ({num_joints}, configurations), was {q.shape}")
     rotations = np.empty((num_joints, 9, q.shape[1]))
     origins = np.empty((num_joints, 3, q.shape[1]))
-    _forward_kinematics(table.chain, q, rotations, origins)
+    _forward_kinematics(tuple(table.chain), q, rotations, origins)
     return rotations.reshape(num_joints, 3, 3, -1), origins
 
 
 @kernel
 def _forward_kinematics(
-    chain: KinematicChain, q: FloatArray, rotations: FloatArray, origins: FloatArray
+    fields: tuple[Any, ...], q: FloatArray, rotations: FloatArray, origins: FloatArray
 ) -> None:
+    """Run the kernel of `forward_kinematics`; fields of a `KinematicChain` as a plain tuple."""
+    chain = KinematicChain(*fields)
     num_joints, total = len(chain.parent), q.shape[1]
     block_q = np.zeros(q.shape[0] * BLOCK)
     frames, scratch = np.empty(num_joints * SPATIAL_ROWS * BLOCK), np.empty(SPATIAL_ROWS * BLOCK)

@@ -36,12 +36,22 @@ from evoexp.collision.models.encounter_kernels import body_meets_body, body_meet
 from evoexp.collision.models.packed_shapes import (
     FIRST_LISTED,
     STOP_LISTED,
+    PackedObstacles,
+    PackedShapes,
     PrimitiveTables,
+    Units,
 )
 from evoexp.collision.models.primitive_distances import FIXED_ROWS, VALUE, WIDTH
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.records import FloatArray, IntArray
-from evoexp.robots.kinematics import BLOCK, SPATIAL_ROWS, U, block_frames, load_block
+from evoexp.robots.kinematics import (
+    BLOCK,
+    SPATIAL_ROWS,
+    KinematicChain,
+    U,
+    block_frames,
+    load_block,
+)
 
 WORD = 64
 """Encounters of one configuration that fit a word of bits."""
@@ -99,19 +109,27 @@ class Memory(NamedTuple):
 
 @kernel
 def primitive_clearances(
-    tables: PrimitiveTables, limit: float, decide: bool, q: FloatArray, out: FloatArray
+    tables: tuple[Any, ...], limit: float, decide: bool, q: FloatArray, out: FloatArray
 ) -> None:
     """Run the kernel of `PrimitiveCollision`.
 
     Args:
-        tables: `PrimitiveCollision.tables`.
+        tables: `PrimitiveCollision.tables`: fields of `PrimitiveTables` as plain tuples.
         limit: Above it no clearance is measured [length unit].
         decide: Whether the first clearance below 0 ends the judgement of a configuration: all rows
             are −inf then.
         q: (nq, configurations) [rad].
         out: (3, configurations), written: rows OBSTACLES, BETWEEN, SELF.
     """
-    num_joints, num_units = len(tables.chain.parent), len(tables.units.whole)
+    chain, units, shapes, obstacles, pairs = tables
+    named = PrimitiveTables(
+        KinematicChain(*chain),
+        Units(*units),
+        PackedShapes(*shapes),
+        PackedObstacles(*obstacles),
+        pairs,
+    )
+    num_joints, num_units = len(named.chain.parent), len(named.units.whole)
     memory = Memory(
         np.zeros(q.shape[0] * BLOCK),
         np.empty(BLOCKS * (num_joints + 1) * SPATIAL_ROWS * BLOCK),
@@ -120,10 +138,10 @@ def primitive_clearances(
         np.empty(num_units * 3 * LANES),
         np.empty(3 * LANES),
         np.empty(LANES, dtype=np.uint64),
-        np.empty(_room(tables.units.whole, tables.pairs), dtype=np.uint64),
-        np.empty((FIXED_ROWS + 3 * tables.shapes.most) * WIDTH),
+        np.empty(_room(named.units.whole, pairs), dtype=np.uint64),
+        np.empty((FIXED_ROWS + 3 * named.shapes.most) * WIDTH),
     )
-    _clearances(tables, limit, decide, q, out, memory)
+    _clearances(named, limit, decide, q, out, memory)
 
 
 @kernel

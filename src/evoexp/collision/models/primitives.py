@@ -26,6 +26,7 @@ from evoexp.collision.models.primitive_tables import (
     pack_obstacles,
     pack_shapes,
 )
+from evoexp.numeric.compilation import plain
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.kinematics import KinematicTable, kinematic_table
 from evoexp.scenarios.obstacles import ObstacleTable
@@ -97,32 +98,34 @@ class PrimitiveCollision(NamedTuple):
     Attributes:
         table: The kinematic table of the model.
         joints: (bodies,) the Pinocchio joint of each body.
-        tables: The tables that the kernel `primitive_clearances` reads.
+        packed: Bodies, obstacles and pairs as arrays.
+        tables: Fields of `packed` as plain tuples, for the kernel `primitive_clearances`.
     """
 
     table: KinematicTable
     joints: IntArray
-    tables: PrimitiveTables
+    packed: PrimitiveTables
+    tables: tuple[Any, ...]
 
     @property
     def units(self) -> Units:
         """Bodies, then their parts."""
-        return self.tables.units
+        return self.packed.units
 
     @property
     def shapes(self) -> PackedShapes:
         """Shapes of the units."""
-        return self.tables.shapes
+        return self.packed.shapes
 
     @property
     def obstacles(self) -> PackedObstacles:
         """The obstacles, and which body is checked against which."""
-        return self.tables.obstacles
+        return self.packed.obstacles
 
     @property
     def pairs(self) -> IntArray:
         """(pairs, 3) two units, and the row of the result that they count for."""
-        return self.tables.pairs
+        return self.packed.pairs
 
     @classmethod
     def build(
@@ -155,7 +158,7 @@ class PrimitiveCollision(NamedTuple):
         shapes, table = shapes.checked(model), kinematic_table(model)
         numbers, first = np.unique(shapes.labels, return_index=True)
         joints = shapes.joint[first]
-        units, packed, parts = pack_shapes(table, shapes, numbers, joints)
+        units, own, parts = pack_shapes(table, shapes, numbers, joints)
         given = default_pairs(model, joints) if pairs is None else pairs
         chosen = tuple((int(a), int(b)) for a, b in given)
         arm = arms_of_joints(model) if arms is None else tuple(arms)
@@ -165,8 +168,9 @@ class PrimitiveCollision(NamedTuple):
             )
         around, lists = pack_obstacles(obstacles, numbers, joints, tuple(ignored))
         units.whole[: len(joints), FIRST_LISTED:] = lists
-        rows = _pair_table(numbers, chosen, [arm[joint] for joint in joints], parts, units, packed)
-        return cls(table, joints, PrimitiveTables(table.chain, units, packed, around, rows))
+        rows = _pair_table(numbers, chosen, [arm[joint] for joint in joints], parts, units, own)
+        packed = PrimitiveTables(table.chain, units, own, around, rows)
+        return cls(table, joints, packed, plain(packed))
 
     @classmethod
     def from_geometry(

@@ -8,7 +8,7 @@ distance. A caller that only asks for collisions (`limit` 0) is spared the pairs
 far apart in a whole block.
 """
 
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -89,26 +89,34 @@ class Memory(NamedTuple):
 
 
 @kernel
-def clearances(tables: SphereTables, limit: float, q: FloatArray, out: FloatArray) -> None:
+def clearances(tables: tuple[Any, ...], limit: float, q: FloatArray, out: FloatArray) -> None:
     """Run the kernel of `SphereCollision.clearance`.
 
     Args:
-        tables: `SphereCollision.tables`.
+        tables: `SphereCollision.tables`: fields of `SphereTables` as plain tuples.
         limit: Above it no clearance is measured [length unit].
         q: (nq, configurations) [deg].
         out: (2, configurations), written: between arms, to obstacles.
     """
+    chain, space, spheres, bounds, obstacles = tables
+    named = SphereTables(
+        KinematicChain(*chain),
+        space,
+        Spheres(*spheres),
+        LinkBalls(*bounds),
+        ObstacleTable(*obstacles),
+    )
     memory = Memory(
         np.zeros(q.shape[0] * BLOCK),
-        np.empty(len(tables.chain.parent) * SPATIAL_ROWS * BLOCK),
-        np.empty(len(tables.spheres.joint) * ROWS),
-        np.empty(len(tables.bounds.joint) * ROWS),
+        np.empty(len(named.chain.parent) * SPATIAL_ROWS * BLOCK),
+        np.empty(len(named.spheres.joint) * ROWS),
+        np.empty(len(named.bounds.joint) * ROWS),
         np.empty(SPATIAL_ROWS * BLOCK),
         np.empty(ROWS),
         np.empty(BLOCK),
         np.empty(BLOCK),
     )
-    _clearances(tables, limit, q, out, memory)
+    _clearances(named, limit, q, out, memory)
 
 
 @kernel

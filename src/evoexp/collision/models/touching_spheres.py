@@ -11,6 +11,7 @@ import numpy as np
 from evoexp.collision.models.obstacle_kernels import LinkBalls
 from evoexp.collision.models.sphere_kernels import Space, Spheres, SphereTables, clearances
 from evoexp.errors import SettingError
+from evoexp.numeric.compilation import plain
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.assembly import Assembly, sphere_geometry
 from evoexp.scenarios.obstacles import ObstacleTable, obstacle_table
@@ -61,12 +62,16 @@ class TouchingSpheres(Component):
         links = np.cumsum(np.diff(joint, prepend=joint[0]) != 0)
         link_arms = np.array([arms[np.argmax(links == k)] for k in range(links[-1] + 1)])
         of_links, of_arms = _ranges(links, links[-1] + 1), _ranges(link_arms, assembly.num_arms)
+        fixed, table = Spheres(joint, local, self.sphere_radius), assembly.table
+        around = obstacle_table(obstacles).without_ellipses()
+        space: Space = None if table.planar else True
+        balls = _balls(joint, local, of_links, of_arms)
         return SphereCollision(
             assembly,
-            Spheres(joint, local, self.sphere_radius),
+            fixed,
             _ranges(arms, assembly.num_arms),
-            _balls(joint, local, of_links, of_arms),
-            obstacle_table(obstacles).without_ellipses(),
+            around,
+            plain(SphereTables(table.chain, space, fixed, balls, around)),
             sphere_geometry(
                 assembly,
                 np.array([sphere.center for sphere in kept]),
@@ -149,16 +154,16 @@ class SphereCollision(NamedTuple):
         assembly: The robot.
         spheres: The spheres.
         arm_spheres: (arms, 2) first and one-past-last sphere of each arm.
-        bounds: Balls around the spheres of each link.
         obstacles: The obstacle table.
+        tables: Fields of `SphereTables` as plain tuples, for the kernel `clearances`.
         geometry: The same spheres as a `pin.GeometryModel` of coal spheres.
     """
 
     assembly: Assembly
     spheres: Spheres
     arm_spheres: IntArray
-    bounds: LinkBalls
     obstacles: ObstacleTable
+    tables: tuple[Any, ...]
     geometry: Any
 
     def clearance(self, q: FloatArray, limit: float = np.inf) -> Clearance:
@@ -187,10 +192,3 @@ class SphereCollision(NamedTuple):
     def radius(self) -> float:
         """Radius of every sphere [length unit]."""
         return self.spheres.radius
-
-    @property
-    def tables(self) -> SphereTables:
-        """The tables that the kernel `clearances` reads."""
-        table = self.assembly.table
-        space: Space = None if table.planar else True
-        return SphereTables(table.chain, space, self.spheres, self.bounds, self.obstacles)

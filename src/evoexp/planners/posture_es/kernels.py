@@ -3,11 +3,10 @@
 A population is an array (nq, individuals) [rad].
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.packed_shapes import PrimitiveTables
 from evoexp.collision.models.primitive_kernels import primitive_clearances
 from evoexp.numeric.compilation import kernel
 from evoexp.objectives.posture_cost import (
@@ -59,7 +58,7 @@ class Judging(NamedTuple):
     weights: FloatArray
     tilts: FloatArray
     limits: FloatArray
-    tables: PrimitiveTables
+    tables: tuple[Any, ...]
     reach: float
     tolerances: FloatArray
 

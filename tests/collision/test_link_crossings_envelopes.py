@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from evoexp.collision.models.envelope_contact import Envelope, colliding
 from evoexp.collision.models.link_crossings import Arm, count_crossings
-from evoexp.collision.models.link_envelope_kernels import Envelope, colliding
 from evoexp.collision.models.link_envelopes import EnvelopedArm, count_collisions, update_collisions
 from references import link_crossings_numpy as plain
 

@@ -10,6 +10,8 @@ per pass: with eight, LLVM meets more pairs of rows than it is willing to test f
 not vectorise (three times slower).
 """
 
+import math
+
 import numpy as np
 
 from evoexp.numeric.compilation import kernel
@@ -75,7 +77,7 @@ def root(q0: float, q1: float, q2: float, q3: float, q4: float, u: float) -> flo
     Rounding may make the square negative near zero.
     """
     square = q0 + u * (q1 + u * (q2 + u * (q3 + u * q4)))
-    return np.sqrt(square if square > 0.0 else 0.0)  # type: ignore[no-any-return]
+    return math.sqrt(square if square > 0.0 else 0.0)
 
 
 @kernel

@@ -4,12 +4,8 @@ from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.ellipse_kernels import (
-    Ellipses,
-    TestedPath,
-    first_contact,
-    paths_collide,
-)
+from evoexp.collision.models.ellipse_contact import first_contact
+from evoexp.collision.models.ellipse_kernels import Ellipses, TestedPath, paths_collide
 from evoexp.errors import SettingError
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.assembly import Assembly

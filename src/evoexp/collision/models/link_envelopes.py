@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from evoexp.collision.models import link_envelope_kernels as kernels
+from evoexp.collision.models.envelope_contact import Envelope
 from evoexp.collision.models.link_crossings import (
     Arm,
     Crossings,
@@ -154,7 +155,7 @@ def _update(
                 f"{radius}"
             )
         base, lengths = (float(x), float(y)), (float(first), float(second))
-        arms.append(kernels.Envelope(base, lengths, float(half_width), float(radius)))
+        arms.append(Envelope(base, lengths, float(half_width), float(radius)))
     if not (np.isfinite(outlines_1).all() and np.isfinite(outlines_2).all()):
         raise ValueError("outlines must be finite")
     kernels.collisions(arms[0], outlines_1, rows, others, arms[1], outlines_2, columns, *found)

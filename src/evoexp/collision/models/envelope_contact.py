@@ -1,0 +1,71 @@
+"""The contact of two arms with envelopes in one configuration, decided in double precision."""
+
+from typing import NamedTuple
+
+from evoexp.collision.models.link_crossing_kernels import Point
+from evoexp.collision.models.segment_predicates import squared_distance, touching
+from evoexp.numeric.compilation import kernel
+from evoexp.records import FloatArray
+
+
+class Envelope(NamedTuple):
+    """An arm of two links with its envelope [length unit of the scene].
+
+    Attributes:
+        base: x, y of its first joint.
+        lengths: Of its links.
+        half_width: Distance of the boundary lines from their link.
+        tcp_radius: Of the circle around the tip.
+    """
+
+    base: Point
+    lengths: Point
+    half_width: float
+    tcp_radius: float
+
+
+@kernel
+def boundary(
+    arm: Envelope, outline: FloatArray, k: int, n: int, link: int, side: float
+) -> tuple[float, float, float, float]:
+    """Return the ends (x, y, x, y) of a boundary line: side −1 right of the link, +1 left of it."""
+    c, s = outline[k, 4 + 2 * link, n], outline[k, 5 + 2 * link, n]
+    x, y = -(side * arm.half_width * s), side * arm.half_width * c
+    elbow_x, elbow_y = outline[k, 0, n], outline[k, 1, n]
+    if link == 0:
+        return arm.base[0] + x, arm.base[1] + y, elbow_x + x, elbow_y + y
+    return elbow_x + x, elbow_y + y, outline[k, 2, n] + x, outline[k, 3, n] + y
+
+
+@kernel
+def colliding(
+    arm_1: Envelope,
+    outline_1: FloatArray,
+    i: int,
+    arm_2: Envelope,
+    outline_2: FloatArray,
+    j: int,
+    k: int,
+) -> bool:
+    """Return whether two individuals collide in configuration k, decided in double precision."""
+    radius_1, radius_2 = arm_1.tcp_radius, arm_2.tcp_radius
+    # circle against circle
+    cx, cy, fx, fy = outline_1[k, 2, i], outline_1[k, 3, i], outline_2[k, 2, j], outline_2[k, 3, j]
+    reach = radius_1 + radius_2
+    if (fx - cx) * (fx - cx) + (fy - cy) * (fy - cy) < reach * reach:
+        return True
+    # boundary lines of arm 1 against the circle and the boundary lines of arm 2
+    for one in range(4):
+        ax, ay, bx, by = boundary(arm_1, outline_1, k, i, one // 2, 2.0 * (one % 2) - 1.0)
+        if squared_distance(ax, ay, bx, by, fx, fy) < radius_2 * radius_2:
+            return True
+        for two in range(4):
+            dx, dy, ex, ey = boundary(arm_2, outline_2, k, j, two // 2, 2.0 * (two % 2) - 1.0)
+            if touching(ax, ay, bx, by, dx, dy, ex, ey):
+                return True
+    # boundary lines of arm 2 against the circle of arm 1
+    for two in range(4):
+        dx, dy, ex, ey = boundary(arm_2, outline_2, k, j, two // 2, 2.0 * (two % 2) - 1.0)
+        if squared_distance(dx, dy, ex, ey, cx, cy) < radius_1 * radius_1:
+            return True
+    return False

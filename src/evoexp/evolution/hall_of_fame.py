@@ -258,16 +258,29 @@ def renew_hall(
     # the best by rank and key, again and again; whoever shares a member with it is out
     held = 0
     while held < len(hall.teams) and num_left > 0:
-        best = left[0]
-        for c in range(1, num_left):
-            k = left[c]
-            if (ranks[k], hits[k], costs[k]) < (ranks[best], hits[best], costs[best]):
-                best = k
+        best = first_by_key(left[:num_left], ranks, hits, costs)
         hall.teams[held], hall.ages[held] = pool[best], ages[best]
         hall.collisions[held], hall.costs[held] = hits[best], costs[best]
         num_left = drop_rivals(pool, hall.teams[held], left, num_left)
         held += 1
     return held
+
+
+@kernel
+def first_by_key(left: IntArray, ranks: IntArray, hits: IntArray, costs: FloatArray) -> int:
+    """Return the candidate with the lowest (rank, collisions, cost) of some, the first of equals.
+
+    Args:
+        left: Indices of candidates.
+        ranks: (candidates,).
+        hits: (candidates,).
+        costs: (candidates,).
+    """
+    best = left[0]
+    for k in left[1:]:
+        if (ranks[k], hits[k], costs[k]) < (ranks[best], hits[best], costs[best]):
+            best = k
+    return int(best)
 
 
 @kernel

@@ -4,7 +4,6 @@ Nothing here needs a network.
 """
 
 import os
-import shutil
 import subprocess
 import sys
 import zipfile
@@ -12,9 +11,6 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from numba.core.caching import UserProvidedCacheLocator
-
-from evoexp.numeric import elementary
 
 ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "src" / "evoexp"
@@ -81,32 +77,6 @@ def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return directory
 
 
-@pytest.fixture(scope="module")
-def cache(installed: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Copy the compiled kernels of the checkout to where the installed package looks.
-
-    Compiling takes half a minute.
-
-    The sources are the same; numba files by path what it compiles. What is not there yet is
-    compiled after all.
-    """
-    compiled = Path(elementary.numba.config.CACHE_DIR)
-    directory = tmp_path_factory.mktemp("cache")
-    place = UserProvidedCacheLocator.get_suitable_cache_subpath
-    for file in SOURCE.rglob("__init__.py"):
-        there = (
-            directory
-            / "kernels"
-            / compiled.name
-            / place(str(installed / file.relative_to(SOURCE.parent)))
-        )
-        if (compiled / place(str(file))).is_dir():
-            shutil.copytree(
-                compiled / place(str(file)), there, ignore=shutil.ignore_patterns("*.tmp*")
-            )
-    return directory
-
-
 def test_contents(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
     ours = {name for name in names if not name.partition("/")[0].endswith(".dist-info")}
@@ -148,11 +118,9 @@ def test_the_installed_command(installed: Path, tmp_path: Path) -> None:
 
 
 def test_the_installed_package_runs_an_experiment_from_any_directory(
-    installed: Path, cache: Path, tmp_path: Path
+    installed: Path, tmp_path: Path
 ) -> None:
     command = ("-m", "evoexp", "run", "experiment=rana_planar", "budget=smoke", "--no-report")
-    printed = execute(
-        sys.executable, *command, cwd=tmp_path, PYTHONPATH=str(installed), EVOEXP_CACHE=str(cache)
-    )
+    printed = execute(sys.executable, *command, cwd=tmp_path, PYTHONPATH=str(installed))
     assert printed.count("2 of 2") >= 2
     assert len(list(tmp_path.glob("outputs/runs/*/replicates/*.mcap"))) == 4

@@ -1,9 +1,7 @@
-"""Files that a condition needs.
+"""Files that a condition needs: each process keeps their contents, by hash.
 
-Known by the hash of their content, which is kept here by the process that needs it.
-
-The door reads a file where a configuration says `{file: path}` and puts `{sha256: …}` in its place:
-a condition's identity is that of the content, wherever the file lay and whatever it was called. The
+A file is read where a configuration says `{file: path}`, and `{sha256: …}` is put in its place: a
+condition's identity is that of the content, wherever the file lay and whatever it was called. The
 content travels with the descriptions of replicates, is attached to their logs, and lies beside the
 configuration of a stored run.
 """
@@ -22,9 +20,7 @@ FILE, SHA256 = "file", "sha256"
 PREFIX = "files/"  # of the names of such attachments in a log
 
 _contents: dict[str, bytes] = {}
-_origins: dict[
-    str, set[str]
-] = {}  # the paths that a content was read from, as configurations gave them
+_origins: dict[str, set[str]] = {}  # SHA-256 → the paths that the content was read from, as given
 
 
 class MissingFile(EvoexpError):
@@ -112,14 +108,14 @@ def read(path: str, folders: Sequence[Path]) -> str:
 
 
 def origins(sha256: str) -> list[str]:
-    """Return the paths that `read` had a content from; none if it came another way."""
+    """Return the paths from which `read` took a content; none if it came another way."""
     return sorted(_origins.get(sha256, ()))
 
 
 def attached(config: Any) -> dict[str, bytes]:
-    """Return the contents that a plain configuration refers to, as far as they are there.
+    """Return the contents that a plain configuration refers to and this process has.
 
-    By their names in a log.
+    The keys are their names in a log.
     """
     return {PREFIX + sha256: _contents[sha256] for sha256 in _hashes(config) if sha256 in _contents}
 

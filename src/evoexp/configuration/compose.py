@@ -11,7 +11,7 @@ import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import hydra
 import yaml
@@ -20,22 +20,20 @@ from hydra.core.override_parser.types import OverrideType, ValueType
 from hydra.errors import HydraException
 from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
-from pydantic import ValidationError
 
 from evoexp import shipped
 from evoexp.batch.runner_settings import RunnerSettings
-from evoexp.condition import PARTS, Condition, read_files
+from evoexp.condition import Condition
 from evoexp.configuration.assignment import assign_all
+from evoexp.configuration.building import build_condition, build_settings, planned_replicates
 from evoexp.configuration.experiment import Budget, Experiment, Labelled
 from evoexp.configuration.interpolations import MARK, NotWhole, fill_in
 from evoexp.configuration.overrides import (
     ADD,
-    AROUND,
     DELETE,
     FORCE,
     JOIN,
     NOT_IDENTITY,
-    PLANNER_PARTS,
     SCALARS,
     Choice,
     Override,
@@ -48,7 +46,6 @@ from evoexp.configuration.overrides import (
     sweep,
 )
 from evoexp.configuration.refusals import (
-    chosen,
     uncomposed,
     unparsed,
     unresolved,
@@ -56,23 +53,18 @@ from evoexp.configuration.refusals import (
 )
 from evoexp.configuration.search_path import (
     EXPERIMENT,
-    file_directories,
     find,
     folders,
     groups,
     is_file,
 )
 from evoexp.errors import SettingError, UnknownOption, UnknownSetting
-from evoexp.registry import component_class
 from evoexp.report.report_settings import ReportSettings
 from evoexp.shipped import Option
-from evoexp.validation import TARGET, Settings, build, settings_error
 
 _PREFIXES = {OverrideType.ADD: ADD, OverrideType.FORCE_ADD: FORCE, OverrideType.DEL: DELETE}
 _SWEEPS = (ValueType.SIMPLE_CHOICE_SWEEP, ValueType.CHOICE_SWEEP, ValueType.RANGE_SWEEP)
 _COMPOSER = (HydraException, OmegaConfBaseException, yaml.YAMLError, ValueError, TypeError, OSError)
-
-AnySettings = TypeVar("AnySettings", bound=Settings)
 
 
 class Composed(NamedTuple):
@@ -238,7 +230,7 @@ def _expand_one(
 ) -> Experiment:
     name = file.name if file else "custom"
     base, labelled = _labelled(name, overrides, only, compose, file)
-    budget = _settings(Budget, base, "budget")
+    budget = build_settings(Budget, base["budget"], "budget")
     found = {label: compose(choice, file) for label, choice in labelled.items()}
     conditions = tuple(
         Labelled(label, _condition(composed.config, budget)) for label, composed in found.items()
@@ -247,9 +239,9 @@ def _expand_one(
         name,
         budget.name,
         conditions,
-        _num_replicates(base["num_replicates"], budget),
-        _settings(RunnerSettings, base, "runner"),
-        _settings(ReportSettings, base, "report"),
+        planned_replicates(base["num_replicates"], budget),
+        build_settings(RunnerSettings, base["runner"], "runner"),
+        build_settings(ReportSettings, base["report"], "report"),
         _changed(file, overrides, only, conditions, compose),
         {label: composed.options for label, composed in found.items()},
     )
@@ -269,7 +261,7 @@ def _changed(
     base, labelled = _labelled(file.name, plain, (), compose, file)
     if list(labelled) != [label for label, _ in conditions]:
         return True
-    budget = _settings(Budget, base, "budget")
+    budget = build_settings(Budget, base["budget"], "budget")
     return any(
         _condition(compose(labelled[label], file).config, budget).id != condition.id
         for label, condition in conditions
@@ -279,9 +271,9 @@ def _changed(
 def _labelled(
     name: str, overrides: Choice, only: Sequence[str], compose: _Composer, file: Option | None
 ) -> tuple[dict[str, Any], dict[str, Choice]]:
-    """Return the configuration without the experiment's own conditions, and each label's choice."""
+    """Return the settings that all conditions share, and the overrides of each label."""
     swept = list(sweep(overrides))
-    base = compose(swept[0][1], file).config
+    base = _shared(compose(swept[0][1], file).config)
     labels: dict[str, Choice] = {}
     owner: dict[str, str] = {}  # the file's own label of a condition that is swept over
     for template, entry in _entries(base["conditions"]):
@@ -311,35 +303,19 @@ def _entries(conditions: Any) -> Iterator[tuple[str, list[str]]]:
 
 
 def _condition(config: dict[str, Any], budget: Budget) -> Condition:
-    """Check and build one composed configuration."""
-    raw, cap = str(config["planner"]), budget.max_generations
-    resolved = _resolved(config)
-    asked = (resolved.get("ga") or {}).get("num_generations")
+    """Build one composed configuration, its generations capped by the budget."""
+    plain, cap = _resolved(config), budget.max_generations
+    asked = (plain.get("ga") or {}).get("num_generations")
     if cap is not None and isinstance(asked, int) and asked > cap:  # before a planner takes it in
-        capped = config | {"ga": config["ga"] | {"num_generations": cap}}
-        resolved = _resolved(capped)
-    plain = read_files(resolved, file_directories())
-    for group in (group for group in PLANNER_PARTS if plain.get(group) is not None):
-        is_taken = f"${{{group}" in raw
-        if group in plain["planner"] and not is_taken:
-            must = f"left as it is; set {group}, the group that it is taken from"
-            raise SettingError(f"planner.{group}", must, plain["planner"][group])
-        if not is_taken:
-            raise SettingError(group, "a part of the chosen planner", plain[group])
-        build(plain[group], component_class, group)  # errors name the group, as it was typed
-    around = [group for group in AROUND if plain.get(group) is not None]
-    if len(around) > 1:
-        must = f"left out beside a {around[0]}"
-        raise SettingError(around[1], must, plain[around[1]].get(TARGET))
-    for group in around:
-        build(plain["planner"], component_class, "planner")  # likewise
-        if TARGET not in plain[group]:
-            raise SettingError(group, chosen(group), plain[group])
-        if "planner" in plain[group]:
-            must = "left out: it is the chosen planner"
-            raise SettingError(f"{group}.planner", must, plain[group]["planner"])
-        plain["planner"] = {**plain[group], "planner": plain["planner"]}
-    return Condition.from_config({part: plain[part] for part in (*PARTS, "seed")})
+        plain = _resolved(config | {"ga": config["ga"] | {"num_generations": cap}})
+    return build_condition(plain, str(config["planner"]))
+
+
+def _shared(config: dict[str, Any]) -> dict[str, Any]:
+    """Return settings outside the conditions; they may be taken from those of a condition."""
+    shared = {name: config[name] for name in NOT_IDENTITY if name in config}
+    shared = _resolved(config) if MARK in str(shared) else shared
+    return shared | {"conditions": config["conditions"]}  # whose overrides are resolved when set
 
 
 def _resolved(config: dict[str, Any]) -> dict[str, Any]:
@@ -353,22 +329,3 @@ def _resolved(config: dict[str, Any]) -> dict[str, Any]:
     except (*_COMPOSER, RecursionError) as error:
         raise unresolved(error, config) from None
     return dict(plain)
-
-
-def _num_replicates(count: Any, budget: Budget) -> int:
-    if type(count) is not int or count < 1:
-        raise SettingError("num_replicates", "a whole number, at least 1", count)
-    return count if budget.max_replicates is None else min(count, budget.max_replicates)
-
-
-def _settings(kind: type[AnySettings], config: dict[str, Any], group: str) -> AnySettings:
-    """Check the settings of a group that is no component; they may refer to other groups."""
-    own = config[group]
-    own = _resolved(config)[group] if MARK in str(own) else own
-    if TARGET in own:
-        raise UnknownSetting(f"{group}.{TARGET}", kind.model_fields)
-    values = build(own, component_class, group)
-    try:
-        return kind(**values)
-    except ValidationError as error:
-        raise settings_error(kind, error, values, group) from None

@@ -1,8 +1,6 @@
-"""Motions to watch: derived on demand from the solution in a replicate's log.
+"""Motions to watch, made on demand from the solution in a replicate's log.
 
-Nothing of it enters an identity.
-
-`recording` makes of a solution one neutral record: what the bodies are, where they are tick by
-tick, how far apart, and when they touch. `page`, `playable_log` and `trajectory` only write that
-record down.
+`recording` turns a solution into one neutral record: the bodies, their poses tick by tick, their
+distances, and the times at which they touch. `player_page`, `playable_log` and `trajectory` write
+that record in their formats. No identity and no digest depends on this package.
 """

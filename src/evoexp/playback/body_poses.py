@@ -1,4 +1,4 @@
-"""Where frames are along a motion, at Pinocchio's placements."""
+"""Poses of frames along a motion, as Pinocchio places them."""
 
 from typing import Any, NamedTuple
 
@@ -16,15 +16,15 @@ TURN = np.radians(2.0)  # [rad] of a joint between two ticks, where there may be
 SLIDE = 0.01  # [-] of the scene's size, of a sliding joint
 
 Place = tuple[int, Any]
-"""A joint of the model, and a placement in it."""
+"""Index of a joint of the model, and a placement in its frame."""
 
 
 class Frame(NamedTuple):
-    """What moves bodies: a joint's frame, or that of an object that is carried.
+    """A frame that moves bodies: of a joint, or of an object that is carried.
 
     Attributes:
-        name: Unique.
-        parent: Index of the frame that it moves with; −1: the world.
+        name: Unique name.
+        parent: Index of the frame that carries it; −1: the world.
     """
 
     name: str
@@ -32,7 +32,7 @@ class Frame(NamedTuple):
 
 
 class Poses(NamedTuple):
-    """Frames over time.
+    """Poses of all frames over time.
 
     Attributes:
         world: (ticks, frames, 7) position, quaternion x, y, z, w in the world.
@@ -48,8 +48,8 @@ def ticks(motion: Motion, prismatic: np.ndarray, size: float) -> FloatArray:
 
     Args:
         motion: The motion; every instant is shown, unless there are more than `MAX_TICKS`.
-        prismatic: (nq,) which coordinates are lengths.
-        size: Of the scene [length unit].
+        prismatic: (nq,) true for coordinates that are lengths.
+        size: Size of the scene [length unit].
     """
     segments = motion.num_segments
     if segments == 0:
@@ -66,9 +66,9 @@ def ticks(motion: Motion, prismatic: np.ndarray, size: float) -> FloatArray:
 
 
 def frames_of(model: Any, carried: list[str]) -> tuple[Frame, ...]:
-    """Return the frames: all joints of a model, then objects that are carried.
+    """Return the frames of all joints of a model, then those of carried objects.
 
-    Which know the world only.
+    The frame of a carried object hangs on the world.
     """
     joints = [Frame(model.names[k], int(model.parents[k]) - 1) for k in range(1, model.njoints)]
     return (*joints, *(Frame(f"object {name}", -1) for name in carried))
@@ -77,14 +77,14 @@ def frames_of(model: Any, carried: list[str]) -> tuple[Frame, ...]:
 def poses(
     model: Any, motion: Motion, times: FloatArray, parts: list[Part], carried: list[str]
 ) -> Poses:
-    """Return where all frames are.
+    """Return the poses of all frames.
 
     Args:
         model: The `pin.Model`.
         motion: The motion.
         times: (ticks,) [instants].
-        parts: Pieces of the motion, which say where objects are.
-        carried: Names of bodies that get frames of their own.
+        parts: Pieces of the motion; each places the carried objects.
+        carried: Names of the objects that have frames of their own.
     """
     data, count = model.createData(), model.njoints - 1 + len(carried)
     world, local = np.empty((2, len(times), count, 7))
@@ -101,7 +101,7 @@ def poses(
 
 
 def points(world: FloatArray, frame: int, point: FloatArray) -> FloatArray:
-    """Return where a frame's point is over time, (ticks, 3).
+    """Return the positions of a point of a frame over time, (ticks, 3).
 
     Args:
         world: (ticks, frames, 7).
@@ -122,7 +122,7 @@ def _place(part: Part, name: str) -> Place:
 
 
 def _continuous(rows: FloatArray) -> FloatArray:
-    """Give quaternions, of which q and −q are one rotation, the sign of the tick before."""
+    """Choose between q and −q, which are one rotation: the sign nearer to the tick before."""
     signs = np.sign((rows[1:, :, 3:] * rows[:-1, :, 3:]).sum(axis=-1))
     flips = np.cumprod(np.where(signs < 0.0, -1.0, 1.0), axis=0)
     rows[1:, :, 3:] *= flips[:, :, None]

@@ -1,4 +1,4 @@
-"""Colours of arms: those of the reports' figures."""
+"""Colours of arms and obstacles; arms have the colours of the reports' figures."""
 
 ARM_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")  # Okabe & Ito 2008
 OBSTACLE, OBJECT, GOOD = "#8a8f94", "#b8860b", "#117733"
@@ -10,6 +10,6 @@ def arm_colour(arm: int) -> str:
 
 
 def rgb(colour: str) -> tuple[float, float, float]:
-    """Return a colour's parts, 0 to 1."""
+    """Return red, green and blue of a colour, each from 0 to 1."""
     red, green, blue = (int(colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
     return red, green, blue

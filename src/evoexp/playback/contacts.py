@@ -1,4 +1,4 @@
-"""How far the bodies are apart over a motion, and every stretch of it in which they touch."""
+"""Distances of the bodies over a motion, and every stretch of it in which bodies touch."""
 
 from typing import NamedTuple
 
@@ -16,13 +16,13 @@ END_RESOLUTION = 1e-6  # [instants] of the end of a contact
 
 
 class Contact(NamedTuple):
-    """Bodies touch.
+    """A stretch of a motion in which bodies touch.
 
     Attributes:
-        begin: Of the contact [instants].
-        end: Of it, to 1e-6; where bodies part for less than a tick, they are said to touch all the
-            same.
-        pair: The bodies that touch first.
+        begin: Begin of the contact [instants].
+        end: End of the contact, to 1e-6 [instants]; bodies that part for less than a tick count as
+            touching all the time.
+        pair: Names of the bodies that touch first.
     """
 
     begin: float
@@ -31,13 +31,13 @@ class Contact(NamedTuple):
 
 
 class Clearance(NamedTuple):
-    """Exact distances.
+    """Exact distances of the watched bodies.
 
     Attributes:
-        least: (ticks,) between any two bodies that are watched [length unit]; 0 where they touch,
-            inf if none are.
-        pairs: (ticks,) the two that are nearest; empty if none are watched.
-        contacts: In the order of time.
+        least: (ticks,) least distance of two watched bodies [length unit]; 0 where bodies touch,
+            inf if none is watched.
+        pairs: (ticks,) names of the two nearest bodies; empty if none is watched.
+        contacts: All contacts in the order of time.
     """
 
     least: FloatArray
@@ -46,12 +46,12 @@ class Clearance(NamedTuple):
 
 
 def part_at(parts: list[Part], t: float) -> Part:
-    """Return the piece that an instant lies in; where one ends, the next one has begun."""
+    """Return the piece that an instant lies in; at the end of a piece, the next piece."""
     return next((part for part in parts if t < part.last), parts[-1])
 
 
 def clearance(parts: list[Part], motion: Motion, times: FloatArray) -> Clearance:
-    """Return distances at ticks, and all contacts.
+    """Return the distances at the ticks, and all contacts.
 
     Args:
         parts: Pieces of the motion, from `Planner.parts`.
@@ -98,7 +98,7 @@ class _Watch:
 def _contacts(watch: _Watch, part: Part, motion: Motion, ticks: FloatArray) -> list[Contact]:
     """Return the contacts of one piece.
 
-    The certifier finds where each begins, ticks and bisection where it ends.
+    The certifier finds the begin of a contact; ticks and bisection find its end.
     """
     found: list[Contact] = []
     t = float(part.first)
@@ -130,9 +130,9 @@ def _contacts(watch: _Watch, part: Part, motion: Motion, ticks: FloatArray) -> l
 
 
 def remainder(motion: Motion, t: float, last: int) -> Motion:
-    """Return what is left of a motion from t on up to an instant.
+    """Return the rest of a motion from t up to an instant.
 
-    Its first segment is what is left of one.
+    If t lies inside a segment, the first segment is the rest of that one.
     """
     segment = min(int(t), max(motion.num_segments - 1, 0))
     u = t - segment
@@ -152,13 +152,13 @@ def remainder(motion: Motion, t: float, last: int) -> Motion:
 
 
 def at_instant(t: float, begin: float) -> float:
-    """Return an instant of the whole motion for one of its remainder from `begin` on."""
+    """Return the instant of the whole motion for instant t of its rest from `begin` on."""
     segment = int(begin)
     return begin + t * (segment + 1 - begin) if t < 1.0 else segment + t
 
 
 def _joined(contacts: list[Contact]) -> tuple[Contact, ...]:
-    """Return contacts of which none begins where another ends."""
+    """Join contacts that begin where another one ends."""
     joined: list[Contact] = []
     for contact in contacts:
         if joined and contact.begin <= joined[-1].end + END_RESOLUTION:

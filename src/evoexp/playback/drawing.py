@@ -1,4 +1,4 @@
-"""Bodies as Foxglove's scene primitives: of the very sizes that coal's shapes have."""
+"""Bodies as Foxglove's scene primitives, of exactly the sizes of coal's shapes."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -31,11 +31,11 @@ OPACITY = {"arm": 1.0, "object": 0.9, "obstacle": 0.45, "start": 0.2, "end": 0.3
 
 
 def bodies(recording: Recording, roles: Iterable[str]) -> list[Any]:
-    """Return an entity per body, in the frame that moves it.
+    """Return one entity per body, in the frame that moves it.
 
     Args:
-        recording: Whose bodies.
-        roles: Which ones.
+        recording: The motion with its bodies.
+        roles: Roles of the bodies to draw.
     """
     chosen, names = set(roles), frame_names(recording)
     return [
@@ -53,7 +53,7 @@ def bodies(recording: Recording, roles: Iterable[str]) -> list[Any]:
 
 
 def ghosts(recording: Recording) -> list[Any]:
-    """Return everything that moves where it starts and where it ends, translucent."""
+    """Return translucent copies of all moving bodies at the start and at the end."""
     found = []
     for when, tick in (("start", 0), ("end", -1)):
         for shape in (shape for shape in recording.shapes if shape.frame >= 0):
@@ -65,7 +65,7 @@ def ghosts(recording: Recording) -> list[Any]:
 
 
 def marks(recording: Recording) -> list[Any]:
-    """Return the tools' ways, and the places that the task names."""
+    """Return the paths of the tools, and the targets of the task."""
     found = []
     for arm, way in enumerate(recording.traces):
         line = LinePrimitive(
@@ -101,22 +101,22 @@ def marks(recording: Recording) -> list[Any]:
 
 
 def frame_names(recording: Recording) -> list[str]:
-    """Return the names of all frames, the world's last: index −1 is the world."""
+    """Return the names of all frames; the world comes last, so index −1 is the world."""
     return [*(frame.name for frame in recording.frames), WORLD]
 
 
 def entity(
     shape: Shape, frame: str, pose: FloatArray, opacity: float, radius: float, name: str
 ) -> Any:
-    """Return a body as one entity: what coal knows as one shape is drawn once.
+    """Return a body as one entity.
 
     Args:
         shape: The body.
         frame: Name of the frame that moves it.
         pose: (7,) in that frame.
         opacity: From 0 to 1.
-        radius: Of the view, for half-spaces.
-        name: The entity's.
+        radius: Radius of the view, for half-spaces [length unit].
+        name: Name of the entity.
     """
     own = (
         arm_colour(shape.arm)

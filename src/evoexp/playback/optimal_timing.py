@@ -1,4 +1,4 @@
-"""As fast along a path as speed and acceleration limits permit."""
+"""The fastest timing of a path within limits of speed and acceleration."""
 
 from typing import Any
 
@@ -15,14 +15,14 @@ GRID = 200  # points per segment at which toppra keeps to the limits
 
 
 def along_lines(motion: Motion, speeds: FloatArray, accelerations: FloatArray) -> Timed:
-    """Return the fastest timing of straight lines with a stop wherever they meet.
+    """Return the fastest timing of straight lines with a stop wherever two of them meet.
 
-    Ramp up, run, ramp down on each.
+    On each line the joints speed up, run at constant speed, and slow down.
 
     Args:
-        motion: Of straight segments.
-        speeds: (nq,) limits.
-        accelerations: (nq,) limits.
+        motion: A motion of straight segments.
+        speeds: (nq,) limits [rad/s or length unit/s].
+        accelerations: (nq,) limits [rad/s² or length unit/s²].
     """
     times, positions, velocities = [0.0], [motion.q[0]], [np.zeros(motion.q.shape[1])]
     for before, after in zip(motion.q[:-1], motion.q[1:], strict=True):
@@ -54,12 +54,13 @@ def along_lines(motion: Motion, speeds: FloatArray, accelerations: FloatArray) -
 def along_curve(motion: Motion, speeds: FloatArray, accelerations: FloatArray) -> Timed | None:
     """Return the fastest timing of a smooth curve by toppra (Pham & Pham 2018).
 
-    None where that is not installed.
-
     Args:
-        motion: Of cubic segments.
-        speeds: (nq,) limits.
-        accelerations: (nq,) limits.
+        motion: A motion of cubic segments.
+        speeds: (nq,) limits [rad/s or length unit/s].
+        accelerations: (nq,) limits [rad/s² or length unit/s²].
+
+    Returns:
+        The timing; None if toppra is not installed.
     """
     try:
         import toppra
@@ -68,9 +69,8 @@ def along_curve(motion: Motion, speeds: FloatArray, accelerations: FloatArray) -
     toppra.setup_logging("ERROR")
     last = float(motion.num_segments)
     path = _path(toppra, motion)
-    between = (
-        toppra.constraint.DiscretizationType.Interpolation
-    )  # else limits are kept at the points of the grid only
+    # so that limits are kept between the points of the grid, too
+    between = toppra.constraint.DiscretizationType.Interpolation
     bounds = [
         toppra.constraint.JointVelocityConstraint(np.stack([-speeds, speeds], axis=1)),
         toppra.constraint.JointAccelerationConstraint(
@@ -87,7 +87,7 @@ def along_curve(motion: Motion, speeds: FloatArray, accelerations: FloatArray) -
 
 
 def _path(toppra: Any, motion: Motion) -> Any:
-    """Return a motion as toppra's geometric path, exactly: piecewise polynomials."""
+    """Return a motion as a geometric path of toppra: the same polynomials, piece by piece."""
     coefficients = motion.polynomials  # (segments, 4, nq), lowest power first
 
     class Path(toppra.interpolator.AbstractGeometricPath):  # type: ignore[misc]

@@ -1,8 +1,8 @@
-"""A motion as an MCAP that plays: in Foxglove's own schemas, without URDF, layout or ROS.
+"""A motion as an MCAP that plays in Foxglove's own schemas, without URDF, layout or ROS.
 
-The clock is the trajectory's: 0 at the start, as fast as the joints' speed limits permit. How the
-search went has another axis, its generations: it stands in one message at the start, whose arrays a
-plot takes as they are.
+The clock is that of the trajectory: 0 at the start, as fast as the joints' speed limits permit. The
+progress of the search is counted in generations instead; it stands in one message at the start,
+whose arrays Foxglove's Plot panel draws.
 """
 
 import io
@@ -76,31 +76,31 @@ def playable_log(recording: Recording) -> bytes:
             0,
             {"generation": list(generations), "best_cost": list(costs)},
         )
-    said = _said(recording)
+    waiting = _log_messages(recording)
     for k, instant in enumerate(recording.times):
         now = nanoseconds(recording, instant)
-        while said and said[0][0] <= now:
-            out.message("/log", *said.pop(0))
+        while waiting and waiting[0][0] <= now:
+            out.message("/log", *waiting.pop(0))
         out.message("/tf", now, _transforms(recording, k, now))
         out.message("/joint_states", now, _joints(recording, k, now))
         out.json("/clearance", CLEARANCE, now, _clearance(recording, k))
-    for moment, message in said:
+    for moment, message in waiting:
         out.message("/log", moment, message)
     return out.finish()
 
 
 def layout() -> bytes:
-    """Return Foxglove's layout file for these logs."""
+    """Return the layout file with which Foxglove shows these logs."""
     return (resources.files("evoexp") / "assets" / LAYOUT).read_bytes()
 
 
 def nanoseconds(recording: Recording, instant: float) -> int:
-    """Return when an instant is [ns]."""
+    """Return the time of an instant on the clock of the log [ns]."""
     return round(float(instant) * recording.seconds * SECOND)
 
 
 class _Playable:
-    """An MCAP being written in memory; channels are registered with their first message."""
+    """Writes an MCAP in memory; a channel is registered with its first message."""
 
     def __init__(self) -> None:
         self._buffer = io.BytesIO()
@@ -125,7 +125,7 @@ class _Playable:
         self._add(topic, "json", name, moment, json.dumps(values, allow_nan=False).encode())
 
     def scene(self, topic: str, entities: list[Any]) -> None:
-        """Append what is drawn, once and for all."""
+        """Append the entities of a scene, which stay as they are."""
         if entities:
             self.message(topic, 0, SceneUpdate(entities=entities))
 
@@ -150,7 +150,7 @@ def _stamp(now: int) -> Any:
 
 
 def _transforms(recording: Recording, k: int, now: int) -> Any:
-    """Return where every frame is in its parent's: one transform per link."""
+    """Return the pose of every frame in its parent's frame: one transform per link."""
     names, rows = frame_names(recording), []
     for frame, row in zip(recording.frames, recording.poses.local[k].tolist(), strict=True):
         x, y, z, qx, qy, qz, qw = row
@@ -186,8 +186,8 @@ def _clearance(recording: Recording, k: int) -> dict[str, Any]:
     return values | ({"clearance": least} if np.isfinite(least) else {})
 
 
-def _said(recording: Recording) -> list[tuple[int, Any]]:
-    """Return what there is to say of the motion, each at its moment, in the order of time."""
+def _log_messages(recording: Recording) -> list[tuple[int, Any]]:
+    """Return verdict, least clearance and contacts as messages, in the order of time."""
     verdict, unit, rows = recording.verdict, recording.length_unit, []
     answer = {
         True: "certified: no two bodies ever touch",

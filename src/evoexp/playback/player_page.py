@@ -1,7 +1,4 @@
-"""Motions as one self-contained page.
-
-Plays offline in any browser, asks the network for nothing.
-"""
+"""Motions as one self-contained page that plays offline in any browser."""
 
 import base64
 import html
@@ -48,7 +45,7 @@ def page(recordings: Sequence[Recording]) -> bytes:
 
 
 def _motion(recording: Recording) -> dict[str, Any]:
-    """Return what the page's script reads of one motion."""
+    """Return the data of one motion that the script of the page reads."""
     clearance, verdict = recording.clearance, recording.verdict
     pairs = list(dict.fromkeys(clearance.pairs))
     return {
@@ -103,7 +100,7 @@ def _shape(shape: Shape) -> dict[str, Any]:
 
 
 def _dots(recording: Recording) -> list[dict[str, Any]]:
-    """Return the joints of links that are lines, which nothing else shows."""
+    """Return the joints of links without thickness: no body marks these joints."""
     lines = {
         shape.frame: shape.arm
         for shape in recording.shapes

@@ -1,7 +1,4 @@
-"""One motion, ready to be watched.
-
-The neutral record that pages, playable logs and trajectories are written from.
-"""
+"""The recording of one motion, from which pages, playable logs and trajectories are written."""
 
 from itertools import product
 from typing import NamedTuple
@@ -26,16 +23,16 @@ FAR = 3.0  # [-] obstacles larger than so many times the robot's room do not mak
 
 
 class NoMotion(EvoexpError):
-    """A solution that is no motion, so that there is nothing to watch."""
+    """A solution without a motion: there is nothing to watch."""
 
 
 class Heading(NamedTuple):
-    """What a recording is of.
+    """The title of a recording, and the search that found the motion.
 
     Attributes:
-        title: One line.
-        replicate: Its index; −1: a motion of the user's own.
-        improvements: (generation, best cost) whenever a better solution was found.
+        title: One line of text.
+        replicate: Index of the replicate; −1: a motion of the user's own.
+        improvements: (generation, best cost) of every better solution.
     """
 
     title: str
@@ -47,8 +44,8 @@ class Joint(NamedTuple):
     """One coordinate of q.
 
     Attributes:
-        name: The joint's.
-        prismatic: Whether it is a length, not an angle.
+        name: Name of the joint.
+        prismatic: Whether the coordinate is a length, not an angle.
     """
 
     name: str
@@ -56,12 +53,12 @@ class Joint(NamedTuple):
 
 
 class View(NamedTuple):
-    """What a picture has to show.
+    """The room that a picture has to show.
 
     Attributes:
-        center: (3,) of the room that robot and obstacles take.
+        center: (3,) centre of the room that robot and obstacles take [length unit].
         extent: (3,) half the edges of that room [length unit].
-        planar: Whether nothing ever leaves the plane z = 0, or turns out of it.
+        planar: Whether all bodies stay in the plane z = 0.
     """
 
     center: FloatArray
@@ -70,34 +67,34 @@ class View(NamedTuple):
 
     @property
     def radius(self) -> float:
-        """Of a ball around the room [length unit]."""
+        """Radius of a ball around the room [length unit]."""
         return float(np.sqrt((self.extent**2).sum()))
 
 
 class Recording(NamedTuple):
-    """A motion with everything that is to be seen of it.
+    """A motion with its bodies, distances, contacts and verdict.
 
     Attributes:
-        heading: What it is of.
-        condition_id: 64 hex digits.
-        config_json: The condition's canonical form.
-        length_unit: Of every length.
-        joints: (nq).
+        heading: Title and origin.
+        condition_id: Hash of the condition, 64 hex digits.
+        config_json: Canonical form of the condition.
+        length_unit: Unit of every length.
+        joints: (nq) joints of the coordinates.
         motion: The motion itself.
-        times: (ticks,) at which it is shown [instants].
+        times: (ticks,) instants that are shown.
         q: (ticks, nq) [rad, length unit].
         dq: (ticks, nq) [rad/s, length unit/s].
-        seconds: From instant to instant.
-        size: Of the scene, by which lengths are judged [length unit].
-        frames: What moves bodies.
-        poses: Of the frames, at the ticks.
+        seconds: Time from instant to instant [s].
+        size: Size of the scene, by which lengths are judged [length unit].
+        frames: Frames that move bodies.
+        poses: Poses of the frames at the ticks.
         shapes: The bodies: every coal shape once.
-        traces: (arms, ticks, 3) ways of the tools.
+        traces: (arms, ticks, 3) paths of the tools [length unit].
         targets: Places that the task names.
         clearance: Exact distances and contacts.
-        margin: Clearance that the task requires.
-        verdict: The certifier's.
-        view: What a picture has to show.
+        margin: Clearance that the task requires [length unit].
+        verdict: Verdict of the certifier.
+        view: Room that a picture has to show.
     """
 
     heading: Heading
@@ -125,16 +122,16 @@ class Recording(NamedTuple):
 def record(
     condition: Condition, solution: FloatArray, heading: Heading, limits: SpeedLimits | None = None
 ) -> Recording:
-    """Return a solution's motion, ready to be watched.
+    """Return the recording of a solution's motion.
 
     Args:
-        condition: Whose solution it is.
+        condition: The condition of the solution.
         solution: Flat, of the planner's documented shape.
-        heading: What to call it.
-        limits: Speeds of the joints, for the timing.
+        heading: Title and origin.
+        limits: Speed limits of the joints, for the timing.
 
     Raises:
-        NoMotion: If the planner's answer is no motion.
+        NoMotion: If the planner gives no motion for the solution, or no bodies.
     """
     planner, problem = condition.prepare()
     motion = planner.motion(problem, solution)
@@ -185,7 +182,7 @@ def record(
 
 
 def _carried(parts: list[Part]) -> list[str]:
-    """Return the bodies that are not always in the same place of the same joint."""
+    """Return the names of bodies that change their joint, or their place on it, on the way."""
     first, found = parts[0].scene, []
     for name, (_, joint, placement) in zip(first.names, first.shapes, strict=True):
         for part in parts[1:]:
@@ -214,10 +211,7 @@ def _shapes(scene: Scene, assembly: Assembly, carried: list[str]) -> tuple[Shape
 
 
 def _tools(assembly: Assembly) -> list[tuple[int, FloatArray]]:
-    """Return the frame and the point in it of every arm's tool.
-
-    Of a robot without tools its last link's end.
-    """
+    """Return frame and point of every arm's tool; of a robot without tools its last link's end."""
     if assembly.tools:
         return [(tool.joint - 1, tool.position) for tool in assembly.tools]
     last = assembly.links[-1]
@@ -225,10 +219,7 @@ def _tools(assembly: Assembly) -> list[tuple[int, FloatArray]]:
 
 
 def _view(shapes: tuple[Shape, ...], world: FloatArray, places: tuple[Target, ...]) -> View:
-    """Return what has to be seen.
-
-    What moves, wherever it goes, obstacles that are not too large, targets.
-    """
+    """Return the room of moving bodies over time, of targets, and of all but huge obstacles."""
     moving = [shape for shape in shapes if shape.role == "arm"]
     ways = [_corners(shape, world) for shape in moving]
     room = float(np.ptp(np.concatenate(ways), axis=0).max())

@@ -1,4 +1,4 @@
-"""Bodies as they are drawn: read off the very coal shapes that the certifier judges."""
+"""Bodies as they are drawn, with the sizes of the coal shapes that the certifier judges."""
 
 from typing import Any, Literal, NamedTuple
 
@@ -17,7 +17,7 @@ class Outline(NamedTuple):
     """A shape in its own frame; capsules, cylinders and cones lie along z and are centred.
 
     Attributes:
-        kind: What it is.
+        kind: Kind of the shape.
         size: box: the edges | sphere: radius | ellipsoid: semi-axes | capsule, cylinder, cone:
             radius, length (that of a capsule is its segment's) | half-space (all points with z ≤ 0)
             and mesh: nothing.
@@ -32,15 +32,12 @@ class Outline(NamedTuple):
 
     @property
     def is_line(self) -> bool:
-        """Whether it has no thickness, so that whoever draws it must choose one."""
+        """Whether the shape has no thickness; the drawing chooses one."""
         return self.kind == "capsule" and self.size[0] == 0.0
 
     @property
     def reach(self) -> float:
-        """Greatest distance of its points from its frame's origin.
-
-        0 of a half-space, which has no end.
-        """
+        """Greatest distance of a point from the frame's origin; 0 for a half-space."""
         if self.points is not None:
             return float(np.sqrt((self.points**2).sum(axis=1).max()))
         if self.kind == "box":
@@ -56,13 +53,13 @@ class Shape(NamedTuple):
     """One body.
 
     Attributes:
-        name: As verdicts speak of it.
-        frame: The frame that moves it, an index of `Recording.frames`; −1: the world.
+        name: Name of the body in verdicts.
+        frame: Index in `Recording.frames` of the frame that moves it; −1: the world.
         pose: (7,) of the outline in that frame: position, quaternion x, y, z, w.
-        outline: What it looks like.
+        outline: Kind and size.
         role: A part of an arm, an obstacle, or an object, which is an obstacle that is carried for
             a while.
-        arm: Which arm it belongs to; −1: none.
+        arm: Index of its arm; −1: none.
     """
 
     name: str
@@ -74,9 +71,10 @@ class Shape(NamedTuple):
 
 
 def outline(shape: Any) -> tuple[Outline, Any]:
-    """Return a coal shape as it is drawn, and where its outline's frame lies in the shape's.
+    """Return the outline of a coal shape, and the placement of the outline's frame in the shape's.
 
-    A `pin.SE3`.
+    Returns:
+        The outline and a `pin.SE3`.
 
     Raises:
         UnsupportedShape: If there is no way to draw it.
@@ -100,10 +98,7 @@ def outline(shape: Any) -> tuple[Outline, Any]:
 
 
 def _mesh(shape: Any) -> tuple[FloatArray, np.ndarray]:
-    """Return corners and triangles of a mesh.
-
-    Turned as seen from outside if the file has them all the wrong way.
-    """
+    """Return corners and triangles of a mesh, each triangle counter-clockwise seen from outside."""
     convex = hasattr(shape, "polygons")
     if convex:
         points = np.array([shape.point(k) for k in range(shape.num_points)])

@@ -22,13 +22,13 @@ def stored_recording(log: Path, title: str = "", limits: SpeedLimits | None = No
 
     Args:
         log: Path of a finished log.
-        title: What to call it; the condition's hash without.
-        limits: Speeds of the joints.
+        title: Title of the recording; by default the hash of the condition.
+        limits: Speed limits of the joints.
 
     Raises:
         CorruptLog: The log cannot be trusted.
-        RevisionMismatch: It was made by other code.
-        NoMotion: Its answer is no motion.
+        RevisionMismatch: It was made by another revision of a component.
+        NoMotion: Its solution is no motion.
     """
     contents = read_log(log)
     keep_all(data for name, data in contents.attachments.items() if name.startswith(PREFIX))
@@ -44,8 +44,8 @@ def chosen_log(run: RunDirectory, choice: str | int) -> Path:
 
     Args:
         run: The run.
-        choice: Its index, or "best", "worst" (by cost), "refuted": the first one that the exact
-            verdict refutes.
+        choice: Index of the replicate, or "best" or "worst" (by cost), or "refuted": the first
+            replicate that the certifier refutes.
 
     Raises:
         NothingStored: If there is no such replicate.
@@ -71,10 +71,7 @@ def chosen_log(run: RunDirectory, choice: str | int) -> Path:
 
 
 def _finite_first(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return replicates with those that found nothing feasible behind the others.
-
-    Which the worst is one of.
-    """
+    """Move the replicates without a feasible solution behind the others, in either order."""
     infinite = rows["best_cost"].astype("float64") == float("inf")
     return pd.concat([rows[~infinite], rows[infinite]])
 

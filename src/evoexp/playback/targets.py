@@ -1,4 +1,4 @@
-"""What a task asks for, as places to mark."""
+"""The places that a task names, to be marked in pictures."""
 
 from typing import Any, NamedTuple
 
@@ -12,11 +12,11 @@ from evoexp.scenarios.posture_task import PointGoal, PoseGoal, PostureTask
 
 
 class Target(NamedTuple):
-    """A place that something shall reach.
+    """A place that a tool or a robot is to reach.
 
     Attributes:
-        name: For the reader.
-        point: (3,) in the world.
+        name: Name beside the mark.
+        point: (3,) in the world [length unit].
     """
 
     name: str
@@ -24,10 +24,7 @@ class Target(NamedTuple):
 
 
 def targets(scenario: Any, robot: Any) -> tuple[Target, ...]:
-    """Return the places that a scenario names for a robot.
-
-    Tasks given by configurations have none.
-    """
+    """Return the places that a scenario names for a robot; none if it names configurations."""
     if isinstance(scenario, PickAndPlace):
         return (
             _target("via point", scenario.via_point),

@@ -1,7 +1,4 @@
-"""From instants to seconds: as fast as the joints' speed limits permit.
-
-In equal times from instant to instant.
-"""
+"""The time from instant to instant: equal, and as short as the joints' speed limits permit."""
 
 from typing import NamedTuple
 
@@ -12,11 +9,12 @@ from evoexp.records import FloatArray
 
 
 class SpeedLimits(NamedTuple):
-    """What joints may do; the papers print no limits.
+    """Speed limits of joints; the papers print none.
 
     Attributes:
-        turn: Of revolute joints [rad/s].
-        slide: Of prismatic joints [length unit/s]; None: a quarter of the scene's size per second.
+        turn: Limit of revolute joints [rad/s].
+        slide: Limit of prismatic joints [length unit/s]; None: a quarter of the scene's size per
+            second.
     """
 
     turn: float = np.pi / 4.0
@@ -26,8 +24,8 @@ class SpeedLimits(NamedTuple):
         """Return the limit of every coordinate (nq,).
 
         Args:
-            prismatic: (nq,) which coordinates are lengths.
-            size: Of the scene [length unit].
+            prismatic: (nq,) true for coordinates that are lengths.
+            size: Size of the scene [length unit].
         """
         slide = 0.25 * size if self.slide is None else self.slide
         return np.where(prismatic, slide, self.turn)
@@ -51,12 +49,12 @@ def seconds_per_instant(motion: Motion, limits: FloatArray) -> float:
 def velocities(motion: Motion, times: FloatArray, seconds: float) -> FloatArray:
     """Return dq/dt at instants, (ticks, nq) [rad/s or length unit/s].
 
-    Where straight lines meet, that of the later one.
+    Where two straight lines meet, the velocity on the later one is taken.
 
     Args:
         motion: The motion.
         times: (ticks,) [instants].
-        seconds: From instant to instant.
+        seconds: Time from instant to instant [s].
     """
     if motion.num_segments == 0:
         return np.zeros((len(times), motion.q.shape[1]))

@@ -1,11 +1,9 @@
-"""A motion as a joint trajectory, for a robot or MoveIt.
+"""A motion as a joint trajectory, for a robot or MoveIt: names, times, positions, velocities.
 
-Names, times, positions, and velocities where they say more.
-
-What a controller makes of the points is the motion that was judged: without velocities it goes
-straight from point to point; with velocities it goes along the cubic that they determine: the
-spline's own piece (uniform timing), or a straight piece's ramp up, run and ramp down (optimal
-timing).
+A controller that interpolates the points moves as the motion that was judged. Without velocities it
+goes straight from point to point. With velocities it follows the cubics that they determine: the
+pieces of the spline (uniform timing), or speeding up, constant speed and slowing down on a straight
+piece (optimal timing).
 """
 
 import csv
@@ -25,17 +23,17 @@ Timing = Literal["uniform", "optimal"]
 
 
 class BadTiming(EvoexpError):
-    """A timing that cannot be."""
+    """A timing that is not available."""
 
 
 class Trajectory(NamedTuple):
-    """Points of a motion in time.
+    """The points of a motion in time.
 
     Attributes:
-        joints: (nq) names.
-        units: (nq) rad, or the scene's unit of length.
+        joints: (nq) names of the joints.
+        units: (nq) units of the coordinates: rad, or the scene's unit of length.
         times: (points,) from the start [s].
-        positions: (points, nq).
+        positions: (points, nq) [rad or length unit].
         velocities: (points, nq) per second; None: straight from point to point.
     """
 
@@ -49,19 +47,19 @@ class Trajectory(NamedTuple):
 def trajectory(
     recording: Recording, timing: Timing, limits: SpeedLimits, ramp: float
 ) -> Trajectory:
-    """Return a motion in time.
+    """Return the points of a motion in time.
 
     Args:
-        recording: The motion, whose `seconds` come from the same limits.
+        recording: The motion; its `seconds` come from the same limits.
         timing: uniform: equal times from instant to instant, as short as the speed limits permit |
-            optimal: as fast as speed and acceleration limits permit along the path, with a stop
-            wherever straight lines meet.
-        limits: Of speeds.
-        ramp: Time from rest to a joint's greatest speed [s]: limits accelerations, of the optimal
-            timing only.
+            optimal: as fast as limits of speed and acceleration permit along the path, with a stop
+            wherever two straight lines meet.
+        limits: Limits of speed.
+        ramp: Time from rest to a joint's greatest speed [s]; it limits the accelerations of the
+            optimal timing.
 
     Raises:
-        BadTiming: If there is no such timing, or what it needs is not installed.
+        BadTiming: If the timing needs a package that is not installed.
     """
     motion = recording.motion
     prismatic = np.array([joint.prismatic for joint in recording.joints])
@@ -86,10 +84,7 @@ def trajectory(
 
 
 def as_json(recording: Recording, found: Trajectory) -> bytes:
-    """Return a trajectory with the fields of `trajectory_msgs/JointTrajectory`.
-
-    Times in seconds.
-    """
+    """Return a trajectory as JSON, with the fields of `trajectory_msgs/JointTrajectory`."""
     points = []
     for k, time in enumerate(found.times.tolist()):
         point: dict[str, Any] = {"time_from_start": time, "positions": found.positions[k].tolist()}
@@ -108,7 +103,7 @@ def as_json(recording: Recording, found: Trajectory) -> bytes:
 
 
 def as_csv(found: Trajectory) -> bytes:
-    """Return a trajectory as a table: time, positions, and velocities if there are any."""
+    """Return a trajectory as CSV: time, positions, and velocities if there are any."""
     columns = [found.times[:, None], found.positions]
     names = [
         "time_s",

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.sphere_kernels import SphereTables, clearances
+from evoexp.collision.models.sphere_kernels import clearances
 from evoexp.evolution.cost_statistics import summarise
 from evoexp.evolution.crossover import cross_at_sites
 from evoexp.evolution.selection import choose_elites, shuffle_head, spin_roulette
@@ -93,7 +93,7 @@ class Judging(NamedTuple):
 
     substeps: int
     weights: tuple[float, float, float]
-    tables: SphereTables
+    tables: tuple[Any, ...]
 
 
 class Settings(NamedTuple):

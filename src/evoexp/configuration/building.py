@@ -1,0 +1,79 @@
+"""Building: a composed configuration, as plain data, checked and made into typed settings."""
+
+from typing import Any, TypeVar
+
+from pydantic import ValidationError
+
+from evoexp.condition import PARTS, Condition, read_files
+from evoexp.configuration.experiment import Budget
+from evoexp.configuration.overrides import AROUND, PLANNER_PARTS
+from evoexp.configuration.refusals import chosen
+from evoexp.configuration.search_path import file_directories
+from evoexp.errors import SettingError, UnknownSetting
+from evoexp.registry import component_class
+from evoexp.validation import TARGET, Settings, build, settings_error
+
+AnySettings = TypeVar("AnySettings", bound=Settings)
+
+
+def build_condition(config: dict[str, Any], planner: str) -> Condition:
+    """Build the condition of a configuration.
+
+    Args:
+        config: All groups, interpolations filled in.
+        planner: The planner's settings as text, interpolations as they are written: they tell
+            which groups the planner takes in.
+
+    Raises:
+        EvoexpError: For a value that cannot be, or parts that do not go together.
+    """
+    plain = read_files(config, file_directories())
+    # groups that the planner takes in, whose errors name the group, as it was typed
+    for group in (group for group in PLANNER_PARTS if plain.get(group) is not None):
+        is_taken = f"${{{group}" in planner
+        if group in plain["planner"] and not is_taken:
+            must = f"left as it is; set {group}, the group that it is taken from"
+            raise SettingError(f"planner.{group}", must, plain["planner"][group])
+        if not is_taken:
+            raise SettingError(group, "a part of the chosen planner", plain[group])
+        build(plain[group], component_class, group)
+    # a control or a reference is put around the planner
+    around = [group for group in AROUND if plain.get(group) is not None]
+    if len(around) > 1:
+        must = f"left out beside a {around[0]}"
+        raise SettingError(around[1], must, plain[around[1]].get(TARGET))
+    for group in around:
+        build(plain["planner"], component_class, "planner")
+        if TARGET not in plain[group]:
+            raise SettingError(group, chosen(group), plain[group])
+        if "planner" in plain[group]:
+            must = "left out: it is the chosen planner"
+            raise SettingError(f"{group}.planner", must, plain[group]["planner"])
+        plain["planner"] = {**plain[group], "planner": plain["planner"]}
+    return Condition.from_config({part: plain[part] for part in (*PARTS, "seed")})
+
+
+def planned_replicates(count: Any, budget: Budget) -> int:
+    """Return the number of replicates, capped by the budget.
+
+    Raises:
+        SettingError: If it is no number of replicates.
+    """
+    if type(count) is not int or count < 1:
+        raise SettingError("num_replicates", "a whole number, at least 1", count)
+    return count if budget.max_replicates is None else min(count, budget.max_replicates)
+
+
+def build_settings(kind: type[AnySettings], config: dict[str, Any], group: str) -> AnySettings:
+    """Build the settings of a group that is no component.
+
+    Raises:
+        EvoexpError: For a value that cannot be, or an unknown setting.
+    """
+    if TARGET in config:
+        raise UnknownSetting(f"{group}.{TARGET}", kind.model_fields)
+    values = build(config, component_class, group)
+    try:
+        return kind(**values)
+    except ValidationError as error:
+        raise settings_error(kind, error, values, group) from None

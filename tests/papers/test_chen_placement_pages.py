@@ -10,7 +10,7 @@ from evoexp.papers.chen import cases as case_results
 from evoexp.papers.chen import placement_claims
 from evoexp.papers.chen.cases import Case
 from evoexp.papers.chen.figures import landscapes, placements
-from evoexp.report import claims
+from evoexp.report import verdicts
 from report_samples import figure_stems, page_settings, smoke_report, smoke_results
 
 
@@ -89,19 +89,20 @@ def test_verdicts_where_they_are_judged(
     verdict = {one.text: one.verdict for one in found}
     assert (
         verdict["least torque norm: the best posture has a torque norm of 1.73"]
-        == claims.REPRODUCED
+        == verdicts.REPRODUCED
     )
     assert (
         verdict["obstacle and link 2: the best posture has a torque norm of 2.08"]
-        == claims.CONTRADICTED
+        == verdicts.CONTRADICTED
     )
     assert (
         verdict["obstacle and platform: the best posture has a torque norm of 3.01"]
-        == claims.REPRODUCED
+        == verdicts.REPRODUCED
     )
     angles = [text for text in verdict if "is at or near the optimum" in text]
     assert len(angles) == 2
-    assert {verdict[text] for text in angles} == {claims.REPRODUCED}
+    assert {verdict[text] for text in angles} == {verdicts.REPRODUCED}
     assert (
-        verdict["manipulability and torque: the Newton-type method gets stuck"] == claims.REPRODUCED
+        verdict["manipulability and torque: the Newton-type method gets stuck"]
+        == verdicts.REPRODUCED
     )

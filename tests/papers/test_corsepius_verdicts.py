@@ -15,10 +15,10 @@ from evoexp.papers.corsepius import claims as task_claims
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius import population_claims as verdicts
 from evoexp.report import judging
-from evoexp.report.claims import CONTRADICTED, INCONCLUSIVE, NOT_JUDGED, REPRODUCED, Claim
 from evoexp.report.judging import Judge
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results, StoredLogs
+from evoexp.report.verdicts import CONTRADICTED, INCONCLUSIVE, NOT_JUDGED, REPRODUCED, Claim
 from report_samples import REPORT
 from shipped_conditions import expanded
 

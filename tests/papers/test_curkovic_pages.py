@@ -11,8 +11,8 @@ from evoexp.papers.curkovic import claims as sweep_claims
 from evoexp.papers.curkovic import families, link_motions, measures, motion_page
 from evoexp.papers.curkovic.figures import link_intersection, pareto_fronts, robot_motions
 from evoexp.papers.curkovic.fronts import read_fronts
-from evoexp.report import claims, judging, style
-from evoexp.report.page import Page
+from evoexp.report import judging, style, verdicts
+from evoexp.report.page_parts import Page
 from evoexp.report.pages import page_of
 from evoexp.report.results import ConditionResults
 from report_samples import figure_stems, page_settings, smoke_report, smoke_results
@@ -200,13 +200,13 @@ def test_verdicts_follow_the_rows_of_a_sweep(
     settings, found = page_settings("curkovic_mutation"), []
     for first, second in ((low, high), (high, low), (low, low)):
         rows = tuple(
-            claims.compare(f"constant {k}", first, second, True, 0.95, 50) for k in range(3)
+            verdicts.compare(f"constant {k}", first, second, True, 0.95, 50) for k in range(3)
         )
         tested = [one._replace(rows=rows) for one in families.tested(results, settings, 12.0)[:1]]
         (judged,) = sweep_claims.of_sweep(results, settings, tested)
         found.append(judged.verdict)
         assert "constant 2 (A12" in judged.evidence
-    assert found == [claims.REPRODUCED, claims.CONTRADICTED, claims.INCONCLUSIVE]
+    assert found == [verdicts.REPRODUCED, verdicts.CONTRADICTED, verdicts.INCONCLUSIVE]
 
 
 def test_what_is_tested_between_configurations_is_paired_with_its_twin(outputs: Path) -> None:

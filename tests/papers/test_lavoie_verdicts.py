@@ -13,7 +13,11 @@ from evoexp.configuration import expansions
 from evoexp.configuration.experiment import Experiment
 from evoexp.papers.lavoie import claims, measures, sweep_claims
 from evoexp.papers.lavoie.measures import RefutedMotions
-from evoexp.report.claims import (
+from evoexp.report.judging import Judge, judge
+from evoexp.report.proportions import Proportion
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results import ConditionResults, Results, StoredLogs
+from evoexp.report.verdicts import (
     CONTRADICTED,
     INCONCLUSIVE,
     NOT_JUDGED,
@@ -21,10 +25,6 @@ from evoexp.report.claims import (
     Claim,
     judge_greater,
 )
-from evoexp.report.judging import Judge, judge
-from evoexp.report.proportions import Proportion
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results, StoredLogs
 from report_samples import REPORT
 
 SETTINGS = ReportSettings(**REPORT, figures="lavoie")  # type: ignore[arg-type]

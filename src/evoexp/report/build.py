@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from evoexp.condition import Condition
 from evoexp.report.index import render
-from evoexp.report.page import Drawing
+from evoexp.report.page_parts import Drawing
 from evoexp.report.pages import page_of
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import gather

@@ -6,9 +6,9 @@ import numpy as np
 
 from evoexp.condition import Condition
 from evoexp.records import FloatArray
-from evoexp.report.claims import Comparison, adjusted, compare
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results, wrapped
+from evoexp.report.verdicts import Comparison, adjusted, compare
 
 Values = Callable[[ConditionResults], FloatArray]
 

@@ -3,12 +3,12 @@
 from collections.abc import Iterable, Iterator, Sequence
 
 from evoexp.report import markdown
-from evoexp.report.claims import Claim, Comparison
-from evoexp.report.page import Drawing, Page
+from evoexp.report.page_parts import Drawing, Page
 from evoexp.report.parameters import Parameter, parameters
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results, Verdicts
 from evoexp.report.statistics import wilson
+from evoexp.report.verdicts import Claim, Comparison
 
 WIDEST = 20  # conditions side by side; more stand one below the other
 

@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from evoexp.report import claims, markdown
-from evoexp.report.claims import Claim, Comparison
+from evoexp.report import markdown, verdicts
 from evoexp.report.parameters import option, planned_replicates
 from evoexp.report.proportions import Proportion
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results
+from evoexp.report.verdicts import Claim, Comparison
 from evoexp.shipped import config_directory, shipped
 
 
@@ -25,19 +25,19 @@ class Judge(NamedTuple):
 
     def claim(self, text: str, source: str, evidence: str, verdict: str) -> Claim:
         """Make a claim whose verdict the caller has found."""
-        reason = f"{claims.NOT_JUDGED} ({self.reason})"
+        reason = f"{verdicts.NOT_JUDGED} ({self.reason})"
         return Claim(text, source, evidence, reason if self.reason else verdict)
 
     def every(
         self, text: str, source: str, evidence: str, holds: int, done: int, planned: int
     ) -> Claim:
-        """Make a claim about every run; see `claims.judge_all`."""
-        verdict = claims.judge_all(holds, done, planned)
+        """Make a claim about every run; see `verdicts.judge_all`."""
+        verdict = verdicts.judge_all(holds, done, planned)
         return self.claim(text, source, evidence, verdict)
 
     def majority(self, text: str, source: str, evidence: str, holds: int, done: int) -> Claim:
         """Make a claim that is reproduced if it holds in more than half of the runs."""
-        verdict = claims.REPRODUCED if holds > done / 2 else claims.CONTRADICTED
+        verdict = verdicts.REPRODUCED if holds > done / 2 else verdicts.CONTRADICTED
         return self.claim(text, source, evidence, verdict)
 
     def better(
@@ -52,7 +52,7 @@ class Judge(NamedTuple):
             word: Of the one that is better: "lower", "earlier".
             told: The evidence; its {} stands for the comparison in words.
         """
-        verdict = claims.judge_better(row, self.significance)
+        verdict = verdicts.judge_better(row, self.significance)
         words = evidence(row, word) if row else "nothing to compare"
         return self.claim(text, source, told.replace("{}", words), verdict)
 
@@ -60,7 +60,7 @@ class Judge(NamedTuple):
         self, text: str, source: str, evidence: str, rows: Sequence[Comparison]
     ) -> Claim:
         """Make a claim that one condition is better than each of several others."""
-        verdict = claims.judge_better_than_all(rows, self.significance)
+        verdict = verdicts.judge_better_than_all(rows, self.significance)
         return self.claim(text, source, evidence, verdict)
 
     def greater(
@@ -72,8 +72,8 @@ class Judge(NamedTuple):
         two: Proportion,
         p_adjusted: float | None = None,
     ) -> Claim:
-        """Make a claim that proportion `one` is greater than `two`; see `claims.judge_greater`."""
-        verdict = claims.judge_greater(one, two, self.significance, p_adjusted)
+        """Make a claim that `one` is greater than `two`; see `verdicts.judge_greater`."""
+        verdict = verdicts.judge_greater(one, two, self.significance, p_adjusted)
         return self.claim(text, source, evidence, verdict)
 
 

@@ -13,7 +13,6 @@ protocol (`ConditionResults.evaluate`, `motion`, `problem`). Its parts are:
 
 from evoexp.report import (
     body_contacts,
-    claims,
     comparisons,
     judging,
     markdown,
@@ -21,11 +20,11 @@ from evoexp.report import (
     run_measures,
     style,
     sweep_figures,
+    verdicts,
 )
-from evoexp.report.claims import Claim, Comparison
 from evoexp.report.comparisons import Values, by_column, compared
 from evoexp.report.judging import Judge, evidence
-from evoexp.report.page import Drawing, Page, Quantity, Table
+from evoexp.report.page_parts import Drawing, Page, Quantity, Table
 from evoexp.report.pages import generic
 from evoexp.report.proportions import Proportion, fisher_exact, newcombe
 from evoexp.report.report_settings import ReportSettings
@@ -49,6 +48,7 @@ from evoexp.report.statistics import (
     quantile,
     spread,
 )
+from evoexp.report.verdicts import Claim, Comparison
 
 __all__ = [
     "BOOTSTRAP_SEED",
@@ -67,7 +67,6 @@ __all__ = [
     "Values",
     "body_contacts",
     "by_column",
-    "claims",
     "compared",
     "comparisons",
     "counted",
@@ -95,4 +94,5 @@ __all__ = [
     "style",
     "success",
     "sweep_figures",
+    "verdicts",
 ]

@@ -3,13 +3,13 @@
 from collections.abc import Mapping, Sequence
 from functools import partial
 
-from evoexp.report.claims import Comparison
 from evoexp.report.figures import effects, shares
 from evoexp.report.figures.effects import Values
-from evoexp.report.page import Drawing
+from evoexp.report.page_parts import Drawing
 from evoexp.report.proportions import Proportion
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results
+from evoexp.report.verdicts import Comparison
 
 WHISKERS = "whiskers to the last value within 1.5 interquartile ranges"
 BOXES = (

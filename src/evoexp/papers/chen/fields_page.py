@@ -17,11 +17,11 @@ from evoexp.report.kit import (
     Page,
     ReportSettings,
     Results,
-    claims,
     generic,
     groups,
     judging,
     records,
+    verdicts,
 )
 
 PRINT = "chen_fig_1.txt"
@@ -90,7 +90,7 @@ def _claims(judge: Judge, table: pd.DataFrame) -> Iterator[Claim]:
                 "for "
                 "single slips of the print: at most one in a hundred)"
             ),
-            verdict=claims.judged(same >= 0.99 * total),
+            verdict=verdicts.judged(same >= 0.99 * total),
         )
 
 

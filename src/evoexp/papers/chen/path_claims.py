@@ -13,11 +13,11 @@ from evoexp.report.kit import (
     ReportSettings,
     Results,
     by_column,
-    claims,
     compared,
     evidence,
     judging,
     markdown,
+    verdicts,
 )
 
 SOURCE = "section 4.1, Fig. 2"
@@ -81,7 +81,7 @@ def _compromise(judge: Judge, settings: ReportSettings, groups: tuple[Group, ...
                 for other, word, rows in ((a, "safer", safer), (c, "shorter", shorter))
                 for row in rows
             ),
-            rows=claims.adjusted([*safer, *shorter]),
+            rows=verdicts.adjusted([*safer, *shorter]),
         ),
         judge.better(
             f"{c.label}: a very safe path, safer than {b.label}",

@@ -12,11 +12,11 @@ from evoexp.report.kit import (
     ReportSettings,
     Results,
     by_column,
-    claims,
     compared,
     fisher_exact,
     judging,
     markdown,
+    verdicts,
 )
 
 ROUNDED = 0.005  # half a unit in the last place of the printed numbers
@@ -56,7 +56,7 @@ def _value(judge: Judge, case: Case) -> Iterator[Claim]:
         text=f"{case.name}: the best posture has a {name} of {printed.value:g}",
         source=f"section 4.2, {printed.figure}",
         evidence=told,
-        verdict=claims.judged(agrees),
+        verdict=verdicts.judged(agrees),
     )
 
 
@@ -76,7 +76,7 @@ def _angles(judge: Judge, case: Case) -> Iterator[Claim]:
         evidence=(
             f"E = {cost:.6g} there, {case.least:.6g} at the optimum: {100 * gap:.2g} % above it"
         ),
-        verdict=claims.judged(gap <= CLOSE[1]),
+        verdict=verdicts.judged(gap <= CLOSE[1]),
     )
 
 
@@ -109,7 +109,7 @@ def _against_conventional(judge: Judge, case: Case, settings: ReportSettings) ->
                 "above "
                 f"the optimum ({markdown.percent(stuck.interval(settings.confidence))})"
             ),
-            verdict=claims.judged(verdict),
+            verdict=verdicts.judged(verdict),
         )
         if case.elitist is not None:
             yield _better(judge, case, method, at_best)
@@ -161,5 +161,5 @@ def _seconds(judge: Judge, case: Case) -> Iterator[Claim]:
         evidence=(
             f"{1000 * seconds:.1f} ms of this machine per run (median), verdict and log included"
         ),
-        verdict=claims.judged(seconds <= PAPER_S),
+        verdict=verdicts.judged(seconds <= PAPER_S),
     )

@@ -10,13 +10,13 @@ from evoexp.report.kit import (
     Judge,
     ReportSettings,
     Results,
-    claims,
     counted,
     fisher_exact,
     judging,
     markdown,
     solved,
     success,
+    verdicts,
 )
 
 MANY_JOINTS = 6  # arms with more joints are redundant
@@ -96,7 +96,7 @@ def _redundant(
             text="The approach works for highly redundant arms",
             source="section 6",
             evidence=f"{'; '.join(texts)} (reproduced: a certified path, in one task at least)",
-            verdict=claims.judged(any(free.values())),
+            verdict=verdicts.judged(any(free.values())),
         )
 
 
@@ -113,7 +113,7 @@ def _planning_time(condition: ConditionResults) -> Iterator[Claim]:
         f"spheres to this model's {shapes}"
     )
     what = f"{condition.label}: planning takes a couple of seconds up to a few minutes"
-    yield Claim(what, "section 5", told, f"{claims.NOT_JUDGED} (another machine, another model)")
+    yield Claim(what, "section 5", told, f"{verdicts.NOT_JUDGED} (another machine, another model)")
 
 
 def _stuck(

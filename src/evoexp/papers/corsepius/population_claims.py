@@ -15,7 +15,6 @@ from evoexp.report.kit import (
     Judge,
     ReportSettings,
     Values,
-    claims,
     effort_ratio,
     expected_effort,
     fisher_exact,
@@ -23,6 +22,7 @@ from evoexp.report.kit import (
     markdown,
     solved,
     success,
+    verdicts,
 )
 
 RECOMMENDED = 100.0  # individuals (section 5)
@@ -147,7 +147,7 @@ def _short(ratio: float) -> str:
 
 def _unless(against: object, favour: object) -> str:
     """Return the verdict: contradicted if anything is against, reproduced if anything favours."""
-    return claims.judged(False if against else True if favour else None)
+    return verdicts.judged(False if against else True if favour else None)
 
 
 def _no_faster(judge: Judge, metric: str, rows: list[SizeComparison]) -> Claim:

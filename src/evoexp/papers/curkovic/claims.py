@@ -3,12 +3,12 @@
 from collections.abc import Callable, Sequence
 
 from evoexp.papers.curkovic.families import FamilyComparison
-from evoexp.report import claims, judging, markdown
-from evoexp.report.claims import Claim, Comparison
+from evoexp.report import judging, markdown, verdicts
 from evoexp.report.judging import Judge
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
 from evoexp.report.statistics import spread
+from evoexp.report.verdicts import Claim, Comparison
 
 HALL = {"ga.hall_depth", "ga.hall_memory", "ga.hall_frozen", "ga.num_elites"}
 MUTATION = {"ga.mutation_rate", "ga.mutation_decay", "ga.mutation_direction"}
@@ -81,7 +81,7 @@ def _depth(judge: Judge, results: Results, found: Sequence[FamilyComparison]) ->
             f"A hall of at most {first.label} of the population is the best, judged by "
             f"{one.measure.name}"
         )
-        verdict = claims.judge_best(one.rows, own <= min(medians), judge.significance)
+        verdict = verdicts.judge_best(one.rows, own <= min(medians), judge.significance)
         judged.append(judge.claim(text, "section 3", evidence, verdict))
     return judged
 

@@ -5,11 +5,11 @@ from typing import Any, NamedTuple
 
 from evoexp.papers.curkovic import measures
 from evoexp.report import markdown
-from evoexp.report.claims import Comparison
 from evoexp.report.pages import generic
 from evoexp.report.pages.generic import Values
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
+from evoexp.report.verdicts import Comparison
 
 
 class Family(NamedTuple):

@@ -8,7 +8,7 @@ from evoexp.papers.curkovic import link_motions
 from evoexp.planners.coevolution.planner import Problem
 from evoexp.records import FloatArray
 from evoexp.report import markdown
-from evoexp.report.page import Quantity
+from evoexp.report.page_parts import Quantity
 from evoexp.report.pages import generic
 from evoexp.report.proportions import Proportion
 from evoexp.report.results import ConditionResults, Results

@@ -15,11 +15,11 @@ from evoexp.papers.curkovic.figures import (
 from evoexp.planners.coevolution.planner import Problem
 from evoexp.records import FloatArray
 from evoexp.report import judging, markdown
-from evoexp.report.claims import Claim, Comparison
-from evoexp.report.page import Drawing, Page
+from evoexp.report.page_parts import Drawing, Page
 from evoexp.report.pages import generic
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
+from evoexp.report.verdicts import Claim, Comparison
 
 INTRODUCTION = (
     "Link angles are absolute, from the positive x-axis; one instant is one sampling step from a "

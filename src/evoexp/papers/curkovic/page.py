@@ -6,12 +6,12 @@ import numpy as np
 
 from evoexp.papers.curkovic import measures
 from evoexp.papers.curkovic.figures import methods
-from evoexp.report import claims, judging, markdown
-from evoexp.report.claims import Comparison
-from evoexp.report.page import Drawing, Page
+from evoexp.report import judging, markdown, verdicts
+from evoexp.report.page_parts import Drawing, Page
 from evoexp.report.pages import generic
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results
+from evoexp.report.verdicts import Comparison
 
 PAIRS = (("V", "I"), ("VI", "II"), ("VII", "III"), ("VIII", "IV"))
 INTRODUCTION = (
@@ -68,7 +68,7 @@ def _claims(
     generations: tuple[Comparison, ...],
     costs: tuple[Comparison, ...],
     threshold: float,
-) -> tuple[claims.Claim, ...]:
+) -> tuple[verdicts.Claim, ...]:
     judge = judging.judge(results, settings)
     found = [
         judge.better(

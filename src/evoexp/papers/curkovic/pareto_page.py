@@ -10,7 +10,7 @@ from evoexp.papers.curkovic.figures import pareto_fronts
 from evoexp.papers.curkovic.fronts import read_fronts
 from evoexp.records import FloatArray, FrontRow
 from evoexp.report import markdown
-from evoexp.report.page import Drawing, Page, Quantity
+from evoexp.report.page_parts import Drawing, Page, Quantity
 from evoexp.report.pages import generic
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results

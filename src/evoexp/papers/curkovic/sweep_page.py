@@ -9,7 +9,7 @@ from evoexp.papers.curkovic import claims, families, measures
 from evoexp.papers.curkovic.families import FamilyComparison
 from evoexp.papers.curkovic.figures import defect_rates
 from evoexp.report import markdown
-from evoexp.report.page import Drawing, Page, Quantity
+from evoexp.report.page_parts import Drawing, Page, Quantity
 from evoexp.report.pages import generic
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results

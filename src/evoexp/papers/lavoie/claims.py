@@ -11,12 +11,12 @@ from evoexp.report.kit import (
     ConditionResults,
     Judge,
     Proportion,
-    claims,
     counted,
     fisher_exact,
     markdown,
     newcombe,
     solved,
+    verdicts,
 )
 
 SOURCE = "section 5, Fig. 3"
@@ -42,9 +42,9 @@ def judge_equal(one: Proportion, two: Proportion, confidence: float) -> str:
         Reproduced if 0 lies within the interval, else contradicted.
     """
     if not one.total or not two.total:
-        return claims.INCONCLUSIVE
+        return verdicts.INCONCLUSIVE
     low, high = newcombe(one, two, confidence)
-    return claims.judged(low <= 0.0 <= high)
+    return verdicts.judged(low <= 0.0 <= high)
 
 
 def percentages(judge: Judge, condition: ConditionResults, level: float) -> list[Claim]:
@@ -142,6 +142,6 @@ def judged_elsewhere() -> list[Claim]:
     """Return the claims that need a sweep, not judged."""
     told = "judged by its sweep: `evoexp run experiment={}`"
     return [
-        Claim(text, source, told.format(experiment), claims.NOT_JUDGED)
+        Claim(text, source, told.format(experiment), verdicts.NOT_JUDGED)
         for text, source, experiment in ELSEWHERE
     ]

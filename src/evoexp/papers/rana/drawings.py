@@ -12,7 +12,7 @@ from evoexp.papers.rana import motions, planar_page
 from evoexp.papers.rana.figures import planar_models, planar_motion, spatial_models, spatial_paths
 from evoexp.report import markdown
 from evoexp.report.figures import convergence
-from evoexp.report.page import Drawing
+from evoexp.report.page_parts import Drawing
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
 

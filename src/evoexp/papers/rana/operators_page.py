@@ -1,12 +1,12 @@
 """The page of ablations: the first condition against each other one, on common seeds."""
 
 from evoexp.report import judging, markdown
-from evoexp.report.claims import Claim, Comparison
-from evoexp.report.page import Page
+from evoexp.report.page_parts import Page
 from evoexp.report.pages import generic
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results
 from evoexp.report.sweep_figures import effects_drawing, values_drawing
+from evoexp.report.verdicts import Claim, Comparison
 
 COMPARED = (  # name in figures, name, unit, column, whether lower is better
     ("best cost", "best cost", "–", "best_cost", True),

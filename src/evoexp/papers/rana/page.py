@@ -5,9 +5,9 @@ import numpy as np
 from evoexp.papers.rana import drawings, motions
 from evoexp.papers.rana.drawings import AT, BETWEEN, MeasuredMotions, measure
 from evoexp.planners.via_point_ga.strings import Problem
-from evoexp.report import claims, markdown
+from evoexp.report import markdown, verdicts
 from evoexp.report.judging import Judge
-from evoexp.report.page import Page, Quantity
+from evoexp.report.page_parts import Page, Quantity
 from evoexp.report.pages import generic
 from evoexp.report.parameters import overridden, parameters, planned_replicates
 from evoexp.report.report_settings import ReportSettings
@@ -112,8 +112,8 @@ def _claims(
     results: Results,
     settings: ReportSettings,
     one: MeasuredMotions,
-    comparisons: tuple[tuple[str, tuple[claims.Comparison, ...]], ...],
-) -> list[claims.Claim]:
+    comparisons: tuple[tuple[str, tuple[verdicts.Comparison, ...]], ...],
+) -> list[verdicts.Claim]:
     """Return the paper's claims with verdicts on one condition."""
     c, unit, who = one.condition, one.condition.condition.length_unit, _who(results, one)
     judge = Judge(not_judged(results, c), settings.significance)
@@ -146,7 +146,7 @@ def _claims(
     )
     command = f"`evoexp run experiment=rana_{'planar' if one.planar else 'puma'}_ablations`"
     told = f"{ablations}: {command}"
-    found.append(judge.claim(text, "section 5", told, claims.NOT_JUDGED))
+    found.append(judge.claim(text, "section 5", told, verdicts.NOT_JUDGED))
     text = (
         f"{who}Evolution adds to that: better than random search that redistributes and relaxes, "
         "too (our reading)"
@@ -154,7 +154,7 @@ def _claims(
     own = f"{c.label} against "
     best = next((rows[0] for heading, rows in comparisons if heading.startswith(own)), None)
     told = _evidence(best) if best else "no random search beside it"
-    verdict = claims.judge_better(best, settings.significance)
+    verdict = verdicts.judge_better(best, settings.significance)
     return [*found, judge.claim(text, "section 5", told, verdict)]
 
 
@@ -163,7 +163,7 @@ def _who(results: Results, one: MeasuredMotions) -> str:
     return f"{one.condition.label}: " if len(results.main) > 1 else ""
 
 
-def _evidence(comparison: claims.Comparison) -> str:
+def _evidence(comparison: verdicts.Comparison) -> str:
     low, high = comparison.better.interval
     return (
         f"at equal evaluations the best cost is lower in {100 * comparison.better.a12:.0f} % of "

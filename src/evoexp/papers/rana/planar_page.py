@@ -6,7 +6,7 @@ import pandas as pd
 
 from evoexp.papers.rana.figures import planar_motion
 from evoexp.planners.via_point_ga.strings import Problem
-from evoexp.report.page import Drawing, Page
+from evoexp.report.page_parts import Drawing, Page
 from evoexp.report.pages import generic
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results

@@ -10,11 +10,11 @@ from matplotlib.ticker import EngFormatter
 
 from evoexp.records import FloatArray
 from evoexp.report import style
-from evoexp.report.claims import Comparison
 from evoexp.report.figures.boxes import draw_box
 from evoexp.report.results import ConditionResults, Results
 from evoexp.report.rows import groups
 from evoexp.report.statistics import quantile
+from evoexp.report.verdicts import Comparison
 
 WRAPPED = 24  # characters of a name in a panel, per line
 THOUSANDS = 10_000  # from here on numbers along an axis are written with k and M

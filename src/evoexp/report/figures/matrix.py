@@ -8,11 +8,16 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from evoexp.report import style
-from evoexp.report.claims import Comparison
 from evoexp.report.rows import records
+from evoexp.report.verdicts import Comparison
 
 SIZE = 0.44  # [inch] of a cell
 LONGEST = 28  # characters of a name beside the matrix
+LETTER = 0.065  # [inch] of a character of it
+NARROWEST = 3.2  # [inch] of the figure
+BAR = 0.14  # [inch] width of the colour bar
+LUMINANCE = (0.2126, 0.7152, 0.0722)  # of red, green and blue (ITU-R BT.709)
+DARK = 0.46  # [-] luminance below which a cell is dark
 
 
 def matrix_table(
@@ -41,23 +46,32 @@ def matrix_table(
 
 def draw_matrix(table: pd.DataFrame) -> Figure:
     """Draw one cell per pair: A12 of the row's condition being better than the column's."""
-    labels = list(dict.fromkeys(table["condition"]))
+    labels, significance = list(dict.fromkeys(table["condition"])), table["significance"].iloc[0]
     count = len(labels)
-    places = {label: k for k, label in enumerate(labels)}
-    cells = np.full((count, count), np.nan)
-    figure = style.figure(SIZE * count + 1.9)
+    cells = table.assign(**{name: table[name].map(labels.index) for name in ("condition", "other")})
+    a12 = cells.pivot(index="condition", columns="other", values="a12").to_numpy()
+    names = [
+        f"{k}  {label if len(label) <= LONGEST else f'{label[: LONGEST - 1]}…'}"
+        for k, label in enumerate(labels, 1)
+    ]
+    beside = LETTER * max(map(len, names)) + 1.2  # [inch] of names and colour bar
+    width = max(NARROWEST, SIZE * count + beside)
+    figure = style.figure(SIZE * count + 0.9, width)
     axes = figure.subplots()
-    for row in records(table):
-        y, x = places[row.condition], places[row.other]
-        cells[y, x] = row.a12
-        clear = row.p_adjusted < row.significance
-        look: dict[str, Any] = {"weight": "bold"} if clear else {"color": style.NEUTRAL}
-        axes.annotate(f"{row.a12:.2f}", (x, y), ha="center", va="center", fontsize=7, **look)
-    image = axes.imshow(cells, cmap="RdBu", vmin=0.0, vmax=1.0, alpha=0.6)
-    figure.colorbar(image, ax=axes, label="A12: the row's condition is better", shrink=0.8)
-    names = [label if len(label) <= LONGEST else f"{label[: LONGEST - 1]}…" for label in labels]
-    axes.set_xticks(range(count), names, rotation=40, ha="right")
+    image = axes.imshow(a12, cmap="RdBu", vmin=0.0, vmax=1.0)
+    # numbers, white in dark cells
+    for row in records(cells):
+        dark = np.dot(LUMINANCE, image.to_rgba(row.a12)[:3]) < DARK
+        look: dict[str, Any] = {"color": "white" if dark else "black", "fontsize": 7}
+        look["weight"] = "bold" if row.p_adjusted < significance else "normal"
+        place = row.other, row.condition
+        axes.annotate(f"{row.a12:.2f}", place, ha="center", va="center", **look)
+    axes.set_xticks(range(count), [str(k + 1) for k in range(count)])
     axes.set_yticks(range(count), names)
+    axes.xaxis.tick_top()
+    axes.tick_params(length=0)
     axes.grid(visible=False)
-    axes.set_xlabel(f"bold: adjusted p < {table['significance'].iloc[0]:g}")
+    axes.set_xlabel(f"bold: adjusted p < {significance:g}")
+    bar: dict[str, Any] = {"fraction": BAR / width, "aspect": SIZE * count / BAR}
+    figure.colorbar(image, ax=axes, label="A12: the row is better", ticks=[0.0, 0.5, 1.0], **bar)
     return figure

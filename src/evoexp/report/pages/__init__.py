@@ -11,7 +11,7 @@ from evoexp.registry import PAGES, Registration, names, registered
 from evoexp.report.report_settings import ReportSettings
 
 if TYPE_CHECKING:  # pandas: `evoexp run` asks for the names of the pages before anything else
-    from evoexp.report.page import Page
+    from evoexp.report.page_parts import Page
     from evoexp.report.results import Results
 
 GENERIC = "generic"  # page of an experiment that names none

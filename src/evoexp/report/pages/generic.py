@@ -9,7 +9,7 @@ from evoexp.report.comparisons import compare_on_common_seeds as compare_on_comm
 from evoexp.report.comparisons import compared as compared
 from evoexp.report.comparisons import comparisons as comparisons
 from evoexp.report.figures import convergence
-from evoexp.report.page import Drawing, Page, Quantity
+from evoexp.report.page_parts import Drawing, Page, Quantity
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results
 from evoexp.report.run_measures import search_seconds

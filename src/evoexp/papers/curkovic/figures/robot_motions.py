@@ -15,7 +15,7 @@ from matplotlib.patheffects import withStroke
 from evoexp.condition import Prepared
 from evoexp.papers.curkovic import link_motions
 from evoexp.report import body_contacts, motion_geometry, style
-from evoexp.report.figures.arms import draw_arm
+from evoexp.report.figures.arm_drawing import draw_arm
 from evoexp.report.results import ConditionResults
 from evoexp.report.rows import groups, records, rounded
 from evoexp.scenarios.obstacles import obstacle_table

@@ -13,7 +13,7 @@ from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.papers.rana import motions
 from evoexp.records import FloatArray
 from evoexp.report import motion_geometry, style
-from evoexp.report.figures.arms import draw_arm
+from evoexp.report.figures.arm_drawing import draw_arm
 from evoexp.report.results import ConditionResults
 from evoexp.report.rows import groups, records, rounded
 

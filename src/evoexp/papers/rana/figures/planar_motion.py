@@ -16,7 +16,7 @@ from evoexp.papers.rana.figures.planar_models import path_table
 from evoexp.papers.rana.motions import STRAIGHT
 from evoexp.records import FloatArray
 from evoexp.report import motion_geometry, style
-from evoexp.report.figures.arms import draw_arm
+from evoexp.report.figures.arm_drawing import draw_arm
 from evoexp.report.results import ConditionResults
 from evoexp.report.rows import groups, rounded
 from evoexp.scenarios.obstacles import obstacle_table

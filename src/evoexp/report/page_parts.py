@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import pandas as pd
 
-from evoexp.report.claims import Claim, Comparison
 from evoexp.report.results import ConditionResults
 from evoexp.report.statistics import Spread
+from evoexp.report.verdicts import Claim, Comparison
 
 if TYPE_CHECKING:  # loaded only where something is drawn
     from matplotlib.figure import Figure

@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
 
-from evoexp.report.claims import (
+from evoexp.report.judging import Judge
+from evoexp.report.proportions import Proportion
+from evoexp.report.verdicts import (
     CONTRADICTED,
     INCONCLUSIVE,
     REPRODUCED,
@@ -13,8 +15,6 @@ from evoexp.report.claims import (
     judge_better,
     judge_better_than_all,
 )
-from evoexp.report.judging import Judge
-from evoexp.report.proportions import Proportion
 
 LOW, HIGH = np.arange(12.0), np.arange(12.0) + 20.0
 

@@ -4,7 +4,6 @@ import pytest
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
-from evoexp.papers.rana import motions
 from evoexp.papers.rana.figures import planar_models, planar_motion
 from evoexp.report import motion_geometry, style
 from evoexp.report.figures import convergence
@@ -122,7 +121,7 @@ def test_circles_show_the_least_distance(results: Results) -> None:
         condition.prepared, condition.solutions[condition.best_replicate]
     )
     assert row["distance"] == pytest.approx(
-        motions.centre_distances(condition.prepared.problem, q).min(), abs=1e-9
+        condition.prepared.problem.centre_distances(q).min(), abs=1e-9
     )
     assert np.hypot(row["x_end"] - row["x"], row["y_end"] - row["y"]) == pytest.approx(
         row["distance"]

@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from evoexp.condition import Prepared
-from evoexp.papers.rana import motions
 from evoexp.records import FloatArray
 from evoexp.report import motion_geometry
 from evoexp.report.results import Results
@@ -85,9 +84,9 @@ def test_link_distances_are_those_of_segments(prepared: Prepared, q: FloatArray)
 
 
 def test_centre_distances_are_those_of_the_centres(prepared: Prepared, q: FloatArray) -> None:
-    found = motions.centre_distances(prepared.problem, q)
+    found = prepared.problem.centre_distances(q)
     for k in range(20):
-        one, other = motions.sphere_centres(prepared.problem, q[:, k])
+        one, other = prepared.problem.sphere_centres(q[:, k])
         assert one.shape == other.shape == (9, 3)
         least = np.linalg.norm(one[:, None] - other, axis=2).min()
         assert found[k] == pytest.approx(least, abs=1e-9)
@@ -116,7 +115,7 @@ def test_distances_agree_with_the_recorded_terms(results: Results) -> None:
     condition = results.conditions[0]
     for replicate, solution in condition.solutions.items():
         q = motion_geometry.configurations(condition.prepared, solution)
-        at = motions.centre_distances(condition.prepared.problem, q).min()
+        at = condition.prepared.problem.centre_distances(q).min()
         term = condition.summaries.loc[replicate, "term_arm_distance_at_via_points"]
         assert at == pytest.approx(float(term), abs=1e-9)
 

@@ -1,14 +1,12 @@
-"""Motions of strings of via-points, and the paper's circles or spheres along them."""
+"""Motions of strings of via-points, their straight lines, and how they are drawn as paths."""
 
 from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
 import pandas as pd
-import pinocchio as pin
 from matplotlib.lines import Line2D
 
-from evoexp.numeric.elementary import DEGREE
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.records import FloatArray
 from evoexp.report import motion_geometry, style
@@ -95,34 +93,6 @@ def path_keys(table: pd.DataFrame) -> list[Line2D]:
         style.key("start", marker="s", ms=6.5, **end),
         style.key("goal", marker="*", ms=10.5, **end),
     ]
-
-
-def sphere_centres(found: Problem, q: FloatArray) -> list[FloatArray]:
-    """Return the centres of circles or spheres at one configuration, per arm (spheres, 3).
-
-    Args:
-        found: With the collision model.
-        q: (nq,) [deg].
-    """
-    model, geometry = found.assembly.model, found.collision.geometry
-    data, placements = model.createData(), geometry.createData()
-    pin.updateGeometryPlacements(model, data, geometry, placements, DEGREE * q)
-    centres = np.array([placement.translation for placement in placements.oMg])
-    return [centres[first:stop] for first, stop in found.collision.arm_spheres]
-
-
-def centre_distances(found: Problem, q: FloatArray) -> FloatArray:
-    """Return the least distance of circle centres of two arms, as the paper draws it.
-
-    Args:
-        found: With the collision model.
-        q: (nq, configurations) [deg].
-
-    Returns:
-        (configurations,) [length unit].
-    """
-    clearance = found.collision.clearance(q)
-    return np.asarray(clearance.between_arms + 2.0 * found.collision.radius)
 
 
 def colliding_after(condition: ConditionResults, relaxed: bool) -> int:

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from evoexp.collision.models.touching_spheres import SphereCollision
 from evoexp.collision.scene import Scene
@@ -49,6 +50,37 @@ class Problem(NamedTuple):
     def arm_slices(self) -> IntArray:
         """(arms, 2) rows of each arm."""
         return self.assembly.arm_slices
+
+    @property
+    def sphere_radius(self) -> float:
+        """Radius of the circles or spheres that approximate the links [length unit]."""
+        return self.collision.radius
+
+    def sphere_centres(self, q: FloatArray) -> list[FloatArray]:
+        """Return the centres of the circles or spheres at one configuration.
+
+        Args:
+            q: (nq,) [deg].
+
+        Returns:
+            One array (spheres, 3) [length unit] per arm.
+        """
+        model, geometry = self.assembly.model, self.collision.geometry
+        data, placements = model.createData(), geometry.createData()
+        pin.updateGeometryPlacements(model, data, geometry, placements, DEGREE * q)
+        centres = np.array([placement.translation for placement in placements.oMg])
+        return [centres[first:stop] for first, stop in self.collision.arm_spheres]
+
+    def centre_distances(self, q: FloatArray) -> FloatArray:
+        """Return the least distance between centres of two arms, as the paper's Figs. 7 and 13 do.
+
+        Args:
+            q: (nq, configurations) [deg].
+
+        Returns:
+            (configurations,) [length unit].
+        """
+        return np.asarray(self.collision.clearance(q).between_arms + 2.0 * self.sphere_radius)
 
 
 class Judgement(NamedTuple):

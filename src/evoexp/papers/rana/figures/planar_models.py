@@ -123,15 +123,15 @@ def circles_table(condition: ConditionResults) -> pd.DataFrame:
     """
     problem = motions.problem(condition)
     q = motions.best_motion(condition)
-    instant = int(np.argmin(motions.centre_distances(problem, q)))
+    instant = int(np.argmin(problem.centre_distances(q)))
     at = q[:, instant]
     rows: list[tuple[object, ...]] = [
         ("link", arm, *start[0, :2], *end[0, :2], np.nan, np.nan)
         for arm, _, start, end in motion_geometry.joint_positions(problem.assembly, at[:, None])
     ]
-    centres = motions.sphere_centres(problem, at)
+    centres = problem.sphere_centres(at)
     for arm, points in enumerate(centres):
-        rows += [("circle", arm, *p[:2], *p[:2], problem.collision.radius, np.nan) for p in points]
+        rows += [("circle", arm, *p[:2], *p[:2], problem.sphere_radius, np.nan) for p in points]
     a, b = _closest(centres)
     rows.append(("centres", -1, *a[:2], *b[:2], np.nan, float(np.linalg.norm(a - b))))
     nearest = motion_geometry.link_distance(problem.assembly).nearest(DEGREE * at)
@@ -140,7 +140,7 @@ def circles_table(condition: ConditionResults) -> pd.DataFrame:
     )
     names = ["element", "arm", "x", "y", "x_end", "y_end", "radius", "distance"]
     return rounded(pd.DataFrame(rows, columns=names)).assign(
-        safety_distance=condition.condition.scenario.security_margin,  # type: ignore[attr-defined]
+        safety_distance=problem.security_margin,
         instant=instant,
         length_unit=condition.condition.length_unit,
     )

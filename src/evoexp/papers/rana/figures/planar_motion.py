@@ -143,7 +143,7 @@ def sampled_distances(condition: ConditionResults, samples: int) -> pd.DataFrame
         path = motion_geometry.configurations(condition.prepared, solution)
         instants, q = motion_geometry.dense(path, samples)
         columns = {"replicate": replicate, "instant": instants}
-        columns |= {"centres": motions.centre_distances(problem, q), "links": links(DEGREE * q)}
+        columns |= {"centres": problem.centre_distances(q), "links": links(DEGREE * q)}
         parts.append(pd.DataFrame(columns))
     return rounded(pd.concat(parts, ignore_index=True))
 
@@ -174,7 +174,7 @@ def distances_table(condition: ConditionResults, sampled: pd.DataFrame) -> pd.Da
         ):
             columns = {"measure": measure, "series": series, "instant": values.index}
             parts.append(pd.DataFrame(columns | {"distance": values.to_numpy()}))
-    margin = condition.condition.scenario.security_margin  # type: ignore[attr-defined]
+    margin = motions.problem(condition).security_margin
     table = rounded(pd.concat([*parts, *_exact(condition)], ignore_index=True))
     return table.assign(safety_distance=margin, length_unit=condition.condition.length_unit)
 

@@ -40,12 +40,12 @@ def arm_table(condition: ConditionResults) -> pd.DataFrame:
     """
     problem = motions.problem(condition)
     links = links_table(condition, problem.start[:, None])
-    spheres = motions.sphere_centres(problem, problem.start)[0]
+    spheres = problem.sphere_centres(problem.start)[0]
     first = links[links["arm"] == 0].assign(element="link", radius=np.nan)
     rows = [(0, 0, -1, *centre, *centre) for centre in spheres]
     added = rounded(pd.DataFrame(rows, columns=["instant", *motion_geometry.LINK]))
     added = added.assign(
-        element="sphere", radius=problem.collision.radius, length_unit=first["length_unit"].iloc[0]
+        element="sphere", radius=problem.sphere_radius, length_unit=first["length_unit"].iloc[0]
     )
     return pd.concat([first, added], ignore_index=True)
 

@@ -58,16 +58,6 @@ def test_every_experiment_says_its_command_and_content() -> None:
         assert third.startswith("# ") and len(third) > 20, path
 
 
-TOO_LONG = (  # kernels that named tuples made longer; each is to be split by noun
-    "grid_path_ga/kernels.py",
-    "posture_es/phases.py",
-    "encounter_kernels.py: body_meets_obstacles",
-    "placement_kernels.py: _measure_lanes",
-    "kernels.py: advance",
-    "kernels.py: breed",
-)
-
-
 def test_files_functions_and_lines_are_short() -> None:
     long = []
     for path in SOURCES:
@@ -77,7 +67,7 @@ def test_files_functions_and_lines_are_short() -> None:
         for node in ast.walk(ast.parse(text)):
             if isinstance(node, ast.FunctionDef) and (node.end_lineno or 0) - node.lineno >= 60:
                 long.append(f"{path.name}: {node.name}")
-    assert sorted(long) == sorted(TOO_LONG), "a shorter one is to be taken out of TOO_LONG"
+    assert not long
 
 
 def test_a_file_name_occurs_once_but_for_the_roles() -> None:
@@ -103,7 +93,7 @@ RIDDLES = (
 )
 """Sentences that a stranger reads twice."""
 
-RIDDLES_LEFT = 35  # of some 500; to be lowered with every one that is rewritten
+RIDDLES_LEFT = 3  # of some 500; to be lowered with every one that is rewritten
 
 
 def test_docstrings_name_things() -> None:

@@ -11,7 +11,6 @@ import pinocchio as pin
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.configuration import compose
-from evoexp.planners.posture_es.phases import begin, scene_of
 from references import posture_es_python
 
 SIZE = 100
@@ -53,8 +52,8 @@ def bench_search(beside: Any) -> None:
 def bench_collisions(beside: Any) -> None:
     """The MANUS arm, its sphere sets, before table and bottle; coal with the bodies themselves."""
     _, problem = condition("corsepius_bottle").prepare()
-    stage = begin(problem, 0, problem.start, problem.first_situation)
-    scene = scene_of(problem, stage)
+    stage = problem.begin(0, problem.start, problem.first_situation)
+    scene = problem.scene_of(stage)
     collision = problem.bodies.collision(problem.obstacles)
     low, high = problem.limits.T
     q = np.random.default_rng(0).uniform(low[:, None], high[:, None], (len(low), SIZE))

@@ -12,7 +12,7 @@ from evoexp.errors import SettingError
 from evoexp.numeric.random_stream import Block
 from evoexp.objectives.path_cost import PathCost
 from evoexp.planners.baselines.random_search import RandomSearch
-from evoexp.planners.grid_path_ga import kernels
+from evoexp.planners.grid_path_ga import path_operators
 from evoexp.planners.grid_path_ga import planner as grid_planner
 from evoexp.planners.planner import judge_motion
 from planners.grid_samples import FIELDS, faults, planner, robot, scenario, solvable
@@ -68,12 +68,12 @@ def test_exchange_without_loops_is_exchange_and_then_erasing_loops(
     )
     child = np.zeros(problem.fields.grid.num_nodes + 1, dtype=np.int32)
     for one, two in zip(paths[:-1], paths[1:], strict=True):
-        count = kernels.coincident_sites(one, two, place, sites)
+        count = path_operators.coincident_sites(one, two, place, sites)
         common = set(nodes_of(one)[1:-1]) & set(nodes_of(two)[1:-1])
         assert count == len(common)
         for i, j in sites[:, :count].T.tolist():
             assert one[i] == two[j]
-            kernels.exchange_without_loops(one, two, i, j, sites[:, :count], child)
+            path_operators.exchange_without_loops(one, two, i, j, sites[:, :count], child)
             assert nodes_of(child) == without_loops(nodes_of(one)[:i] + nodes_of(two)[j:])
 
 
@@ -92,10 +92,12 @@ def test_paths_without_a_common_node_are_crossed_where_they_are_near() -> None:
     for row, path in zip(table, (lower, upper), strict=False):
         row[: len(path) + 1] = [len(path), *map(index, path)]
     draws = Block(rng(1).random(64), np.zeros(1, dtype=np.int64))
-    scratch, pair = kernels.Scratch.of(size), (table[2], table[3])
+    scratch, pair = path_operators.Scratch.of(size), (table[2], table[3])
     for reach, crossed in ((0, False), (2, True)):
-        breeding = kernels.Breeding(True, 2.0, 1.0, reach, 0.0)
-        done = kernels.cross(draws, problem.world, (table[0], table[1]), breeding, pair, scratch)
+        breeding = path_operators.Breeding(True, 2.0, 1.0, reach, 0.0)
+        done = path_operators.cross(
+            draws, problem.world, (table[0], table[1]), breeding, pair, scratch
+        )
         assert done is crossed
     for child in table[2:]:
         assert faults(problem, child, revisits=False) == []

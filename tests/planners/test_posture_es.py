@@ -14,7 +14,6 @@ from evoexp.commands import evaluate
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.posture_cost import UPRIGHT
 from evoexp.planners.planner import judge_motion
-from evoexp.planners.posture_es.phases import judge, scene_of, spans
 from evoexp.planners.posture_es.planner import dense
 from references import posture_es_python
 
@@ -256,7 +255,7 @@ def carried() -> int:
 def test_phases_follow_each_other_in_one_motion(carried: int) -> None:
     planner, problem = prepared("corsepius_pick_and_place")
     found = log("corsepius_pick_and_place", replicate=carried)
-    spoken = [span.stage.phase.name for span in spans(problem, postures(found))]
+    spoken = [span.stage.phase.name for span in problem.spans(postures(found))]
     assert spoken == ["approach", "grasp", "lift", "carry", "place", "detach"]
     ends = [int(found.summary.terms[f"phase_{k + 1}_end"]) for k in range(6)]
     assert ends == sorted(ends) and ends[-1] == len(postures(found)) - 1
@@ -268,7 +267,7 @@ def test_phases_follow_each_other_in_one_motion(carried: int) -> None:
 
 def test_what_is_held_moves_with_the_tool_and_stays_where_it_is_left(carried: int) -> None:
     _, problem = prepared("corsepius_pick_and_place")
-    found = spans(problem, postures(log("corsepius_pick_and_place", replicate=carried)))
+    found = problem.spans(postures(log("corsepius_pick_and_place", replicate=carried)))
     lift, place, detach = found[2], found[4], found[5]
     assert lift.stage.situation.held == problem.task.names.index("bottle")
     bottle = detach.stage.situation.poses[lift.stage.situation.held]
@@ -293,8 +292,8 @@ def test_the_tilt_stays_within_its_limit_also_between_postures(carried: int) -> 
         <= terms["greatest_upright_between_deg"]
         <= 10.0 + 0.045 / DEGREE
     )
-    for span in spans(problem, solution.reshape(-1, 6))[2:5]:
-        rows = judge(span.stage, dense(solution.reshape(-1, 6)[span.first : span.last + 1])).rows
+    for span in problem.spans(solution.reshape(-1, 6))[2:5]:
+        rows = span.stage.judge(dense(solution.reshape(-1, 6)[span.first : span.last + 1])).rows
         assert rows[UPRIGHT].max() <= 10.0 * DEGREE + 0.045
 
 
@@ -328,10 +327,10 @@ def test_fast_collisions_of_all_phases_miss_nothing_that_coal_sees(carried: int)
     _, problem = prepared("corsepius_pick_and_place")
     path = postures(log("corsepius_pick_and_place", replicate=carried))
     q = random_postures(problem, 400)
-    for span in spans(problem, path):
-        scene = scene_of(problem, span.stage)
+    for span in problem.spans(path):
+        scene = problem.scene_of(span.stage)
         data, placements = scene.model.createData(), scene.geometry.createData()
-        found = judge(span.stage, q)
+        found = span.stage.judge(q)
         for n in range(q.shape[1]):
             if pin.computeCollisions(
                 scene.model, data, scene.geometry, placements, np.ascontiguousarray(q[:, n]), True

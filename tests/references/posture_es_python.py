@@ -11,7 +11,7 @@ import numpy as np
 
 from evoexp.numeric.elementary import standard_normal
 from evoexp.planners.posture_es.kernels import COST
-from evoexp.planners.posture_es.phases import Problem, begin, finish, judge
+from evoexp.planners.posture_es.phases import Problem
 
 FAULTS = ("no selection", "best of generation", "half scope", "no mutation", "no crossover")
 
@@ -58,13 +58,13 @@ def cycles(
     """Yield all generations of all phases; `fault`, one of `FAULTS`, is made on purpose."""
     line, evaluations, situation = [problem.start], 0, problem.first_situation
     for index in range(len(problem.phases)):
-        stage = begin(problem, index, line[-1], situation)
+        stage = problem.begin(index, line[-1], situation)
         for cycle in _phase(problem, planner, rng, stage, line, evaluations, fault):
             yield cycle
         if cycle.reason != "goal":
             return
         line, evaluations = cycle.best, cycle.evaluations
-        situation = finish(problem, stage, line[-1])
+        situation = problem.finish(stage, line[-1])
 
 
 def _phase(
@@ -72,7 +72,7 @@ def _phase(
     evaluations: int, fault: str,
 ) -> Iterator[Cycle]:  # fmt: skip
     ga, nq = planner.ga, len(problem.scope)
-    judged = judge(stage, line[-1][:, None])
+    judged = stage.judge(line[-1][:, None])
     best, best_cost, idle, evaluations = line, float(judged.rows[COST, 0]), 0, evaluations + 1
     parents = [(best_cost, line)]
     reason = "goal" if judged.met[0] else "cap" if ga.num_generations == 0 else ""
@@ -92,12 +92,12 @@ def _phase(
         children = [_bred(problem, ga, numbers, parents, n, fault) for n in range(bred)]
         children += [_immigrant(problem, numbers, parents) for _ in range(ga.num_immigrants)]
         postures = np.array([child[-1] for child in children]).T
-        judged = judge(stage, postures)
+        judged = stage.judge(postures)
         feasible = judged.feasible.copy()
         for k in range(planner.edge_check):  # between parent and child
             share = (k + 1.0) / (planner.edge_check + 1.0)
             between = [child[-2] + share * (child[-1] - child[-2]) for child in children]
-            feasible &= judge(stage, np.array(between).T).feasible
+            feasible &= stage.judge(np.array(between).T).feasible
         costs, evaluations = judged.rows[COST], evaluations + len(children)
         usable = [(float(costs[n]), n) for n in range(len(children)) if feasible[n]]
         met = [(cost, n) for cost, n in usable if judged.met[n]]

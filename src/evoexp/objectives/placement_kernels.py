@@ -310,29 +310,14 @@ def _measure_lanes(
     within: BoolArray,
 ) -> None:
     """Measure one branch of a population as `measure_posture` does, bit for bit, lane by lane."""
-    task, weights, avoided, limits = model
-    l1, l2, l3, x_e, _, f_x, f_y = task
+    task, weights, _, limits = model
+    l1, l2, l3, _, _, f_x, f_y = task
     epsilon, lam, delta, a1, a2, a3, cap = weights
     sign = -1.0 if branch == 1 else 1.0
     s1, c1, s12, c12, s123 = links[0], links[1], links[2], links[3], links[4]
     c123, absolute = links[5], links[6]
-    # obstacles (Eq. 12)
     obstacles = out[OBSTACLE]
-    obstacles[:] = 0.0
-    for n in range(len(avoided)):
-        weight, link, place = avoided[n, 0], avoided[n, 1], avoided[n, 2]
-        x_o, y_o = avoided[n, 3], avoided[n, 4]
-        first = (place if link == 1.0 else 1.0) * (link >= 1.0)
-        second, third = (place if link == 2.0 else 1.0) * (link >= 2.0), place * (link >= 3.0)
-        for k in range(count):
-            x1, x2, x3 = l1 * c1[k], l2 * c12[k], l3 * (sign * c123[k])
-            y1, y2, y3 = l1 * s1[k], l2 * s12[k], l3 * s123[k]
-            platform = x_e - (x1 + x2 + x3)
-            x, y = platform + first * x1, first * y1
-            x += second * x2 + third * x3
-            y += second * y2 + third * y3
-            dx, dy = x - x_o, y - y_o
-            obstacles[k] += weight * _inverse(dx * dx + dy * dy, cap)
+    _obstacle_lanes(count, links, sign, model, obstacles)
     # all other criteria, limits, cost
     low_1, high_1, low_2, high_2 = limits[0, 0], limits[0, 1], limits[1, 0], limits[1, 1]
     low_3, high_3, least_1, most_1 = limits[2, 0], limits[2, 1], limits[3, 0], limits[3, 1]
@@ -367,3 +352,28 @@ def _measure_lanes(
         out[OBSTACLE, k] = obstacle if reached & (obstacle < cap) else cap
         out[COST, k] = total if free & (total < cap) else cap
         within[k] = free
+
+
+@kernel
+def _obstacle_lanes(
+    count: int, links: FloatArray, sign: float, model: Model, obstacles: FloatArray
+) -> None:
+    """Write Σ γ E_obs (Eq. 12) of a population; `sign` of the third link's extent along x."""
+    s1, c1, s12, c12, s123, c123 = links[0], links[1], links[2], links[3], links[4], links[5]
+    avoided, cap = model.avoided, model.weights.greatest
+    l1, l2, l3, x_e, _, _, _ = model.task
+    obstacles[:] = 0.0
+    for n in range(len(avoided)):
+        weight, link, place = avoided[n, 0], avoided[n, 1], avoided[n, 2]
+        x_o, y_o = avoided[n, 3], avoided[n, 4]
+        first = (place if link == 1.0 else 1.0) * (link >= 1.0)
+        second, third = (place if link == 2.0 else 1.0) * (link >= 2.0), place * (link >= 3.0)
+        for k in range(count):
+            x1, x2, x3 = l1 * c1[k], l2 * c12[k], l3 * (sign * c123[k])
+            y1, y2, y3 = l1 * s1[k], l2 * s12[k], l3 * s123[k]
+            platform = x_e - (x1 + x2 + x3)
+            x, y = platform + first * x1, first * y1
+            x += second * x2 + third * x3
+            y += second * y2 + third * y3
+            dx, dy = x - x_o, y - y_o
+            obstacles[k] += weight * _inverse(dx * dx + dy * dy, cap)

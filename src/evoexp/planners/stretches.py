@@ -94,4 +94,4 @@ class Stretches(ABC):
 
     @abstractmethod
     def population(self, place: int, is_last: bool) -> NDArray[Any]:
-        """Return the population at a place; the last one is hashed and holds individuals alone."""
+        """Return the population at a place; the last one, which is hashed, without padding."""

@@ -83,17 +83,10 @@ def body_meets_obstacles(
         best: Lowered.
     """
     runs, spheres, capsules = shapes.runs, shapes.spheres, shapes.capsules
-    data, whole = obstacles.data, units.whole
+    whole = units.whole
     # the body's frame and the obstacle's, and the motion from one to the other
     _gather(width, whole[unit, JOINT], lane_of, frames, place, FRAME, work)
-    for n in range(width):
-        o, k = obstacle_of[U(n)], U(n)
-        for row in range(9):
-            work[BASE + U(row) * W + k] = data[o, TURN + row]
-        for row in range(3):
-            work[BASE + U(9 + row) * W + k] = data[o, row]
-        for row in range(4):
-            work[CORE + U(row) * W + k] = data[o, CORE_SIZE + row]
+    _gather_obstacles(width, obstacles.data, obstacle_of, work)
     _relative(width, work)
     # spheres, then capsules
     first, stop = whole[unit, FIRST_RUN], whole[unit, STOP_RUN]
@@ -195,6 +188,21 @@ def _gather(
         begin, o = place[lane_of[U(n)]] + j, target + U(n)
         for row in range(SPATIAL_ROWS):
             work[o + U(row) * W] = frames[begin + U(row * BLOCK)]
+
+
+@kernel
+def _gather_obstacles(
+    width: int, data: FloatArray, obstacle_of: NDArray[np.uint64], work: FloatArray
+) -> None:
+    """Copy the frames of the encounters' obstacles to BASE, and their cores' sizes to CORE."""
+    for n in range(width):
+        o, k = obstacle_of[U(n)], U(n)
+        for row in range(9):
+            work[BASE + U(row) * W + k] = data[o, TURN + row]
+        for row in range(3):
+            work[BASE + U(9 + row) * W + k] = data[o, row]
+        for row in range(4):
+            work[CORE + U(row) * W + k] = data[o, CORE_SIZE + row]
 
 
 @kernel

@@ -54,7 +54,7 @@ class PotentialFields(Component):
         goal_potentials: d_1, d_2, … after 1, 2, … steps from the goal, where it is 0; goes on with
             the last difference.
         obstacle_potentials: o_0, o_1, … after 0, 1, … steps from obstacles and from the ring of
-            nodes around the grid; the last one is held.
+            nodes around the grid; all further steps have the last of these potentials.
         max_unsafeness: S_* of Eq. 3: no path may pass a node of a greater one; None: any.
     """
 

@@ -32,12 +32,10 @@ from evoexp.planners.grid_path_ga.kernels import (
     DISTANCE,
     RESULTS,
     UNSAFENESS,
-    Breeding,
     Memory,
     Population,
-    Scratch,
-    World,
 )
+from evoexp.planners.grid_path_ga.path_operators import Breeding, Scratch, World
 from evoexp.planners.planner import Candidate, PlannerDefaults
 from evoexp.planners.stretches import Stretches
 from evoexp.records import BoolArray, FloatArray, Generation

@@ -227,8 +227,7 @@ def breed(
     scope, limits, rate = strategy.scope, strategy.limits, strategy.crossover_rate
     parents, num_parents = members.postures, members.size
     offspring, origin = memory.offspring, memory.origin
-    nq, count = offspring.shape
-    u = v = 0
+    nq, u, v = len(offspring), 0, 0
     for n in range(num_bred):
         # parent: in turn, or by rank
         parent = n % num_parents
@@ -258,12 +257,22 @@ def breed(
             offspring[k, n] = min(max(offspring[k, n] + step, limits[k, 0]), limits[k, 1])
         if rate > 0.0:
             origin[n] = nearest_parent(offspring, n, parents, num_parents, scope)
-    # immigrants
-    for n in range(num_bred, count):
-        for k in range(nq):
+    draw_immigrants(uniforms[u:], num_bred, strategy, members, memory)
+
+
+@kernel
+def draw_immigrants(
+    uniforms: FloatArray, first: int, strategy: Strategy, members: Members, memory: Memory
+) -> None:
+    """Write offspring from index `first` on, uniform within the limits, and their parents."""
+    offspring, limits, u = memory.offspring, strategy.limits, 0
+    for n in range(first, offspring.shape[1]):
+        for k in range(len(limits)):
             offspring[k, n] = limits[k, 0] + (limits[k, 1] - limits[k, 0]) * uniforms[u]
             u += 1
-        origin[n] = nearest_parent(offspring, n, parents, num_parents, scope)
+        memory.origin[n] = nearest_parent(
+            offspring, n, members.postures, members.size, strategy.scope
+        )
 
 
 @kernel

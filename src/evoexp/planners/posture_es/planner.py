@@ -33,7 +33,7 @@ from evoexp.planners.planner import Candidate, Keeper, Listing, PlannerDefaults
 from evoexp.planners.posture_es import problem as posture_problem
 from evoexp.planners.posture_es.cycles import Ancestry, Search
 from evoexp.planners.posture_es.kernels import COST
-from evoexp.planners.posture_es.phases import Problem, Span, begin, finish, judge, spans
+from evoexp.planners.posture_es.phases import Problem, Span
 from evoexp.planners.posture_es.settings import StrategySettings
 from evoexp.records import FloatArray, Generation
 from evoexp.robots.assembly import Robot
@@ -99,7 +99,7 @@ class PostureEs(PlannerDefaults, Component):
         node = int(ancestry.add(problem.start[None], -1)[0])
         situation = problem.first_situation
         for index in range(len(problem.phases)):
-            stage = begin(problem, index, ancestry.postures[node], situation)
+            stage = problem.begin(index, ancestry.postures[node], situation)
             search = Search(self.ga, problem, stage.judging, self.edge_check, ancestry, node)
             last = index == len(problem.phases) - 1
             while True:
@@ -112,7 +112,7 @@ class PostureEs(PlannerDefaults, Component):
             if not search.won:
                 return
             node = search.best
-            situation = finish(problem, stage, ancestry.postures[node])
+            situation = problem.finish(stage, ancestry.postures[node])
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
         """Return postures uniform within the joint limits, (nq, count)."""
@@ -121,8 +121,8 @@ class PostureEs(PlannerDefaults, Component):
 
     def cost(self, problem: Problem, population: FloatArray) -> Judgement:
         """Judge postures (nq, individuals) by the first phase."""
-        stage = begin(problem, 0, problem.start, problem.first_situation)
-        return Judgement(*judge(stage, population), self.chosen)
+        stage = problem.begin(0, problem.start, problem.first_situation)
+        return Judgement(*stage.judge(population), self.chosen)
 
     @property
     def chosen(self) -> tuple[int, ...]:
@@ -147,7 +147,7 @@ class PostureEs(PlannerDefaults, Component):
             ValueError: If the solution is no list of postures.
         """
         postures = self._postures(problem, solution)
-        found, several = spans(problem, postures), len(problem.phases) > 1
+        found, several = problem.spans(postures), len(problem.phases) > 1
         terms = named(found[-1].judged.rows[:, -1], self.chosen)
         terms |= path_terms(postures, problem.scope)
         for k in range(len(problem.phases) if several else 0):
@@ -162,7 +162,7 @@ class PostureEs(PlannerDefaults, Component):
         terms = (COLUMNS[k] for k in self.chosen)
         names = ["posture", "phase", *terms, "cost", "goal", "step_rad", "step_scopes"]
         rows: list[list[Any]] = []
-        for span in spans(problem, postures):
+        for span in problem.spans(postures):
             for n in range(0 if span.first == 0 else 1, span.last - span.first + 1):
                 at, judged = span.first + n, span.judged
                 step = np.abs(postures[at] - postures[at - 1]) if at else np.zeros_like(postures[0])
@@ -180,7 +180,7 @@ class PostureEs(PlannerDefaults, Component):
         return ..., (len(problem.start),)
 
     def notes(self, problem: Problem) -> tuple[str, ...]:
-        """Return what the collision model is, and which pairs of bodies it does not test."""
+        """Describe the collision model and list the body pairs that it skips."""
         return posture_problem.notes(problem)
 
     def _tilts(self, found: list[Span], postures: FloatArray) -> dict[str, float]:
@@ -192,7 +192,7 @@ class PostureEs(PlannerDefaults, Component):
             for span in (span for span in found if span.stage.weight(name) > 0.0):
                 at.append(float(span.judged.rows[term].max()))
                 on_the_way = dense(postures[span.first : span.last + 1])
-                between.append(float(judge(span.stage, on_the_way).rows[term].max()))
+                between.append(float(span.stage.judge(on_the_way).rows[term].max()))
             terms[f"greatest_{name}_deg"] = max(at) / DEGREE
             terms[f"greatest_{name}_between_deg"] = max(between) / DEGREE
         return terms

@@ -1,6 +1,7 @@
 """The problem of a posture search: robot, task and objective, checked against each other."""
 
 import functools
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -11,7 +12,7 @@ from evoexp.collision.scene import obstacle_shapes
 from evoexp.errors import SettingError, nearest
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.posture_cost import ANGLE, AXIAL, HEADING, TERMS, PostureCost
-from evoexp.planners.posture_es.phases import Problem, begin, judge, scene_of
+from evoexp.planners.posture_es.phases import Problem
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly, Robot
 from evoexp.robots.poses import local_pose
@@ -53,20 +54,19 @@ def prepare(
             raise SettingError(
                 f"scenario.obstacles[{k}].name", "a name that no body of the robot has", name
             )
-    phases = task.all_phases
     problem = Problem(
         assembly,
         bodies,
         task,
-        phases,
-        _weights(task, objective, obstacles),
-        objective,
         obstacles,
         _covers(task, obstacles, collision),
+        (tool.joint - 1, local_pose(assembly.table, tool.joint, tool.rotation, tool.position)),
+        task.all_phases,
+        _weights(task, objective, obstacles),
+        objective,
         start,
         limits,
         _scope(scope, len(start)),
-        (tool.joint - 1, local_pose(assembly.table, tool.joint, tool.rotation, tool.position)),
         None,
         task.security_margin,
         {},
@@ -74,9 +74,9 @@ def prepare(
     _check_contacts(task, (*bodies.names, *task.names))
     if task.check_reach:
         _check_reach(problem)
-    stage = begin(problem, 0, start, problem.first_situation)
-    problem = problem._replace(scene=scene_of(problem, stage))
-    if not judge(stage, start[:, None]).feasible[0]:
+    stage = problem.begin(0, start, problem.first_situation)
+    problem = replace(problem, scene=problem.scene_of(stage))
+    if not stage.judge(start[:, None]).feasible[0]:
         raise _infeasible(problem, start)
     return problem
 
@@ -289,8 +289,8 @@ def _infeasible(problem: Problem, start: FloatArray) -> SettingError:
     placements = scene.geometry.createData()
     pin.computeDistances(scene.model, data, scene.geometry, placements, start)
     distances = np.array([result.min_distance for result in placements.distanceResults])
-    stage = begin(problem, 0, start, problem.first_situation)
-    if judge(stage, start[:, None]).rows[TERMS.index("collision"), 0] == 0.0:
+    stage = problem.begin(0, start, problem.first_situation)
+    if stage.judge(start[:, None]).rows[TERMS.index("collision"), 0] == 0.0:
         return SettingError(
             "scenario.q_start", "within the hard limits of upright and keep_parallel", given
         )

@@ -9,7 +9,7 @@ from evoexp.validation import Count, NonNegative, NonNegativeCount, Positive
 
 
 class SelectiveSettings(GeneticSettings):
-    """What real and binary coding share; `RealGenetic` and `BinaryGenetic` are complete.
+    """Settings of real and of binary coding; `RealGenetic` and `BinaryGenetic` add their own.
 
     Attributes:
         selection: `tournament`; `roulette` with weights 1/cost; `rank`: roulette with linear

@@ -1,0 +1,338 @@
+"""Crossover and mutation of paths over a grid, compiled (Chen & Zalzala 1995, section 2.3).
+
+A path is a row of a table, see `paths.grid_walks`.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from evoexp.numeric.compilation import kernel
+from evoexp.numeric.random_stream import Block, draw_index
+from evoexp.paths.grid_walks import erase_loops, walk
+from evoexp.paths.grids import Moves, NodeArray, StepArray, spread_front
+from evoexp.records import FloatArray
+
+NOT_CONNECTED, CONNECTED = -1, -2
+
+
+class World(NamedTuple):
+    """A grid and its fields.
+
+    Attributes:
+        neighbours: (nodes, moves), see `grids.Grid`.
+        num_moves: Moves that a front makes; they come first.
+        coordinates: (nodes, dimensions).
+        kinds: See `grids.Grid`.
+        unsafeness: (nodes,).
+        potentials: (≥ greatest number of steps + 1,) toward a target after so many steps.
+        fronts: (nodes, nodes) steps to every node from every other; (0, nodes) on large grids.
+    """
+
+    neighbours: NodeArray
+    num_moves: int
+    coordinates: NodeArray
+    kinds: NodeArray
+    unsafeness: FloatArray
+    potentials: FloatArray
+    fronts: StepArray
+
+
+class Breeding(NamedTuple):
+    """Settings of the operators.
+
+    Attributes:
+        erase: Whether loops are erased.
+        multiple: Copies that the best one expects, in units of the mean.
+        crossover_rate: Probability per pair.
+        reach: How far apart two nodes may be, in every coordinate, to cross paths there [cell].
+        mutation_rate: Probability per path.
+    """
+
+    erase: bool
+    multiple: float
+    crossover_rate: float
+    reach: int
+    mutation_rate: float
+
+
+class Scratch(NamedTuple):
+    """Scratch of the operators.
+
+    Attributes:
+        place: (nodes,) places in a path.
+        joined: (3 nodes + 3,) a path of several pieces.
+        sites: (2, nodes + 1) places where two paths meet.
+        steps: (nodes,) of a front.
+        queue: (nodes,) of a front.
+        walked: (nodes + 1,) a walk.
+    """
+
+    place: NodeArray
+    joined: NodeArray
+    sites: NodeArray
+    steps: NodeArray
+    queue: NodeArray
+    walked: NodeArray
+
+    @classmethod
+    def of(cls, nodes: int) -> "Scratch":
+        """Return scratch for a grid of so many nodes."""
+        shapes = nodes, 3 * nodes + 3, (2, nodes + 1), nodes, nodes, nodes + 1
+        return cls(*(np.zeros(shape, dtype=np.int32) for shape in shapes))
+
+
+@kernel
+def copy_path(path: NodeArray, out: NodeArray) -> None:
+    """Copy a path; the rest of the row stays as it is."""
+    for k in range(path[0] + 1):
+        out[k] = path[k]
+
+
+@kernel
+def cross(
+    draws: Block,
+    world: World,
+    parents: tuple[NodeArray, NodeArray],
+    breeding: Breeding,
+    children: tuple[NodeArray, NodeArray],
+    scratch: Scratch,
+) -> bool:
+    """Exchange the remainders of two paths at a common node, or at two nodes that are near.
+
+    "If the path pair have coincident points, then select one randomly as the crossover site and
+    exchange the remainder of the two paths"; if not, a pair of nodes at most `reach` apart (in
+    every coordinate), drawn among all such pairs, is connected, by a move or by a node between.
+    Start and goal, which all paths have in common, are no sites.
+
+    Args:
+        draws: Uniform numbers.
+        world: Grid and fields.
+        parents: Two paths.
+        breeding: Settings of the operators.
+        children: Two paths, written if the parents are crossed.
+        scratch: Scratch.
+
+    Returns:
+        Whether they are crossed: there may be no site.
+    """
+    one, two = parents
+    place, joined, sites, erase = scratch.place, scratch.joined, scratch.sites, breeding.erase
+    # at a common node
+    count = coincident_sites(one, two, place, sites)
+    if count > 0:
+        site = draw_index(draws, count)
+        i, j = sites[0, site], sites[1, site]
+        if erase:
+            exchange_without_loops(one, two, i, j, sites[:, :count], children[0])
+            exchange_without_loops(two, one, j, i, sites[::-1, :count], children[1])
+        else:
+            settle(joined, _join(one, i, -1, two, j + 1, joined), False, children[0], place)
+            settle(joined, _join(two, j, -1, one, i + 1, joined), False, children[1], place)
+        return True
+    # at two near nodes
+    i, j = near_sites(draws, world.coordinates, one, two, breeding.reach)
+    if i == 0:
+        return False
+    link = connection(draws, world.neighbours, one[i], two[j])
+    if link == NOT_CONNECTED:
+        return False
+    settle(joined, _join(one, i, link, two, j, joined), erase, children[0], place)
+    settle(joined, _join(two, j, link, one, i, joined), erase, children[1], place)
+    return True
+
+
+@kernel
+def exchange_without_loops(
+    head: NodeArray, tail: NodeArray, i: int, j: int, sites: NodeArray, child: NodeArray
+) -> None:
+    """Write a path's head up to node i and another's tail behind node j, without loops.
+
+    Neither path has loops, so a loop begins in the head and ends in the tail, at a site. Erasing
+    loops one by one leaves the head up to the first node that the tail passes, too, and the tail
+    from there.
+
+    Args:
+        head: A path without loops.
+        tail: Another one.
+        i: Place of a node in the head.
+        j: Place of the same node in the tail.
+        sites: (2, sites) places in `head` and in `tail` of all common nodes but start and goal.
+        child: Written.
+    """
+    least, behind = i, j
+    for k in range(sites.shape[1]):
+        sooner = (sites[1, k] > j) & (sites[0, k] < least)
+        least = sites[0, k] if sooner else least
+        behind = sites[1, k] if sooner else behind
+    for k in range(1, least + 1):
+        child[k] = head[k]
+    shift = least - behind
+    for k in range(behind + 1, tail[0] + 1):
+        child[k + shift] = tail[k]
+    child[0] = tail[0] + shift
+
+
+@kernel
+def _join(head: NodeArray, i: int, link: int, tail: NodeArray, j: int, joined: NodeArray) -> int:
+    """Write the head of a path up to i, the node `link` if it is one, another's tail from j.
+
+    Returns:
+        The number of nodes written.
+    """
+    count = i
+    for k in range(1, i + 1):
+        joined[k] = head[k]
+    if link >= 0:
+        count += 1
+        joined[count] = link
+    for k in range(j, tail[0] + 1):
+        count += 1
+        joined[count] = tail[k]
+    return count
+
+
+@kernel
+def coincident_sites(one: NodeArray, two: NodeArray, place: NodeArray, sites: NodeArray) -> int:
+    """Write the places of common nodes but start and goal into `sites` (2, nodes + 1).
+
+    Of a node that the first path passes several times, the last time counts.
+
+    Returns:
+        The number of sites.
+    """
+    for k in range(2, one[0]):
+        place[one[k]] = k
+    count = 0
+    for k in range(2, two[0]):
+        known = place[two[k]]
+        known = known if (known >= 2) & (known < one[0]) else 0
+        sites[0, count], sites[1, count] = known, k  # kept by counting it, without a branch
+        count += (known > 0) & (one[known] == two[k])
+    return count
+
+
+@kernel
+def near_sites(
+    draws: Block, coordinates: NodeArray, one: NodeArray, two: NodeArray, reach: int
+) -> tuple[int, int]:
+    """Draw a pair of nodes of two paths that are at most `reach` apart in every coordinate.
+
+    Args:
+        draws: Uniform numbers.
+        coordinates: (nodes, dimensions).
+        one: A path.
+        two: A path.
+        reach: [cell].
+
+    Returns:
+        Their places in both paths; (0, 0) if there is no such pair.
+    """
+    # how many pairs there are
+    num = 0
+    for k in range(2, two[0]):
+        num += _count_near(coordinates, one, two[k], reach)
+    if num == 0:
+        return 0, 0
+    # one of them
+    left = draw_index(draws, num)
+    for k in range(2, two[0]):
+        here = _count_near(coordinates, one, two[k], reach)
+        if left < here:
+            for i in range(2, one[0]):
+                if _near(coordinates, one[i], two[k], reach):
+                    if left == 0:
+                        return i, k
+                    left -= 1
+        left -= here
+    return 0, 0
+
+
+@kernel
+def _count_near(coordinates: NodeArray, path: NodeArray, node: int, reach: int) -> int:
+    count = 0
+    for i in range(2, path[0]):
+        count += _near(coordinates, path[i], node, reach)
+    return count
+
+
+@kernel
+def _near(coordinates: NodeArray, one: int, two: int, reach: int) -> bool:
+    near = True
+    for axis in range(coordinates.shape[1]):
+        near &= abs(coordinates[one, axis] - coordinates[two, axis]) <= reach
+    return near
+
+
+@kernel
+def connection(draws: Block, neighbours: NodeArray, one: int, two: int) -> int:
+    """Return a node between two others, drawn among all that moves join to both.
+
+    Returns:
+        The node; `CONNECTED` if a move joins the two themselves, `NOT_CONNECTED` if there is none.
+    """
+    # how many nodes are between
+    count = 0
+    for move in range(neighbours.shape[1]):
+        between: int = neighbours[one, move]
+        if between == two:
+            return CONNECTED
+        if between >= 0:
+            for again in range(neighbours.shape[1]):
+                count += neighbours[between, again] == two
+    if count == 0:
+        return NOT_CONNECTED
+    # one of them
+    left = draw_index(draws, count)
+    for move in range(neighbours.shape[1]):
+        between = neighbours[one, move]
+        if between >= 0:
+            for again in range(neighbours.shape[1]):
+                if neighbours[between, again] == two:
+                    if left == 0:
+                        return between
+                    left -= 1
+    return NOT_CONNECTED
+
+
+@kernel
+def mutate(draws: Block, world: World, erase: bool, path: NodeArray, scratch: Scratch) -> None:
+    """Replace the piece between two nodes of a path, drawn at random, by a random walk."""
+    neighbours, potentials, fronts = world.neighbours, world.potentials, world.fronts
+    joined, walked, place = scratch.joined, scratch.walked, scratch.place
+    # two different nodes
+    count = path[0]
+    first = draw_index(draws, count) + 1
+    second = draw_index(draws, count - 1) + 1
+    second += second >= first
+    low, high = min(first, second), max(first, second)
+    ends = (path[low], path[high])
+    # a walk from one to the other
+    if len(fronts) > 0:
+        walk(draws, Moves(neighbours, potentials, fronts[ends[1]]), ends, erase, walked, place)
+    else:
+        target = path[high : high + 1]
+        spread_front(neighbours, world.num_moves, target, scratch.steps, scratch.queue)
+        walk(draws, Moves(neighbours, potentials, scratch.steps), ends, erase, walked, place)
+    # head, walk and tail
+    last = low - 1
+    for k in range(1, low):
+        joined[k] = path[k]
+    for k in range(1, walked[0] + 1):
+        last += 1
+        joined[last] = walked[k]
+    for k in range(high + 1, count + 1):
+        last += 1
+        joined[last] = path[k]
+    settle(joined, last, erase, path, place)
+
+
+@kernel
+def settle(nodes: NodeArray, count: int, erase: bool, path: NodeArray, place: NodeArray) -> None:
+    """Write a joined path, without its loops if these are erased or if it is too long with them."""
+    if erase or count > len(path) - 1:
+        erase_loops(nodes, count, path, place)
+    else:
+        for k in range(1, count + 1):
+            path[k] = nodes[k]
+        path[0] = count

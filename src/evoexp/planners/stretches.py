@@ -94,4 +94,4 @@ class Stretches(ABC):
 
     @abstractmethod
     def population(self, place: int, is_last: bool) -> NDArray[Any]:
-        """Return the population at a place; the last one, which is hashed, without padding."""
+        """Return the population at a place, and the last population, which is hashed, unpadded."""

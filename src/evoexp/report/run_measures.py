@@ -7,7 +7,13 @@ import numpy as np
 
 from evoexp.records import FloatArray
 from evoexp.report.proportions import Proportion
-from evoexp.report.results import ConditionResults
+from evoexp.report.results import ConditionResults, Results
+
+
+def planned_by(results: Results, planner: type) -> bool:
+    """Whether there are results, and all are of one type of planner, controls included."""
+    found = results.with_data
+    return bool(found) and all(isinstance(c.planner, planner) for c in found)
 
 
 def solved(condition: ConditionResults) -> np.ndarray:

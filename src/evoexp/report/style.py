@@ -102,6 +102,23 @@ def row_of_panels(height: float, count: int, *, sharey: bool = False) -> tuple[F
     return found, list(found.subplots(1, count, squeeze=False, sharey=sharey)[0])
 
 
+def lines_of_panels(
+    height: float, count: int, per_line: int, foot: float
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure over the whole page with some panels, and the panels, line by line.
+
+    Args:
+        height: Of a line [inch].
+        count: Number of panels.
+        per_line: Panels side by side at most.
+        foot: Height below the panels, for a legend [inch].
+    """
+    columns = min(count, per_line)
+    lines = -(-count // columns)
+    found = figure(height * lines + foot)
+    return found, [found.add_subplot(lines, columns, k + 1) for k in range(count)]
+
+
 def arm_colour(arm: int) -> str:
     """Return the colour of an arm, counted from 0."""
     return ARM_COLOURS[arm % len(ARM_COLOURS)]

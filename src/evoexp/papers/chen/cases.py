@@ -1,19 +1,17 @@
 """The five criteria of Chen & Zalzala 1995, section 4.2: their conditions and printed postures."""
 
-import contextlib
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.planners.placement_ga.planner import PlacementGa
 from evoexp.records import FloatArray
 from evoexp.report.kit import ConditionResults, Proportion, Results, counted, grouped
 
 METHODS = {
-    "newton": "Newton-type",
-    "bounded": "Newton-type, smooth form",
+    "Newton-type": "newton",
+    "Newton-type, smooth form": "bounded",
     "subgradient": "subgradient",
-}  # as the reference records them → as the page names them
+}  # conventional methods: names on the page → names in the records of the reference
 CLOSE = (0.001, 0.01)  # [-] gaps to the optimum; shares of runs within them are given
 
 
@@ -75,9 +73,9 @@ class Case(NamedTuple):
         return {name: c for name, c in named.items() if c is not None}
 
     @property
-    def printed(self) -> PrintedPosture | None:
-        """The numbers that the paper prints."""
-        return PRINTED.get(self.name)
+    def printed(self) -> PrintedPosture:
+        """The numbers that the paper prints: no value and no angles where it prints none."""
+        return PRINTED.get(self.name, PrintedPosture("", "", np.nan))
 
     @property
     def least(self) -> float:
@@ -87,17 +85,8 @@ class Case(NamedTuple):
     @property
     def optimal_angles(self) -> FloatArray | None:
         """θ1, θ2 [deg] of the exact optimum; None if it was not computed."""
-        return (
-            self.optimum.solutions[self.optimum.best_replicate]
-            if self.optimum is not None
-            else None
-        )
-
-    @property
-    def printed_angles(self) -> FloatArray | None:
-        """θ1, θ2 [deg] that the paper prints; None if it prints none."""
-        angles = self.printed.angles if self.printed is not None else None
-        return None if angles is None else np.array(angles)
+        best = self.optimum
+        return best.solutions[best.best_replicate] if best is not None else None
 
     @property
     def minima(self) -> FloatArray:
@@ -121,12 +110,12 @@ class Case(NamedTuple):
 
         They are given by the method's name; methods that were not run are left out.
         """
-        found: dict[str, FloatArray] = {}
-        for key, name in METHODS.items():
-            with contextlib.suppress(KeyError):
-                if self.conventional is not None:
-                    found[name] = self.conventional.array(key)
-        return found
+        own = self.conventional
+        return {
+            name: own.array(key)
+            for name, key in METHODS.items()
+            if own is not None and f"term_{key}_evaluations" in own.summaries
+        }
 
 
 def cases(results: Results) -> list[Case]:
@@ -138,19 +127,12 @@ def cases(results: Results) -> list[Case]:
     return [Case(_name(own[0]), **{_role(c): c for c in reversed(own)}) for own in groups]
 
 
-def fits(results: Results) -> bool:
-    """Whether there are results, and all planners are placement searches."""
-    found = results.with_data
-    return bool(found) and all(isinstance(c.planner, PlacementGa) for c in found)
-
-
 def _role(condition: ConditionResults) -> str:
     """Return the attribute of `Case` that a condition belongs to."""
     if condition.is_reference:
         return str(condition.condition.planner.component).removeprefix("placement_")
-    if condition.is_control:
-        return "search"
-    return "elitist" if condition.planner.ga.num_elites else "plain"
+    evolved = "elitist" if condition.planner.ga.num_elites else "plain"
+    return "search" if condition.is_control else evolved
 
 
 def _name(condition: ConditionResults) -> str:

@@ -1,6 +1,5 @@
 """Chen & Zalzala 1995, Fig. 1: two numerical potential fields, and the slips of their print."""
 
-from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
@@ -46,17 +45,14 @@ def page(results: Results, settings: ReportSettings) -> Page:
     if not shown:
         return generic.page(results, settings)
     tables = {c.label: _compared(c) for c in shown if _fields(c)[0].shape == (16, 16)}
-    of_print = [c for c in shown if c.label in tables]
+    judge, compared = judging.judge(results, settings), tables.values()
+    numbers = (_numbers(c, tables[c.label]) for c in shown if c.label in tables)
     return Page(
         title=f"Chen & Zalzala 1995: {results.experiment or 'stored runs'}",
         introduction=INTRODUCTION,
-        claims=tuple(
-            one
-            for table in tables.values()
-            for one in _claims(judging.judge(results, settings), table)
-        ),
-        checks=tuple(row for table in tables.values() for row in _slips(table)),
-        drawings=(*(_numbers(c, tables[c.label]) for c in of_print), *(_map(c) for c in shown)),
+        claims=tuple(_claim(judge, *own) for table in compared for own in groups(table, "field")),
+        checks=tuple(_slips(*own) for table in compared for own in groups(table, "field")),
+        drawings=(*numbers, *map(_map, shown)),
     )
 
 
@@ -73,40 +69,29 @@ def _compared(condition: ConditionResults) -> pd.DataFrame:
     return pd.concat(parts, ignore_index=True)
 
 
-def _claims(judge: Judge, table: pd.DataFrame) -> Iterator[Claim]:
-    """Judge that each field is printed as the wave front computes it."""
-    for name, own in groups(table, "field"):
-        total = int((own["slip"] != SURPLUS).sum())
-        same, wrong, missing, surplus = (
-            int((own["slip"] == slip).sum()) for slip in ("", WRONG, MISSING, SURPLUS)
-        )
-        yield judge.claim(
-            text=f"The wave front gives Fig. 1{name}",
-            source="Fig. 1",
-            evidence=(
-                f"{same} of {total} nodes as printed; {wrong} with another number, {missing} "
-                "left "
-                f"out, {surplus} tokens too many (reproduced: every node that is printed, but "
-                "for "
-                "single slips of the print: at most one in a hundred)"
-            ),
-            verdict=verdicts.judged(same >= 0.99 * total),
-        )
+def _claim(judge: Judge, name: str, table: pd.DataFrame) -> Claim:
+    """Judge that a field is printed as the wave front computes it."""
+    total = int((table["slip"] != SURPLUS).sum())
+    same, wrong, missing, surplus = (
+        int((table["slip"] == slip).sum()) for slip in ("", WRONG, MISSING, SURPLUS)
+    )
+    return judge.claim(
+        text=f"The wave front gives Fig. 1{name}",
+        source="Fig. 1",
+        evidence=(
+            f"{same} of {total} nodes as printed; {wrong} with another number, {missing} left "
+            f"out, {surplus} tokens too many (reproduced: every node that is printed, but for "
+            "single slips of the print: at most one in a hundred)"
+        ),
+        verdict=verdicts.judged(same >= 0.99 * total),
+    )
 
 
-def _slips(table: pd.DataFrame) -> list[tuple[str, str]]:
-    """Return a row of checks per field: its slips in words."""
-    return [
-        (
-            f"Slips of the print, Fig. 1{name} (counted from 0)",
-            "; ".join(
-                SLIPS[row.slip].format(row).replace("*", "\\*")
-                for row in records(own[own["slip"] != ""])
-            )
-            or "none",
-        )
-        for name, own in groups(table, "field")
-    ]
+def _slips(name: str, table: pd.DataFrame) -> tuple[str, str]:
+    """Return the row of checks on a field: its slips in words."""
+    slips = records(table[table["slip"] != ""])
+    told = "; ".join(SLIPS[row.slip].format(row).replace("*", "\\*") for row in slips)
+    return f"Slips of the print, Fig. 1{name} (counted from 0)", told or "none"
 
 
 def _numbers(condition: ConditionResults, table: pd.DataFrame) -> Drawing:

@@ -6,10 +6,8 @@ import numpy as np
 
 from evoexp.papers.chen import path_measures as measures
 from evoexp.papers.chen import path_page
-from evoexp.papers.chen.figures import grid_paths, lingering
-from evoexp.papers.chen.figures.grid_paths import EXACT, MEDIAN, Line, Panel
+from evoexp.papers.chen.figures import grid_paths
 from evoexp.papers.chen.path_measures import Group
-from evoexp.planners.grid_path_ga.planner import Problem
 from evoexp.report.kit import Drawing, Page, ReportSettings, Results, generic, markdown
 
 INTRODUCTION = (
@@ -30,26 +28,27 @@ def page(results: Results, settings: ReportSettings) -> Page:
         title=f"Chen & Zalzala 1995: {results.experiment or 'stored runs'}",
         introduction=INTRODUCTION,
         quantities=path_page.quantities(results, groups),
-        checks=tuple(_checks(groups)),
+        checks=(
+            *((f"{g.name}: lingering", _lingering(g, groups)) for g in groups if g.revisits),
+            *(
+                (f"{g.name}: best path known", _best_known(g))
+                for g in groups
+                if g.truth is not None
+            ),
+        ),
         drawings=_drawings(groups),
     )
 
 
-def _checks(groups: tuple[Group, ...]) -> list[tuple[str, str]]:
-    """Return rows on repeated nodes where they are permitted, then on the best paths known."""
-    rows = []
-    for free in (group for group in groups if group.revisits):
-        simple = [_length(g) for g in groups if g.weights == free.weights and not g.revisits][:1]
-        repeats = [_repeated(path) for path in measures.paths(free.main).values()]
-        told = (
-            f"{markdown.share(int(np.count_nonzero(repeats)), len(repeats))} runs pass nodes "
-            f"again, median {np.median(repeats):.0f} repeated nodes; median length "
-            f"{_length(free):.0f} cells"
-        )
-        told += "".join(f", {length:.0f} without revisits" for length in simple)
-        rows.append((f"{free.name}: lingering", told))
-    known = (group for group in groups if group.truth is not None)
-    return rows + [(f"{group.name}: best path known", _best_known(group)) for group in known]
+def _lingering(group: Group, groups: tuple[Group, ...]) -> str:
+    """Count the repeated nodes of the runs of a weighting that permits them."""
+    repeats = [_repeated(path) for path in measures.paths(group.main).values()]
+    simple = [g for g in groups if g.weights == group.weights and not g.revisits][:1]
+    return (
+        f"{markdown.share(int(np.count_nonzero(repeats)), len(repeats))} runs pass nodes "
+        f"again, median {np.median(repeats):.0f} repeated nodes; median length "
+        f"{_length(group):.0f} cells"
+    ) + "".join(f", {_length(g):.0f} without revisits" for g in simple)
 
 
 def _best_known(group: Group) -> str:
@@ -77,14 +76,14 @@ def _repeated(path: np.ndarray) -> int:
 
 
 def _drawings(groups: tuple[Group, ...]) -> tuple[Drawing, ...]:
-    places = [(group.name, group.main, _unsafeness(group)) for group in groups]
+    panels = [(group.name, group.main, grid_paths.known_lines(group)) for group in groups]
     return (
         Drawing(
             "paths",
             "Paths with and without revisits",
             "Run of median cost of the genetic algorithm, and the best path known. Lines that go "
             "back and forth lie on each other: the next figure counts nodes.",
-            partial(grid_paths.paths_table, [_panel(group) for group in groups]),
+            partial(grid_paths.paths_table, panels),
             grid_paths.draw_paths,
             tuple(c for group in groups for c in group.all),
         ),
@@ -93,21 +92,8 @@ def _drawings(groups: tuple[Group, ...]) -> tuple[Drawing, ...]:
             "How many nodes lie in places of which unsafeness",
             "Nodes of the best solution of every run: mean number per unsafeness of the node, "
             "counted as often as they are passed.",
-            partial(lingering.places_table, places),
-            lingering.draw_places,
+            partial(grid_paths.places_table, groups),
+            grid_paths.draw_places,
             tuple(group.main for group in groups),
         ),
     )
-
-
-def _unsafeness(group: Group) -> np.ndarray:
-    """Return the unsafeness of every node, (along x, along y)."""
-    fields = group.main.problem(Problem).fields
-    return np.asarray(fields.grid.inner(fields.unsafeness))
-
-
-def _panel(group: Group) -> Panel:
-    c = group.main
-    lines = [Line(MEDIAN, measures.paths(c)[measures.median_replicate(c)])]
-    lines += [Line(EXACT, path) for path in group.best_path]
-    return Panel(group.name, c.condition.length_unit, measures.boxes(c), lines)

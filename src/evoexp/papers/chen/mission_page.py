@@ -1,16 +1,11 @@
 """The title of Chen & Zalzala 1995 kept: a safe path and a docking posture as one motion."""
 
 from functools import partial
-from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
-from evoexp.papers.chen import path_measures as measures
 from evoexp.papers.chen.figures import missions
-from evoexp.papers.chen.figures.missions import DOCKED, TRAVEL, Mission
-from evoexp.planners.two_stage.planner import Problem, TwoStage
-from evoexp.records import FloatArray
+from evoexp.planners.two_stage.planner import TwoStage
 from evoexp.report.kit import (
     ConditionResults,
     Drawing,
@@ -21,6 +16,7 @@ from evoexp.report.kit import (
     by_column,
     generic,
     markdown,
+    planned_by,
     run_measures,
 )
 
@@ -37,7 +33,7 @@ INTRODUCTION = (
 def page(results: Results, settings: ReportSettings) -> Page:
     """Build the page of the missions, or the generic page if another planner was run."""
     found = results.with_data
-    if not found or not all(isinstance(c.planner, TwoStage) for c in found):
+    if not planned_by(results, TwoStage):
         return generic.page(results, settings)
     row, column = partial(generic.quantity, results), by_column
     clearance = "clearance of the bodies over the whole motion (exact)"
@@ -47,7 +43,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
         "Per condition the run of median cost. Left: the floor, obstacles from centre to centre "
         "of their outermost nodes. Right: the platform at its docking place, the arm as it "
         "drives and as it docks, the force that acts.",
-        partial(missions.missions_table, [_mission(c) for c in found]),
+        partial(missions.missions_table, found),
         missions.draw_missions,
         found,
     )
@@ -75,11 +71,11 @@ def page(results: Results, settings: ReportSettings) -> Page:
 
 def _checks(condition: ConditionResults, settings: ReportSettings) -> tuple[tuple[str, str], ...]:
     """Return the rows on a condition's exact verdicts and on its docking places."""
-    label, found, scenario = condition.label, condition.verdicts, _scenario(condition)
+    label, found, scenario = condition.label, condition.verdicts, condition.condition.scenario
     free = Proportion(found.certified, found.judged)
     nearest = condition.summaries["clearance_pair"].value_counts()
     places = np.round(condition.column("term_platform_x"), 3)
-    near = np.count_nonzero(places < scenario.docking.target[0])
+    near = np.count_nonzero(places < scenario.docking.target[0])  # type: ignore[attr-defined]
     verdicts = (
         f"{markdown.share(*free)} ({markdown.percent(free.interval(settings.confidence))}) free "
         f"of contact over the whole motion; {found.refuted} touch, {found.undecided} undecided; "
@@ -90,46 +86,3 @@ def _checks(condition: ConditionResults, settings: ReportSettings) -> tuple[tupl
         "side of the end-effector"
     )
     return (f"{label}: exact verdicts", verdicts), (f"{label}: docking places X_p", spread)
-
-
-def _scenario(condition: ConditionResults) -> Any:
-    """Return a mission's scenario: its grid, docking and origin."""
-    return condition.condition.scenario
-
-
-def _mission(condition: ConditionResults) -> Mission:
-    """Return the run of median cost, as it is drawn."""
-    replicate = measures.median_replicate(condition)
-    scenario, model = _scenario(condition), condition.problem(Problem).scene.model
-    robot: Any = condition.condition.robot
-    q, verdict = condition.motion(replicate).q, condition.summaries.loc[replicate]
-    (x, _), (reach, above) = scenario.task_origin, scenario.docking.target
-    word = "certified" if verdict["certified"] else "not certified"
-    return Mission(
-        title=f"{condition.label}, run {replicate}, {word}, clearance {verdict['clearance']:.3g}",
-        unit=condition.condition.length_unit,
-        boxes=list(scenario.grid.obstacles),
-        path=q[:-1, :2],
-        postures={
-            name: _joints(model, own, robot.link_lengths[-1])
-            for name, own in ((TRAVEL, q[-2]), (DOCKED, q[-1]))
-        },
-        body=(robot.body_radius, robot.body_height),
-        target=np.array([x + reach, robot.body_height + above]),
-        force=scenario.docking.force,
-    )
-
-
-def _joints(model: pin.Model, q: FloatArray, last: float) -> FloatArray:
-    """Return the arm's joints and its end, (4, 2): x, and height.
-
-    Args:
-        model: Platform and arm.
-        q: (nq,) configuration.
-        last: Length of the last link.
-    """
-    data = model.createData()
-    pin.forwardKinematics(model, data, q)
-    points = [data.oMi[k].translation for k in range(3, model.njoints)]
-    points.append(data.oMi[model.njoints - 1].act(np.array([last, 0.0, 0.0])))
-    return np.array(points)[:, [0, 2]]

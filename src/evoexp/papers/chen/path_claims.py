@@ -29,9 +29,12 @@ def judge_paths(
 ) -> tuple[Claim, ...]:
     """Judge the claims of Fig. 2: they need its three weightings, in their order."""
     judge = judging.judge(results, settings)
-    found = [_nearly_shortest(judge, groups), *_compromise(judge, settings, groups)]
-    found += [_decreases(judge, group) for group in groups]
-    return (*found, *(c for group in groups for c in _better_than_random(judge, settings, group)))
+    return (
+        _nearly_shortest(judge, groups),
+        *(_compromise(judge, settings, groups) if len(groups) == 3 else ()),
+        *(_decreases(judge, group.main) for group in groups),
+        *(c for group in groups for c in _better_than_random(judge, settings, group)),
+    )
 
 
 def _excess(condition: ConditionResults, groups: tuple[Group, ...]) -> FloatArray:
@@ -51,8 +54,7 @@ def _nearly_shortest(judge: Judge, groups: tuple[Group, ...]) -> Claim:
             f"{np.median(excess):.1f} % above the shortest "
             f"{markdown.number(measures.shortest(groups))} (Dijkstra); "
             f"{markdown.share(near, first.done)} runs within {100 * NEAR:g} % (reproduced: more "
-            "than "
-            "half of the runs)"
+            "than half of the runs)"
         ),
         holds=near,
         done=first.done,
@@ -60,9 +62,7 @@ def _nearly_shortest(judge: Judge, groups: tuple[Group, ...]) -> Claim:
 
 
 def _compromise(judge: Judge, settings: ReportSettings, groups: tuple[Group, ...]) -> list[Claim]:
-    """Judge the claims that compare weightings; there are none unless there are three."""
-    if len(groups) != 3:
-        return []
+    """Judge the claims that compare the three weightings."""
     a, b, c = (group.main for group in groups)
     safer = _compared(b, a, UNSAFENESS, settings)
     shorter = _compared(b, c, DISTANCE, settings)
@@ -72,6 +72,10 @@ def _compromise(judge: Judge, settings: ReportSettings, groups: tuple[Group, ...
         f"median {np.median(excess):.0f} % longer, {markdown.share(longer, c.done)} runs more "
         f"than {100 * MUCH:g} % (reproduced: more than half of the runs)"
     )
+    truth = groups[2].truth
+    if truth is not None:  # the weighting itself asks for a longer path
+        known = float(_excess(truth, groups)[0])
+        much += f"; the best path known of this weighting is {known:.0f} % longer, and costs less"
     return [
         judge.better_than_all(
             text=f"{b.label}: a compromise, safer than {a.label} and shorter than {c.label}",
@@ -92,43 +96,29 @@ def _compromise(judge: Judge, settings: ReportSettings, groups: tuple[Group, ...
         judge.majority(
             f"{c.label}: the safe path is much longer than the shortest",
             SOURCE,
-            much + _needed(groups),
+            much,
             longer,
             c.done,
         ),
     ]
 
 
-def _needed(groups: tuple[Group, ...]) -> str:
-    """Say how much longer the best path known of the third weighting is.
-
-    The cost does not ask for anything that the search adds to it.
-    """
-    truth = groups[2].truth
-    if truth is None:
-        return ""
-    excess = float(_excess(truth, groups)[0])
-    return f"; the best path known of this weighting is {excess:.0f} % longer, and costs less"
-
-
-def _decreases(judge: Judge, group: Group) -> Claim:
+def _decreases(judge: Judge, condition: ConditionResults) -> Claim:
     """Judge that the best cost decreases, and that the average cost converges toward it."""
-    c = group.main
-    rows = c.generations.sort_values("index").groupby("replicate")
+    rows = condition.generations.sort_values("index").groupby("replicate")
     first, last = rows.first(), rows.last()
     lower = last["best_cost"] < first["best_cost"]
     holds = int((lower & (last["mean_cost"] <= 1.05 * last["best_cost_in_generation"])).sum())
     return judge.every(
-        text=f"{c.label}: path costs decrease and converge with generations",
+        text=f"{condition.label}: path costs decrease and converge with generations",
         source=SOURCE,
         evidence=(
-            f"in {markdown.share(holds, c.done)} runs the best cost falls and the last "
-            "generation's "
-            "average is within 5 % of its best (reproduced: all of them)"
+            f"in {markdown.share(holds, condition.done)} runs the best cost falls and the last "
+            "generation's average is within 5 % of its best (reproduced: all of them)"
         ),
         holds=holds,
-        done=c.done,
-        planned=c.planned,
+        done=condition.done,
+        planned=condition.planned,
     )
 
 

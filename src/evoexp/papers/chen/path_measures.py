@@ -1,15 +1,14 @@
 """Measures of the grid paths of Chen & Zalzala 1995: weightings, gaps to the truth, routes."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from evoexp.papers.chen.routes import Route, inside_points, routes
 from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.records import FloatArray
-from evoexp.report.kit import ConditionResults, Proportion, Results, run_measures
+from evoexp.report.kit import ConditionResults, Results, planned_by, run_measures
 
-Weights = tuple[float, float]
 NEAR = 0.05  # [-] "nearly shortest": a length within 5 % of the shortest one
 MUCH = 0.25  # [-] "much longer": a length more than 25 % above the shortest one
 
@@ -26,7 +25,7 @@ class Group(NamedTuple):
     """
 
     name: str
-    weights: Weights
+    weights: tuple[float, float]
     revisits: bool
     conditions: tuple[ConditionResults, ...]
     truth: ConditionResults | None
@@ -65,10 +64,8 @@ class Group(NamedTuple):
 def fits(results: Results) -> bool:
     """Whether there are planners' results, and all are of paths over a plane grid."""
     found = results.with_data
-    return any(not c.is_reference for c in found) and all(
-        isinstance(c.planner, GridPathGa) and len(c.condition.scenario.size) == 2  # type: ignore[attr-defined]
-        for c in found
-    )
+    evolved = planned_by(results, GridPathGa) and any(not c.is_reference for c in found)
+    return evolved and all(len(_scenario(c).size) == 2 for c in found)
 
 
 def group_list(results: Results) -> tuple[Group, ...]:
@@ -77,12 +74,10 @@ def group_list(results: Results) -> tuple[Group, ...]:
     for members in run_measures.grouped(
         results.with_data, lambda c: (c.planner.objective.weights, c.planner.revisits)
     ):
-        planner = members[0].planner
         evolved = tuple(c for c in members if not c.is_reference)
         truth = next((c for c in members if c.is_reference), None)
-        if evolved:
-            weights, revisits = planner.objective.weights, planner.revisits
-            found.append(Group(evolved[0].label, weights, revisits, evolved, truth))
+        weights, revisits = members[0].planner.objective.weights, members[0].planner.revisits
+        found += [Group(c.label, weights, revisits, evolved, truth) for c in evolved[:1]]
     return tuple(found)
 
 
@@ -97,11 +92,6 @@ def gaps(condition: ConditionResults, truth: float) -> FloatArray:
     return np.asarray(np.round(100.0 * (condition.column("best_cost") / truth - 1.0), 9))
 
 
-def within(condition: ConditionResults, truth: float, share: float) -> Proportion:
-    """Count the runs whose cost is above a known one by a share of it at most."""
-    return run_measures.counted(gaps(condition, truth) <= 100.0 * share + 1e-9)
-
-
 def paths(condition: ConditionResults) -> dict[int, FloatArray]:
     """Return replicate → nodes (nodes, 2) of its best path."""
     return {k: values.reshape(-1, 2) for k, values in condition.solutions.items()}
@@ -109,7 +99,12 @@ def paths(condition: ConditionResults) -> dict[int, FloatArray]:
 
 def boxes(condition: ConditionResults) -> list[tuple[int, ...]]:
     """Return the obstacles as blocks of nodes (x0, y0, x1, y1)."""
-    return list(condition.condition.scenario.obstacles)  # type: ignore[attr-defined]
+    return list(_scenario(condition).obstacles)
+
+
+def _scenario(condition: ConditionResults) -> Any:
+    """Return the grid, with the fields that only it has."""
+    return condition.condition.scenario
 
 
 def route_list(groups: tuple[Group, ...]) -> list[Route]:
@@ -124,7 +119,8 @@ def routes_of(condition: ConditionResults, found: list[Route]) -> dict[str, list
     return {name: members for name, members in own.items() if members}
 
 
-def median_replicate(condition: ConditionResults, replicates: list[int] | None = None) -> int:
-    """Return the replicate of median cost (the lower one of two) among some, or all."""
+def median_path(condition: ConditionResults, replicates: list[int] | None = None) -> FloatArray:
+    """Return the path of median cost (the lower one of two) among some replicates, or all."""
     among = None if replicates is None else condition.summaries.index.isin(replicates)
-    return run_measures.median_replicate(condition, condition.column("best_cost"), among)
+    costs = condition.column("best_cost")
+    return paths(condition)[run_measures.median_replicate(condition, costs, among)]

@@ -9,7 +9,7 @@ import numpy as np
 from evoexp.papers.chen import path_claims
 from evoexp.papers.chen import path_measures as measures
 from evoexp.papers.chen.figures import grid_costs, grid_paths
-from evoexp.papers.chen.figures.grid_paths import EXACT, FAINT, MEDIAN, Line, Panel
+from evoexp.papers.chen.figures.grid_paths import FAINT, Line
 from evoexp.papers.chen.path_measures import Group
 from evoexp.papers.chen.routes import Route
 from evoexp.report.kit import (
@@ -23,6 +23,7 @@ from evoexp.report.kit import (
     Values,
     by_column,
     compared,
+    counted,
     generic,
     markdown,
     run_measures,
@@ -104,24 +105,28 @@ def checks(
         for group in groups
         if group.truth is not None
     ]
-    routes = []
-    for group in groups:
-        taken = measures.routes_of(group.main, found)
-        text = ", ".join(f"{name} {len(members)}" for name, members in taken.items())
-        what = f"{group.name}: routes taken (sides of the obstacles passed), runs each"
-        routes.append((what, text))
+    routes = [
+        (
+            f"{group.name}: routes taken (sides of the obstacles passed), runs each",
+            ", ".join(
+                f"{name} {len(members)}"
+                for name, members in measures.routes_of(group.main, found).items()
+            ),
+        )
+        for group in groups
+    ]
     return (*gaps, *_same_problem(groups), *routes, *CHECKS)
 
 
 def _gap_text(condition: ConditionResults, group: Group, settings: ReportSettings) -> str:
     """Describe how far a condition's runs end above the best path known."""
-    median = float(np.median(measures.gaps(condition, group.optimum)))
-    shares = []
-    for bound in (0.0, 0.01, 0.05):
-        found = measures.within(condition, group.optimum, bound)
-        name = "at it or below" if bound == 0.0 else f"within {100 * bound:g} %"
+    gaps, shares = measures.gaps(condition, group.optimum), []
+    for bound in (0, 1, 5):  # [%]
+        found = counted(gaps <= bound + 1e-9)
         interval = markdown.percent(found.interval(settings.confidence))
+        name = f"within {bound} %" if bound else "at it or below"
         shares.append(f"{name} {markdown.share(*found)} ({interval})")
+    median = float(np.median(gaps))
     return f"{condition.label}: median {median:+.1f} %, {', '.join(shares)}".replace("-", "−")
 
 
@@ -142,15 +147,14 @@ def _truth_text(group: Group) -> str:
 def _same_problem(groups: tuple[Group, ...]) -> Iterator[tuple[str, str]]:
     """Return a row per two neighbouring weightings with λ > 0: how near they are as problems."""
     for one, two in pairwise(groups):
-        if one.truth is None or two.truth is None or 0.0 in (*one.weights, *two.weights):
-            continue
-        ratios = [lam / epsilon for epsilon, lam in (one.weights, two.weights)]
-        same = np.array_equal(one.truth.solutions[0], two.truth.solutions[0])
-        text = (
-            f"only λ/ε matters: {ratios[0]:.0f} and {ratios[1]:.0f} cells; the best path "
-            f"known is {'the same one' if same else 'another one'}"
-        )
-        yield (f"{one.name} and {two.name} are nearly the same problem", text)
+        if one.truth is not None and two.truth is not None and 0.0 not in one.weights + two.weights:
+            ratios = [lam / epsilon for epsilon, lam in (one.weights, two.weights)]
+            same = np.array_equal(one.truth.solutions[0], two.truth.solutions[0])
+            text = (
+                f"only λ/ε matters: {ratios[0]:.0f} and {ratios[1]:.0f} cells; the best path "
+                f"known is {'the same one' if same else 'another one'}"
+            )
+            yield (f"{one.name} and {two.name} are nearly the same problem", text)
 
 
 def comparisons(
@@ -171,6 +175,11 @@ def comparisons(
 def drawings(groups: tuple[Group, ...], found: list[Route]) -> tuple[Drawing, ...]:
     """Return the figures."""
     shown = tuple(c for group in groups for c in group.all)
+    faint = {
+        g.name: [Line(FAINT, path) for path in measures.paths(g.main).values()] for g in groups
+    }
+    panels = [(g.title, g.main, [*faint[g.name], *grid_paths.known_lines(g)]) for g in groups]
+    of_routes = [(g.title, g.main, _route_lines(g, found)) for g in groups]
     gaps = Drawing(
         "gaps",
         "Gaps to the best path known",
@@ -196,7 +205,7 @@ def drawings(groups: tuple[Group, ...], found: list[Route]) -> tuple[Drawing, ..
             "Fig. 2: paths",
             "All runs of the genetic algorithm, the one of median cost, and the best path known. "
             "Grey: obstacles, from centre to centre of their outermost nodes.",
-            partial(grid_paths.paths_table, [_panel(group) for group in groups]),
+            partial(grid_paths.paths_table, panels),
             grid_paths.draw_paths,
             shown,
         ),
@@ -206,7 +215,7 @@ def drawings(groups: tuple[Group, ...], found: list[Route]) -> tuple[Drawing, ..
             "Paths that pass the same sides of all obstacles are one route; of each the run of "
             "median cost, as wide as the route is frequent. A is the most frequent one over all "
             "panels.",
-            partial(grid_paths.paths_table, [_route_panel(group, found) for group in groups]),
+            partial(grid_paths.paths_table, of_routes),
             grid_paths.draw_routes,
             tuple(group.main for group in groups),
         ),
@@ -214,27 +223,15 @@ def drawings(groups: tuple[Group, ...], found: list[Route]) -> tuple[Drawing, ..
     )
 
 
-def _panel(group: Group) -> Panel:
-    """Return the panel of all runs of a weighting."""
-    c, own = group.main, measures.paths(group.main)
-    lines = [
-        *(Line(FAINT, path) for path in own.values()),
-        Line(MEDIAN, own[measures.median_replicate(c)]),
-        *(Line(EXACT, path) for path in group.best_path),
-    ]
-    return Panel(group.title, c.condition.length_unit, measures.boxes(c), lines)
-
-
-def _route_panel(group: Group, found: list[Route]) -> Panel:
-    """Return the panel of one path per route."""
-    c, own = group.main, measures.paths(group.main)
-    lines = [
+def _route_lines(group: Group, found: list[Route]) -> list[Line]:
+    """Return one path per route of a weighting."""
+    c = group.main
+    return [
         Line(
             name,
-            own[measures.median_replicate(c, members)],
+            measures.median_path(c, members),
             len(members) / c.done,
             f"{name}: {len(members)} of {c.done}",
         )
         for name, members in measures.routes_of(c, found).items()
     ]
-    return Panel(group.title, c.condition.length_unit, measures.boxes(c), lines)

@@ -1,13 +1,14 @@
-"""Chen & Zalzala 1995, Figs. 3–8: docking postures by five criteria, exact optima, controls."""
+"""Chen & Zalzala 1995, Figs. 3–9: docking postures by five criteria, exact optima, controls."""
 
 from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
 
-from evoexp.papers.chen import cases, placement_claims
-from evoexp.papers.chen.cases import CLOSE, Case
-from evoexp.papers.chen.figures import placements
+from evoexp.papers.chen import placement_claims
+from evoexp.papers.chen.cases import CLOSE, Case, cases
+from evoexp.papers.chen.figures import landscapes, placements
+from evoexp.planners.placement_ga.planner import PlacementGa
 from evoexp.report.kit import (
     ConditionResults,
     Drawing,
@@ -17,6 +18,7 @@ from evoexp.report.kit import (
     Table,
     generic,
     markdown,
+    planned_by,
     spread,
 )
 
@@ -55,13 +57,25 @@ POSTURES = (
     "E_man",
     "E",
 )
+LANDSCAPES = (
+    "criterion",
+    "pairs of angles that are feasible",
+    "local minima",
+    "(θ1, θ2): E",
+    "best run of the GA",
+)
+LANDSCAPES_INTRODUCTION = (
+    "E over θ1 and θ2, at the better θ3 of each pair; white: no posture reaches the target. The "
+    "paper draws the fitness 250 − E as a surface. The criteria are judged where all methods "
+    "stand side by side: `evoexp run experiment=chen_placement`."
+)
 
 
 def page(results: Results, settings: ReportSettings) -> Page:
     """Build the page of the placements, or the generic page if another planner was run."""
-    if not cases.fits(results):
+    if not planned_by(results, PlacementGa):
         return generic.page(results, settings)
-    found = cases.cases(results)
+    found = cases(results)
     exact = [case for case in found if case.optimum is not None]
     postures = tuple(row for case in found for row in _posture_rows(case))
     return Page(
@@ -77,23 +91,53 @@ def page(results: Results, settings: ReportSettings) -> Page:
     )
 
 
+def landscapes_page(results: Results, settings: ReportSettings) -> Page:
+    """Build the page of the landscapes (Fig. 9), or that of the placements if there are none."""
+    found = cases(results) if planned_by(results, PlacementGa) else []
+    shown = [case for case in found if case.landscape is not None]
+    if not shown:
+        return page(results, settings)
+    drawing = Drawing(
+        "fig_9_landscapes",
+        "Fig. 9: landscapes",
+        "Points: the best of every run of the genetic algorithm; stars: the exact optimum and "
+        "its mirror image; triangles: the other local minima; cross: the angles that the paper "
+        "prints.",
+        partial(landscapes.landscape_table, shown),
+        landscapes.draw_landscape,
+        tuple(c for case in shown for c in case.conditions),
+    )
+    return Page(
+        title=f"Chen & Zalzala 1995: {results.experiment or 'stored runs'}",
+        introduction=LANDSCAPES_INTRODUCTION,
+        tables=(Table("Landscapes", LANDSCAPES, tuple(map(_landscape_row, shown))),),
+        drawings=(drawing,),
+    )
+
+
+def _landscape_row(case: Case) -> tuple[object, ...]:
+    """Return a criterion's feasible share, its local minima and the best run."""
+    assert case.landscape is not None
+    share = 100.0 * float(case.landscape.column("term_share_feasible")[0])
+    told = "; ".join(f"({a:.2f}, {b:.2f})°: {e:.5g}" for a, b, e in case.minima).replace("-", "−")
+    best = float(case.plain.column("best_cost").min()) if case.plain is not None else np.nan
+    return case.name, f"{share:.1f} %", len(case.minima), told or "–", markdown.number(best)
+
+
 def _result_row(case: Case) -> tuple[str, ...]:
     """Return a criterion's row: paper, exact optimum, GA, random search, conventional methods."""
     methods = (f"{name} {_shares(case, ends[:, 2])}" for name, ends in case.ends().items())
     least = f"E = {case.least:.6g}" if case.optimum is not None else "–"
     runs = (_run(case, c) for c in (case.plain, case.elitist, case.search))
-    return (case.name, _paper(case), least, *runs, "; ".join(methods) or "–")
+    return (case.name, _paper(case) or "–", least, *runs, "; ".join(methods) or "–")
 
 
 def _paper(case: Case) -> str:
     """Return the printed number, and E at the printed angles."""
-    if case.printed is None:
-        return "–"
-    told = []
-    if not np.isnan(case.printed.value):
-        told.append(f"{case.printed.term.replace('_', ' ')} {case.printed.value:g}")
-    if case.printed.angles is not None:
-        told.append(f"E = {case.measured(case.printed.angles)['cost']:.6g} at its angles")
+    value, angles = case.printed.value, case.printed.angles
+    told = [] if np.isnan(value) else [f"{case.printed.term.replace('_', ' ')} {value:g}"]
+    if angles is not None:
+        told.append(f"E = {case.measured(angles)['cost']:.6g} at its angles")
     return "; ".join(told)
 
 
@@ -107,36 +151,33 @@ def _run(case: Case, condition: ConditionResults | None) -> str:
 
 def _shares(case: Case, costs: np.ndarray) -> str:
     """Return the shares of costs near the optimum; empty if it is not known."""
-    if np.isnan(case.least):
-        return ""
     shares = (f"{100 * case.within(costs, close).share:.0f} %" for close in CLOSE)
-    return f"({', '.join(shares)})"
+    return "" if np.isnan(case.least) else f"({', '.join(shares)})"
 
 
 def _posture_rows(case: Case) -> Iterator[tuple[str, ...]]:
-    """Return the numbers of the exact optimum and of the paper's angles."""
-    shown = {"exact optimum": case.optimal_angles, "paper's angles": case.printed_angles}
+    """Yield the numbers of the exact optimum and of the paper's angles."""
+    shown = {"exact optimum": case.optimal_angles, "paper's angles": case.printed.angles}
     for name, angles in shown.items():
-        if angles is None:
-            continue
-        found = case.measured(angles)
-        row = (
-            case.name,
-            name,
-            ", ".join(f"{found[f'theta_{k}_deg']:.2f}" for k in (1, 2, 3)),
-            f"{found['platform_x']:.4f}",
-            ", ".join(f"{found[f'torque_{k}']:.3f}" for k in (1, 2, 3)),
-            *(
-                f"{found[term]:.4g}"
-                for term in ("torque_norm", "torque_max", "obstacle", "manipulability")
-            ),
-            f"{found['cost']:.6g}",
-        )
-        yield tuple(cell.replace("-", "−") for cell in row)
+        if angles is not None:
+            found = case.measured(angles)
+            row = (
+                case.name,
+                name,
+                ", ".join(f"{found[f'theta_{k}_deg']:.2f}" for k in (1, 2, 3)),
+                f"{found['platform_x']:.4f}",
+                ", ".join(f"{found[f'torque_{k}']:.3f}" for k in (1, 2, 3)),
+                *(
+                    f"{found[term]:.4g}"
+                    for term in ("torque_norm", "torque_max", "obstacle", "manipulability")
+                ),
+                f"{found['cost']:.6g}",
+            )
+            yield tuple(cell.replace("-", "−") for cell in row)
 
 
 def _checks(case: Case) -> list[tuple[str, str]]:
-    """Return the rows on local minima and on exact bodies."""
+    """Return the rows on the local minima, and on contacts of the exact bodies."""
     rows = []
     if case.optimum is not None:
         values = ", ".join(f"{value:.4g}" for value in case.minima[:, 2])

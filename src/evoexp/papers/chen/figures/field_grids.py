@@ -22,6 +22,9 @@ FRAMES: dict[str, dict[str, Any]] = {
     for slip, colour in ((WRONG, "#CC3311"), (MISSING, "#EE7733"), (SURPLUS, "#0077BB"))
 }
 
+NUMBER: dict[str, Any] = {"ha": "center", "va": "center_baseline", "fontsize": 6.0}
+SMALL = NUMBER | {"va": "center", "fontsize": 4.2}
+
 
 def draw_fields(table: pd.DataFrame) -> Figure:
     """Draw one grid per field, with the number of every node, and mark where the print differs.
@@ -33,8 +36,7 @@ def draw_fields(table: pd.DataFrame) -> Figure:
     figure = style.figure(7.2 * 0.5 * 1.12, style.WIDTH * (1.0 if count > 1 else 0.55))
     panels = figure.subplots(1, count, squeeze=False)[0]
     for axes, (name, rows) in zip(panels, groups(table, "field"), strict=True):
-        _draw_field(axes, rows)
-        axes.set_title(str(name))
+        _draw_field(axes, rows, str(name))
     keys = [
         Rectangle((0, 0), 1, 1, label=text, **FRAMES[slip])
         for slip, text in NAMES.items()
@@ -50,7 +52,7 @@ def draw_maps(table: pd.DataFrame) -> Figure:
     figure, panels = style.row_of_panels(3.4, table["field"].nunique())
     for axes, (name, rows) in zip(panels, groups(table, "field"), strict=True):
         wide = rows.pivot_table(index="y", columns="x", values="value", dropna=False)
-        image = wide.to_numpy(dtype=float)
+        image = wide.to_numpy(dtype=np.float64)
         shown = axes.imshow(image, origin="lower", cmap="viridis", interpolation="nearest")
         bar = figure.colorbar(shown, ax=axes, label="potential [–]", shrink=0.75)
         for axis in (axes.xaxis, axes.yaxis, bar.ax.yaxis):
@@ -60,7 +62,7 @@ def draw_maps(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _draw_field(axes: Axes, rows: pd.DataFrame) -> None:
+def _draw_field(axes: Axes, rows: pd.DataFrame, title: str) -> None:
     """Draw a grid: a shaded square with a number per node, frames around slips."""
     count = int(rows["row"].max()) + 1
     width = int(rows.loc[rows["slip"] != SURPLUS, "column"].max()) + 1
@@ -72,21 +74,18 @@ def _draw_field(axes: Axes, rows: pd.DataFrame) -> None:
         if cell.slip == SURPLUS:
             axes.add_patch(Rectangle((x - 0.62, y - 0.46), 0.24, 0.92, zorder=3, **FRAMES[SURPLUS]))
             continue
-        # the node and its number
-        blocked = cell.computed == BLOCKED
+        # the node and its number, lifted where a wrong one stands below
+        blocked, wrong = cell.computed == BLOCKED, cell.slip == WRONG
         face, ink = (style.NEUTRAL, "white") if blocked else (str(shade), "black")
         square = Rectangle((x - 0.5, y - 0.5), 1, 1, facecolor=face, edgecolor="white", lw=0.5)
         axes.add_patch(square)
-        middle: dict[str, Any] = {"ha": "center", "va": "center_baseline", "fontsize": 6.0}
-        lifted = y + (0.12 if cell.slip == WRONG else 0.0)
-        axes.text(x, lifted, cell.computed, color=ink, **middle)
+        axes.text(x, y + 0.12 * wrong, cell.computed, color=ink, **NUMBER)
         # a wrong or missing number
         if cell.slip:
             look = FRAMES[cell.slip]
             axes.add_patch(Rectangle((x - 0.46, y - 0.46), 0.92, 0.92, zorder=3, **look))
-        if cell.slip == WRONG:
-            small = middle | {"va": "center", "fontsize": 4.2}
-            axes.text(x, y - 0.27, cell.printed, color=FRAMES[WRONG]["edgecolor"], **small)
+        if wrong:
+            axes.text(x, y - 0.27, cell.printed, color=FRAMES[WRONG]["edgecolor"], **SMALL)
     axes.grid(visible=False)
     axes.set(
         xlim=(-0.5, width - 0.3),
@@ -96,4 +95,5 @@ def _draw_field(axes: Axes, rows: pd.DataFrame) -> None:
         yticks=range(0, count, 5),
         xlabel="x [node]",
         ylabel="y [node]",
+        title=title,
     )

@@ -1,5 +1,7 @@
 """Costs of paths over a grid (Chen & Zalzala 1995, Fig. 2): by generation, and above the best."""
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -27,12 +29,12 @@ def costs_table(found: tuple[Group, ...]) -> pd.DataFrame:
             columns = {"best so far": "best_cost"} | ({} if position else {AVERAGE: "mean_cost"})
             for name, column in columns.items():
                 for generation, own in c.generations.groupby("index"):
-                    values = spread(own[column].to_numpy(dtype=np.float64))
+                    median, lower, upper, _ = spread(own[column].to_numpy(dtype=np.float64))
                     given = group.title, position, _name(c, group), name, generation
-                    rows.append((*given, *values[:3]))
+                    rows.append((*given, median, lower, upper))
         if group.truth is not None:
-            for name, value in ((EXACT, group.optimum), (BOUND, group.bound)):
-                rows.append((group.title, -1, name, name, 0, value, value, value))
+            known = (EXACT, group.optimum), (BOUND, group.bound)
+            rows += [(group.title, -1, name, name, 0, *(value,) * 3) for name, value in known]
     return pd.DataFrame(rows, columns=NAMES)
 
 
@@ -54,19 +56,13 @@ def draw_costs(table: pd.DataFrame) -> Figure:
 
 def _curve(axes: Axes, line: pd.DataFrame, colour: str, *, dashed: bool) -> None:
     """Draw a median, and its quartiles unless it is dashed."""
-    label, x = str(line["condition"].iloc[0]), line["generation"]
+    label, x, median = str(line["condition"].iloc[0]), line["generation"], line["median"]
     if dashed:
-        axes.plot(
-            x,
-            line["median"],
-            label=f"{label}, average",
-            color=colour,
-            linestyle="--",
-            linewidth=0.9,
-        )
-        return
-    axes.plot(x, line["median"], color=colour, label=label)
-    axes.fill_between(x, line["lower"], line["upper"], color=colour, alpha=0.18, linewidth=0)
+        look: dict[str, Any] = {"linestyle": "--", "linewidth": 0.9}
+        axes.plot(x, median, label=f"{label}, average", color=colour, **look)
+    else:
+        axes.plot(x, median, color=colour, label=label)
+        axes.fill_between(x, line["lower"], line["upper"], color=colour, alpha=0.18, linewidth=0)
 
 
 def gaps_table(found: tuple[Group, ...]) -> pd.DataFrame:
@@ -97,8 +93,7 @@ def draw_gaps(table: pd.DataFrame) -> Figure:
     for axes, (name, rows) in zip(panels, grouped(table, "panel"), strict=True):
         for (position, kind), own in grouped(rows, ["position", "condition"]):
             values = np.sort(own["gap_percent"].to_numpy())
-            steps = np.arange(len(values) + 1) / len(values)
-            x = np.concatenate([[min(values[0], 0.0)], values])
+            x, steps = [min(values[0], 0.0), *values], np.arange(len(values) + 1) / len(values)
             colour = style.condition_colour(int(position))
             axes.step(x, 100.0 * steps, where="post", color=colour, label=str(kind))
         axes.axvline(0.0, color=style.NEUTRAL, linewidth=1.0, linestyle=":")

@@ -1,15 +1,18 @@
-"""Paths over a grid among its obstacles (Chen & Zalzala 1995, Fig. 2)."""
+"""Paths over a grid among its obstacles, and how unsafe their nodes are (Fig. 2, Eq. 3)."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from evoexp.papers.chen.path_measures import Group, boxes, median_path, paths
+from evoexp.planners.grid_path_ga.planner import Problem
 from evoexp.records import FloatArray
-from evoexp.report.kit import groups, style
+from evoexp.report.kit import ConditionResults, groups, style
 
 OBSTACLE = "obstacle"
 FAINT, MEDIAN, EXACT = "all runs", "run of median cost", "best path known (reference)"
@@ -37,35 +40,30 @@ class Line(NamedTuple):
     text: str = ""
 
 
-class Panel(NamedTuple):
-    """One workspace.
-
-    Attributes:
-        title: Text above it.
-        unit: Unit of lengths.
-        boxes: Obstacles (x0, y0, x1, y1) of nodes.
-        lines: Paths, drawn in this order.
-    """
-
-    title: str
-    unit: str
-    boxes: Sequence[Sequence[int]]
-    lines: Sequence[Line]
+def known_lines(group: Group) -> list[Line]:
+    """Return the run of median cost, and the best path that the reference knows."""
+    best = (Line(EXACT, path) for path in group.best_path)
+    return [Line(MEDIAN, median_path(group.main)), *best]
 
 
-def paths_table(panels: Sequence[Panel]) -> pd.DataFrame:
+def paths_table(
+    panels: Sequence[tuple[str, ConditionResults, Sequence[Line]]],
+) -> pd.DataFrame:
     """Return obstacles and paths of all workspaces.
+
+    Args:
+        panels: (title, a condition of the workspace, lines in the order in which they are drawn).
 
     Returns:
         Columns panel, unit, kind, text, number (of the line), share, x, y; an obstacle has two
         rows, its corners.
     """
     rows: list[tuple[object, ...]] = []
-    for panel in panels:
-        head = (panel.title, panel.unit)
-        for number, (x0, y0, x1, y1) in enumerate(panel.boxes):
+    for title, c, lines in panels:
+        head = title, c.condition.length_unit
+        for number, (x0, y0, x1, y1) in enumerate(boxes(c)):
             rows += [(*head, OBSTACLE, "", number, 1.0, x, y) for x, y in ((x0, y0), (x1, y1))]
-        for number, line in enumerate(panel.lines):
+        for number, line in enumerate(lines):
             same = (*head, line.kind, line.text, number, line.share)
             rows += [(*same, x, y) for x, y in line.path.tolist()]
     return pd.DataFrame(rows, columns=NAMES)
@@ -83,18 +81,12 @@ def draw_paths(table: pd.DataFrame) -> Figure:
 
 def draw_routes(table: pd.DataFrame) -> Figure:
     """Draw one path per route, as wide as it is frequent, with a legend per workspace."""
-    found = {str(kind) for kind in table["kind"] if kind != OBSTACLE}
-    names = sorted(found, key=lambda name: (len(name), name))
+    names = sorted({*table["kind"]} - {OBSTACLE}, key=lambda name: (len(name), name))
     figure, panels = _panels(table, 3.1)
     for axes, kind, line in _lines(panels, table):
         text, share = line[["text", "share"]].iloc[0]
-        axes.plot(
-            line["x"],
-            line["y"],
-            label=text,
-            color=style.condition_colour(names.index(kind)),
-            linewidth=0.8 + 3.2 * share,
-        )
+        colour, width = style.condition_colour(names.index(kind)), 0.8 + 3.2 * share
+        axes.plot(line["x"], line["y"], label=text, color=colour, linewidth=width)
     for axes in panels:
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.24), ncols=2, fontsize=6.5)
     return figure
@@ -130,3 +122,41 @@ def _panels(table: pd.DataFrame, height: float) -> tuple[Figure, list[Axes]]:
     for axes in panels[1:]:
         axes.set_ylabel("")
     return figure, panels
+
+
+def places_table(shown: Sequence[Group]) -> pd.DataFrame:
+    """Return how many nodes of every unsafeness the paths of each first condition pass.
+
+    Returns:
+        Columns position, condition, unsafeness, nodes (mean over the runs), runs.
+    """
+    rows: list[tuple[object, ...]] = []
+    for position, group in enumerate(shown):
+        fields, found = group.main.problem(Problem).fields, paths(group.main).values()
+        unsafeness = np.asarray(fields.grid.inner(fields.unsafeness))  # (along x, along y)
+        passed = np.concatenate([unsafeness[tuple(path.astype(int).T)] for path in found])
+        rows += [
+            (position, group.name, float(value), (passed == value).sum() / len(found), len(found))
+            for value in np.unique(unsafeness)
+        ]
+    return pd.DataFrame(rows, columns=["position", "condition", "unsafeness", "nodes", "runs"])
+
+
+def draw_places(table: pd.DataFrame) -> Figure:
+    """Draw one bar per unsafeness and condition."""
+    figure, (axes,) = style.row_of_panels(2.7, 1)
+    values = sorted(set(table.loc[table["nodes"] > 0.0, "unsafeness"]))
+    count = table["position"].nunique()
+    width = 0.8 / count
+    for k, (position, rows) in enumerate(groups(table, "position")):
+        own = rows.set_index("unsafeness")["nodes"].reindex(values)
+        x = np.arange(len(values)) + width * (k - 0.5 * (count - 1))
+        label = f"{rows['condition'].iloc[0]} (n = {rows['runs'].iloc[0]})"
+        axes.bar(x, own, width=width, color=style.condition_colour(int(position)), label=label)
+    axes.set_xticks(np.arange(len(values)), [f"{value:g}" for value in values])
+    axes.set(
+        xlabel="unsafeness Sᵢ of a node (1: far from everything)", ylabel="nodes per path, mean"
+    )
+    axes.grid(visible=False, axis="x")
+    style.legend_below(figure, axes, min(count, 4))
+    return figure

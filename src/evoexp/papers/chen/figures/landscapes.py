@@ -21,6 +21,7 @@ LOOKS: dict[str, dict[str, Any]] = {
     PAPER: {"marker": "+", "color": "#000000", "mew": 1.6, "ms": 10, "zorder": 8},
 }
 NAMES = ["panel", "case", "element", "theta_1_deg", "theta_2_deg", "cost"]
+LABEL = "E [-], lower is better"
 TICKS = {20.0: [1.0, 2.0, 5.0, 10.0, 20.0], 3.0: [1.0, 1.5, 2.0, 3.0]}
 """Range of a colour bar → its ticks, both in units of the least E."""
 
@@ -33,15 +34,15 @@ def landscape_table(cases: list[Case]) -> pd.DataFrame:
     """
     parts = []
     for panel, case in enumerate(cases):
-        if case.landscape is None:
-            continue
+        assert case.landscape is not None
         one, two, cost = (case.landscape.array(name) for name in ("theta_1", "theta_2", "cost"))
-        x, y = np.meshgrid(one, two, indexing="ij")
-        elements = [(GRID, np.column_stack([x.ravel(), y.ravel()]), cost.ravel())]
-        for element, angles in _points(case).items():
-            costs = np.array([case.measured(pair)["cost"] for pair in angles])
-            elements.append((element, angles, costs))
-        for element, angles, costs in elements:
+        grid = np.stack(np.meshgrid(one, two, indexing="ij"), axis=-1).reshape(-1, 2)
+        marked = {
+            element: (angles, np.array([case.measured(pair)["cost"] for pair in angles]))
+            for element, angles in _points(case).items()
+            if len(angles)
+        }
+        for element, (angles, costs) in ({GRID: (grid, cost.ravel())} | marked).items():
             columns = panel, case.name, element, angles[:, 0], angles[:, 1], costs
             parts.append(pd.DataFrame(dict(zip(NAMES, columns, strict=True))))
     return rounded(pd.concat(parts, ignore_index=True))
@@ -49,15 +50,15 @@ def landscape_table(cases: list[Case]) -> pd.DataFrame:
 
 def _points(case: Case) -> dict[str, FloatArray]:
     """Return the marked points θ1, θ2 [deg] by element, (points, 2) each."""
-    points = {}
+    points, minima = {}, case.minima
     if case.plain is not None:
         points[RUN] = np.array([case.plain.solutions[k] for k in sorted(case.plain.solutions)])
-    if len(case.minima):
-        best = case.minima[:, 2] <= case.minima[0, 2] * (1.0 + 1e-9)
-        points |= {OPTIMUM: case.minima[best, :2], MINIMUM: case.minima[~best, :2]}
-    if case.printed_angles is not None:
-        points[PAPER] = case.printed_angles[None]
-    return {element: angles for element, angles in points.items() if len(angles)}
+    if len(minima):
+        best = minima[:, 2] <= minima[0, 2] * (1.0 + 1e-9)
+        points |= {OPTIMUM: minima[best, :2], MINIMUM: minima[~best, :2]}
+    if case.printed.angles is not None:
+        points[PAPER] = np.array([case.printed.angles])
+    return points
 
 
 def draw_landscape(table: pd.DataFrame) -> Figure:
@@ -65,10 +66,9 @@ def draw_landscape(table: pd.DataFrame) -> Figure:
 
     White: no posture is feasible.
     """
-    panels = [rows for _, rows in groups(table, "panel")]
-    figure = style.figure(7.4)
-    places = figure.subplots(2, len(panels), squeeze=False)
-    for (whole, close), rows in zip(places.T, panels, strict=True):
+    figure, count = style.figure(7.4), table["panel"].nunique()
+    places = figure.subplots(2, count, squeeze=False)
+    for (whole, close), (_, rows) in zip(places.T, groups(table, "panel"), strict=True):
         grid = rows[rows["element"] == GRID]
         wide = grid.pivot(index="theta_2_deg", columns="theta_1_deg", values="cost")
         for axes, widest in zip((whole, close), TICKS, strict=True):
@@ -83,8 +83,7 @@ def draw_landscape(table: pd.DataFrame) -> Figure:
             axis.set_major_locator(MultipleLocator(90.0))
         best = rows[rows["element"].isin([OPTIMUM, PAPER, RUN])]
         for axis, name in (("x", "theta_1_deg"), ("y", "theta_2_deg")) if len(best) else ():
-            low, high = float(best[name].min()) - 15.0, float(best[name].max()) + 15.0
-            close.set(**{f"{axis}lim": (low, high)})
+            close.set(**{f"{axis}lim": (best[name].min() - 15.0, best[name].max() + 15.0)})
         close.set_title("around the best", fontweight="normal")
     style.legend_below(figure, places[0, 0], 4)
     return figure
@@ -92,31 +91,21 @@ def draw_landscape(table: pd.DataFrame) -> Figure:
 
 def _draw_costs(figure: Figure, axes: Axes, wide: pd.DataFrame, widest: float) -> None:
     """Draw the costs in colours, up to a multiple of the least one, and their colour bar."""
-    costs = wide.to_numpy()
-    least = float(np.nanmin(costs))
+    costs, least = wide.to_numpy(), float(np.nanmin(wide))
+    look: dict[str, Any] = {"cmap": "viridis_r", "shading": "nearest", "rasterized": True}
     norm = LogNorm(vmin=least, vmax=least * widest)
-    image = axes.pcolormesh(
-        wide.columns,
-        wide.index,
-        costs,
-        norm=norm,
-        cmap="viridis_r",
-        shading="nearest",
-        rasterized=True,
-    )
+    image = axes.pcolormesh(wide.columns, wide.index, costs, norm=norm, **look)
+    bar = figure.colorbar(image, ax=axes, extend="max", shrink=0.8, label=LABEL)
     ticks = [least * tick for tick in TICKS[widest]]
-    bar = figure.colorbar(image, ax=axes, extend="max", shrink=0.8)
     bar.set_ticks(ticks, labels=[f"{tick:.3g}" for tick in ticks])
     bar.minorticks_off()
-    bar.set_label("E [-], lower is better")
 
 
 def _draw_points(axes: Axes, rows: pd.DataFrame) -> None:
     """Draw the marked points of a criterion."""
     for element, look in LOOKS.items():
-        own = rows[rows["element"] == element]
-        if len(own):
-            x, y = own["theta_1_deg"], own["theta_2_deg"]
+        x, y = rows.loc[rows["element"] == element, ["theta_1_deg", "theta_2_deg"]].to_numpy().T
+        if len(x):
             axes.plot(x, y, linestyle="none", label=element, **look)
     axes.set(xlabel="θ₁ [deg]", ylabel="θ₂ [deg]", aspect="equal")
     axes.grid(False)

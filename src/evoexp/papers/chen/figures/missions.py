@@ -1,71 +1,71 @@
 """A mobile manipulator's whole motion: the way from above, the docking posture from the side."""
 
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
+import pinocchio as pin
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from evoexp.papers.chen.figures.grid_paths import OBSTACLE, draw_obstacle
+from evoexp.planners.two_stage.planner import Problem
 from evoexp.records import FloatArray
-from evoexp.report.kit import groups, style
+from evoexp.report.kit import ConditionResults, groups, median_replicate, style
 
-PATH, TRAVEL, DOCKED, TARGET, BODY, FORCE = (
-    "path",
-    "travel posture",
-    "docking posture",
-    "target",
-    "body",
-    "force",
-)
+PATH, TRAVEL, DOCKED = "path", "travel posture", "docking posture"
+TARGET, BODY, FORCE = "target", "body", "force"
+MARK: dict[str, Any] = {"color": style.NEUTRAL}
+PLATFORM: dict[str, Any] = {"facecolor": "#dddddd", "edgecolor": style.NEUTRAL}
+ARROW = {"arrowstyle": "-|>", "color": style.FORBIDDEN}
 
 
-class Mission(NamedTuple):
-    """A motion to draw.
-
-    Attributes:
-        title: Of its row: label, run and verdict with commas between.
-        unit: Of lengths.
-        boxes: Obstacles (x0, y0, x1, y1).
-        path: (places, 2) of the platform, the docking place last.
-        postures: Name → joints of the arm from its first one to the end-effector, (4, 2): along the
-            floor, and height.
-        body: Radius and height of the platform.
-        target: (2,) of the end-effector: along the floor, and height.
-        force: (2,) that acts on it.
-    """
-
-    title: str
-    unit: str
-    boxes: list[tuple[int, ...]]
-    path: FloatArray
-    postures: dict[str, FloatArray]
-    body: tuple[float, float]
-    target: FloatArray
-    force: tuple[float, float]
-
-
-def missions_table(shown: list[Mission]) -> pd.DataFrame:
-    """Return everything that is drawn.
+def missions_table(shown: Sequence[ConditionResults]) -> pd.DataFrame:
+    """Return the run of median cost of every condition, with everything that is drawn of it.
 
     Returns:
-        Columns row, unit, kind, number, a, b: x and y of the floor; of postures, the body and the
-        target place along the floor and height; of the force its components.
+        Columns row (label, run and verdict with commas between), unit, kind, number, a, b: x and y
+        of the floor, the docking place last of the path; of postures (the arm's joints and its
+        end), the target and the body (its radius and height) place along the floor and height; of
+        the force its components.
     """
     rows: list[tuple[object, ...]] = []
-    for one in shown:
+    for c in shown:
+        replicate = median_replicate(c, c.column("best_cost"))
+        q, verdict = c.motion(replicate).q, c.summaries.loc[replicate]
+        word = "certified" if verdict["certified"] else "not certified"
+        told = f"{c.label}, run {replicate}, {word}, clearance {verdict['clearance']:.3g}"
+        robot, scenario = _typed(c)
+        reach, above = scenario.docking.target
         kinds = [
-            *((OBSTACLE, k, [box[:2], box[2:]]) for k, box in enumerate(one.boxes)),
-            (PATH, 0, one.path.tolist()),
-            *((name, 0, joints.tolist()) for name, joints in one.postures.items()),
-            (BODY, 0, [one.body]),
-            (TARGET, 0, [one.target.tolist()]),
-            (FORCE, 0, [one.force]),
+            *((OBSTACLE, k, [box[:2], box[2:]]) for k, box in enumerate(scenario.grid.obstacles)),
+            (PATH, 0, q[:-1, :2].tolist()),
+            (TRAVEL, 0, _joints(c, q[-2])),
+            (DOCKED, 0, _joints(c, q[-1])),
+            (BODY, 0, [(robot.body_radius, robot.body_height)]),
+            (TARGET, 0, [(scenario.task_origin[0] + reach, robot.body_height + above)]),
+            (FORCE, 0, [scenario.docking.force]),
         ]
-        rows += [(one.title, one.unit, *kind, a, b) for *kind, points in kinds for a, b in points]
+        given = told, c.condition.length_unit
+        rows += [(*given, *kind, a, b) for *kind, points in kinds for a, b in points]
     return pd.DataFrame(rows, columns=["row", "unit", "kind", "number", "a", "b"])
+
+
+def _typed(condition: ConditionResults) -> tuple[Any, Any]:
+    """Return a mission's robot and scenario, with the fields that only they have."""
+    return condition.condition.robot, condition.condition.scenario
+
+
+def _joints(condition: ConditionResults, q: FloatArray) -> list[list[float]]:
+    """Return the arm's joints and its end at a configuration (nq,), (4, 2): x, and height."""
+    model, (robot, _) = condition.problem(Problem).scene.model, _typed(condition)
+    data = model.createData()
+    pin.forwardKinematics(model, data, q)
+    points = [data.oMi[k].translation for k in range(3, model.njoints)]
+    points.append(data.oMi[model.njoints - 1].act(np.array([robot.link_lengths[-1], 0.0, 0.0])))
+    return [[float(x), float(z)] for x, _, z in points]
 
 
 def draw_missions(table: pd.DataFrame) -> Figure:
@@ -88,56 +88,30 @@ def _draw_above(axes: Axes, rows: pd.DataFrame) -> None:
     for _, corners in groups(rows[rows["kind"] == OBSTACLE], "number"):
         draw_obstacle(axes, corners["a"], corners["b"])
     path = rows.loc[rows["kind"] == PATH, ["a", "b"]].to_numpy()
-    look: dict[str, Any] = {"color": style.NEUTRAL}
     axes.plot(*path.T, color=style.CONDITION_COLOURS[0], label="way of the platform")
-    axes.plot(*path[0], "o", markersize=4, **look)
-    axes.plot(*path[-1], "*", markersize=8, label="docking place", **look)
+    axes.plot(*path[0], "o", markersize=4, **MARK)
+    axes.plot(*path[-1], "*", markersize=8, label="docking place", **MARK)
     style.operational_axes(axes, str(rows["unit"].iloc[0]))
     axes.margins(0.08)
 
 
 def _draw_side(axes: Axes, rows: pd.DataFrame) -> None:
     """Draw the platform, both postures of the arm, the target and the force."""
-    (radius, height), unit = _pair(rows, BODY), str(rows["unit"].iloc[0])
-    middle, _ = _pair(rows, DOCKED)
-    axes.add_patch(
-        Rectangle(
-            (middle - radius, 0.0),
-            2.0 * radius,
-            height,
-            facecolor="#dddddd",
-            edgecolor=style.NEUTRAL,
-        )
-    )
+    first = {str(kind): own[["a", "b"]].to_numpy()[0] for kind, own in groups(rows, "kind")}
+    (radius, height), (middle, _) = first[BODY], first[DOCKED]
+    axes.add_patch(Rectangle((middle - radius, 0.0), 2.0 * radius, height, **PLATFORM))
     for name, colour, pattern in ((TRAVEL, style.FAINT, "--"), (DOCKED, style.ARM_COLOURS[1], "-")):
         arm: dict[str, Any] = {"marker": "o", "markersize": 3.5, "color": colour, "label": name}
         joints = rows[rows["kind"] == name]
         axes.plot(joints["a"], joints["b"], pattern, **arm)
-    (x, z), (fx, fz) = _pair(rows, TARGET), _pair(rows, FORCE)
-    axes.plot(
-        x,
-        z,
-        "x",
-        label="where the end-effector shall be",
-        color=style.NEUTRAL,
-        markersize=7,
-        zorder=4,
-    )
+    (x, z), (fx, fz) = first[TARGET], first[FORCE]
+    axes.plot(x, z, "x", label="where the end-effector shall be", markersize=7, zorder=4, **MARK)
     size = np.hypot(fx, fz) or 1.0
-    arrow = {"arrowstyle": "-|>", "color": style.FORBIDDEN}
     tail = x - 0.6 * fx / size, z - 0.6 * fz / size
-    axes.annotate("F", (x, z), tail, arrowprops=arrow, ha="center", fontsize=7.5)
-    axes.axhline(0.0, color=style.NEUTRAL, linewidth=1.0)
+    axes.annotate("F", (x, z), tail, arrowprops=ARROW, ha="center", fontsize=7.5)
+    axes.axhline(0.0, linewidth=1.0, **MARK)
+    unit = rows["unit"].iloc[0]
     axes.set(
-        adjustable="datalim",
-        aspect="equal",
-        xlabel=f"x [{unit}]",
-        ylabel=f"height z [{unit}]",
+        xlabel=f"x [{unit}]", ylabel=f"height z [{unit}]", adjustable="datalim", aspect="equal"
     )
     axes.margins(0.1)
-
-
-def _pair(rows: pd.DataFrame, kind: str) -> tuple[float, float]:
-    """Return a and b of the first row of a kind."""
-    first, second = rows.loc[rows["kind"] == kind, ["a", "b"]].iloc[0]
-    return float(first), float(second)

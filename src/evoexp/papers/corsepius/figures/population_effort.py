@@ -1,6 +1,6 @@
 """Success and expected effort against one setting, task by task (Corsépius 2001, section 5)."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -54,11 +54,12 @@ def effort_table(
         for position, task in enumerate(found)
         for value, c in task.by_value.items()
     ]
-    rows: list[tuple[object, ...]] = []
-    for name, count in shares.items():
-        for *given, c in points:
-            one = count(c)
-            rows.append((name, SHARE, *given, one.share, *one.interval(confidence), *one))
+    rows: list[tuple[object, ...]] = [
+        (name, SHARE, *given, one.share, *one.interval(confidence), *one)
+        for name, count in shares.items()
+        for *given, c in points
+        for one in (count(c),)
+    ]
     for name, values in effort.items():
         for *given, c in points:
             runs = values(c), solved(c)
@@ -144,23 +145,26 @@ def _draw_series(axes: Axes, table: pd.DataFrame, count: int, marked: float) -> 
     axes.axvline(marked, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
     share = table["kind"].iloc[0] == SHARE
     scale = 100.0 if share else 1.0
-    for position, rows in groups(table, "position"):
-        rows = rows.sort_values("value").replace(np.inf, np.nan)
-        rows = rows[rows["expected"].notna()]
+    known = table.replace(np.inf, np.nan).dropna(subset="expected").sort_values("value")
+    for position, rows in groups(known, "position"):
         x = rows["value"] * (1.0 + APART * (position - 0.5 * (count - 1)))
-        look = _look(int(position))
+        look, most = _look(int(position)), rows["upper"].fillna(rows["expected"])
         axes.plot(x, scale * rows["expected"], linewidth=1.1, **look)
-        least, most = rows["lower"], rows["upper"].fillna(rows["expected"])
-        axes.vlines(x, scale * least, scale * most, color=look["color"], linewidth=1.0, alpha=0.7)
-    axes.set_xscale("log")
-    axes.xaxis.set_minor_locator(NullLocator())
-    values = sorted({*table["value"], marked})
-    axes.set_xticks(values, [f"{value:g}" for value in values])
+        bars = {"color": look["color"], "linewidth": 1.0, "alpha": 0.7}
+        axes.vlines(x, scale * rows["lower"], scale * most, **bars)
+    logarithmic_axis(axes, sorted({*table["value"], marked}))
     if share:
         axes.set_ylim(-4, 104)
     else:
         axes.set_yscale("log")
         axes.yaxis.set_minor_formatter(NullFormatter())
+
+
+def logarithmic_axis(axes: Axes, values: Collection[float]) -> None:
+    """Make the horizontal axis logarithmic, with these values of a setting as its only ticks."""
+    axes.set_xscale("log")
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.set_xticks(list(values), [f"{value:g}" for value in values])
 
 
 def _look(position: int) -> dict[str, Any]:

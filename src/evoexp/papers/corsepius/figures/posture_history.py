@@ -17,6 +17,7 @@ MANY = 3  # conditions; more have panels of their own
 VISIBLE = 1e-6  # [length unit] smaller tolerances are not drawn
 QUARTILES = (0.5, 0.25, 0.75)
 TOLERANCE: dict[str, Any] = {"color": style.NEUTRAL, "linewidth": 0.9, "linestyle": (0, (4, 2))}
+BESIDE: dict[str, Any] = {"va": "center", "ha": "left"}  # a text to the right of its place
 PHASES = [
     *("position", "condition", "order", "phase", "begun", "reached"),
     *("share", "lower", "upper", "cycles", "cycles_lower", "cycles_upper"),
@@ -36,17 +37,14 @@ def history_table(results: Results) -> pd.DataFrame:
     """
     parts = []
     for position, c in enumerate(results.main):
-        names = measures.phase_names(c)
+        names, scenario = measures.phase_names(c), c.condition.scenario
         for phase, own in groups(c.generations, "term_phase"):
             cycle = own.groupby("replicate")["index"].rank(method="first").astype(int) - 1
+            numbered = own.assign(cycle=cycle)
             for quantity, column in ((DISTANCE, "term_goal_distance"), (COST, "term_cost")):
-                wide = own.assign(cycle=cycle).pivot(
-                    index="cycle", columns="replicate", values=column
-                )
+                wide = numbered.pivot(index="cycle", columns="replicate", values=column)
                 values = wide.abs().ffill().to_numpy(dtype=np.float64)
-                median, lower, upper = (
-                    [quantile(row, share) for row in values] for share in QUARTILES
-                )
+                quartiles = ([quantile(row, share) for row in values] for share in QUARTILES)
                 table = {
                     "position": position,
                     "condition": c.label,
@@ -54,12 +52,10 @@ def history_table(results: Results) -> pd.DataFrame:
                     "order": int(phase) - len(names),
                     "quantity": quantity,
                     "cycle": wide.index,
-                    "median": median,
-                    "lower": lower,
-                    "upper": upper,
+                    **dict(zip(("median", "lower", "upper"), quartiles, strict=True)),
                     "begun": wide.shape[1],
                     "running": wide.notna().sum(axis=1).to_numpy(),
-                    "tolerance": c.condition.scenario.position_tolerance,  # type: ignore[attr-defined]
+                    "tolerance": scenario.position_tolerance,  # type: ignore[attr-defined]
                     "length_unit": c.condition.length_unit,
                 }
                 parts.append(pd.DataFrame(table))
@@ -74,25 +70,20 @@ def draw_history(table: pd.DataFrame) -> Figure:
     """
     conditions = sorted(set(zip(table["position"], table["condition"], strict=True)))
     phases, many = _ordered(table), len(conditions) > MANY
+    by, names = ("phase", phases) if many else ("condition", [name for _, name in conditions])
     if many:
         panels = [(table["position"] == k, name, DISTANCE) for k, name in conditions]
     elif len(phases) == 1:
-        panels = [
-            (table["phase"] == phases[0], f"{letter}  {what}", what)
-            for letter, what in (("a", COST), ("b", DISTANCE))
-        ]
+        both = (("a", COST), ("b", DISTANCE))
+        panels = [(table["phase"] == phases[0], f"{k}  {name}", name) for k, name in both]
     else:
         panels = [
             (table["phase"] == name, f"{k + 1}  {name}", DISTANCE) for k, name in enumerate(phases)
         ]
-    columns = min(PER_LINE, len(panels))
-    lines = -(-len(panels) // columns)
-    figure = style.figure((2.1 if many else 2.4) * lines + 0.8)
-    names = phases if many else [name for _, name in conditions]
-    for k, (chosen, title, quantity) in enumerate(panels):
-        axes = figure.add_subplot(lines, columns, k + 1)
+    figure, places = style.lines_of_panels(2.1 if many else 2.4, len(panels), PER_LINE, 0.8)
+    for axes, (chosen, title, quantity) in zip(places, panels, strict=True):
         rows = table[chosen & (table["quantity"] == quantity)]
-        _draw_curves(axes, rows, "phase" if many else "condition", names)
+        _draw_curves(axes, rows, by, names)
         tolerance, unit = rows[["tolerance", "length_unit"]].iloc[0]
         if quantity == DISTANCE and tolerance >= VISIBLE:
             axes.axhline(tolerance, **TOLERANCE)
@@ -114,16 +105,8 @@ def _draw_curves(axes: Axes, table: pd.DataFrame, by: str, names: list[str]) -> 
         )
         axes.fill_between(x, curve["lower"], curve["upper"], color=colour, alpha=0.2, linewidth=0)
         axes.plot(x, median, color=colour)
-        at = (x.iloc[-1], median.iloc[-1])
-        axes.annotate(
-            f" {curve['begun'].iloc[0]}",
-            at,
-            annotation_clip=False,
-            fontsize=6,
-            color=colour,
-            va="center",
-            ha="left",
-        )
+        at, runs = (x.iloc[-1], median.iloc[-1]), f" {curve['begun'].iloc[0]}"
+        axes.annotate(runs, at, color=colour, annotation_clip=False, fontsize=6, **BESIDE)
     axes.set(yscale="log", xlim=(0, max(1, int(table["cycle"].max()))))
     axes.xaxis.set_major_locator(MaxNLocator(nbins=4, integer=True))
 
@@ -157,8 +140,7 @@ def draw_phases(table: pd.DataFrame) -> Figure:
     several = table["position"].nunique() > 1
     figure = style.figure(0.28 * len(table) + 1.1)
     left, right = figure.subplots(1, 2, sharey=True)
-    beside: dict[str, Any] = {"xycoords": left.get_yaxis_transform(), "fontsize": 6.5}
-    labels = []
+    at_edge: dict[str, Any] = {"xycoords": left.get_yaxis_transform(), "fontsize": 6.5} | BESIDE
     for y, row in enumerate(records(table)):
         colour = style.condition_colour(int(row.position))
         shares = 100 * row.lower, 100 * row.share, 100 * row.upper
@@ -166,9 +148,11 @@ def draw_phases(table: pd.DataFrame) -> Figure:
         for axes, (lower, middle, upper) in ((left, shares), (right, cycles)):
             axes.hlines(y, lower, upper, color=colour, linewidth=1.6)
             axes.plot([middle], [y], "o", color=colour, markersize=4.5)
-        left.annotate(f" {row.reached}/{row.begun}", (1.0, y), va="center", ha="left", **beside)
-        start = f"{row.condition}: " if several else ""
-        labels.append(f"{start}{row.order + 1}  {row.phase}")
+        left.annotate(f" {row.reached}/{row.begun}", (1.0, y), **at_edge)
+    labels = [
+        (f"{row.condition}: " if several else "") + f"{row.order + 1}  {row.phase}"
+        for row in records(table)
+    ]
     left.set_yticks(range(len(labels)), labels)
     left.set(
         ylim=(len(labels) - 0.5, -0.5),

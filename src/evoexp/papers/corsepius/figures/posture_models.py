@@ -36,15 +36,15 @@ def models_table(shown: Sequence[tuple[str, ConditionResults]]) -> pd.DataFrame:
         data, placements = model.createData(), geometry.createData()
         pin.updateGeometryPlacements(model, data, geometry, placements, problem.start)
         own = [
-            (BODY, item.name, *(solids.solid(item.geometry, place) or ()))
+            (BODY, item.name, *solids.solid(item.geometry, place).values())
             for item, place in zip(geometry.geometryObjects, placements.oMg, strict=True)
         ]
         joints = (data.oMi[item.parentJoint] for item in geometry.geometryObjects)
         for name, joint, cover in zip(bodies.names, joints, bodies.covers, strict=True):
             capsules = zip(cover.start, cover.end, cover.radius, strict=True)
             own += [(COVER, name, *_capsule(joint, *capsule)) for capsule in capsules]
-        end = bodies.inflation, c.condition.length_unit
-        rows += [(position, title, *row, *end) for row in own]
+        unit = c.condition.length_unit
+        rows += [(position, title, *row, bodies.inflation, unit) for row in own]
     return rounded(pd.DataFrame(rows, columns=NAMES))
 
 
@@ -59,12 +59,11 @@ def draw_models(table: pd.DataFrame) -> Figure:
         bodies, covers = (rows[rows["element"] == element] for element in (BODY, COVER))
         counts = covers["shape"].value_counts()
         kinds = ", ".join(f"{counts[kind]} {KINDS[kind]}" for kind in KINDS if kind in counts)
-        for k, (own, alpha, title) in enumerate(
-            (
-                (bodies, 0.85, f"{robot}: {len(bodies)} bodies"),
-                (covers, 0.35, f"{kinds}, at most {inflation:.3g} {unit} beyond"),
-            )
-        ):
+        shown = (
+            (bodies, 0.85, f"{robot}: {len(bodies)} bodies"),
+            (covers, 0.35, f"{kinds}, at most {inflation:.3g} {unit} beyond"),
+        )
+        for k, (own, alpha, title) in enumerate(shown):
             axes = solids.space(figure, grid[position, k], points, unit, VIEW)
             for row in records(own):
                 solids.draw_solid(axes, row, style.arm_colour(k), alpha)

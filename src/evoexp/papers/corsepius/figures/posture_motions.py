@@ -49,19 +49,17 @@ def motions_table(shown: list[ShownPath]) -> pd.DataFrame:
         path), name, x, y, z, x_end, y_end, z_end (of a link), those of `solids` (of obstacles and
         objects), length_unit.
     """
-    rows: list[dict[str, Any]] = []
-    panel = 0
+    panels: list[list[dict[str, Any]]] = []
     for one in shown:
         problem = measures.problem(one.condition)
         postures = measures.paths(one.condition)[one.replicate]
-        spans = problem.spans(postures)
+        spans, unit = problem.spans(postures), one.condition.condition.length_unit
         for number, span in enumerate(spans) if one.by_phase else [(0, spans[-1])]:
             first = span.first if one.by_phase else 0
             title = f"{number + 1}  {span.stage.phase.name}" if one.by_phase else one.title
-            unit = one.condition.condition.length_unit
-            given = {"panel": panel, "title": title, "length_unit": unit}
-            rows += [given | row for row in _panel(problem, span, postures, first)]
-            panel += 1
+            given = {"panel": len(panels), "title": title, "length_unit": unit}
+            panels.append([given | row for row in _panel(problem, span, postures, first)])
+    rows = [row for panel in panels for row in panel]
     return rounded(pd.DataFrame(rows).reindex(columns=NAMES))
 
 
@@ -74,8 +72,7 @@ def draw_motions(table: pd.DataFrame) -> Figure:
     figure = style.figure((3.1 if above else 2.6) * lines + 0.3)
     grid = figure.add_gridspec(lines, columns)
     for k, ((_, title), rows) in enumerate(panels):
-        unit = rows["length_unit"].iloc[0]
-        place = (k, 0) if above else divmod(k, columns)
+        unit, place = rows["length_unit"].iloc[0], (k, 0) if above else divmod(k, columns)
         axes = solids.space(figure, grid[place], _points(rows), unit, VIEW)
         axes.set_title(title, fontsize=8)
         _draw(axes, rows, "xyz")
@@ -106,26 +103,28 @@ def _panel(problem: Problem, span: Span, postures: FloatArray, first: int) -> li
     They are the postures from `first` to the end of the span, and things as they are in it.
     """
     own = postures[first : span.last + 1]
-    rows: list[tuple[str, int, str, list[str], Any]] = []
-    for _, link, start, end in motion_geometry.joint_positions(problem.assembly, own.T / DEGREE):
-        places = np.hstack([start, end])
-        rows += [(LINK, n, str(link), [*PLACE, *PATH], row) for n, row in enumerate(places, first)]
-    tips = tool_places(problem, own)
-    rows += [(TIP, n, "tool", PLACE, place) for n, place in enumerate(tips, first)]
-    target = span.stage.target_position
-    rows.append((GOAL, span.last, span.stage.phase.name, PLACE, target))
+    ends = motion_geometry.joint_positions(problem.assembly, own.T / DEGREE)
+    links = [
+        _row(LINK, n, str(link), *start[n - first], *end[n - first])
+        for _, link, start, end in ends
+        for n in range(first, span.last + 1)
+    ]
+    places = enumerate(tool_places(problem, own), first)
+    goal = _row(GOAL, span.last, span.stage.phase.name, *span.stage.target_position)
+    rows = [*links, *(_row(TIP, n, "tool", *place) for n, place in places), goal]
     for k, (shape, placement) in enumerate(obstacle_shapes(problem.obstacles_in(span.stage))):
         name, held = problem.task.names[k], k == span.stage.situation.held
         for instant in [first, span.last] if held else [span.last]:
             where = _held_pose(problem, span, postures[instant]) if held else placement
-            found = solids.solid(shape, where)
-            if found is not None:
-                rows.append((HELD if held else OBSTACLE, instant, name, solids.COLUMNS, found))
-    return [
-        {"element": element, "instant": instant, "name": name}
-        | dict(zip(names, values, strict=True))
-        for element, instant, name, names, values in rows
-    ]
+            found, element = solids.solid(shape, where), HELD if held else OBSTACLE
+            rows += [_row(element, instant, name) | found] if found else []
+    return rows
+
+
+def _row(element: str, instant: int, name: str, *places: float) -> dict[str, Any]:
+    """Return a row with a place, or with the two ends of a link."""
+    row = {"element": element, "instant": instant, "name": name}
+    return row | dict(zip([*PLACE, *PATH], places, strict=False))
 
 
 def _held_pose(problem: Problem, span: Span, posture: FloatArray) -> pin.SE3:

@@ -1,5 +1,7 @@
 """A local minimum of the search: the stuck runs, the cost around, and the way of a sub-goal."""
 
+from typing import Any
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -12,6 +14,7 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.figures import solids
 from evoexp.papers.corsepius.figures.posture_motions import tool_places
+from evoexp.planners.posture_es.phases import Problem
 from evoexp.records import FloatArray
 from evoexp.report.kit import (
     BOOTSTRAP_SEED,
@@ -35,6 +38,13 @@ NAMES = [
     *("element", "series", "replicate", "order", "value", *solids.COLUMNS),
     *("x_end", "y_end", "scope_deg"),
 ]
+END: dict[str, Any] = {"color": style.FORBIDDEN, "markersize": 4, "zorder": 5}
+STAR: dict[str, Any] = {
+    "color": "white",
+    "markeredgecolor": style.NEUTRAL,
+    "markersize": 10,
+    "zorder": 6,
+}
 Rows = list[dict[str, object]]
 
 
@@ -44,13 +54,16 @@ def pair(shown: tuple[ConditionResults, ...]) -> tuple[ConditionResults, Conditi
     Returns:
         (without sub-goals, with sub-goals); None if either is missing.
     """
-    for helped in shown:
-        for stuck in shown:
-            different = stuck.solved < stuck.done and helped.solved > 0
-            alone = len(measures.phase_names(stuck)) == 1
-            if different and alone and measures.only_subgoals_differ(stuck, helped):
-                return stuck, helped
-    return None
+    found = (
+        (stuck, helped)
+        for helped in shown
+        for stuck in shown
+        if stuck.solved < stuck.done
+        and helped.solved > 0
+        and len(measures.phase_names(stuck)) == 1
+        and measures.only_subgoals_differ(stuck, helped)
+    )
+    return next(found, None)
 
 
 def trap_table(stuck: ConditionResults, helped: ConditionResults) -> pd.DataFrame:
@@ -66,25 +79,21 @@ def trap_table(stuck: ConditionResults, helped: ConditionResults) -> pd.DataFram
         (NaN: infeasible), with the stuck posture and its scope. Escapes: half the edge of a box
         [scopes], the stuck posture's cost, the least one found in the box.
     """
-    problem, rows = measures.problem(stuck), list[dict[str, object]]()
+    rows: Rows = []
     for series, condition in ((STUCK, stuck), (HELPED, helped)):
-        wanted = solved(condition) == (series == HELPED)
-        kept = set(condition.summaries.index[wanted])
-        for replicate, q in measures.paths(condition).items():
-            if replicate in kept:
-                rows += _way(stuck, series, int(replicate), q)
+        wanted, found = solved(condition) == (series == HELPED), measures.paths(condition)
+        for replicate in condition.summaries.index[wanted]:
+            rows += _way(stuck, series, int(replicate), found[replicate])
     median = median_replicate(stuck, measures.evaluations(stuck), ~solved(stuck))
     failed = measures.paths(stuck)[median]
     a, b = sorted(int(k) for k in np.argsort(-np.ptp(failed, axis=0), kind="stable")[:2])
     rows += [*_cells(stuck, failed[-1], a, b), *_escape(stuck, failed[-1])]
-    stage = problem.last_stage
-    goal = dict(zip("xyz", stage.target_position, strict=True))
+    problem = measures.problem(stuck)
+    goal = dict(zip("xyz", problem.last_stage.target_position, strict=True))
     rows.append({"element": GOAL, "order": 0} | goal)
-    for k, (shape, placement) in enumerate(obstacle_shapes(problem.obstacles_in(stage))):
-        found = solids.solid(shape, placement)
-        if found is not None:
-            given = dict(zip(solids.COLUMNS, found, strict=True))
-            rows.append({"element": OBSTACLE, "order": k} | given)
+    shapes = obstacle_shapes(problem.obstacles_in(problem.last_stage))
+    standing = [solids.solid(*shape) for shape in shapes]
+    rows += [{"element": OBSTACLE, "order": k} | own for k, own in enumerate(standing) if own]
     table = rounded(pd.DataFrame(rows).reindex(columns=NAMES))
     return table.assign(joint_x=a + 1, joint_y=b + 1, length_unit=stuck.condition.length_unit)
 
@@ -112,11 +121,7 @@ def _way(condition: ConditionResults, series: str, replicate: int, q: FloatArray
 def _cells(condition: ConditionResults, end: FloatArray, a: int, b: int) -> Rows:
     """Return the cost over two joints, the others as at the end of the run that is stuck."""
     problem = measures.problem(condition)
-    reach = AROUND * problem.scope
-    low, high = (
-        np.maximum(problem.limits[:, 0], end - reach),
-        np.minimum(problem.limits[:, 1], end + reach),
-    )
+    low, high = _box(problem, end, AROUND)
     ranges = [np.linspace(low[k], high[k], CELLS) for k in (a, b)]
     q = np.repeat(end[:, None], CELLS * CELLS, axis=1)
     q[a], q[b] = (axis.ravel() for axis in np.meshgrid(*ranges, indexing="ij"))
@@ -128,18 +133,20 @@ def _cells(condition: ConditionResults, end: FloatArray, a: int, b: int) -> Rows
 
 def _escape(condition: ConditionResults, end: FloatArray) -> Rows:
     """Return the least cost of random postures in boxes around a posture, and its own cost."""
-    problem = measures.problem(condition)
     rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
-    low, high = problem.limits.T
-    (own,) = _cost(condition, end[:, None])
-    rows: Rows = []
+    (own,), rows = _cost(condition, end[:, None]), list[dict[str, object]]()
     for n, half in enumerate(BOXES):
-        least = np.maximum(end - half * problem.scope, low)
-        most = np.minimum(end + half * problem.scope, high)
-        q = least[:, None] + (most - least)[:, None] * rng.random((len(end), SAMPLES))
+        low, high = _box(measures.problem(condition), end, half)
+        q = low[:, None] + (high - low)[:, None] * rng.random((len(end), SAMPLES))
         least_cost = np.fmin.reduce(_cost(condition, q))  # NaN if none is feasible
         rows.append({"element": ESCAPE, "order": n, "x": half, "y": own, "value": least_cost})
     return rows
+
+
+def _box(problem: Problem, q: FloatArray, scopes: float) -> tuple[FloatArray, FloatArray]:
+    """Return the bounds (nq,) of a box of so many scopes around a posture, within the limits."""
+    (low, high), half = problem.limits.T, scopes * problem.scope
+    return np.maximum(q - half, low), np.minimum(q + half, high)
 
 
 def draw_trap(table: pd.DataFrame) -> Figure:
@@ -162,23 +169,8 @@ def draw_trap(table: pd.DataFrame) -> Figure:
             for axes, x, y in ((above, "x", "y"), (along, "order", "value")):
                 axes.plot(rows[x], rows[y], color=colour, linewidth=0.7, alpha=0.45)
             if series == STUCK:
-                above.plot(
-                    rows["x"].iloc[-1:],
-                    rows["y"].iloc[-1:],
-                    "x",
-                    color=style.FORBIDDEN,
-                    markersize=4,
-                    zorder=5,
-                )
-    above.plot(
-        goal["x"],
-        goal["y"],
-        "*",
-        color="white",
-        markeredgecolor=style.NEUTRAL,
-        markersize=10,
-        zorder=6,
-    )
+                above.plot(*rows[["x", "y"]].iloc[-1], "x", **END)
+    above.plot(goal["x"], goal["y"], "*", **STAR)
     style.operational_axes(above, unit)
     above.set_title("a  ways of the tools, from above")
     along.set(
@@ -197,27 +189,13 @@ def draw_trap(table: pd.DataFrame) -> Figure:
 def _draw_landscape(figure: Figure, axes: Axes, cells: pd.DataFrame) -> None:
     """Draw the cost over two joints, the stuck posture and its scope."""
     wide = cells.pivot(index="y", columns="x", values="value")
-    shown = axes.pcolormesh(
-        wide.columns,
-        wide.index,
-        wide.to_numpy(),
-        cmap="viridis_r",
-        shading="nearest",
-        rasterized=True,
-    )
+    look: dict[str, Any] = {"cmap": "viridis_r", "shading": "nearest", "rasterized": True}
+    shown = axes.pcolormesh(wide.columns, wide.index, wide.to_numpy(), **look)
     figure.colorbar(shown, ax=axes, label="cost [-]", shrink=0.9)
     x, y, scope, *joints = cells[["x_end", "y_end", "scope_deg", "joint_x", "joint_y"]].iloc[0]
     axes.plot(x, y, "X", color=style.FORBIDDEN, mec="white", markersize=8)
-    axes.add_patch(
-        Rectangle(
-            (x - scope, y - scope),
-            2 * scope,
-            2 * scope,
-            fill=False,
-            edgecolor=style.FORBIDDEN,
-            linewidth=1.2,
-        )
-    )
+    frame: dict[str, Any] = {"fill": False, "edgecolor": style.FORBIDDEN, "linewidth": 1.2}
+    axes.add_patch(Rectangle((x - scope, y - scope), 2 * scope, 2 * scope, **frame))
     axes.grid(visible=False)
     first, second = (f"{style.joint_symbol(0, int(joint) - 1)} [deg]" for joint in joints)
     title = "c  cost around a stuck posture (×), its scope"

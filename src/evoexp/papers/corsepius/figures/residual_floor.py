@@ -3,9 +3,9 @@
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullLocator
 
 from evoexp.papers.corsepius import measures
+from evoexp.papers.corsepius.figures.population_effort import logarithmic_axis
 from evoexp.papers.corsepius.measures import Task
 from evoexp.report.figures.boxes import JITTER
 from evoexp.report.kit import spread, style
@@ -25,8 +25,8 @@ def floor_table(task: Task) -> pd.DataFrame:
     rows: list[tuple[object, ...]] = []
     for scope, c in task.by_value.items():
         for name, values in ((RESIDUAL, measures.residuals(c)), (CYCLES, measures.cycles(c))):
-            found = spread(values)
-            rows.append((name, scope, found.median, found.lower, found.upper, c.done))
+            median, lower, upper, _ = spread(values)
+            rows.append((name, scope, median, lower, upper, c.done))
         rows += [(POINT, scope, value, value, value, 1) for value in measures.residuals(c)]
     table = pd.DataFrame(rows, columns=NAMES)
     return table.assign(slope=slope(task), length_unit=task.conditions[0].condition.length_unit)
@@ -69,9 +69,7 @@ def draw_floor(table: pd.DataFrame) -> Figure:
         x = own["scope"]
         axes.plot(x, own["median"], "o-", color=colour, markersize=4.5, linewidth=1.1)
         axes.vlines(x, own["lower"], own["upper"], color=colour, linewidth=1.6)
-        axes.set_xscale("log")
-        axes.xaxis.set_minor_locator(NullLocator())
-        axes.set_xticks(list(x), [f"{scope:g}" for scope in x])
+        logarithmic_axis(axes, list(x))
         axes.set_xlabel("scope of a joint [rad]")
     # a proportional line through the middle
     x, middle = residuals["scope"], len(residuals) // 2

@@ -17,6 +17,7 @@ from evoexp.report.kit import BOOTSTRAP_SEED, ConditionResults, groups, records,
 POSTURE, REACH, TOOL = "posture", "reach", "tool"
 FACTORS = (2.0, 1.0, 0.5)  # of the scope, whose reach is drawn
 STEPS = 3000  # random ones whose hull is drawn
+EQUAL: dict[str, Any] = {"adjustable": "datalim", "aspect": "equal"}
 NAMES = ["element", "order", "x", "y", "half_x", "half_y", "factor"]
 
 
@@ -41,7 +42,7 @@ def scope_table(condition: ConditionResults, replicate: int) -> pd.DataFrame:
         reached = problem.start + factor * problem.scope * steps
         places = tool_places(problem, np.clip(reached, *problem.limits.T))[:, :2]
         parts.append((REACH, places[ConvexHull(places).vertices], np.nan, np.nan, factor))
-    parts.append((TOOL, tool_places(problem, q)[:, :2], *(np.nan,) * 3))
+    parts.append((TOOL, tool_places(problem, q)[:, :2], np.nan, np.nan, np.nan))
     rows = [
         (element, n, x, y, *rest)
         for element, points, *rest in parts
@@ -57,39 +58,22 @@ def draw_scope(table: pd.DataFrame) -> Figure:
     path, reach, tool = (table[table["element"] == element] for element in (POSTURE, REACH, TOOL))
     blue, last = style.arm_colour(0), max(1, len(path) - 1)
     for row in records(path):
-        corner, size = (row.x - row.half_x, row.y - row.half_y), (2 * row.half_x, 2 * row.half_y)
-        left.add_patch(
-            Rectangle(
-                corner, *size, linewidth=0, facecolor=blue, alpha=0.10 + 0.12 * row.order / last
-            )
-        )
+        corner, shade = (row.x - row.half_x, row.y - row.half_y), 0.10 + 0.12 * row.order / last
+        look: dict[str, Any] = {"linewidth": 0, "facecolor": blue, "alpha": shade}
+        left.add_patch(Rectangle(corner, 2 * row.half_x, 2 * row.half_y, **look))
     left.plot(path["x"], path["y"], "o-", color=blue, markersize=2.8, linewidth=1.0)
     _draw_ends(left, path)
-    x, y = (
-        f"{style.joint_symbol(0, int(table[name].iloc[0]) - 1)} [deg]"
-        for name in ("joint_x", "joint_y")
-    )
-    left.set(
-        xlabel=x,
-        ylabel=y,
-        title="a  boxes of offspring along a path",
-        adjustable="datalim",
-        aspect="equal",
-    )
+    joints = (int(table[name].iloc[0]) - 1 for name in ("joint_x", "joint_y"))
+    x, y = (f"{style.joint_symbol(0, joint)} [deg]" for joint in joints)
+    left.set(xlabel=x, ylabel=y, title="a  boxes of offspring along a path", **EQUAL)
     for k, (factor, rows) in enumerate(sorted(groups(reach, "factor"), reverse=True)):
         colour, hull = style.ARM_COLOURS[(1, 0, 2)[k]], rows.sort_values("order")
-        right.fill(
-            hull["x"],
-            hull["y"],
-            label=f"{factor:g} × scope",
-            facecolor=colour,
-            edgecolor=colour,
-            alpha=0.25,
-        )
+        look = {"facecolor": colour, "edgecolor": colour, "alpha": 0.25}
+        right.fill(hull["x"], hull["y"], label=f"{factor:g} × scope", **look)
     right.plot(tool["x"], tool["y"], color=style.NEUTRAL, linewidth=1.0, label="way of the tool")
     _draw_ends(right, tool)
     style.operational_axes(right, table["length_unit"].iloc[0])
-    right.set(title="b  the tool, one step from the start", adjustable="datalim", aspect="equal")
+    right.set(title="b  the tool, one step from the start", **EQUAL)
     style.legend_below(figure, right, 6)
     return figure
 

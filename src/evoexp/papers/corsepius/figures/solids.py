@@ -1,5 +1,6 @@
 """Bodies and obstacles in space: a row of a table for each, and their surfaces drawn."""
 
+from collections.abc import Callable
 from typing import Any
 
 import coal
@@ -19,28 +20,32 @@ COLUMNS = ["shape", "x", "y", "z", *TURN, *SIZES]
 AROUND, ALONG = 12, 4  # pieces of a round surface, and of each of its ends
 
 
-def solid(shape: Any, placement: Any) -> tuple[Any, ...] | None:
-    """Return one row of `COLUMNS` for a coal shape and its placement (`pin.SE3`).
+SOLIDS: dict[type, tuple[str, Callable[[Any], tuple[float, ...]]]] = {
+    coal.Sphere: (BALL, lambda shape: (shape.radius, 0.0, 0.0)),
+    coal.Capsule: (ROD, lambda shape: (shape.radius, shape.halfLength, 0.0)),
+    coal.Cylinder: (DRUM, lambda shape: (shape.radius, shape.halfLength, 0.0)),
+    coal.Box: (BRICK, lambda shape: tuple(shape.halfSide)),
+}
+"""Shapes that have a row of their own: its name, and the function that gives its sizes."""
+
+
+def solid(shape: Any, placement: Any) -> dict[str, Any]:
+    """Return the `COLUMNS` of a coal shape and its placement (`pin.SE3`).
 
     A mesh, or another shape without a row of its own, is the box around it. A half-space has no
-    row: None.
+    row: empty.
     """
-    where = np.asarray(placement.translation, dtype=np.float64)
-    turn = np.asarray(placement.rotation, dtype=np.float64)
+    where, turn = np.array(placement.translation), np.array(placement.rotation)
     if isinstance(shape, coal.Halfspace | coal.Plane):
-        return None
-    if isinstance(shape, coal.Sphere):
-        name, size = BALL, (shape.radius, 0.0, 0.0)
-    elif isinstance(shape, coal.Capsule | coal.Cylinder):
-        name = ROD if isinstance(shape, coal.Capsule) else DRUM
-        size = (shape.radius, shape.halfLength, 0.0)
-    elif isinstance(shape, coal.Box):
-        name, size = BRICK, tuple(shape.halfSide)
+        return {}
+    if type(shape) in SOLIDS:
+        name, size_of = SOLIDS[type(shape)]
+        size = size_of(shape)
     else:
         shape.computeLocalAABB()
-        name, size = BRICK, tuple(0.5 * (shape.aabb_local.max_ - shape.aabb_local.min_))
-        where = where + turn @ shape.aabb_local.center()
-    return (name, *where, *turn.ravel(), *size)
+        box = shape.aabb_local
+        name, size, where = BRICK, 0.5 * (box.max_ - box.min_), where + turn @ box.center()
+    return dict(zip(COLUMNS, (name, *where, *turn.ravel(), *size), strict=True))
 
 
 def _read(row: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -53,20 +58,16 @@ def _read(row: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def draw_solid(axes: Any, row: Any, colour: str, alpha: float) -> None:
-    """Draw a row of `COLUMNS`."""
+    """Draw a row of `COLUMNS` in axes in space."""
     turn, size, place = _read(row)
     if row.shape == BRICK:
         faces = [corners * size @ turn.T + place for corners in _FACES]
-        axes.add_collection3d(
-            Poly3DCollection(
-                faces, zorder=1, facecolor=colour, edgecolor=colour, alpha=alpha, linewidth=0.5
-            )
-        )
-        return
-    surface = np.einsum("ij,jkl->ikl", turn, _grid(row.shape, size)) + place[:, None, None]
-    axes.plot_surface(
-        *surface, color=colour, alpha=alpha, linewidth=0, shade=True, antialiased=False
-    )
+        look = {"facecolor": colour, "edgecolor": colour, "alpha": alpha, "linewidth": 0.5}
+        axes.add_collection3d(Poly3DCollection(faces, zorder=1, **look))
+    else:
+        surface = np.einsum("ij,jkl->ikl", turn, _grid(row.shape, size)) + place[:, None, None]
+        smooth = {"linewidth": 0, "shade": True, "antialiased": False}
+        axes.plot_surface(*surface, color=colour, alpha=alpha, **smooth)
 
 
 def draw_outline(axes: Any, row: Any, colour: str, alpha: float) -> None:
@@ -75,13 +76,8 @@ def draw_outline(axes: Any, row: Any, colour: str, alpha: float) -> None:
     brick = row.shape == BRICK
     points = np.vstack(_FACES) * size if brick else _grid(row.shape, size).reshape(3, -1).T
     seen = (points @ turn.T)[:, :2] + place[:2]
-    axes.fill(
-        *seen[ConvexHull(seen).vertices].T,
-        facecolor=colour,
-        edgecolor=colour,
-        alpha=alpha,
-        linewidth=0.5,
-    )
+    look = {"facecolor": colour, "edgecolor": colour, "alpha": alpha, "linewidth": 0.5}
+    axes.fill(*seen[ConvexHull(seen).vertices].T, **look)
 
 
 def corners(table: pd.DataFrame) -> FloatArray:
@@ -89,9 +85,8 @@ def corners(table: pd.DataFrame) -> FloatArray:
     found = [np.empty((0, 3))]
     for row in table.itertuples(index=False):
         turn, size, place = _read(row)
-        reach = size[0] + np.abs(turn[:, 2]) * size[1]
-        if row.shape == BRICK:
-            reach = np.abs(turn) @ size
+        round_reach = size[0] + np.abs(turn[:, 2]) * size[1]
+        reach = np.abs(turn) @ size if row.shape == BRICK else round_reach
         found += [place[None] - reach, place[None] + reach]
     return np.vstack(found)
 
@@ -128,21 +123,17 @@ def space(
 
 def _grid(shape: str, size: FloatArray) -> FloatArray:
     """Return the surface of a round solid, (3, along, around)."""
-    radius, height = _profile(shape, size[0], size[1])
-    turned = np.linspace(0.0, 2.0 * np.pi, AROUND + 1)
-    circle = np.cos(turned), np.sin(turned), np.ones_like(turned)
-    profiles = zip((radius, radius, height), circle, strict=True)
-    return np.array([np.outer(profile, around) for profile, around in profiles])
-
-
-def _profile(shape: str, radius: float, half: float) -> tuple[FloatArray, FloatArray]:
-    """Return radii and heights along the axis of a round solid."""
-    if shape == DRUM:
-        return np.array([0.0, radius, radius, 0.0]), np.array([-half, -half, half, half])
+    radius, half = size[:2]
     rise = np.linspace(0.0, 0.5 * np.pi, ALONG)
-    end = radius * np.cos(rise)
-    height = half + radius * np.sin(rise)
-    return np.concatenate([end[::-1], end]), np.concatenate([-height[::-1], height])
+    if shape == DRUM:
+        wide, high = np.array([radius, 0.0]), np.array([half, half])
+    else:
+        wide, high = radius * np.cos(rise), half + radius * np.sin(rise)
+    # radii and heights along the axis, each once around it
+    turned = np.linspace(0.0, 2.0 * np.pi, AROUND + 1)
+    radii, heights = np.append(wide[::-1], wide), np.append(-high[::-1], high)
+    sides = (radii, np.cos(turned)), (radii, np.sin(turned)), (heights, np.ones_like(turned))
+    return np.array([np.outer(along, around) for along, around in sides])
 
 
 _SQUARE = [(-1, -1), (1, -1), (1, 1), (-1, 1)]

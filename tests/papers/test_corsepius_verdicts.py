@@ -17,13 +17,12 @@ from evoexp.papers.corsepius import population_claims as verdicts
 from evoexp.report import judging
 from evoexp.report.judging import Judge
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results, StoredLogs
+from evoexp.report.results import ConditionResults, Results
 from evoexp.report.verdicts import CONTRADICTED, INCONCLUSIVE, NOT_JUDGED, REPRODUCED, Claim
 from report_samples import REPORT
 from shipped_conditions import expanded
 
 SETTINGS = ReportSettings(**REPORT, figures="corsepius")  # type: ignore[arg-type]
-NO_LOGS = StoredLogs(None, (), None)  # type: ignore[arg-type]
 RUNS = 40
 Effort = Callable[
     [str, float], tuple[float, int]
@@ -40,7 +39,7 @@ def made_up(name: str, rows: Callable[[str], dict[str, object]]) -> Results:
     experiment, found = conditions_of(name), []
     for label, condition in experiment.conditions:
         table = pd.DataFrame({"stop_reason": ["goal"] * RUNS} | rows(label))
-        found.append(ConditionResults(label, condition, RUNS, table, {}, NO_LOGS, {}))
+        found.append(ConditionResults(label, condition, RUNS, table, {}, None, {}))
     return Results(experiment.name, experiment.budget, tuple(found))
 
 

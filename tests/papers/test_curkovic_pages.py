@@ -1,5 +1,6 @@
 """The pages on Curkovic et al. 2013: what they hold, and the tables behind their figures."""
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from evoexp.configuration import compose
 from evoexp.papers.curkovic import claims as sweep_claims
 from evoexp.papers.curkovic import families, link_motions, measures, motion_page
 from evoexp.papers.curkovic.figures import link_intersection, pareto_fronts, robot_motions
-from evoexp.papers.curkovic.fronts import read_fronts
+from evoexp.papers.curkovic.pareto_page import read_fronts
 from evoexp.report import judging, style, verdicts
 from evoexp.report.page_parts import Page
 from evoexp.report.pages import page_of
@@ -259,16 +260,16 @@ def test_effort_to_a_threshold_counts_runs_that_never_get_there(outputs: Path) -
 def test_claims_are_judged_only_on_the_papers_own_settings(outputs: Path) -> None:
     found = smoke_results(outputs, "curkovic_pareto")
     (paper,) = compose.expand(["experiment=curkovic_pareto"])[0].conditions
-    judged = found.conditions[0]._replace(condition=paper.condition, planned=20)
+    judged = dataclasses.replace(found.conditions[0], condition=paper.condition, planned=20)
 
     def reason(condition: ConditionResults, budget: str = "paper") -> str:
         return judging.not_judged(found._replace(budget=budget, conditions=(condition,)))
 
     assert reason(judged) == ""
-    assert reason(judged._replace(condition=paper.condition._replace(seed=5))) == ""
+    assert reason(dataclasses.replace(judged, condition=paper.condition._replace(seed=5))) == ""
     assert reason(judged, "quick") == "budget quick"
-    assert reason(judged._replace(planned=3)) == "fewer replicates than planned"
-    assert reason(found.conditions[0]._replace(planned=20)) == "settings overridden"
+    assert reason(dataclasses.replace(judged, planned=3)) == "fewer replicates than planned"
+    assert reason(dataclasses.replace(found.conditions[0], planned=20)) == "settings overridden"
 
 
 def test_rates_are_counted_among_solved_motions(outputs: Path) -> None:

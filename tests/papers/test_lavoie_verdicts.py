@@ -3,6 +3,7 @@
 On made-up runs of the shipped conditions.
 """
 
+import dataclasses
 import functools
 
 import numpy as np
@@ -16,7 +17,7 @@ from evoexp.papers.lavoie.measures import RefutedMotions
 from evoexp.report.judging import Judge, judge
 from evoexp.report.proportions import Proportion
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results, StoredLogs
+from evoexp.report.results import ConditionResults, Results
 from evoexp.report.verdicts import (
     CONTRADICTED,
     INCONCLUSIVE,
@@ -28,7 +29,6 @@ from evoexp.report.verdicts import (
 from report_samples import REPORT
 
 SETTINGS = ReportSettings(**REPORT, figures="lavoie")  # type: ignore[arg-type]
-NO_LOGS = StoredLogs(None, (), None)  # type: ignore[arg-type]
 
 
 @functools.cache
@@ -53,7 +53,7 @@ def made_up(errors: dict[str, np.ndarray], *words: str) -> Results:
             "term_attempts": np.ones(len(values)),
         }
         rows = pd.DataFrame(columns)
-        found.append(ConditionResults(label, condition, len(rows), rows, {}, NO_LOGS, {}))
+        found.append(ConditionResults(label, condition, len(rows), rows, {}, None, {}))
     return Results(experiment.name, experiment.budget, tuple(found))
 
 
@@ -138,7 +138,7 @@ def test_motions_in_contact_contradict() -> None:
     seven, ten = results.conditions
     certified = seven.summaries["certified"].copy()
     certified[:115] = False
-    seven = seven._replace(summaries=seven.summaries.assign(certified=certified))
+    seven = dataclasses.replace(seven, summaries=seven.summaries.assign(certified=certified))
     found = claims.free_of_collision(judge(results, SETTINGS), seven, Proportion(115, 1000), 0.95)
     assert found.verdict == CONTRADICTED
     assert "885 of 1000 certified; refuted 115 of 1000 = 11.5 % [9.7, 13.6]" in found.evidence

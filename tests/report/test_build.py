@@ -1,3 +1,4 @@
+import dataclasses
 import hashlib
 import json
 import os
@@ -125,7 +126,7 @@ def test_nothing_in_a_report_tells_where_or_when_it_was_made(page: Path, stored:
 def test_the_index_says_it_all(page: Path, results: Results) -> None:
     text = page.read_text()
     for condition in results.conditions:
-        assert f"| {condition.label} | `{condition.hash12}` | 2 | 2 | 0 |" in text
+        assert f"| {condition.label} | `{condition.condition.id[:12]}` | 2 | 2 | 0 |" in text
     assert (
         "| solved | certified | refuted | undecided | solved, yet refuted | margin certified |"
         in text
@@ -300,16 +301,19 @@ def test_an_unknown_page_is_named(stored: Path) -> None:
 
 def test_claims_are_judged_only_on_the_papers_own_settings(results: Results) -> None:
     paper = compose.expand(["experiment=rana_planar"])[0]
-    condition = results.conditions[0]._replace(condition=paper.conditions[0].condition, planned=20)
+    condition = dataclasses.replace(
+        results.conditions[0], condition=paper.conditions[0].condition, planned=20
+    )
     judged = results._replace(budget="paper")
     assert rana_page.not_judged(judged, condition) == ""
     assert rana_page.not_judged(results, condition) == "budget smoke"
     assert (
-        rana_page.not_judged(judged, condition._replace(planned=3)) == "3 of 20 replicates planned"
+        rana_page.not_judged(judged, dataclasses.replace(condition, planned=3))
+        == "3 of 20 replicates planned"
     )
-    assert rana_page.not_judged(judged, results.conditions[0]._replace(planned=20)).startswith(
-        "overridden: ga."
-    )
+    assert rana_page.not_judged(
+        judged, dataclasses.replace(results.conditions[0], planned=20)
+    ).startswith("overridden: ga.")
 
 
 def test_redistribution_is_applied_to_solved_strings_only(results: Results) -> None:
@@ -317,7 +321,7 @@ def test_redistribution_is_applied_to_solved_strings_only(results: Results) -> N
     count = motions.colliding_after(search, relaxed=False)
     assert 0 <= count <= search.solved
     none = search.summaries.assign(solved=False)
-    assert motions.colliding_after(search._replace(summaries=none), relaxed=True) == 0
+    assert motions.colliding_after(dataclasses.replace(search, summaries=none), relaxed=True) == 0
 
 
 def test_drawing_leaves_matplotlib_as_it_was(page: Path) -> None:

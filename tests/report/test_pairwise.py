@@ -1,5 +1,7 @@
 """All conditions against each other: which pairs, which tests, which tables."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -15,7 +17,9 @@ def shifted(condition: ConditionResults, number: int) -> ConditionResults:
     """Return a condition whose costs are higher by a number, under another name."""
     rows = condition.summaries
     costs = rows["best_cost"] + number * (1.0 + 0.1 * np.arange(len(rows)))
-    return condition._replace(label=f"+{number}", summaries=rows.assign(best_cost=costs))
+    return dataclasses.replace(
+        condition, label=f"+{number}", summaries=rows.assign(best_cost=costs)
+    )
 
 
 def copies(results: Results, count: int) -> Results:
@@ -47,8 +51,8 @@ def test_shares_that_differ_are_tested_pair_by_pair(
     results: Results, settings: ReportSettings
 ) -> None:
     first = results.conditions[0]
-    some = first._replace(label="all", summaries=first.summaries.assign(solved=True))
-    none = first._replace(label="none", summaries=first.summaries.assign(solved=False))
+    some = dataclasses.replace(first, label="all", summaries=first.summaries.assign(solved=True))
+    none = dataclasses.replace(first, label="none", summaries=first.summaries.assign(solved=False))
     own, between = pairwise.share_tables(results._replace(conditions=(some, none)), settings)
     assert [row[:2] for row in own.rows] == [
         ("all", "2 of 2 = 100 % [34, 100]"),

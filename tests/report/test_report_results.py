@@ -67,7 +67,7 @@ def test_failed_and_missing_replicates_are_counted(tmp_path: Path) -> None:
     found = gather(tmp_path, experiment.conditions, 3, "rana_planar", "smoke", "")
     first, second = found.conditions
     assert (first.done, first.failed, first.failures) == (1, 1, {1: "worker died"})
-    assert (second.done, second.failed, second.first_solution) == (0, 0, None)
+    assert (second.done, second.failed, second.solutions) == (0, 0, {})
     assert found.with_data == (first,)
 
 

@@ -18,7 +18,7 @@ def by_column(name: str) -> Values:
     return lambda condition: condition.column(name)
 
 
-def comparisons(
+def compared_with_controls(
     results: Results, settings: ReportSettings, compared: Sequence[tuple[str, bool, Values]]
 ) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
     """Compare every condition with its controls: those that wrap the same planner.

@@ -83,7 +83,7 @@ def _conditions(results: Results, settings: ReportSettings) -> str:
         rows.append(
             (
                 c.label,
-                f"`{c.hash12}`",
+                f"`{c.condition.id[:12]}`",
                 c.done,
                 c.planned,
                 c.failed,

@@ -13,7 +13,6 @@ protocol (`ConditionResults.evaluate`, `motion`, `problem`). Its parts are:
 
 from evoexp.report import (
     body_contacts,
-    comparisons,
     judging,
     markdown,
     motion_geometry,
@@ -22,13 +21,16 @@ from evoexp.report import (
     sweep_figures,
     verdicts,
 )
-from evoexp.report.comparisons import Values, by_column, compared
+from evoexp.report.comparisons import Values, by_column, compared, compared_with_controls
+from evoexp.report.figures import convergence, shares
+from evoexp.report.figures.boxes import draw_box
 from evoexp.report.judging import Judge, evidence
 from evoexp.report.page_parts import Drawing, Page, Quantity, Table
 from evoexp.report.pages import generic
+from evoexp.report.parameters import overridden, parameters, planned_replicates
 from evoexp.report.proportions import Proportion, fisher_exact, newcombe
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
+from evoexp.report.results import ConditionResults, Results, wrapped
 from evoexp.report.rows import groups, records, rounded
 from evoexp.report.run_measures import (
     counted,
@@ -69,8 +71,10 @@ __all__ = [
     "body_contacts",
     "by_column",
     "compared",
-    "comparisons",
+    "compared_with_controls",
+    "convergence",
     "counted",
+    "draw_box",
     "effort_ratio",
     "evidence",
     "expected_effort",
@@ -85,16 +89,21 @@ __all__ = [
     "median_replicate",
     "motion_geometry",
     "newcombe",
+    "overridden",
+    "parameters",
     "planned_by",
+    "planned_replicates",
     "quantile",
     "records",
     "rounded",
     "run_measures",
     "search_seconds",
+    "shares",
     "solved",
     "spread",
     "style",
     "success",
     "sweep_figures",
     "verdicts",
+    "wrapped",
 ]

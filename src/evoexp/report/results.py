@@ -3,6 +3,7 @@
 import functools
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -53,63 +54,20 @@ class Verdicts(NamedTuple):
     with_margin: int
 
 
-class StoredLogs:
-    """The content of the logs of some finished replicates, each part read at its first use.
-
-    A page that draws no convergence reads no generation; thousands of logs are looked at one by
-    one, and only the columns stay.
-    """
-
-    def __init__(self, run: RunDirectory, replicates: Sequence[int], best: int | None) -> None:
-        """Name the logs; nothing is read.
-
-        Args:
-            run: Where they are.
-            replicates: Which, in order.
-            best: Replicate of the lowest best cost; None where nothing is finished.
-        """
-        self._run, self._replicates, self._best = run, replicates, best
-
-    @functools.cached_property
-    def generations(self) -> pd.DataFrame:
-        """One row per generation of every replicate."""
-        return read_generations(self._run, self._replicates)
-
-    @functools.cached_property
-    def solutions(self) -> dict[int, FloatArray]:
-        """Replicate → its best solution, flat."""
-        return {k: read_solution(self._run.log_path(k)).values for k in self._replicates}
-
-    @functools.cached_property
-    def first_solution(self) -> FloatArray | None:
-        """Best of the initial population of the best replicate; None where nothing is finished."""
-        return (
-            None
-            if self._best is None
-            else read_log(self._run.log_path(self._best)).solutions[0].values
-        )
-
-    def array(self, name: str) -> NDArray[Any]:
-        """Return an array attached to the log of the best replicate.
-
-        Raises:
-            KeyError: If there is none of this name.
-        """
-        if self._best is None:
-            raise KeyError(name)
-        return read_array(self._run.log_path(self._best), name)
-
-
-class ConditionResults(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class ConditionResults:
     """One condition's replicates as far as they are stored and planned.
+
+    The content of their logs is read at its first use: a page that draws no convergence reads no
+    generation. Thousands of logs are opened one by one, and only the columns stay in memory.
 
     Attributes:
         label: Its name in figures.
         condition: The condition that was run.
-        planned: Number of replicates; those stored beyond it are not looked at.
+        planned: Number of planned replicates; those stored beyond it are not read.
         summaries: One row per finished replicate, indexed by replicate, in order.
-        failures: Replicate → why it failed.
-        logs: What the logs of the finished replicates hold.
+        failures: Replicate → reason of its failure.
+        run: Directory of the logs.
         code: Version, commit and dirty flag of the code that created the run.
         options: The option that was taken of each group; empty where nothing records it.
     """
@@ -119,29 +77,36 @@ class ConditionResults(NamedTuple):
     planned: int
     summaries: pd.DataFrame
     failures: dict[int, str]
-    logs: StoredLogs
+    run: RunDirectory
     code: dict[str, Any]
     options: tuple[Option, ...] = ()
 
-    @property
+    @functools.cached_property
     def generations(self) -> pd.DataFrame:
         """One row per generation of every finished replicate."""
-        return self.logs.generations
+        return read_generations(self.run, self._finished)
 
-    @property
+    @functools.cached_property
     def solutions(self) -> dict[int, FloatArray]:
         """Replicate → its best solution, flat."""
-        return self.logs.solutions
+        return {k: read_solution(self.run.log_path(k)).values for k in self._finished}
+
+    @functools.cached_property
+    def first_solution(self) -> FloatArray:
+        """Best of the initial population of the best replicate."""
+        return read_log(self.run.log_path(self.best_replicate)).solutions[0].values
+
+    def array(self, name: str) -> NDArray[Any]:
+        """Return an array attached to the log of the best replicate, of a reference the only one.
+
+        Raises:
+            KeyError: If there is none of this name.
+        """
+        return read_array(self.run.log_path(self.best_replicate), name)
 
     @property
-    def first_solution(self) -> FloatArray | None:
-        """Best of the initial population of the best replicate; None where nothing is finished."""
-        return self.logs.first_solution
-
-    @property
-    def hash12(self) -> str:
-        """The twelve hex digits that are shown."""
-        return self.condition.id[:12]
+    def _finished(self) -> list[int]:
+        return [int(replicate) for replicate in self.summaries.index]
 
     @property
     def done(self) -> int:
@@ -178,7 +143,7 @@ class ConditionResults(NamedTuple):
     @property
     def best_replicate(self) -> int:
         """Replicate of the lowest best cost; the first of equals."""
-        return _best_replicate(self.summaries)
+        return int(self.summaries.index[int(np.argmin(self.column("best_cost")))])
 
     @property
     def prepared(self) -> Prepared:
@@ -227,14 +192,6 @@ class ConditionResults(NamedTuple):
     def is_reference(self) -> bool:
         """Return whether this is a reference: a truth that stands beside the planners."""
         return self.condition.is_reference
-
-    def array(self, name: str) -> NDArray[Any]:
-        """Return an array attached to the log of the best replicate, of a reference the only one.
-
-        Raises:
-            KeyError: If there is none of this name.
-        """
-        return self.logs.array(name)
 
     def column(self, name: str) -> FloatArray:
         """Return a column of the summaries as floats, (done,); NaN where there is none."""
@@ -344,36 +301,23 @@ def _read(
 ) -> ConditionResults:
     run = RunDirectory(outputs, condition.id)
     stored = run.completed() | run.failed()
-    planned = (
-        max(stored, default=-1) + 1
-        if num_replicates is None
-        else condition.num_replicates(num_replicates)
-    )
+    planned = max(stored, default=-1) + 1
+    if num_replicates is not None:
+        planned = condition.num_replicates(num_replicates)
     if stored:
         run.check()
-    rows = read_summaries(run)
-    rows = (
-        rows[rows["replicate"] < planned]
-        .sort_values("replicate", kind="stable")
-        .set_index("replicate")
-    )
+    rows = read_summaries(run).sort_values("replicate", kind="stable").set_index("replicate")
+    rows = rows[rows.index < planned]
     done, failed = rows[rows["status"] == "done"], rows[rows["status"] == "failed"]
-    best = _best_replicate(done) if len(done) else None
     return ConditionResults(
         label,
         condition,
         planned,
         done,
         dict(zip(map(int, failed.index), map(str, failed["stop_reason"]), strict=True)),
-        StoredLogs(run, [int(k) for k in done.index], best),
+        run,
         _code(run) if stored else {},
         _recorded_options(run) if options is None and stored else options or (),
-    )
-
-
-def _best_replicate(done: pd.DataFrame) -> int:
-    return int(
-        done.index[int(np.argmin(done["best_cost"].to_numpy(dtype=np.float64, na_value=np.nan)))]
     )
 
 

@@ -123,10 +123,12 @@ def signed_rank(x: FloatArray, y: FloatArray) -> SignedRank:
     difference = x[differing] - y[differing]
     ranks = _doubled_midranks(np.abs(difference))
     doubled = int(ranks[difference > 0.0].sum())
-    if not len(ranks):
-        return SignedRank(0, 0.0, 1.0)
-    test = _exact_p if len(ranks) <= EXACT_PAIRS else _normal_p
-    return SignedRank(len(ranks), doubled / 2.0, test(ranks, doubled))
+    if len(ranks) <= EXACT_PAIRS:
+        p_value = _exact_p(_sign_probabilities(ranks), doubled)
+    else:  # ties are accounted for by the ranks themselves
+        variance = float((ranks.astype(np.float64) ** 2).sum()) / 4.0
+        p_value = _normal_p(doubled - ranks.sum() / 2.0, variance)
+    return SignedRank(len(ranks), doubled / 2.0, p_value)
 
 
 def rank_sum(x: FloatArray, y: FloatArray) -> RankSum:
@@ -136,12 +138,15 @@ def rank_sum(x: FloatArray, y: FloatArray) -> RankSum:
         x: (n,); infinite values are compared as such.
         y: (m,).
     """
-    if not len(x) or not len(y):
-        return RankSum(0.0, 1.0)
-    ranks = _doubled_midranks(np.concatenate([x, y]))
-    doubled = int(ranks[: len(x)].sum())
-    test = _exact_rank_sum_p if len(ranks) <= EXACT_VALUES else _normal_rank_sum_p
-    return RankSum((doubled - len(x) * (len(x) + 1)) / 2.0, test(ranks, len(x), doubled))
+    size, ranks = len(x), _doubled_midranks(np.concatenate([x, y]))
+    doubled, total = int(ranks[:size].sum()), len(ranks)
+    if total <= EXACT_VALUES:
+        p_value = _exact_p(_ways_to_choose(ranks, size), doubled, math.comb(total, size))
+    else:  # ties are accounted for by the ranks themselves
+        mean, spread_of_ranks = float(ranks.mean()), float(np.mean((ranks - ranks.mean()) ** 2))
+        variance = size * (total - size) / (total - 1) * spread_of_ranks
+        p_value = _normal_p(doubled - size * mean, variance)
+    return RankSum((doubled - size * (size + 1)) / 2.0, p_value)
 
 
 def holm(p_values: Sequence[float]) -> list[float]:
@@ -264,46 +269,40 @@ def _doubled_midranks(values: FloatArray) -> np.ndarray:
     return np.asarray((2 * last - counts + 1)[group])
 
 
-def _exact_p(ranks: np.ndarray, doubled: int) -> float:
-    """Two-sided p over all assignments of signs to the ranks."""
+def _sign_probabilities(ranks: np.ndarray) -> np.ndarray:
+    """Return the probability of each sum of positive ranks over all signs, (greatest sum + 1,)."""
     probability = np.zeros(int(ranks.sum()) + 1)
     probability[0] = 1.0
     for rank in ranks:
         shifted = np.zeros_like(probability)
         shifted[rank:] = probability[: len(probability) - rank]
         probability = 0.5 * (probability + shifted)
-    below, above = math.fsum(probability[: doubled + 1]), math.fsum(probability[doubled:])
-    return min(1.0, 2.0 * min(below, above))
+    return probability
 
 
-def _normal_p(ranks: np.ndarray, doubled: int) -> float:
-    """Two-sided p by the normal approximation, ties accounted for by the ranks themselves."""
-    mean, variance = ranks.sum() / 2.0, float((ranks.astype(np.float64) ** 2).sum()) / 4.0
-    return _two_sided(doubled - mean, variance)
-
-
-def _exact_rank_sum_p(ranks: np.ndarray, size: int, doubled: int) -> float:
-    """Two-sided p over all choices of `size` of the ranks."""
-    # number of ways to choose so many ranks of such a sum
-    choices = np.zeros((size + 1, int(ranks.sum()) + 1))
+def _ways_to_choose(ranks: np.ndarray, size: int) -> np.ndarray:
+    """Return in how many ways `size` of the ranks have each sum, (greatest sum + 1,)."""
+    choices = np.zeros((size + 1, int(ranks.sum()) + 1))  # (ranks chosen, sum)
     choices[0, 0] = 1.0
     for k, rank in enumerate(ranks):
         for chosen in range(min(k + 1, size), 0, -1):
             choices[chosen, rank:] += choices[chosen - 1, : choices.shape[1] - rank]
-    ways = choices[size]
-    below, above = math.fsum(ways[: doubled + 1]), math.fsum(ways[doubled:])
-    return min(1.0, 2.0 * min(below, above) / math.comb(len(ranks), size))
+    return np.asarray(choices[size])
 
 
-def _normal_rank_sum_p(ranks: np.ndarray, size: int, doubled: int) -> float:
-    """Two-sided p by the normal approximation, ties accounted for by the ranks themselves."""
-    total, other = len(ranks), len(ranks) - size
-    mean = size * float(ranks.mean())
-    variance = size * other / (total - 1) * float(np.mean((ranks - ranks.mean()) ** 2))
-    return _two_sided(doubled - mean, variance)
+def _exact_p(weights: np.ndarray, doubled: int, total: int = 1) -> float:
+    """Return the two-sided p of an observed sum.
+
+    Args:
+        weights: Of each sum: its probability, or the number of ways that lead to it.
+        doubled: The observed sum of doubled ranks.
+        total: Sum of the weights.
+    """
+    below, above = math.fsum(weights[: doubled + 1]), math.fsum(weights[doubled:])
+    return min(1.0, 2.0 * min(below, above) / total)
 
 
-def _two_sided(deviation: float, variance: float) -> float:
+def _normal_p(deviation: float, variance: float) -> float:
     """Return the probability that a normal deviate is as far from its mean."""
     # erfc keeps the far tail, where a distribution function rounds to 1
     return math.erfc(abs(deviation) / math.sqrt(2.0 * variance)) if variance else 1.0

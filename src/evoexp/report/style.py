@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import matplotlib as mpl
+import pandas as pd
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -144,6 +145,21 @@ def operational_axes(axes: Axes, unit: str) -> None:
     """Set up axes as a plane of the operational space."""
     axes.set_aspect("equal", adjustable="box")
     axes.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]")
+
+
+def draw_arm(
+    axes: Axes, arm: int, rows: pd.DataFrame, *, alpha: float = 1.0, dashed: bool = False
+) -> None:
+    """Draw an arm's links, given by rows with x, y, x_end, y_end in order."""
+    x, y = ([*rows[name], rows[f"{name}_end"].iloc[-1]] for name in "xy")
+    colour = arm_colour(arm)
+    line: dict[str, Any] = (
+        {"linestyle": (0, (2, 1)), "linewidth": 2} if dashed else {"linewidth": 3}
+    )
+    axes.plot(x, y, color=colour, alpha=alpha, zorder=3 + dashed, **line)
+    joints: dict[str, Any] = {"color": "white", "markeredgecolor": colour, "ms": 5}
+    axes.plot(x[:-1], y[:-1], "o", alpha=alpha, zorder=4, **joints)
+    axes.plot(x[-1], y[-1], "o", color=colour, alpha=alpha, markersize=4, zorder=4)
 
 
 def configuration_axes(axes: Axes, arm: int) -> None:

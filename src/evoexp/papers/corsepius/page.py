@@ -25,7 +25,7 @@ from evoexp.report.kit import (
     Results,
     Table,
     by_column,
-    comparisons,
+    compared_with_controls,
     counted,
     generic,
     markdown,
@@ -79,7 +79,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
         tables=tables(results, settings),
         claims=claims.judge_tasks(results, settings),
         checks=checks(results),
-        comparisons=comparisons.comparisons(results, settings, compared),
+        comparisons=compared_with_controls(results, settings, compared),
         drawings=drawings(results, settings),
     )
 

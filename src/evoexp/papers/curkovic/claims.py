@@ -3,12 +3,18 @@
 from collections.abc import Callable, Sequence
 
 from evoexp.papers.curkovic.families import FamilyComparison
-from evoexp.report import judging, markdown, verdicts
-from evoexp.report.judging import Judge
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.statistics import spread
-from evoexp.report.verdicts import Claim, Comparison
+from evoexp.report.kit import (
+    Claim,
+    Comparison,
+    ConditionResults,
+    Judge,
+    ReportSettings,
+    Results,
+    judging,
+    markdown,
+    spread,
+    verdicts,
+)
 
 HALL = {"ga.hall_depth", "ga.hall_memory", "ga.hall_frozen", "ga.num_elites"}
 MUTATION = {"ga.mutation_rate", "ga.mutation_decay", "ga.mutation_direction"}

@@ -4,12 +4,16 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from evoexp.papers.curkovic import measures
-from evoexp.report import markdown
-from evoexp.report.pages import generic
-from evoexp.report.pages.generic import Values
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.verdicts import Comparison
+from evoexp.report.kit import (
+    Comparison,
+    ConditionResults,
+    ReportSettings,
+    Results,
+    Values,
+    by_column,
+    compared,
+    markdown,
+)
 
 
 class Family(NamedTuple):
@@ -86,7 +90,7 @@ def tested(
         threshold: Cost that "generations to a team" means.
     """
     return tuple(
-        FamilyComparison(one, family, generic.compared(family.pairs, one.values, settings))
+        FamilyComparison(one, family, compared(family.pairs, one.values, settings))
         for one in _measures(results, threshold)
         for family in families(results)
     )
@@ -100,7 +104,7 @@ def curved(results: Results) -> bool:
 def _measures(results: Results, threshold: float) -> tuple[Measure, ...]:
     to = f"to a team of cost ≤ {markdown.number(threshold)}"
     found = [
-        Measure("best cost", generic.by_column("best_cost")),
+        Measure("best cost", by_column("best_cost")),
         Measure(f"generations {to}", partial(measures.generations_to, threshold=threshold)),
     ]
     sizes = [

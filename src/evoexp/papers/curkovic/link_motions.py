@@ -9,8 +9,7 @@ from evoexp.condition import Prepared
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion, cubic_motion, top_speeds
 from evoexp.records import FloatArray
-from evoexp.report import motion_geometry
-from evoexp.report.results import wrapped
+from evoexp.report.kit import motion_geometry, wrapped
 
 
 class SampledMotion(NamedTuple):

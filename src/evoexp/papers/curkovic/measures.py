@@ -7,13 +7,20 @@ import numpy as np
 from evoexp.papers.curkovic import link_motions
 from evoexp.planners.coevolution.planner import Problem
 from evoexp.records import FloatArray
-from evoexp.report import markdown
-from evoexp.report.page_parts import Quantity
-from evoexp.report.pages import generic
-from evoexp.report.proportions import Proportion
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.run_measures import counted, search_seconds, solved
-from evoexp.report.statistics import expected_effort, quantile
+from evoexp.report.kit import (
+    ConditionResults,
+    Proportion,
+    Quantity,
+    Results,
+    by_column,
+    counted,
+    expected_effort,
+    generic,
+    markdown,
+    quantile,
+    search_seconds,
+    solved,
+)
 
 ROUNDING = 1e-9  # [deg] a curve may leave the range by this much and still touch its end
 REFUTED = "collides between its configurations (exact verdict)"
@@ -98,16 +105,14 @@ def team_quantities(results: Results, threshold: float, *more: Quantity) -> tupl
         clearance_quantity(results),
         *more,
         *effort,
-        row("CPU time of a run", "s", generic.by_column("cpu_s")),
+        row("CPU time of a run", "s", by_column("cpu_s")),
     )
 
 
 def clearance_quantity(results: Results) -> Quantity:
     """Return the row of the exact clearance."""
     name, unit = "clearance of the bodies over the whole motion (exact)", results.with_data[0]
-    return generic.quantity(
-        results, name, unit.condition.length_unit, generic.by_column("clearance")
-    )
+    return generic.quantity(results, name, unit.condition.length_unit, by_column("clearance"))
 
 
 def refuted(condition: ConditionResults) -> FloatArray:

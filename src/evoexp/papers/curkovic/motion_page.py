@@ -14,12 +14,19 @@ from evoexp.papers.curkovic.figures import (
 )
 from evoexp.planners.coevolution.planner import Problem
 from evoexp.records import FloatArray
-from evoexp.report import judging, markdown
-from evoexp.report.page_parts import Drawing, Page
-from evoexp.report.pages import generic
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.verdicts import Claim, Comparison
+from evoexp.report.kit import (
+    Claim,
+    Comparison,
+    ConditionResults,
+    Drawing,
+    Page,
+    ReportSettings,
+    Results,
+    compared,
+    generic,
+    judging,
+    markdown,
+)
 
 INTRODUCTION = (
     "Link angles are absolute, from the positive x-axis; one instant is one sampling step from a "
@@ -103,7 +110,7 @@ def _by_radius(results: Results) -> dict[int, list[ConditionResults]]:
 def _tools(results: Results, settings: ReportSettings) -> tuple[Comparison, ...]:
     """Compare the largest radius with the smallest one, for every number of collision substeps."""
     pairs = [(own[-1], own[0]) for own in _by_radius(results).values() if len(own) > 1]
-    return generic.compared(pairs, tool_distance, settings, lower_is_better=False, named=_pair)
+    return compared(pairs, tool_distance, settings, lower_is_better=False, named=_pair)
 
 
 def _pair(largest: ConditionResults, smallest: ConditionResults) -> str:

@@ -6,12 +6,19 @@ import numpy as np
 
 from evoexp.papers.curkovic import measures
 from evoexp.papers.curkovic.figures import methods
-from evoexp.report import judging, markdown, verdicts
-from evoexp.report.page_parts import Drawing, Page
-from evoexp.report.pages import generic
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import Results
-from evoexp.report.verdicts import Comparison
+from evoexp.report.kit import (
+    Comparison,
+    Drawing,
+    Page,
+    ReportSettings,
+    Results,
+    by_column,
+    compared,
+    generic,
+    judging,
+    markdown,
+    verdicts,
+)
 
 PAIRS = (("V", "I"), ("VI", "II"), ("VII", "III"), ("VIII", "IV"))
 INTRODUCTION = (
@@ -33,12 +40,12 @@ def page(results: Results, settings: ReportSettings) -> Page:
     by_label = {c.label: c for c in results.with_data}
     pairs = [(by_label[a], by_label[b]) for a, b in PAIRS if {a, b} <= set(by_label)]
     matched = partial(
-        generic.compared,
+        compared,
         pairs,
         settings=settings,
         named=lambda a, b: f"{a.label} against {b.label}",
     )
-    costs = matched(generic.by_column("best_cost"))
+    costs = matched(by_column("best_cost"))
     generations = matched(partial(measures.generations_to, threshold=threshold))
     one_scene = len({(c.condition.robot, c.condition.scenario) for c in results.with_data}) == 1
     return Page(

@@ -7,14 +7,20 @@ import numpy as np
 from evoexp.evolution.pareto import pareto_front
 from evoexp.papers.curkovic import measures
 from evoexp.papers.curkovic.figures import pareto_fronts
-from evoexp.papers.curkovic.fronts import read_fronts
 from evoexp.records import FloatArray, FrontRow
-from evoexp.report import markdown
-from evoexp.report.page_parts import Drawing, Page, Quantity
-from evoexp.report.pages import generic
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.statistics import spread
+from evoexp.report.kit import (
+    ConditionResults,
+    Drawing,
+    Page,
+    Quantity,
+    ReportSettings,
+    Results,
+    generic,
+    markdown,
+    spread,
+)
+from evoexp.store.log_reader import read_log
+from evoexp.store.run_directory import RunDirectory
 
 INTRODUCTION = (
     "One population of paths per robot. An individual is on the front of its population if no "
@@ -45,6 +51,22 @@ def page(results: Results, settings: ReportSettings) -> Page:
             generic.best_drawing(results),
         ),
     )
+
+
+def read_fronts(results: Results, condition: ConditionResults, replicate: int) -> list[FrontRow]:
+    """Return the criteria of a finished replicate's populations, one record per population.
+
+    Args:
+        results: The results that the condition is part of.
+        condition: The condition.
+        replicate: Number of the replicate.
+
+    Raises:
+        CorruptLog: If the log cannot be trusted.
+    """
+    return read_log(
+        RunDirectory(results.outputs, condition.condition.id).log_path(replicate)
+    ).fronts
 
 
 def _fronts(results: Results, condition: ConditionResults) -> dict[int, list[FrontRow]]:

@@ -3,18 +3,25 @@
 from collections.abc import Sequence
 from functools import partial
 
+import numpy as np
 import pandas as pd
+from matplotlib.figure import Figure
 
 from evoexp.papers.curkovic import claims, families, measures
 from evoexp.papers.curkovic.families import FamilyComparison
-from evoexp.papers.curkovic.figures import defect_rates
-from evoexp.report import markdown
-from evoexp.report.page_parts import Drawing, Page, Quantity
-from evoexp.report.pages import generic
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import Results
-from evoexp.report.sweep_figures import A12, WHISKERS, effects_drawing, values_drawing
+from evoexp.report.kit import (
+    Drawing,
+    Page,
+    Quantity,
+    ReportSettings,
+    Results,
+    generic,
+    markdown,
+    shares,
+    sweep_figures,
+)
 
+NAMES = {"quantity": "defect", "having": "failing", "total": "solved"}  # of shares, of defects
 INTRODUCTION = (
     "Each condition changes one part of a method; all share their seeds. The cost of a team is "
     "C2 + C3 + C4 (end-effector paths, turns of the links, unevenness) summed over the robots, "
@@ -26,12 +33,11 @@ SHORT = {
     measures.LEAVES: "leave [0, π]",
     measures.TOO_FAST: "too fast (Eq. 2)",
 }
-
 VALUES = (
-    f"Boxes: median and quartiles of the runs that get there, {WHISKERS}, every replicate a point; "
-    "dashed: median of the first condition, where it has one."
+    f"Boxes: median and quartiles of the runs that get there, {sweep_figures.WHISKERS}, "
+    "every replicate a point; dashed: median of the first condition, where it has one."
 )
-EFFECTS = f"{A12} the first one is better than the other one; dashed: no difference."
+EFFECTS = f"{sweep_figures.A12} the first one is better than the other one; dashed: no difference."
 
 
 def page(results: Results, settings: ReportSettings) -> Page:
@@ -84,8 +90,10 @@ def _drawings(
     }
     bound = markdown.number(threshold / settings.threshold_ratio)
     return (
-        values_drawing(results, values, VALUES),
-        effects_drawing(results, settings, by_name, "the first condition of a family", EFFECTS),
+        sweep_figures.values_drawing(results, values, VALUES),
+        sweep_figures.effects_drawing(
+            results, settings, by_name, "the first condition of a family", EFFECTS
+        ),
         generic.best_drawing(
             results, f" Threshold {markdown.number(threshold)}, lower bound {bound}."
         ),
@@ -93,18 +101,32 @@ def _drawings(
             "defects",
             "Motions that the paper's model accepts and that fail",
             f"Share of the solved motions, with Wilson's {100 * settings.confidence:g} % interval.",
-            partial(_rates, results, settings.confidence),
-            defect_rates.draw_rates,
+            partial(rates_table, results, settings.confidence),
+            draw_rates,
             results.with_data,
         ),
     )
 
 
-def _rates(results: Results, confidence: float) -> pd.DataFrame:
-    """Return the table of defects; without curves only the first of them varies."""
+def rates_table(results: Results, confidence: float) -> pd.DataFrame:
+    """Return the shares of solved motions that have a defect; without curves only one varies.
+
+    Args:
+        results: With data.
+        confidence: Level of Wilson's intervals.
+
+    Returns:
+        Columns defect, position, condition, failing, solved, lower, upper, share.
+    """
     shown = list(SHORT)[: None if families.curved(results) else 1]
     found = [(position, c, measures.rates(c)) for position, c in enumerate(results.with_data)]
-    return defect_rates.rates_table(
-        [(SHORT[name], k, c.label, rates[name]) for k, c, rates in found for name in shown],
-        confidence,
-    )
+    rows = [(SHORT[name], k, c.label, rates[name]) for k, c, rates in found for name in shown]
+    table = shares.shares_table(rows, {}, confidence).rename(columns=NAMES)
+    order = ["defect", "position", "condition", "failing", "solved", "lower", "upper"]
+    return table[order].assign(share=table["share"].fillna(0.0))
+
+
+def draw_rates(table: pd.DataFrame) -> Figure:
+    """Draw one panel per defect, one row per condition."""
+    named = table.rename(columns={of_defects: of_shares for of_shares, of_defects in NAMES.items()})
+    return shares.draw_shares(named.assign(printed=np.nan), "share of solved motions [%]")

@@ -17,7 +17,7 @@ from evoexp.report.kit import (
     ReportSettings,
     Results,
     Values,
-    comparisons,
+    compared,
     grouped,
     newcombe,
     success,
@@ -61,7 +61,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
     if not measures.fits(results) or len(results.with_data) < 2:
         return whole_page.page(results, settings)
     refuted = {c.label: measures.refuted(c) for c in results.with_data}
-    found = compared(results, settings)
+    found = compared_arms(results, settings)
     return Page(
         title=f"Lavoie & Boudreau 2001: {results.experiment or 'stored runs'}",
         introduction=INTRODUCTION,
@@ -82,7 +82,7 @@ def arms(results: Results) -> tuple[tuple[ConditionResults, ...], ...]:
     return grouped(results.with_data, measures.num_joints)
 
 
-def compared(results: Results, settings: ReportSettings) -> tuple[ArmComparison, ...]:
+def compared_arms(results: Results, settings: ReportSettings) -> tuple[ArmComparison, ...]:
     """Compare the first condition of every arm with its others, quantity by quantity."""
     quantities = (
         Measure("position error", results.with_data[0].condition.length_unit, measures.errors),
@@ -92,7 +92,7 @@ def compared(results: Results, settings: ReportSettings) -> tuple[ArmComparison,
         ArmComparison(
             measure,
             first,
-            comparisons.compared([(first, other) for other in others], measure.values, settings),
+            compared([(first, other) for other in others], measure.values, settings),
         )
         for measure in quantities
         for first, *others in arms(results)

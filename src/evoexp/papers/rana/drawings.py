@@ -10,11 +10,14 @@ import pandas as pd
 
 from evoexp.papers.rana import motions, planar_page
 from evoexp.papers.rana.figures import planar_models, planar_motion, spatial_models, spatial_paths
-from evoexp.report import markdown
-from evoexp.report.figures import convergence
-from evoexp.report.page_parts import Drawing
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
+from evoexp.report.kit import (
+    ConditionResults,
+    Drawing,
+    ReportSettings,
+    Results,
+    convergence,
+    markdown,
+)
 
 AT, BETWEEN = "term_arm_distance_at_via_points", "term_arm_distance_between_sampled"
 

@@ -9,9 +9,7 @@ from matplotlib.lines import Line2D
 
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.records import FloatArray
-from evoexp.report import motion_geometry, style
-from evoexp.report.results import ConditionResults
-from evoexp.report.rows import groups
+from evoexp.report.kit import ConditionResults, groups, motion_geometry, style
 
 STRAIGHT, OTHERS = "straight line", "replicate"
 WHITE: dict[str, Any] = {"color": "white", "markeredgecolor": style.NEUTRAL, "zorder": 5}

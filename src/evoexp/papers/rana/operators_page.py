@@ -1,12 +1,19 @@
 """The page of ablations: the first condition against each other one, on common seeds."""
 
-from evoexp.report import judging, markdown
-from evoexp.report.page_parts import Page
-from evoexp.report.pages import generic
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import Results
-from evoexp.report.sweep_figures import effects_drawing, values_drawing
-from evoexp.report.verdicts import Claim, Comparison
+from evoexp.report.kit import (
+    Claim,
+    Comparison,
+    Page,
+    ReportSettings,
+    Results,
+    Values,
+    by_column,
+    compared,
+    generic,
+    judging,
+    markdown,
+    sweep_figures,
+)
 
 COMPARED = (  # name in figures, name, unit, column, whether lower is better
     ("best cost", "best cost", "–", "best_cost", True),
@@ -36,15 +43,15 @@ def page(results: Results, settings: ReportSettings) -> Page:
     unit = results.with_data[0].condition.length_unit or "–"
     first, *others = results.with_data
     pairs = [(first, other) for other in others]
-    tables, by_name, drawn = {}, {}, dict[str, generic.Values]()
+    tables, by_name, drawn = {}, {}, dict[str, Values]()
     for short, name, of, column, lower in COMPARED:
-        values = generic.by_column(column)
-        tables[name] = generic.compared(pairs, values, settings, lower_is_better=lower)
+        values = by_column(column)
+        tables[name] = compared(pairs, values, settings, lower_is_better=lower)
         if len(drawn) < DRAWN:
             drawn[f"{short} [{unit if of == 'length' else of}]"] = values
             by_name[short] = tables[name]
     cost, *quantities = base.quantities
-    clearance = generic.quantity(results, COMPARED[1][1], unit, generic.by_column("clearance"))
+    clearance = generic.quantity(results, COMPARED[1][1], unit, by_column("clearance"))
     return base._replace(
         title=f"{results.experiment or 'stored runs'}: {first.label} against each other condition",
         introduction=INTRODUCTION,
@@ -54,8 +61,8 @@ def page(results: Results, settings: ReportSettings) -> Page:
             (f"{name}: {first.label} against …", rows) for name, rows in tables.items() if rows
         ),
         drawings=(
-            values_drawing(results, drawn),
-            effects_drawing(results, settings, by_name, first.label),
+            sweep_figures.values_drawing(results, drawn),
+            sweep_figures.effects_drawing(results, settings, by_name, first.label),
             generic.best_drawing(results),
         ),
     )

@@ -5,25 +5,34 @@ import numpy as np
 from evoexp.papers.rana import drawings, motions
 from evoexp.papers.rana.drawings import AT, BETWEEN, MeasuredMotions, measure
 from evoexp.planners.via_point_ga.strings import Problem
-from evoexp.report import markdown, verdicts
-from evoexp.report.judging import Judge
-from evoexp.report.page_parts import Page, Quantity
-from evoexp.report.pages import generic
-from evoexp.report.parameters import overridden, parameters, planned_replicates
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
-from evoexp.report.statistics import spread
+from evoexp.report.kit import (
+    ConditionResults,
+    Judge,
+    Page,
+    Quantity,
+    ReportSettings,
+    Results,
+    by_column,
+    compared_with_controls,
+    generic,
+    markdown,
+    overridden,
+    parameters,
+    planned_replicates,
+    spread,
+    verdicts,
+)
 
-CLEARANCE = generic.by_column("clearance")
+CLEARANCE = by_column("clearance")
 ARMS = {True: "two planar arms", False: "two PUMA-like arms"}
 COMPARED = (  # with the controls: name, whether lower is better, values
-    ("best cost", True, generic.by_column("best_cost")),
+    ("best cost", True, by_column("best_cost")),
     (
         "path length over that of the straight line",
         True,
-        generic.by_column("term_path_length_ratio"),
+        by_column("term_path_length_ratio"),
     ),
-    ("colliding instants C5 of the best", True, generic.by_column("term_collisions")),
+    ("colliding instants C5 of the best", True, by_column("term_collisions")),
     ("clearance of the bodies over the whole motion", False, CLEARANCE),
 )
 INTRODUCTION = (
@@ -37,7 +46,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
     """Build the page of the paper, or the generic page if its figures cannot draw a robot."""
     if not results.with_data or not all(_fits(condition) for condition in results.with_data):
         return generic.page(results, settings)
-    comparisons = generic.comparisons(results, settings, COMPARED)
+    comparisons = compared_with_controls(results, settings, COMPARED)
     drawn = [measure(c, suffix, settings) for c, suffix in results.suffixed]
     found = [claim for one in drawn for claim in _claims(results, settings, one, comparisons)]
     checks = [
@@ -84,15 +93,12 @@ def _quantities(results: Results) -> tuple[Quantity, ...]:
         ("the same, sampled between via-points too", unit, BETWEEN),
         (clearance, unit, "clearance"),
     )
-    fitness = generic.by_column("term_fitness")
+    fitness = by_column("term_fitness")
     return (
         cost,
         generic.quantity(results, "fitness F of the best", "–", fitness),
         first._replace(name=first_name),
-        *(
-            generic.quantity(results, name, of, generic.by_column(column))
-            for name, of, column in rows
-        ),
+        *(generic.quantity(results, name, of, by_column(column)) for name, of, column in rows),
         *effort,
     )
 

@@ -6,10 +6,7 @@ import pandas as pd
 
 from evoexp.papers.rana.figures import planar_motion
 from evoexp.planners.via_point_ga.strings import Problem
-from evoexp.report.page_parts import Drawing, Page
-from evoexp.report.pages import generic
-from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
+from evoexp.report.kit import ConditionResults, Drawing, Page, ReportSettings, Results, generic
 
 SNAPSHOTS = (
     "Motion of the best replicate (lowest cost), stage by stage; links that cross on paper in "

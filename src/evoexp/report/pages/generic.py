@@ -3,11 +3,7 @@
 from functools import partial
 
 from evoexp.report import pairwise, sweep_figures
-from evoexp.report.comparisons import Values as Values
-from evoexp.report.comparisons import by_column as by_column
-from evoexp.report.comparisons import compare_on_common_seeds as compare_on_common_seeds
-from evoexp.report.comparisons import compared as compared
-from evoexp.report.comparisons import comparisons as comparisons
+from evoexp.report.comparisons import Values, by_column, compared_with_controls
 from evoexp.report.figures import convergence
 from evoexp.report.page_parts import Drawing, Page, Quantity
 from evoexp.report.report_settings import ReportSettings
@@ -55,7 +51,9 @@ def basis(results: Results, settings: ReportSettings) -> Page:
         title=results.experiment or "stored runs",
         introduction="",
         quantities=(*quantities(results), *term_quantities(results)),
-        comparisons=comparisons(results, settings, (("best cost", True, by_column("best_cost")),)),
+        comparisons=compared_with_controls(
+            results, settings, (("best cost", True, by_column("best_cost")),)
+        ),
         drawings=(cost_drawing(results),) if results.with_data else (),
     )
 

@@ -10,10 +10,14 @@ from matplotlib.ticker import MaxNLocator
 from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.curkovic import link_motions
 from evoexp.planners.coevolution.planner import Problem
-from evoexp.report import body_contacts, style
-from evoexp.report.motion_geometry import BodyDistance
-from evoexp.report.results import ConditionResults
-from evoexp.report.rows import groups, rounded
+from evoexp.report.kit import (
+    ConditionResults,
+    body_contacts,
+    groups,
+    motion_geometry,
+    rounded,
+    style,
+)
 
 COLUMNS = 2  # of panels
 STRAIGHT = -1  # instead of a replicate
@@ -35,7 +39,7 @@ def distances_table(conditions: tuple[ConditionResults, ...], samples: int) -> p
     for position, c in enumerate(conditions):
         prepared, refuted = c.prepared, body_contacts.refuted(c)
         scene = c.problem(Problem).scene
-        distance = BodyDistance(scene.model, scene.geometry)
+        distance = motion_geometry.BodyDistance(scene.model, scene.geometry)
         solutions = {STRAIGHT: link_motions.straight(prepared), **c.solutions}
         for replicate, solution in solutions.items():
             found = link_motions.sampled(link_motions.executed(prepared, solution), samples)

@@ -8,9 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from evoexp.papers.curkovic import link_motions
-from evoexp.report import style
-from evoexp.report.results import ConditionResults
-from evoexp.report.rows import groups, rounded
+from evoexp.report.kit import ConditionResults, groups, rounded, style
 
 SAMPLES = 40  # per segment
 HALF_TURN = 180.0  # [deg]

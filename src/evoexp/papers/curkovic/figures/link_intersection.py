@@ -11,9 +11,7 @@ from evoexp.collision.models.link_crossings import closed_form
 from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.curkovic import link_motions
 from evoexp.planners.coevolution.planner import Problem
-from evoexp.report import style
-from evoexp.report.results import ConditionResults
-from evoexp.report.rows import records, rounded
+from evoexp.report.kit import ConditionResults, records, rounded, style
 
 SAMPLES = 200  # configurations per segment of the straight line among which one is chosen
 TOP_LINKS = 3  # of the four pairs of links that `closed_form` tells apart

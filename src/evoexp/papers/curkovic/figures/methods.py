@@ -6,10 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from evoexp.records import FloatArray
-from evoexp.report import style
-from evoexp.report.figures.boxes import draw_box
-from evoexp.report.results import Results
-from evoexp.report.rows import groups
+from evoexp.report.kit import Results, draw_box, groups, style
 
 CURVE, FINAL, BOUND = "best so far", "final", "lower bound"
 

@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 
 from evoexp.evolution.pareto import pareto_front
 from evoexp.records import FrontRow
-from evoexp.report import style
-from evoexp.report.rows import groups, rounded
+from evoexp.report.kit import groups, rounded, style
 
 CRITERIA = ("c1", "c2", "c3", "c4")
 MARKERS = ("o", "^", "s", "D")  # of populations

@@ -14,10 +14,15 @@ from matplotlib.patheffects import withStroke
 
 from evoexp.condition import Prepared
 from evoexp.papers.curkovic import link_motions
-from evoexp.report import body_contacts, motion_geometry, style
-from evoexp.report.figures.arm_drawing import draw_arm
-from evoexp.report.results import ConditionResults
-from evoexp.report.rows import groups, records, rounded
+from evoexp.report.kit import (
+    ConditionResults,
+    body_contacts,
+    groups,
+    motion_geometry,
+    records,
+    rounded,
+    style,
+)
 from evoexp.scenarios.obstacles import obstacle_table
 
 POSTURES = 4  # per segment: a stroboscope
@@ -198,7 +203,7 @@ def _trail(axes: Axes, table: pd.DataFrame) -> None:
     for (robot, instant), rows in groups(postures, ["robot", "instant"]):
         links = rows[rows["link"] < TOOL]
         if instant in (0.0, last):
-            draw_arm(axes, int(robot), links, dashed=instant == 0.0)
+            style.draw_arm(axes, int(robot), links, dashed=instant == 0.0)
         else:
             x, y = ([*links[name], links[f"{name}_end"].iloc[-1]] for name in "xy")
             axes.plot(x, y, color=style.arm_colour(int(robot)), linewidth=0.9, alpha=0.3, zorder=2)

@@ -12,10 +12,7 @@ from matplotlib.patheffects import withStroke
 from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.papers.rana import motions
 from evoexp.records import FloatArray
-from evoexp.report import motion_geometry, style
-from evoexp.report.figures.arm_drawing import draw_arm
-from evoexp.report.results import ConditionResults
-from evoexp.report.rows import groups, records, rounded
+from evoexp.report.kit import ConditionResults, groups, motion_geometry, records, rounded, style
 
 ANGLES = ["joint_1_deg", "joint_2_deg"]
 NUMBERED = 5  # every fifth via-point carries its number
@@ -49,7 +46,7 @@ def draw_arms(table: pd.DataFrame) -> Figure:
     style.operational_axes(axes, table["length_unit"].iloc[0])
     for (posture, arm), links in groups(table, ["posture", "arm"]):
         at_start = posture == "start"
-        draw_arm(axes, arm, links, alpha=1.0 if at_start else 0.35, dashed=not at_start)
+        style.draw_arm(axes, arm, links, alpha=1.0 if at_start else 0.35, dashed=not at_start)
         for row in records(links) if at_start else ():
             _angle(axes, row)
     for row in records(table[(table["joint"] == 0) & (table["posture"] == "start")]):
@@ -74,7 +71,6 @@ def via_points_table(condition: ConditionResults) -> pd.DataFrame:
     Returns:
         Columns stage, arm, instant, joint_1_deg, joint_2_deg.
     """
-    assert condition.first_solution is not None
     solutions = {
         "best of the initial population": condition.first_solution,
         "best at the end": condition.solutions[condition.best_replicate],
@@ -162,7 +158,7 @@ def draw_circles(table: pd.DataFrame) -> Figure:
         )
         axes.plot(row.x, row.y, ".", color=colour, markersize=3)
     for arm, links in groups(table[table["element"] == "link"], "arm"):
-        draw_arm(axes, arm, links)
+        style.draw_arm(axes, arm, links)
         _base(axes, links["x"].iloc[0], links["y"].iloc[0])
     for row in records(table[table["distance"].notna()]):
         centres = row.element == "centres"

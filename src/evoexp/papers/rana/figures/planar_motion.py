@@ -15,10 +15,7 @@ from evoexp.papers.rana import motions
 from evoexp.papers.rana.figures.planar_models import path_table
 from evoexp.papers.rana.motions import STRAIGHT
 from evoexp.records import FloatArray
-from evoexp.report import motion_geometry, style
-from evoexp.report.figures.arm_drawing import draw_arm
-from evoexp.report.results import ConditionResults
-from evoexp.report.rows import groups, rounded
+from evoexp.report.kit import ConditionResults, groups, motion_geometry, rounded, style
 from evoexp.scenarios.obstacles import obstacle_table
 
 STAGES = 5  # panels that a motion is cut into; the sixth holds all of it
@@ -288,7 +285,7 @@ def _snapshot(axes: Axes, rows: pd.DataFrame, whole: bool) -> None:
             x: FloatArray = np.append(links["x"].to_numpy(), links["x_end"].iloc[-1])
             y: FloatArray = np.append(links["y"].to_numpy(), links["y_end"].iloc[-1])
             if instant == last:
-                draw_arm(axes, arm, links)
+                style.draw_arm(axes, arm, links)
             elif instant == first:
                 axes.plot(
                     x, y, linestyle=(0, (2, 1)), color=colour, linewidth=1.4, alpha=0.8, zorder=2

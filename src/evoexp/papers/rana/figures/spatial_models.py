@@ -10,9 +10,7 @@ from matplotlib.lines import Line2D
 from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.papers.rana import motions
 from evoexp.records import FloatArray
-from evoexp.report import motion_geometry, style
-from evoexp.report.results import ConditionResults
-from evoexp.report.rows import groups, records, rounded
+from evoexp.report.kit import ConditionResults, groups, motion_geometry, records, rounded, style
 
 STAGES = 5  # panels that a motion is cut into; the sixth holds all of it
 POINT_NAMES = ("p", "q")  # of the arms, as in the paper's Fig. 9

@@ -8,9 +8,7 @@ from matplotlib.figure import Figure
 
 from evoexp.papers.rana import motions
 from evoexp.records import FloatArray
-from evoexp.report import motion_geometry, style
-from evoexp.report.results import ConditionResults
-from evoexp.report.rows import groups, rounded
+from evoexp.report.kit import ConditionResults, groups, motion_geometry, rounded, style
 
 BEST = "best replicate"
 

@@ -26,6 +26,7 @@ CONDITION_COLOURS = (
 NEUTRAL, FAINT, FORBIDDEN = "#333333", "#9a9a9a", "#882255"
 ARM_SYMBOLS = ("θ", "α", "β", "γ", "δ", "ε")  # θ and α are the paper's
 SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+DOTS: dict[str, Any] = {"mec": "white", "ms": 5, "clip_on": False}  # configurations of a path
 WIDTH = 7.2  # [inch] of a figure over the whole page
 
 _RC: dict[str, Any] = {

@@ -79,17 +79,21 @@ def draw_paths(axes: Any, rows: pd.DataFrame, columns: list[str], best: str, col
             axes.plot(*points, color=colour, linewidth=0.8, alpha=0.3)
 
 
+def stage_title(rows: pd.DataFrame, whole: bool) -> str:
+    """Return the title of the panel of one stage of a motion, or of the whole motion."""
+    instants = f"instants {rows['first'].iloc[0]}–{rows['last'].iloc[0]}"
+    return f"all {instants}" if whole else instants
+
+
 def path_keys(table: pd.DataFrame) -> list[Line2D]:
     """Return the entries of the legend of `draw_paths`."""
     count, grey = table.loc[table["replicate"] >= 0, "replicate"].nunique(), style.NEUTRAL
-    end: dict[str, Any] = {"color": "none", "mec": grey, "mfc": "white"}
-    best = "best replicate, its via-points"
     return [
-        style.key(best, color=grey, linewidth=1.8, marker="o", ms=3),
+        style.key("best replicate, its via-points", color=grey, linewidth=1.8, marker="o", ms=3),
         style.key(f"all replicates (n = {count})", color=grey, linewidth=0.8, alpha=0.4),
         style.key(STRAIGHT, color=grey, linewidth=1.1, linestyle=":"),
-        style.key("start", marker="s", ms=6.5, **end),
-        style.key("goal", marker="*", ms=10.5, **end),
+        style.key("start", marker="s", ms=6.5, color="none", mec=grey, mfc="white"),
+        style.key("goal", marker="*", ms=10.5, color="none", mec=grey, mfc="white"),
     ]
 
 

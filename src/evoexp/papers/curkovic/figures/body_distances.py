@@ -1,7 +1,5 @@
 """Least distances of bodies along motions: of robots from each other and from obstacles."""
 
-from typing import Any
-
 import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
@@ -43,9 +41,15 @@ def distances_table(conditions: tuple[ConditionResults, ...], samples: int) -> p
         solutions = {STRAIGHT: link_motions.straight(prepared), **c.solutions}
         for replicate, solution in solutions.items():
             found = link_motions.sampled(link_motions.executed(prepared, solution), samples)
-            columns = {"condition": c.label, "position": position, "replicate": replicate}
-            columns |= {"best": replicate == c.best_replicate, "refuted": replicate in refuted}
-            columns |= {"instant": found.instants, "distance": distance(DEGREE * found.q)}
+            columns = {
+                "condition": c.label,
+                "position": position,
+                "replicate": replicate,
+                "best": replicate == c.best_replicate,
+                "refuted": replicate in refuted,
+                "instant": found.instants,
+                "distance": distance(DEGREE * found.q),
+            }
             parts.append(pd.DataFrame(columns))
     return rounded(pd.concat(parts, ignore_index=True)).assign(
         length_unit=conditions[0].condition.length_unit
@@ -73,14 +77,13 @@ def draw_distances(table: pd.DataFrame) -> Figure:
             elif best:
                 axes.plot(own["instant"], own["distance"], color=colour)
                 at = own[own["instant"] == own["instant"].round()]
-                dots: dict[str, Any] = {"color": colour, "mec": "white", "clip_on": False}
-                axes.plot(at["instant"], at["distance"], "o", markersize=5, **dots)
+                axes.plot(at["instant"], at["distance"], "o", color=colour, **style.DOTS)
         refuted = of_runs.groupby("replicate")["refuted"].first()
         title = f"{rows['condition'].iloc[0]}: {int(refuted.sum())} of {len(refuted)} refuted"
         axes.set_title(title, fontsize=7.5)
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    panels[0].set_xlim(0.0, table["instant"].max())
-    panels[0].set_ylim(bottom=-0.02 * float(table["distance"].max()))
+    below = -0.02 * float(table["distance"].max())
+    panels[0].set(xlim=(0.0, table["instant"].max()), ylim=(below, None))
     for k, axes in enumerate(panels):
         if k % columns == 0:
             axes.set_ylabel(f"least distance [{table['length_unit'].iloc[0]}]")

@@ -25,13 +25,19 @@ def joints_table(condition: ConditionResults) -> pd.DataFrame:
     prepared = condition.prepared
     motion = link_motions.executed(prepared, condition.solutions[condition.best_replicate])
     found, limits = link_motions.sampled(motion, SAMPLES), link_motions.speed_limits(prepared)
-    parts = []
-    for robot, own in enumerate(limits):
-        for link, limit in enumerate(own):
-            columns = {"robot": robot, "link": link, "instant": found.instants}
-            columns |= {"angle_deg": found.links[:, robot, link]}
-            columns |= {"turn_deg": np.abs(found.speeds[:, robot, link]), "limit_deg": limit}
-            parts.append(pd.DataFrame(columns))
+    parts = [
+        pd.DataFrame(
+            {
+                "robot": robot,
+                "link": link,
+                "instant": found.instants,
+                "angle_deg": found.links[:, robot, link],
+                "turn_deg": np.abs(found.speeds[:, robot, link]),
+                "limit_deg": limit,
+            }
+        )
+        for (robot, link), limit in np.ndenumerate(limits)
+    ]
     table = rounded(pd.concat(parts, ignore_index=True))
     table.insert(3, "at_configuration", table["instant"] == table["instant"].round())
     return table
@@ -46,11 +52,14 @@ def draw_joints(table: pd.DataFrame) -> Figure:
         _robot(angles, turns, table[table["robot"] == robot], style.arm_colour(int(robot)))
         angles.set_ylabel(f"robot {robot + 1}: link angle [deg]")
         turns.set_ylabel("turn per step [deg]")
-    panels[0, 0].set_title("a  link angles from +x")
-    panels[0, 1].set_title("b  turns per sampling step")
-    for axes in panels[-1]:
-        axes.set_xlabel("sampling step (whole numbers: configurations)")
-        axes.set_xlim(-0.05, table["instant"].max() + 0.05)
+    for axes, title in zip(
+        panels.T, ("a  link angles from +x", "b  turns per sampling step"), strict=True
+    ):
+        axes[0].set_title(title)
+        axes[-1].set(
+            xlabel="sampling step (whole numbers: configurations)",
+            xlim=(-0.05, table["instant"].max() + 0.05),
+        )
     grey, red = style.NEUTRAL, style.FORBIDDEN
     keys = [
         *(style.key(f"link {k + 1}", color=grey, linestyle=kind) for k, kind in enumerate(KINDS)),
@@ -66,18 +75,21 @@ def _robot(angles: Axes, turns: Axes, table: pd.DataFrame, colour: str) -> None:
     low, high = float(table["angle_deg"].min()), float(table["angle_deg"].max())
     for edge in (0.0, HALF_TURN):
         angles.axhline(edge, color=style.FORBIDDEN, linewidth=0.9, zorder=1)
-    angles.set_ylim(min(0.0, low) - 10.0, max(HALF_TURN, high) + 10.0)
-    angles.set_yticks([0, 60, 120, 180])
+    ends = min(0.0, low) - 10.0, max(HALF_TURN, high) + 10.0
+    angles.set(ylim=ends, yticks=[0, 60, 120, 180])
     for link, rows in groups(table, "link"):
         kind = KINDS[int(link)]
         angles.plot(rows["instant"], rows["angle_deg"], color=colour, linestyle=kind)
         turns.plot(rows["instant"], rows["turn_deg"], color=colour, linestyle=kind)
         at = rows[rows["at_configuration"]]
-        dots: dict[str, Any] = {"color": colour, "mec": "white", "clip_on": False}
-        angles.plot(at["instant"], at["angle_deg"], "o", markersize=5, **dots)
+        angles.plot(at["instant"], at["angle_deg"], "o", color=colour, **style.DOTS)
         limit = float(rows["limit_deg"].iloc[0])
         turns.axhline(limit, color=style.FORBIDDEN, linewidth=1.2, linestyle=":")
-        beside: dict[str, Any] = {"xycoords": turns.get_yaxis_transform(), "fontsize": 6.5}
-        beside["va"] = "top" if link == 0 else "bottom"  # the limits may be close
-        turns.annotate(f"link {int(link) + 1}: {limit:.1f}°", (1.01, limit), **beside)
+        turns.annotate(
+            f"link {int(link) + 1}: {limit:.1f}°",
+            (1.01, limit),
+            xycoords=turns.get_yaxis_transform(),
+            fontsize=6.5,
+            va="bottom" if link else "top",  # the limits may be close
+        )
     turns.set_ylim(bottom=0.0)

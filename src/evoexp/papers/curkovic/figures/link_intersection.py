@@ -38,8 +38,10 @@ def intersection_table(condition: ConditionResults) -> pd.DataFrame:
     for robot, arm in enumerate((one, two)):
         elbow_x, elbow_y, tip_x, tip_y = arm.points(links[k, robot].reshape(1, 2, 1))[0, :, 0]
         angles = links[k, robot] / DEGREE
-        rows.append((VECTORS[2 * robot], *arm.base, elbow_x, elbow_y, angles[0]))
-        rows.append((VECTORS[2 * robot + 1], elbow_x, elbow_y, tip_x, tip_y, angles[1]))
+        rows += [
+            (VECTORS[2 * robot], *arm.base, elbow_x, elbow_y, angles[0]),
+            (VECTORS[2 * robot + 1], elbow_x, elbow_y, tip_x, tip_y, angles[1]),
+        ]
     _, x, y, x_end, y_end, _ = rows[1]
     at = (x + mu[k] * (x_end - x), y + mu[k] * (y_end - y))
     rows += [("base", *one.base, *two.base, np.nan), ("point", *at, *at, np.nan)]
@@ -101,9 +103,8 @@ def draw_intersection(table: pd.DataFrame) -> Figure:
     axes.annotate(
         "P", (point.x, point.y), xytext=(0, 9), color=style.FORBIDDEN, weight="bold", **text
     )
-    first = rows["a"]
-    word = "the links cross" if first.crossing else "the links do not cross"
-    axes.set_title(f"μ = {first.mu:.3f}, ν = {first.nu:.3f}: {word}")
+    word = "the links cross" if base.crossing else "the links do not cross"
+    axes.set_title(f"μ = {base.mu:.3f}, ν = {base.nu:.3f}: {word}")
     axes.margins(0.12)
     figure.supxlabel("O₁P = μ b,  O₂P = ν d;  they cross where both lie in [0, 1]", fontsize=8)
     return figure
@@ -118,13 +119,16 @@ def _vector(axes: Any, row: Any, colour: str, number: int, size: float) -> None:
     )  # for the limits of the axes
     away = np.array([-(row.y_end - row.y), row.x_end - row.x]) / size * 10.0
     middle = 0.5 * (row.x + row.x_end), 0.5 * (row.y + row.y_end)
-    look: dict[str, Any] = {
-        "textcoords": "offset points",
-        "ha": "center",
-        "va": "center",
-        "color": colour,
-    }
-    axes.annotate(row.element, middle, xytext=tuple(away), weight="bold", **look)
+    axes.annotate(
+        row.element,
+        middle,
+        xytext=tuple(away),
+        textcoords="offset points",
+        ha="center",
+        va="center",
+        color=colour,
+        weight="bold",
+    )
     radius = 0.2 * size
     axes.plot(
         [row.x, row.x + 1.5 * radius],
@@ -146,11 +150,9 @@ def _vector(axes: Any, row: Any, colour: str, number: int, size: float) -> None:
         )
     )
     half = np.radians(0.5 * row.angle_deg)
-    place = row.x + 1.45 * radius * np.cos(half), row.y + 1.45 * radius * np.sin(half)
-    subscript = str(number).translate(style.SUBSCRIPTS)
     axes.annotate(
-        f"φ{subscript} = {row.angle_deg:.0f}°",
-        place,
+        f"φ{str(number).translate(style.SUBSCRIPTS)} = {row.angle_deg:.0f}°",
+        (row.x + 1.45 * radius * np.cos(half), row.y + 1.45 * radius * np.sin(half)),
         ha="left",
         va="center",
         color=colour,

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -32,16 +31,18 @@ def fronts_table(fronts: Sequence[FrontRow], replicate: int, length_unit: str) -
         Columns replicate, generation, population, individual, c1 [collisions], c2 [length unit], c3
         [rad], c4 [length unit], non_dominated (in its own population), length_unit.
     """
-    parts = []
-    for front in fronts:
-        columns: dict[str, Any] = {"generation": front.generation, "population": front.population}
-        columns |= {"individual": np.arange(len(front.criteria))}
-        columns |= dict(zip(CRITERIA, front.criteria.T, strict=True))
-        parts.append(
-            pd.DataFrame(
-                columns | {"non_dominated": pareto_front(np.ascontiguousarray(front.criteria.T))}
-            )
+    parts = [
+        pd.DataFrame(
+            {
+                "generation": front.generation,
+                "population": front.population,
+                "individual": np.arange(len(front.criteria)),
+                **dict(zip(CRITERIA, front.criteria.T, strict=True)),
+                "non_dominated": pareto_front(np.ascontiguousarray(front.criteria.T)),
+            }
         )
+        for front in fronts
+    ]
     return rounded(pd.concat(parts, ignore_index=True)).assign(
         replicate=replicate, length_unit=length_unit
     )
@@ -65,22 +66,26 @@ def draw_fronts(table: pd.DataFrame) -> Figure:
             axes.plot(
                 rows[x], rows[y], marker, markersize=3.6 if front else 3.2, mec="none", **look
             )
-        axes.set_xlabel(names[x])
-        axes.set_ylabel(names[y])
+        axes.set(xlabel=names[x], ylabel=names[y])
         axes.yaxis.set_major_locator(style.few_ticks())
         if x == CRITERIA[0]:
             axes.set_xscale("symlog", linthresh=1.0)  # most have no collision, a few have many
             axes.set_xlim(left=-0.2)
         else:
             axes.xaxis.set_major_locator(style.few_ticks())
-    keys = []
-    for population, rows in groups(table, "population"):
-        own = int(rows["non_dominated"].sum())
-        for colour, word in (
-            (FRONT, f"{own} non-dominated"),
-            (DOMINATED, f"{len(rows) - own} dominated"),
-        ):
-            look = {"color": colour, "marker": MARKERS[int(population) % len(MARKERS)], "ms": 4}
-            keys.append(style.key(f"robot {population + 1}: {word}", linestyle="none", **look))
+    keys = [
+        style.key(
+            f"robot {population + 1}: {int((rows['non_dominated'] == front).sum())} {word}",
+            linestyle="none",
+            color=colour,
+            marker=MARKERS[int(population) % len(MARKERS)],
+            ms=4,
+        )
+        for population, rows in groups(table, "population")
+        for front, colour, word in (
+            (True, FRONT, "non-dominated"),
+            (False, DOMINATED, "dominated"),
+        )
+    ]
     style.keys_below(figure, keys)
     return figure

@@ -56,10 +56,10 @@ def motion_table(condition: ConditionResults) -> pd.DataFrame:
             _path(prepared, link_motions.sampled(motion, POINTS)).assign(replicate=replicate)
         )
         if replicate == best:
-            for element, samples in ((POSTURE, POSTURES), (CONFIGURATION, 1)):
-                parts.append(
-                    _links(prepared, link_motions.sampled(motion, samples)).assign(element=element)
-                )
+            parts += [
+                _links(prepared, link_motions.sampled(motion, samples)).assign(element=element)
+                for element, samples in ((POSTURE, POSTURES), (CONFIGURATION, 1))
+            ]
     parts.append(_contacts(condition))
     table = rounded(pd.concat(parts, ignore_index=True)).assign(
         best=best, length_unit=condition.condition.length_unit
@@ -109,10 +109,14 @@ def tools_table(conditions: Sequence[ConditionResults]) -> pd.DataFrame:
         motion = link_motions.executed(c.prepared, c.solutions[c.best_replicate])
         path = _path(c.prepared, link_motions.sampled(motion, POINTS))
         model = c.planner.collision
-        given = {"condition": c.label, "position": position, "tcp_radius": model.tcp_radius}
-        given |= {"collision_substeps": model.collision_substeps}
-        at = path["instant"] == path["instant"].round()
-        parts.append(path.assign(**given, at_configuration=at))
+        given = path.assign(
+            condition=c.label,
+            position=position,
+            tcp_radius=model.tcp_radius,
+            collision_substeps=model.collision_substeps,
+            at_configuration=path["instant"] == path["instant"].round(),
+        )
+        parts.append(given)
     table = rounded(pd.concat(parts, ignore_index=True)).assign(
         length_unit=conditions[0].condition.length_unit
     )
@@ -135,15 +139,20 @@ def draw_tools(table: pd.DataFrame) -> Figure:
             colour = style.condition_colour(radii.index(radius))
             axes.plot(rows["x_end"], rows["y_end"], color=colour)
             for row in records(rows[rows["at_configuration"]]):
-                look: dict[str, Any] = {"edgecolor": colour, "lw": 0.7, "alpha": 0.7}
-                axes.add_patch(Circle((row.x_end, row.y_end), radius, fill=False, **look))
+                tip = row.x_end, row.y_end
+                axes.add_patch(Circle(tip, radius, fill=False, edgecolor=colour, lw=0.7, alpha=0.7))
             _ends(axes, rows)
         for robot, rows in groups(table, "robot"):
-            text: dict[str, Any] = {"xytext": (0, -13), "textcoords": "offset points"}
-            text |= {"fontsize": 7.5, "ha": "center"}
-            halo = [withStroke(linewidth=2.0, foreground="white")]
-            start = (rows["x_end"].iloc[0], rows["y_end"].iloc[0])
-            axes.annotate(f"robot {int(robot) + 1}", start, zorder=7, path_effects=halo, **text)
+            axes.annotate(
+                f"robot {int(robot) + 1}",
+                (rows["x_end"].iloc[0], rows["y_end"].iloc[0]),
+                xytext=(0, -13),
+                textcoords="offset points",
+                ha="center",
+                fontsize=7.5,
+                zorder=7,
+                path_effects=[withStroke(linewidth=2.0, foreground="white")],
+            )
         axes.set_title(
             "tested at the configurations" if substeps == 1 else f"tested at {substeps} substeps"
         )
@@ -159,12 +168,12 @@ def draw_tools(table: pd.DataFrame) -> Figure:
 def _links(prepared: Prepared, sampled: link_motions.SampledMotion) -> pd.DataFrame:
     """Return the links of all robots at every sample."""
     assembly = prepared.problem.assembly
-    rows = []
-    for item, (robot, link, start, end) in zip(
-        assembly.links, motion_geometry.joint_positions(assembly, sampled.q), strict=True
-    ):
-        for k, instant in enumerate(sampled.instants):
-            rows.append((robot, link, instant, *start[k, :2], *end[k, :2], item.radius))
+    places = motion_geometry.joint_positions(assembly, sampled.q)
+    rows = [
+        (robot, link, instant, *start[k, :2], *end[k, :2], item.radius)
+        for item, (robot, link, start, end) in zip(assembly.links, places, strict=True)
+        for k, instant in enumerate(sampled.instants)
+    ]
     return pd.DataFrame(rows, columns=LINK).assign(replicate=-1)
 
 
@@ -190,9 +199,11 @@ def _contacts(condition: ConditionResults) -> pd.DataFrame:
 def _obstacles(condition: ConditionResults) -> pd.DataFrame:
     """Return the outlines of the obstacles."""
     table = obstacle_table(condition.condition.scenario.obstacles)  # type: ignore[attr-defined]
-    rows: list[tuple[Any, ...]] = []
-    for k, outline in enumerate(motion_geometry.obstacle_outlines(table)):
-        rows += [(OBSTACLE, -1, -1, k, 0.0, *a, *b, 0.0) for a, b in itertools.pairwise(outline)]
+    rows = [
+        (OBSTACLE, -1, -1, k, 0.0, *a, *b, 0.0)
+        for k, outline in enumerate(motion_geometry.obstacle_outlines(table))
+        for a, b in itertools.pairwise(outline)
+    ]
     return pd.DataFrame(rows, columns=["element", "replicate", *LINK])
 
 
@@ -247,18 +258,24 @@ def _limits(table: pd.DataFrame) -> tuple[tuple[float, float], tuple[float, floa
 
 
 def _end_keys() -> list[Line2D]:
-    look: dict[str, Any] = {"linestyle": "none"}
+    grey = style.NEUTRAL
     return [
-        style.key("start of an end-effector", marker="o", mec=style.NEUTRAL, mfc="white", **look),
-        style.key("its goal", marker="x", color=style.NEUTRAL, ms=7, mew=1.8, **look),
+        style.key("start of an end-effector", marker="o", mec=grey, mfc="white", linestyle="none"),
+        style.key("its goal", marker="x", color=grey, ms=7, mew=1.8, linestyle="none"),
     ]
 
 
 def _keys(table: pd.DataFrame, contacts: int) -> list[Line2D]:
     grey, red = style.NEUTRAL, style.FORBIDDEN
     robots = sorted(table.loc[table["element"] == PATH, "robot"].unique())
-    text, cross = f"first contact of bodies (refuted: {contacts})", {"marker": "X", "mec": "white"}
-    contact = style.key(text, linestyle="none", color=red, ms=8, **cross)
+    contact = style.key(
+        f"first contact of bodies (refuted: {contacts})",
+        linestyle="none",
+        color=red,
+        ms=8,
+        marker="X",
+        mec="white",
+    )
     return [
         *style.arm_keys(robots, "robot", linewidth=3),
         style.key("start posture", color=grey, linewidth=2, linestyle=DASHES),

@@ -1,5 +1,6 @@
 """Drawings of the model of planar arms: their angles, via-points, links as touching circles."""
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,10 @@ from evoexp.records import FloatArray
 from evoexp.report.kit import ConditionResults, groups, motion_geometry, records, rounded, style
 
 ANGLES = ["joint_1_deg", "joint_2_deg"]
+CLOSEST: dict[str, tuple[str, dict[str, Any]]] = {  # pairs of points: name, look of their line
+    "centres": ("circle centres", {"color": "black", "lw": 3}),
+    "bodies": ("the links", {"color": style.ARM_COLOURS[3], "ls": ":"}),
+}
 NUMBERED = 5  # every fifth via-point carries its number
 
 
@@ -51,14 +56,19 @@ def draw_arms(table: pd.DataFrame) -> Figure:
             _angle(axes, row)
     for row in records(table[(table["joint"] == 0) & (table["posture"] == "start")]):
         _base(axes, row.x, row.y)
-        below: dict[str, Any] = {"xytext": (0, -22), "textcoords": "offset points", "ha": "center"}
         axes.annotate(
-            f"arm {row.arm + 1}", (row.x, row.y), color=style.arm_colour(row.arm), **below
+            f"arm {row.arm + 1}",
+            (row.x, row.y),
+            xytext=(0, -22),
+            textcoords="offset points",
+            ha="center",
+            color=style.arm_colour(row.arm),
         )
-    grey = style.NEUTRAL
-    start = style.key("start", color=grey, linewidth=3, marker="o", markersize=4)
-    goal = style.key("goal", color=grey, linewidth=2, alpha=0.35, linestyle=(0, (2, 1)))
-    style.keys_below(figure, [start, goal])
+    keys = [
+        style.key("start", color=style.NEUTRAL, linewidth=3, marker="o", markersize=4),
+        style.key("goal", color=style.NEUTRAL, linewidth=2, alpha=0.35, linestyle=(0, (2, 1))),
+    ]
+    style.keys_below(figure, keys)
     axes.margins(0.12)
     return figure
 
@@ -75,39 +85,50 @@ def via_points_table(condition: ConditionResults) -> pd.DataFrame:
         "best of the initial population": condition.first_solution,
         "best at the end": condition.solutions[condition.best_replicate],
     }
-    parts = [
-        path_table(condition, solution).assign(stage=stage) for stage, solution in solutions.items()
-    ]
-    return pd.concat(parts, ignore_index=True)
+    return pd.concat(
+        [path_table(condition, each).assign(stage=stage) for stage, each in solutions.items()],
+        ignore_index=True,
+    )
 
 
 def draw_via_points(table: pd.DataFrame) -> Figure:
     """Draw via-points in the arms' configuration planes, numbered by instant."""
-    arms = sorted(table["arm"].unique())
-    figure = style.figure(3.6 if len(arms) < 3 else 3.0)
-    planes = figure.subplots(1, len(arms), squeeze=False)[0]
-    stages = list(dict.fromkeys(table["stage"]))
-    for axes, arm in zip(planes, arms, strict=True):
-        style.configuration_axes(axes, arm)
-        for stage in stages:
-            rows = table[(table["arm"] == arm) & (table["stage"] == stage)]
-            final = stage == stages[-1]
-            colour = style.arm_colour(arm) if final else style.FAINT
-            x, y = rows["joint_1_deg"].to_numpy(), rows["joint_2_deg"].to_numpy()
-            marker = "o" if final else "s"
-            axes.plot(
-                x, y, color=colour, linewidth=0.9, marker=marker, markersize=4 if final else 3
-            )
-            if final:
-                _numbers(axes, x, y, rows["instant"].to_numpy())
+    figure, planes = configuration_planes(table, 3.6)
+    first, last = dict.fromkeys(table["stage"])
+    looks: dict[str, dict[str, Any]] = {
+        first: {"color": style.FAINT, "linewidth": 0.9, "marker": "s", "markersize": 3},
+        last: {"color": style.NEUTRAL, "linewidth": 0.9, "marker": "o", "markersize": 4},
+    }
+    for axes, arm, rows in planes:
+        initial, final = (rows[rows["stage"] == stage] for stage in (first, last))
+        axes.plot(*(initial[name] for name in ANGLES), **looks[first])
+        axes.plot(
+            *(final[name] for name in ANGLES), **looks[last] | {"color": style.arm_colour(arm)}
+        )
+        _numbers(axes, *(final[name].to_numpy() for name in (*ANGLES, "instant")))
         axes.margins(0.1)
-    first, last = stages[0], f"{stages[-1]} (numbers: instants)"
     keys = [
-        style.key(first, color=style.FAINT, linewidth=0.9, marker="s", markersize=3),
-        style.key(last, color=style.NEUTRAL, linewidth=0.9, marker="o", markersize=4),
+        style.key(first, **looks[first]),
+        style.key(f"{last} (numbers: instants)", **looks[last]),
     ]
     style.keys_below(figure, keys)
     return figure
+
+
+def configuration_planes(
+    table: pd.DataFrame, height: float
+) -> tuple[Figure, list[tuple[Axes, int, pd.DataFrame]]]:
+    """Return a figure with a plane of joint angles per arm: (axes, arm, rows of the arm).
+
+    Args:
+        table: With the column arm.
+        height: Of the figure, if it has two planes or one [inch].
+    """
+    by_arm = list(groups(table, "arm"))
+    figure, panels = style.row_of_panels(height if len(by_arm) < 3 else 3.0, len(by_arm))
+    for axes, (arm, _) in zip(panels, by_arm, strict=True):
+        style.configuration_axes(axes, arm)
+    return figure, [(axes, *own) for axes, own in zip(panels, by_arm, strict=True)]
 
 
 def circles_table(condition: ConditionResults) -> pd.DataFrame:
@@ -150,31 +171,23 @@ def draw_circles(table: pd.DataFrame) -> Figure:
     style.operational_axes(axes, unit)
     for row in records(table[table["element"] == "circle"]):
         colour = style.arm_colour(row.arm)
-        axes.add_patch(
-            Circle((row.x, row.y), row.radius, facecolor=colour, alpha=0.14, linewidth=0)
-        )
-        axes.add_patch(
-            Circle((row.x, row.y), row.radius, fill=False, edgecolor=colour, linewidth=0.8)
-        )
+        for look in (
+            {"fc": colour, "alpha": 0.14, "lw": 0},
+            {"fill": False, "ec": colour, "lw": 0.8},
+        ):
+            axes.add_patch(Circle((row.x, row.y), row.radius, **look))
         axes.plot(row.x, row.y, ".", color=colour, markersize=3)
     for arm, links in groups(table[table["element"] == "link"], "arm"):
         style.draw_arm(axes, arm, links)
         _base(axes, links["x"].iloc[0], links["y"].iloc[0])
     for row in records(table[table["distance"].notna()]):
-        centres = row.element == "centres"
-        label = (
-            f"least distance of {'circle centres' if centres else 'the links'}: "
-            f"{row.distance:.3f} {unit}"
-        )
-        look: dict[str, Any] = (
-            {"color": "black", "lw": 3} if centres else {"color": style.ARM_COLOURS[3], "ls": ":"}
-        )
-        axes.plot([row.x, row.x_end], [row.y, row.y_end], zorder=6, label=label, **look)
-    safety = table["safety_distance"].iloc[0]
+        what, line = CLOSEST[row.element]
+        label = f"least distance of {what}: {row.distance:.3f} {unit}"
+        axes.plot([row.x, row.x_end], [row.y, row.y_end], zorder=6, label=label, **line)
     circles = f"circles of radius r = {radius:g} {unit}"
     axes.plot([], [], "o", color=style.FAINT, fillstyle="none", label=circles)
-    collision = f"collision below 2r = {2 * radius:g} {unit}; safety distance {safety:g} {unit}"
-    axes.plot([], [], " ", label=collision)
+    safety = f"safety distance {table['safety_distance'].iloc[0]:g} {unit}"
+    axes.plot([], [], " ", label=f"collision below 2r = {2 * radius:g} {unit}; {safety}")
     axes.set_title(f"instant {int(table['instant'].iloc[0])}")
     axes.margins(0.08)
     style.legend_below(figure, axes, 1)
@@ -220,31 +233,27 @@ def _numbers(axes: Axes, x: FloatArray, y: FloatArray, instants: np.ndarray) -> 
     halo = withStroke(linewidth=2.0, foreground="white")
     for k, instant in enumerate(instants):
         if instant % NUMBERED == 0 or k == len(instants) - 1:
-            along = np.array(
-                [
-                    x[min(k + 1, len(x) - 1)] - x[max(k - 1, 0)],
-                    y[min(k + 1, len(y) - 1)] - y[max(k - 1, 0)],
-                ]
-            )
+            after, before = min(k + 1, len(x) - 1), max(k - 1, 0)
+            along = np.array([x[after] - x[before], y[after] - y[before]])
             side = 9.0 * np.array([-along[1], along[0]]) / max(float(np.linalg.norm(along)), 1e-9)
-            place: dict[str, Any] = {
-                "xytext": tuple(side),
-                "textcoords": "offset points",
-                "ha": "center",
-                "va": "center",
-            }
             axes.annotate(
-                str(instant), (x[k], y[k]), fontsize=7, path_effects=[halo], zorder=6, **place
+                str(instant),
+                (x[k], y[k]),
+                xytext=tuple(side),
+                textcoords="offset points",
+                ha="center",
+                va="center",
+                fontsize=7,
+                path_effects=[halo],
+                zorder=6,
             )
 
 
 def _closest(centres: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
     """Return the two closest centres of different arms."""
-    found: list[tuple[float, FloatArray, FloatArray]] = []
-    for k, first in enumerate(centres):
-        for second in centres[k + 1 :]:
-            distances = np.linalg.norm(first[:, None] - second, axis=2)
-            i, j = np.unravel_index(int(np.argmin(distances)), distances.shape)
-            found.append((float(distances[i, j]), first[i], second[j]))
-    _, a, b = min(found, key=lambda item: item[0])
-    return a, b
+    couples = (
+        (a, b)
+        for first, second in itertools.combinations(centres, 2)
+        for a, b in itertools.product(first, second)
+    )
+    return min(couples, key=lambda ab: float(np.linalg.norm(ab[0] - ab[1])))

@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,9 +13,8 @@ from matplotlib.ticker import MaxNLocator
 
 from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.rana import motions
-from evoexp.papers.rana.figures.planar_models import path_table
+from evoexp.papers.rana.figures.planar_models import ANGLES, configuration_planes, path_table
 from evoexp.papers.rana.motions import STRAIGHT
-from evoexp.records import FloatArray
 from evoexp.report.kit import ConditionResults, groups, motion_geometry, rounded, style
 from evoexp.scenarios.obstacles import obstacle_table
 
@@ -25,6 +25,22 @@ CLOSEST, REFUTED = (
     "closest over the whole motion, every replicate (exact)",
     "refuted: first contact of bodies",
 )
+LOOKS: dict[str, dict[str, Any]] = {  # of the series of distances that are drawn as they are
+    STRAIGHT: {"linestyle": ":", "color": style.FAINT, "lw": 1.2},
+    BEST: {"color": style.ARM_COLOURS[0], "lw": 1.3, "label": f"{BEST}, between via-points too"},
+    AT_VIA_POINTS: {
+        **{"color": style.ARM_COLOURS[0], "ls": "none", "marker": "o", "mew": 0.6, "zorder": 4},
+        **style.DOTS,
+    },
+    CLOSEST: {
+        **{"color": style.NEUTRAL, "ls": "none", "marker": "D", "ms": 3.2},
+        **{"clip_on": False, "zorder": 5},
+    },
+    REFUTED: {
+        **{"color": style.FORBIDDEN, "ls": "none", "marker": "X", "ms": 8, "mec": "white"},
+        **{"clip_on": False, "zorder": 5},
+    },
+}
 LOWEST, HIGHEST = "lowest of all replicates", "highest of all replicates"
 
 
@@ -69,20 +85,16 @@ def draw_snapshots(table: pd.DataFrame) -> Figure:
     figure = style.figure(lines * (min(panel, 3.2) + 0.3) + 0.8, width)
     panels = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
     unit = table["length_unit"].iloc[0]
-    for k, axes in enumerate(panels.ravel()):
-        if k >= len(stages):
-            axes.set_axis_off()
-            continue
-        rows = table[table["stage"] == stages[k]]
+    for axes in panels.ravel()[len(stages) :]:
+        axes.set_axis_off()
+    for axes, (stage, rows) in zip(panels.ravel(), groups(table, "stage"), strict=False):
+        whole = stage == stages[-1]
         for _, outline in groups(obstacles, "link"):
             axes.fill(outline["x"], outline["y"], color=style.FAINT, linewidth=0)
-        _snapshot(axes, rows, whole=k == len(stages) - 1)
+        _snapshot(axes, rows, whole=whole)
         style.operational_axes(axes, unit)
         axes.label_outer()
-        first, last = rows["first"].iloc[0], rows["last"].iloc[0]
-        axes.set_title(
-            f"all instants {first}–{last}" if k == len(stages) - 1 else f"instants {first}–{last}"
-        )
+        axes.set_title(motions.stage_title(rows, whole))
     panels[0, 0].set(xlim=(left, right), ylim=(low, high))
     arms = sorted(table["arm"].unique())
     keys = [
@@ -107,13 +119,9 @@ def paths_table(condition: ConditionResults) -> pd.DataFrame:
 
 def draw_paths(table: pd.DataFrame) -> Figure:
     """Draw the paths in the arms' configuration planes."""
-    arms = sorted(table["arm"].unique())
-    figure = style.figure(3.7 if len(arms) < 3 else 3.0)
-    planes = figure.subplots(1, len(arms), squeeze=False)[0]
-    for axes, arm in zip(planes, arms, strict=True):
-        style.configuration_axes(axes, arm)
-        rows, colour = table[table["arm"] == arm], style.arm_colour(arm)
-        motions.draw_paths(axes, rows, ["joint_1_deg", "joint_2_deg"], "best", colour)
+    figure, planes = configuration_planes(table, 3.7)
+    for axes, arm, rows in planes:
+        motions.draw_paths(axes, rows, ANGLES, "best", style.arm_colour(arm))
         axes.margins(0.08)
     style.keys_below(figure, motions.path_keys(table))
     return figure
@@ -139,8 +147,12 @@ def sampled_distances(condition: ConditionResults, samples: int) -> pd.DataFrame
     }.items():
         path = motion_geometry.configurations(condition.prepared, solution)
         instants, q = motion_geometry.dense(path, samples)
-        columns = {"replicate": replicate, "instant": instants}
-        columns |= {"centres": problem.centre_distances(q), "links": links(DEGREE * q)}
+        columns = {
+            "replicate": replicate,
+            "instant": instants,
+            "centres": problem.centre_distances(q),
+            "links": links(DEGREE * q),
+        }
         parts.append(pd.DataFrame(columns))
     return rounded(pd.concat(parts, ignore_index=True))
 
@@ -202,9 +214,12 @@ def draw_distances(table: pd.DataFrame) -> Figure:
     }
     for axes, measure in zip(panels, (CENTRES, LINKS), strict=True):
         _distances(axes, table[table["measure"] == measure], safety, unit)
-        axes.set_title(titles[measure])
-        axes.set(ylabel=f"least distance [{unit}]", xlim=(0, table["instant"].max()))
-        axes.set_ylim(bottom=0)
+        axes.set(
+            title=titles[measure],
+            ylabel=f"least distance [{unit}]",
+            xlim=(0, table["instant"].max()),
+            ylim=(0, None),
+        )
     panels[1].xaxis.set_major_locator(MaxNLocator(integer=True, nbins=12))
     panels[1].set_xlabel("instant (whole numbers: via-points)")
     style.legend_below(figure, panels[1], 2)
@@ -213,8 +228,7 @@ def draw_distances(table: pd.DataFrame) -> Figure:
 
 def _distances(axes: Axes, rows: pd.DataFrame, safety: float, unit: str) -> None:
     series = dict(groups(rows, "series"))
-    low, high = series[LOWEST], series[HIGHEST]
-    colour = style.ARM_COLOURS[0]
+    low, high, colour = series[LOWEST], series[HIGHEST], style.ARM_COLOURS[0]
     axes.fill_between(
         low["instant"],
         low["distance"],
@@ -224,50 +238,9 @@ def _distances(axes: Axes, rows: pd.DataFrame, safety: float, unit: str) -> None
         linewidth=0,
         label="range over replicates",
     )
-    axes.plot(
-        series[STRAIGHT]["instant"],
-        series[STRAIGHT]["distance"],
-        ":",
-        color=style.FAINT,
-        lw=1.2,
-        label=STRAIGHT,
-    )
-    axes.plot(
-        series[BEST]["instant"],
-        series[BEST]["distance"],
-        color=colour,
-        lw=1.3,
-        label=f"{BEST}, between via-points too",
-    )
-    points = series[AT_VIA_POINTS]
-    axes.plot(
-        points["instant"],
-        points["distance"],
-        "o",
-        color=colour,
-        mec="white",
-        mew=0.6,
-        ms=5,
-        label=AT_VIA_POINTS,
-        clip_on=False,
-        zorder=4,
-    )
-    for name, look in (
-        (CLOSEST, {"marker": "D", "ms": 3.2}),
-        (REFUTED, {"marker": "X", "ms": 8, "mec": "white"}),
-    ):
+    for name, look in LOOKS.items():
         if name in series:
-            red = style.FORBIDDEN if name == REFUTED else style.NEUTRAL
-            axes.plot(
-                series[name]["instant"],
-                series[name]["distance"],
-                color=red,
-                linestyle="none",
-                label=name,
-                clip_on=False,
-                zorder=5,
-                **look,  # type: ignore[arg-type]
-            )
+            axes.plot(series[name]["instant"], series[name]["distance"], **{"label": name} | look)
     label = f"below the safety distance of {safety:g} {unit}"
     axes.axhspan(0.0, safety, color=style.FORBIDDEN, alpha=0.08, linewidth=0, label=label)
     axes.axhline(safety, color=style.FORBIDDEN, linewidth=1.0, linestyle=(0, (5, 2)))
@@ -282,8 +255,7 @@ def _snapshot(axes: Axes, rows: pd.DataFrame, whole: bool) -> None:
         axes.plot(tips["x_end"], tips["y_end"], ":", color=colour, linewidth=0.8, zorder=2)
         between, shades = [], []
         for instant, links in groups(own, "instant"):
-            x: FloatArray = np.append(links["x"].to_numpy(), links["x_end"].iloc[-1])
-            y: FloatArray = np.append(links["y"].to_numpy(), links["y_end"].iloc[-1])
+            x, y = (np.append(links[name], links[f"{name}_end"].iloc[-1]) for name in "xy")
             if instant == last:
                 style.draw_arm(axes, arm, links)
             elif instant == first:

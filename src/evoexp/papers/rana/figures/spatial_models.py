@@ -142,9 +142,7 @@ def draw_snapshots(table: pd.DataFrame) -> Figure:
         axes = _space(figure, (lines, 3, k + 1), [table], table["length_unit"].iloc[0], zoom=1.08)
         rows = table[table["stage"] == stage]
         first, last = rows["first"].iloc[0], rows["last"].iloc[0]
-        axes.set_title(
-            f"instants {first}–{last}" if k < len(stages) - 1 else f"all instants {first}–{last}"
-        )
+        axes.set_title(motions.stage_title(rows, whole=k == len(stages) - 1))
         for (arm, instant), links in groups(rows, ["arm", "instant"]):
             newest = instant == last
             shade = 1.0 if newest else 0.15 + 0.45 * (instant - first) / max(1, last - first)
@@ -158,8 +156,7 @@ def draw_snapshots(table: pd.DataFrame) -> Figure:
                 color=style.arm_colour(arm),
                 linewidth=1.0,
             )
-    dots = style.key("trace of the tip", color=style.NEUTRAL, linewidth=1.0, linestyle=":")
-    _legend(figure, table, dots)
+    _legend(figure, table, style.key("trace of the tip", color=style.NEUTRAL, lw=1.0, ls=":"))
     return figure
 
 
@@ -187,8 +184,8 @@ def _space(
         low, high = float(values.min()), float(values.max())
         pad = 0.05 + 0.5 * max(0.0, 0.5 - (high - low))
         getattr(axes, f"set_{name}lim")(low - pad, high + pad)
-        box.append(high - low + 2.0 * pad)
         getattr(axes, f"set_{name}label")(f"{name} [{unit}]", labelpad=-7, fontsize=7)
+        box.append(high - low + 2.0 * pad)
     axes.set_box_aspect(box, zoom=zoom)
     axes.patch.set_visible(False)  # else it hides the labels of the panel beside it
     axes.tick_params(labelsize=6, pad=-2)
@@ -227,10 +224,8 @@ def _arm(
 
 def _name_points(axes: Any, arm: int, rows: pd.DataFrame) -> None:
     name = POINT_NAMES[arm] if arm < len(POINT_NAMES) else f"r{arm}"
-    points = np.vstack(
-        [rows[["x", "y", "z"]].to_numpy()[:1], rows[["x_end", "y_end", "z_end"]].to_numpy()]
-    )
-    for k, (x, y, z) in enumerate(points):
+    points = ([rows[axis].iloc[0], *rows[f"{axis}_end"]] for axis in "xyz")
+    for k, (x, y, z) in enumerate(zip(*points, strict=True)):
         text = f"{name}{str(k).translate(style.SUBSCRIPTS)}"
         axes.text(x, y, z + 0.09, text, color=style.arm_colour(arm), fontsize=8)
 

@@ -59,25 +59,26 @@ def _path(condition: ConditionResults, solution: FloatArray) -> pd.DataFrame:
     """Return one solution's joint angles and tips."""
     problem = motions.problem(condition)
     q = motion_geometry.configurations(condition.prepared, solution)
-    tips = {
-        arm: end for arm, _, _, end in motion_geometry.joint_positions(problem.assembly, q)
-    }  # the last link's end stays
+    places = motion_geometry.joint_positions(problem.assembly, q)
+    tips = {arm: end for arm, _, _, end in places}  # the last link's end stays
     frames = []
     for arm, (first, stop) in enumerate(problem.arm_slices):
-        columns = {"arm": arm, "instant": np.arange(q.shape[1])}
-        columns |= dict(zip("xyz", tips[arm].T, strict=True))
-        columns |= {f"joint_{j + 1}_deg": q[first + j] for j in range(stop - first)}
+        columns = {
+            "arm": arm,
+            "instant": np.arange(q.shape[1]),
+            **dict(zip("xyz", tips[arm].T, strict=True)),
+            **{f"joint_{j + 1}_deg": q[first + j] for j in range(stop - first)},
+        }
         frames.append(pd.DataFrame(columns))
     return pd.concat(frames, ignore_index=True)
 
 
 def _label(axes: Any, labels: list[str], title: str) -> None:
-    axes.set_xlabel(labels[0], labelpad=-2)
-    axes.set_ylabel(labels[1], labelpad=-2)
-    axes.set_zlabel(labels[2], labelpad=-2)
     axes.set_title(title)
     axes.tick_params(labelsize=6, pad=-1)
-    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+    for axis, label in zip((axes.xaxis, axes.yaxis, axes.zaxis), labels, strict=True):
+        axis.set_label_text(label)
+        axis.labelpad = -2
         axis.set_major_locator(style.few_ticks())
     axes.view_init(elev=24.0, azim=-50.0)
     axes.set_box_aspect(None, zoom=0.82)

@@ -24,7 +24,7 @@ COMMANDS = {
 
 
 class CommandParser(argparse.ArgumentParser):
-    """Says in one line which word is wrong.
+    """Parser that names the wrong word in one line.
 
     Takes no abbreviated options, whose meaning changes when options are added.
     """

@@ -52,7 +52,7 @@ def print_json(value: Any) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value as JSON has it; scalars of numpy as Python's, anything else as text."""
+    """Return a value that JSON can hold: scalars of numpy as Python's, other values as text."""
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

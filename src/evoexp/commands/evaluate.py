@@ -69,7 +69,7 @@ def _listing(label: str, listing: Listing) -> Table:
 
 
 def _tables(rows: list[dict[str, Any]], width: int) -> list[Table]:
-    """Return a table with one column per condition; several where the terminal is too narrow."""
+    """Return a table with one column per condition; more in a narrow terminal."""
     names = list(dict.fromkeys(name for row in rows for name in row if name not in HEAD))
     longest_word = max(len(word) for row in rows for word in row["label"].split())
     column = min(max(12, longest_word), 40) + 3

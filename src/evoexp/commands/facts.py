@@ -40,7 +40,7 @@ KEYS = {
 
 
 def composed_facts(experiment: Experiment, label: str, command: str) -> dict[str, Any]:
-    """Return the facts about one condition of an experiment, whether it was run here or not.
+    """Return the facts about one condition of an experiment, whether or not it was run here.
 
     Args:
         experiment: The experiment.

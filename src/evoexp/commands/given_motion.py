@@ -1,4 +1,4 @@
-"""A motion out of a file, for commands that take one: told from the overrides, read, fitted."""
+"""A motion out of a file: recognised among the overrides, read, and fitted to a condition."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""What a hash that nobody knows might have meant."""
+"""Suggestions for a hash that belongs to no stored run."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ def stored_names(outputs: Path) -> list[str]:
 
 
 def stored_runs(outputs: Path) -> list[tuple[str, RunDirectory | EvoexpError]]:
-    """Return all stored runs by name; a damaged one is what is wrong with it."""
+    """Return all stored runs by name; in place of a damaged one, the text of its error."""
     found: list[tuple[str, RunDirectory | EvoexpError]] = []
     for name in stored_names(outputs):
         try:

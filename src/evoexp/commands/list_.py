@@ -80,7 +80,7 @@ def _experiment_table(experiments: list[dict[str, Any]]) -> Table:
 
 
 def _run(name: str, run: RunDirectory | EvoexpError) -> dict[str, Any]:
-    """Return the entry of a stored run; of a damaged one little but the damage."""
+    """Return the entry of a stored run; of a damaged run little but the damage."""
     row: dict[str, Any] = dict.fromkeys(RUN_KEYS) | {"hash": name, "changed": False}
     try:
         if isinstance(run, EvoexpError):

@@ -88,7 +88,7 @@ def recordings(arguments: argparse.Namespace) -> list[Recording]:
 
 
 def single(arguments: argparse.Namespace) -> Recording:
-    """Return the one motion that the arguments choose.
+    """Return the single motion that the arguments choose.
 
     Raises:
         MotionFileError: If it is not one.
@@ -165,7 +165,7 @@ def _not_here(word: str, error: UnknownHash) -> EvoexpError:
 
 
 def _titles(runs: list[RunDirectory]) -> dict[str, str]:
-    """Return what to call runs: an experiment that has all of them, and their labels in it.
+    """Name the runs: the experiment that has all of them, and their labels in it.
 
     Else what they ran as.
     """

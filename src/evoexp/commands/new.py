@@ -1,4 +1,4 @@
-"""`evoexp new`: a package to begin with, of a planner of one's own."""
+"""`evoexp new`: the first files of a package with a planner of the user's own."""
 
 import argparse
 import keyword
@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def main(arguments: argparse.Namespace) -> int:
-    """Write the package and say what to type next."""
+    """Write the package and print the commands to type next."""
     name = arguments.name
     root = arguments.directory / name
     _check(name, root)

@@ -44,7 +44,7 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _pages(arguments: argparse.Namespace) -> list[Path]:
-    """Draw the report of every experiment that is named, or one of all runs that are named."""
+    """Draw a report of every named experiment, or a single report of all named runs."""
     multirun, only, known = arguments.multirun, arguments.only, options("experiment")
     overrides = [word for word in arguments.overrides if is_override(word)]
     names = [word for word in arguments.overrides if word not in overrides]
@@ -76,7 +76,7 @@ def of_experiment(
     only: Sequence[str] = (),
     config_dir: Sequence[str] = (),
 ) -> Path:
-    """Draw the report of one experiment; `run` ends with it, too.
+    """Draw the report of one experiment, as `run` does at its end.
 
     Args:
         experiment: As `expansions.expand` gives it.

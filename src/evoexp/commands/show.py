@@ -53,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def main(arguments: argparse.Namespace) -> int:
-    """Print one screen per condition; a table where an experiment has several."""
+    """Print a screen of facts; of several conditions a table."""
     run: RunDirectory | None = None
     experiments: list[Experiment] = []
     if any(map(is_override, arguments.overrides)):

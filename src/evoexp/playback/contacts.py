@@ -158,7 +158,7 @@ def at_instant(t: float, begin: float) -> float:
 
 
 def _joined(contacts: list[Contact]) -> tuple[Contact, ...]:
-    """Join contacts that begin where another one ends."""
+    """Join contacts of which one begins where the other ends."""
     joined: list[Contact] = []
     for contact in contacts:
         if joined and contact.begin <= joined[-1].end + END_RESOLUTION:

@@ -150,7 +150,7 @@ def _stamp(now: int) -> Any:
 
 
 def _transforms(recording: Recording, k: int, now: int) -> Any:
-    """Return the pose of every frame in its parent's frame: one transform per link."""
+    """Return the pose of every frame in the frame of its parent, one transform per link."""
     names, rows = frame_names(recording), []
     for frame, row in zip(recording.frames, recording.poses.local[k].tolist(), strict=True):
         x, y, z, qx, qy, qz, qw = row

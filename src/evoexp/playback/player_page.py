@@ -45,7 +45,7 @@ def page(recordings: Sequence[Recording]) -> bytes:
 
 
 def _motion(recording: Recording) -> dict[str, Any]:
-    """Return the data of one motion that the script of the page reads."""
+    """Return the data of a motion for the script of the page."""
     clearance, verdict = recording.clearance, recording.verdict
     pairs = list(dict.fromkeys(clearance.pairs))
     return {

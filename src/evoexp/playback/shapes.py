@@ -32,7 +32,7 @@ class Outline(NamedTuple):
 
     @property
     def is_line(self) -> bool:
-        """Whether the shape has no thickness; the drawing chooses one."""
+        """Return whether the shape has no thickness, so that the drawing chooses a thickness."""
         return self.kind == "capsule" and self.size[0] == 0.0
 
     @property

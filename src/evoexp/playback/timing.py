@@ -9,7 +9,7 @@ from evoexp.records import FloatArray
 
 
 class SpeedLimits(NamedTuple):
-    """Speed limits of joints; the papers print none.
+    """Speed limits of joints, which no paper prints.
 
     Attributes:
         turn: Limit of revolute joints [rad/s].

@@ -93,7 +93,7 @@ def report(
     files[INDEX] = render(page, found, settings, f"evoexp report {request.words}").encode()
     directory.mkdir(parents=True, exist_ok=True)
     write_files({directory / name: content for name, content in files.items()})
-    for path in directory.iterdir():  # what an earlier report had and this one has not
+    for path in directory.iterdir():  # files of an earlier report that this report does not have
         if path.name not in files and not path.name.startswith("."):
             path.unlink()
     return directory / INDEX

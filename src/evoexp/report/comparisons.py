@@ -87,7 +87,7 @@ def compare_on_common_seeds(
     values: Values,
     settings: ReportSettings,
 ) -> Comparison | None:
-    """Compare one quantity over the replicates that both have; None where there is none."""
+    """Compare a quantity over the replicates that both have; None if they share no replicate."""
     common = first.summaries.index.intersection(second.summaries.index)
     x = values(first)[first.summaries.index.get_indexer(common)]
     y = values(second)[second.summaries.index.get_indexer(common)]

@@ -64,8 +64,8 @@ def _incomplete(results: Results) -> str:
         if c.done < c.planned
     ]
     return (
-        f"> **Partial results.** {'; '.join(missing)}. Everything below is drawn from what is "
-        "there.\n" * bool(missing)
+        f"> **Partial results.** {'; '.join(missing)}. Everything below is drawn from the "
+        "finished replicates.\n" * bool(missing)
     )
 
 
@@ -134,11 +134,11 @@ def _claims(claims: Sequence[Claim]) -> str:
     if not claims:
         return ""
     rows = [(c.text, c.source, c.evidence, f"**{c.verdict}**") for c in claims]
-    return markdown.table(("claim", "paper", "what is found", "verdict"), rows)
+    return markdown.table(("claim", "paper", "evidence", "verdict"), rows)
 
 
 def _checks(checks: Sequence[tuple[str, str]]) -> str:
-    return markdown.table(("what", "found"), checks) if checks else ""
+    return markdown.table(("check", "finding"), checks) if checks else ""
 
 
 def _comparison(rows: Iterable[Comparison], settings: ReportSettings) -> str:

@@ -59,7 +59,7 @@ class Judge(NamedTuple):
     def better_than_all(
         self, text: str, source: str, evidence: str, rows: Sequence[Comparison]
     ) -> Claim:
-        """Make a claim that one condition is better than each of several others."""
+        """Make a claim that a condition is better than each of several others."""
         verdict = verdicts.judge_better_than_all(rows, self.significance)
         return self.claim(text, source, evidence, verdict)
 

@@ -13,7 +13,7 @@ def table(headers: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 
 def number(value: float) -> str:
-    """Return a number with four significant digits, a whole one with all of its; a dash for NaN."""
+    """Return a number with four significant digits, whole ones with all digits, NaN as a dash."""
     if math.isnan(value):
         return "–"
     if math.isinf(value):

@@ -82,7 +82,7 @@ def planned_replicates(results: Results) -> int:
 
 
 def _file(group: str, name: str, taken: dict[str, Option]) -> Path | None:
-    """Return the file of the option taken of a group, or the shipped one; None: there is none."""
+    """Return the file of the option taken of a group, else of the shipped option, else None."""
     shipped = config_directory() / group / f"{name}.yaml"
     path = Path(taken[group].path) if group in taken else shipped
     return path if path.is_file() else None
@@ -112,7 +112,7 @@ def option(path: Path) -> dict[str, Entry]:
 
 
 def _taken_in(base: Any, path: Path, entries: dict[str, Entry]) -> dict[str, Entry]:
-    """Return the entries of an option that another one takes in.
+    """Return the entries of an option that another option takes in.
 
     Args:
         base: An item of its defaults: `name`, `name@part` or `/group@part: name`.

@@ -24,9 +24,8 @@ from evoexp.store.run_directory import RunDirectory
 from evoexp.store.tables import read_generations, read_summaries
 
 Kind = TypeVar("Kind")
-WRAPPED = (
-    "planner"  # the field of a control (random search) that holds the planner it stands beside
-)
+# the field of a control (random search) that holds the planner it stands beside
+WRAPPED = "planner"
 
 
 def wrapped(planner: Any) -> Any:
@@ -97,7 +96,7 @@ class ConditionResults:
         return read_log(self.run.log_path(self.best_replicate)).solutions[0].values
 
     def array(self, name: str) -> NDArray[Any]:
-        """Return an array attached to the log of the best replicate, of a reference the only one.
+        """Return an array attached to the log of the best replicate.
 
         Raises:
             KeyError: If there is none of this name.
@@ -142,7 +141,7 @@ class ConditionResults:
 
     @property
     def best_replicate(self) -> int:
-        """Replicate of the lowest best cost; the first of equals."""
+        """Replicate of the lowest best cost; among equals the first."""
         return int(self.summaries.index[int(np.argmin(self.column("best_cost")))])
 
     @property
@@ -180,7 +179,7 @@ class ConditionResults:
 
     @property
     def planner(self) -> Any:
-        """The paper's planner; of a control or a reference the one that it stands beside."""
+        """The paper's planner; of a control or a reference the planner that it stands beside."""
         return wrapped(self.condition.planner)
 
     @property
@@ -247,7 +246,7 @@ class Results(NamedTuple):
 
     @property
     def suffixed(self) -> Iterator[tuple[ConditionResults, str]]:
-        """Conditions of `main` with the ends of their files' names; a single one has none."""
+        """Conditions of `main` with the ends of their files' names, empty for a single one."""
         for k, condition in enumerate(self.main):
             slug = re.sub(r"[^a-z0-9]+", "_", condition.label.lower()).strip("_") or str(k)
             yield condition, "" if len(self.main) == 1 else f"_{k + 1}_{slug}"

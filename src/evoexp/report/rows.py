@@ -5,9 +5,8 @@ from typing import Any
 
 import pandas as pd
 
-DECIMALS = (
-    12  # of coordinates and distances; rounding errors beside 0 would differ between machines
-)
+# of coordinates and distances; rounding errors beside 0 would differ between machines
+DECIMALS = 12
 
 
 def records(table: pd.DataFrame) -> Iterator[Any]:

@@ -11,7 +11,7 @@ from evoexp.report.results import ConditionResults, Results
 
 
 def planned_by(results: Results, planner: type) -> bool:
-    """Whether there are results, and all are of one type of planner, controls included."""
+    """Return whether there are results, all of one type of planner, controls included."""
     found = results.with_data
     return bool(found) and all(isinstance(c.planner, planner) for c in found)
 

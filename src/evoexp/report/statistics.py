@@ -159,7 +159,7 @@ def holm(p_values: Sequence[float]) -> list[float]:
 
 
 def vargha_delaney(x: FloatArray, y: FloatArray) -> float:
-    """Return A12 = P(x > y) + P(x = y) / 2 of values (n,) and (m,); NaN if one is empty."""
+    """Return A12 = P(x > y) + P(x = y) / 2 of values (n,) and (m,); NaN if either is empty."""
     if not len(x) or not len(y):
         return math.nan
     greater, equal = x[:, None] > y, x[:, None] == y

@@ -42,7 +42,7 @@ def effects_drawing(
     first: str,
     caption: str = f"{A12} {BETTER}",
 ) -> Drawing:
-    """Return the figure of effect sizes: a first condition against each other one.
+    """Return the figure of effect sizes: a first condition against each of the others.
 
     Args:
         results: Whose conditions are drawn.

@@ -107,7 +107,7 @@ def judge_better(comparison: Comparison | None, significance: float) -> str:
 
 
 def judge_better_than_all(comparisons: Sequence[Comparison], significance: float) -> str:
-    """Judge a claim that one condition is better than each of several others.
+    """Judge a claim that a condition is better than each of several others.
 
     Args:
         comparisons: Of that condition with each other one.
@@ -184,7 +184,7 @@ def judge_greater(
     significance: float,
     p_adjusted: float | None = None,
 ) -> str:
-    """Judge a claim that a proportion is greater than another one, by Fisher's exact test.
+    """Judge a claim that a proportion is greater than another proportion, by Fisher's exact test.
 
     Args:
         one: Said to be greater.

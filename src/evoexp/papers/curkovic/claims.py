@@ -24,7 +24,7 @@ READINGS = {"one_sided": "Eq. 9 as printed", "symmetric": "Eq. 9 read as symmetr
 def of_sweep(
     results: Results, settings: ReportSettings, found: Sequence[FamilyComparison]
 ) -> tuple[Claim, ...]:
-    """Return the claims that a sweep can judge; the settings that differ tell which ones."""
+    """Return the claims that a sweep can judge, chosen by the settings that differ."""
     claims_of: Callable[[Judge, Results, Sequence[FamilyComparison]], list[Claim]]
     varied = _varied(results)
     if varied <= HALL and varied & {"ga.hall_frozen", "ga.num_elites"}:

@@ -1,4 +1,4 @@
-"""The page of sweeps over Curkovic et al. 2013: the first of a family against each other one."""
+"""The page of sweeps over settings of Curkovic et al. 2013, family by family of conditions."""
 
 from collections.abc import Sequence
 from functools import partial

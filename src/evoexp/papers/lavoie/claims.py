@@ -77,7 +77,7 @@ def _percentage(
         ),
         source=SOURCE,
         evidence=(
-            f"{measures.text(own, level)}; the printed one lies {place}, its own thousand runs "
+            f"{measures.text(own, level)}; the printed share lies {place}, its own thousand runs "
             "give "
             f"[{100 * their_own.low:.1f}, {100 * their_own.high:.1f}]; {difference} points "
             f"(reproduced: 0 within the {100 * level:g} % interval of the difference by "

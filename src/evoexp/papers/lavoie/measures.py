@@ -52,7 +52,7 @@ BOUNDS = (1.0, 2.0)  # those of the printed percentages
 
 
 def fits(results: Results) -> bool:
-    """Whether there are results, and all of arms that go by a via point into a box."""
+    """Return whether there are results, all of arms that go by a via point into a box."""
     found = results.with_data
     return bool(found) and all(isinstance(c.planner, RedundantGa) for c in found)
 
@@ -93,7 +93,7 @@ def tests_per_second(condition: ConditionResults) -> FloatArray:
 
 
 def contacts(condition: ConditionResults, replicate: int, verdict: Contact) -> list[Contact]:
-    """Return the first contact on each sub-path that has one.
+    """Return the first contacts on both sub-paths, as far as there are any.
 
     A verdict names the first contact of the whole motion only; if that is on SP1, the planner's
     motion on SP2 is judged by itself.

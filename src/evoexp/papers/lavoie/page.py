@@ -222,7 +222,7 @@ def _drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]
 
 
 def _solutions(results: Results) -> Iterator[Drawing]:
-    """Return the figures of each arm's median solution, and of its median refuted one."""
+    """Return the figures of each arm's median solution and of its median refuted solution."""
     for stem, title, caption, only_refuted in (
         ("fig_2_solution", "Fig. 2: solutions", SOLUTIONS, False),
         ("refuted", "Contacts between tested positions", THROUGH, True),

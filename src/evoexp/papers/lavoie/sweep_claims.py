@@ -48,7 +48,7 @@ def judge_sweep(
 
 
 def groups_but_for(results: Results, *path: str) -> list[Group]:
-    """Return the conditions that agree in all but one setting of the planner, two or more each.
+    """Return groups of conditions that agree in all settings of the planner but one.
 
     Args:
         results: With data; controls are left out.
@@ -209,7 +209,7 @@ def _positions(
 
 
 def _wrapped_by(control: ConditionResults, other: ConditionResults) -> bool:
-    """Whether a control stands beside this very planner, in the same scene."""
+    """Return whether a control stands beside this very planner in the same scene."""
     same_robot = control.condition.robot == other.condition.robot
     same_task = control.condition.scenario == other.condition.scenario
     return same_robot and same_task and control.planner == other.planner

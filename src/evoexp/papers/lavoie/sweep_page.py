@@ -150,7 +150,7 @@ def _weak_evidence(results: Results, settings: ReportSettings) -> Iterator[tuple
 
 
 def _paths_differ(results: Results) -> bool:
-    """Whether conditions differ in how paths are tested for collision."""
+    """Return whether conditions differ in their test of paths for collision."""
     return len({c.planner.collision for c in results.with_data}) > 1
 
 

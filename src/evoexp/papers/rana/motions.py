@@ -58,7 +58,7 @@ def paths_table(
 
 
 def draw_paths(axes: Any, rows: pd.DataFrame, columns: list[str], best: str, colour: str) -> None:
-    """Draw the paths of one arm in a plane or in space, the best one with its start and goal.
+    """Draw the paths of an arm in a plane or in space, the best path with its start and goal.
 
     Args:
         axes: With as many dimensions as there are columns.

@@ -1,4 +1,4 @@
-"""The page of ablations: the first condition against each other one, on common seeds."""
+"""The page of ablations: the first condition against each of the others, on common seeds."""
 
 from evoexp.report.kit import (
     Claim,
@@ -32,7 +32,11 @@ INTRODUCTION = (
     "by the same formula, except that collision substeps look for collisions between via-points, "
     "too. Without elites a generation evaluates as many individuals more as there were elites."
 )
-PARTS = ("no redistribution", "no relaxation (δ = 0)", "neither")  # what the claim is about
+PARTS = (
+    "no redistribution",
+    "no relaxation (δ = 0)",
+    "neither",
+)  # of the claim
 
 
 def page(results: Results, settings: ReportSettings) -> Page:

@@ -165,7 +165,7 @@ def _claims(
 
 
 def _who(results: Results, one: MeasuredMotions) -> str:
-    """Return the label that begins a line about one of several conditions; else nothing."""
+    """Return the label that begins a line about a condition, or nothing if there is one only."""
     return f"{one.condition.label}: " if len(results.main) > 1 else ""
 
 

@@ -18,7 +18,7 @@ def draw_box(
     colour: str,
     orientation: Literal["horizontal", "vertical"] = "horizontal",
 ) -> None:
-    """Draw median, quartiles and whiskers of the finite ones of some values.
+    """Draw median, quartiles and whiskers of those values that are finite.
 
     Args:
         axes: To draw on.

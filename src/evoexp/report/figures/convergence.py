@@ -79,7 +79,7 @@ def draw_best(table: pd.DataFrame) -> Figure:
 
 
 def draw_fitness(table: pd.DataFrame) -> Figure:
-    """Draw best and average fitness over the whole range, and the best ones from near by."""
+    """Draw best and average fitness over the whole range, and the best fitness enlarged."""
     figure = style.figure(4.1)
     whole, close = figure.subplots(1, 2)
     for axes in (whole, close):

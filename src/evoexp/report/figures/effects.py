@@ -1,4 +1,4 @@
-"""Sweeps: quantities of all conditions side by side, and effect sizes of the first one."""
+"""Sweeps: quantities of all conditions side by side, and effect sizes of the first condition."""
 
 import textwrap
 from collections.abc import Callable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""A matrix of effect sizes: each condition against each other one."""
+"""A matrix of effect sizes: each condition against each of the others."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -86,7 +86,7 @@ def draw_methods(table: pd.DataFrame) -> Figure:
 
 
 def _curves(axes: Axes, table: pd.DataFrame) -> dict[float, str]:
-    """Draw one curve per method; return the methods' names by position."""
+    """Draw a curve per method and return the names of the methods by position."""
     names = {}
     for (position, method), rows in groups(table, ["position", "method"]):
         colour = style.condition_colour(int(position))

@@ -178,7 +178,7 @@ def _links(prepared: Prepared, sampled: link_motions.SampledMotion) -> pd.DataFr
 
 
 def _path(prepared: Prepared, sampled: link_motions.SampledMotion) -> pd.DataFrame:
-    """Return the end-effectors at every sample, each row from the one before."""
+    """Return the path of each end-effector, one row from each sample to the next."""
     links = _links(prepared, sampled)
     tips = links[links["link"] == 1].drop(columns=["x", "y"])
     before = tips.groupby("robot")[["x_end", "y_end"]].shift().fillna(tips[["x_end", "y_end"]])

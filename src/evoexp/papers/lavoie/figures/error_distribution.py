@@ -77,7 +77,7 @@ def draw_distribution(table: pd.DataFrame) -> Figure:
 
 
 def _curve(axes: Axes, rows: pd.DataFrame, greatest: float, colour: str, name: str) -> None:
-    """Draw one arm's steps on to the right end, and their band."""
+    """Draw the steps of an arm's curve up to the right end, and their band."""
     rows = pd.concat([rows, rows.iloc[[-1]].assign(error=greatest)], ignore_index=True)
     x, label = rows["error"], f"{name} (n = {int(rows['total'].iloc[0])})"
     axes.fill_between(

@@ -90,7 +90,7 @@ def reaching_table(shown: Sequence[ShownMotion]) -> pd.DataFrame:
 
 
 def draw_reaching(table: pd.DataFrame) -> Figure:
-    """Draw every scene with its postures; where anything moves, the box from near, too."""
+    """Draw every scene with its postures, and below each motion a close view of its box."""
     panels = [rows for _, rows in groups(table, "panel")]
     ratios = [x / y for x, y in map(_span, panels)]
     moving = bool((table["sub_path"] > 0).any())

@@ -210,7 +210,7 @@ def _base(axes: Axes, x: float, y: float) -> None:
 
 
 def _angle(axes: Axes, row: Any) -> None:
-    """Draw one joint angle: the direction it is measured from, its arc and its value."""
+    """Draw a joint angle: its reference direction, its arc and its value."""
     x, y, arm, joint = row.x, row.y, row.arm, row.joint
     reference, angle = row.reference_deg, row.angle_deg
     colour, radius = style.arm_colour(arm), 0.75 if joint == 0 else 0.55

@@ -238,6 +238,6 @@ def _ball(row: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def _legend(figure: Figure, table: pd.DataFrame, more: Line2D) -> None:
-    """Put the arms and one more entry into a legend below."""
+    """Put a legend of the arms and of a further entry below the figure."""
     arms = style.arm_keys(sorted(table["arm"].unique()), linewidth=2.4)
     style.keys_below(figure, [*arms, more])

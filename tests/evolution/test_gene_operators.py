@@ -6,14 +6,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from evoexp.evolution.gene_crossover import (
+from evoexp.evolution.crossover import (
     ARITHMETIC,
     BLX_ALPHA,
     UNIFORM,
     cross_genes,
     num_gene_uniforms,
 )
-from evoexp.evolution.gene_mutation import (
+from evoexp.evolution.mutation import (
     GAUSSIAN,
     GENE,
     INDIVIDUAL,
@@ -25,8 +25,7 @@ from evoexp.evolution.gene_mutation import (
     non_uniform_spread,
     num_mutation_uniforms,
 )
-from evoexp.evolution.ranking import choose_by_tournament, rank_weights
-from evoexp.evolution.selection import spin_roulette
+from evoexp.evolution.selection import choose_by_tournament, rank_weights, spin_roulette
 from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic
 from evoexp.records import FloatArray
 

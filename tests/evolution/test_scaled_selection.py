@@ -8,8 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoexp.evolution.remainder import stochastic_remainder
-from evoexp.evolution.scaling import scale_linearly
+from evoexp.evolution.scaled_selection import scale_linearly, stochastic_remainder
 
 COSTS = st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=30).map(np.array)
 

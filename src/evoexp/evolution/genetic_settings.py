@@ -1,8 +1,8 @@
 """The hyperparameters that evolutionary planners share."""
 
-from typing import ClassVar, Self
+from typing import Annotated, ClassVar, Self
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from evoexp.errors import SettingError
 from evoexp.validation import Component, Count, NonNegativeCount, Rate
@@ -44,3 +44,15 @@ class GeneticSettings(Component):
     def num_evaluations(self) -> int:
         """Evaluations of a whole run: the initial population, then all offspring."""
         return self.population_size + self.num_generations * self.num_offspring
+
+
+class ScaledGenetic(GeneticSettings):
+    """A generational genetic algorithm whose parents are chosen as in `scaled_selection`.
+
+    Attributes:
+        scaling_multiple: Copies that the best one expects, in units of the mean [-].
+    """
+
+    component: ClassVar[str] = "scaled_genetic"
+
+    scaling_multiple: Annotated[float, Field(gt=1.0)]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoexp.evolution.cost_statistics import CostStatistics
-from evoexp.evolution.scaled_settings import ScaledGenetic
+from evoexp.evolution.genetic_settings import ScaledGenetic
 from evoexp.numeric.random_stream import Block, Draws
 from evoexp.planners.planner import Candidate, Keeper
 from evoexp.records import FloatArray, Generation

@@ -6,8 +6,11 @@ A path is a row of a table, see `paths.grid_walks`.
 from typing import NamedTuple
 
 from evoexp.evolution.cost_statistics import summarise
-from evoexp.evolution.remainder import choose_by_remainders, num_remainder_uniforms
-from evoexp.evolution.scaling import scale_costs
+from evoexp.evolution.scaled_selection import (
+    choose_by_remainders,
+    num_remainder_uniforms,
+    scale_costs,
+)
 from evoexp.evolution.selection import choose_elites
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.random_stream import Block, draw, draw_many, used_up

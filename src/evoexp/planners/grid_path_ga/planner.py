@@ -19,7 +19,7 @@ import numpy as np
 from evoexp.collision.models.potential_fields import Fields, PotentialFields
 from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
-from evoexp.evolution.scaled_settings import ScaledGenetic
+from evoexp.evolution.genetic_settings import ScaledGenetic
 from evoexp.numeric.random_stream import Block, Draws
 from evoexp.objectives.path_cost import PathCost
 from evoexp.paths.grid_walks import walk_each

@@ -7,8 +7,11 @@ from typing import NamedTuple
 
 from evoexp.evolution.bit_coding import cross_strings, decode_strings, flip_strings
 from evoexp.evolution.cost_statistics import summarise
-from evoexp.evolution.remainder import choose_by_remainders, num_remainder_uniforms
-from evoexp.evolution.scaling import scale_costs
+from evoexp.evolution.scaled_selection import (
+    choose_by_remainders,
+    num_remainder_uniforms,
+    scale_costs,
+)
 from evoexp.evolution.selection import choose_elites
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.random_stream import Block, draw_many, used_up

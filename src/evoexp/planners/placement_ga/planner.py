@@ -16,7 +16,7 @@ from pydantic import Field
 
 from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
-from evoexp.evolution.scaled_settings import ScaledGenetic
+from evoexp.evolution.genetic_settings import ScaledGenetic
 from evoexp.numeric.elementary import DEGREE
 from evoexp.numeric.random_stream import Block
 from evoexp.objectives.placement_criteria import PlacementCriteria

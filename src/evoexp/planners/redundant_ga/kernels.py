@@ -11,11 +11,15 @@ import numpy as np
 
 from evoexp.collision.models.ellipse_kernels import Ellipses, TestedPath, paths_collide
 from evoexp.evolution.cost_statistics import summarise
-from evoexp.evolution.crossover import cross_single_point
-from evoexp.evolution.gene_crossover import ONE_POINT, cross_genes
-from evoexp.evolution.gene_mutation import decode_bits, flip_bits, mutate_genes
-from evoexp.evolution.ranking import choose_by_tournament, rank_weights
-from evoexp.evolution.selection import choose_elites, inverse_weights, spin_roulette
+from evoexp.evolution.crossover import ONE_POINT, cross_genes, cross_single_point
+from evoexp.evolution.mutation import decode_bits, flip_bits, mutate_genes
+from evoexp.evolution.selection import (
+    choose_by_tournament,
+    choose_elites,
+    inverse_weights,
+    rank_weights,
+    spin_roulette,
+)
 from evoexp.evolution.succession import succeed_rows
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.objectives.reaching import measure_reach, measure_reach_from

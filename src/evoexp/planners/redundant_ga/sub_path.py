@@ -5,9 +5,13 @@ from typing import NamedTuple
 import numpy as np
 
 from evoexp.evolution.cost_statistics import CostStatistics
-from evoexp.evolution.crossover import num_single_point_uniforms
-from evoexp.evolution.gene_crossover import CROSSOVERS, ONE_POINT, num_gene_uniforms
-from evoexp.evolution.gene_mutation import (
+from evoexp.evolution.crossover import (
+    CROSSOVERS,
+    ONE_POINT,
+    num_gene_uniforms,
+    num_single_point_uniforms,
+)
+from evoexp.evolution.mutation import (
     GAUSSIAN,
     GENE,
     MUTATIONS,

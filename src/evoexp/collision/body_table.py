@@ -153,8 +153,7 @@ def _core(item: Any) -> tuple[_Core, FloatArray, FloatArray]:
     swept = float(shape.getSweptSphereRadius()) if isinstance(shape, coal.ShapeBase) else 0.0
     if isinstance(shape, coal.Halfspace):
         normal = rotation @ shape.n
-        turn = _with_z(normal)
-        return _Core(HALF_SPACE, radius=swept), turn, translation + normal * shape.d
+        return _Core(HALF_SPACE, radius=swept), _with_z(normal), translation + normal * shape.d
     if isinstance(shape, coal.Sphere):
         core = _Core(SEGMENT, radius=shape.radius + swept)
     elif isinstance(shape, coal.Capsule):
@@ -212,7 +211,6 @@ def _reach(core: _Core, rotation: FloatArray, translation: FloatArray) -> tuple[
 
 def _with_z(normal: FloatArray) -> FloatArray:
     """Return a rotation whose third column is the unit vector `normal`."""
-    helper = np.eye(3)[np.argmin(np.abs(normal))]
-    x = np.cross(helper, normal)
+    x = np.cross(np.eye(3)[np.argmin(np.abs(normal))], normal)
     x /= np.sqrt((x * x).sum())
     return np.column_stack([x, np.cross(normal, x), normal])

@@ -51,8 +51,7 @@ def best_team(collisions: CollisionCounts, own: FloatArray) -> BestTeam:
     """
     check_shapes(collisions, own, own.shape)
     team = np.empty(len(own), dtype=np.int64)
-    cost = find_best_team(collisions, own, own.shape[1], team)
-    return BestTeam(team, float(cost))
+    return BestTeam(team, float(find_best_team(collisions, own, own.shape[1], team)))
 
 
 def check_shapes(

@@ -136,8 +136,11 @@ class PostureCost(Component):
         if self.goal_distance is None:
             raise SettingError("goal_distance", "given: every goal is a place", None)
         if self.upright is not None and self.keep_parallel is not None:
-            must = "left out with upright, which holds another axis of the same frame"
-            raise SettingError("keep_parallel", must, self.keep_parallel.weight)
+            raise SettingError(
+                "keep_parallel",
+                "left out with upright, which holds another axis of the same frame",
+                self.keep_parallel.weight,
+            )
         if self.free_space is not None and self.collision is None:
             raise SettingError(
                 "free_space",
@@ -167,8 +170,11 @@ class PostureCost(Component):
                     f"{field}[{k}]", f"a cost term ({', '.join(TERMS)})", name, nearest(name, TERMS)
                 )
             if name not in self.chosen:
-                must = f"a term that the objective gives a weight ({', '.join(self.chosen)})"
-                raise SettingError(f"{field}[{k}]", must, name)
+                raise SettingError(
+                    f"{field}[{k}]",
+                    f"a term that the objective gives a weight ({', '.join(self.chosen)})",
+                    name,
+                )
         counting = terms or self.chosen
         given = [getattr(self, name) if name in counting else None for name in TERMS]
         rates = [

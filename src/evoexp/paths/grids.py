@@ -103,8 +103,7 @@ def grid(blocked: BoolArray) -> Grid:
         int(np.abs(nodes[inside] - _shifted(nodes, (1,) * dimensions)).max()) + 1, dtype=np.int32
     )
     for k, move in enumerate(moves):
-        permitted = _permitted(free, move)
-        neighbours[(*inside, k)] = np.where(permitted, _shifted(nodes, move), -1)
+        neighbours[(*inside, k)] = np.where(_permitted(free, move), _shifted(nodes, move), -1)
         kinds[abs(int(_shifted(nodes, move).flat[0] - nodes[inside].flat[0]))] = sum(map(abs, move))
     changes = np.array([sum(map(abs, move)) for move in moves], dtype=np.int32)
     coordinates = np.stack(np.unravel_index(nodes.ravel(), free.shape), axis=1).astype(np.int32) - 1

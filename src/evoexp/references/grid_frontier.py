@@ -172,8 +172,7 @@ def best_walk(
         SettingError: If no walk has as few nodes.
     """
     # how many nodes a better walk has at most
-    free = np.unique(network.tails)
-    slack = known - lam * network.unsafeness[free].min()
+    slack = known - lam * network.unsafeness[np.unique(network.tails)].min()
     most = min(max_nodes, int(slack / epsilon) + 2) if epsilon > 0.0 else max_nodes
     arrivals = arrivals_of(network, epsilon)
     costs = np.full(most + 1, np.inf)

@@ -67,8 +67,11 @@ class DhChain(Chain):
     def _bodies_fit(self) -> Self:
         for k, joint in enumerate(self.joints):
             if not joint.limits[0] < joint.limits[1]:
-                must = "[least, greatest] with least < greatest"
-                raise SettingError(f"joints[{k}].limits", must, list(joint.limits))
+                raise SettingError(
+                    f"joints[{k}].limits",
+                    "[least, greatest] with least < greatest",
+                    list(joint.limits),
+                )
         names = [body.name for body in self.bodies]
         for k, body in enumerate(self.bodies):
             if body.joint > len(self.joints):

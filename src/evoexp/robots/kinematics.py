@@ -347,8 +347,7 @@ def _frame_with_z(axis: FloatArray) -> FloatArray:
         return np.eye(3)
     if unit[2] == -1.0:
         return np.diag([1.0, -1.0, -1.0])
-    helper = np.eye(3)[np.argmin(np.abs(unit))]
-    x = np.cross(helper, unit)
+    x = np.cross(np.eye(3)[np.argmin(np.abs(unit))], unit)
     x /= np.linalg.norm(x)
     return np.column_stack([x, np.cross(unit, x), unit])
 

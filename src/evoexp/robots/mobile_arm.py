@@ -46,8 +46,9 @@ class MobileArm(Chain):
         for name in ("joint_limits", "torque_limits"):
             for k, (least, greatest) in enumerate(getattr(self, name) or ()):
                 if not least < greatest:
-                    must = "[least, greatest] with least < greatest"
-                    raise SettingError(f"{name}[{k}]", must, [least, greatest])
+                    raise SettingError(
+                        f"{name}[{k}]", "[least, greatest] with least < greatest", [least, greatest]
+                    )
         length, height = self.platform_size
         if length <= height:
             raise SettingError(

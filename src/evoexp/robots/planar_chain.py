@@ -41,8 +41,11 @@ class PlanarChain(Chain):
         if self.joint_limits is None:
             return self
         if len(self.joint_limits) != len(self.link_lengths):
-            must = f"one pair per link ({len(self.link_lengths)})"
-            raise SettingError("joint_limits", must, len(self.joint_limits))
+            raise SettingError(
+                "joint_limits",
+                f"one pair per link ({len(self.link_lengths)})",
+                len(self.joint_limits),
+            )
         for k, (least, greatest) in enumerate(self.joint_limits):
             if not least < greatest:
                 raise SettingError(

@@ -50,8 +50,11 @@ def planar_arm(assembly: Assembly) -> PlanarArm:
         or bent
         or len(links) != len(table.parent)
     ):
-        joints = ", ".join(f"{stop - first} joints" for first, stop in assembly.arm_slices)
-        raise SettingError("robot", "one planar arm in the plane z = 0", joints)
+        raise SettingError(
+            "robot",
+            "one planar arm in the plane z = 0",
+            ", ".join(f"{stop - first} joints" for first, stop in assembly.arm_slices),
+        )
     x, y, _ = table.translation[0]
     angle = float(atan2(table.rotation[0][3], table.rotation[0][0]))
     return PlanarArm(np.array([link.end[0] for link in links]), float(x), float(y), angle)

@@ -198,9 +198,10 @@ class Urdf(Chain):
                     model, text, pin.GeometryType.COLLISION, None, directory
                 )
             except (ValueError, RuntimeError) as error:
-                reason = str(error).strip().splitlines()[0].replace(directory, "")
                 raise SettingError(
-                    "robot.path", "a URDF whose collision bodies can be read", reason
+                    "robot.path",
+                    "a URDF whose collision bodies can be read",
+                    str(error).strip().splitlines()[0].replace(directory, ""),
                 ) from None
 
     def _base(self, model: Any) -> Any:
@@ -244,8 +245,11 @@ def _check_joints(root: Any, field: str) -> None:
                 if kind == "continuous"
                 else ""
             )
-            must = f"a URDF whose joints are {', '.join(MOVING)} or fixed{hint}"
-            raise SettingError(field, must, f"joint '{joint.get('name')}' of type {what}")
+            raise SettingError(
+                field,
+                f"a URDF whose joints are {', '.join(MOVING)} or fixed{hint}",
+                f"joint '{joint.get('name')}' of type {what}",
+            )
 
 
 def _mesh(name: str, urdf: Path, field: str) -> bytes:
@@ -280,8 +284,12 @@ def _plain(content: bytes, places: dict[str, str]) -> str:
 def _frame(model: Any, name: str, field: str) -> Any:
     names = [frame.name for frame in model.frames]
     if name not in names:
-        must = f"a frame of the URDF ({', '.join(names)})"
-        raise SettingError(f"robot.{field}", must, name, nearest(name, names))
+        raise SettingError(
+            f"robot.{field}",
+            f"a frame of the URDF ({', '.join(names)})",
+            name,
+            nearest(name, names),
+        )
     return model.frames[names.index(name)]
 
 

@@ -56,8 +56,11 @@ def _read_text(content: bytes, field: str) -> np.ndarray:
     for number, line in enumerate(lines, 1):
         row = "".join(line.split())
         if wrong := next((letter for letter in row if letter not in BLOCKED + FREE), ""):
-            must = f"a map of {' or '.join(BLOCKED)} (blocked) and {' or '.join(FREE)} (free)"
-            raise SettingError(field, must, f"{wrong} in row {number}")
+            raise SettingError(
+                field,
+                f"a map of {' or '.join(BLOCKED)} (blocked) and {' or '.join(FREE)} (free)",
+                f"{wrong} in row {number}",
+            )
         if row:
             blocks[-1].append(row)
         elif blocks[-1]:

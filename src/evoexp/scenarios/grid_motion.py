@@ -60,8 +60,11 @@ class GridMotion(Component):
                 not 0 <= a <= b < n
                 for a, b, n in zip(corners[:half], corners[half:], self.size, strict=True)
             ):
-                must = f"from a lower to an upper corner inside the grid ({self.inside})"
-                raise SettingError(f"obstacles[{k}]", must, list(corners))
+                raise SettingError(
+                    f"obstacles[{k}]",
+                    f"from a lower to an upper corner inside the grid ({self.inside})",
+                    list(corners),
+                )
         return self
 
     def _check_node(self, name: str, node: tuple[int, ...]) -> None:

@@ -67,8 +67,11 @@ class Posture(Settings):
             )
         for k, angle in enumerate(angles):
             if not 0.0 <= angle <= HALF_TURN:
-                must = "within [0, 180] deg, where the genes live"
-                raise SettingError(f"{field}.angles[{k}]", must, float(angle))
+                raise SettingError(
+                    f"{field}.angles[{k}]",
+                    "within [0, 180] deg, where the genes live",
+                    float(angle),
+                )
         return angles
 
 
@@ -119,8 +122,11 @@ class LinkMotion(Component):
             if not 0 <= robot < len(bases):
                 raise SettingError("scenario.stationary", f"robots 0 … {len(bases) - 1}", robot)
             if not np.array_equal(found[0][robot], found[1][robot]):
-                must = "the same as its start, since the robot is stationary"
-                raise SettingError(f"scenario.q_goal[{robot}]", must, list(found[1][robot]))
+                raise SettingError(
+                    f"scenario.q_goal[{robot}]",
+                    "the same as its start, since the robot is stationary",
+                    list(found[1][robot]),
+                )
         return found[0], found[1]
 
 
@@ -134,8 +140,11 @@ def _reach(
     cosine = (squared - first * first - second * second) / (2.0 * first * second)
     if not -1.0 <= cosine <= 1.0:
         least, most = abs(first - second), first + second
-        must = f"{least:g} to {most:g} away from the robot's base"
-        raise SettingError(field, must, f"{float(np.sqrt(squared)):g} away")
+        raise SettingError(
+            field,
+            f"{least:g} to {most:g} away from the robot's base",
+            f"{float(np.sqrt(squared)):g} away",
+        )
     # of the second link against the first: an elbow on the left bends to the right
     bend = -side * acos(cosine)
     sine_bend = -side * np.sqrt(max(0.0, 1.0 - cosine * cosine))

@@ -133,8 +133,11 @@ class ObstacleTable(NamedTuple):
             SettingError: If there is one.
         """
         if ELLIPSE in self.kind:
-            field = f"scenario.obstacles[{int(np.argmax(self.kind == ELLIPSE))}].shape"
-            raise SettingError(field, "any but an ellipse with this collision model", "ellipse")
+            raise SettingError(
+                f"scenario.obstacles[{int(np.argmax(self.kind == ELLIPSE))}].shape",
+                "any but an ellipse with this collision model",
+                "ellipse",
+            )
         return self
 
 

@@ -164,8 +164,12 @@ class PostureTask(Component):
             SettingError: If none has this name.
         """
         if name not in self.names:
-            must = f"the name of an obstacle ({', '.join(self.names) or 'there is none'})"
-            raise SettingError(field, must, name, nearest(name, self.names))
+            raise SettingError(
+                field,
+                f"the name of an obstacle ({', '.join(self.names) or 'there is none'})",
+                name,
+                nearest(name, self.names),
+            )
         return self.names.index(name)
 
     @property

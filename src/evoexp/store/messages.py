@@ -200,8 +200,7 @@ def _typed(record: type, row: dict[str, Any]) -> tuple[dict[str, Any], dict[str,
             fields[name] = kind(value)
         else:
             fields[name] = np.array(value, dtype=np.float64) if kind == FloatArray else value
-    terms = {name[5:]: float(value) for name, value in row.items() if name[:5] == TERM}
-    return fields, terms
+    return fields, {name[5:]: float(value) for name, value in row.items() if name[:5] == TERM}
 
 
 def restore(row: dict[str, Any]) -> None:

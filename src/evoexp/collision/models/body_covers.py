@@ -229,8 +229,7 @@ def _ellipsoid_bound(points: FloatArray, half: FloatArray) -> FloatArray:
     Outside, the bound is the way toward the middle; inside, it follows from the thinnest axis.
     """
     scale = np.sqrt(((points / half) ** 2).sum(axis=1))
-    away = np.sqrt((points**2).sum(axis=1))
-    outside = away * (1.0 - 1.0 / np.maximum(scale, 1.0))
+    outside = np.sqrt((points**2).sum(axis=1)) * (1.0 - 1.0 / np.maximum(scale, 1.0))
     return np.asarray(np.where(scale > 1.0, outside, (scale - 1.0) * half.min()))
 
 

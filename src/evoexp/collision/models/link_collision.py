@@ -147,9 +147,10 @@ def _pairs_of_joints(assembly: Assembly) -> list[tuple[int, int]]:
     straight = flat and all(not link.start.any() and not link.end[1:].any() for link in links)
     turned = [bool(assembly.table.turned[k]) for k in range(len(assembly.table.parent))]
     if not straight or any(turned):
-        must = "planar arms of two links with base_angle 0"
         raise SettingError(
-            "robot", must, ", ".join(f"{stop - first} joints" for first, stop in slices)
+            "robot",
+            "planar arms of two links with base_angle 0",
+            ", ".join(f"{stop - first} joints" for first, stop in slices),
         )
     return slices
 

@@ -87,8 +87,11 @@ class PotentialFields(Component):
             SettingError: If p is more than the grid has dimensions.
         """
         if self.neighbourhood > blocked.ndim:
-            must = f"at most the grid's number of dimensions ({blocked.ndim})"
-            raise SettingError("collision.neighbourhood", must, self.neighbourhood)
+            raise SettingError(
+                "collision.neighbourhood",
+                f"at most the grid's number of dimensions ({blocked.ndim})",
+                self.neighbourhood,
+            )
         unsafeness = self._unsafeness(blocked)
         closed = (
             blocked if self.max_unsafeness is None else blocked | (unsafeness > self.max_unsafeness)

@@ -94,8 +94,11 @@ class Coevolution(PlannerDefaults, Component):
     @model_validator(mode="after")
     def _genes_come_in_pairs(self) -> Self:
         if self.chromosome_length < 2 or self.chromosome_length % 2:
-            must = "even and at least 2: two link angles per configuration"
-            raise SettingError("chromosome_length", must, self.chromosome_length)
+            raise SettingError(
+                "chromosome_length",
+                "even and at least 2: two link angles per configuration",
+                self.chromosome_length,
+            )
         return self
 
     @property
@@ -124,9 +127,10 @@ class Coevolution(PlannerDefaults, Component):
             if contact := collision.contact(posture):
                 relative = np.stack([posture[:, 0], posture[:, 1] - posture[:, 0]], axis=1).ravel()
                 closest = " and ".join(bodies.nearest_pair(relative))
-                given = (posture / DEGREE).round(9).tolist()
                 raise SettingError(
-                    f"scenario.{name}", f"free of collision ({contact}: {closest})", given
+                    f"scenario.{name}",
+                    f"free of collision ({contact}: {closest})",
+                    (posture / DEGREE).round(9).tolist(),
                 )
         return problem
 

@@ -113,8 +113,11 @@ def _limits(assembly: Assembly) -> FloatArray:
     for joint in range(1, model.njoints):
         low, high = limits[model.idx_qs[joint]]
         if not (abs(low) < 1e6 and abs(high) < 1e6 and low < high):
-            must = "given for every joint: postures are drawn between them, and margins rated"
-            raise SettingError("robot.joint_limits", must, f"none for joint '{model.names[joint]}'")
+            raise SettingError(
+                "robot.joint_limits",
+                "given for every joint: postures are drawn between them, and margins rated",
+                f"none for joint '{model.names[joint]}'",
+            )
     return limits
 
 
@@ -134,8 +137,11 @@ def _start(task: PostureTask, assembly: Assembly, limits: FloatArray) -> FloatAr
     start = np.array(task.q_start) * units
     for k, (value, (least, greatest)) in enumerate(zip(start, limits, strict=True)):
         if not least <= value <= greatest:
-            must = f"within the joint's limits, {least / units[k]:g} to {greatest / units[k]:g}"
-            raise SettingError(f"scenario.q_start[{k}]", must, task.q_start[k])
+            raise SettingError(
+                f"scenario.q_start[{k}]",
+                f"within the joint's limits, {least / units[k]:g} to {greatest / units[k]:g}",
+                task.q_start[k],
+            )
     return start
 
 
@@ -183,11 +189,12 @@ def _check_terms(
         raise SettingError(where, "a point, since no goal_angle rates its orientation", "pose")
     for term in (AXIAL, HEADING):
         if weights[term] > 0.0 and not isinstance(goal, SurfaceGoal):
-            must = (
+            raise SettingError(
+                where,
                 f"the surface of an object, since {TERMS[term]} rates the way to it (or {field} "
-                "without it)"
+                "without it)",
+                goal.kind,
             )
-            raise SettingError(where, must, goal.kind)
     if isinstance(goal, SurfaceGoal):
         kind = obstacles.kind[task.names.index(goal.object)]
         shape = task.obstacles[task.names.index(goal.object)].shape
@@ -222,9 +229,11 @@ def _check_contacts(task: PostureTask, names: tuple[str, ...]) -> None:
         for c, pair in enumerate(phase.contacts):
             for name in pair:
                 if name not in names:
-                    must = f"names of bodies or obstacles ({', '.join(names)})"
                     raise SettingError(
-                        f"scenario.phases[{k}].contacts[{c}]", must, name, nearest(name, names)
+                        f"scenario.phases[{k}].contacts[{c}]",
+                        f"names of bodies or obstacles ({', '.join(names)})",
+                        name,
+                        nearest(name, names),
                     )
 
 

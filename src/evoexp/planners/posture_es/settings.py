@@ -49,8 +49,11 @@ class StrategySettings(Component):
             self.selection == "comma"
             and self.num_parents > self.num_offspring + self.num_immigrants
         ):
-            must = f"at most num_offspring ({self.num_offspring}) with comma selection"
-            raise SettingError("num_parents", must, self.num_parents)
+            raise SettingError(
+                "num_parents",
+                f"at most num_offspring ({self.num_offspring}) with comma selection",
+                self.num_parents,
+            )
         return self
 
     @property

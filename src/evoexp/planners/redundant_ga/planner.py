@@ -321,8 +321,7 @@ class _Plans:
         self, cost: float, via: FloatArray, goal: FloatArray, terms: dict[str, float]
     ) -> None:
         plan = np.concatenate([self._problem.start, via, goal])
-        solved = bool(self._planner.successful(1, cost))
-        self._keeper.keep(cost, Candidate(plan, terms, solved))
+        self._keeper.keep(cost, Candidate(plan, terms, bool(self._planner.successful(1, cost))))
 
 
 def named_terms(terms: FloatArray) -> dict[str, float]:

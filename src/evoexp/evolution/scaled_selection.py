@@ -4,10 +4,61 @@ Linear scaling says how many copies of every individual are expected among the p
 makes each a parent as often as expected, rounded up or down.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
+from evoexp.evolution.selection import choose_elites
 from evoexp.numeric.compilation import kernel
+from evoexp.numeric.random_stream import Block, draw_many, used_up
 from evoexp.records import FloatArray, IntArray
+
+
+class SelectionMemory(NamedTuple):
+    """Arrays that the selection of a generation writes.
+
+    Attributes:
+        parents: (offspring,) indices of individuals.
+        elites: (elites,) likewise.
+        expected: (individuals,) expected numbers of copies.
+        order: (individuals,) order in which remainders are scanned.
+    """
+
+    parents: IntArray
+    elites: IntArray
+    expected: FloatArray
+    order: IntArray
+
+    @classmethod
+    def of(cls, num_offspring: int, num_elites: int, size: int) -> "SelectionMemory":
+        """Return memory for a population of a size."""
+        parents, elites = (np.empty(n, dtype=np.int64) for n in (num_offspring, num_elites))
+        return cls(parents, elites, np.empty(size), np.empty(size, dtype=np.int64))
+
+
+@kernel
+def choose_parents(
+    draws: Block, costs: FloatArray, multiple: float, memory: SelectionMemory
+) -> bool:
+    """Choose the elites, and parents by linear scaling and stochastic remainders.
+
+    Args:
+        draws: Uniform numbers.
+        costs: (individuals,).
+        multiple: Copies that the best one expects, in units of the mean.
+        memory: Written.
+
+    Returns:
+        Whether the draws sufficed; if not, no parents are chosen.
+    """
+    parents, elites, expected, order = memory
+    choose_elites(costs, elites)
+    scale_costs(costs, len(parents), multiple, expected)
+    uniforms = draw_many(draws, num_remainder_uniforms(len(costs), len(parents)))
+    if used_up(draws):
+        return False
+    choose_by_remainders(uniforms, expected, order, parents)
+    return True
 
 
 def scale_linearly(costs: FloatArray, count: int, multiple: float = 2.0) -> FloatArray:
@@ -95,7 +146,7 @@ def stochastic_remainder(rng: np.random.Generator, expected: FloatArray) -> IntA
 
     Args:
         rng: Source of `num_remainder_uniforms` uniform numbers.
-        expected: (individuals,) ≥ 0, as `scaling.scale_linearly` returns them; their sum is the
+        expected: (individuals,) ≥ 0, as `scale_linearly` returns them; their sum is the
             number of parents.
 
     Returns:

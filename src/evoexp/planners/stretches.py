@@ -5,7 +5,7 @@ time.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.evolution.genetic_settings import ScaledGenetic
-from evoexp.numeric.random_stream import Block, Draws
+from evoexp.evolution.scaled_selection import SelectionMemory
+from evoexp.numeric.random_stream import Draws
 from evoexp.planners.planner import Candidate, Keeper
 from evoexp.records import FloatArray, Generation
 
@@ -27,21 +28,29 @@ class Stretches(ABC):
         num_places: Generations computed per call, and the one before them.
         summaries: (places, SUMMARY).
         costs: (places, individuals).
+        chosen: Memory of the selection.
+        arguments: All that `evolve` takes behind the draws and the first and the last generation.
     """
 
     costs: FloatArray
+    arguments: tuple[Any, ...]
 
-    def __init__(self, ga: ScaledGenetic, stretch: int, block: int) -> None:
+    def __init__(
+        self, ga: ScaledGenetic, evolve: Callable[..., int], stretch: int, block: int
+    ) -> None:
         """Begin a run.
 
         Args:
             ga: Its settings.
+            evolve: Kernel that computes the generations after one up to another, as far as the
+                draws suffice, and returns the last generation that was computed.
             stretch: Generations computed per call, at most.
             block: Uniform numbers drawn at once, at least.
         """
         self.num_places = min(stretch, ga.num_generations) + 1
         self.summaries = np.empty((self.num_places, SUMMARY))
-        self._ga, self._known, self._draws = ga, -1, Draws(block)
+        self.chosen = SelectionMemory.of(ga.num_offspring, ga.num_elites, ga.population_size)
+        self._ga, self._evolve, self._known, self._draws = ga, evolve, -1, Draws(block)
 
     def generations(self, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield the initial population, then every generation."""
@@ -70,7 +79,8 @@ class Stretches(ABC):
             self._known = 0
         elif index > self._known:
             last = min(self._known + self.num_places - 1, self._ga.num_generations)
-            while (known := self.go_on(self._draws.block, self._known, last)) < last:
+            arguments = self.arguments
+            while (known := self._evolve(self._draws.block, self._known, last, *arguments)) < last:
                 self._known = known
                 self._draws.extend(rng)
             self._known = last
@@ -79,14 +89,6 @@ class Stretches(ABC):
     @abstractmethod
     def begin(self, rng: np.random.Generator) -> None:
         """Draw and judge the initial population, at place 0."""
-
-    @abstractmethod
-    def go_on(self, draws: Block, first: int, last: int) -> int:
-        """Compute the generations after `first` up to `last`, as far as the draws suffice.
-
-        Returns:
-            The last generation that was computed.
-        """
 
     @abstractmethod
     def candidate(self, place: int, individual: int) -> Candidate:

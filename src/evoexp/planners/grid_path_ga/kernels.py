@@ -6,14 +6,9 @@ A path is a row of a table, see `paths.grid_walks`.
 from typing import NamedTuple
 
 from evoexp.evolution.cost_statistics import summarise
-from evoexp.evolution.scaled_selection import (
-    choose_by_remainders,
-    num_remainder_uniforms,
-    scale_costs,
-)
-from evoexp.evolution.selection import choose_elites
+from evoexp.evolution.scaled_selection import SelectionMemory, choose_parents
 from evoexp.numeric.compilation import borrowed, kernel
-from evoexp.numeric.random_stream import Block, draw, draw_many, used_up
+from evoexp.numeric.random_stream import Block, draw, used_up
 from evoexp.paths.grid_walks import measure_path
 from evoexp.paths.grids import NodeArray
 from evoexp.planners.grid_path_ga.path_operators import (
@@ -24,7 +19,7 @@ from evoexp.planners.grid_path_ga.path_operators import (
     cross,
     mutate,
 )
-from evoexp.records import FloatArray, IntArray
+from evoexp.records import FloatArray
 
 RESULTS = 3
 DISTANCE, UNSAFENESS, COST = range(RESULTS)
@@ -40,24 +35,6 @@ class Population(NamedTuple):
 
     paths: NodeArray
     results: FloatArray
-
-
-class Memory(NamedTuple):
-    """Scratch of a generation.
-
-    Attributes:
-        parents: (offspring,) indices of individuals.
-        elites: (elites,) likewise.
-        expected: (individuals,) expected numbers of copies.
-        order: (individuals,) order in which remainders are scanned.
-        scratch: Of the operators.
-    """
-
-    parents: IntArray
-    elites: IntArray
-    expected: FloatArray
-    order: IntArray
-    scratch: Scratch
 
 
 @kernel
@@ -89,7 +66,8 @@ def evolve(
     weights: tuple[float, float],
     breeding: Breeding,
     table: Population,
-    memory: Memory,
+    chosen: SelectionMemory,
+    scratch: Scratch,
     summaries: FloatArray,
 ) -> int:
     """Go on from one generation to another.
@@ -102,21 +80,24 @@ def evolve(
         weights: ε and λ of Eq. 1.
         breeding: Settings of the operators.
         table: Some generations; number g is at place g modulo the number of places.
-        memory: Scratch.
+        chosen: Parents and elites, written.
+        scratch: Of the operators.
         summaries: (places, 4) written, see `summarise_results`.
 
     Returns:
         The generation reached: an earlier one if the draws did not suffice. Then it is to go on
         there with more.
     """
-    draws, world, table, memory, summaries = borrowed((draws, world, table, memory, summaries))
+    draws, world, table, chosen, scratch, summaries = borrowed(
+        (draws, world, table, chosen, scratch, summaries)
+    )
     paths, results = table.paths, table.results
     for generation in range(first, last):
         before, own = draws.taken[0], generation % len(paths)
         other = (generation + 1) % len(paths)
         population = Population(paths[own], results[own])
         following = Population(paths[other], results[other])
-        if not advance(draws, world, weights, breeding, population, following, memory):
+        if not advance(draws, world, weights, breeding, population, following, chosen, scratch):
             draws.taken[0] = before
             return generation
         summarise_results(results[other], summaries[other])
@@ -138,7 +119,8 @@ def advance(
     breeding: Breeding,
     population: Population,
     following: Population,
-    memory: Memory,
+    chosen: SelectionMemory,
+    scratch: Scratch,
 ) -> bool:
     """Write the population that follows another: its offspring, then the elites, best first.
 
@@ -149,16 +131,15 @@ def advance(
         breeding: Settings of the operators.
         population: The present one.
         following: Written.
-        memory: Scratch.
+        chosen: Parents and elites, written.
+        scratch: Of the operators.
 
     Returns:
         Whether the draws sufficed; if not, what is written is not complete.
     """
     (paths, results), (children, values) = population, following
-    parents, elites, scratch = memory.parents, memory.elites, memory.scratch
-    count = len(parents)
-    choose_elites(results[COST], elites)
-    if not choose_parents(draws, results[COST], breeding.multiple, memory):
+    parents, elites, count = chosen.parents, chosen.elites, len(chosen.parents)
+    if not choose_parents(draws, results[COST], breeding.multiple, chosen):
         return False
     for first in range(0, count, 2):
         # crossover of a pair
@@ -187,17 +168,6 @@ def advance(
         copy_path(paths[elites[e]], children[count + e])
         for row in range(RESULTS):
             values[row, count + e] = results[row, elites[e]]
-    return True
-
-
-@kernel
-def choose_parents(draws: Block, costs: FloatArray, multiple: float, memory: Memory) -> bool:
-    """Choose parents by linear scaling and stochastic remainders; whether the draws sufficed."""
-    scale_costs(costs, len(memory.parents), multiple, memory.expected)
-    uniforms = draw_many(draws, num_remainder_uniforms(len(costs), len(memory.parents)))
-    if used_up(draws):
-        return False
-    choose_by_remainders(uniforms, memory.expected, memory.order, memory.parents)
     return True
 
 

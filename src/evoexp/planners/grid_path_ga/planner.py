@@ -20,7 +20,7 @@ from evoexp.collision.models.potential_fields import Fields, PotentialFields
 from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
 from evoexp.evolution.genetic_settings import ScaledGenetic
-from evoexp.numeric.random_stream import Block, Draws
+from evoexp.numeric.random_stream import Draws
 from evoexp.objectives.path_cost import PathCost
 from evoexp.paths.grid_walks import walk_each
 from evoexp.paths.grids import UNREACHED, Moves, NodeArray, StepArray, spread_front
@@ -32,7 +32,6 @@ from evoexp.planners.grid_path_ga.kernels import (
     DISTANCE,
     RESULTS,
     UNSAFENESS,
-    Memory,
     Population,
 )
 from evoexp.planners.grid_path_ga.path_operators import Breeding, Scratch, World
@@ -232,20 +231,13 @@ class _Search(Stretches):
 
     def __init__(self, planner: GridPathGa, problem: Problem) -> None:
         ga, nodes, size = planner.ga, problem.fields.grid.num_nodes, planner.ga.population_size
-        super().__init__(ga, STRETCH, BLOCK)
+        super().__init__(ga, kernels.evolve, STRETCH, BLOCK)
         self._planner, self._problem = planner, problem
         self._table = Population(
             np.empty((self.num_places, size, nodes + 1), dtype=np.int32),
             np.empty((self.num_places, RESULTS, size)),
         )
         self.costs = self._table.results[:, COST]
-        memory = Memory(
-            np.empty(ga.num_offspring, dtype=np.int64),
-            np.empty(ga.num_elites, dtype=np.int64),
-            np.empty(size),
-            np.empty(size, dtype=np.int64),
-            Scratch.of(nodes),
-        )
         breeding = Breeding(
             not planner.revisits,
             ga.scaling_multiple,
@@ -253,8 +245,9 @@ class _Search(Stretches):
             planner.crossover_reach,
             ga.mutation_rate,
         )
+        scratch = Scratch.of(nodes)
         self._world = problem.world, planner.objective.weights
-        self._arguments = *self._world, breeding, self._table, memory, self.summaries
+        self.arguments = *self._world, breeding, self._table, self.chosen, scratch, self.summaries
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw and measure the initial population."""
@@ -263,10 +256,6 @@ class _Search(Stretches):
         paths[:, : drawn.shape[1]] = drawn
         kernels.measure_all(paths, *self._world, results)
         kernels.summarise_results(results, self.summaries[0])
-
-    def go_on(self, draws: Block, first: int, last: int) -> int:
-        """Compute generations."""
-        return int(kernels.evolve(draws, first, last, *self._arguments))
 
     def candidate(self, place: int, individual: int) -> Candidate:
         """Return a path, which is valid, and its terms."""

@@ -7,12 +7,7 @@ from typing import NamedTuple
 
 from evoexp.evolution.bit_coding import cross_strings, decode_strings, flip_strings
 from evoexp.evolution.cost_statistics import summarise
-from evoexp.evolution.scaled_selection import (
-    choose_by_remainders,
-    num_remainder_uniforms,
-    scale_costs,
-)
-from evoexp.evolution.selection import choose_elites
+from evoexp.evolution.scaled_selection import SelectionMemory, choose_parents
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.random_stream import Block, draw_many, used_up
 from evoexp.objectives.placement_kernels import COST, CRITERIA, Model, measure_postures
@@ -62,22 +57,6 @@ class Population(NamedTuple):
     rows: FloatArray
 
 
-class Memory(NamedTuple):
-    """Scratch.
-
-    Attributes:
-        parents: (offspring,) indices of individuals.
-        elites: (elites,) likewise.
-        expected: (individuals,) expected numbers of copies.
-        order: (individuals,) order in which remainders are scanned.
-    """
-
-    parents: IntArray
-    elites: IntArray
-    expected: FloatArray
-    order: IntArray
-
-
 @kernel
 def evolve(
     draws: Block,
@@ -87,7 +66,7 @@ def evolve(
     coding: Coding,
     model: Model,
     table: Population,
-    memory: Memory,
+    chosen: SelectionMemory,
     summaries: FloatArray,
 ) -> int:
     """Go on from one generation to another.
@@ -100,15 +79,15 @@ def evolve(
         coding: The meaning of strings.
         model: Task, weights and limits of the criteria.
         table: Some generations; number g is at place g modulo the number of places.
-        memory: Scratch.
+        chosen: Parents and elites, written.
         summaries: (places, 4) written, see `summarise_rows`.
 
     Returns:
         The generation reached: an earlier one if the draws did not suffice. Then it is to go on
         there with more.
     """
-    draws, coding, model, table, memory, summaries = borrowed(
-        (draws, coding, model, table, memory, summaries)
+    draws, coding, model, table, chosen, summaries = borrowed(
+        (draws, coding, model, table, chosen, summaries)
     )
     strings, rows = table.strings, table.rows
     for generation in range(first, last):
@@ -116,7 +95,7 @@ def evolve(
         other = (generation + 1) % len(strings)
         population = Population(strings[own], rows[own])
         following = Population(strings[other], rows[other])
-        if not advance(draws, breeding, coding, model, population, following, memory):
+        if not advance(draws, breeding, coding, model, population, following, chosen):
             draws.taken[0] = before
             return generation
         summarise_rows(rows[other], summaries[other])
@@ -131,7 +110,7 @@ def advance(
     model: Model,
     population: Population,
     following: Population,
-    memory: Memory,
+    chosen: SelectionMemory,
 ) -> bool:
     """Write the population that follows another: its offspring, then the elites, best first.
 
@@ -142,23 +121,18 @@ def advance(
         model: Task, weights and limits of the criteria.
         population: The present one.
         following: Written.
-        memory: Scratch.
+        chosen: Parents and elites, written.
 
     Returns:
         Whether the draws sufficed; if not, what is written is not complete.
     """
     strings, rows, children = population.strings, population.rows, following.strings
-    parents, elites, expected = memory.parents, memory.elites, memory.expected
-    bits, num, count = coding.bits, strings.shape[1], len(parents)
-    costs = rows[GENES + COST]
-    # parents by linear scaling and stochastic remainders
-    choose_elites(costs, elites)
-    scale_costs(costs, count, breeding.multiple, expected)
-    choosing = draw_many(draws, num_remainder_uniforms(num, count))
+    parents, elites, bits, count = chosen.parents, chosen.elites, coding.bits, len(chosen.parents)
+    if not choose_parents(draws, rows[GENES + COST], breeding.multiple, chosen):
+        return False
     crossing = draw_many(draws, 2 * (count // 2))
     if used_up(draws):
         return False
-    choose_by_remainders(choosing, expected, memory.order, parents)
     # crossover, mutation, criteria
     cross_strings(crossing, strings, bits, parents, breeding.crossover_rate, children)
     flip_strings(draws, children, bits, count, breeding.mutation_rate)

@@ -18,12 +18,11 @@ from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
 from evoexp.evolution.genetic_settings import ScaledGenetic
 from evoexp.numeric.elementary import DEGREE
-from evoexp.numeric.random_stream import Block
 from evoexp.objectives.placement_criteria import PlacementCriteria
 from evoexp.objectives.placement_kernels import PLATFORM, THETA_3, TORQUE, Model, Task
 from evoexp.paths.motion import Motion
 from evoexp.planners.placement_ga import kernels
-from evoexp.planners.placement_ga.kernels import GENES, ROWS, Breeding, Coding, Memory, Population
+from evoexp.planners.placement_ga.kernels import GENES, ROWS, Breeding, Coding, Population
 from evoexp.planners.planner import Candidate, PlannerDefaults
 from evoexp.planners.stretches import Stretches
 from evoexp.records import BoolArray, FloatArray, Generation, IntArray
@@ -189,22 +188,16 @@ class _Search(Stretches):
 
     def __init__(self, planner: PlacementGa, problem: Problem) -> None:
         ga, size = planner.ga, planner.ga.population_size
-        super().__init__(ga, STRETCH, BLOCK)
+        super().__init__(ga, kernels.evolve, STRETCH, BLOCK)
         self._planner, self._problem = planner, problem
         self._table = Population(
             np.empty((self.num_places, GENES, size), dtype=np.int64),
             np.empty((self.num_places, ROWS, size)),
         )
         self.costs = self._table.rows[:, FIRST_CRITERION]
-        memory = Memory(
-            np.empty(ga.num_offspring, dtype=np.int64),
-            np.empty(ga.num_elites, dtype=np.int64),
-            np.empty(size),
-            np.empty(size, dtype=np.int64),
-        )
         breeding = Breeding(ga.scaling_multiple, ga.crossover_rate, ga.mutation_rate)
         self._judging = planner.strings_of(problem), problem.model
-        self._arguments = breeding, *self._judging, self._table, memory, self.summaries
+        self.arguments = breeding, *self._judging, self._table, self.chosen, self.summaries
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw and judge the initial population."""
@@ -212,10 +205,6 @@ class _Search(Stretches):
         strings[:] = self._planner.sample(self._problem, rng, strings.shape[1])
         kernels.judge(strings, *self._judging, strings.shape[1], rows)
         kernels.summarise_rows(rows, self.summaries[0])
-
-    def go_on(self, draws: Block, first: int, last: int) -> int:
-        """Compute generations."""
-        return int(kernels.evolve(draws, first, last, *self._arguments))
 
     def candidate(self, place: int, individual: int) -> Candidate:
         """Return angles, criteria and whether the posture is feasible."""

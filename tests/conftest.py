@@ -3,12 +3,14 @@
 Property tests draw the same examples each time, and no time is an assertion.
 """
 
+import gc
 import os
+from typing import Any
 
 import pytest
 from hypothesis import settings
 
-EXHAUSTIVE = "EVOEXP_EXHAUSTIVE"  # set where larger counts are asked for; see `matrix.counts`
+from matrix import EXHAUSTIVE, MATRICES, matrices_are_asked_for
 
 settings.register_profile("evoexp", deadline=None, derandomize=True, database=None)
 settings.register_profile(
@@ -23,18 +25,25 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Choose how many examples property tests draw."""
+    """Choose how many examples property tests draw, and whether the matrices are collected."""
     if config.getoption("--exhaustive"):
         os.environ[EXHAUSTIVE] = "1"
     settings.load_profile("exhaustive" if EXHAUSTIVE in os.environ else "evoexp")
+    asked = config.getoption("--all") or EXHAUSTIVE in os.environ or config.getoption("-m")
+    if asked or any("::" in word for word in config.args):
+        os.environ[MATRICES] = "1"
+    gc.disable()  # while thousands of tests are collected, nothing of which is garbage
 
 
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out the matrices unless they are asked for, by an option, a marker or their name."""
-    asked = config.getoption("--all") or config.getoption("--exhaustive")
-    if asked or config.getoption("-m") or any("::" in word for word in config.args):
-        return
-    left_out = [item for item in items if item.get_closest_marker("matrix")]
-    if left_out:
-        config.hook.pytest_deselected(items=left_out)
-        items[:] = [item for item in items if not item.get_closest_marker("matrix")]
+def pytest_pycollect_makeitem(collector: pytest.Collector, name: str, obj: Any) -> Any:
+    """Leave out what is marked `matrix` unless it is asked for; see `matrix.examples`."""
+    if matrices_are_asked_for():
+        return None
+    marked = [mark.name for mark in getattr(obj, "pytestmark", ()) if name.startswith("test")]
+    return [] if "matrix" in marked or collector.get_closest_marker("matrix") else None
+
+
+def pytest_collection_finish() -> None:
+    """Let garbage be collected again, and what is kept never be looked at."""
+    gc.freeze()
+    gc.enable()

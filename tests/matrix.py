@@ -6,18 +6,27 @@ from typing import Any
 
 import pytest
 
+MATRICES = "EVOEXP_MATRICES"  # set where the matrices are asked for
+EXHAUSTIVE = "EVOEXP_EXHAUSTIVE"  # set where larger counts are asked for
+
+
+def matrices_are_asked_for() -> bool:
+    """Whether tests marked `matrix` are collected: by an option, a marker or a test's name."""
+    return MATRICES in os.environ
+
 
 def examples(values: Iterable[Any], always: Callable[[Any], bool]) -> list[Any]:
-    """Return values as parameters; those that are not for always are marked `matrix`.
+    """Return values as parameters; the others are marked `matrix`, or left out.
 
     Args:
-        values: What `parametrize` takes.
-        always: Which of them run without --all.
+        values: As `parametrize` takes them.
+        always: Tells the values that run without --all.
     """
     found = []
     for value in values:
-        given = value if isinstance(value, tuple) else (value,)
-        found.append(pytest.param(*given, marks=() if always(value) else pytest.mark.matrix))
+        given, is_example = value if isinstance(value, tuple) else (value,), always(value)
+        if is_example or matrices_are_asked_for():
+            found.append(pytest.param(*given, marks=() if is_example else pytest.mark.matrix))
     return found
 
 
@@ -30,4 +39,4 @@ def first(count: int, values: Iterable[Any]) -> list[Any]:
 
 def counts(few: int, many: int) -> int:
     """Return the number of cases of a test: many with ./scripts/test --exhaustive, else few."""
-    return many if "EVOEXP_EXHAUSTIVE" in os.environ else few
+    return many if EXHAUSTIVE in os.environ else few

@@ -15,6 +15,7 @@ from evoexp.condition import Condition
 from evoexp.configuration import expansions
 from evoexp.configuration.experiment import Experiment
 from evoexp.configuration.search_path import options
+from matrix import examples
 
 KINDS = range(66)  # numbers of all kinds of conditions; `test_shipped` checks how many there are
 EXAMPLES = (  # (experiment, number of its condition): every planner, and its rarer parts
@@ -32,7 +33,7 @@ EXAMPLES = (  # (experiment, number of its condition): every planner, and its ra
 Kind = int | tuple[str, int]
 KIND_EXAMPLES = [  # as parameters: the examples always, all kinds with --all
     *(pytest.param(example, id=f"{example[0]} {example[1]}") for example in EXAMPLES),
-    *(pytest.param(number, marks=pytest.mark.matrix) for number in KINDS),
+    *examples(KINDS, lambda kind: False),
 ]
 
 

@@ -14,6 +14,7 @@ from evoexp.batch.reproduction import fingerprint, same_fingerprint
 from evoexp.cli import main
 from evoexp.condition import Condition
 from evoexp.shipped import Shipped
+from matrix import matrices_are_asked_for
 from shipped_conditions import EXAMPLES, KINDS, expanded, kinds_of_conditions, shipped_conditions
 
 ROOT = Path(__file__).parents[1]
@@ -72,7 +73,7 @@ def is_example(row: Shipped) -> bool:
 SMOKE = [
     pytest.param(row, id=f"{row.experiment}: {row.label}", marks=() if is_example(row) else MATRIX)
     for row in TABLE
-    if row.budget == "smoke"
+    if row.budget == "smoke" and (is_example(row) or matrices_are_asked_for())
 ]
 
 

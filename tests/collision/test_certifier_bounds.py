@@ -4,9 +4,9 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+import scipy
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.interpolate import CubicSpline
 
 from collision.certifier_scenes import random_motion, random_scene
 from evoexp.collision.certifier.convex_distance import CONVERGED
@@ -178,7 +178,7 @@ def test_a_spline_becomes_a_motion() -> None:
     rng = np.random.default_rng(0)
     knots = np.array([0.0, 0.5, 2.0, 2.3])
     values = rng.normal(size=(4, 3))
-    spline = CubicSpline(knots, values)
+    spline = scipy.interpolate.CubicSpline(knots, values)
     motion = spline_motion(spline)
     assert motion.num_segments == 3
     assert np.allclose(motion.q, values, atol=1e-12)

@@ -1,7 +1,9 @@
+from typing import Any
+
 import coal
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
+import scipy
 
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE
@@ -33,10 +35,13 @@ COUNT = 300
 LENGTH = LengthTerm(weight=1.0)
 
 
-def drawn(seed: int) -> tuple[np.ndarray, list[Rotation], np.ndarray]:
+def drawn(seed: int) -> tuple[np.ndarray, list[Any], np.ndarray]:
     """Return poses (12, COUNT), their rotations, their positions."""
     rng = np.random.default_rng(seed)
-    rotations = [Rotation.random(random_state=int(k)) for k in rng.integers(0, 2**31, COUNT)]
+    rotations = [
+        scipy.spatial.transform.Rotation.random(random_state=int(k))
+        for k in rng.integers(0, 2**31, COUNT)
+    ]
     positions = rng.uniform(-1.0, 1.0, (COUNT, 3))
     pose = np.vstack([np.array([r.as_matrix().ravel() for r in rotations]).T, positions.T])
     return np.ascontiguousarray(pose), rotations, positions
@@ -48,7 +53,7 @@ def rated(pose: np.ndarray, aim: Aim) -> np.ndarray:
     return rows
 
 
-def aim_at(rotation: Rotation, point: np.ndarray) -> Aim:
+def aim_at(rotation: Any, point: np.ndarray) -> Aim:
     matrix = np.ascontiguousarray(rotation.as_matrix())
     up, across = np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
     axis = matrix[:, 2].copy()
@@ -57,7 +62,10 @@ def aim_at(rotation: Rotation, point: np.ndarray) -> Aim:
 
 def test_poses_against_scipy() -> None:
     pose, rotations, positions = drawn(0)
-    goal, point = Rotation.from_euler("xyz", [30, 40, 50], degrees=True), np.array([0.1, 0.2, 0.3])
+    goal, point = (
+        scipy.spatial.transform.Rotation.from_euler("xyz", [30, 40, 50], degrees=True),
+        np.array([0.1, 0.2, 0.3]),
+    )
     rows = rated(pose, aim_at(goal, point))
     assert rows[DISTANCE] == pytest.approx(np.linalg.norm(positions - point, axis=1), abs=1e-12)
     assert rows[ANGLE] == pytest.approx([(r.inv() * goal).magnitude() for r in rotations], abs=1e-7)
@@ -78,7 +86,7 @@ SHAPES = {
 def test_distances_from_surfaces_against_coal(name: str) -> None:
     shape, (kind, half, radius) = SHAPES[name]
     pose, _, positions = drawn(1)
-    place = Rotation.from_euler("xyz", [10, 70, -20], degrees=True)
+    place = scipy.spatial.transform.Rotation.from_euler("xyz", [10, 70, -20], degrees=True)
     aim = aim_at(place, np.array([0.1, -0.2, 0.3]))._replace(
         surface=kind, half_length=half, radius=radius, half_edges=np.array([0.2, 0.3, 0.4])
     )
@@ -122,7 +130,7 @@ def depth(name: str, point: np.ndarray) -> float:
 def test_axial_and_heading_against_their_definitions() -> None:
     pose, rotations, positions = drawn(2)
     place, middle = (
-        Rotation.from_euler("xyz", [10, 70, -20], degrees=True),
+        scipy.spatial.transform.Rotation.from_euler("xyz", [10, 70, -20], degrees=True),
         np.array([0.1, -0.2, 0.3]),
     )
     aim = aim_at(place, middle)._replace(surface=ROUND, half_length=0.4, radius=0.2)

@@ -3,7 +3,7 @@
 import math
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy
 
 DENSE = 512  # sub-intervals per segment; 4-point Gauss on each
 
@@ -11,7 +11,7 @@ DENSE = 512  # sub-intervals per segment; 4-point Gauss on each
 def redistributed(path, end_condition):
     """Return the points (N + 1, joints) at equal arc length along the spline through `path`."""
     num = len(path) - 1
-    spline = CubicSpline(np.arange(num + 1), path, bc_type=end_condition)
+    spline = scipy.interpolate.CubicSpline(np.arange(num + 1), path, bc_type=end_condition)
     edges = np.arange(num * DENSE + 1) / DENSE
     nodes, weights = np.polynomial.legendre.leggauss(4)
     pieces = np.zeros(num * DENSE)

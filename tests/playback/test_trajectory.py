@@ -4,8 +4,8 @@ import json
 
 import numpy as np
 import pytest
+import scipy
 from playback_samples import SAMPLES, recording
-from scipy.interpolate import CubicHermiteSpline
 
 from evoexp.paths.motion import Motion, clamped_cubic
 from evoexp.playback.optimal_timing import along_curve, along_lines
@@ -23,7 +23,7 @@ def executed(
     """Return what a controller makes of the points."""
     if velocities is None:
         return np.stack([np.interp(at, times, column) for column in positions.T], axis=1)
-    return CubicHermiteSpline(times, positions, velocities)(at)
+    return scipy.interpolate.CubicHermiteSpline(times, positions, velocities)(at)
 
 
 @pytest.mark.parametrize("name", sorted(SAMPLES))
@@ -58,7 +58,7 @@ def test_sliding_joints_have_the_unit_of_the_scene() -> None:
 def check_limits(
     times: np.ndarray, positions: np.ndarray, velocities: np.ndarray, slack: float
 ) -> None:
-    curve = CubicHermiteSpline(times, positions, velocities)
+    curve = scipy.interpolate.CubicHermiteSpline(times, positions, velocities)
     at = np.linspace(0.0, times[-1], 20001)
     assert np.abs(curve(at, 1)).max() <= 0.5 * (1.0 + slack)
     assert np.abs(curve(at, 2)).max() <= 1.0 * (1.0 + slack)
@@ -69,7 +69,9 @@ def test_optimal_lines_keep_the_limits_stay_on_the_lines_and_could_not_be_faster
     times, positions, velocities = along_lines(Motion(PATH), np.full(2, 0.5), np.full(2, 1.0))
     assert (np.diff(times) > 0.0).all()
     check_limits(times, positions, velocities, 1e-9)
-    at = CubicHermiteSpline(times, positions, velocities)(np.linspace(0.0, times[-1], 2001))
+    at = scipy.interpolate.CubicHermiteSpline(times, positions, velocities)(
+        np.linspace(0.0, times[-1], 2001)
+    )
     ends = np.stack([PATH[:-1], PATH[1:]], axis=1)
     offsets = []
     for a, b in ends[[0, 2, 3]]:

@@ -13,8 +13,8 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.stats import rankdata
 
 from evoexp.numeric.elementary import standard_normal
 
@@ -155,7 +155,7 @@ class Breeding:
         with np.errstate(divide="ignore"):
             weights = 1.0 / costs
         if self.ga.selection == "rank":
-            s, ranks = self.ga.rank_pressure, rankdata(-costs) - 1.0
+            s, ranks = self.ga.rank_pressure, scipy.stats.rankdata(-costs) - 1.0
             weights = 2.0 - s + 2.0 * (s - 1.0) * ranks / (size - 1)
         if self.fault == "uniform selection" or not weights.any():
             weights = np.ones(size)

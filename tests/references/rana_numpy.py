@@ -18,8 +18,8 @@ from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 Array = NDArray[np.float64]
 
@@ -180,7 +180,9 @@ def redistributed(paths: Array, chords: int, spline_end: str) -> Array:
     """
     num = paths.shape[1] - 1
     rows = np.arange(len(paths))[:, None]
-    spline: Any = CubicSpline(np.arange(num + 1), paths, axis=1, bc_type=spline_end)
+    spline: Any = scipy.interpolate.CubicSpline(
+        np.arange(num + 1), paths, axis=1, bc_type=spline_end
+    )
     steps = np.diff(spline(np.arange(num * chords + 1) / chords), axis=1)
     length = np.zeros((len(paths), num * chords + 1))
     np.cumsum(np.sqrt((steps * steps).sum(axis=2)), axis=1, out=length[:, 1:])

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.sparse import csgraph, csr_array
+import scipy
 
 from evoexp.errors import SettingError
 from evoexp.references.grid_frontier import (
@@ -152,8 +152,10 @@ def test_the_shortest_weighted_path_is_that_of_a_graph_made_anew(mu: float) -> N
     ((_, path),) = frontier(network, np.array([mu]))
     found = frontier(network, np.array([5.0, mu]))  # the second one with the first one's graph
     costs = network.lengths + mu * network.unsafeness[network.heads]
-    least = csgraph.bellman_ford(
-        csr_array((costs, (network.tails, network.heads)), shape=(len(network.unsafeness),) * 2),
+    least = scipy.sparse.csgraph.bellman_ford(
+        scipy.sparse.csr_array(
+            (costs, (network.tails, network.heads)), shape=(len(network.unsafeness),) * 2
+        ),
         indices=network.ends[0],
     )[network.ends[1]]
     edges = dict(

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from scipy.stats import fisher_exact as scipy_fisher_exact
+import scipy
 
 from evoexp.report.proportions import Proportion, fisher_exact, newcombe
 from evoexp.report.statistics import Interval, wilson
@@ -46,5 +46,5 @@ def test_fishers_test_is_scipys() -> None:
             Proportion(int(rng.integers(0, m + 1)), m),
         )
         table = [[p.having, p.total - p.having] for p in (one, two)]
-        assert fisher_exact(one, two) == pytest.approx(scipy_fisher_exact(table)[1], rel=1e-9)
+        assert fisher_exact(one, two) == pytest.approx(scipy.stats.fisher_exact(table)[1], rel=1e-9)
     assert fisher_exact(Proportion(0, 0), Proportion(1, 2)) == 1.0

@@ -41,6 +41,23 @@ def test_every_number_has_unit_and_source() -> None:
     assert not missing
 
 
+READ_OFF = re.compile(
+    r"\b(read|taken|measured|digiti[sz]ed|estimated) (off|from|in) (the (paper's |printed )?)?Fig",
+    re.I,
+)
+
+
+def test_no_number_claims_to_come_from_a_drawing() -> None:
+    """The papers' texts came without their figures: what is not printed was assumed."""
+    pages = [*SOURCES, ROOT / "README.md"]
+    assert not [
+        f"{path.name}: {match[0]}"
+        for path in [*OPTIONS, *pages]
+        for match in READ_OFF.finditer(path.read_text())
+    ]
+    assert READ_OFF.search("assumed: read off Fig. 4")
+
+
 def test_the_rule_about_numbers_can_fail() -> None:
     assert NUMBER.search(" 0.5 ")
     assert NUMBER.search(" [4.0, 4.0]")

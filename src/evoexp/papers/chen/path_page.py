@@ -45,7 +45,8 @@ CHECKS = (
     ),
     (
         "Where the obstacles of Fig. 2 are",
-        "is read off the printed map; the platform is a cylinder of an assumed radius, "
+        "is assumed: the text says of the map only that it is cluttered; the platform is a "
+        "cylinder of an assumed radius, "
         "obstacles are boxes between the centres of their outermost nodes: every permitted "
         "move is free, past corners, too",
     ),

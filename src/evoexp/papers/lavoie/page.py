@@ -63,8 +63,9 @@ CHECKS = (
     ),
 )
 START = (
-    "The ellipses as they are tested, exactly; their places and sizes are read off the paper's "
-    "Fig. 1. The tip must end inside the box."
+    "The ellipses as they are tested, exactly; the paper prints neither their places nor their "
+    "sizes: ours make a box around the printed goal, open towards the printed via-point. The "
+    "tip must end inside the box."
 )
 SOLUTIONS = (
     "The paper shows one solution of the arm of seven joints. Here: per arm the run whose "

@@ -48,12 +48,9 @@ def _section(heading: str, text: str) -> str:
 
 
 def _made_by(results: Results, command: str) -> str:
-    lines = [f"Made by `{command}`"]
-    if results.experiment:
-        lines.append(f"experiment `{results.experiment}`")
-    if results.budget:
-        lines.append(f"budget `{results.budget}`")
-    return ", ".join(lines) + ".\n"
+    named = {"experiment": results.experiment, "budget": results.budget}
+    words = [f"{kind} `{name}`" for kind, name in named.items() if name]
+    return ", ".join([f"Made by `{command}`", *words]) + ".\n"
 
 
 def _incomplete(results: Results) -> str:
@@ -142,21 +139,19 @@ def _checks(checks: Sequence[tuple[str, str]]) -> str:
 
 
 def _comparison(rows: Iterable[Comparison], settings: ReportSettings) -> str:
-    cells = []
-    for c in rows:
-        low, high = c.better.interval
-        cells.append(
-            (
-                c.quantity,
-                c.num_seeds,
-                markdown.number(c.median_difference),
-                f"{c.better.a12:.3f} [{low:.3f}, {high:.3f}]",
-                markdown.p_value(c.test.p_value),
-                markdown.p_value(c.p_adjusted),
-                markdown.p_value(c.unpaired.p_value),
-                markdown.p_value(c.unpaired_adjusted),
-            )
+    cells = [
+        (
+            c.quantity,
+            c.num_seeds,
+            markdown.number(c.median_difference),
+            f"{c.better.a12:.3f} [{c.better.interval.low:.3f}, {c.better.interval.high:.3f}]",
+            markdown.p_value(c.test.p_value),
+            markdown.p_value(c.p_adjusted),
+            markdown.p_value(c.unpaired.p_value),
+            markdown.p_value(c.unpaired_adjusted),
         )
+        for c in rows
+    ]
     tests = ("Wilcoxon p", "adjusted", "Mann–Whitney p", "adjusted")
     headers = ("quantity", "common seeds", "median difference", "A12 of being better", *tests)
     note = (
@@ -172,12 +167,8 @@ def _comparison(rows: Iterable[Comparison], settings: ReportSettings) -> str:
 
 def _figure(drawing: Drawing, settings: ReportSettings) -> str:
     shown = next((kind for kind in ("png", "svg") if kind in settings.formats), None)
-    files = [
-        *(f"{drawing.stem}.{kind}" for kind in settings.formats),
-        f"{drawing.stem}.csv",
-        f"{drawing.stem}.json",
-    ]
-    links = " · ".join(f"[{name.rsplit('.', 1)[1]}]({name})" for name in files)
+    kinds = (*settings.formats, "csv", "json")
+    links = " · ".join(f"[{kind}]({drawing.stem}.{kind})" for kind in kinds)
     picture = f"![{drawing.title}]({drawing.stem}.{shown})\n\n" if shown else ""
     return f"### {drawing.title}\n\n{picture}{drawing.caption}\n\n{links}\n"
 
@@ -188,18 +179,17 @@ def _parameters(results: Results) -> str:
     for condition in results.conditions:
         for parameter in parameters(results, condition):
             by_name.setdefault(parameter.name, {}).setdefault(parameter, []).append(condition.label)
-    rows = []
-    for name in _ordered(by_name):
-        for parameter, labels in by_name[name].items():
-            where = "" if len(labels) == len(results.conditions) else f" ({', '.join(labels)})"
-            rows.append(
-                (
-                    f"`{name}`{where}",
-                    parameter.value,
-                    parameter.unit or "–",
-                    parameter.source or "–",
-                )
-            )
+    every = len(results.conditions)
+    rows = [
+        (
+            f"`{name}`" + ("" if len(labels) == every else f" ({', '.join(labels)})"),
+            parameter.value,
+            parameter.unit or "–",
+            parameter.source or "–",
+        )
+        for name in _ordered(by_name)
+        for parameter, labels in by_name[name].items()
+    ]
     return markdown.table(("setting", "value", "unit", "source"), rows)
 
 

@@ -37,10 +37,9 @@ def fitness_table(results: Results) -> pd.DataFrame:
 
 def draw_cost(table: pd.DataFrame) -> Figure:
     """Draw best and average cost against generations."""
-    figure = style.figure(3.4)
-    axes = figure.subplots()
+    figure, (axes,) = style.row_of_panels(3.4, 1)
     beside = table["quantity"] == REFERENCE
-    _curves(axes, table[~beside], tuple(NAMES))
+    _curves(axes, table[~beside])
     for position, label, cost in table.loc[beside, ["position", "condition", "median"]].itertuples(
         index=False
     ):
@@ -58,19 +57,16 @@ def draw_cost(table: pd.DataFrame) -> Figure:
 
 def draw_best(table: pd.DataFrame) -> Figure:
     """Draw medians of the best cost only, for many conditions at once."""
-    figure = style.figure(4.4)
-    axes = figure.subplots()
+    figure, (axes,) = style.row_of_panels(4.4, 1)
     best = table[table["quantity"] == NAMES["best_cost"]].replace([np.inf, -np.inf], np.nan)
     across = _across(best)
     for (position, condition), curve in groups(best, ["position", "condition"]):
-        kind = "-" if position < len(style.CONDITION_COLOURS) else (0, (4, 1.5))
-        label = f"{condition} ({_counts(curve)})"
         axes.plot(
             curve[across],
             curve["median"],
-            linestyle=kind,
+            linestyle="-" if position < len(style.CONDITION_COLOURS) else (0, (4, 1.5)),
             color=style.condition_colour(position),
-            label=label,
+            label=f"{condition} ({_counts(curve)})",
         )
     limits = (0, max(1, int(best[across].max())))
     axes.set(xlim=limits, xlabel=across, ylabel="best cost so far (median)")
@@ -80,13 +76,10 @@ def draw_best(table: pd.DataFrame) -> Figure:
 
 def draw_fitness(table: pd.DataFrame) -> Figure:
     """Draw best and average fitness over the whole range, and the best fitness enlarged."""
-    figure = style.figure(4.1)
-    whole, close = figure.subplots(1, 2)
-    for axes in (whole, close):
-        _curves(axes, table, tuple(NAMES))
-        axes.set_ylabel("fitness F [-]")
-    whole.set_title("a  whole range")
-    close.set_title("b  best fitness")
+    figure, (whole, close) = style.row_of_panels(4.1, 2)
+    for axes, title in ((whole, "a  whole range"), (close, "b  best fitness")):
+        _curves(axes, table)
+        axes.set(ylabel="fitness F [-]", title=title)
     best = table[table["quantity"] == NAMES["best_cost"]]
     finite = best[np.isfinite(best[["median", "lower", "upper"]]).all(axis=1)]
     if len(finite):
@@ -137,12 +130,12 @@ def _references(results: Results) -> list[pd.DataFrame]:
     ]
 
 
-def _curves(axes: Axes, table: pd.DataFrame, columns: tuple[str, ...]) -> None:
+def _curves(axes: Axes, table: pd.DataFrame) -> None:
     """Draw medians as lines (the average dashed) and quartiles as bands."""
     across = _across(table)
     for (position, condition), rows in groups(table, ["position", "condition"]):
         colour = style.condition_colour(position)
-        for column in columns:
+        for column in COLUMNS:
             curve = rows[rows["quantity"] == NAMES[column]].replace([np.inf, -np.inf], np.nan)
             kind = "-" if column == "best_cost" else (0, (3, 1.5))
             label = f"{condition}, {NAMES[column]} ({_counts(curve)})"

@@ -32,15 +32,20 @@ def values_table(results: Results, quantities: Mapping[str, Values]) -> pd.DataF
         Columns quantity, position, condition, replicate, value, failed (replicates of the
         condition).
     """
-    parts = []
-    for name, values in quantities.items():
-        for position, c in enumerate(results.with_data):
-            given = {"quantity": name, "position": position, "condition": c.label}
-            parts.append(
-                pd.DataFrame(
-                    given | {"replicate": c.summaries.index, "value": values(c), "failed": c.failed}
-                )
-            )
+    parts = [
+        pd.DataFrame(
+            {
+                "quantity": name,
+                "position": position,
+                "condition": c.label,
+                "replicate": c.summaries.index,
+                "value": values(c),
+                "failed": c.failed,
+            }
+        )
+        for name, values in quantities.items()
+        for position, c in enumerate(results.with_data)
+    ]
     return pd.concat(parts, ignore_index=True)
 
 
@@ -48,8 +53,7 @@ def draw_values(table: pd.DataFrame) -> Figure:
     """Draw Tukey's boxes with every replicate's point, the first condition on top."""
     quantities = list(dict.fromkeys(table["quantity"]))
     labels = dict(zip(table["position"], table["condition"], strict=True))
-    figure = style.figure(0.32 * len(labels) + 1.1)
-    panels = figure.subplots(1, len(quantities), sharey=True, squeeze=False)[0]
+    figure, panels = style.row_of_panels(0.32 * len(labels) + 1.1, len(quantities), sharey=True)
     for axes, quantity in zip(panels, quantities, strict=True):
         rows = table[table["quantity"] == quantity]
         for position, own in groups(rows, "position"):
@@ -113,8 +117,7 @@ def draw_effects(table: pd.DataFrame) -> Figure:
     """Draw A12 with its interval, one row per other condition, one panel per quantity."""
     quantities = list(dict.fromkeys(table["quantity"]))
     labels = list(dict.fromkeys(table["condition"]))
-    figure = style.figure(0.3 * len(labels) + 1.2)
-    panels = figure.subplots(1, len(quantities), sharey=True, squeeze=False)[0]
+    figure, panels = style.row_of_panels(0.3 * len(labels) + 1.2, len(quantities), sharey=True)
     for axes, quantity in zip(panels, quantities, strict=True):
         rows = table[table["quantity"] == quantity]
         y = np.array([labels.index(label) for label in rows["condition"]])
@@ -123,23 +126,9 @@ def draw_effects(table: pd.DataFrame) -> Figure:
         axes.hlines(y, low, high, color=style.ARM_COLOURS[0], linewidth=1.4)
         level = float(rows["significance"].iloc[0])
         clear = rows["p_adjusted"].to_numpy(np.float64) < level
-        axes.plot(
-            a12[clear],
-            y[clear],
-            "o",
-            color=style.ARM_COLOURS[0],
-            markersize=5,
-            label=f"adjusted p < {level:g}",
-        )
-        axes.plot(
-            a12[~clear],
-            y[~clear],
-            "o",
-            color=style.ARM_COLOURS[0],
-            mfc="white",
-            markersize=5,
-            label=f"adjusted p ≥ {level:g}",
-        )
+        for shown, fill, sign in ((clear, style.ARM_COLOURS[0], "<"), (~clear, "white", "≥")):
+            label, colour = f"adjusted p {sign} {level:g}", style.ARM_COLOURS[0]
+            axes.plot(a12[shown], y[shown], "o", color=colour, mfc=fill, ms=5, label=label)
         label = "A12: the first condition is better"
         axes.set(xlim=(-0.03, 1.03), title=textwrap.fill(quantity, WRAPPED), xlabel=label)
     panels[0].set_yticks(range(len(labels)), [f"against {label}" for label in labels])

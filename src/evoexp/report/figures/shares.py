@@ -46,8 +46,7 @@ def draw_shares(table: pd.DataFrame, label: str = "share of runs [%]") -> Figure
     quantities = list(dict.fromkeys(table["quantity"]))
     labels = dict(zip(table["position"], table["condition"], strict=True))
     rows_of = {position: row for row, position in enumerate(sorted(labels))}
-    figure = style.figure(0.26 * len(labels) + 1.1)
-    panels = figure.subplots(1, len(quantities), sharey=True, squeeze=False)[0]
+    figure, panels = style.row_of_panels(0.26 * len(labels) + 1.1, len(quantities), sharey=True)
     for axes, quantity in zip(panels, quantities, strict=True):
         every = table[table["quantity"] == quantity]
         own = every[every["total"] > 0]
@@ -58,9 +57,8 @@ def draw_shares(table: pd.DataFrame, label: str = "share of runs [%]") -> Figure
                     y, 100 * rows["lower"], 100 * rows["upper"], color=colour, linewidth=1.6
                 )
                 axes.plot(100 * rows["share"], [y], "o", color=colour, markersize=4.5)
-            text = f" {rows['having'].iloc[0]}/{rows['total'].iloc[0]}"
             axes.annotate(
-                text,
+                f" {rows['having'].iloc[0]}/{rows['total'].iloc[0]}",
                 (1.0, y),
                 xycoords=axes.get_yaxis_transform(),
                 fontsize=6.5,

@@ -117,16 +117,18 @@ def _scene(condition: ConditionResults) -> list[tuple[Any, ...]]:
     """Return the rows of ellipses, box and targets."""
     scenario: Any = condition.condition.scenario
     table = scenario.obstacle_table()
-    rows = []
-    for k, (center, rotation, size) in enumerate(
-        zip(table.center, table.rotation, table.size, strict=True)
-    ):
-        angle = float(np.degrees(np.arctan2(rotation[3], rotation[0])))
-        rows.append((ELLIPSE, f"obstacle_{k + 1}", *center[:2], *center[:2], *size[:2], angle))
+    angles = np.degrees(np.arctan2(table.rotation[:, 3], table.rotation[:, 0]))
+    ellipses = zip(table.center[:, :2], table.size[:, :2], angles, strict=True)
+    targets = zip(TARGETS, (scenario.via_point, scenario.goal_point), strict=True)
     left, right, bottom, top = scenario.box
-    rows.append((BOX, "box", left, bottom, right, top, *NO_SIZE))
-    for name, point in zip(TARGETS, (scenario.via_point, scenario.goal_point), strict=True):
-        rows.append((TARGET, name, *point, *point, *NO_SIZE))
+    rows: list[tuple[Any, ...]] = [
+        *(
+            (ELLIPSE, f"obstacle_{k}", *center, *center, *size, float(angle))
+            for k, (center, size, angle) in enumerate(ellipses, 1)
+        ),
+        (BOX, "box", left, bottom, right, top, *NO_SIZE),
+        *((TARGET, name, *point, *point, *NO_SIZE) for name, point in targets),
+    ]
     return [(element, name, 0, np.nan, -1, *rest) for element, name, *rest in rows]
 
 
@@ -184,9 +186,16 @@ def _draw_scene(axes: Axes, rows: pd.DataFrame) -> None:
         edge: dict[str, Any] = INSIDE | {"fill": False, "edgecolor": style.FAINT, "zorder": 1}
         axes.add_patch(Rectangle((row.x, row.y), *size, **edge))
     for row in records(rows[rows["element"] == TARGET]):
-        marker: dict[str, Any] = {"color": "black", "mec": "white", "mew": 0.8, "zorder": 8}
-        marker["ms"] = 8 if row.name == "via point" else 11
-        axes.plot(row.x, row.y, MARKERS[row.name], **marker)
+        axes.plot(
+            row.x,
+            row.y,
+            MARKERS[row.name],
+            color="black",
+            mec="white",
+            mew=0.8,
+            ms=8 if row.name == "via point" else 11,
+            zorder=8,
+        )
 
 
 def _near_the_box(axes: Axes, rows: pd.DataFrame) -> None:
@@ -231,12 +240,13 @@ def _draw_joints(axes: Axes, x: list[float], y: list[float], sub_path: int, name
     colour = _colour(sub_path)
     axes.plot(x[:-1], y[:-1], "o", color="white", mec=colour, ms=3.6, mew=0.9, zorder=7)
     if named:
-        place: dict[str, Any] = {"xytext": (-4, 5), "textcoords": "offset points", "ha": "right"}
         axes.annotate(
             ("start", "A", "B")[sub_path],
             (x[-1], y[-1]),
+            xytext=(-4, 5),
+            textcoords="offset points",
+            ha="right",
             zorder=10,
-            **place,
             fontsize=8,
             color=colour,
             path_effects=[HALO],

@@ -26,12 +26,14 @@ def stopping_table(results: Results, errors: Values, effort: Values) -> pd.DataF
         Columns quantity (position error, evaluations), num_generations, stop_cost, condition,
         median, lower, upper (quartiles over all runs), solved, done, length_unit.
     """
-    rows = []
-    for name, values in ((ERROR, errors), (EFFORT, effort)):
-        for c in results.with_data:
-            found = spread(values(c))
-            given = name, c.planner.ga.num_generations, c.planner.stop_cost_sp2, c.label
-            rows.append((*given, found.median, found.lower, found.upper, c.solved, c.done))
+    rows = [
+        (
+            *(name, c.planner.ga.num_generations, c.planner.stop_cost_sp2, c.label),
+            *(*spread(values(c))[:3], c.solved, c.done),
+        )
+        for name, values in ((ERROR, errors), (EFFORT, effort))
+        for c in results.with_data
+    ]
     unit = results.with_data[0].condition.length_unit
     return pd.DataFrame(rows, columns=NAMES).assign(length_unit=unit)
 
@@ -52,14 +54,10 @@ def draw_stopping(table: pd.DataFrame) -> Figure:
             rows = rows.sort_values("stop_cost")
             x = rows["stop_cost"] + apart * (2 * k - count + 1)
             solved, done = rows[["solved", "done"]].sum()
-            name = (
-                f"at most {int(generations)} generations ({solved} of {done} runs with a solution)"
-            )
-            colour = style.condition_colour(k)
+            runs, colour = f"({solved} of {done} runs with a solution)", style.condition_colour(k)
+            name = f"at most {int(generations)} generations {runs}"
             axes.vlines(x, rows["lower"], rows["upper"], color=colour, linewidth=1.2)
-            axes.plot(
-                x, rows["median"], "o-", label=name, color=colour, markersize=4.5, linewidth=1.0
-            )
+            axes.plot(x, rows["median"], "o-", label=name, color=colour, ms=4.5, lw=1.0)
         axes.set(
             ylim=(0.0, None),
             xlabel="stopping value of SP2 (objective) [-]",

@@ -38,7 +38,7 @@ def store(outputs: Path, experiment: Experiment) -> None:
             condition.to_json(), manifest(condition.id) | {"label": label}, condition.files()
         )
         for replicate in range(condition.num_replicates(experiment.num_replicates)):
-            run.write_log(replicate, run_replicate(condition, replicate).content)
+            run.write_logs({replicate: run_replicate(condition, replicate).content})
 
 
 @functools.cache

@@ -25,7 +25,7 @@ def add(run: RunDirectory) -> Callable[..., Finished]:
 
     def store(replicate: int, **changes: Any) -> Finished:
         finished = write(generations(6, seed=replicate), replicate, **changes)
-        run.write_log(replicate, finished.content)
+        run.write_logs({replicate: finished.content})
         return finished
 
     return store

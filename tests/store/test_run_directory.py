@@ -44,7 +44,7 @@ WRITE = """
         print("held", flush=True)
         while True:
             for replicate in range(0, 50, 10):
-                run.write_log(replicate, content)
+                run.write_logs({replicate: content})
                 run.write_logs(dict.fromkeys(range(replicate, replicate + 10), content))
 """
 
@@ -103,7 +103,7 @@ def test_a_failed_write_leaves_nothing(run: RunDirectory, monkeypatch: pytest.Mo
 
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(OSError, match="No space"):
-        run.write_log(0, b"x" * 1000)
+        run.write_logs({0: b"x" * 1000})
     assert os.listdir(run.replicates) == []
 
 

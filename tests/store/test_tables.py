@@ -234,7 +234,7 @@ def test_read_generations(run: RunDirectory, add: Add, tmp_path: Path) -> None:
     for replicate in (1, 0):
         add(replicate)
     given = [g._replace(terms={"other": float(g.index)}) for g in generations(4, seed=2)]
-    run.write_log(2, write(given, 2).content)
+    run.write_logs({2: write(given, 2).content})
     frame = read_generations([run])
     assert frame.columns[:3].tolist() == ["condition", "replicate", "index"]
     assert frame.columns[-4:].tolist() == [

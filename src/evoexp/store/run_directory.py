@@ -162,12 +162,11 @@ class RunDirectory:
             raise StoreError(f"{self.failure_path(replicate)}: damaged: no reason and traceback")
         return failure
 
-    def write_log(self, replicate: int, content: bytes) -> None:
-        """Keep a finished log: from now on the replicate is completed, whatever failed before."""
-        self.write_logs({replicate: content})
-
     def write_logs(self, contents: Mapping[int, bytes]) -> None:
-        """Keep several finished logs; cheaper than one by one."""
+        """Keep finished logs: their replicates are completed from now on, whatever failed before.
+
+        Several at once are cheaper than one by one.
+        """
         self.replicates.mkdir(parents=True, exist_ok=True)
         write_files({self.log_path(replicate): content for replicate, content in contents.items()})
         for replicate in contents:

@@ -23,7 +23,9 @@ def read_summaries(runs: Runs) -> pd.DataFrame:
     Raises:
         CorruptLog: A log is damaged or of another replicate.
     """
-    frame: pd.DataFrame = summary_table(runs).to_pandas(types_mapper=_pandas_type)
+    frame: pd.DataFrame = summary_table(runs).to_pandas(
+        types_mapper=lambda kind: None if pa.types.is_string(kind) else pd.ArrowDtype(kind)
+    )
     return frame
 
 
@@ -74,7 +76,3 @@ def read_generations(runs: Runs, replicates: Collection[int] | None = None) -> p
         )
         frame[name] = np.concatenate([np.empty(0, dtype=kind), *filled])
     return pd.DataFrame(frame, copy=False)
-
-
-def _pandas_type(kind: pa.DataType) -> Any:
-    return None if pa.types.is_string(kind) else pd.ArrowDtype(kind)

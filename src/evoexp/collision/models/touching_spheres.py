@@ -55,7 +55,7 @@ class TouchingSpheres(Component):
             if link.joint > 0
             for sphere in self._of_link(assembly, link)
         ]
-        kept = _without_repetitions(spheres)
+        kept = [s for k, s in enumerate(spheres) if not any(map(s.repeats, spheres[:k]))]
         joint = np.array([sphere.joint - 1 for sphere in kept], dtype=np.int64)
         local = np.array([assembly.table.local(sphere.joint, sphere.center) for sphere in kept])
         arms = np.array([sphere.arm for sphere in kept])
@@ -122,10 +122,6 @@ def _ranges(owners: np.ndarray, count: int) -> np.ndarray:
             for k in range(count)
         ]
     )
-
-
-def _without_repetitions(spheres: list[_Sphere]) -> list[_Sphere]:
-    return [s for k, s in enumerate(spheres) if not any(s.repeats(other) for other in spheres[:k])]
 
 
 class Clearance(NamedTuple):

@@ -11,7 +11,14 @@ import pytest
 from evoexp.collision.models.potential_fields import PotentialFields
 from evoexp.configuration import compose
 from evoexp.errors import SettingError
-from evoexp.papers.chen.printed_grids import MISSING, SURPLUS, WRONG, compare, printed, rows_of
+from evoexp.papers.chen.figures.field_grids import (
+    MISSING,
+    SURPLUS,
+    WRONG,
+    compare,
+    printed,
+    rows_of,
+)
 
 PRINTED = {"neighbourhood": 1, "goal_potentials": (1.0, 3.0, 5.0)}
 PRINTED |= {"obstacle_potentials": (10.0, 9.0, 7.0, 5.0, 3.0, 1.0)}

@@ -14,11 +14,8 @@ from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.figures import (
     population_effort,
     posture_history,
-    posture_models,
     posture_motions,
     posture_trap,
-    residual_floor,
-    search_scope,
     solids,
 )
 from evoexp.papers.corsepius.figures.posture_motions import ShownPath
@@ -159,28 +156,26 @@ def test_lengths_and_detours_of_paths(outputs: Path) -> None:
 
 def test_models_show_bodies_and_covers_that_hold_them(outputs: Path) -> None:
     condition = smoke_results(outputs, "corsepius_ball").conditions[0]
-    table = posture_models.models_table([("MANUS", condition)])
-    bodies, covers = (
-        table[table["element"] == kind] for kind in (posture_models.BODY, posture_models.COVER)
-    )
+    table = solids.models_table([("MANUS", condition)])
+    bodies, covers = (table[table["element"] == kind] for kind in (solids.BODY, solids.COVER))
     problem = measures.problem(condition)
     assert list(bodies["name"]) == list(problem.bodies.names)
     assert len(covers) == problem.bodies.num_shapes
     least, most = solids.corners(covers).min(axis=0), solids.corners(covers).max(axis=0)
     assert (solids.corners(bodies).min(axis=0) >= least - 1e-9).all()
     assert (solids.corners(bodies).max(axis=0) <= most + 1e-9).all()
-    assert drawn(table, posture_models.draw_models)
+    assert drawn(table, solids.draw_models)
 
 
 def test_every_child_lies_in_the_box_of_its_parent(outputs: Path) -> None:
     condition = solved(outputs, "corsepius_ball").conditions[0]
-    table = search_scope.scope_table(condition, measures.shown_replicate(condition))
-    path = table[table["element"] == search_scope.POSTURE].sort_values("order")
+    table = posture_motions.scope_table(condition, measures.shown_replicate(condition))
+    path = table[table["element"] == posture_motions.POSTURE].sort_values("order")
     for axis in ("x", "y"):
         assert (path[axis].diff().abs().dropna() <= path[f"half_{axis}"].iloc[0] + 1e-9).all()
     assert path["half_x"].iloc[0] == pytest.approx(0.1 / DEGREE)
-    assert set(table["factor"].dropna()) == set(search_scope.FACTORS)
-    assert drawn(table, search_scope.draw_scope)
+    assert set(table["factor"].dropna()) == set(posture_motions.FACTORS)
+    assert drawn(table, posture_motions.draw_scope)
 
 
 def test_histories_keep_the_last_value_of_searches_that_ended(outputs: Path) -> None:
@@ -243,12 +238,12 @@ def test_expected_effort_counts_failures(outputs: Path) -> None:
 def test_the_slope_of_the_floor_is_that_of_the_medians(outputs: Path) -> None:
     task = measures.tasks(smoke_results(outputs, "corsepius_scope"), "scope", "")[0]
     assert task.values == (0.0125, 0.025, 0.05, 0.1, 0.2, 0.4)
-    table = residual_floor.floor_table(task)
-    medians = table[table["quantity"] == residual_floor.RESIDUAL]["median"].to_numpy(
+    table = population_effort.floor_table(task)
+    medians = table[table["quantity"] == population_effort.RESIDUAL]["median"].to_numpy(
         dtype=np.float64
     )
     expected = np.polyfit(np.log(task.values), np.log(medians), 1)[0]
-    assert residual_floor.slope(task) == pytest.approx(expected)
+    assert population_effort.slope(task) == pytest.approx(expected)
 
 
 def test_tables_of_many_conditions_stand_upright(outputs: Path) -> None:

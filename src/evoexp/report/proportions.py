@@ -27,7 +27,7 @@ class Proportion(NamedTuple):
         """Return Wilson's score interval."""
         return wilson(self.having, self.total, confidence)
 
-    def with_interval(self, confidence: float, decimals: int) -> str:
+    def with_interval(self, confidence: float, decimals: int = 0) -> str:
         """Return the proportion and its interval in words: "964 of 1000 = 96.4 % [95.1, 97.4]"."""
         if not self.total:
             return "0 of 0"

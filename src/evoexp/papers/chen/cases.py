@@ -94,7 +94,7 @@ class Case(NamedTuple):
         return self.optimum.array("minima") if self.optimum is not None else np.empty((0, 3))
 
     def gaps(self, costs: FloatArray) -> FloatArray:
-        """Return by how much costs are above the optimum, as multiples of it [-]."""
+        """Return the gaps of costs above the optimum, as multiples of the optimum [-]."""
         return costs / self.least - 1.0
 
     def within(self, costs: FloatArray, close: float) -> Proportion:
@@ -106,9 +106,10 @@ class Case(NamedTuple):
         return self.conditions[0].evaluate(np.asarray(angles, dtype=np.float64))
 
     def ends(self) -> dict[str, FloatArray]:
-        """Return the postures at which local methods end, (starts, 3): θ1, θ2 [deg], E.
+        """Return the postures at which local methods end.
 
-        They are given by the method's name; methods that were not run are left out.
+        Returns:
+            Name of a method that was run → (starts, 3): θ1, θ2 [deg], E.
         """
         own = self.conventional
         return {
@@ -136,7 +137,7 @@ def _role(condition: ConditionResults) -> str:
 
 
 def _name(condition: ConditionResults) -> str:
-    """Return the criterion's name, told by its weights and the links that avoid obstacles."""
+    """Return the name of a criterion with these weights and links that avoid obstacles."""
     cost = condition.planner.objective
     weights = cost.torque_norm_weight, cost.torque_max_weight, cost.manipulability_weight
     names: dict[Any, str] = {

@@ -6,7 +6,14 @@ import numpy as np
 import pandas as pd
 
 from evoexp.papers.chen.figures import field_grids
-from evoexp.papers.chen.printed_grids import MISSING, SURPLUS, WRONG, compare, printed, rows_of
+from evoexp.papers.chen.figures.field_grids import (
+    MISSING,
+    SURPLUS,
+    WRONG,
+    compare,
+    printed,
+    rows_of,
+)
 from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.report.kit import (
     Claim,
@@ -61,7 +68,7 @@ def _fields(condition: ConditionResults) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _compared(condition: ConditionResults) -> pd.DataFrame:
-    """Return all nodes of both fields beside the printed ones; see `printed_grids.compare`."""
+    """Return all nodes of both fields beside the printed ones; see `field_grids.compare`."""
     goal, unsafeness = _fields(condition)
     blocked, edge = np.isnan(goal), f"{condition.planner.collision.obstacle_potentials[0]:g}"
     computed = rows_of(goal, blocked), rows_of(unsafeness, blocked, edge)
@@ -110,8 +117,8 @@ def _map(condition: ConditionResults) -> Drawing:
     return Drawing(
         f"fields_{'_'.join(map(str, _fields(condition)[0].shape))}",
         f"{condition.label}: the fields as maps",
-        "Dark grey: obstacles. The potential of the goal is not followed downhill: it weighs "
-        "draws of random walks.",
+        "Dark grey: obstacles. The potential of the goal weighs the draws of random walks; no path "
+        "follows it downhill.",
         partial(_map_table, condition),
         field_grids.draw_maps,
         (condition,),
@@ -122,9 +129,6 @@ def _map_table(condition: ConditionResults) -> pd.DataFrame:
     """Return both fields node by node: columns field, x, y, value (NaN: an obstacle)."""
     goal, unsafeness = _fields(condition)
     x, y = (axis.ravel() for axis in np.indices(goal.shape))
-    closed = np.where(np.isnan(goal), np.nan, unsafeness)
-    parts = [
-        pd.DataFrame({"field": name, "x": x, "y": y, "value": values.ravel()})
-        for name, values in zip(NAMES, (goal, closed), strict=True)
-    ]
-    return pd.concat(parts, ignore_index=True)
+    fields = zip(NAMES, (goal, np.where(np.isnan(goal), np.nan, unsafeness)), strict=True)
+    parts = [{"field": name, "x": x, "y": y, "value": values.ravel()} for name, values in fields]
+    return pd.concat(map(pd.DataFrame, parts), ignore_index=True)

@@ -1,4 +1,4 @@
-"""The title of Chen & Zalzala 1995 kept: a safe path and a docking posture as one motion."""
+"""Chen & Zalzala 1995, both searches joined: a safe path and a docking posture as one motion."""
 
 from functools import partial
 
@@ -24,7 +24,7 @@ INTRODUCTION = (
     "Two searches, one motion: the placement search (section 3) chooses docking place and "
     "posture of the arm, the path search (section 2) a path over the floor to the node nearest "
     "to it. The platform drives along the path, on to the docking place, and the arm goes from "
-    "its travel posture to the one that was chosen. The exact verdict is on the whole of it: "
+    "its travel posture to the docking posture. The exact verdict covers the whole motion: "
     "platform and links against all obstacles, and against each other. The cost is E (Eq. 14) + "
     "C (Eq. 1)."
 )

@@ -38,7 +38,7 @@ def judge_paths(
 
 
 def _excess(condition: ConditionResults, groups: tuple[Group, ...]) -> FloatArray:
-    """Return by how much each run's path is longer than the shortest one, (done,) [%]."""
+    """Return the excess of each run's length over the shortest one, (done,) [%]."""
     return np.asarray(100.0 * (condition.column(DISTANCE) / measures.shortest(groups) - 1.0))
 
 

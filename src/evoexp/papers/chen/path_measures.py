@@ -1,16 +1,19 @@
 """Measures of the grid paths of Chen & Zalzala 1995: weightings, gaps to the truth, routes."""
 
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.papers.chen.routes import Route, inside_points, routes
 from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.records import FloatArray
 from evoexp.report.kit import ConditionResults, Results, planned_by, run_measures
 
 NEAR = 0.05  # [-] "nearly shortest": a length within 5 % of the shortest one
 MUCH = 0.25  # [-] "much longer": a length more than 25 % above the shortest one
+# name of a route (A, B, …; A is the most frequent) → keys of its paths
+Routes = dict[str, tuple[Any, ...]]
 
 
 class Group(NamedTuple):
@@ -82,13 +85,13 @@ def group_list(results: Results) -> tuple[Group, ...]:
 
 
 def shortest(groups: tuple[Group, ...]) -> float:
-    """Return the length of the shortest path [cell]; NaN if no reference tells it."""
+    """Return the length of the shortest path [cell]; NaN without a reference."""
     known = (g.truth.array("frontier")[:, 1].min() for g in groups if g.truth is not None)
     return float(min(known, default=np.nan))
 
 
 def gaps(condition: ConditionResults, truth: float) -> FloatArray:
-    """Return by how much each run's cost is above a known one, (done,) [%]."""
+    """Return the gap of each run's cost above a known cost, (done,) [%]."""
     return np.asarray(np.round(100.0 * (condition.column("best_cost") / truth - 1.0), 9))
 
 
@@ -107,15 +110,16 @@ def _scenario(condition: ConditionResults) -> Any:
     return condition.condition.scenario
 
 
-def route_list(groups: tuple[Group, ...]) -> list[Route]:
+def route_list(groups: tuple[Group, ...]) -> Routes:
     """Return the routes of all first conditions together: members are (label, replicate)."""
     of = {(g.main.label, k): path for g in groups for k, path in paths(g.main).items()}
     return routes(of, inside_points(boxes(groups[0].main)))
 
 
-def routes_of(condition: ConditionResults, found: list[Route]) -> dict[str, list[int]]:
-    """Return name of a route → replicates of a condition that take it, where any does."""
-    own = {route.name: [m[1] for m in route.members if m[0] == condition.label] for route in found}
+def routes_of(condition: ConditionResults, found: Routes) -> dict[str, list[int]]:
+    """Return name of a route → replicates of a condition that take it; none is empty."""
+    label = condition.label
+    own = {name: [m[1] for m in members if m[0] == label] for name, members in found.items()}
     return {name: members for name, members in own.items() if members}
 
 
@@ -124,3 +128,50 @@ def median_path(condition: ConditionResults, replicates: list[int] | None = None
     among = None if replicates is None else condition.summaries.index.isin(replicates)
     costs = condition.column("best_cost")
     return paths(condition)[run_measures.median_replicate(condition, costs, among)]
+
+
+def signature(path: FloatArray, centres: FloatArray) -> tuple[int, ...]:
+    """Count the passes of a path above each obstacle, rightward minus leftward.
+
+    Two paths with the same ends that pass the same sides of all obstacles have the same signature.
+
+    Args:
+        path: (nodes, 2).
+        centres: (obstacles, 2) a point inside each obstacle, whose x is that of no node.
+    """
+    before, after = path[:-1, None, :], path[1:, None, :]
+    crosses = (before[..., 0] < centres[:, 0]) != (after[..., 0] < centres[:, 0])
+    run = np.where(crosses, after[..., 0] - before[..., 0], 1.0)
+    share = (centres[:, 0] - before[..., 0]) / run
+    above = crosses & (before[..., 1] + share * (after[..., 1] - before[..., 1]) > centres[:, 1])
+    return tuple(int(value) for value in (above * np.sign(run)).sum(axis=0))
+
+
+def inside_points(boxes: Sequence[Sequence[int]]) -> FloatArray:
+    """Return a point inside each box (x0, y0, x1, y1) of nodes; no point has the x of a node."""
+    return np.array(
+        [[0.5 * (x0 + x1) + 0.26, 0.5 * (y0 + y1)] for x0, y0, x1, y1 in boxes]
+    ).reshape(-1, 2)
+
+
+def routes(paths: Mapping[Any, FloatArray], centres: FloatArray) -> Routes:
+    """Return paths grouped by signature, the most frequent route first.
+
+    Of equally frequent routes, that of the earlier path is first. As far as signatures tell, no
+    path of a route passes over an obstacle if it is bent to another path of the route.
+
+    Args:
+        paths: Key → (nodes, 2).
+        centres: See `signature`.
+    """
+    of = {key: signature(path, centres) for key, path in paths.items()}
+    return {
+        _name(k): tuple(key for key, own in of.items() if own == found)
+        for k, (found, _) in enumerate(Counter(of.values()).most_common())
+    }
+
+
+def _name(number: int) -> str:
+    """Return the name of a route, counted from 0: A to Z, then AA and so on."""
+    before, last = divmod(number, 26)
+    return (_name(before - 1) if before else "") + chr(ord("A") + last)

@@ -1,4 +1,4 @@
-"""Chen & Zalzala 1995, Fig. 2: safe paths over a grid, beside the truth; routes, gaps, controls."""
+"""Chen & Zalzala 1995, Fig. 2: safe paths over a grid, beside the truth; paths that linger."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -10,8 +10,7 @@ from evoexp.papers.chen import path_claims
 from evoexp.papers.chen import path_measures as measures
 from evoexp.papers.chen.figures import grid_costs, grid_paths
 from evoexp.papers.chen.figures.grid_paths import FAINT, Line
-from evoexp.papers.chen.path_measures import Group
-from evoexp.papers.chen.routes import Route
+from evoexp.papers.chen.path_measures import Group, Routes
 from evoexp.report.kit import (
     Comparison,
     ConditionResults,
@@ -38,14 +37,21 @@ INTRODUCTION = (
     "nodes, exact); where that walk lingers, the truth of paths without loops lies between the "
     "two."
 )
+LINGERING = (
+    "The unsafeness of a path is the mean over its nodes (Eq. 3): every further step in a safe "
+    "place lowers it. Where nodes may be passed again, the best path waits there; the cost of "
+    "its length alone ends it. The paper does not say whether nodes may be passed again; "
+    "everywhere else loops are erased. For paths with revisits the best walk is exact (dynamic "
+    "programming over the number of nodes); without them it is a bound."
+)
 CHECKS = (
     (
         "Lingering in safe nodes, which the mean of Eq. 3 rewards",
         "`evoexp run experiment=chen_lingering`",
     ),
     (
-        "Where the obstacles of Fig. 2 are",
-        "is assumed: the text says of the map only that it is cluttered; the platform is a "
+        "Places of the obstacles of Fig. 2",
+        "are assumed: the text says of the map only that it is cluttered; the platform is a "
         "cylinder of an assumed radius, "
         "obstacles are boxes between the centres of their outermost nodes: every permitted "
         "move is free, past corners, too",
@@ -85,7 +91,7 @@ def quantities(results: Results, groups: tuple[Group, ...]) -> tuple[Quantity, .
         row("mean unsafeness S", "–", column("term_unsafeness")),
         row("nodes N", "–", column("term_num_nodes")),
         row(above, "%", gap("optimum")),
-        row("cost above the bound that no path can pass", "%", gap("bound")),
+        row("cost above the lower bound of any path", "%", gap("bound")),
         row("clearance of the platform over the whole motion (exact)", "unit", column("clearance")),
         row("evaluations", "–", column("evaluations")),
         row("CPU time of a run, exact verdict included", "s", column("cpu_s")),
@@ -95,7 +101,7 @@ def quantities(results: Results, groups: tuple[Group, ...]) -> tuple[Quantity, .
 
 
 def checks(
-    groups: tuple[Group, ...], settings: ReportSettings, found: list[Route]
+    groups: tuple[Group, ...], settings: ReportSettings, found: Routes
 ) -> tuple[tuple[str, str], ...]:
     """Return the rows on gaps, on weightings that are nearly the same, and on routes."""
     gaps = [
@@ -120,12 +126,12 @@ def checks(
 
 
 def _gap_text(condition: ConditionResults, group: Group, settings: ReportSettings) -> str:
-    """Describe how far a condition's runs end above the best path known."""
+    """Describe the gaps of a condition's runs above the best path known."""
     gaps, shares = measures.gaps(condition, group.optimum), []
     for bound in (0, 1, 5):  # [%]
         found = counted(gaps <= bound + 1e-9)
         interval = markdown.percent(found.interval(settings.confidence))
-        name = f"within {bound} %" if bound else "at it or below"
+        name = f"within {bound} %" if bound else "equal or better"
         shares.append(f"{name} {markdown.share(*found)} ({interval})")
     median = float(np.median(gaps))
     return f"{condition.label}: median {median:+.1f} %, {', '.join(shares)}".replace("-", "−")
@@ -146,7 +152,7 @@ def _truth_text(group: Group) -> str:
 
 
 def _same_problem(groups: tuple[Group, ...]) -> Iterator[tuple[str, str]]:
-    """Return a row per two neighbouring weightings with λ > 0: how near they are as problems."""
+    """Yield a row on each two neighbouring weightings with λ > 0: ratios λ/ε and best paths."""
     for one, two in pairwise(groups):
         if one.truth is not None and two.truth is not None and 0.0 not in one.weights + two.weights:
             ratios = [lam / epsilon for epsilon, lam in (one.weights, two.weights)]
@@ -163,17 +169,15 @@ def comparisons(
 ) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
     """Compare the costs of the first condition of each weighting with those of its others."""
     values = by_column("best_cost")
-    found = (
-        (
-            f"cost: {group.main.label} against …",
-            compared([(group.main, c) for c in group.conditions[1:]], values, settings),
-        )
+    return tuple(
+        (f"cost: {group.main.label} against …", rows)
         for group in groups
+        for rows in (compared([(group.main, c) for c in group.conditions[1:]], values, settings),)
+        if rows
     )
-    return tuple((heading, rows) for heading, rows in found if rows)
 
 
-def drawings(groups: tuple[Group, ...], found: list[Route]) -> tuple[Drawing, ...]:
+def drawings(groups: tuple[Group, ...], found: Routes) -> tuple[Drawing, ...]:
     """Return the figures."""
     shown = tuple(c for group in groups for c in group.all)
     faint = {
@@ -184,8 +188,8 @@ def drawings(groups: tuple[Group, ...], found: list[Route]) -> tuple[Drawing, ..
     gaps = Drawing(
         "gaps",
         "Gaps to the best path known",
-        "Share of runs that end at most so far above it. Random walks may be so far off that the "
-        "curve starts late.",
+        "Share of runs whose cost is at most so far above the best path known. Random walks may be "
+        "so far off that their curve starts late.",
         partial(grid_costs.gaps_table, groups),
         grid_costs.draw_gaps,
         shown,
@@ -224,7 +228,7 @@ def drawings(groups: tuple[Group, ...], found: list[Route]) -> tuple[Drawing, ..
     )
 
 
-def _route_lines(group: Group, found: list[Route]) -> list[Line]:
+def _route_lines(group: Group, found: Routes) -> list[Line]:
     """Return one path per route of a weighting."""
     c = group.main
     return [
@@ -236,3 +240,83 @@ def _route_lines(group: Group, found: list[Route]) -> list[Line]:
         )
         for name, members in measures.routes_of(c, found).items()
     ]
+
+
+def lingering_page(results: Results, settings: ReportSettings) -> Page:
+    """Build the page of lingering paths, or the generic page if another planner was run."""
+    if not measures.fits(results):
+        return generic.page(results, settings)
+    groups = measures.group_list(results)
+    return Page(
+        title=f"Chen & Zalzala 1995: {results.experiment or 'stored runs'}",
+        introduction=LINGERING,
+        quantities=quantities(results, groups),
+        checks=(
+            *((f"{g.name}: lingering", _lingering(g, groups)) for g in groups if g.revisits),
+            *(
+                (f"{g.name}: best path known", _best_known(g))
+                for g in groups
+                if g.truth is not None
+            ),
+        ),
+        drawings=_lingering_drawings(groups),
+    )
+
+
+def _lingering(group: Group, groups: tuple[Group, ...]) -> str:
+    """Count the repeated nodes of the runs of a weighting that permits them."""
+    repeats = [_repeated(path) for path in measures.paths(group.main).values()]
+    simple = [g for g in groups if g.weights == group.weights and not g.revisits][:1]
+    return (
+        f"{markdown.share(int(np.count_nonzero(repeats)), len(repeats))} runs pass nodes "
+        f"again, median {np.median(repeats):.0f} repeated nodes; median length "
+        f"{_length(group):.0f} cells"
+    ) + "".join(f", {_length(g):.0f} without revisits" for g in simple)
+
+
+def _best_known(group: Group) -> str:
+    """Describe the best path that the reference knows."""
+    assert group.truth is not None
+    (best,) = group.best_path
+    length, unsafeness, exact = (
+        float(group.truth.column(f"term_{name}")[0])
+        for name in ("distance", "unsafeness", "bound_is_reached")
+    )
+    return (
+        f"cost {group.optimum:.4g}: length {length:.4g}, mean unsafeness {unsafeness:.3g}, "
+        f"{len(best)} nodes, {_repeated(best)} of them passed before; "
+        f"{'exact' if exact else f'no path is below {group.bound:.4g}'}"
+    )
+
+
+def _length(group: Group) -> float:
+    return float(np.median(group.main.column("term_distance")))
+
+
+def _repeated(path: np.ndarray) -> int:
+    """Count the nodes of a path that were passed before."""
+    return len(path) - len(np.unique(path, axis=0))
+
+
+def _lingering_drawings(groups: tuple[Group, ...]) -> tuple[Drawing, ...]:
+    panels = [(group.name, group.main, grid_paths.known_lines(group)) for group in groups]
+    return (
+        Drawing(
+            "paths",
+            "Paths with and without revisits",
+            "Run of median cost of the genetic algorithm, and the best path known. Lines that go "
+            "back and forth lie on each other: the next figure counts nodes.",
+            partial(grid_paths.paths_table, panels),
+            grid_paths.draw_paths,
+            tuple(c for group in groups for c in group.all),
+        ),
+        Drawing(
+            "lingering",
+            "Nodes by their unsafeness",
+            "Nodes of the best solution of every run: mean number per unsafeness of the node, "
+            "counted as often as they are passed.",
+            partial(grid_paths.places_table, groups),
+            grid_paths.draw_places,
+            tuple(group.main for group in groups),
+        ),
+    )

@@ -24,12 +24,12 @@ from evoexp.report.kit import (
 
 INTRODUCTION = (
     "Two angles of a three-link arm on a platform are searched; θ3 (the better of its two "
-    "values) and the platform's place follow from where the end-effector shall be. The cost is E "
+    "values) and the platform's place follow from the target of the end-effector. The cost is E "
     "(Eq. 14), lower is better; the paper's fitness is f = 250 − E. Infeasible postures cost "
-    "250. Elitism: the paper speaks of none, so both are shown. Exact optima: a dense search "
-    "over both angles, every minimum polished; conventional methods: local ones, from the same "
-    "feasible starts spread evenly. Without an obstacle everything has a mirror image of the "
-    "same cost."
+    "250. The paper mentions no elitism; runs with and without it are shown. Exact optima: a "
+    "dense search over both angles, every minimum polished; conventional methods: local ones, from "
+    "the same feasible starts spread evenly. Without an obstacle every posture has a mirror image "
+    "of the same cost."
 )
 RESULTS = (
     "criterion",
@@ -206,36 +206,38 @@ def _drawings(cases: list[Case]) -> tuple[Drawing, ...]:
     """Return the figures: postures, and where optima are known, fitness and gaps."""
     exact = [case for case in cases if case.optimum is not None and case.evolved]
     shown = tuple(c for case in cases for c in case.conditions)
-    postures = Drawing(
-        "fig_3_to_8_postures",
-        "Figs. 3–8: postures",
-        "Thick: the exact optimum; thin: the best run of the genetic algorithm, with elitism "
-        "where it was run; where the paper prints angles, its posture. Where two differ, "
-        "they are often mirror images. The platform's size and the obstacle of Fig. 7 are "
-        "assumed.",
-        partial(placements.postures_table, cases),
-        placements.draw_postures,
-        shown,
+    found = (
+        Drawing(
+            "fig_3_to_8_postures",
+            "Figs. 3–8: postures",
+            "Thick: the exact optimum; thin: the best run of the genetic algorithm, with elitism "
+            "where it was run; where the paper prints angles, its posture. Where two differ, "
+            "they are often mirror images. The platform's size and the obstacle of Fig. 7 are "
+            "assumed.",
+            partial(placements.postures_table, cases),
+            placements.draw_postures,
+            shown,
+        ),
+        Drawing(
+            "fig_4_to_8_fitness",
+            "Figs. 4–8: the best of a run against generations",
+            "Median and quartiles over runs of the best so far, at equal evaluations; "
+            "dash-dotted: the exact optimum. For the least torque norm the paper draws the "
+            "torque norm itself (lower is better), else the fitness f = 250 − E (higher is "
+            "better).",
+            partial(placements.fitness_table, exact),
+            placements.draw_fitness,
+            shown,
+        ),
+        Drawing(
+            "gaps",
+            "Gaps to the exact optimum",
+            "Share of runs, or of starts of a conventional method (dashed), that end closer to "
+            "the optimum than x; dotted: 0.1 % and 1 %. Smaller gaps than 1e-6 are drawn as 1e-6; "
+            "plateaus on the right are local minima.",
+            partial(placements.gaps_table, exact),
+            placements.draw_gaps,
+            shown,
+        ),
     )
-    fitness = Drawing(
-        "fig_4_to_8_fitness",
-        "Figs. 4–8: the best of a run against generations",
-        "Median and quartiles over runs of the best so far, at equal evaluations; "
-        "dash-dotted: the exact optimum. For the least torque norm the paper draws the "
-        "torque norm itself (lower is better), else the fitness f = 250 − E (higher is "
-        "better).",
-        partial(placements.fitness_table, exact),
-        placements.draw_fitness,
-        shown,
-    )
-    gaps = Drawing(
-        "gaps",
-        "Gaps to the exact optimum",
-        "Share of runs, or of starts of a conventional method (dashed), that end closer to "
-        "the optimum than x; dotted: 0.1 % and 1 %. Smaller gaps than 1e-6 are drawn as 1e-6; "
-        "plateaus on the right are local minima.",
-        partial(placements.gaps_table, exact),
-        placements.draw_gaps,
-        shown,
-    )
-    return (postures, fitness, gaps) if exact else (postures,)
+    return found if exact else found[:1]

@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 
 from evoexp.planners.posture_es.phases import Problem
-from evoexp.planners.posture_es.planner import PostureEs
 from evoexp.records import FloatArray
 from evoexp.report.kit import (
     ConditionResults,
@@ -23,10 +22,8 @@ from evoexp.report.kit import (
 
 REASONS = ("goal", "stagnation", "cap")  # why a search ends
 
-cycles = by_column("term_cycles")
-"""Cycles of each run, all phases together, (done,)."""
-evaluations = by_column("evaluations")
-"""Evaluations of each run, (done,)."""
+cycles = by_column("term_cycles")  # of each run, all phases together, (done,)
+evaluations = by_column("evaluations")  # of each run, (done,)
 
 
 class Task(NamedTuple):
@@ -46,12 +43,6 @@ class Task(NamedTuple):
     def by_value(self) -> dict[float, ConditionResults]:
         """The condition of each value that has results."""
         return dict(zip(self.values, self.conditions, strict=True))
-
-
-def fits(results: Results) -> bool:
-    """Whether there are results, and all of postures as individuals."""
-    found = results.with_data
-    return bool(found) and all(isinstance(c.planner, PostureEs) for c in found)
 
 
 def problem(condition: ConditionResults) -> Problem:
@@ -125,7 +116,7 @@ def num_steps(condition: ConditionResults) -> FloatArray:
 
 
 def num_joints(condition: ConditionResults) -> int:
-    """Return how many joints the arm has."""
+    """Return the number of joints of the arm."""
     return len(condition.condition.scenario.q_start)  # type: ignore[attr-defined]
 
 
@@ -148,9 +139,7 @@ def detours(condition: ConditionResults) -> FloatArray:
     It is NaN if the path ends where it began.
     """
     straight = np.array([np.sqrt(((q[-1] - q[0]) ** 2).sum()) for q in paths(condition).values()])
-    found = np.full(len(straight), np.nan)
-    np.divide(path_lengths(condition), straight, out=found, where=straight > 0.0)
-    return found
+    return path_lengths(condition) / np.where(straight > 0.0, straight, np.nan)
 
 
 def reasons(condition: ConditionResults) -> dict[str, Proportion]:
@@ -193,9 +182,8 @@ def phase_cycles(condition: ConditionResults) -> pd.DataFrame:
     """
     rows = condition.generations
     begun = rows.assign(phase=rows["term_phase"].astype(int) - 1)
-    sizes = begun.groupby(["replicate", "phase"], as_index=False).size()
-    table = sizes.rename(columns={"size": "cycles"})
-    table["cycles"] -= 1  # the posture that a phase begins with
+    sizes = begun.groupby(["replicate", "phase"]).size()
+    table = (sizes - 1).reset_index(name="cycles")  # without the posture that a phase begins with
     last = table.groupby("replicate")["phase"].transform("max")
     won = table["replicate"].map(condition.summaries["solved"].astype(bool))
     whole = won & (table["phase"] == len(phase_names(condition)) - 1)
@@ -204,11 +192,5 @@ def phase_cycles(condition: ConditionResults) -> pd.DataFrame:
 
 def shown_replicate(condition: ConditionResults) -> int:
     """Return the run that figures show: of median evaluations among the solved ones, if any."""
-    having = solved(condition)
-    among = having if having.any() else None
+    among = solved(condition) if condition.solved else None
     return median_replicate(condition, evaluations(condition), among)
-
-
-def text(proportion: Proportion, confidence: float) -> str:
-    """Return a proportion with its interval: "48 of 50 = 96 % [87, 99]"."""
-    return proportion.with_interval(confidence, 0)

@@ -8,13 +8,12 @@ import numpy as np
 from evoexp.papers.corsepius import claims, measures
 from evoexp.papers.corsepius.figures import (
     posture_history,
-    posture_models,
     posture_motions,
     posture_trap,
-    search_scope,
+    solids,
 )
 from evoexp.papers.corsepius.figures.posture_motions import ShownPath
-from evoexp.papers.corsepius.measures import text
+from evoexp.planners.posture_es.planner import PostureEs
 from evoexp.report.figures import shares
 from evoexp.report.kit import (
     ConditionResults,
@@ -29,6 +28,7 @@ from evoexp.report.kit import (
     counted,
     generic,
     markdown,
+    planned_by,
     run_measures,
     spread,
 )
@@ -36,9 +36,9 @@ from evoexp.report.kit import (
 INTRODUCTION = (
     "An individual is a posture. Every cycle random steps within a local scope of a few parents "
     "give the offspring, the best of which are the next parents; the path is the ancestry of the "
-    "first one that meets the goal. The cost is a sum of weighted terms in configuration and "
+    "first posture that meets the goal. The cost is a sum of weighted terms in configuration and "
     "work space; lower is better. A run without a winner ends by stagnation or at its cap of "
-    "cycles, and its path is that of the best posture. Solved: the goal is met, and every "
+    "cycles, and its path is the ancestry of the best posture. Solved: the goal is met, and every "
     "posture of the path is free by the spheres; the exact verdict judges the motion between "
     "postures, too."
 )
@@ -69,7 +69,7 @@ CHECKS = (
 
 def page(results: Results, settings: ReportSettings) -> Page:
     """Build the page of the tasks, or the generic page if another planner was run."""
-    if not measures.fits(results) or not results.main:
+    if not planned_by(results, PostureEs):
         return generic.page(results, settings)
     compared = (("distance to the goal", True, measures.residuals),)
     return Page(
@@ -126,20 +126,27 @@ def effort_quantities(results: Results) -> tuple[Quantity, ...]:
 def tables(results: Results, settings: ReportSettings) -> tuple[Table, ...]:
     """Return the tables of tasks, and of the phases of those that have several."""
     level = settings.confidence
-    rows = []
-    for c in results.with_data:
-        counts = run_measures.success(c), measures.certified(c), measures.refuted(c)
-        ended = (f"{name} {p.having}" for name, p in measures.reasons(c).items() if p.having)
-        per_run = (measures.cycles(c), measures.evaluations(c), measures.num_steps(c))
-        spreads = (markdown.spread(spread(values)) for values in per_run)
-        rows.append((c.label, *(text(one, level) for one in counts), ", ".join(ended), *spreads))
+    phases = tuple(row for c in _phased(results) for row in _phase_rows(c, level))
     note = (
         f"Shares of runs, in brackets Wilson's {100 * level:g} % interval; of others median "
         "[quartiles] over all runs."
     )
-    phases = tuple(row for c in _phased(results) for row in _phase_rows(c, level))
-    found = Table("Tasks", TASKS, tuple(rows), note), Table("Phases", PHASES, phases)
+    rows = tuple(_task_row(c, level) for c in results.with_data)
+    found = Table("Tasks", TASKS, rows, note), Table("Phases", PHASES, phases)
     return found if phases else found[:1]
+
+
+def _task_row(condition: ConditionResults, level: float) -> tuple[str, ...]:
+    """Return the row of a task: shares of its runs, the ends of searches, efforts."""
+    counts = run_measures.success, measures.certified, measures.refuted
+    reasons = measures.reasons(condition).items()
+    efforts = measures.cycles, measures.evaluations, measures.num_steps
+    return (
+        condition.label,
+        *(count(condition).with_interval(level) for count in counts),
+        ", ".join(f"{name} {p.having}" for name, p in reasons if p.having),
+        *(markdown.spread(spread(effort(condition))) for effort in efforts),
+    )
 
 
 def _phased(results: Results) -> tuple[ConditionResults, ...]:
@@ -153,7 +160,12 @@ def _phase_rows(condition: ConditionResults, level: float) -> Iterator[tuple[obj
     for k, name in enumerate(measures.phase_names(condition)):
         own = table[table["phase"] == k]
         cycles = markdown.spread(spread(own["cycles"].to_numpy(dtype=np.float64)))
-        yield (condition.label, f"{k + 1}  {name}", text(counted(own["reached"]), level), cycles)
+        yield (
+            condition.label,
+            f"{k + 1}  {name}",
+            counted(own["reached"]).with_interval(level),
+            cycles,
+        )
 
 
 def checks(results: Results) -> tuple[tuple[str, str], ...]:
@@ -174,7 +186,11 @@ def checks(results: Results) -> tuple[tuple[str, str], ...]:
 def drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
     """Return the figures."""
     main, level = results.main, f"{100 * settings.confidence:g} %"
-    reasons = posture_history.reason_rows(results)
+    reasons = [
+        (f"ended by {reason}", position, c.label, measures.reasons(c)[reason])
+        for reason in measures.REASONS
+        for position, c in enumerate(main)
+    ]
     return (
         _models(main),
         Drawing(
@@ -184,15 +200,15 @@ def drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
             "plane of its two joints that move most; every child lies in its parent's box. "
             "Right: where the tool can be one step away from the start, for the scope, a half "
             "and twice of it: hulls of random steps, as seen from above.",
-            partial(search_scope.scope_table, main[0], measures.shown_replicate(main[0])),
-            search_scope.draw_scope,
+            partial(posture_motions.scope_table, main[0], measures.shown_replicate(main[0])),
+            posture_motions.draw_scope,
             main[:1],
         ),
         Drawing(
             "history",
             "Approach to the goal",
             "Best so far against cycles: median and quartiles of the runs that began the phase; "
-            "one that has ended keeps its last value. The best posture is that of the least "
+            "a run that has ended keeps its last value. The best posture is the one of least "
             "cost, so its distance may grow. At the curves: numbers of runs.",
             partial(posture_history.history_table, results),
             posture_history.draw_history,
@@ -219,23 +235,22 @@ def _paths(stem: str, title: str, caption: str, shown: list[ShownPath]) -> Drawi
 
 def _manoeuvres(results: Results, settings: ReportSettings) -> list[Drawing]:
     """Return the figures of conditions that have several phases."""
-    phased, found = _phased(results), []
+    phased, level = _phased(results), settings.confidence
     several = [c for c in phased if len(measures.phase_names(c)) > len(measures.subgoals(c)) + 1]
-    for c in several:
-        one = ShownPath(c.label, c, measures.shown_replicate(c), True)
-        stem = "manoeuvre" if len(several) == 1 else f"manoeuvre_{results.position(c.label) + 1}"
-        found.append(_paths(stem, "The manoeuvre, phase by phase", MANOEUVRE, [one]))
+    ends = [f"_{results.position(c.label) + 1}" if len(several) > 1 else "" for c in several]
+    shown = [ShownPath(c.label, c, measures.shown_replicate(c), True) for c in several]
     phases = Drawing(
         "phases",
         "Phases",
         "Of the runs that began a phase: how many met its goal (Wilson's "
-        f"{100 * settings.confidence:g} % interval), and their cycles.",
-        partial(
-            posture_history.phases_table, results._replace(conditions=phased), settings.confidence
-        ),
+        f"{100 * level:g} % interval), and their cycles.",
+        partial(posture_history.phases_table, results._replace(conditions=phased), level),
         posture_history.draw_phases,
         phased,
     )
+    title = "The manoeuvre, phase by phase"
+    named = zip(ends, shown, strict=True)
+    found = [_paths(f"manoeuvre{end}", title, MANOEUVRE, [one]) for end, one in named]
     return [*found, phases] if phased else found
 
 
@@ -251,19 +266,19 @@ def _trap(main: tuple[ConditionResults, ...]) -> list[Drawing]:
 PATHS = (
     "Per condition the run of median evaluations among the solved ones; where none is solved, "
     "among all. Lines: the links at every posture of the path, which is the winner's ancestry. "
-    "Nobody planned it."
+    "It was not planned beforehand."
 )
 MANOEUVRE = (
     "The same path, one panel per phase. Green: the object while it is held, where the phase "
     "begins and ends."
 )
 TRAP = (
-    "a: where the tools go, all runs that are stuck (crosses: their ends) and all that a "
+    "a: ways of the tools, of all runs that are stuck (crosses: their ends) and all that a "
     "sub-goal has helped. b: a way around must lead away from the goal, or along the wall, "
     "before it leads there. c: the cost over the two joints that moved most on the way to the "
     "median stuck posture, the others as they are there; grey: infeasible. d: the least cost "
-    f"among {posture_trap.SAMPLES} random postures in boxes around it: how far away something "
-    "better is."
+    f"among {posture_trap.SAMPLES} random postures in boxes around it, which "
+    "shows the distance to a better one."
 )
 
 
@@ -273,10 +288,10 @@ def _models(main: tuple[ConditionResults, ...]) -> Drawing:
     return Drawing(
         "fig_3_4_models",
         "Figs. 3 and 4: robots, and the shapes that cover them",
-        "Left: the bodies, by which the exact verdict judges. Right: the spheres or capsules "
-        "that cover them, by which the search does; the paper's sets have 10⁵ to 10⁶ spheres.",
-        partial(posture_models.models_table, shown),
-        posture_models.draw_models,
+        "Left: the bodies, which the exact verdict uses. Right: the spheres or capsules that "
+        "cover them, which the search uses; the paper's sets have 10⁵ to 10⁶ spheres.",
+        partial(solids.models_table, shown),
+        solids.draw_models,
         found,
     )
 

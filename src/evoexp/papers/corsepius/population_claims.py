@@ -157,9 +157,9 @@ def _no_faster(judge: Judge, metric: str, rows: list[SizeComparison]) -> Claim:
         text=f"Larger populations do not plan faster, on any task: {metric}",
         source=SOURCE,
         evidence=(
-            f"expected {metric} in units of those of 100 (of which λ): less for "
-            f"{_ratios(rows, -1)}. "
-            f"More for {_ratios(rows, 1)} (reproduced: none is faster, one at least is slower)"
+            f"expected {metric} over those of 100 individuals, λ in brackets: less for "
+            f"{_ratios(rows, -1)}; more for {_ratios(rows, 1)} (reproduced: none is faster, at "
+            "least one is slower)"
         ),
         verdict=_unless(-1 in says, 1 in says),
     )
@@ -190,10 +190,9 @@ def _over_proportional(judge: Judge, metric: str, rows: list[SizeComparison]) ->
         text=f"Smaller populations increase planning times over-proportionally: {metric}",
         source=SOURCE,
         evidence=(
-            f"over-proportional: the ratio exceeds {exceeds}. It does for {_ratios(rows, 1)}. It "
-            "is "
-            f"below for {_ratios(rows, -1)}. Not certain: {says.count(0)} of {len(rows)} "
-            "(reproduced: everywhere)"
+            f"over-proportional: the ratio exceeds {exceeds}. Above: {_ratios(rows, 1)}. Below: "
+            f"{_ratios(rows, -1)}. Not certain: {says.count(0)} of {len(rows)} (reproduced: all "
+            "above)"
         ),
         verdict=_unless(-1 in says, says and 0 not in says),
     )

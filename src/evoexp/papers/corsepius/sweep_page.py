@@ -1,13 +1,15 @@
-"""Corsépius 2001: settings side by side, per task the first condition against each other one."""
+"""Corsépius 2001: settings side by side, and the size of the population (section 5)."""
 
 from functools import partial
 
 import numpy as np
 
-from evoexp.papers.corsepius import measures
+from evoexp.papers.corsepius import measures, population_claims
 from evoexp.papers.corsepius import page as whole_page
-from evoexp.papers.corsepius.figures import population_effort, residual_floor
-from evoexp.papers.corsepius.measures import Task, text
+from evoexp.papers.corsepius.figures import population_effort
+from evoexp.papers.corsepius.measures import Task
+from evoexp.papers.corsepius.population_claims import METRICS, RECOMMENDED, SizeComparison
+from evoexp.planners.posture_es.planner import PostureEs
 from evoexp.records import FloatArray
 from evoexp.report.kit import (
     Comparison,
@@ -18,10 +20,14 @@ from evoexp.report.kit import (
     Results,
     Table,
     compared,
+    expected_effort,
+    expected_interval,
     fisher_exact,
     grouped,
     holm,
+    judging,
     markdown,
+    planned_by,
     solved,
     spread,
     success,
@@ -48,22 +54,48 @@ NOTE = (
     "conditions."
 )
 FLOOR = (
-    "The goal's tolerance is too small to be met, so every search ends by stagnation: "
-    "how near it came. Points: runs; bars: medians and quartiles. A step has the size of "
-    "the scope, so it seldom lands nearer than some share of it."
+    "The goal's tolerance is too small to be met, so every search ends by stagnation; "
+    "drawn is its distance to the goal then. Points: runs; bars: medians and quartiles. A step "
+    "has the size of the scope, so it seldom lands nearer than some share of it."
 )
 VALUES = f"{sweep_figures.BOXES}; never: runs that do not meet the goal."
 EFFECTS = (
     f"{sweep_figures.A12} the first condition takes fewer evaluations to the goal than the other "
     "one; dashed: no difference."
 )
+SETTING = "num_offspring"
+SCALES = {"cycles": (1.0, ""), "evaluations": (1.0, ""), "CPU time": (1e3, " [ms]")}
+SIZES = (
+    "λ individuals are generated per cycle, of which 5 are selected; all else is equal, seeds "
+    "included. Expected running time: the effort of all runs, failed ones included, over the "
+    "number of runs that met the goal: the price of a success if one starts again after every "
+    "failure. Cycles stand for planning time on as many processors as individuals, evaluations "
+    "for time on one; CPU time is that of the search here, at the median run's price of an "
+    "evaluation, and has a fixed part per cycle, which weighs more where λ is small. A smaller λ "
+    "is not only less search per cycle: selection is weaker, too (5 of λ)."
+)
+SIZE_CHECKS = (
+    (
+        "Intervals of ratios",
+        "by Bonferroni over all of a metric, so that the verdicts of one metric hold together; "
+        "on common seeds",
+    ),
+    (
+        "A task that no size solves",
+        "says nothing of effort: the local minimum, `evoexp run experiment=corsepius_wall`",
+    ),
+    (
+        "The narrow gate at the recommended size",
+        "is a matter of the scope, too: `evoexp run experiment=corsepius_gate_narrow`",
+    ),
+)
+# quantity, first condition of a task, its comparisons with the others
 FirstComparison = tuple[str, str, tuple[Comparison, ...]]
-"""(quantity, first condition of a task, its comparisons with each other one)."""
 
 
 def page(results: Results, settings: ReportSettings) -> Page:
     """Build the page of a sweep, or that of the tasks if there is nothing to compare."""
-    if not measures.fits(results) or len(results.main) < 2:
+    if not planned_by(results, PostureEs) or len(results.main) < 2:
         return whole_page.page(results, settings)
     found = comparisons(results, settings)
     slope = "slope of log residual over log scope {:.2f}; 1: proportional"
@@ -73,7 +105,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
         quantities=whole_page.quantities(results),
         tables=(_table(results, settings),),
         checks=tuple(
-            ("Residual floor", slope.format(residual_floor.slope(task)))
+            ("Residual floor", slope.format(population_effort.slope(task)))
             for task in _scopes(results)
         ),
         comparisons=tuple((f"{name}: {first} against …", rows) for name, first, rows in found),
@@ -111,14 +143,19 @@ def _table(results: Results, settings: ReportSettings) -> Table:
     rows, level = [], settings.confidence
     for first, *others in groups(results):
         met, touching = (
-            holm([fisher_exact(count(first), count(c)) for c in others])
+            [
+                "–",
+                *map(
+                    markdown.p_value, holm([fisher_exact(count(first), count(c)) for c in others])
+                ),
+            ]
             for count in (success, measures.refuted)
         )
-        for c, *p_values in zip((first, *others), (None, *met), (None, *touching), strict=True):
-            p_met, p_touching = ("–" if p is None else markdown.p_value(p) for p in p_values)
+        for c, p_met, p_touching in zip((first, *others), met, touching, strict=True):
+            goal_met, refuted = success(c).with_interval(level), measures.refuted(c)
             beyond = markdown.spread(spread(c.column("term_oversized_steps")))
-            told = text(success(c), level), p_met, text(measures.refuted(c), level), p_touching
-            rows.append((c.label, *told, beyond))
+            told = goal_met, p_met, refuted.with_interval(level), p_touching, beyond
+            rows.append((c.label, *told))
     return Table("Shares of runs", SHARES, tuple(rows), NOTE)
 
 
@@ -140,8 +177,8 @@ def _drawings(
             "floor",
             "Residual floor",
             FLOOR,
-            partial(residual_floor.floor_table, task),
-            residual_floor.draw_floor,
+            partial(population_effort.floor_table, task),
+            population_effort.draw_floor,
             task.conditions,
         )
         for task in scopes
@@ -185,3 +222,100 @@ def _effort(found: tuple[Task, ...], settings: ReportSettings) -> Drawing:
         partial(population_effort.draw_effort, setting="parents μ [-]", marked=PRINTED_PARENTS),
         tuple(c for task in found for c in task.conditions),
     )
+
+
+def population_page(results: Results, settings: ReportSettings) -> Page:
+    """Build the page of sizes, or that of the tasks if no size differs."""
+    found = measures.tasks(results, SETTING) if planned_by(results, PostureEs) else ()
+    if not found:
+        return whole_page.page(results, settings)
+    sizes = {metric: population_claims.compare_sizes(found, metric, settings) for metric in METRICS}
+    judge = judging.judge(results, settings)
+    return Page(
+        title=f"Corsépius 2001: {results.experiment or 'stored runs'}",
+        introduction=SIZES,
+        quantities=whole_page.effort_quantities(results),
+        tables=(_size_table(found, settings),),
+        claims=population_claims.judge_study(judge, found, sizes, settings),
+        checks=SIZE_CHECKS,
+        drawings=_size_drawings(found, sizes, settings),
+    )
+
+
+def _size_table(found: tuple[Task, ...], settings: ReportSettings) -> Table:
+    """Return success and expected running times with their intervals, a row per task and size."""
+    level = settings.confidence
+    rows = tuple(
+        (
+            task.name,
+            f"{value:g}",
+            success(c).with_interval(level),
+            measures.refuted(c).with_interval(level),
+            *(_expected(c, metric, settings) for metric in METRICS),
+        )
+        for task in found
+        for value, c in task.by_value.items()
+    )
+    note = (
+        f"In brackets {100 * level:g} % intervals: Wilson's of shares, percentiles of "
+        f"{settings.num_resamples} resamples of seeds for expected running times; "
+        f"{sum(c.done for task in found for c in task.conditions)} runs."
+    )
+    names = (f"expected {metric}{SCALES[metric][1]}" for metric in METRICS)
+    headers = ("task", "λ", "goal met", "of these refuted", *names)
+    return Table("Success and expected running times", headers, rows, note)
+
+
+def _expected(condition: ConditionResults, metric: str, settings: ReportSettings) -> str:
+    """Return the expected running time with its interval."""
+    if not condition.solved:
+        return "∞"
+    runs = METRICS[metric](condition), solved(condition)
+    interval = expected_interval(*runs, settings.confidence, settings.num_resamples)
+    expected, low, high = (
+        markdown.number(float(f"{SCALES[metric][0] * value:.3g}"))
+        for value in (expected_effort(*runs), *interval)
+    )
+    return f"{expected} [{low}, {high}]"
+
+
+def _size_drawings(
+    found: tuple[Task, ...], sizes: dict[str, list[SizeComparison]], settings: ReportSettings
+) -> tuple[Drawing, ...]:
+    """Return the figures of effort, and of ratios where there are any."""
+    level = f"{100 * settings.confidence:g} %"
+    shown = tuple(c for task in found for c in task.conditions)
+    units = (f"{metric} [{'s' if metric == 'CPU time' else '-'}]" for metric in METRICS)
+    effort = dict(zip(units, METRICS.values(), strict=True))
+    shares = {"goal met": success, "of these: in contact between postures": measures.refuted}
+    levels = settings.confidence, settings.num_resamples
+    names = [task.name for task in found]
+    drawn = (
+        Drawing(
+            "effort",
+            "Success and effort against the size",
+            "a: share of runs that meet the goal; b: of these, the share whose path touches "
+            f"something between two postures; Wilson's {level} intervals. c–e: expected running "
+            f"times, {level} bootstrap intervals; sizes without a success have no point. Dashed: "
+            f"{RECOMMENDED:g}, which the paper recommends.",
+            partial(population_effort.effort_table, found, shares, effort, *levels),
+            partial(
+                population_effort.draw_effort,
+                setting="offspring per cycle λ [-]",
+                marked=RECOMMENDED,
+            ),
+            shown,
+        ),
+        Drawing(
+            "ratios",
+            f"Effort against that of {RECOMMENDED:g}",
+            f"Expected running times in units of that of {RECOMMENDED:g}, with intervals on "
+            "common seeds, Bonferroni's over a panel. Above 1: worse. Dotted: as many more "
+            "cycles as there are fewer individuals; above it the increase is over-proportional. "
+            "Where one of the two never succeeds, there is no point.",
+            partial(population_effort.ratios_table, sizes, names, RECOMMENDED),
+            partial(population_effort.draw_ratios, setting="λ [-]"),
+            shown,
+        ),
+    )
+    return drawn if any(sizes.values()) else drawn[:1]

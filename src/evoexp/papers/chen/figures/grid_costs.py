@@ -13,7 +13,6 @@ from evoexp.report.kit import groups as grouped
 
 AVERAGE = "average of a generation"
 EXACT, BOUND = "best path known", "no path costs less"
-NAMES = ["panel", "position", "condition", "quantity", "generation", "median", "lower", "upper"]
 
 
 def costs_table(found: tuple[Group, ...]) -> pd.DataFrame:
@@ -35,7 +34,19 @@ def costs_table(found: tuple[Group, ...]) -> pd.DataFrame:
         if group.truth is not None:
             known = (EXACT, group.optimum), (BOUND, group.bound)
             rows += [(group.title, -1, name, name, 0, *(value,) * 3) for name, value in known]
-    return pd.DataFrame(rows, columns=NAMES)
+    return pd.DataFrame(
+        rows,
+        columns=[
+            "panel",
+            "position",
+            "condition",
+            "quantity",
+            "generation",
+            "median",
+            "lower",
+            "upper",
+        ],
+    )
 
 
 def draw_costs(table: pd.DataFrame) -> Figure:

@@ -21,7 +21,6 @@ LOOKS: dict[str, dict[str, Any]] = {
     MEDIAN: {"color": style.CONDITION_COLOURS[0], "linewidth": 1.8},
     EXACT: {"color": style.CONDITION_COLOURS[1], "linewidth": 1.4, "linestyle": "--"},
 }
-NAMES = ["panel", "unit", "kind", "text", "number", "share", "x", "y"]
 
 
 class Line(NamedTuple):
@@ -66,7 +65,9 @@ def paths_table(
         for number, line in enumerate(lines):
             same = (*head, line.kind, line.text, number, line.share)
             rows += [(*same, x, y) for x, y in line.path.tolist()]
-    return pd.DataFrame(rows, columns=NAMES)
+    return pd.DataFrame(
+        rows, columns=["panel", "unit", "kind", "text", "number", "share", "x", "y"]
+    )
 
 
 def draw_paths(table: pd.DataFrame) -> Figure:
@@ -125,7 +126,7 @@ def _panels(table: pd.DataFrame, height: float) -> tuple[Figure, list[Axes]]:
 
 
 def places_table(shown: Sequence[Group]) -> pd.DataFrame:
-    """Return how many nodes of every unsafeness the paths of each first condition pass.
+    """Count the nodes of every unsafeness on the paths of each first condition.
 
     Returns:
         Columns position, condition, unsafeness, nodes (mean over the runs), runs.

@@ -22,8 +22,8 @@ LOOKS: dict[str, dict[str, Any]] = {
 }
 NAMES = ["panel", "case", "element", "theta_1_deg", "theta_2_deg", "cost"]
 LABEL = "E [-], lower is better"
+# range of a colour bar → its ticks, both in units of the least E
 TICKS = {20.0: [1.0, 2.0, 5.0, 10.0, 20.0], 3.0: [1.0, 1.5, 2.0, 3.0]}
-"""Range of a colour bar → its ticks, both in units of the least E."""
 
 
 def landscape_table(cases: list[Case]) -> pd.DataFrame:

@@ -105,7 +105,7 @@ def _draw_side(axes: Axes, rows: pd.DataFrame) -> None:
         joints = rows[rows["kind"] == name]
         axes.plot(joints["a"], joints["b"], pattern, **arm)
     (x, z), (fx, fz) = first[TARGET], first[FORCE]
-    axes.plot(x, z, "x", label="where the end-effector shall be", markersize=7, zorder=4, **MARK)
+    axes.plot(x, z, "x", label="target of the end-effector", markersize=7, zorder=4, **MARK)
     size = np.hypot(fx, fz) or 1.0
     tail = x - 0.6 * fx / size, z - 0.6 * fz / size
     axes.annotate("F", (x, z), tail, arrowprops=ARROW, ha="center", fontsize=7.5)

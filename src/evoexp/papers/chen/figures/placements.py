@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 
 from evoexp.papers.chen.cases import CLOSE, METHODS, Case
-from evoexp.records import FloatArray
 from evoexp.report.kit import groups, quantile, records, rounded, spread, style
 
 RUNS = ("GA", "GA, elitism", "random search")
@@ -21,15 +20,10 @@ OPTIMUM: dict[str, Any] = {
 }
 LEAST_GAP = 1e-6  # [-] smaller gaps are drawn as this one
 POSTURES = ("exact optimum", "best run", "paper's angles")
+# colour and width of each posture
 LOOKS = (style.NEUTRAL, 3.4), (style.ARM_COLOURS[0], 1.7), (style.ARM_COLOURS[1], 1.1)
-"""Colour and width of each of `POSTURES`."""
 ARROW: dict[str, Any] = {"arrowstyle": "-|>", "color": style.ARM_COLOURS[2], "linewidth": 1.4}
 OBSTACLE: dict[str, Any] = {"color": style.FORBIDDEN, "ms": 7, "mec": "white", "zorder": 8}
-FITNESS = [
-    *("panel", "case", "quantity", "method", "generation"),
-    *("median", "lower", "upper", "average", "runs", "optimum"),
-]
-LINKS = ["panel", "case", "element", "posture", "x", "y", "x_end", "y_end", "size"]
 
 
 def _colour(method: str) -> str:
@@ -42,7 +36,7 @@ def _colour(method: str) -> str:
 def fitness_table(cases: list[Case]) -> pd.DataFrame:
     """Return median and quartiles over runs of the best fitness f = E_m − E so far.
 
-    Of the least torque norm it is the torque norm itself, which the paper draws.
+    For the criterion of the least torque norm it is that norm itself, as in the paper.
 
     Returns:
         Columns panel, case, quantity, method, generation, median, lower, upper, average (of a
@@ -60,12 +54,20 @@ def fitness_table(cases: list[Case]) -> pd.DataFrame:
                 median, lower, upper, _ = spread(best)
                 told = median, lower, upper, quantile(mean, 0.5), len(best)
                 rows.append((*given, method, index, *told, offset + sign * case.least))
-    return rounded(pd.DataFrame(rows, columns=FITNESS))
+    return rounded(
+        pd.DataFrame(
+            rows,
+            columns=[
+                *("panel", "case", "quantity", "method", "generation"),
+                *("median", "lower", "upper", "average", "runs", "optimum"),
+            ],
+        )
+    )
 
 
 def draw_fitness(table: pd.DataFrame) -> Figure:
     """Draw one panel per criterion: the best so far against generations, the optimum as a line."""
-    figure, places = _panels(table, 2.5)
+    figure, places = style.lines_of_panels(2.5, table["panel"].nunique(), 3, 0.6)
     for axes, (_, rows) in zip(places, groups(table, "panel"), strict=True):
         optimum, quantity = rows[["optimum", "quantity"]].iloc[0]
         for method, own in groups(rows, "method"):
@@ -117,7 +119,7 @@ def gaps_table(cases: list[Case]) -> pd.DataFrame:
 
 def draw_gaps(table: pd.DataFrame) -> Figure:
     """Draw shares of runs, or starts, whose gap is smaller than x, one panel per criterion."""
-    figure, places = _panels(table, 2.5)
+    figure, places = style.lines_of_panels(2.5, table["panel"].nunique(), 3, 0.6)
     for axes, (_, rows) in zip(places, groups(table, "panel"), strict=True):
         for (_, method), own in groups(rows, ["at", "method"]):
             x = np.sort(np.maximum(np.nan_to_num(own["gap"].to_numpy(), posinf=np.inf), LEAST_GAP))
@@ -175,7 +177,12 @@ def postures_table(cases: list[Case]) -> pd.DataFrame:
             if found.get("branch", -1.0) >= 0.0:
                 own += _links(case, posture, found)
         rows += [(panel, case.name, *row) for row in own]
-    return rounded(pd.DataFrame(rows, columns=LINKS))
+    return rounded(
+        pd.DataFrame(
+            rows,
+            columns=["panel", "case", "element", "posture", "x", "y", "x_end", "y_end", "size"],
+        )
+    )
 
 
 def _links(case: Case, posture: str, found: dict[str, float]) -> list[tuple[Any, ...]]:
@@ -194,7 +201,12 @@ def _links(case: Case, posture: str, found: dict[str, float]) -> list[tuple[Any,
 
 def draw_postures(table: pd.DataFrame) -> Figure:
     """Draw one panel per criterion: three postures, the force, the obstacle."""
-    figure, places = _panels(table, 2.6)
+    limits: dict[str, Any] = {}  # over all panels, with a margin
+    for axis in "xy":
+        values = table[[axis, f"{axis}_end"]].to_numpy()
+        margin = 0.07 * float(np.ptp(values)) + 0.05
+        limits[f"{axis}lim"] = values.min() - margin, values.max() + margin
+    figure, places = style.lines_of_panels(2.6, table["panel"].nunique(), 3, 0.6)
     for axes, (_, rows) in zip(places, groups(table, "panel"), strict=True):
         style.operational_axes(axes, "unit")
         axes.axhline(0.0, color=style.FAINT, linewidth=0.8)
@@ -208,7 +220,7 @@ def draw_postures(table: pd.DataFrame) -> Figure:
         for row in records(rows[rows["element"] == "force"]):
             axes.annotate("", (row.x_end, row.y_end), (row.x, row.y), arrowprops=ARROW, zorder=7)
             axes.plot([], [], color=ARROW["color"], label="force F")
-        axes.set(xlim=_around(table, "x"), ylim=_around(table, "y"), title=rows["case"].iloc[0])
+        axes.set(title=rows["case"].iloc[0], **limits)
         axes.xaxis.set_major_locator(style.few_ticks())
     style.legend_of_all(figure, places, 5)
     return figure
@@ -225,15 +237,3 @@ def _draw_posture(axes: Axes, rows: pd.DataFrame, label: str, colour: str, width
         look: dict[str, Any] = {"fill": False, "edgecolor": colour, "linewidth": 0.6 * width}
         corner, length = (row.x, row.y), row.x_end - row.x
         axes.add_patch(FancyBboxPatch(corner, length, height, boxstyle=ends, zorder=4, **look))
-
-
-def _around(table: pd.DataFrame, name: str) -> tuple[float, float]:
-    """Return the range of a coordinate over all panels, with a margin."""
-    values: FloatArray = table[[name, f"{name}_end"]].to_numpy()
-    margin = 0.07 * float(np.ptp(values)) + 0.05
-    return float(values.min()) - margin, float(values.max()) + margin
-
-
-def _panels(table: pd.DataFrame, height: float) -> tuple[Figure, list[Axes]]:
-    """Return a figure with a panel for each criterion of a table, three in a line at most."""
-    return style.lines_of_panels(height, table["panel"].nunique(), 3, 0.6)

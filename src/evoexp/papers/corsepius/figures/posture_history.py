@@ -1,4 +1,4 @@
-"""How a search comes near its goal, phase by phase, and why searches end."""
+"""The approach of searches to their goals, phase by phase."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from evoexp.papers.corsepius import measures
-from evoexp.report.kit import Proportion, Results, counted, groups, quantile, records, style
+from evoexp.report.kit import Results, counted, groups, quantile, records, style
 
 DISTANCE, COST = "distance to the goal", "cost"
 PER_LINE = 3  # panels
@@ -18,10 +18,6 @@ VISIBLE = 1e-6  # [length unit] smaller tolerances are not drawn
 QUARTILES = (0.5, 0.25, 0.75)
 TOLERANCE: dict[str, Any] = {"color": style.NEUTRAL, "linewidth": 0.9, "linestyle": (0, (4, 2))}
 BESIDE: dict[str, Any] = {"va": "center", "ha": "left"}  # a text to the right of its place
-PHASES = [
-    *("position", "condition", "order", "phase", "begun", "reached"),
-    *("share", "lower", "upper", "cycles", "cycles_lower", "cycles_upper"),
-]
 
 
 def history_table(results: Results) -> pd.DataFrame:
@@ -132,7 +128,13 @@ def phases_table(results: Results, confidence: float) -> pd.DataFrame:
             given = position, c.label, int(phase), measures.phase_names(c)[int(phase)]
             share = (reached.total, reached.having, reached.share, *reached.interval(confidence))
             rows.append((*given, *share, *(quantile(cycles, share) for share in QUARTILES)))
-    return pd.DataFrame(rows, columns=PHASES)
+    return pd.DataFrame(
+        rows,
+        columns=[
+            *("position", "condition", "order", "phase", "begun", "reached"),
+            *("share", "lower", "upper", "cycles", "cycles_lower", "cycles_upper"),
+        ],
+    )
 
 
 def draw_phases(table: pd.DataFrame) -> Figure:
@@ -162,12 +164,3 @@ def draw_phases(table: pd.DataFrame) -> Figure:
     )
     right.set(xlim=(0, None), xlabel="cycles (median, quartiles)", title="b  cycles")
     return figure
-
-
-def reason_rows(results: Results) -> list[tuple[str, int, str, Proportion]]:
-    """Count the runs of every condition that ended for each reason: rows of `shares_table`."""
-    return [
-        (f"ended by {reason}", position, c.label, measures.reasons(c)[reason])
-        for reason in measures.REASONS
-        for position, c in enumerate(results.main)
-    ]

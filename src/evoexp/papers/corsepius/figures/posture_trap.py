@@ -34,10 +34,6 @@ AROUND = 3.0  # [scopes] the landscape reaches from the posture that is stuck
 BOXES = (0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
 SAMPLES = 20_000  # postures in each box
 STUCK, HELPED = "stuck", "helped"
-NAMES = [
-    *("element", "series", "replicate", "order", "value", *solids.COLUMNS),
-    *("x_end", "y_end", "scope_deg"),
-]
 END: dict[str, Any] = {"color": style.FORBIDDEN, "markersize": 4, "zorder": 5}
 STAR: dict[str, Any] = {
     "color": "white",
@@ -94,7 +90,14 @@ def trap_table(stuck: ConditionResults, helped: ConditionResults) -> pd.DataFram
     shapes = obstacle_shapes(problem.obstacles_in(problem.last_stage))
     standing = [solids.solid(*shape) for shape in shapes]
     rows += [{"element": OBSTACLE, "order": k} | own for k, own in enumerate(standing) if own]
-    table = rounded(pd.DataFrame(rows).reindex(columns=NAMES))
+    table = rounded(
+        pd.DataFrame(rows).reindex(
+            columns=[
+                *("element", "series", "replicate", "order", "value", *solids.COLUMNS),
+                *("x_end", "y_end", "scope_deg"),
+            ]
+        )
+    )
     return table.assign(joint_x=a + 1, joint_y=b + 1, length_unit=stuck.condition.length_unit)
 
 

@@ -9,7 +9,7 @@ import pytest
 from evoexp.papers.chen import cases as case_results
 from evoexp.papers.chen import placement_claims
 from evoexp.papers.chen.cases import Case
-from evoexp.papers.chen.figures import landscapes, placements
+from evoexp.papers.chen.figures import placements
 from evoexp.report import verdicts
 from report_samples import figure_stems, page_settings, smoke_report, smoke_results
 
@@ -53,10 +53,10 @@ def test_the_landscapes(outputs: Path) -> None:
     directory = smoke_report(outputs, "chen_landscapes")
     assert figure_stems(directory) == {"fig_9_landscapes"}
     table = pd.read_csv(directory / "fig_9_landscapes.csv")
-    assert set(table["element"]) == {*landscapes.LOOKS, landscapes.GRID}
-    grid = table[table["element"] == landscapes.GRID]
+    assert set(table["element"]) == {*placements.LOOKS, placements.GRID}
+    grid = table[table["element"] == placements.GRID]
     least = grid.groupby("case")["cost"].min()
-    best = table[table["element"] == landscapes.OPTIMUM].groupby("case")["cost"].min()
+    best = table[table["element"] == placements.OPTIMUM].groupby("case")["cost"].min()
     assert (best <= least).all()
 
 

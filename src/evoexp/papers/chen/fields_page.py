@@ -6,14 +6,6 @@ import numpy as np
 import pandas as pd
 
 from evoexp.papers.chen.figures import field_grids
-from evoexp.papers.chen.figures.field_grids import (
-    MISSING,
-    SURPLUS,
-    WRONG,
-    compare,
-    printed,
-    rows_of,
-)
 from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.report.kit import (
     Claim,
@@ -34,9 +26,9 @@ PRINT = "chen_fig_1.txt"
 NAMES = ("(a) potential toward the goal", "(b) potential of obstacles")
 PLACE = "row {0.row} from the top, column {0.column}"
 SLIPS = {
-    WRONG: PLACE + ": {0.printed} for {0.computed}",
-    MISSING: PLACE + ": {0.computed} is left out",
-    SURPLUS: PLACE + ": a {0.printed} too many before it",
+    field_grids.WRONG: PLACE + ": {0.printed} for {0.computed}",
+    field_grids.MISSING: PLACE + ": {0.computed} is left out",
+    field_grids.SURPLUS: PLACE + ": a {0.printed} too many before it",
 }
 INTRODUCTION = (
     "Wave fronts over a grid (section 2.1): from the goal, whose potential is 0, and from "
@@ -71,16 +63,17 @@ def _compared(condition: ConditionResults) -> pd.DataFrame:
     """Return all nodes of both fields beside the printed ones; see `field_grids.compare`."""
     goal, unsafeness = _fields(condition)
     blocked, edge = np.isnan(goal), f"{condition.planner.collision.obstacle_potentials[0]:g}"
-    computed = rows_of(goal, blocked), rows_of(unsafeness, blocked, edge)
-    parts = map(compare, NAMES, computed, printed(PRINT))
+    computed = field_grids.rows_of(goal, blocked), field_grids.rows_of(unsafeness, blocked, edge)
+    parts = map(field_grids.compare, NAMES, computed, field_grids.printed(PRINT))
     return pd.concat(parts, ignore_index=True)
 
 
 def _claim(judge: Judge, name: str, table: pd.DataFrame) -> Claim:
     """Judge that a field is printed as the wave front computes it."""
-    total = int((table["slip"] != SURPLUS).sum())
+    total = int((table["slip"] != field_grids.SURPLUS).sum())
     same, wrong, missing, surplus = (
-        int((table["slip"] == slip).sum()) for slip in ("", WRONG, MISSING, SURPLUS)
+        int((table["slip"] == slip).sum())
+        for slip in ("", field_grids.WRONG, field_grids.MISSING, field_grids.SURPLUS)
     )
     return judge.claim(
         text=f"The wave front gives Fig. 1{name}",

@@ -68,7 +68,10 @@ def fits(results: Results) -> bool:
     """Whether there are planners' results, and all are of paths over a plane grid."""
     found = results.with_data
     evolved = planned_by(results, GridPathGa) and any(not c.is_reference for c in found)
-    return evolved and all(len(_scenario(c).size) == 2 for c in found)
+    return evolved and all(
+        len(c.condition.scenario.size) == 2  # type: ignore[attr-defined]
+        for c in found
+    )
 
 
 def group_list(results: Results) -> tuple[Group, ...]:
@@ -102,12 +105,7 @@ def paths(condition: ConditionResults) -> dict[int, FloatArray]:
 
 def boxes(condition: ConditionResults) -> list[tuple[int, ...]]:
     """Return the obstacles as blocks of nodes (x0, y0, x1, y1)."""
-    return list(_scenario(condition).obstacles)
-
-
-def _scenario(condition: ConditionResults) -> Any:
-    """Return the grid, with the fields that only it has."""
-    return condition.condition.scenario
+    return list(condition.condition.scenario.obstacles)  # type: ignore[attr-defined]
 
 
 def route_list(groups: tuple[Group, ...]) -> Routes:

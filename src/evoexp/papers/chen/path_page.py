@@ -8,7 +8,7 @@ import numpy as np
 
 from evoexp.papers.chen import path_claims
 from evoexp.papers.chen import path_measures as measures
-from evoexp.papers.chen.figures import grid_costs, grid_paths
+from evoexp.papers.chen.figures import grid_paths
 from evoexp.papers.chen.figures.grid_paths import FAINT, Line
 from evoexp.papers.chen.path_measures import Group, Routes
 from evoexp.report.kit import (
@@ -190,8 +190,8 @@ def drawings(groups: tuple[Group, ...], found: Routes) -> tuple[Drawing, ...]:
         "Gaps to the best path known",
         "Share of runs whose cost is at most so far above the best path known. Random walks may be "
         "so far off that their curve starts late.",
-        partial(grid_costs.gaps_table, groups),
-        grid_costs.draw_gaps,
+        partial(grid_paths.gaps_table, groups),
+        grid_paths.draw_gaps,
         shown,
     )
     return (
@@ -201,8 +201,8 @@ def drawings(groups: tuple[Group, ...], found: Routes) -> tuple[Drawing, ...]:
             "Best so far: median and quartiles of the runs; dashed: average of a generation. "
             "Random search draws as many random walks. Dotted and dash-dotted: cost of "
             "the best path known, and the bound below which no path is.",
-            partial(grid_costs.costs_table, groups),
-            grid_costs.draw_costs,
+            partial(grid_paths.costs_table, groups),
+            grid_paths.draw_costs,
             shown,
         ),
         Drawing(

@@ -7,7 +7,7 @@ import numpy as np
 
 from evoexp.papers.chen import placement_claims
 from evoexp.papers.chen.cases import CLOSE, Case, cases
-from evoexp.papers.chen.figures import landscapes, placements
+from evoexp.papers.chen.figures import placements
 from evoexp.planners.placement_ga.planner import PlacementGa
 from evoexp.report.kit import (
     ConditionResults,
@@ -103,8 +103,8 @@ def landscapes_page(results: Results, settings: ReportSettings) -> Page:
         "Points: the best of every run of the genetic algorithm; stars: the exact optimum and "
         "its mirror image; triangles: the other local minima; cross: the angles that the paper "
         "prints.",
-        partial(landscapes.landscape_table, shown),
-        landscapes.draw_landscape,
+        partial(placements.landscape_table, shown),
+        placements.draw_landscape,
         tuple(c for case in shown for c in case.conditions),
     )
     return Page(

@@ -186,6 +186,11 @@ def checks(results: Results) -> tuple[tuple[str, str], ...]:
 def drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
     """Return the figures."""
     main, level = results.main, f"{100 * settings.confidence:g} %"
+    shown = [
+        ShownPath(f"{c.label}\nrun {k}{'' if c.solved else ', not solved'}", c, k)
+        for c in main
+        for k in (measures.shown_replicate(c),)
+    ]
     reasons = [
         (f"ended by {reason}", position, c.label, measures.reasons(c)[reason])
         for reason in measures.REASONS
@@ -222,7 +227,7 @@ def drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
             shares.draw_shares,
             main,
         ),
-        _paths("paths", "Paths", PATHS, [_shown(c) for c in main]),
+        _paths("paths", "Paths", PATHS, shown),
         *_manoeuvres(results, settings),
         *_trap(main),
     )
@@ -294,10 +299,3 @@ def _models(main: tuple[ConditionResults, ...]) -> Drawing:
         solids.draw_models,
         found,
     )
-
-
-def _shown(condition: ConditionResults) -> ShownPath:
-    """Return the run that is drawn of a condition."""
-    replicate = measures.shown_replicate(condition)
-    state = "" if condition.solved else ", not solved"
-    return ShownPath(f"{condition.label}\nrun {replicate}{state}", condition, replicate)

@@ -113,11 +113,6 @@ def page(results: Results, settings: ReportSettings) -> Page:
     )
 
 
-def groups(results: Results) -> tuple[tuple[ConditionResults, ...], ...]:
-    """Return the conditions by robot and scenario, controls included."""
-    return grouped(results.with_data, measures.scene)
-
-
 def effort(condition: ConditionResults) -> FloatArray:
     """Return the evaluations to the goal of each run, (done,); inf without it."""
     return np.where(solved(condition), measures.evaluations(condition), np.inf)
@@ -133,7 +128,7 @@ def comparisons(results: Results, settings: ReportSettings) -> list[FirstCompari
     values = effort if reaching else measures.residuals
     found = (
         (name, first.label, compared([(first, other) for other in others], values, settings))
-        for first, *others in groups(results)
+        for first, *others in grouped(results.with_data, measures.scene)
     )
     return [one for one in found if one[2]]
 
@@ -141,7 +136,7 @@ def comparisons(results: Results, settings: ReportSettings) -> list[FirstCompari
 def _table(results: Results, settings: ReportSettings) -> Table:
     """Return success, verdicts and oversized steps of every condition."""
     rows, level = [], settings.confidence
-    for first, *others in groups(results):
+    for first, *others in grouped(results.with_data, measures.scene):
         met, touching = (
             [
                 "–",

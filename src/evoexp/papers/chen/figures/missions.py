@@ -1,6 +1,7 @@
 """A mobile manipulator's whole motion: the way from above, the docking posture from the side."""
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -37,13 +38,15 @@ def missions_table(shown: Sequence[ConditionResults]) -> pd.DataFrame:
         q, verdict = c.motion(replicate).q, c.summaries.loc[replicate]
         word = "certified" if verdict["certified"] else "not certified"
         told = f"{c.label}, run {replicate}, {word}, clearance {verdict['clearance']:.3g}"
-        robot, scenario = _typed(c)
+        robot: Any = c.condition.robot
+        scenario: Any = c.condition.scenario
+        arm = partial(_joints, c.problem(Problem).scene.model, robot.link_lengths[-1])
         reach, above = scenario.docking.target
         kinds = [
             *((OBSTACLE, k, [box[:2], box[2:]]) for k, box in enumerate(scenario.grid.obstacles)),
             (PATH, 0, q[:-1, :2].tolist()),
-            (TRAVEL, 0, _joints(c, q[-2])),
-            (DOCKED, 0, _joints(c, q[-1])),
+            (TRAVEL, 0, arm(q[-2])),
+            (DOCKED, 0, arm(q[-1])),
             (BODY, 0, [(robot.body_radius, robot.body_height)]),
             (TARGET, 0, [(scenario.task_origin[0] + reach, robot.body_height + above)]),
             (FORCE, 0, [scenario.docking.force]),
@@ -53,18 +56,18 @@ def missions_table(shown: Sequence[ConditionResults]) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=["row", "unit", "kind", "number", "a", "b"])
 
 
-def _typed(condition: ConditionResults) -> tuple[Any, Any]:
-    """Return a mission's robot and scenario, with the fields that only they have."""
-    return condition.condition.robot, condition.condition.scenario
+def _joints(model: pin.Model, last: float, q: FloatArray) -> list[list[float]]:
+    """Return the arm's joints and its end, (4, 2): x, and height.
 
-
-def _joints(condition: ConditionResults, q: FloatArray) -> list[list[float]]:
-    """Return the arm's joints and its end at a configuration (nq,), (4, 2): x, and height."""
-    model, (robot, _) = condition.problem(Problem).scene.model, _typed(condition)
+    Args:
+        model: Platform and arm.
+        last: Length of the last link.
+        q: (nq,) configuration.
+    """
     data = model.createData()
     pin.forwardKinematics(model, data, q)
     points = [data.oMi[k].translation for k in range(3, model.njoints)]
-    points.append(data.oMi[model.njoints - 1].act(np.array([robot.link_lengths[-1], 0.0, 0.0])))
+    points.append(data.oMi[model.njoints - 1].act(np.array([last, 0.0, 0.0])))
     return [[float(x), float(z)] for x, _, z in points]
 
 

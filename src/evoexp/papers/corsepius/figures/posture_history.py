@@ -65,7 +65,9 @@ def draw_history(table: pd.DataFrame) -> Figure:
     its own panel, with a line per phase.
     """
     conditions = sorted(set(zip(table["position"], table["condition"], strict=True)))
-    phases, many = _ordered(table), len(conditions) > MANY
+    in_order = table.sort_values(["position", "order"], kind="stable")["phase"]
+    phases = sorted(dict.fromkeys(in_order), key=lambda name: not name.startswith("subgoal"))
+    many = len(conditions) > MANY
     by, names = ("phase", phases) if many else ("condition", [name for _, name in conditions])
     if many:
         panels = [(table["position"] == k, name, DISTANCE) for k, name in conditions]
@@ -105,12 +107,6 @@ def _draw_curves(axes: Axes, table: pd.DataFrame, by: str, names: list[str]) -> 
         axes.annotate(runs, at, color=colour, annotation_clip=False, fontsize=6, **BESIDE)
     axes.set(yscale="log", xlim=(0, max(1, int(table["cycle"].max()))))
     axes.xaxis.set_major_locator(MaxNLocator(nbins=4, integer=True))
-
-
-def _ordered(table: pd.DataFrame) -> list[str]:
-    """Return the names of the phases, sub-goals first, those of every condition in its order."""
-    names = table.sort_values(["position", "order"], kind="stable")["phase"]
-    return sorted(dict.fromkeys(names), key=lambda name: not name.startswith("subgoal"))
 
 
 def phases_table(results: Results, confidence: float) -> pd.DataFrame:

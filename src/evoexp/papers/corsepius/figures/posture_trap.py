@@ -50,16 +50,18 @@ def pair(shown: tuple[ConditionResults, ...]) -> tuple[ConditionResults, Conditi
     Returns:
         (without sub-goals, with sub-goals); None if either is missing.
     """
-    found = (
-        (stuck, helped)
-        for helped in shown
-        for stuck in shown
-        if stuck.solved < stuck.done
-        and helped.solved > 0
-        and len(measures.phase_names(stuck)) == 1
-        and measures.only_subgoals_differ(stuck, helped)
+    return next(
+        (
+            (stuck, helped)
+            for helped in shown
+            for stuck in shown
+            if stuck.solved < stuck.done
+            and helped.solved > 0
+            and len(measures.phase_names(stuck)) == 1
+            and measures.only_subgoals_differ(stuck, helped)
+        ),
+        None,
     )
-    return next(found, None)
 
 
 def trap_table(stuck: ConditionResults, helped: ConditionResults) -> pd.DataFrame:

@@ -179,7 +179,8 @@ def models_table(shown: Sequence[tuple[str, ConditionResults]]) -> pd.DataFrame:
 def draw_models(table: pd.DataFrame) -> Figure:
     """Draw one row per robot: its bodies, and their covers."""
     robots = list(groups(table, ["position", "robot"]))
-    heights = [_height(corners(rows)) for _, rows in robots]
+    spans = [np.ptp(corners(rows), axis=0) for _, rows in robots]
+    heights = [float(np.clip(2.0 + 1.6 * z / max(x, y), 2.3, 3.3)) for x, y, z in spans]  # [inch]
     figure = style.figure(sum(heights))
     grid = figure.add_gridspec(len(robots), 2, height_ratios=heights)
     for (position, robot), rows in robots:
@@ -197,12 +198,6 @@ def draw_models(table: pd.DataFrame) -> Figure:
                 draw_solid(axes, row, style.arm_colour(k), alpha)
             axes.set_title(title)
     return figure
-
-
-def _height(points: FloatArray) -> float:
-    """Return the height of a panel that holds some points [inch]."""
-    x, y, z = np.ptp(points, axis=0)
-    return float(np.clip(2.0 + 1.6 * z / max(x, y), 2.3, 3.3))
 
 
 def _capsule(joint: Any, start: FloatArray, stop: FloatArray, radius: float) -> tuple[Any, ...]:

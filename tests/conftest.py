@@ -43,6 +43,22 @@ def pytest_pycollect_makeitem(collector: pytest.Collector, name: str, obj: Any) 
     return [] if "matrix" in marked or collector.get_closest_marker("matrix") else None
 
 
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Keep some cases of tests marked `examples`, unless the matrices are asked for."""
+    cases: dict[str, list[pytest.Item]] = {}
+    for item in items:
+        if item.get_closest_marker("examples") and not matrices_are_asked_for():
+            cases.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    left_out = set[pytest.Item]()
+    for every in cases.values():
+        marker = every[0].get_closest_marker("examples")
+        count = marker.args[0] if marker else len(every)
+        left_out.update(set(every) - {every[k * len(every) // count] for k in range(count)})
+    if left_out:
+        config.hook.pytest_deselected(items=list(left_out))
+        items[:] = [item for item in items if item not in left_out]
+
+
 def pytest_collection_finish() -> None:
     """Let garbage be collected again, and what is kept never be looked at."""
     gc.freeze()

@@ -113,6 +113,7 @@ def test_every_shipped_condition_has_a_hash_of_its_own() -> None:
     assert len(different) > len(everything) // 2
 
 
+@pytest.mark.examples(2)
 def test_every_setting_is_part_of_the_hash(shipped: Condition) -> None:
     """Change each setting by the smallest step that stays valid: another hash, or it is refused.
 
@@ -163,6 +164,7 @@ def test_every_setting_is_part_of_the_hash(shipped: Condition) -> None:
     assert count > 20
 
 
+@pytest.mark.examples(2)
 def test_whole_numbers_and_floats_are_one_setting(shipped: Condition) -> None:
     config = json.loads(shipped.to_json())
     for path, value in leaves(config):

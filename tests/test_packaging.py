@@ -117,6 +117,7 @@ def test_the_installed_command(installed: Path, tmp_path: Path) -> None:
     assert "rana_planar" in execute(command, "list", cwd=tmp_path, PYTHONPATH=str(installed))
 
 
+@pytest.mark.matrix
 def test_the_installed_package_runs_an_experiment_from_any_directory(
     installed: Path, tmp_path: Path
 ) -> None:

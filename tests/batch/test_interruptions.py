@@ -152,6 +152,7 @@ def test_kill_9_at_any_moment(
     assert not list(directory.replicates.glob(".*"))
 
 
+@pytest.mark.matrix
 def test_a_worker_forked_from_the_server_may_die(
     faulty: Condition, undisturbed: dict[int, str], tmp_path: Path, plug_in: Path
 ) -> None:

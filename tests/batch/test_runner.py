@@ -308,6 +308,7 @@ def test_what_a_killed_writer_left_is_cleared_away(faulty: Condition, tmp_path: 
 # Workers
 
 
+@pytest.mark.matrix
 def test_a_killed_worker_costs_its_own_replicate_a_retry(
     faulty: Condition,
     undisturbed: dict[int, str],

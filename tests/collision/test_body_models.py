@@ -67,6 +67,7 @@ def test_no_hit_that_coal_sees_is_missed(name: str, kind: str) -> None:
     assert np.count_nonzero(found & ~seen) < 0.35 * 4000, "what the covers add stays a part"
 
 
+@pytest.mark.examples(1)
 @pytest.mark.parametrize("name", EXPERIMENTS)
 def test_pairs_that_are_left_out_never_or_always_touch(name: str) -> None:
     assembly, _ = robot(name)

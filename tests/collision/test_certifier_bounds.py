@@ -138,6 +138,7 @@ def slow_walk(judged: _Judgement, pair: int, t: float) -> float:
     return least
 
 
+@pytest.mark.matrix
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 2**32 - 1), t=st.floats(0.0, 1.0))
 def test_local_minima_are_found(seed: int, t: float) -> None:

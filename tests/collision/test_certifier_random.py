@@ -15,6 +15,7 @@ SCENES, BATCH = 200, 20
 COAL_ERROR = 1e-6  # of distances of curved bodies, far above what was seen
 
 
+@pytest.mark.examples(1)
 @pytest.mark.parametrize("first_scene", first(2, range(0, SCENES, BATCH)))
 def test_brute_force_never_contradicts(first_scene: int) -> None:
     statuses = []

@@ -110,6 +110,7 @@ def random_points(kind: str, rng: np.random.Generator, size: int) -> tuple[Any, 
     return (0.0, 0.0), points[0], (scale, 0.0), points[1]
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize(
     "kind", ["grid", "thirds", "close", "far", "ulps", "tiny", "huge", "mixed"]
 )

@@ -81,6 +81,7 @@ def test_counts_are_coal_s(names: Any) -> None:
     assert 0 < found.sum() < least.size
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize("names", [*([name] for name in OBSTACLES), list(OBSTACLES)], ids=" ".join)
 def test_envelopes_are_coal_s(names: Any) -> None:
     table = obstacle_table(tuple(OBSTACLES[name] for name in names))

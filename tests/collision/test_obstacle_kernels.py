@@ -53,6 +53,7 @@ def coal_distances(
     return np.array(found).reshape(geometry.ngeoms, len(obstacles))
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize(
     "obstacles", [*((o,) for o in CYLINDERS + HALF_SPACES), CYLINDERS + HALF_SPACES]
 )

@@ -150,6 +150,7 @@ def test_spheres_on_random_trees_agree_with_the_plain_reference(seed: int) -> No
     check_against_plain(rng, model, geometry, -np.inf)
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize("seed", range(6))
 def test_capsules_on_random_trees_agree_with_the_plain_reference(seed: int) -> None:
     rng = np.random.default_rng(100 + seed)

@@ -92,6 +92,7 @@ def coal_obstacle(obstacle: object) -> coal.CollisionObject:
     return coal.CollisionObject(coal.Capsule(obstacle.radius, length), turn, 0.5 * (start + end))
 
 
+@pytest.mark.examples(1)
 @pytest.mark.parametrize(
     "robot", [TWO_PLANAR, THREE_PLANAR, TWO_SPATIAL], ids=["two planar", "three planar", "spatial"]
 )

@@ -38,6 +38,7 @@ def motion(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize("label", LABELS)
 @pytest.mark.parametrize("replicate", [0, 1])
 def test_the_best_of_a_stored_run_is_worth_what_is_recorded(

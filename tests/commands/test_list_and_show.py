@@ -62,6 +62,7 @@ def test_stored_runs(evoexp: Evoexp, stored: Path, width: int) -> None:
     assert "via-point" in said.out
 
 
+@pytest.mark.examples(1)
 @pytest.mark.parametrize("name", ["rana_planar", "rana", "rana_planar_ablations"])
 def test_a_condition_that_experiments_share_is_named_as_it_was_run(
     name: str, evoexp: Evoexp, outputs: Path, monkeypatch: pytest.MonkeyPatch

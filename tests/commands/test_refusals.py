@@ -27,6 +27,7 @@ EXPERIMENTS = ", ".join(options("experiment"))
 OPTIONS = f"(options: {EXPERIMENTS})"
 
 
+@pytest.mark.examples(11)
 @pytest.mark.parametrize(
     ("override", "message"),
     [
@@ -163,6 +164,7 @@ def test_overrides(refused: Refused, override: str, message: str) -> None:
     assert message in refused("run", *ARMS, override)
 
 
+@pytest.mark.examples(4)
 @pytest.mark.parametrize(
     ("words", "message"),
     [

@@ -1,6 +1,7 @@
 """`evoexp show` of a configuration before anything ran, and of a log; `--json` of show and list."""
 
 import json
+import re
 import shlex
 from collections.abc import Callable
 from pathlib import Path
@@ -97,7 +98,7 @@ def test_a_stored_run_is_one_screen(evoexp: Evoexp, stored: Path, width: int) ->
         assert len(lines) <= 40
         assert max(map(len, lines)) <= width
         found = sections(said.out)
-        assert f"stored in {run.path}" in found["origin"].replace("\n", "")
+        assert f"stored in {run.path}".replace(" ", "") in re.sub(r"\s", "", found["origin"])
         rows = read_summaries(run)
         certified = int((rows["certified"] == True).sum())  # noqa: E712  # a column
         assert found["verdict"].startswith(f"{certified} certified, {2 - certified} refuted")

@@ -67,6 +67,7 @@ def test_words_that_are_overrides(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert is_motion("~mine.json")
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize(
     "words",
     [
@@ -104,6 +105,7 @@ def test_a_motion_file_alone_lacks_an_experiment(refused: Refused, motion: str) 
         assert refused(command, motion).startswith("experiment: must be chosen: ")
 
 
+@pytest.mark.matrix
 def test_all_commands_search_a_folder_of_options(
     evoexp: Evoexp, outputs: Path, motion: str, conf: str, tmp_path: Path
 ) -> None:

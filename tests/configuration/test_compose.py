@@ -56,6 +56,7 @@ def write_experiment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callabl
     return write
 
 
+@pytest.mark.examples(4)
 @pytest.mark.parametrize("experiment", EXPERIMENTS)
 @pytest.mark.parametrize("budget", ["paper", "smoke"])
 def test_every_experiment_composes_at_every_budget(experiment: str, budget: str) -> None:
@@ -72,6 +73,7 @@ def test_every_kind_of_condition_can_be_prepared(kind: Kind) -> None:
     of_kind(kind, "paper").prepare()
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize("experiment", EXPERIMENTS)
 def test_a_quick_budget_has_the_conditions_of_the_papers(experiment: str) -> None:
     paper = expanded(experiment, "paper")
@@ -82,6 +84,7 @@ def test_a_quick_budget_has_the_conditions_of_the_papers(experiment: str) -> Non
     assert quick.num_replicates == min(paper.num_replicates, 5)
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize(
     "words",
     [
@@ -111,6 +114,7 @@ def test_an_experiment_file_says_how_it_is_run_and_what_it_is(experiment: str) -
 # Identity
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize(
     "overrides",
     [
@@ -134,6 +138,7 @@ def test_what_changes_no_result_changes_no_hash(overrides: tuple[str, ...]) -> N
     assert not experiment.changed
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize(
     "override",
     [
@@ -336,6 +341,7 @@ def test_an_experiment_twice_is_refused() -> None:
         expand(["experiment=rana_planar,rana_planar"], multirun=True)
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize(
     ("conditions", "message"),
     [
@@ -467,6 +473,7 @@ def test_a_group_that_the_planner_does_not_take_is_refused(
         expand(["experiment=mine", "ga=null"])
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize(
     ("overrides", "kind", "message"),
     [

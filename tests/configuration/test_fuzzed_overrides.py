@@ -133,6 +133,7 @@ def check(refusal: EvoexpError, text: str) -> None:
         assert isinstance(refusal, UnknownOption) and refusal.known, (text, message)
 
 
+@pytest.mark.examples(1)
 @pytest.mark.parametrize("experiment", first(3, EXPERIMENTS))
 def test_a_mutated_override_is_refused_in_one_line_or_taken(experiment: str) -> None:
     rng = random.Random(experiment)
@@ -172,6 +173,7 @@ def option_cases(rng: random.Random) -> Iterator[list[str]]:
         yield words
 
 
+@pytest.mark.matrix
 def test_choices_of_options_are_refused_in_one_line_or_taken() -> None:
     rng = random.Random(0)
     for _, words in zip(range(counts(40, 400)), option_cases(rng), strict=False):

@@ -209,6 +209,7 @@ def test_a_kept_expansion_of_a_file_follows_its_content(
     assert found == [21, 22]
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize(
     ("text", "message"),
     [

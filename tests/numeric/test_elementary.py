@@ -421,6 +421,7 @@ def test_normal_deviates_refuse_a_negative_size() -> None:
         standard_normal(np.random.default_rng(0), -1)
 
 
+@pytest.mark.matrix
 def test_kernels_do_not_load_scipy_but_those_that_need_blas_find_it() -> None:
     code = """
 import sys, numba, numpy as np

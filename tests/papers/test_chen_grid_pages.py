@@ -86,6 +86,7 @@ def test_no_gap_is_below_the_bound_and_groups_are_the_weightings(outputs: Path) 
     assert path_measures.shortest(groups) == pytest.approx(39.62741699796952)
 
 
+@pytest.mark.matrix
 def test_the_page_of_lingering_counts_repeated_nodes(outputs: Path) -> None:
     directory = smoke_report(outputs, "chen_lingering")
     assert figure_stems(directory) == {"paths", "lingering"}
@@ -94,6 +95,7 @@ def test_the_page_of_lingering_counts_repeated_nodes(outputs: Path) -> None:
     assert "100 nodes, 50 of them passed before; exact" in text
 
 
+@pytest.mark.matrix
 def test_the_page_of_fig_1_names_every_slip(outputs: Path) -> None:
     directory = smoke_report(outputs, "chen_fields")
     assert figure_stems(directory) == {"fig_1_fields", "fields_16_16", "fields_32_32"}

@@ -24,6 +24,7 @@ def cases(outputs: Path) -> list[Case]:
     return case_results.cases(smoke_results(outputs, "chen_placement"))
 
 
+@pytest.mark.matrix
 def test_conditions_are_told_apart(cases: list[Case]) -> None:
     assert [case.name for case in cases] == list(case_results.PRINTED)
     for case in cases:
@@ -49,6 +50,7 @@ def test_the_page(outputs: Path) -> None:
     assert "placement_optimum, revision 1" in text
 
 
+@pytest.mark.matrix
 def test_the_landscapes(outputs: Path) -> None:
     directory = smoke_report(outputs, "chen_landscapes")
     assert figure_stems(directory) == {"fig_9_landscapes"}

@@ -75,6 +75,7 @@ def test_the_page_of_a_task_has_its_figures_and_judges_nothing_below_its_budget(
     assert "## Phases" not in text
 
 
+@pytest.mark.matrix
 def test_a_manoeuvre_is_told_phase_by_phase(outputs: Path) -> None:
     directory = smoke_report(outputs, "corsepius_pick_and_place")
     assert {"manoeuvre", "phases"} <= figure_stems(directory)
@@ -84,6 +85,7 @@ def test_a_manoeuvre_is_told_phase_by_phase(outputs: Path) -> None:
     assert "greatest tilt at postures (upright)" in text
 
 
+@pytest.mark.examples(1)
 @pytest.mark.parametrize(
     ("name", "expected"),
     [
@@ -154,6 +156,7 @@ def test_lengths_and_detours_of_paths(outputs: Path) -> None:
     assert (detours >= 1.0).all()
 
 
+@pytest.mark.matrix
 def test_models_show_bodies_and_covers_that_hold_them(outputs: Path) -> None:
     condition = smoke_results(outputs, "corsepius_ball").conditions[0]
     table = solids.models_table([("MANUS", condition)])
@@ -188,6 +191,7 @@ def test_histories_keep_the_last_value_of_searches_that_ended(outputs: Path) -> 
     assert drawn(table, posture_history.draw_history)
 
 
+@pytest.mark.matrix
 def test_what_is_held_moves_in_the_manoeuvre(outputs: Path) -> None:
     condition = solved(outputs, "corsepius_pick_and_place").conditions[0]
     replicate = measures.shown_replicate(condition)
@@ -207,6 +211,7 @@ def test_what_is_held_moves_in_the_manoeuvre(outputs: Path) -> None:
     assert drawn(table, posture_motions.draw_motions)
 
 
+@pytest.mark.matrix
 def test_the_trap_shows_both_kinds_of_runs(outputs: Path) -> None:
     pair = posture_trap.pair(solved(outputs, "corsepius_wall").main)
     assert pair is not None
@@ -246,6 +251,7 @@ def test_the_slope_of_the_floor_is_that_of_the_medians(outputs: Path) -> None:
     assert population_effort.slope(task) == pytest.approx(expected)
 
 
+@pytest.mark.matrix
 def test_tables_of_many_conditions_stand_upright(outputs: Path) -> None:
     directory = smoke_report(outputs, "corsepius_population")
     text = (directory / "index.md").read_text()

@@ -74,6 +74,7 @@ def verdict(claims: dict[str, Claim], text: str) -> str:
     return next(claim.verdict for name, claim in claims.items() if name.startswith(text))
 
 
+@pytest.mark.matrix
 def test_equal_evaluations_per_cycle_make_larger_populations_slower() -> None:
     """Where cycles do not depend on the size, evaluations go with it."""
     claims = study(lambda task, size: (20.0, RUNS))

@@ -54,6 +54,7 @@ def test_the_page_has_the_papers_figures_and_judges_nothing_below_its_budget(out
     assert "convergence" not in figure_stems(directory)
 
 
+@pytest.mark.matrix
 def test_one_arm_has_a_page_of_its_own(outputs: Path) -> None:
     directory = smoke_report(outputs, "lavoie_10dof")
     text = (directory / "index.md").read_text()
@@ -74,6 +75,7 @@ def test_no_generation_is_read(outputs: Path, monkeypatch: pytest.MonkeyPatch) -
         drawing.table()
 
 
+@pytest.mark.examples(1)
 @pytest.mark.parametrize(
     ("name", "expected"),
     [
@@ -138,6 +140,7 @@ def test_arms_stand_as_the_paper_prints(outputs: Path) -> None:
     )
 
 
+@pytest.mark.matrix
 def test_solutions_show_tested_positions_and_contacts(outputs: Path) -> None:
     condition = blind(outputs)
     replicate, verdict = next(iter(body_contacts.refuted(condition).items()))

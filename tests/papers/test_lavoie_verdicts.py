@@ -99,7 +99,7 @@ def test_printed_percentages_say_the_numbers_and_the_rule() -> None:
     )
     assert (seven.verdict, ten.verdict) == (CONTRADICTED, REPRODUCED)
     assert seven.text == "7-DOF: a position error below 1 in 93.5 % of runs"
-    assert "964 of 1000 = 96.4 % [95.1, 97.4]; the printed one lies outside" in seven.evidence
+    assert "964 of 1000 = 96.4 % [95.1, 97.4]; the printed share lies outside" in seven.evidence
     assert (
         "its own thousand runs give [91.8, 94.9]; ours − printed +2.9 [+1.0, +4.9] points"
         in seven.evidence

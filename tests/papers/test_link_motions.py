@@ -30,6 +30,7 @@ def solution(one: Prepared) -> FloatArray:
     return genes.ravel()
 
 
+@pytest.mark.examples(1)
 def test_an_executed_motion_passes_its_configurations(one: Prepared, solution: FloatArray) -> None:
     found = link_motions.sampled(link_motions.executed(one, solution), 10)
     assert found.links.shape == found.speeds.shape == (51, 2, 2)
@@ -60,6 +61,7 @@ def test_limits_are_those_of_equation_2() -> None:
     assert link_motions.times_over_limit(one, link_motions.straight(one)) == pytest.approx(expected)
 
 
+@pytest.mark.matrix
 def test_a_control_has_the_limits_of_the_planner_beside_it() -> None:
     control = (
         expand("curkovic_methods_b", "control=random_search").conditions[0].condition.prepare()

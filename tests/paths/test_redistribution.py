@@ -71,6 +71,7 @@ BOUNDS = {
 }  # fmt: skip
 
 
+@pytest.mark.examples(9)
 @pytest.mark.parametrize("end", ENDS)
 @pytest.mark.parametrize(("joints", "samples"), BOUNDS)
 @pytest.mark.parametrize("num", [2, 3, 20, 40])

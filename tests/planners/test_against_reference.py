@@ -52,6 +52,7 @@ def largest_differences(given: Condition, seed: int, **changes: Any) -> tuple[fl
     return strings, costs
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("chords", ARC_LENGTH)
 def test_generations_agree_to_the_accuracy_of_the_arc_length(chords: int, seed: int) -> None:
@@ -61,6 +62,7 @@ def test_generations_agree_to_the_accuracy_of_the_arc_length(chords: int, seed: 
     assert costs < ARC_LENGTH[chords]  # weighted by 0.5 and 0.005, but summed over points
 
 
+@pytest.mark.examples(1)
 @pytest.mark.parametrize(
     ("experiment", "overrides"),
     [
@@ -78,6 +80,7 @@ def test_variants_agree_to_the_accuracy_of_the_arc_length(
     assert max(strings, costs) < ARC_LENGTH[128]
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize(
     ("experiment", "overrides"),
     [
@@ -114,6 +117,7 @@ def test_a_wrong_term_would_be_noticed() -> None:
     assert max(largest_differences(given, 0, unevenness_weight=0.0051)) > ROUNDING
 
 
+@pytest.mark.matrix
 def test_runs_end_equally_well() -> None:
     """With 8 samples of arc length the planner goes other ways than the reference, as far.
 

@@ -38,6 +38,7 @@ def same_paths(own: Any, problem: Any, seed: int, fault: str = "") -> bool:
     return True
 
 
+@pytest.mark.examples(3)
 @pytest.mark.parametrize(
     ("shape", "share", "changes"),
     [
@@ -98,6 +99,7 @@ def same_postures(planner: Any, problem: Any, seed: int, fault: str = "") -> boo
     return True
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize(
     ("words", "changes"),
     [

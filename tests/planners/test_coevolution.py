@@ -74,6 +74,7 @@ def test_costs_are_the_papers_sums() -> None:
         assert found.costs[r, i] == pytest.approx(sum(expected), abs=1e-12)
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize(
     "settings", [SMALL, NO_HALL, (*SMALL, "ga.hall_frozen=true"), (*SMALL, "ga.hall_memory=3")]
 )
@@ -175,6 +176,7 @@ def test_restarts_draw_fresh_populations() -> None:
         assert (first != second).sum() > (changed - 1) * 2 - 1
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -248,6 +250,7 @@ def test_no_team_is_cheaper_than_the_lower_bound() -> None:
     assert bound > turns
 
 
+@pytest.mark.matrix
 def test_a_spline_is_executed_between_the_same_configurations() -> None:
     planner, problem = prepared(*SMALL)
     curved, _ = prepared(*SMALL, "planner.interpolation=cubic")
@@ -293,6 +296,7 @@ def test_the_first_generations_of_method_v_are_those_of_the_pareto_experiment() 
     assert other.criteria is None
 
 
+@pytest.mark.matrix
 def test_thick_links_and_tools_are_judged_by_their_bodies() -> None:
     """What the envelopes' lines let pass between configurations, or a circle hides.
 

@@ -77,6 +77,7 @@ def compare(given: Condition, seed: int) -> dict[str, int]:
     return events
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize("method", METHODS)
 def test_the_papers_methods_agree(method: str) -> None:
     events = compare(condition({"ga.num_generations": 15}, label=method), 0)
@@ -84,6 +85,7 @@ def test_the_papers_methods_agree(method: str) -> None:
     assert events["feasible"] > 0
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize(
     "changes",
     [
@@ -112,6 +114,7 @@ def test_variants_agree(changes: dict[str, Any]) -> None:
         assert (events["contacts"] > 0) is ("scenario.obstacles" in changes)
 
 
+@pytest.mark.examples(1)
 @pytest.mark.parametrize("discs", [[], [DISC]], ids=["free", "beside a disc"])
 def test_three_robots_agree(discs: list[Any]) -> None:
     changes = SMALL | {"ga.num_elites": 1, "scenario.obstacles": discs}

@@ -37,6 +37,7 @@ def test_cost_and_solution_are_those_of_evolve() -> None:
         assert planner.evaluate(problem, generation.best)["cost"] == generation.best_cost  # type: ignore[attr-defined]
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize(("block", "stretch"), [(1, 16), (500, 16), (8192, 1), (8192, 5), (700, 3)])
 @pytest.mark.parametrize("elites", [0, 2])
 def test_generations_do_not_depend_on_how_numbers_and_they_are_made_in_blocks(
@@ -114,6 +115,7 @@ def test_an_infeasible_posture_is_told_as_such() -> None:
         planner.evaluate(problem, np.zeros(3))  # type: ignore[attr-defined]
 
 
+@pytest.mark.examples(3)
 @pytest.mark.parametrize(
     ("words", "message"),
     [

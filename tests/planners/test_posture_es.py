@@ -49,6 +49,7 @@ def differs(given: Any, fault: str = "") -> bool:
     return False
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize(
     ("name", "overrides"),
     [
@@ -78,6 +79,7 @@ def test_a_fault_would_be_noticed(fault: str) -> None:
     assert differs(condition("corsepius_ball", "ga.crossover_rate=0.5"), fault)
 
 
+@pytest.mark.examples(3)
 @pytest.mark.parametrize("replicate", range(5))
 @pytest.mark.parametrize("name", ["corsepius_ball", "corsepius_bottle", "corsepius_shelf"])
 def test_the_search_is_the_obvious_one(name: str, replicate: int) -> None:
@@ -91,6 +93,7 @@ def test_the_search_is_the_obvious_one(name: str, replicate: int) -> None:
     assert found.summary.stop_reason == reason
 
 
+@pytest.mark.examples(4)
 @pytest.mark.parametrize("replicate", range(10))
 @pytest.mark.parametrize("size", [10, 100])
 def test_a_path_has_one_posture_per_cycle_and_no_step_beyond_the_scope(
@@ -175,6 +178,7 @@ def test_a_sub_goal_solves_the_wall() -> None:
     assert found.summary.terms["phase_1_end"] > 0.0
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize(
     "override",
     [

@@ -19,6 +19,7 @@ def phases(text: str) -> str:
     return f"scenario.phases={text}"
 
 
+@pytest.mark.examples(6)
 @pytest.mark.parametrize(
     ("overrides", "message"),
     [
@@ -178,6 +179,7 @@ def test_goals_out_of_reach_are_searched_on_request() -> None:
     assert last.terms["goal_distance"] > 1.0
 
 
+@pytest.mark.examples(1)
 @pytest.mark.parametrize("name", ["corsepius_ball", "corsepius_shelf", "corsepius_gate_wide"])
 def test_nothing_is_farther_than_the_reach(name: str) -> None:
     _, problem = prepared(name)

@@ -75,6 +75,7 @@ def test_a_collision_costs_inf_and_says_where() -> None:
     )
 
 
+@pytest.mark.examples(1)
 @pytest.mark.parametrize("replicate", range(3))
 def test_a_whole_run_keeps_its_promises(replicate: int) -> None:
     planner, problem = prepared()
@@ -117,6 +118,7 @@ def test_a_whole_run_keeps_its_promises(replicate: int) -> None:
     assert 2.0 <= y <= 11.0
 
 
+@pytest.mark.examples(3)
 @pytest.mark.parametrize(
     "overrides",
     [
@@ -159,6 +161,7 @@ def test_all_settings_run_and_the_best_never_gets_worse(overrides: tuple[str, ..
         )
 
 
+@pytest.mark.examples(1)
 @pytest.mark.parametrize(
     "overrides", [(), ("ga.mutation_rate=0.01", "ga.crossover_rate=0.1"), ("ga.population_size=7",)]
 )
@@ -243,6 +246,7 @@ def test_the_arm_of_ten_joints_stands_before_the_moved_box() -> None:
     assert planner.shape(problem) == ((10,),) * 3
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize(
     ("overrides", "message"),
     [

@@ -71,6 +71,7 @@ def largest_difference(given: Any, seed: int, fault: str = "") -> tuple[float, s
     return largest, searched
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize(
     "changes",
     [

@@ -225,6 +225,7 @@ def test_more_evaluations_than_the_papers_are_not_made() -> None:
     assert last.collision_queries == last.evaluations * 20
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize(
     "overrides",
     [
@@ -256,6 +257,7 @@ def test_degenerate_settings_run(overrides: tuple[str, ...]) -> None:
         assert np.all(np.isfinite(generation.population))
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize(
     ("overrides", "message"),
     [

@@ -24,6 +24,7 @@ def unpacked(text: object) -> np.ndarray:
     return np.frombuffer(base64.b64decode(str(text)), dtype="<f4")
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize("name", sorted(SAMPLES))
 def test_a_page_holds_its_motion_and_refers_to_nothing(name: str) -> None:
     shown = recording(name)

@@ -68,6 +68,7 @@ def name(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
 
+@pytest.mark.examples(2)
 def test_it_reads_back_by_its_own_schemas_and_is_the_same_each_time(name: str) -> None:
     shown = recording(name)
     content = playable_log(shown)
@@ -84,6 +85,7 @@ def test_it_reads_back_by_its_own_schemas_and_is_the_same_each_time(name: str) -
     assert last == round(shown.motion.num_segments * shown.seconds * SECOND)
 
 
+@pytest.mark.examples(2)
 def test_composed_transforms_are_those_of_pinocchio(name: str) -> None:
     shown, topics = recording(name), decoded(playable_log(recording(name)))
     model = condition(name).robot.build().model
@@ -105,6 +107,7 @@ def test_composed_transforms_are_those_of_pinocchio(name: str) -> None:
             assert np.abs(where[model.names[joint]] - data.oMi[joint].homogeneous).max() < 1e-9
 
 
+@pytest.mark.examples(2)
 def test_every_body_is_drawn_once_in_the_frame_that_moves_it_and_of_its_size(name: str) -> None:
     shown, topics = recording(name), decoded(playable_log(recording(name)))
     frames = [*(frame.name for frame in shown.frames), "world"]

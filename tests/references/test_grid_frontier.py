@@ -53,6 +53,7 @@ def test_the_shortest_path_is_the_shortest_of_all(seed: int) -> None:
     assert truth.terms["bound_is_reached"]
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("weights", [(0.3, 1.0), (1.0, 0.3)])
 def test_no_path_is_below_the_bound_and_the_best_known_is_a_path(
@@ -181,6 +182,7 @@ def test_the_frontier_goes_from_the_shortest_to_the_safest() -> None:
     assert sums == sorted(sums, reverse=True)
 
 
+@pytest.mark.matrix
 def test_lingering_pays_in_the_papers_own_workspace() -> None:
     experiment = expanded("chen_lingering", "paper")
     found = {

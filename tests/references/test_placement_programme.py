@@ -40,6 +40,7 @@ def limited(case: str) -> Directions:
     )
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize("with_limits", [False, True])
 @pytest.mark.parametrize("case", LABELS)
 def test_the_programme_and_its_derivatives_are_those_of_complex_steps(

@@ -22,6 +22,7 @@ CASES = {  # E of the optimum as first found; see the test with another parametr
 }
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize("case", CASES)
 def test_the_optimum_is_that_of_another_parametrisation(case: str) -> None:
     truth, _, problem = found(case, "optimum")
@@ -98,6 +99,7 @@ def test_starts_reach_the_target() -> None:
     assert len({tuple(row) for row in truth.arrays["starts"]}) == 60
 
 
+@pytest.mark.matrix
 def test_the_landscape_is_the_planners_cost() -> None:
     truth, _, problem = found("minimax", "landscape")
     one, two, cost = (truth.arrays[name] for name in ("theta_1", "theta_2", "cost"))

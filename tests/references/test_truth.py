@@ -130,6 +130,7 @@ def test_run_list_show_reproduce_report(
     assert "DIVERGES by" in said("reproduce", found.id[:12], code=1)
 
 
+@pytest.mark.matrix
 def test_the_report_reads_references_beside_the_planners(
     said: Callable[..., str], tmp_path: Path
 ) -> None:

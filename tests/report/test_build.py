@@ -99,6 +99,7 @@ def test_sidecars_tell_what_a_figure_was_drawn_from(page: Path, results: Results
         )
 
 
+@pytest.mark.matrix
 def test_a_report_is_the_same_in_another_process(page: Path, stored: Path, tmp_path: Path) -> None:
     first = contents(page)
     for path in page.parent.iterdir():
@@ -153,6 +154,7 @@ def test_the_command_in_the_index_makes_this_report(
     assert cli.main(["report", *hashes[1].split()]) == 0
 
 
+@pytest.mark.matrix
 def test_partial_results_are_drawn_and_said(tmp_path: Path) -> None:
     experiment = expand("rana_planar", "ga.num_generations=1")
     store(tmp_path, experiment)
@@ -180,6 +182,7 @@ def test_partial_results_are_drawn_and_said(tmp_path: Path) -> None:
     assert sorted(contents(page)) == ["index.md"]  # the figures of before are gone
 
 
+@pytest.mark.matrix
 def test_arms_in_space_have_the_papers_other_figures(tmp_path: Path) -> None:
     store(tmp_path, expand("rana_puma", "ga.num_generations=2"))
     page = draw(tmp_path, "rana", "rana_puma", "ga.num_generations=2", formats=("svg",))
@@ -200,6 +203,7 @@ def test_arms_in_space_have_the_papers_other_figures(tmp_path: Path) -> None:
     assert len(ends.round(9)[["x", "y", "z"]].drop_duplicates()) == 1
 
 
+@pytest.mark.matrix
 def test_one_page_holds_the_whole_paper(tmp_path: Path) -> None:
     words = ("ga.num_generations=1", "num_replicates=1")
     store(tmp_path, expand("rana", *words))
@@ -212,6 +216,7 @@ def test_one_page_holds_the_whole_paper(tmp_path: Path) -> None:
     assert "PUMA-like arms against PUMA-like arms, random search" in text
 
 
+@pytest.mark.matrix
 def test_ablations_are_compared_with_the_first_condition(tmp_path: Path) -> None:
     words = ("ga.num_generations=2", "num_replicates=2")
     experiment = expand("rana_planar_ablations", *words)
@@ -273,6 +278,7 @@ def test_nothing_stored_names_the_command(tmp_path: Path) -> None:
     assert not (tmp_path / "reports").exists()
 
 
+@pytest.mark.matrix
 def test_three_arms_have_figures_too(stored: Path) -> None:
     page = draw(
         stored, "planar_arms", "rana_three_arms", "scenario=rana_three_arms", formats=("svg",)
@@ -330,6 +336,7 @@ def test_drawing_leaves_matplotlib_as_it_was(page: Path) -> None:
     assert pyplot is None or pyplot.get_fignums() == []
 
 
+@pytest.mark.matrix
 def test_swept_conditions_are_told_apart_and_compared_with_their_own_control(
     tmp_path: Path,
 ) -> None:

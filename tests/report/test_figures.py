@@ -186,6 +186,7 @@ def test_distances_are_best_and_envelope(results: Results) -> None:
     } <= set(words)
 
 
+@pytest.mark.matrix
 def test_a_figure_has_the_same_bytes_each_time_whatever_the_users_style() -> None:
     import matplotlib as mpl
 

@@ -22,6 +22,7 @@ def page(captured: pytest.CaptureFixture[str]) -> Path:
     return Path(captured.readouterr().out.removeprefix("report: ").strip())
 
 
+@pytest.mark.matrix
 def test_an_experiment_with_overrides(outputs: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert report("rana_planar", *SMALL) == 0
     index = page(capsys)
@@ -30,6 +31,7 @@ def test_an_experiment_with_overrides(outputs: Path, capsys: pytest.CaptureFixtu
     assert f"Made by `evoexp report rana_planar budget=smoke {arguments}`" in index.read_text()
 
 
+@pytest.mark.matrix
 def test_the_experiment_may_be_an_override_as_for_run(capsys: pytest.CaptureFixture[str]) -> None:
     assert report("experiment=rana_planar", *SMALL, "--only", "random search") == 0
     text = page(capsys).read_text()
@@ -49,6 +51,7 @@ def test_runs_by_prefixes_of_their_hashes(
     assert f"{ids[0][:12]} against {ids[1][:12]}" in text
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize(
     ("words", "message"),
     [

@@ -82,6 +82,7 @@ def nudged_at(generation: int) -> Change:
     return change
 
 
+@pytest.mark.examples(1)
 def test_an_unchanged_run_matches(condition: Condition, tmp_path: Path) -> None:
     comparison = reproduce_log(record(condition, tmp_path))
     assert comparison.verdict == "MATCH"

@@ -99,6 +99,7 @@ def test_order_of_conditions_and_replicates(run: Run, plain: Any) -> None:
     assert turned == plain["digests"]
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(("seed", "num_threads"), first(1, [("4242", "3"), ("0", "1")]))
 def test_hash_seed_and_number_of_threads(
     run: Run, plain: Any, conditions: list[str], seed: str, num_threads: str

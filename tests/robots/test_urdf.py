@@ -158,6 +158,7 @@ def test_the_base_frame_stands_at_the_base_pose(tmp_path: Path) -> None:
     assert poses[1] == pytest.approx(poses[3], abs=1e-12)
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -202,6 +203,7 @@ def test_refusals(tmp_path: Path, change: Any, message: str) -> None:
     assert "\n" not in str(found.value)
 
 
+@pytest.mark.examples(2)
 @pytest.mark.parametrize(
     ("overrides", "message"),
     [

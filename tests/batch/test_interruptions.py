@@ -125,6 +125,7 @@ def test_ctrl_c_keeps_what_is_finished_and_the_same_command_goes_on(
     assert read_summaries(directory)["digest"].tolist() == list(undisturbed.values())
 
 
+@pytest.mark.matrix
 def test_kill_9_at_any_moment(
     faulty: Condition, undisturbed: dict[int, str], tmp_path: Path, plug_in: Path
 ) -> None:

@@ -75,6 +75,7 @@ def test_two_capsules(a: Point, b: Point, c: Point, d: Point, one: float, two: f
         assert found == pytest.approx(expected, abs=1e-12)
 
 
+@pytest.mark.matrix
 @settings(max_examples=300, deadline=None)
 @given(POINTS, POINTS, RADII, st.integers(0, len(OBSTACLES) - 1))
 @example((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), 0.0, 1)  # along the middle of a thin box

@@ -204,6 +204,7 @@ BOUNDS = {
 }
 
 
+@pytest.mark.examples(3)
 @pytest.mark.parametrize("name", BOUNDS)
 def test_error_stays_below_the_documented_bound(name: str) -> None:
     absolute = name in ("sin", "cos")

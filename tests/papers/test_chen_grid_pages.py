@@ -58,6 +58,7 @@ def outputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("chen_grid")
 
 
+@pytest.mark.matrix
 def test_the_page_of_fig_2_has_its_figures_and_judges_nothing_below_its_budget(
     outputs: Path,
 ) -> None:

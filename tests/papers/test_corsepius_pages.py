@@ -85,7 +85,7 @@ def test_a_manoeuvre_is_told_phase_by_phase(outputs: Path) -> None:
     assert "greatest tilt at postures (upright)" in text
 
 
-@pytest.mark.examples(1)
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("name", "expected"),
     [

@@ -36,6 +36,7 @@ def drawing(found: Page, stem: str) -> pd.DataFrame:
     return table
 
 
+@pytest.mark.matrix
 def test_fronts_are_what_no_other_individual_dominates(outputs: Path) -> None:
     directory = smoke_report(outputs, "curkovic_pareto")
     table = pd.read_csv(directory / "fig_5_fronts.csv")
@@ -54,6 +55,7 @@ def test_fronts_are_what_no_other_individual_dominates(outputs: Path) -> None:
     assert "larger than the hall of fame may be (15 of 100)" in text
 
 
+@pytest.mark.matrix
 def test_motions_of_two_robots_are_figures_7_to_9(outputs: Path) -> None:
     directory = smoke_report(outputs, "curkovic_motion")
     names = {

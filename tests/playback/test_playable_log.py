@@ -155,6 +155,7 @@ def test_every_body_is_drawn_once_in_the_frame_that_moves_it_and_of_its_size(nam
         assert np.array([p.x, p.y, p.z]) == pytest.approx(shape.pose[:3], abs=1e-12)
 
 
+@pytest.mark.examples(3)
 def test_joint_states_are_positions_and_their_speeds(name: str) -> None:
     shown, topics = recording(name), decoded(playable_log(recording(name)))
     for k in range(0, len(shown.times), 50):

@@ -55,6 +55,7 @@ def test_the_minimax_optimum_has_equal_torques() -> None:
     np.testing.assert_allclose(torques, truth.cost, atol=1e-10)
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize(
     ("limit", "k"),
     [([[-180, 60], [-180, 180], [-180, 180]], 0), ([[-180, 180], [60, 90], [-180, 180]], 1)],

@@ -110,6 +110,7 @@ def test_the_log_carries_the_arrays_and_reads_them_one_by_one() -> None:
     assert run_replicate(found, 0).summary.digest == log.summary.digest
 
 
+@pytest.mark.matrix
 def test_run_list_show_reproduce_report(
     said: Callable[..., str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

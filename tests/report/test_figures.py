@@ -64,6 +64,7 @@ def test_conditions_of_other_effort_share_an_axis_of_evaluations() -> None:
     assert axes.get_xlim()[1] == 300.0
 
 
+@pytest.mark.matrix
 def test_convergence_of_infinite_costs_and_of_one_generation() -> None:
     table = curves("GA", 0, 50.0)
     table.loc[table["generation"] < 2, ["median", "lower", "upper"]] = np.inf

@@ -1,1 +1,1 @@
-"""Planners: one paper's algorithm, one file; each reads beside its paper from top to bottom."""
+"""Planners: a package per algorithm, and the protocol that all of them keep."""

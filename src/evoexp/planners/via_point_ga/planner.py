@@ -11,22 +11,20 @@ arm, instant by instant, joint by joint (arms × (N + 1) × joints) [deg], start
 
 from collections.abc import Iterator
 from itertools import chain, islice
-from typing import Annotated, ClassVar, Literal, Self
+from typing import ClassVar
 
 import numpy as np
-from pydantic import Field, model_validator
 
-from evoexp.collision.models.touching_spheres import Clearance, TouchingSpheres
+from evoexp.collision.models.touching_spheres import Clearance
 from evoexp.collision.scene import scene
 from evoexp.errors import SettingError
 from evoexp.evolution.cost_statistics import cost_statistics
-from evoexp.evolution.genetic_settings import GeneticSettings
 from evoexp.numeric.elementary import DEGREE
-from evoexp.objectives.string_fitness import StringFitness
 from evoexp.paths.interpolation import interpolate_linear
 from evoexp.paths.motion import Motion
 from evoexp.paths.workspace import prepare_redistribution
 from evoexp.planners.planner import Candidate, Keeper, PlannerDefaults
+from evoexp.planners.via_point_ga.settings import ViaPointSettings
 from evoexp.planners.via_point_ga.strings import (
     LANES,
     JudgedGeneration,
@@ -37,54 +35,15 @@ from evoexp.planners.via_point_ga.strings import (
 from evoexp.records import FloatArray, Generation
 from evoexp.robots.assembly import Robot
 from evoexp.scenarios.arm_motion import ArmMotion
-from evoexp.validation import Component, Count, NonNegativeCount, Positive, Rate
+from evoexp.validation import Component
 
-SAMPLES = tuple(2**k for k in range(3, 11))  # per segment, that the redistribution can take
 SAMPLES_BETWEEN = 100  # configurations per segment where a clearance between via-points is sampled
 
 
-class ViaPointGa(PlannerDefaults, Component):
-    """The evolutionary algorithm of Rana & Zalzala, sections 3 and 4.
-
-    Attributes:
-        num_via_points: N; instants 1 … N are judged, 0 is the start, N the goal.
-        walk_step: Step length of a new trajectory, in units of its straight distance over N.
-        max_turn: Largest random turn of a step away from the direction of the goal [deg].
-        num_new_trajectories: Offspring replaced by new trajectories per generation.
-        crossover_distance: Strings are crossed only where they are closer than this [deg].
-        relaxation_step: delta of Eqs. 8, 9.
-        redistribution: Whether via-points are redistributed evenly along a spline (off: an
-            ablation).
-        spline_end: End condition of that spline.
-        samples_per_segment: Samples of its arc length between two via-points.
-        ga: Population, generations, elites, rates.
-        objective: Weights of Eq. 7.
-        collision: The touching circles or spheres.
-    """
+class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
+    """The evolutionary algorithm of Rana & Zalzala, sections 3 and 4."""
 
     component: ClassVar[str] = "via_point_ga"
-
-    num_via_points: Count
-    walk_step: Positive
-    max_turn: Annotated[float, Field(ge=0.0, le=180.0)]
-    num_new_trajectories: NonNegativeCount
-    crossover_distance: Positive
-    relaxation_step: Rate
-    redistribution: bool
-    spline_end: Literal["natural", "clamped"]
-    samples_per_segment: Count
-    ga: GeneticSettings
-    objective: StringFitness
-    collision: TouchingSpheres
-
-    @model_validator(mode="after")
-    def _samples_halve(self) -> Self:
-        count = self.samples_per_segment
-        if count not in SAMPLES:
-            raise SettingError(
-                "samples_per_segment", f"one of {', '.join(map(str, SAMPLES))}", count
-            )
-        return self
 
     def prepare(self, robot: Robot, scenario: ArmMotion) -> Problem:
         """Build the robot and check that start and goal fit it and are free of collision.

@@ -1,7 +1,7 @@
 """Populations of strings of via-points: the problem they solve, and the steps they go through."""
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -16,11 +16,9 @@ from evoexp.objectives.string_fitness import StringTerms
 from evoexp.paths.walk import num_uniforms, walk
 from evoexp.paths.workspace import Redistribution
 from evoexp.planners.via_point_ga import kernels
+from evoexp.planners.via_point_ga.settings import ViaPointSettings
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
-
-if TYPE_CHECKING:
-    from evoexp.planners.via_point_ga.planner import ViaPointGa
 
 LANES = 8  # individuals are padded to whole vectors
 
@@ -127,7 +125,7 @@ class JudgedGeneration(NamedTuple):
 class Strings:
     """The population-wide steps of one planner on one problem."""
 
-    def __init__(self, planner: "ViaPointGa", problem: Problem) -> None:
+    def __init__(self, planner: ViaPointSettings, problem: Problem) -> None:
         self.planner, self.problem, ga, spline = planner, problem, planner.ga, problem.spline
         self.num_arms, max_turn = len(problem.arm_slices), DEGREE * planner.max_turn
         self.num_uniforms = num_uniforms(problem.arm_slices, planner.num_via_points)

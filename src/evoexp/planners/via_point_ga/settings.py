@@ -1,0 +1,55 @@
+"""Settings of the planner of strings of via-points."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from evoexp.collision.models.touching_spheres import TouchingSpheres
+from evoexp.errors import SettingError
+from evoexp.evolution.genetic_settings import GeneticSettings
+from evoexp.objectives.string_fitness import StringFitness
+from evoexp.validation import Count, NonNegativeCount, Positive, Rate, Settings
+
+SAMPLES = tuple(2**k for k in range(3, 11))  # per segment, that the redistribution can take
+
+
+class ViaPointSettings(Settings):
+    """Hyperparameters of Rana & Zalzala, Tables 1 and 3.
+
+    Attributes:
+        num_via_points: N; instants 1 … N are judged, 0 is the start, N the goal.
+        walk_step: Step length of a new trajectory, in units of its straight distance over N.
+        max_turn: Largest random turn of a step away from the direction of the goal [deg].
+        num_new_trajectories: Offspring replaced by new trajectories per generation.
+        crossover_distance: Strings are crossed only where they are closer than this [deg].
+        relaxation_step: delta of Eqs. 8, 9.
+        redistribution: Whether via-points are redistributed evenly along a spline (off: an
+            ablation).
+        spline_end: End condition of that spline.
+        samples_per_segment: Samples of its arc length between two via-points.
+        ga: Population, generations, elites, rates.
+        objective: Weights of Eq. 7.
+        collision: The touching circles or spheres.
+    """
+
+    num_via_points: Count
+    walk_step: Positive
+    max_turn: Annotated[float, Field(ge=0.0, le=180.0)]
+    num_new_trajectories: NonNegativeCount
+    crossover_distance: Positive
+    relaxation_step: Rate
+    redistribution: bool
+    spline_end: Literal["natural", "clamped"]
+    samples_per_segment: Count
+    ga: GeneticSettings
+    objective: StringFitness
+    collision: TouchingSpheres
+
+    @model_validator(mode="after")
+    def _samples_halve(self) -> Self:
+        count = self.samples_per_segment
+        if count not in SAMPLES:
+            raise SettingError(
+                "samples_per_segment", f"one of {', '.join(map(str, SAMPLES))}", count
+            )
+        return self

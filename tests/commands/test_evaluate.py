@@ -59,6 +59,7 @@ def test_the_best_of_a_stored_run_is_worth_what_is_recorded(
     assert head == {"label": label, "condition": runs[label].condition_id, "length_unit": "unit"}
     verdict = {name: said.pop(name) for name in Certificate._fields}
     assert verdict == {name: getattr(log.summary, name) for name in Certificate._fields}
+    assert (said.pop("solution_of_the_task"), said.pop("departures")) == (True, [])
     assert said == log.summary.terms
     columns = read_summaries(runs[label]).columns
     assert {f"term_{name}" for name in said} == {
@@ -76,9 +77,23 @@ def test_several_conditions_are_several_objects_and_columns(evoexp: Evoexp, moti
         assert rows[0][name] == rows[1][name]
     table = evoexp("evaluate", str(motion), *PLANAR).out
     assert all(row["condition"][:12] in table and row["label"] in table for row in rows)
-    assert all(
-        f"│ {name} " in table for name in rows[0].keys() - {"label", "condition", "length_unit"}
-    )
+    apart = {"label", "condition", "length_unit", "departures"}
+    assert all(f"│ {name} " in table for name in rows[0].keys() - apart)
+
+
+def test_a_motion_that_stays_at_the_start_is_no_solution_though_it_touches_nothing(
+    evoexp: Evoexp, tmp_path: Path
+) -> None:
+    still = np.repeat([[[45.0, 225.0]], [[225.0, 225.0]]], 21, axis=1)
+    np.save(tmp_path / "still.npy", still)
+    words = ("evaluate", *PLANAR, "--only", LABELS[0], str(tmp_path / "still.npy"))
+    said = json.loads(evoexp(*words, "--json").out)
+    assert said["certified"] is True
+    assert said["solution_of_the_task"] is False
+    assert said["departures"] == [
+        f"the goal of arm {arm} is not the task's: 90 deg away" for arm in (1, 2)
+    ]
+    assert f"{LABELS[0]} – no solution of the task: the goal of arm 1" in evoexp(*words).out
 
 
 def test_overrides_and_only_narrow_it_down(evoexp: Evoexp, motion: Path) -> None:

@@ -11,6 +11,7 @@ from evoexp.commands.console import add_columns, new_table, plain_console, print
 from evoexp.commands.given_motion import fitting_motions
 from evoexp.planners.planner import Listing, judge_motion
 
+DEPARTURES = "departures"  # of a row: the ways in which the motion is none of the task
 HEAD = ("label", "condition", "length_unit")  # of a row; its other entries are terms and verdict
 
 
@@ -35,9 +36,12 @@ def main(arguments: argparse.Namespace) -> int:
     rows: list[dict[str, Any]] = []
     listings: list[Listing | None] = []
     for label, condition, planner, problem, solution in fitting:
-        verdict = judge_motion(planner, problem, planner.motion(problem, solution))
         head = dict(zip(HEAD, (label, condition.id, condition.length_unit), strict=True))
-        rows.append(head | planner.evaluate(problem, solution) | verdict._asdict())
+        terms = planner.evaluate(problem, solution)
+        verdict = judge_motion(planner, problem, planner.motion(problem, solution))._asdict()
+        departures = list(planner.departures(problem, solution))
+        of_task = {"solution_of_the_task": not departures}
+        rows.append(head | terms | of_task | verdict | {DEPARTURES: departures})
         listings.append(planner.listing(problem, solution))
     if arguments.json:
         whole = [_with_rows(*pair) for pair in zip(rows, listings, strict=True)]
@@ -49,6 +53,9 @@ def main(arguments: argparse.Namespace) -> int:
             console.print(_listing(row["label"], listing))
     for table in _tables(rows, console.width):
         console.print(table)
+    for row in rows:
+        for departure in row[DEPARTURES]:
+            console.print(f"{row['label']} – no solution of the task: {departure}")
     return 0
 
 
@@ -70,7 +77,8 @@ def _listing(label: str, listing: Listing) -> Table:
 
 def _tables(rows: list[dict[str, Any]], width: int) -> list[Table]:
     """Return a table with one column per condition; more in a narrow terminal."""
-    names = list(dict.fromkeys(name for row in rows for name in row if name not in HEAD))
+    apart = (*HEAD, DEPARTURES)
+    names = list(dict.fromkeys(name for row in rows for name in row if name not in apart))
     longest_word = max(len(word) for row in rows for word in row["label"].split())
     column = min(max(12, longest_word), 40) + 3
     count = max(1, (width - max(map(len, names)) - 4) // column)

@@ -155,6 +155,13 @@ class Planner(Protocol):
             ValueError: If the solution has not the documented shape.
         """
 
+    def departures(self, problem: Any, solution: FloatArray) -> Sequence[str]:
+        """Return the ways in which a solution is none of the task, each in a phrase.
+
+        Another start or goal, a joint beyond its limits, a forbidden move; nothing about
+        collisions, which `parts` are judged for, nor about a goal that a search comes near to.
+        """
+
     def shape(self, problem: Any) -> Shape:
         """Return the documented shape of a solution, part by part."""
 
@@ -206,6 +213,10 @@ class PlannerDefaults:
     def security_margin(self, problem: Any) -> float:
         """Return the problem's margin."""
         return float(problem.security_margin)
+
+    def departures(self, problem: Any, solution: FloatArray) -> Sequence[str]:
+        """Return none: every solution of the documented shape is one of the task."""
+        return ()
 
     def listing(self, problem: Any, solution: FloatArray) -> Listing | None:
         """Return None: there is no table."""

@@ -54,6 +54,10 @@ class WrappedPlanner(PlannerDefaults, Component):
         """Return an individual as the wrapped planner does."""
         return self.planner.solution(problem, population, individual)
 
+    def departures(self, problem: Any, solution: FloatArray) -> Sequence[str]:
+        """Compare with the task as the wrapped planner does."""
+        return self.planner.departures(problem, solution)
+
     def motion(self, problem: Any, solution: FloatArray) -> Motion | None:
         """Return the wrapped planner's motion of a solution."""
         return self.planner.motion(problem, solution)

@@ -31,6 +31,7 @@ CHECKS: tuple[Check, ...] = (
     solutions.samples_are_judged_alike,
     solutions.recorded_costs_are_those_of_the_population,
     solutions.terms_agree_with_evaluate,
+    solutions.a_solved_solution_is_one_of_the_task,
     solutions.motions_fit_the_robot,
     solutions.pieces_cover_the_motion,
     solutions.the_local_operator_leaves_its_argument_alone,

@@ -109,6 +109,17 @@ def recorded_costs_are_those_of_the_population(condition: Condition) -> None:
             demand(np.array_equal(judged, costs), condition, must, "others")
 
 
+def a_solved_solution_is_one_of_the_task(condition: Condition) -> None:
+    """`departures` gives phrases, and none where the planner's own model accepts its best."""
+    found = evolution(condition)
+    departures = found.planner.departures(found.problem, np.array(found.last.best))
+    is_text = not isinstance(departures, str) and all(isinstance(one, str) for one in departures)
+    demand(is_text, condition, "departures must return phrases", departures)
+    if found.last.solved:
+        must = "the best solution is solved, so departures must return none"
+        demand(not departures, condition, must, departures)
+
+
 def terms_agree_with_evaluate(condition: Condition) -> None:
     """`evaluate` gives the recorded terms of the best solution, and numbers only."""
     found = evolution(condition)

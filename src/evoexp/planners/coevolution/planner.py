@@ -32,6 +32,7 @@ from evoexp.planners.coevolution.chromosome_length import SpeedLimit, length_not
 from evoexp.planners.coevolution.kernels import Breeding, breed, measure, renew
 from evoexp.planners.coevolution.settings import CoevolutionSettings
 from evoexp.planners.coevolution.teams import Evaluated, Judgement
+from evoexp.planners.departures import of_limits, of_place
 from evoexp.planners.planner import Candidate, Keeper, PlannerDefaults
 from evoexp.records import BoolArray, FloatArray, Generation
 from evoexp.robots.assembly import Assembly, Robot
@@ -321,6 +322,18 @@ class Coevolution(PlannerDefaults, Component):
             terms[f"out_of_range_robot_{r + 1}_deg"] = beyond
             terms[f"fastest_turn_robot_{r + 1}_deg"] = float(turns[r].max())
         return terms
+
+    def departures(self, problem: Problem, solution: FloatArray) -> list[str]:
+        """Compare start and goal of every robot with the task's, and links with [0, π]."""
+        paths, found = self._paths(problem, solution), []
+        limits = np.array([[0.0, HALF_TURN / DEGREE]] * 2)
+        for r, path in enumerate(paths):
+            robot = f"robot {r + 1}"
+            for end, k, wanted in (("start", 0, problem.start), ("goal", -1, problem.goal)):
+                found += of_place(f"the {end} of {robot}", path[k], wanted[r] / DEGREE, "deg")
+            links = [f"link {k} of {robot}" for k in (1, 2)]
+            found += of_limits(links, path.T, limits, "deg")
+        return found
 
     def notes(self, problem: Problem) -> list[str]:
         """Compare the chromosome's length with Eqs. 2 and 3, line by line."""

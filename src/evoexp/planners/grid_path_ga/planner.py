@@ -43,6 +43,7 @@ from evoexp.scenarios.grid_motion import GridMotion
 from evoexp.validation import Component, NonNegativeCount
 
 FEW_NODES = 2048  # the steps between all nodes of smaller grids are worked out once: at most 8 MB
+FAULTS = "blocked_nodes", "forbidden_moves", "missed_ends"  # with one, a path costs inf
 STRETCH = 8  # generations that are computed in one call of a kernel, at most
 BLOCK = 16384  # uniform numbers drawn at once, at least
 STEPS_PER_WALK = 3.5  # times the fewest: random words for so many steps are drawn at first
@@ -204,11 +205,12 @@ class GridPathGa(PlannerDefaults, Component):
         indices = np.ravel_multi_index(tuple(nodes.astype(np.int64).T + 1), own.free.shape)
         path = np.array([len(nodes), *indices], dtype=np.int32)
         made = (own.neighbours[indices[:-1]] == indices[1:, None]).any(axis=1)
-        faults = {
-            "blocked_nodes": float(np.count_nonzero(~own.free.ravel()[path[1:]])),
-            "forbidden_moves": float(np.count_nonzero(~made)),
-            "missed_ends": float((path[1] != problem.ends[0]) + (path[-1] != problem.ends[1])),
-        }
+        counts = (
+            np.count_nonzero(~own.free.ravel()[path[1:]]),
+            np.count_nonzero(~made),
+            (path[1] != problem.ends[0]) + (path[-1] != problem.ends[1]),
+        )
+        faults = dict(zip(FAULTS, map(float, counts), strict=True))
         results = np.full((RESULTS, 1), np.inf)
         if made.all():
             kernels.measure(path, problem.world, self.objective.weights, results, 0)
@@ -217,6 +219,13 @@ class GridPathGa(PlannerDefaults, Component):
             results[UNSAFENESS] = problem.fields.unsafeness[path[1:]].mean()
         cost = np.inf if any(faults.values()) else float(results[COST, 0])
         return named_terms(results[:, 0], len(nodes)) | faults | {"cost": cost}
+
+    def departures(self, problem: Problem, solution: FloatArray) -> list[str]:
+        """Name the faults that `evaluate` counts: ends, blocked nodes, forbidden moves."""
+        terms = self.evaluate(problem, solution)
+        return [
+            f"{name.replace('_', ' ')}: {terms[name]:.0f}" for name in FAULTS if terms[name] > 0.0
+        ]
 
     def shape(self, problem: Problem) -> tuple[Any, ...]:
         """Return the documented shape of a solution: any number of nodes, each its coordinates."""

@@ -21,6 +21,7 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.placement_criteria import PlacementCriteria
 from evoexp.objectives.placement_kernels import PLATFORM, THETA_3, TORQUE, Model, Task
 from evoexp.paths.motion import Motion
+from evoexp.planners.departures import of_limits
 from evoexp.planners.placement_ga import kernels
 from evoexp.planners.placement_ga.kernels import GENES, ROWS, Breeding, Coding, Population
 from evoexp.planners.planner import Candidate, PlannerDefaults
@@ -177,6 +178,13 @@ class PlacementGa(PlannerDefaults, Component):
             named[f"{prefix}platform_x"] = values[PLATFORM]
             named |= {f"{prefix}torque_{k + 1}": values[TORQUE + k] for k in range(3)}
         return named
+
+    def departures(self, problem: Problem, solution: FloatArray) -> list[str]:
+        """Compare θ1 and θ2 with their limits, and ask for a θ3 that reaches the target."""
+        angles = _two(solution)
+        beyond = of_limits(["θ1", "θ2"], np.array(angles)[:, None], problem.angle_limits, "deg")
+        is_feasible = problem.model.posture(*angles)[0] >= 0
+        return beyond + ([] if is_feasible else ["no θ3 reaches the target within all limits"])
 
     def shape(self, problem: Problem) -> tuple[tuple[()], ...]:
         """Return the documented shape of a solution: two numbers, θ1 and θ2."""

@@ -29,6 +29,7 @@ from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.posture_cost import COLUMNS, PARALLEL, TERMS, UPRIGHT, PostureCost
 from evoexp.paths.motion import Motion
+from evoexp.planners.departures import joint_names, of_limits, of_place
 from evoexp.planners.planner import Candidate, Keeper, Listing, PlannerDefaults
 from evoexp.planners.posture_es import problem as posture_problem
 from evoexp.planners.posture_es.cycles import Ancestry, Search
@@ -155,6 +156,15 @@ class PostureEs(PlannerDefaults, Component):
             terms[f"phase_{k + 1}_end"] = float(found[k].last) if reached else -1.0
         infeasible = sum(np.sum(~span.judged.feasible) for span in found)
         return terms | {"infeasible_postures": float(infeasible)} | self._tilts(found, postures)
+
+    def departures(self, problem: Problem, solution: FloatArray) -> list[str]:
+        """Compare the start with the task's, and all postures with the joint limits."""
+        postures = self._postures(problem, solution)
+        names = joint_names(len(problem.start))
+        return [
+            *of_place("the start", postures[0], problem.start, "rad"),
+            *of_limits(names, postures.T, problem.limits, "rad"),
+        ]
 
     def listing(self, problem: Problem, solution: FloatArray) -> Listing:
         """Return a table with one row per posture: phase, terms, cost, step from the one before."""

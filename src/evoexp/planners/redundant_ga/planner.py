@@ -25,6 +25,7 @@ from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
 from evoexp.objectives.reaching import Reaching
 from evoexp.paths.motion import Motion
+from evoexp.planners.departures import joint_names, of_limits, of_place
 from evoexp.planners.planner import Candidate, Keeper, PlannerDefaults
 from evoexp.planners.redundant_ga import kernels
 from evoexp.planners.redundant_ga.kernels import RESULTS, Judging
@@ -258,6 +259,15 @@ class RedundantGa(PlannerDefaults, Component):
             for name, value in zip(CONTACT, contact, strict=True):
                 named[f"contact_{name}_sp{k + 1}"] = float(value)
         return named
+
+    def departures(self, problem: Problem, solution: FloatArray) -> list[str]:
+        """Compare the start with the task's, and all postures with the joint limits."""
+        postures = self._postures(problem, solution)
+        names = joint_names(len(problem.start))
+        return [
+            *of_place("the start", postures[0], problem.start, "rad"),
+            *of_limits(names, postures.T, problem.joint_limits, "rad"),
+        ]
 
     def judge_plan(self, problem: Problem, solution: FloatArray) -> FloatArray:
         """Return cost, position error and joint displacement of both sub-paths, (2, 3)."""

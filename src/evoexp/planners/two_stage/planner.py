@@ -188,6 +188,15 @@ class TwoStage(PlannerDefaults, Component):
         both = {"last_leg": float(np.sqrt((leg * leg).sum())), "path_cost": path.pop("cost")}
         return posture | path | both | {"cost": posture["posture_cost"] + both["path_cost"]}
 
+    def departures(self, problem: Problem, solution: FloatArray) -> list[str]:
+        """Return the departures of posture and path; without a posture the path has no goal."""
+        angles, nodes = self._parts(solution)
+        found = self.placement.departures(problem.placement, angles)
+        if self.placement.motion(problem.placement, angles) is None:
+            return found
+        path = self.path.departures(self._path_problem(problem, angles), nodes.ravel())
+        return [*found, *path]
+
     def shape(self, problem: Problem) -> tuple[Any, ...]:
         """Return the documented shape of a solution: θ1 and θ2, then nodes, all in pairs."""
         return (..., (ANGLES,))

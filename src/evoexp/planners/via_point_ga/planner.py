@@ -23,6 +23,7 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.interpolation import interpolate_linear
 from evoexp.paths.motion import Motion
 from evoexp.paths.workspace import prepare_redistribution
+from evoexp.planners.departures import joint_names, of_limits, of_place
 from evoexp.planners.planner import Candidate, Keeper, PlannerDefaults
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
 from evoexp.planners.via_point_ga.strings import (
@@ -37,6 +38,7 @@ from evoexp.robots.assembly import Robot
 from evoexp.scenarios.arm_motion import ArmMotion
 from evoexp.validation import Component
 
+UNLIMITED = 1e6  # [rad] a joint without limits has larger ones in the model
 SAMPLES_BETWEEN = 100  # configurations per segment where a clearance between via-points is sampled
 
 
@@ -147,6 +149,17 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
         at = problem.collision.clearance(strings)
         between = problem.collision.clearance(sampled(strings, SAMPLES_BETWEEN))
         return terms | _least_distances(problem, at, between)
+
+    def departures(self, problem: Problem, solution: FloatArray) -> list[str]:
+        """Compare start and goal of every arm with the task's, and angles with their limits."""
+        strings, model, found = self._strings_of(problem, solution), problem.assembly.model, []
+        for arm, (a, b) in enumerate(problem.arm_slices):
+            for end, column, wanted in (("start", 0, problem.start), ("goal", -1, problem.goal)):
+                name = f"the {end} of arm {arm + 1}"
+                found += of_place(name, strings[a:b, column], wanted[a:b], "deg")
+        limits = np.column_stack([model.lowerPositionLimit, model.upperPositionLimit])
+        finite = np.clip(limits, -UNLIMITED, UNLIMITED) / DEGREE
+        return found + of_limits(joint_names(len(strings)), strings, finite, "deg")
 
     def shape(self, problem: Problem) -> tuple[tuple[int, int], ...]:
         """Return the documented shape of a solution: per arm, (N + 1, joints)."""

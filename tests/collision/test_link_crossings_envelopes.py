@@ -50,6 +50,7 @@ def test_boundaries_are_parallel_to_the_links() -> None:
         assert (plain.cross(along, across) > 0.0).all()
 
 
+@pytest.mark.examples(1)
 @pytest.mark.parametrize("arms", [SCENE_A, UNEQUAL])
 @pytest.mark.parametrize(
     "sizes",

@@ -76,7 +76,7 @@ def path_excess(
     return min(float(excess(o, p, q).min()) for o in obstacles for p, q in segments)
 
 
-@pytest.mark.examples(2)
+@pytest.mark.examples(1)
 @pytest.mark.parametrize("swept", ["none", "chords"])
 @pytest.mark.parametrize("num_positions", first(2, [3, 10, 1, 2, 50]))
 @pytest.mark.parametrize(("arm", "obstacles"), [(ARM, BOX), (TURNED, TILTED), (TURNED, TILTED[:1])])

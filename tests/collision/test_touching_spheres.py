@@ -172,6 +172,7 @@ def test_a_wrong_number_of_joints_is_refused() -> None:
         collision.clearance(np.zeros((3, 5)))
 
 
+@pytest.mark.examples(1)
 @pytest.mark.parametrize("limit", [-0.3, 0.0, 0.4, 3.0])
 @pytest.mark.parametrize(
     "robot", [TWO_PLANAR, THREE_PLANAR, TWO_SPATIAL], ids=["two planar", "three planar", "spatial"]

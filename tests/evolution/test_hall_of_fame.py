@@ -331,6 +331,7 @@ def test_equal_keys_keep_the_old_then_the_first_formed() -> None:
     assert chosen.ages.tolist() == [8, 0]
 
 
+@pytest.mark.matrix
 @pytest.mark.parametrize("num", [2, 3])
 @pytest.mark.parametrize("dtype", first(1, [np.float64, np.uint8, np.int32]))
 def test_kernels_ignore_padding_and_take_any_number_type(num: int, dtype: type) -> None:

@@ -107,6 +107,7 @@ def test_studies_have_figures_and_a_row_per_condition(
         assert drawn(table, drawing.draw)
 
 
+@pytest.mark.matrix
 def test_the_study_reads_no_log(outputs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Thousands of runs: summaries say all of it."""
 

@@ -97,6 +97,7 @@ def test_equal_evaluations_per_cycle_make_larger_populations_slower() -> None:
     )  # ten take a tenth
 
 
+@pytest.mark.matrix
 def test_one_task_that_large_populations_plan_faster_contradicts() -> None:
     claims = study(lambda task, size: (20.0 if task != "pose" else 4e5 / size**2, RUNS))
     assert (

@@ -58,6 +58,7 @@ def clearance(
     return collision.clearance(np.zeros((1, 1)))
 
 
+@pytest.mark.matrix
 @settings(max_examples=300, deadline=None)
 @given(POINTS, POINTS, POINTS, POINTS, RADII, RADII)
 @example((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.25, 0.5, 0.0), (0.5, 0.5, 0.0), 0.1, 0.1)

@@ -169,6 +169,7 @@ def test_without_a_free_team_there_is_none() -> None:
     assert best_team(np.zeros((1, 2, 2), dtype=int), own).individuals.tolist() == [1, 0]
 
 
+@pytest.mark.matrix
 @given(
     st.integers(0, 10_000),
     st.sampled_from([2, 3]),

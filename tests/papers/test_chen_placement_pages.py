@@ -36,6 +36,7 @@ def test_conditions_are_told_apart(cases: list[Case]) -> None:
         assert case.optimum.planned == 1
 
 
+@pytest.mark.matrix
 def test_the_page(outputs: Path) -> None:
     directory = smoke_report(outputs, "chen_placement")
     assert figure_stems(directory) == {"fig_3_to_8_postures", "fig_4_to_8_fitness", "gaps"}

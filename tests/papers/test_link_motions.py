@@ -41,6 +41,7 @@ def test_an_executed_motion_passes_its_configurations(one: Prepared, solution: F
     np.testing.assert_allclose(found.q[:, 13], np.degrees(motion.at(1.3)), atol=1e-9)
 
 
+@pytest.mark.examples(1)
 def test_speeds_are_differences_of_angles(one: Prepared, solution: FloatArray) -> None:
     found = link_motions.sampled(link_motions.executed(one, solution), 2000)
     between = np.diff(found.links, axis=0) * 2000

@@ -38,6 +38,7 @@ def plain_trails(world: World, words: np.ndarray, count: int) -> tuple[list[list
     return trails[:count], taken
 
 
+@pytest.mark.matrix
 @settings(max_examples=60, deadline=None)
 @given(
     SHAPES,

@@ -83,6 +83,7 @@ def test_overrides_and_hashes_exclude_each_other(capsys: pytest.CaptureFixture[s
     )
 
 
+@pytest.mark.matrix
 def test_loading_the_command_loads_no_matplotlib() -> None:
     code = "import sys, evoexp.commands.report; sys.exit('matplotlib' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -88,6 +88,7 @@ def test_the_digests_tell_replicates_and_conditions_apart(plain: Any) -> None:
     assert len(set(plain["digests"].values())) == 9
 
 
+@pytest.mark.matrix
 def test_number_of_workers(run: Run, plain: Any) -> None:
     assert run("--workers=2")["digests"] == plain["digests"]
 

@@ -15,7 +15,7 @@ from evoexp.configuration.experiment import Experiment
 from evoexp.papers.lavoie import claims, measures, sweep_claims
 from evoexp.papers.lavoie.measures import RefutedMotions
 from evoexp.report.judging import Judge, judge
-from evoexp.report.proportions import Proportion
+from evoexp.report.proportions import Proportion, fisher_exact
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
 from evoexp.report.verdicts import (
@@ -62,20 +62,29 @@ def below_one(count: int, runs: int = 1000) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("one", "two", "verdict"),
+    ("count", "runs", "verdict"),
     [
-        (Proportion(935, 1000), Proportion(935, 1000), REPRODUCED),
-        (Proportion(950, 1000), Proportion(935, 1000), REPRODUCED),  # within two samples' spread
-        (Proportion(964, 1000), Proportion(935, 1000), CONTRADICTED),
-        (Proportion(900, 1000), Proportion(935, 1000), CONTRADICTED),
-        (Proportion(96, 100), Proportion(935, 1000), REPRODUCED),  # few runs say little
-        (Proportion(0, 0), Proportion(935, 1000), INCONCLUSIVE),
+        (935, 1000, REPRODUCED),
+        (950, 1000, REPRODUCED),  # within two samples' spread
+        (964, 1000, CONTRADICTED),
+        (900, 1000, CONTRADICTED),
+        (96, 100, REPRODUCED),  # few runs say little
     ],
 )
-def test_a_printed_percentage_is_a_sample_too(
-    one: Proportion, two: Proportion, verdict: str
-) -> None:
-    assert claims.judge_equal(one, two, 0.95) == verdict
+def test_a_printed_percentage_is_a_sample_too(count: int, runs: int, verdict: str) -> None:
+    results = made_up({"7-DOF": below_one(count, runs), "10-DOF": below_one(991)}, "lavoie")
+    found = claims.percentages(Judge("", 0.05), results.conditions, 0.95)
+    assert [claim.verdict for claim in found] == [verdict, *[REPRODUCED] * 3]
+
+
+def test_four_percentages_are_one_family_of_tests() -> None:
+    """Alone, 99.9 % would contradict the printed 99.1 %; among four tests it does not."""
+    both = {"7-DOF": below_one(935), "10-DOF": below_one(999)}
+    one, two = Proportion(999, 1000), Proportion(991, 1000)
+    assert fisher_exact(one, two) < 0.05 < 4 * fisher_exact(one, two)
+    found = claims.percentages(Judge("", 0.05), made_up(both, "lavoie").conditions, 0.95)
+    assert [claim.verdict for claim in found] == [REPRODUCED] * 4
+    assert all("adjusted by Holm over 4" in claim.evidence for claim in found)
 
 
 @pytest.mark.parametrize(
@@ -94,9 +103,7 @@ def test_one_proportion_is_greater(one: Proportion, two: Proportion, verdict: st
 
 def test_printed_percentages_say_the_numbers_and_the_rule() -> None:
     results = made_up({"7-DOF": below_one(964), "10-DOF": below_one(991)}, "lavoie")
-    (seven, _), (ten, _) = (
-        claims.percentages(Judge("", 0.05), c, 0.95) for c in results.conditions
-    )
+    seven, _, ten, _ = claims.percentages(Judge("", 0.05), results.conditions, 0.95)
     assert (seven.verdict, ten.verdict) == (CONTRADICTED, REPRODUCED)
     assert seven.text == "7-DOF: a position error below 1 in 93.5 % of runs"
     assert "964 of 1000 = 96.4 % [95.1, 97.4]; the printed share lies outside" in seven.evidence
@@ -104,7 +111,9 @@ def test_printed_percentages_say_the_numbers_and_the_rule() -> None:
         "its own thousand runs give [91.8, 94.9]; ours − printed +2.9 [+1.0, +4.9] points"
         in seven.evidence
     )
-    assert "0 within the 95 % interval of the difference by Newcombe" in seven.evidence
+    assert "(Newcombe's 95 % interval); Fisher's exact p, adjusted by Holm over 4, 0.01" in (
+        seven.evidence
+    )
     assert "lies within, its own thousand runs give" in ten.evidence
 
 
@@ -154,7 +163,7 @@ def test_what_is_overridden_or_too_few_is_not_judged() -> None:
     other = made_up(errors, "lavoie", "planner.success=finite")
     for results, why in ((few, "fewer replicates than planned"), (other, "settings overridden")):
         for claim in (
-            *claims.percentages(judge(results, SETTINGS), results.conditions[0], 0.95),
+            *claims.percentages(judge(results, SETTINGS), results.conditions[:1], 0.95),
             *claims.more_joints_are_better(judge(results, SETTINGS), results.conditions, 0.95),
             claims.no_start_needed(judge(results, SETTINGS), results.conditions[0]),
         ):
@@ -259,7 +268,8 @@ def test_printed_percentages_are_judged_by_either_reading_of_a_success() -> None
     below_1 = {
         claim.text.split(":")[0]: claim.verdict for claim in found if "below 1 " in claim.text
     }
-    assert below_1 == {label: CONTRADICTED if "value" in label else REPRODUCED for label in errors}
+    expected = dict.fromkeys(errors, REPRODUCED) | {"7-DOF, below its value": CONTRADICTED}
+    assert below_1 == expected
     assert len(found) == 8
 
 

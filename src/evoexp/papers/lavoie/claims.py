@@ -13,6 +13,7 @@ from evoexp.report.kit import (
     Proportion,
     counted,
     fisher_exact,
+    holm,
     markdown,
     newcombe,
     solved,
@@ -30,38 +31,38 @@ ELSEWHERE = (
 )
 
 
-def judge_equal(one: Proportion, two: Proportion, confidence: float) -> str:
-    """Judge a claim that two proportions of independent runs are the same.
+def percentages(judge: Judge, conditions: Sequence[ConditionResults], level: float) -> list[Claim]:
+    """Judge the percentages printed for arms of so many joints, as one family of tests.
 
-    Args:
-        one: Proportion of our runs.
-        two: Proportion of the paper's.
-        confidence: Level of Newcombe's interval of their difference.
-
-    Returns:
-        Reproduced if 0 lies within the interval, else contradicted.
-    """
-    if not one.total or not two.total:
-        return verdicts.INCONCLUSIVE
-    low, high = newcombe(one, two, confidence)
-    return verdicts.judged(low <= 0.0 <= high)
-
-
-def percentages(judge: Judge, condition: ConditionResults, level: float) -> list[Claim]:
-    """Judge the percentages printed for an arm of so many joints.
+    Both percentages are samples: a printed one is contradicted where Fisher's exact test, adjusted
+    by Holm over all percentages judged here, tells it from ours.
 
     Args:
         judge: The judge of the experiment.
-        condition: The condition whose runs they are judged by.
-        level: Level of the intervals.
+        conditions: The conditions whose runs they are judged by.
+        level: Level of the tests and intervals.
     """
-    return [_percentage(judge, condition, one, level) for one in measures.printed(condition)]
+    pairs = [(c, printed) for c in conditions for printed in measures.printed(c)]
+    ours = [measures.below(condition, printed.bound) for condition, printed in pairs]
+    compared = [
+        fisher_exact(own, one.proportion) for own, (_, one) in zip(ours, pairs, strict=True)
+    ]
+    return [
+        _percentage(judge, *pair, own, level, p, len(pairs))
+        for pair, own, p in zip(pairs, ours, holm(compared), strict=True)
+    ]
 
 
 def _percentage(
-    judge: Judge, condition: ConditionResults, printed: Percentage, level: float
+    judge: Judge,
+    condition: ConditionResults,
+    printed: Percentage,
+    own: Proportion,
+    level: float,
+    p_adjusted: float,
+    num_tests: int,
 ) -> Claim:
-    own, theirs = measures.below(condition, printed.bound), printed.proportion
+    theirs = printed.proportion
     low, high = newcombe(own, theirs, level)
     within, their_own = own.interval(level), theirs.interval(level)
     place = "within" if within.low <= theirs.share <= within.high else "outside"
@@ -72,18 +73,19 @@ def _percentage(
     return judge.claim(
         text=(
             f"{condition.label}: a position error below {printed.bound:g} in "
-            f"{100 * theirs.share:.1f} "
-            "% of runs"
+            f"{100 * theirs.share:.1f} % of runs"
         ),
         source=SOURCE,
         evidence=(
             f"{measures.text(own, level)}; the printed share lies {place}, its own thousand runs "
-            "give "
-            f"[{100 * their_own.low:.1f}, {100 * their_own.high:.1f}]; {difference} points "
-            f"(reproduced: 0 within the {100 * level:g} % interval of the difference by "
-            "Newcombe; both are samples)"
+            f"give [{100 * their_own.low:.1f}, {100 * their_own.high:.1f}]; {difference} points "
+            f"(Newcombe's {100 * level:g} % interval); Fisher's exact p, adjusted by Holm over "
+            f"{num_tests}, {markdown.p_value(p_adjusted)} (contradicted below {1.0 - level:.2g}; "
+            "both are samples)"
         ),
-        verdict=judge_equal(own, theirs, level),
+        verdict=(
+            verdicts.judged(p_adjusted >= 1.0 - level) if own.total else verdicts.INCONCLUSIVE
+        ),
     )
 
 

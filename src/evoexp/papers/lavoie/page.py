@@ -122,7 +122,7 @@ def _claims(
 ) -> tuple[Claim, ...]:
     judge, level, shown = judging.judge(results, settings), settings.confidence, results.with_data
     return (
-        *(one for c in shown for one in claims.percentages(judge, c, level)),
+        *claims.percentages(judge, shown, level),
         *claims.more_joints_are_better(judge, shown, level),
         *(
             one

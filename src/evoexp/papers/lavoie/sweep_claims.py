@@ -67,9 +67,12 @@ def groups_but_for(results: Results, *path: str) -> list[Group]:
 
 
 def _success(judge: Judge, results: Results, settings: ReportSettings) -> list[Claim]:
-    """Judge the printed percentages by either reading of a success."""
-    conditions = (c for group in groups_but_for(results, "success") for c in group)
-    return [one for c in conditions for one in percentages(judge, c, settings.confidence)]
+    """Judge the printed percentages by either reading of a success, each a family of tests."""
+    by_reading: dict[str, list[ConditionResults]] = {}
+    for condition in itertools.chain(*groups_but_for(results, "success")):
+        by_reading.setdefault(condition.planner.success, []).append(condition)
+    families = (percentages(judge, own, settings.confidence) for own in by_reading.values())
+    return list(itertools.chain(*families))
 
 
 def _precision(judge: Judge, results: Results, settings: ReportSettings) -> Iterator[Claim]:

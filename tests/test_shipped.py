@@ -177,17 +177,29 @@ def update(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
 def test_update_writes_the_table_as_it_is_stored(
     update: ModuleType, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(update, "rows", lambda: TABLE)
+    monkeypatch.setattr(update, "rows", lambda _: TABLE)
     assert update.main([]) == 0
     stored = ROOT / "src" / "evoexp" / "assets" / "shipped.json"
     assert update.TABLE.read_text(encoding="utf-8") == stored.read_text(encoding="utf-8")
     assert sorted(TABLE) == list(TABLE)
 
 
+def test_update_of_one_experiment_keeps_the_rows_of_all_others(
+    update: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    name = TABLE[0].experiment
+    own = [row for row in TABLE if row.experiment == name]
+    changed = own[0]._replace(condition_id="f" * 64, digest="0" * 32)
+    monkeypatch.setattr(update, "rows", lambda names: [changed, *own[1:]] if names == [name] else 0)
+    assert update.main([name]) == 0
+    written = update.TABLE.read_text(encoding="utf-8")
+    assert written == update.to_json(sorted([changed, *own[1:], *TABLE[len(own) :]]))
+
+
 def test_update_refuses_another_digest_under_the_same_hash(
     update: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(update, "rows", lambda: [TABLE[0]._replace(digest="0" * 32), *TABLE[1:]])
+    monkeypatch.setattr(update, "rows", lambda _: [TABLE[0]._replace(digest="0" * 32), *TABLE[1:]])
     assert update.main([]) == 1
     assert update.TABLE.read_text() == "untouched"
     printed = capsys.readouterr().out
@@ -204,7 +216,7 @@ def test_update_takes_a_new_hash_and_says_so(
     update: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     changed = TABLE[0]._replace(condition_id="f" * 64, digest="0" * 32)
-    monkeypatch.setattr(update, "rows", lambda: [changed, *TABLE[2:]])
+    monkeypatch.setattr(update, "rows", lambda _: [changed, *TABLE[2:]])
     assert update.main([]) == 0
     printed = capsys.readouterr().out
     assert f"{', '.join(TABLE[0][:3])}: {TABLE[0].condition_id[:12]} → ffffffffffff" in printed

@@ -24,6 +24,7 @@ ROLES = (
     "sweep_page.py",
     "measures.py",
     "claims.py",
+    "rules.py",
 )
 SOURCE = re.compile(r"# \[[^\]]+\] (paper: \S+|assumed)")
 

@@ -130,8 +130,11 @@ def _quantities(page: Page, results: Results) -> str:
 def _claims(claims: Sequence[Claim]) -> str:
     if not claims:
         return ""
-    rows = [(c.text, c.source, c.evidence, f"**{c.verdict}**") for c in claims]
-    return markdown.table(("claim", "paper", "evidence", "verdict"), rows)
+    rows = [
+        (c.text, c.source, c.evidence, c.n or "–", c.rule or "–", f"**{c.verdict}**")
+        for c in claims
+    ]
+    return markdown.table(("claim", "paper", "evidence", "n", "rule", "verdict"), rows)
 
 
 def _checks(checks: Sequence[tuple[str, str]]) -> str:

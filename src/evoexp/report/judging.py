@@ -8,8 +8,109 @@ from evoexp.report.parameters import option, planned_replicates
 from evoexp.report.proportions import Proportion
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results
+from evoexp.report.rules import NO_RULES, OWN, Rule, Rules
 from evoexp.report.verdicts import Claim, Comparison
 from evoexp.shipped import config_directory, shipped
+
+
+class Hearing(NamedTuple):
+    """One claim before its judge: each method judges it by one kind of rule.
+
+    Attributes:
+        rule: Of the claim, its words filled in.
+        reason: Why nothing is judged ("budget smoke"); empty: claims are judged.
+        significance: Below this adjusted p-value a difference counts.
+    """
+
+    rule: Rule
+    reason: str
+    significance: float
+
+    def every(self, evidence: str, holds: int, done: int, planned: int) -> Claim:
+        """Judge a claim about every run; see `verdicts.judge_all`."""
+        return self._claim("every", evidence, done, verdicts.judge_all(holds, done, planned))
+
+    def majority(self, evidence: str, holds: int, done: int) -> Claim:
+        """Judge a claim that is reproduced if it holds in more than half of the runs."""
+        verdict = verdicts.REPRODUCED if holds > done / 2 else verdicts.CONTRADICTED
+        return self._claim("majority", evidence, done, verdict if done else verdicts.INCONCLUSIVE)
+
+    def better(self, row: Comparison | None, word: str, told: str = "{}") -> Claim:
+        """Judge a claim that the first condition of a comparison is better than the second.
+
+        Args:
+            row: The comparison; None where the two share no seed.
+            word: Of the one that is better: "lower", "earlier".
+            told: The evidence; its {} stands for the comparison in words.
+        """
+        verdict = verdicts.judge_better(row, self.significance)
+        words = evidence(row, word) if row else "nothing to compare"
+        heard = self._replace(
+            rule=self.rule._replace(reproduced=self.rule.reproduced.replace("{word}", word))
+        )
+        return heard._claim("better", told.replace("{}", words), row and row.num_seeds, verdict)
+
+    def better_than_all(self, evidence: str, rows: Sequence[Comparison]) -> Claim:
+        """Judge a claim that a condition is better than each of several others."""
+        verdict = verdicts.judge_better_than_all(rows, self.significance)
+        return self._claim("better than all", evidence, _seeds(rows), verdict)
+
+    def best(self, evidence: str, rows: Sequence[Comparison], best_median: bool) -> Claim:
+        """Judge a claim that one of several settings is the best; see `verdicts.judge_best`."""
+        verdict = verdicts.judge_best(rows, best_median, self.significance)
+        return self._claim("best", evidence, _seeds(rows), verdict)
+
+    def greater(
+        self, evidence: str, one: Proportion, two: Proportion, p_adjusted: float | None = None
+    ) -> Claim:
+        """Judge a claim that `one` is greater than `two`; see `verdicts.judge_greater`."""
+        verdict = verdicts.judge_greater(one, two, self.significance, p_adjusted)
+        return self._claim("greater", evidence, f"{one.total} and {two.total}", verdict)
+
+    def same_share(
+        self, evidence: str, own: Proportion, printed: Proportion, p_adjusted: float
+    ) -> Claim:
+        """Judge a claim that gives a share, a sample itself, by Fisher's exact test.
+
+        Args:
+            evidence: The numbers.
+            own: Our share.
+            printed: The paper's.
+            p_adjusted: Of the test of both, adjusted over all shares that are judged together.
+        """
+        verdict = verdicts.judged(p_adjusted >= self.significance if own.total else None)
+        return self._claim("same share", evidence, f"{own.total} and {printed.total}", verdict)
+
+    def own(self, evidence: str, n: object, holds: bool | None) -> Claim:
+        """Judge a claim by a rule of its own, which its `claims.yaml` states.
+
+        Args:
+            evidence: The numbers.
+            n: Runs, or whatever else was counted.
+            holds: Whether it is reproduced; None: nobody can say.
+        """
+        return self._claim(OWN, evidence, n, verdicts.judged(holds))
+
+    def elsewhere(self, evidence: str) -> Claim:
+        """Return the claim unjudged: another experiment judges it, or nothing can."""
+        return self.made(evidence, "–", verdicts.NOT_JUDGED)
+
+    def _claim(self, kind: str, evidence: str, n: object, verdict: str) -> Claim:
+        if kind != self.rule.kind:
+            raise ValueError(f"{self.rule.name}: its rule is '{self.rule.kind}', was '{kind}'")
+        reason = f"{verdicts.NOT_JUDGED} ({self.reason})"
+        return self.made(evidence, n, reason if self.reason else verdict)
+
+    def made(self, evidence: str, n: object, verdict: str) -> Claim:
+        """Return the claim with this evidence and verdict."""
+        rule, counted = self.rule, "0" if n is None else str(n)
+        return Claim(rule.claim, rule.source, evidence, verdict, rule.name, rule.text, counted)
+
+
+def _seeds(rows: Sequence[Comparison]) -> str:
+    """Return the numbers of common seeds: "20", or "18 to 20"."""
+    counts = sorted({row.num_seeds for row in rows})
+    return " to ".join(map(str, counts if len(counts) < 2 else (counts[0], counts[-1]))) or "0"
 
 
 class Judge(NamedTuple):
@@ -18,10 +119,26 @@ class Judge(NamedTuple):
     Attributes:
         reason: Why nothing is judged ("budget smoke"); empty: claims are judged.
         significance: Below this adjusted p-value a difference counts.
+        rules: Of the paper's claims, by name.
     """
 
     reason: str
     significance: float
+    rules: Rules = NO_RULES
+
+    def on(self, name: str, **words: object) -> Hearing:
+        """Open the hearing of a claim.
+
+        Args:
+            name: Of its rule.
+            words: Filled in for the words in braces of its texts.
+
+        Raises:
+            KeyError: If there is no such rule, or a word is missing.
+        """
+        # a rule that compares names its own word where it is judged
+        rule = self.rules[name].about(**{"word": "{word}", **words})
+        return Hearing(rule, self.reason, self.significance)
 
     def claim(self, text: str, source: str, evidence: str, verdict: str) -> Claim:
         """Make a claim whose verdict the caller has found."""
@@ -77,9 +194,9 @@ class Judge(NamedTuple):
         return self.claim(text, source, evidence, verdict)
 
 
-def judge(results: Results, settings: ReportSettings) -> Judge:
+def judge(results: Results, settings: ReportSettings, rules: Rules = NO_RULES) -> Judge:
     """Return the judge of an experiment's claims."""
-    return Judge(not_judged(results), settings.significance)
+    return Judge(not_judged(results), settings.significance, rules)
 
 
 def not_judged(results: Results) -> str:

@@ -4,7 +4,8 @@ A page is a function (`Results`, `ReportSettings`) → `Page`, named by an entry
 It reads `Results`: columns of summaries, generations, solutions, and the answers of the planner's
 protocol (`ConditionResults.evaluate`, `motion`, `problem`). Its parts are:
 
-- `Table`, `Quantity` (of `generic.quantity`), `Claim` (of a `Judge`, see `judging.judge`),
+- `Table`, `Quantity` (of `generic.quantity`), `Claim` (of a `Judge`, by the rules of the paper's
+  `claims.yaml`, see `rules` and `judging.judge`),
   `Comparison` (of `compared`) and `Drawing`, each with its words in `markdown`;
 - a `Drawing` is two functions: results → table (columns by `records`, `groups`, `rounded`), and
   table → figure (`style`); `sweep_figures` has those that all sweeps share;
@@ -32,6 +33,7 @@ from evoexp.report.proportions import Proportion, fisher_exact, newcombe
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results, wrapped
 from evoexp.report.rows import groups, records, rounded
+from evoexp.report.rules import read_rules
 from evoexp.report.run_measures import (
     counted,
     grouped,
@@ -94,6 +96,7 @@ __all__ = [
     "planned_by",
     "planned_replicates",
     "quantile",
+    "read_rules",
     "records",
     "rounded",
     "run_measures",

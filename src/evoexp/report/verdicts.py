@@ -34,12 +34,18 @@ class Claim(NamedTuple):
         source: Where the paper makes it.
         evidence: The numbers.
         verdict: One of the four words above.
+        name: Of the claim among the paper's.
+        rule: When it is reproduced, and when contradicted.
+        n: Runs, pairs of runs, or whatever was counted.
     """
 
     text: str
     source: str
     evidence: str
     verdict: str
+    name: str = ""
+    rule: str = ""
+    n: str = ""
 
 
 class Comparison(NamedTuple):

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from evoexp.papers.chen.figures import field_grids
+from evoexp.papers.chen.rules import RULES
 from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.report.kit import (
     Claim,
@@ -19,7 +20,6 @@ from evoexp.report.kit import (
     groups,
     judging,
     records,
-    verdicts,
 )
 
 PRINT = "chen_fig_1.txt"
@@ -44,7 +44,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
     if not shown:
         return generic.page(results, settings)
     tables = {c.label: _compared(c) for c in shown if _fields(c)[0].shape == (16, 16)}
-    judge, compared = judging.judge(results, settings), tables.values()
+    judge, compared = judging.judge(results, settings, RULES), tables.values()
     numbers = (_numbers(c, tables[c.label]) for c in shown if c.label in tables)
     return Page(
         title=f"Chen & Zalzala 1995: {results.experiment or 'stored runs'}",
@@ -75,16 +75,12 @@ def _claim(judge: Judge, name: str, table: pd.DataFrame) -> Claim:
         int((table["slip"] == slip).sum())
         for slip in ("", field_grids.WRONG, field_grids.MISSING, field_grids.SURPLUS)
     )
-    return judge.claim(
-        text=f"The wave front gives Fig. 1{name}",
-        source="Fig. 1",
-        evidence=(
-            f"{same} of {total} nodes as printed; {wrong} with another number, {missing} left "
-            f"out, {surplus} tokens too many (reproduced: every node that is printed, but for "
-            "single slips of the print: at most one in a hundred)"
-        ),
-        verdict=verdicts.judged(same >= 0.99 * total),
+    evidence = (
+        f"{same} of {total} nodes as printed; {wrong} with another number, {missing} left out, "
+        f"{surplus} tokens too many"
     )
+    hearing = judge.on("wave_front", part=name)
+    return hearing.own(evidence, f"{total} nodes", same >= hearing.rule.limits["share"] * total)
 
 
 def _slips(name: str, table: pd.DataFrame) -> tuple[str, str]:

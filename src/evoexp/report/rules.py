@@ -1,0 +1,148 @@
+"""The rules by which claims are judged, as data.
+
+A paper keeps its claims in a file `claims.yaml` beside its pages, one entry per claim:
+
+    free_at_via_points:                     # its name
+      claim: "{who}The motion is free of collision at the via-points, in every run"
+      source: "section 3.5, Fig. {figure}"  # where the paper makes it
+      kind: every                           # one of `KINDS`, which says when it is reproduced
+      experiments: [rana, rana_planar]      # those that judge it
+    reasonable:
+      claim: "100 individuals are reasonable: {metric}"
+      source: "section 5"
+      kind: own                             # then it says itself when it is
+      reproduced: "the effort of 100 is at most {most} times that of the best size, on every task"
+      contradicted: "it is more on a task"  # optional; without it: wherever it is not reproduced
+      limits: {most: 2.0}                   # numbers that the rule needs, read by the code
+      experiments: [corsepius_population]
+
+Words in braces are limits, or are given where the claim is judged:
+
+    RULES = read_rules(Path(__file__).with_name("claims.yaml"))
+    judge = judging.judge(results, settings, RULES)
+    judge.on("free_at_via_points", who="", figure="4").every(evidence, holds, done, planned)
+    most = RULES["reasonable"].limits["most"]
+    judge.on("reasonable", metric="cycles").own(evidence, n=50, holds=factor <= most)
+
+The evidence holds the numbers alone; the rule stands in a column of its own.
+"""
+
+import functools
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import yaml
+
+OWN = "own"
+KINDS = {  # kind → (reproduced, contradicted); inconclusive otherwise
+    "every": ("it holds in all planned runs", "it fails in one run"),
+    "majority": ("it holds in more than half of the runs", "it holds in no more than half of them"),
+    "better": (
+        "significantly {word} by the signed-rank test of pairs of the same seed",
+        "significantly the other way round",
+    ),
+    "better than all": (
+        "significantly better than each of the others (signed-rank tests of pairs of the same "
+        "seed, adjusted by Holm)",
+        "one of the others is significantly better",
+    ),
+    "best": (
+        "its median is the best, and it is significantly better than one of the others at least "
+        "(signed-rank tests of pairs of the same seed, adjusted by Holm)",
+        "one of the others is significantly better",
+    ),
+    "greater": (
+        "the share is significantly greater by Fisher's exact test",
+        "it is significantly smaller",
+    ),
+    "same share": (
+        "Fisher's exact test cannot tell the printed share from ours",
+        "the test tells them apart",
+    ),
+    OWN: ("", ""),
+}
+_KEYS = {"claim", "source", "kind", "reproduced", "contradicted", "limits", "experiments"}
+
+
+class Rule(NamedTuple):
+    """A claim of a paper, and the rule by which it is judged.
+
+    Attributes:
+        name: Of the claim: `free_at_via_points`.
+        claim: The claim in our words; {words} are filled in where it is judged.
+        source: Where the paper makes it.
+        kind: One of `KINDS`.
+        reproduced: When the claim is reproduced, in words.
+        contradicted: When it is contradicted, in words; empty: wherever it is not reproduced.
+        limits: Numbers that the rule needs, by name.
+        experiments: Names of the experiments that judge it.
+    """
+
+    name: str
+    claim: str
+    source: str
+    kind: str
+    reproduced: str
+    contradicted: str
+    limits: Mapping[str, float]
+    experiments: tuple[str, ...]
+
+    def about(self, **words: object) -> "Rule":
+        """Return the rule with its words in braces filled in; limits are known already.
+
+        Raises:
+            KeyError: If a word is missing.
+        """
+        known = {**{name: f"{limit:g}" for name, limit in self.limits.items()}, **words}
+        texts = (self.claim, self.source, self.reproduced, self.contradicted)
+        claim, source, reproduced, contradicted = (text.format_map(known) for text in texts)
+        return self._replace(
+            claim=claim, source=source, reproduced=reproduced, contradicted=contradicted
+        )
+
+    @property
+    def text(self) -> str:
+        """The rule in one sentence."""
+        against = f"; contradicted if {self.contradicted}" if self.contradicted else ""
+        return f"reproduced if {self.reproduced}{against}"
+
+
+Rules = Mapping[str, Rule]
+NO_RULES: Rules = MappingProxyType({})
+
+
+@functools.cache
+def read_rules(path: Path) -> Rules:
+    """Read the claims of a file.
+
+    Raises:
+        ValueError: If an entry lacks a key, has an unknown key, or another kind than `KINDS`.
+    """
+    entries = yaml.safe_load(path.read_text(encoding="utf-8"))
+    return MappingProxyType({name: _rule(name, entry) for name, entry in entries.items()})
+
+
+def _rule(name: str, entry: dict[str, Any]) -> Rule:
+    missing = {"claim", "source", "kind", "experiments"} - entry.keys()
+    unknown = entry.keys() - _KEYS
+    if missing or unknown or entry["kind"] not in KINDS:
+        raise ValueError(
+            f"{name}: must have claim, source, experiments, a kind out of {', '.join(KINDS)}; "
+            f"missing: {sorted(missing)}, unknown: {sorted(unknown)}, kind: {entry.get('kind')}"
+        )
+    own = "reproduced" in entry
+    if (entry["kind"] == OWN) != own or ("contradicted" in entry and not own):
+        raise ValueError(f"{name}: a rule of kind {OWN}, and no other, says when it is reproduced")
+    reproduced, contradicted = KINDS[entry["kind"]]
+    return Rule(
+        name,
+        entry["claim"],
+        str(entry["source"]),
+        entry["kind"],
+        entry.get("reproduced", reproduced),
+        entry.get("contradicted", contradicted),
+        MappingProxyType(dict(entry.get("limits", {}))),
+        tuple(entry["experiments"]),
+    )

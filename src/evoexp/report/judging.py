@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from evoexp.report import markdown, verdicts
+from evoexp.report.claim_rules import NO_RULES, OWN, Rule, Rules
 from evoexp.report.parameters import option, planned_replicates
 from evoexp.report.proportions import Proportion
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results
-from evoexp.report.rules import NO_RULES, OWN, Rule, Rules
 from evoexp.report.verdicts import Claim, Comparison
 from evoexp.shipped import config_directory, shipped
 

@@ -5,7 +5,7 @@ It reads `Results`: columns of summaries, generations, solutions, and the answer
 protocol (`ConditionResults.evaluate`, `motion`, `problem`). Its parts are:
 
 - `Table`, `Quantity` (of `generic.quantity`), `Claim` (of a `Judge`, by the rules of the paper's
-  `claims.yaml`, see `rules` and `judging.judge`),
+  `claims.yaml`, see `claim_rules` and `judging.judge`),
   `Comparison` (of `compared`) and `Drawing`, each with its words in `markdown`;
 - a `Drawing` is two functions: results → table (columns by `records`, `groups`, `rounded`), and
   table → figure (`style`); `sweep_figures` has those that all sweeps share;
@@ -22,6 +22,7 @@ from evoexp.report import (
     sweep_figures,
     verdicts,
 )
+from evoexp.report.claim_rules import read_rules
 from evoexp.report.comparisons import Values, by_column, compared, compared_with_controls
 from evoexp.report.figures import convergence, shares
 from evoexp.report.figures.boxes import draw_box
@@ -33,7 +34,6 @@ from evoexp.report.proportions import Proportion, fisher_exact, newcombe
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results, wrapped
 from evoexp.report.rows import groups, records, rounded
-from evoexp.report.rules import read_rules
 from evoexp.report.run_measures import (
     counted,
     grouped,

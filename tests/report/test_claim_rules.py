@@ -3,9 +3,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from evoexp.report.claim_rules import KINDS, Rules, read_rules
 from evoexp.report.judging import Judge
 from evoexp.report.proportions import Proportion
-from evoexp.report.rules import KINDS, Rules, read_rules
 from evoexp.report.verdicts import compare
 
 BETTER = compare("cost", np.arange(12.0), np.arange(12.0) + 20.0, True, 0.95, 50)

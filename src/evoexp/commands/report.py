@@ -14,11 +14,12 @@ from evoexp.condition import Condition
 from evoexp.configuration import expansions
 from evoexp.configuration.experiment import Experiment
 from evoexp.configuration.search_path import is_file, options
-from evoexp.errors import SettingError, UnknownOption
+from evoexp.errors import NothingStored, SettingError, UnknownOption
 from evoexp.report import build
 from evoexp.shipped import shipped
-from evoexp.store.run_directory import outputs_root, resolve
+from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
 
+ASSUMPTIONS = "assumptions"  # stands for the experiments of that name, one per paper
 MAX_NAMED = 4  # runs whose hashes a report's name spells out
 _HASH = re.compile("[0-9a-fA-F]{4,64}")
 _SILENT = (
@@ -32,15 +33,42 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     words = add_experiment_arguments(parser)
     words.metavar, words.nargs = "EXPERIMENT | HASH ... [KEY=VALUE ...]", "+"
-    words.help = "an experiment and overrides as for run, or prefixes of the hashes of stored runs"
+    words.help = (
+        "an experiment and overrides as for run, or prefixes of the hashes of stored runs; "
+        f"`{ASSUMPTIONS}`: every paper's page of assumed numbers"
+    )
 
 
 def main(arguments: argparse.Namespace) -> int:
     """Draw; exit code 0."""
     console = Console()
+    if ASSUMPTIONS in arguments.overrides:
+        arguments.overrides = _with_assumptions(arguments.overrides, console)
     for page in _pages(arguments):
         console.print(f"report: {page}", highlight=False, soft_wrap=True)
     return 0
+
+
+def _with_assumptions(words: Sequence[str], console: Console) -> list[str]:
+    """Return the words with `assumptions` replaced by the papers' experiments of that name.
+
+    An experiment that nothing is stored of is named instead, with the command that runs it.
+
+    Raises:
+        NothingStored: If nothing is stored of any of them.
+    """
+    every = [name for name in options("experiment") if name.endswith(f"_{ASSUMPTIONS}")]
+    table, outputs = shipped(), outputs_root()
+    ids = {name: {r.condition_id for r in table if r.experiment == name} for name in every}
+    stored = [
+        name for name in every if any(RunDirectory(outputs, each).completed() for each in ids[name])
+    ]
+    missing = " ".join(f"evoexp run experiment={name};" for name in every if name not in stored)
+    if not stored:
+        raise NothingStored(f"{ASSUMPTIONS}: nothing stored in {outputs}; try: {missing[:-1]}")
+    if missing:
+        console.print(f"nothing stored yet: {missing[:-1]}", highlight=False, soft_wrap=True)
+    return [name for word in words for name in (stored if word == ASSUMPTIONS else [word])]
 
 
 def _pages(arguments: argparse.Namespace) -> list[Path]:

@@ -37,7 +37,7 @@ def compared_with_controls(
             if (
                 first.is_control
                 or not second.is_control
-                or not _beside(first.condition, second.condition)
+                or not beside(first.condition, second.condition)
             ):
                 continue
             rows = [compare_on_common_seeds(first, second, *what, settings) for what in compared]
@@ -47,7 +47,7 @@ def compared_with_controls(
     return tuple(found)
 
 
-def _beside(first: Condition, control: Condition) -> bool:
+def beside(first: Condition, control: Condition) -> bool:
     """Return whether a control wraps this very planner in the same scene, with its seeds."""
     return control._replace(planner=wrapped(control.planner)) == first
 

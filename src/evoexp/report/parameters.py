@@ -185,6 +185,9 @@ def _setting(
     else:
         for path, leaf in _flat(value, key):
             yield _parameter(f"{group}.{path}", leaf, entries.get(path), otherwise)
+        items = {path.split("]")[0] for path in entries if path.startswith(f"{key}[")}
+        if isinstance(value, list) and len(items) > len(value):  # a list cut short
+            yield Parameter(f"{group}.{key}", f"{len(value)} of {len(items)}", "", otherwise)
 
 
 def _most_like(group: str, config: dict[str, Any]) -> tuple[str, dict[str, Entry]]:

@@ -1,0 +1,286 @@
+"""The page of what a paper leaves open: every assumed number, and which claims survive another one.
+
+A paper has an experiment `<paper>_assumptions` (`conf/experiment`) for it. Its first condition of a
+family is the shipped one, without overrides; each other condition changes assumed settings by
+overrides (`planner.num_via_points=10`), and keeps all options; controls stand beside their
+conditions as everywhere:
+
+    defaults: [..., {override /report: rana_assumptions}]
+    conditions:
+      "as assumed": []
+      "as assumed, multi-start": [control=multi_start]
+      "N = 10": [planner.num_via_points=10]
+      "N = 10, multi-start": [planner.num_via_points=10, control=multi_start]
+
+The paper registers a page (`papers/<paper>/assumptions_page.py`, entry point `evoexp.pages`, option
+`conf/report/<paper>_assumptions.yaml`) that names its headline claims, each with its rule in the
+paper's `claims.yaml`, a quantity that is drawn, and a function that judges it on one condition:
+
+    def page(results, settings):
+        return assumptions.page(results, settings, RULES, "Rana & Zalzala 1995", (
+            Headline("free_at_via_points", "free runs [%]", free, judge_free), ...))
+
+    def judge_free(judge, condition, controls):  # -> Claim
+        return judge.on("free_at_via_points", who="").every(...)
+"""
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from typing import NamedTuple
+
+import pandas as pd
+
+from evoexp.report import judging, markdown
+from evoexp.report.claim_rules import OWN, Rule, Rules
+from evoexp.report.comparisons import Values, beside
+from evoexp.report.figures import robustness
+from evoexp.report.judging import Hearing, Judge
+from evoexp.report.page_parts import Drawing, Page, Table
+from evoexp.report.pages import generic
+from evoexp.report.parameters import OVERRIDE, Parameter, parameters
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results import ConditionResults, Results
+from evoexp.report.statistics import spread
+from evoexp.report.verdicts import Claim
+
+ASSUMED = "assumed"
+SHOWN = 4  # values of a list that are written out
+_INDEX = re.compile(r"\[\d+\]")
+INTRODUCTION = (
+    "The paper does not print every number that its experiments need. Each number that this "
+    "project chose is listed here with its reason. Some are replaced by others, one at a time; the "
+    "headline claims of the paper are judged again under each of them."
+)
+SURVIVES = Rule(
+    name="survives",
+    claim="{claim} — whatever number is assumed",
+    source="our question",
+    kind=OWN,
+    reproduced="the verdict under every variation is that under the assumed numbers",
+    contradicted="the verdict is another one under a variation",
+    limits={},
+    experiments=(),
+)
+
+
+class Headline(NamedTuple):
+    """A headline claim of a paper.
+
+    Attributes:
+        name: Of its rule.
+        quantity: That is drawn, with its unit.
+        values: The quantity of a condition's runs, (done,); inf: never.
+        judge: Judges the claim on one condition with its controls.
+    """
+
+    name: str
+    quantity: str
+    values: Values
+    judge: Callable[[Judge, ConditionResults, tuple[ConditionResults, ...]], Claim]
+
+
+class Family(NamedTuple):
+    """A condition as assumed, and those that change its numbers.
+
+    Attributes:
+        shipped: As assumed.
+        varied: Each other condition with the names of the settings that it changes.
+    """
+
+    shipped: ConditionResults
+    varied: tuple[tuple[ConditionResults, tuple[str, ...]], ...]
+
+
+class Judged(NamedTuple):
+    """A headline claim under one condition.
+
+    Attributes:
+        headline: The claim.
+        family: That the condition belongs to.
+        condition: As assumed, or varied.
+        claim: With evidence and verdict.
+        same: Whether the verdict is that under the assumed numbers.
+    """
+
+    headline: Headline
+    family: Family
+    condition: ConditionResults
+    claim: Claim
+    same: bool
+
+
+def page(
+    results: Results,
+    settings: ReportSettings,
+    rules: Rules,
+    paper: str,
+    headlines: Sequence[Headline],
+) -> Page:
+    """Build the page of a paper's assumptions.
+
+    Args:
+        results: Of the experiment `<paper>_assumptions`.
+        settings: Levels and formats.
+        rules: Of the paper's claims.
+        paper: "Rana & Zalzala 1995".
+        headlines: The claims that are judged again and again.
+    """
+    found = families(results)
+    if not found:
+        return generic.page(results, settings)
+    judge = judging.judge(results, settings, rules)
+    judged = [
+        one
+        for family in found
+        for headline in headlines
+        for one in _heard(results, judge, family, headline)
+    ]
+    drawing = Drawing(
+        "assumptions",
+        "The headline claims under other numbers",
+        "Median and quartiles of every condition's runs; filled: the claim is reproduced, cross: "
+        "contradicted, open: inconclusive or not judged; dashed: the median as assumed.",
+        partial(_drawn, judged),
+        robustness.draw_robustness,
+        results.with_data,
+    )
+    return Page(
+        f"{paper}: assumed numbers, and which claims survive others",
+        INTRODUCTION,
+        generic.quantities(results),
+        claims=tuple(_claims(judge, judged)),
+        tables=(_effects(judged), _assumed(results, found)),
+        drawings=(drawing,),
+    )
+
+
+def families(results: Results) -> tuple[Family, ...]:
+    """Return the conditions as assumed, each with those that change its settings by overrides."""
+    named = {c.label: _changed(results, c) for c in results.main}
+    shipped = [c for c in results.main if not named[c.label]]
+    return tuple(
+        Family(
+            own,
+            tuple(
+                (c, named[c.label])
+                for c in results.main
+                if named[c.label] and _options(c) == _options(own)
+            ),
+        )
+        for own in shipped
+    )
+
+
+def _options(condition: ConditionResults) -> list[tuple[str, str]]:
+    """Return the options of a condition, by group."""
+    return sorted((each.group, each.name) for each in condition.options)
+
+
+def _changed(results: Results, condition: ConditionResults) -> tuple[str, ...]:
+    """Return the names of settings that a condition changes by overrides."""
+    own = parameters(results, condition)
+    ignored = ("seed", "num_replicates")
+    return tuple(p.name for p in own if p.source == OVERRIDE and p.name not in ignored)
+
+
+def _heard(results: Results, judge: Judge, family: Family, headline: Headline) -> Iterator[Judged]:
+    """Judge a headline claim on every condition of a family, first as assumed."""
+    first = ""
+    for condition in (family.shipped, *(varied for varied, _ in family.varied)):
+        controls = tuple(
+            c for c in results.evolved if c.is_control and beside(condition.condition, c.condition)
+        )
+        claim = headline.judge(judge, condition, controls)
+        first = first or claim.verdict
+        yield Judged(headline, family, condition, claim, claim.verdict == first)
+
+
+def _claims(judge: Judge, judged: Sequence[Judged]) -> Iterator[Claim]:
+    """Yield each claim as assumed, then whether it survives every variation."""
+    for family, headline in dict.fromkeys((one.family, one.headline) for one in judged):
+        first, *others = (
+            one for one in judged if one.family is family and one.headline is headline
+        )
+        text = f"{first.condition.label}: {first.claim.text}"
+        yield first.claim._replace(text=text)
+        differing = [
+            f"{one.condition.label} ({one.claim.verdict})" for one in others if not one.same
+        ]
+        told = (
+            f"{first.claim.verdict} as assumed; another verdict under "
+            f"{len(differing)} of {len(others)} variations: {', '.join(differing) or '–'}"
+        )
+        hearing = Hearing(SURVIVES.about(claim=text), judge.reason, judge.significance)
+        yield hearing.own(told, f"{len(others)} variations", not differing if others else None)
+
+
+def _effects(judged: Sequence[Judged]) -> Table:
+    """Return the table of all verdicts, one row per condition."""
+    headlines = list(dict.fromkeys(one.headline for one in judged))
+    rows = []
+    for condition in dict.fromkeys(one.condition for one in judged):
+        own = [one for one in judged if one.condition is condition]
+        changed = dict(own[0].family.varied).get(condition, ())
+        cells = (
+            f"{markdown.spread(spread(one.headline.values(condition)))}: "
+            f"{one.claim.verdict if one.same else f'**{one.claim.verdict}**'}"
+            for one in own
+        )
+        names = ", ".join(f"`{name}`" for name in changed) or "as assumed"
+        rows.append((condition.label, names, condition.done, *cells))
+    return Table(
+        "Headline claims under other numbers",
+        ("condition", "changed", "n", *(f"{h.name}: {h.quantity}" for h in headlines)),
+        tuple(rows),
+        "Median [first quartile, third quartile] of the runs and the verdict; bold where it is not "
+        "the verdict under the assumed numbers.",
+    )
+
+
+def _assumed(results: Results, found: Sequence[Family]) -> Table:
+    """Return the table of every assumed number, with the conditions that vary it."""
+    # name of a setting, or of a list of settings → its entries; entry → the varying conditions
+    lists: dict[str, dict[Parameter, list[str]]] = {}
+    for family in found:
+        for parameter in parameters(results, family.shipped):
+            if ASSUMED in parameter.source:
+                names = {parameter.name, parameter.name.split("[")[0]}
+                by = [c.label for c, changed in family.varied if names & set(changed)]
+                entries = lists.setdefault(_INDEX.sub("[…]", parameter.name), {})
+                entries.setdefault(parameter, []).extend(by)
+    rows = []
+    for name, entries in lists.items():
+        values = list(dict.fromkeys(p.value for p in entries))
+        reasons = dict.fromkeys(p.source.removeprefix(ASSUMED).lstrip(": ") for p in entries)
+        varied = dict.fromkeys(label for labels in entries.values() for label in labels)
+        shown = "; ".join(values) if len(values) <= SHOWN else f"{len(values)} values"
+        units = dict.fromkeys(p.unit for p in entries)
+        reason = "; ".join(filter(None, reasons)) or "–"
+        by_label = "; ".join(varied) or "not varied"
+        rows.append((f"`{name}`", shown, ", ".join(filter(None, units)) or "–", reason, by_label))
+    headers = ("setting", "value", "unit", "why", "varied by")
+    return Table("Every assumed number", headers, tuple(rows))
+
+
+def _drawn(judged: Sequence[Judged]) -> pd.DataFrame:
+    """Return the table of the figure, one row per claim and condition."""
+    positions = {c: k for k, c in enumerate(dict.fromkeys(one.condition for one in judged))}
+    rows = []
+    for one in judged:
+        found = spread(one.headline.values(one.condition))
+        shipped = spread(one.headline.values(one.family.shipped)).median
+        rows.append(
+            (
+                one.headline.quantity,
+                positions[one.condition],
+                one.condition.label,
+                found.median,
+                found.lower,
+                found.upper,
+                one.claim.verdict,
+                shipped,
+                one.family.shipped.label,
+            )
+        )
+    return pd.DataFrame(rows, columns=robustness.COLUMNS)

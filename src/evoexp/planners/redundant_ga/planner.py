@@ -98,7 +98,8 @@ class Judgement(NamedTuple):
 class RedundantGa(PlannerDefaults, Component):
     """The algorithm of Lavoie & Boudreau, sections 3 to 5.
 
-    Controls take the generations and evaluations of one search, those of `ga`.
+    Random search takes the generations and evaluations of one search, those of `ga`; sequential
+    search goes through the same attempts and searches as the algorithm.
 
     Attributes:
         num_attempts: How often SP1 and SP2 are searched at most.
@@ -154,26 +155,37 @@ class RedundantGa(PlannerDefaults, Component):
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield the generations of all searches; their indices go on counting."""
+        return self.search_in_turn(problem, rng, Search)
+
+    def search_in_turn(
+        self, problem: Problem, rng: np.random.Generator, kind: type[Search]
+    ) -> Iterator[Generation]:
+        """Yield the generations of SP1 and SP2 in turn, until both are successful.
+
+        Args:
+            problem: The prepared task.
+            rng: Source of all random numbers.
+            kind: What searches a sub-path: the genetic algorithm, or a control in its place.
+        """
         plans = _Plans(self, problem)
         for _ in range(self.num_attempts):
             plans.attempts += 1
-            via = yield from self._search(problem, rng, plans, 0, problem.start)
+            search = self._new(kind, problem, 0, problem.start)
+            via = yield from self._search(search, rng, plans, 0)
             if self.successful(0, via.cost):
                 plans.via = via
-                goal = yield from self._search(problem, rng, plans, 1, via.posture)
+                search = self._new(kind, problem, 1, via.posture)
+                goal = yield from self._search(search, rng, plans, 1)
                 if self.successful(1, goal.cost):
                     return
 
+    def _new(self, kind: type[Search], problem: Problem, path: int, start: FloatArray) -> Search:
+        return kind(self.ga, problem.joint_limits, self._judging(problem, path), start)
+
     def _search(
-        self,
-        problem: Problem,
-        rng: np.random.Generator,
-        plans: "_Plans",
-        path: int,
-        start: FloatArray,
+        self, search: Search, rng: np.random.Generator, plans: "_Plans", path: int
     ) -> Generator[Generation, None, BestEnd]:
         """Search the end of one sub-path (0: SP1, 1: SP2); yield generations, return the best."""
-        search = Search(self.ga, problem.joint_limits, self._judging(problem, path), start)
         search.begin(rng)
         yield plans.record(search, path, self.ga.population_size)
         for index in range(self.ga.num_generations):
@@ -310,7 +322,7 @@ class _Plans:
             search.statistics,
             search.costs[None, :],
             search.genomes,
-            lowest=np.inf if path == 0 else best.cost,
+            lowest=np.inf if path == 0 else float(search.costs[search.statistics.best]),
             num_feasible=search.num_finite,
             evaluations=count,
             collision_queries=count * self._problem.collision.queries,

@@ -104,16 +104,22 @@ class Search:
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw the initial population, uniform within the limits, and judge it."""
-        size, limits = len(self.costs), self._breeding.limits
+        self._take(self._draw(rng, len(self._starts[0])))
+
+    def _draw(self, rng: np.random.Generator, count: int) -> tuple[int, float, float, int]:
+        """Draw the first `count` individuals anew and judge them; return their summary."""
+        limits, angles = self._breeding.limits, self._angles[:, :count]
         if self._breeding.binary:
-            self.genomes[:] = np.floor(2.0 * rng.random(self.genomes.shape))
-            decode_bits(self.genomes, size, limits, self._angles)
+            self.genomes[:, :count] = np.floor(2.0 * rng.random((len(self.genomes), count)))
+            decode_bits(self.genomes, count, limits, self._angles)
         else:
             low, high = limits.T
-            self._angles[:] = low[:, None] + (high - low)[:, None] * rng.random(self._angles.shape)
+            angles[:] = low[:, None] + (high - low)[:, None] * rng.random(angles.shape)
         lanes, judged = self._memory.lanes, (self._judging, self._results, self._memory.hit)
-        kernels.judge(self._starts, self._angles, lanes, size, *judged)
-        self._take(kernels.summary(self.costs))
+        lanes[:] = np.arange(len(lanes))
+        kernels.judge(self._starts, self._angles, lanes, count, *judged)
+        found: tuple[int, float, float, int] = kernels.summary(self._results[0, :count])
+        return found
 
     def advance(self, rng: np.random.Generator, index: int) -> None:
         """Replace the population of generation `index` by the next one."""
@@ -137,6 +143,23 @@ class Search:
         self.statistics, self.num_finite = CostStatistics(*summary[:3]), summary[3]
         terms = self._results[:, summary[0]].copy()
         self.best = BestEnd(float(terms[0]), self._angles[:, summary[0]].copy(), terms)
+
+
+class DrawnSearch(Search):
+    """The same search without evolution: every generation is drawn as the initial population is.
+
+    A generation draws as many individuals as the genetic algorithm breeds, and costs as many
+    evaluations. `genomes` and `costs` are those of the last draw.
+    """
+
+    def advance(self, rng: np.random.Generator, index: int) -> None:
+        """Draw the next population; keep the best individual of all draws so far."""
+        before, count = self.best, self._ga.num_offspring
+        if count == 0:  # all are elites: nothing is bred, and nothing drawn
+            return
+        self._take(self._draw(rng, count))
+        self.genomes, self.costs = self.genomes[:, :count], self._results[0, :count]
+        self.best = self.best if self.best.cost < before.cost else before
 
 
 def _breeding(ga: SelectiveSettings, limits: FloatArray) -> Breeding:

@@ -1,0 +1,43 @@
+"""Sequential search: the loop of Lavoie & Boudreau 2001 with drawing in place of evolution."""
+
+from collections.abc import Iterator
+from typing import Any, ClassVar
+
+import numpy as np
+from pydantic import field_validator
+
+from evoexp.errors import SettingError
+from evoexp.planners.redundant_ga.planner import Problem, RedundantGa
+from evoexp.planners.redundant_ga.sub_path import DrawnSearch
+from evoexp.planners.wrapped_planner import WrappedPlanner
+from evoexp.records import Generation
+from evoexp.validation import Component
+
+
+class SequentialSearch(WrappedPlanner):
+    """Searches SP1, then SP2, by uniform draws; everything but the operators is as in the planner.
+
+    Population size, number of generations, stopping costs and attempts are those of the planner.
+    Selection, crossover and mutation are left out: every generation is drawn anew, and the best
+    individual drawn so far ends the sub-path. What the planner does better is due to evolution.
+    (Random search draws both sub-paths at once and must succeed in both with one draw.)
+
+    Attributes:
+        planner: The planner whose loop, sampling and budget are used.
+    """
+
+    component: ClassVar[str] = "sequential_search"
+
+    planner: RedundantGa
+
+    @field_validator("planner", mode="before")
+    @classmethod
+    def _planner_fits(cls, planner: Any) -> Any:
+        if isinstance(planner, Component) and not isinstance(planner, RedundantGa):
+            must = "redundant_ga, whose sub-paths sequential_search draws"
+            raise SettingError("planner", must, planner.component)
+        return planner
+
+    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
+        """Yield the generations of all draws; their indices go on counting."""
+        return self.planner.search_in_turn(problem, rng, DrawnSearch)

@@ -25,7 +25,7 @@ from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import Busy, CorruptLog, SettingError
 from evoexp.store.log_reader import read_log
-from evoexp.store.run_directory import RunDirectory
+from evoexp.store.run_directory import Plan, RunDirectory
 from evoexp.store.tables import read_summaries
 
 
@@ -66,6 +66,7 @@ def test_more_replicates_leave_the_earlier_ones_alone(faulty: Condition, tmp_pat
     assert [outcome.replicate for outcome in run(tmp_path, (faulty, 4))] == [2, 3]
     after = stamps(directory) | {"": (0, (directory.path / "manifest.json").read_bytes())}
     assert {name: after[name] for name in before} == before
+    assert directory.plans() == [Plan(2, 0), Plan(4, 2)]
     assert read_summaries(directory)["replicate"].tolist() == [0, 1, 2, 3]
     assert run(tmp_path, (faulty, 1)) == []
     assert sorted(directory.completed()) == [0, 1, 2, 3], "fewer replicates take nothing away"

@@ -73,11 +73,7 @@ def test_overrides_and_budgets_are_told_apart() -> None:
     assert rows["num_replicates"].source == "budget smoke"
     assert rows["ga.crossover_rate"].source == "paper: Tab. 1, cross_over_probability"
     assert rows["seed"].source == "override"
-    assert sorted(overridden(rows.values())) == [
-        "ga.num_generations",
-        "ga.population_size",
-        "num_replicates",
-    ]
+    assert sorted(overridden(rows.values())) == ["ga.num_generations", "ga.population_size"]
 
 
 def test_another_option_than_the_experiments_own_is_recognised() -> None:

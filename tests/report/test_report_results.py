@@ -4,13 +4,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.errors import NothingStored
 from evoexp.report import results as results_module
+from evoexp.report.index import render
+from evoexp.report.page_parts import Page
+from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results, gather
 from evoexp.store.log_reader import read_log
-from evoexp.store.run_directory import RunDirectory
-from report_samples import expand, store
+from evoexp.store.run_directory import Plan, RunDirectory, StoreError
+from report_samples import REPORT, expand, store
 
 
 def gathered(outputs: Path, count: int | None, *overrides: str) -> Results:
@@ -50,12 +54,37 @@ def test_results_are_what_the_logs_hold(stored: Path, results: Results) -> None:
     assert math.isnan(ga.spread("no such column").median)
 
 
-def test_only_planned_replicates_are_looked_at(stored: Path) -> None:
+def test_every_stored_replicate_is_read_however_many_are_planned(stored: Path) -> None:
     ga = gathered(stored, 1).conditions[0]
-    assert (ga.done, ga.planned, list(ga.solutions)) == (1, 1, [0])
-    assert set(ga.generations["replicate"]) == {0}
+    assert (ga.done, ga.planned, list(ga.solutions)) == (2, 2, [0, 1])
+    assert set(ga.generations["replicate"]) == {0, 1}
     assert gathered(stored, None).conditions[0].planned == 2
-    assert gathered(stored, 5).conditions[0].done == 2
+    five = gathered(stored, 5).conditions[0]
+    assert (five.done, five.planned) == (2, 5)
+
+
+def test_replicates_asked_for_when_results_were_there_are_told_apart(tmp_path: Path) -> None:
+    settings = ReportSettings(**REPORT, figures="generic")  # type: ignore[arg-type]
+    experiment = expand("rana_planar", "num_replicates=1", "ga.num_generations=1")
+    ga = experiment.conditions[0].condition
+    run = RunDirectory(tmp_path, ga.id)
+    run.note_plan(1)
+    store(tmp_path, experiment)
+    run.note_plan(1)  # the same again, and fewer, are no other plan
+    assert run.plans() == [Plan(1, 0)]
+    run.note_plan(3)
+    assert run.plans() == [Plan(1, 0), Plan(3, 1)]
+    run.write_logs({k: run_replicate(ga, k).content for k in (1, 2)})
+    found = gather(tmp_path, experiment.conditions, 1, "", "", "").conditions[0]
+    assert (found.done, found.planned) == (3, 3)
+    assert found.added(fixed=1) == 2
+    assert found.added(fixed=2) == 1  # the experiment's own number was fixed before
+    assert found.added(fixed=3) == 0
+    text = render(Page("title", ""), Results("", "", (found,)), settings, "evoexp report")
+    assert f"**Replicates added later.** {found.label}: 2 of 3" in text
+    (run.path / "plans.json").write_text('{"plans": [{"num_replicates": "3", "stored": 1}]}')
+    with pytest.raises(StoreError, match=r"plans\.json: damaged"):
+        run.plans()
 
 
 def test_failed_and_missing_replicates_are_counted(tmp_path: Path) -> None:

@@ -102,6 +102,8 @@ class Batch:
                     for run, own, _, notes in wanted
                     for text in (own.to_json(),)
                 )
+                for key in dict.fromkeys(job.condition_id for job in self.jobs):
+                    self.runs[key].note_plan(self._wanted[key][1])
                 _compile(config_jsons)
             try:
                 for outcomes in fan_out(self.jobs, num_workers):

@@ -4,6 +4,7 @@ import argparse
 import contextlib
 import shlex
 import sys
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from evoexp.batch.runner import Batch
 from evoexp.commands.arguments import add_experiment_arguments, folder_words
 from evoexp.commands.console import add_columns, add_hash_column, new_table, plain_console
 from evoexp.commands.progress import BatchProgress
+from evoexp.condition import Condition
 from evoexp.configuration import expansions
 from evoexp.configuration.experiment import Experiment
 from evoexp.report.pages import page_registration
@@ -48,7 +50,7 @@ def main(arguments: argparse.Namespace) -> int:
     ]
     batch = Batch(wanted, experiments[0].runner, outputs_root())
     batch.prepare()
-    failures = _run(batch, console)
+    failures = _run(batch, wanted, console)
     try:
         for experiment in experiments:
             console.print(summary_table(experiment))
@@ -77,10 +79,16 @@ def _command(arguments: argparse.Namespace) -> str:
     return shlex.join(["evoexp", "run", *words])
 
 
-def _run(batch: Batch, console: Console) -> list[Outcome]:
+def _run(
+    batch: Batch, wanted: Sequence[tuple[Condition, int, dict[str, Any]]], console: Console
+) -> list[Outcome]:
     if not batch.jobs:
         console.print("nothing to run: every replicate is there")
         return []
+    planned = sorted({count for _, count, _ in wanted})
+    console.print(
+        f"replicates of each condition, fixed before they run: {' or '.join(map(str, planned))}"
+    )
     failures = []
     with (
         BatchProgress(console, len(batch.jobs)) as progress,

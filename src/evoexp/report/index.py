@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from evoexp.report import markdown
 from evoexp.report.page_parts import Drawing, Page
-from evoexp.report.parameters import Parameter, parameters
+from evoexp.report.parameters import Parameter, parameters, planned_replicates
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results, Verdicts
 from evoexp.report.statistics import wilson
@@ -26,6 +26,7 @@ def render(page: Page, results: Results, settings: ReportSettings, command: str)
         f"# {page.title}\n",
         _made_by(results, command),
         _incomplete(results),
+        _added(results),
         f"{page.introduction}\n" if page.introduction else "",
         _section("Conditions", _conditions(results, settings)),
         _section("Results", _quantities(page, results)),
@@ -63,6 +64,20 @@ def _incomplete(results: Results) -> str:
     return (
         f"> **Partial results.** {'; '.join(missing)}. Everything below is drawn from the "
         "finished replicates.\n" * bool(missing)
+    )
+
+
+def _added(results: Results) -> str:
+    """Name the replicates that were added when results could be known; empty if none was."""
+    fixed = planned_replicates(results) if results.experiment else 0
+    added = [
+        f"{c.label}: {n} of {c.done}"
+        for c in results.conditions
+        if (n := c.added(c.condition.num_replicates(fixed)))
+    ]
+    return (
+        f"> **Replicates added later.** {'; '.join(added)}: asked for when results of earlier ones "
+        "were stored already. Numbers and verdicts below use all of them.\n" * bool(added)
     )
 
 

@@ -89,9 +89,12 @@ def _file(group: str, name: str, taken: dict[str, Option]) -> Path | None:
 
 
 def overridden(found: Iterable[Parameter]) -> list[str]:
-    """Return the names of settings that are no longer the paper's; any seed is as good as its."""
+    """Return the names of settings that are no longer the paper's.
+
+    Any seed is as good as its own, and more replicates are no worse.
+    """
     changed = (p for p in found if p.source == OVERRIDE or p.source.startswith("budget"))
-    return [p.name for p in changed if p.name != "seed"]
+    return [p.name for p in changed if p.name not in ("seed", "num_replicates")]
 
 
 @functools.cache

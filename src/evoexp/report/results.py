@@ -20,7 +20,7 @@ from evoexp.report.statistics import Spread, spread
 from evoexp.shipped import ORIGIN, Option, config_directory
 from evoexp.store.log_reader import read_array, read_log, read_solution
 from evoexp.store.messages import TERM
-from evoexp.store.run_directory import RunDirectory
+from evoexp.store.run_directory import Plan, RunDirectory
 from evoexp.store.tables import read_generations, read_summaries
 
 Kind = TypeVar("Kind")
@@ -63,12 +63,15 @@ class ConditionResults:
     Attributes:
         label: Its name in figures.
         condition: The condition that was run.
-        planned: Number of planned replicates; those stored beyond it are not read.
+        planned: Number of planned replicates: by the experiment or, where more were asked for or
+            are stored, that many.
         summaries: One row per finished replicate, indexed by replicate, in order.
         failures: Replicate → reason of its failure.
         run: Directory of the logs.
         code: Version, commit and dirty flag of the code that created the run.
         options: The option that was taken of each group; empty where nothing records it.
+        plans: The numbers of replicates that were asked for, in order; empty where nothing records
+            them.
     """
 
     label: str
@@ -79,6 +82,7 @@ class ConditionResults:
     run: RunDirectory
     code: dict[str, Any]
     options: tuple[Option, ...] = ()
+    plans: tuple[Plan, ...] = ()
 
     @functools.cached_property
     def generations(self) -> pd.DataFrame:
@@ -116,6 +120,18 @@ class ConditionResults:
     def failed(self) -> int:
         """Number of failed replicates."""
         return len(self.failures)
+
+    def added(self, fixed: int) -> int:
+        """Return how many finished replicates were asked for when results were there already.
+
+        Args:
+            fixed: Replicates that the experiment fixes by itself; these never count.
+        """
+        known = [max(fixed, plan.num_replicates) for plan in self.plans if not plan.stored]
+        seen = [plan.num_replicates for plan in self.plans if plan.stored]
+        if not seen:
+            return 0
+        return int(np.count_nonzero(self.summaries.index >= max([fixed, *known])))
 
     @property
     def solved(self) -> int:
@@ -270,7 +286,7 @@ def gather(
     Args:
         outputs: Root of all outputs.
         conditions: (label, condition).
-        num_replicates: Planned for every condition; None: as many as each one has.
+        num_replicates: Planned for every condition, at least; every stored one is read.
         experiment: Its name.
         budget: Its name.
         command: The command that helps where nothing is stored.
@@ -300,13 +316,12 @@ def _read(
 ) -> ConditionResults:
     run = RunDirectory(outputs, condition.id)
     stored = run.completed() | run.failed()
-    planned = max(stored, default=-1) + 1
-    if num_replicates is not None:
-        planned = condition.num_replicates(num_replicates)
+    plans = tuple(run.plans())
+    asked = condition.num_replicates(num_replicates) if num_replicates is not None else 0
+    planned = max([asked, *(plan.num_replicates for plan in plans), max(stored, default=-1) + 1])
     if stored:
         run.check()
     rows = read_summaries(run).sort_values("replicate", kind="stable").set_index("replicate")
-    rows = rows[rows.index < planned]
     done, failed = rows[rows["status"] == "done"], rows[rows["status"] == "failed"]
     return ConditionResults(
         label,
@@ -317,6 +332,7 @@ def _read(
         run,
         _code(run) if stored else {},
         _recorded_options(run) if options is None and stored else options or (),
+        plans,
     )
 
 

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from filelock import FileLock, Timeout
 
@@ -22,6 +22,18 @@ _FAILED = re.compile(r"(\d{4,})\.failed\.json")
 
 class StoreError(EvoexpError):
     """A run directory that is damaged, or that belongs to another condition."""
+
+
+class Plan(NamedTuple):
+    """A number of replicates that was asked for.
+
+    Attributes:
+        num_replicates: All of them, those stored by then included.
+        stored: Logs that were there already, whose results could be known.
+    """
+
+    num_replicates: int
+    stored: int
 
 
 class RunDirectory:
@@ -140,6 +152,34 @@ class RunDirectory:
             StoreError: `manifest.json` is missing or damaged.
         """
         return _read_object(self.path / "manifest.json")
+
+    def plans(self) -> list[Plan]:
+        """Return how many replicates were asked for, in the order in which that was done.
+
+        Raises:
+            StoreError: `plans.json` is damaged.
+        """
+        path = self.path / "plans.json"
+        if not path.exists():
+            return []
+        try:
+            found = [
+                (each["num_replicates"], each["stored"]) for each in _read_object(path)["plans"]
+            ]
+        except (KeyError, TypeError) as error:
+            raise StoreError(f"{path}: damaged: no list of plans") from error
+        if not all(isinstance(number, int) for plan in found for number in plan):
+            raise StoreError(f"{path}: damaged: a plan is two whole numbers")
+        return [Plan(*each) for each in found]
+
+    def note_plan(self, num_replicates: int) -> None:
+        """Note that so many replicates are asked for, before any of them runs; more than ever."""
+        plans = self.plans()
+        if num_replicates > max((plan.num_replicates for plan in plans), default=0):
+            plans.append(Plan(num_replicates, len(self.completed())))
+            self.path.mkdir(parents=True, exist_ok=True)
+            text = json.dumps({"plans": [plan._asdict() for plan in plans]}, indent=2)
+            write_file(self.path / "plans.json", text.encode() + b"\n")
 
     def completed(self) -> set[int]:
         """Return the replicates whose finished log is there."""

@@ -68,6 +68,13 @@ def test_everything_may_be_null_or_off() -> None:
     )
     assert full.num_offspring == 0
     assert built(hall_frozen=True).hall_frozen
+    assert built(hall_distinct="index").hall_distinct == "index"
+
+
+def test_distinct_genomes_are_the_default_and_no_part_of_the_canonical_form() -> None:
+    assert built() == built(hall_distinct="genome")
+    assert "hall_distinct" not in built().canonical()
+    assert built(hall_distinct="index").canonical()["hall_distinct"] == "index"
 
 
 @pytest.mark.parametrize(
@@ -91,6 +98,16 @@ def test_everything_may_be_null_or_off() -> None:
         (
             {"hall_depth": 0.0, "hall_frozen": True},
             "ga.hall_frozen: must be false where there is no hall (hall_depth is 0), was True",
+        ),
+        (
+            {"hall_depth": 0.0, "hall_distinct": "index"},
+            "ga.hall_distinct: must be genome where there is no hall (hall_depth is 0), was "
+            "'index'",
+        ),
+        (
+            {"hall_distinct": "genomes"},
+            "ga.hall_distinct: must be one of 'genome' or 'index', was 'genomes'; did you mean "
+            "'genome'?",
         ),
         (
             {"hall_frozen": True, "hall_memory": 3},

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from evoexp.evolution.best_team import BestTeam, best_team, find_best_team
 from evoexp.evolution.hall_of_fame import (
     Hall,
+    HallRules,
     Teams,
     form_teams,
     gather_teams,
@@ -58,6 +59,13 @@ def world(seed: int, num: int, size: int, free: float = 0.4, ties: bool = False)
     return World(collisions, own, rng.random((num, size)) < 0.4)
 
 
+def rules(
+    num: int, memory: int | None = None, frozen: bool = False, shared: tuple[int, ...] = ()
+) -> HallRules:
+    """Rules of a hall of `num` populations; those in `shared` may be in all teams."""
+    return HallRules(memory or 0, frozen, np.array([p not in shared for p in range(num)]))
+
+
 def teams_by_definition(w: World) -> list[tuple[int, ...]]:
     num, size = w.own.shape
     teams = []
@@ -76,20 +84,30 @@ def teams_by_definition(w: World) -> list[tuple[int, ...]]:
 
 
 def hall_by_definition(
-    w: World, hall: Hall, depth: int, memory: int | None, frozen: bool
+    w: World,
+    hall: Hall,
+    depth: int,
+    memory: int | None,
+    frozen: bool,
+    shared: tuple[int, ...] = (),
+    best: tuple[int, ...] | None = None,
 ) -> list[tuple[int, ...]]:
     old = [tuple(map(int, team)) for team in hall.teams]
     ranked = []
     for k, team in enumerate(old):
         expired = memory is not None and hall.ages[k] + 1 > memory
         ranked.append(((-1, 0, 0.0, k) if frozen else (int(expired), *w.key(team), k), team))
-    new = [team for team in teams_by_definition(w) if team not in old]
+    offered = teams_by_definition(w) + ([] if best is None else [best])
+    new = [team for team in offered if team not in old]
     ranked += [((0, *w.key(team), len(old) + k), team) for k, team in enumerate(new)]
     chosen: list[tuple[int, ...]] = []
     for _, team in sorted(ranked):
-        if len(chosen) < depth and not any(
-            a == b for other in chosen for a, b in zip(team, other, strict=True)
-        ):
+        met = [
+            p not in shared and a == b
+            for other in chosen
+            for p, (a, b) in enumerate(zip(team, other, strict=True))
+        ]
+        if len(chosen) < depth and not any(met):
             chosen.append(team)
     return chosen
 
@@ -178,15 +196,28 @@ def test_without_a_free_team_there_is_none() -> None:
     st.sampled_from([None, 1, 3]),
     st.booleans(),
     st.booleans(),
+    st.sampled_from([(), (0,), (1,)]),
+    st.booleans(),
 )
 @settings(deadline=None)
 def test_hall_is_chosen_as_defined(
-    seed: int, num: int, size: int, depth: int, memory: int | None, frozen: bool, ties: bool
+    seed: int,
+    num: int,
+    size: int,
+    depth: int,
+    memory: int | None,
+    frozen: bool,
+    ties: bool,
+    shared: tuple[int, ...],
+    offers_best: bool,
 ) -> None:
     w = world(seed, num, size, ties=ties)
     hall = some_hall(seed, num, size, seed % (min(depth, size) + 1))
-    chosen = update_hall(*w, hall, depth, memory, frozen)
-    expected = hall_by_definition(w, hall, depth, memory, frozen)
+    team, cost = best_by_definition(w)
+    best = team if offers_best and cost < np.inf else None
+    given = np.array(team) if offers_best else None
+    chosen = update_hall(*w, hall, depth, rules(num, memory, frozen, shared), given)
+    expected = hall_by_definition(w, hall, depth, memory, frozen, shared, best)
     assert [tuple(team) for team in chosen.teams] == expected
     assert list(zip(chosen.collisions, chosen.costs, strict=True)) == [
         w.key(team) for team in expected
@@ -249,7 +280,10 @@ class Evolution:
         )
         front = self.rng.random(own.shape) < 0.3
         self.hall = update_hall(
-            collisions, own, front, self.hall.moved(first), self.depth, memory, frozen
+            *(collisions, own, front),
+            self.hall.moved(first),
+            self.depth,
+            rules(self.num, memory, frozen),
         )
         return [tuple(map(int, team)) for team in self.members[rows, self.hall.teams]]
 
@@ -307,7 +341,7 @@ def test_memory_counts_generations_and_needs_somebody_new() -> None:
     )
     firsts = []
     for _ in range(4):
-        hall = update_hall(collisions, own, front, hall, 1, memory=2)
+        hall = update_hall(collisions, own, front, hall, 1, rules(2, memory=2))
         firsts.append(hall.teams[0].tolist())
     assert firsts == [[0, 0], [0, 0], [1, 1], [1, 1]]
     old = hall._replace(teams=np.zeros((1, 2), dtype=np.int64), ages=np.array([9]))
@@ -315,7 +349,7 @@ def test_memory_counts_generations_and_needs_somebody_new() -> None:
         [[True, False], [True, False]]
     )  # forms the very team that must give way: nobody new
     for nobody in (again, np.zeros((2, 2), dtype=bool)):
-        stayed = update_hall(collisions, own, nobody, old, 1, memory=2)
+        stayed = update_hall(collisions, own, nobody, old, 1, rules(2, memory=2))
         assert stayed.teams.tolist() == [[0, 0]]
         assert stayed.ages.tolist() == [10]
 
@@ -330,6 +364,24 @@ def test_equal_keys_keep_the_old_then_the_first_formed() -> None:
         [0, 0],
     ]  # all new pairs have member 0 of one population
     assert chosen.ages.tolist() == [8, 0]
+
+
+def test_the_best_team_is_taken_even_if_nobody_of_it_is_on_a_front() -> None:
+    """Individuals 0 are cheaper, but collide; 1 and 1 are the best pair, of no front."""
+    own = np.array([[1.0, 2.0], [1.0, 2.0]])
+    collisions = np.array([[[1, 1], [1, 0]]])
+    front = np.array([[True, False], [True, False]])
+    best = best_team(collisions, own)
+    for offered, expected in ((None, [[0, 0]]), (best.individuals, [[1, 1], [0, 0]])):
+        chosen = update_hall(collisions, own, front, Hall.empty(2), 2, best=offered)
+        assert chosen.teams.tolist() == expected
+
+
+def test_individuals_of_a_population_that_may_be_shared_are_in_many_teams() -> None:
+    own, collisions = np.ones((2, 4)), np.zeros((1, 4, 4), dtype=int)
+    front = np.array([[True] * 4, [True] + [False] * 3])
+    chosen = update_hall(collisions, own, front, Hall.empty(2), 3, rules(2, shared=(1,)))
+    assert chosen.teams.tolist() == [[0, 0], [1, 0], [2, 0]]
 
 
 @pytest.mark.matrix
@@ -351,15 +403,16 @@ def test_kernels_ignore_padding_and_take_any_number_type(num: int, dtype: type) 
     for mine, theirs in zip(teams, form_teams(*w), strict=True):
         assert np.array_equal(mine[:count], theirs)
     renewed = hall.with_room(6)
-    held = renew_hall(collisions, own, front, 13, renewed, 3, 2, False)
-    for mine, theirs in zip(renewed, update_hall(*w, hall, 6, memory=2), strict=True):
+    forgetting, nobody = rules(num, memory=2), np.full(num, -1)
+    held = renew_hall(collisions, own, front, 13, renewed, 3, nobody, forgetting)
+    for mine, theirs in zip(renewed, update_hall(*w, hall, 6, forgetting), strict=True):
         assert np.array_equal(mine[:held], theirs)
 
 
 def test_nothing_is_random_and_inputs_are_left_alone() -> None:
     w, hall = world(6, 2, 30), some_hall(2, 2, 30, 4)
     copies = [array.copy() for array in (*w, *hall)]
-    first, second = (update_hall(*w, hall, 5, memory=2) for _ in range(2))
+    first, second = (update_hall(*w, hall, 5, rules(2, memory=2)) for _ in range(2))
     assert all(np.array_equal(a, b) for a, b in zip(first, second, strict=True))
     assert all(np.array_equal(a, b) for a, b in zip((*w, *hall), copies, strict=True))
 

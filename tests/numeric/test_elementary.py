@@ -27,6 +27,7 @@ from evoexp.numeric.elementary import (
     asin,
     atan2,
     cos,
+    exact_sincos,
     exp,
     log,
     pow_int,
@@ -83,6 +84,13 @@ def sincos_loop(x: Array, s: Array, c: Array) -> None:
     """Fill s and c with sine and cosine."""
     for i in range(x.size):
         s[i], c[i] = sincos(x[i])
+
+
+@kernel
+def exact_sincos_loop(x: Array, s: Array, c: Array) -> None:
+    """Fill s and c with sine and cosine, exact for multiples of 90°."""
+    for i in range(x.size):
+        s[i], c[i] = exact_sincos(x[i])
 
 
 @kernel
@@ -319,6 +327,30 @@ def test_sincos_has_the_bits_of_sine_and_cosine() -> None:
         sincos_loop(x, s, c)
         assert same_bits(s, over_array("sin", x))
         assert same_bits(c, over_array("cos", x))
+
+
+def test_multiples_of_90_degrees_have_exact_sines_and_cosines() -> None:
+    quarters = np.arange(-10, 11)
+    for x in (elementary.DEGREE * (90.0 * quarters), quarters * (np.pi / 2.0)):
+        s, c = np.empty_like(x), np.empty_like(x)
+        exact_sincos_loop(x, s, c)
+        assert s.tolist() == [(0.0, 1.0, 0.0, -1.0)[k % 4] for k in quarters]
+        assert c.tolist() == [(1.0, 0.0, -1.0, 0.0)[k % 4] for k in quarters]
+        for neighbour in (np.nextafter(x, -np.inf), np.nextafter(x, np.inf)):
+            exact_sincos_loop(neighbour, s, c)
+            assert (s != 0.0).all()
+            assert (c != 0.0).all()
+
+
+def test_all_other_angles_keep_the_bits_of_sincos() -> None:
+    for (x,) in points("sin"):
+        found, expected = np.empty((2, x.size)), np.empty((2, x.size))
+        exact_sincos_loop(x, *found)
+        sincos_loop(x, *expected)
+        right = x == np.round(x / (np.pi / 2.0)) * (np.pi / 2.0)
+        assert (~right).any()
+        for mine, theirs in zip(found, expected, strict=True):
+            assert same_bits(mine[~right], theirs[~right])
 
 
 @pytest.mark.parametrize("name", ["sin", "asin"])

@@ -94,6 +94,9 @@ def test_the_papers_methods_agree(method: str) -> None:
         {"ga.selection": "difference"},
         {"ga.hall_memory": 2},
         {"ga.hall_frozen": True},
+        {"ga.hall_distinct": "index"},
+        {"ga.hall_distinct": "index", "ga.hall_memory": 2},
+        {"ga.hall_distinct": "index", "ga.hall_frozen": True},
         {"collision.collision_substeps": 3},
         {"chromosome_length": 2},
         {"ga.population_size": 13, "ga.crossover_rate": 1.0},
@@ -105,7 +108,7 @@ def test_the_papers_methods_agree(method: str) -> None:
         },
         {"scenario.obstacles": DISCS},
     ],
-    ids=lambda changes: next(iter(changes)),
+    ids=lambda changes: " ".join(changes),
 )
 def test_variants_agree(changes: dict[str, Any]) -> None:
     for seed in range(3):
@@ -125,8 +128,10 @@ def test_three_robots_agree(discs: list[Any]) -> None:
         assert (events["contacts"] > 0) is bool(discs)
 
 
-def test_a_robot_that_stands_still_agrees() -> None:
-    compare(condition(SMALL, "curkovic_stationary", next(iter(shipped("curkovic_stationary")))), 0)
+@pytest.mark.parametrize("distinct", ["genome", "index"])
+def test_a_robot_that_stands_still_agrees(distinct: str) -> None:
+    label = next(iter(shipped("curkovic_stationary")))
+    compare(condition(SMALL | {"ga.hall_distinct": distinct}, "curkovic_stationary", label), 0)
 
 
 def test_restarts_agree() -> None:
@@ -182,6 +187,22 @@ def copies_on_the_front(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kernels, "drop_copies", lambda *_: None)
 
 
+def copies_as_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kernels, "merge_copies", kernels.merge_copies.py_func)
+    monkeypatch.setattr(kernels, "same_genome", lambda *_: False)
+
+
+def hall_never_offered_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    merge = kernels.merge_copies
+
+    def without(populations: Any, marks: Any, teams: Any, fronts: Any) -> None:
+        merge(populations, marks, teams, fronts)
+        for robot, front in enumerate(fronts):
+            front[teams[:, robot]] = False
+
+    monkeypatch.setattr(kernels, "merge_copies", without)
+
+
 def everybody_on_the_front(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kernels, "non_dominated", lambda criteria, count, out: out.fill(True))
 
@@ -199,6 +220,8 @@ FAULTS: list[Callable[[pytest.MonkeyPatch], None]] = [
     constant_rate_for_eq_10,
     c1_without_obstacles,
     copies_on_the_front,
+    copies_as_others,
+    hall_never_offered_again,
     everybody_on_the_front,
 ]
 
@@ -207,7 +230,9 @@ FAULTS: list[Callable[[pytest.MonkeyPatch], None]] = [
 def test_every_planted_fault_is_noticed(
     plant: Callable[[pytest.MonkeyPatch], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    given = condition(SMALL | {"ga.num_elites": 2, "scenario.obstacles": DISCS})
+    distinct = "index" if plant is copies_on_the_front else "genome"
+    changes = {"ga.num_elites": 2, "scenario.obstacles": DISCS, "ga.hall_distinct": distinct}
+    given = condition(SMALL | changes)
     for name in ("breed", "renew"):
         monkeypatch.setattr(planner_module, name, getattr(kernels, name).py_func)
     plant(monkeypatch)

@@ -57,6 +57,7 @@ class Curkovic:
     num_hall_teams: int
     hall_memory: int | None
     hall_frozen: bool
+    hall_distinct: str
     restart_after: int | None
     collision_weight: float
     path_weight: float
@@ -116,6 +117,7 @@ class Generation(NamedTuple):
         populations: (robots, genes, individuals).
         judged: Their judgement.
         best_cost: Lowest cost of a collision-free team in this generation; inf: there is none.
+        best_team: That team, the first of equal ones; None: there is none.
         num_feasible: Individuals of the first robot with a collision-free partner in every other
             population.
         restarted: Whether the populations were drawn afresh.
@@ -124,6 +126,7 @@ class Generation(NamedTuple):
     populations: Array
     judged: Judged
     best_cost: float
+    best_team: tuple[int, ...] | None
     num_feasible: int
     restarted: bool
 
@@ -200,7 +203,9 @@ def judged_generation(c: Curkovic, populations: Array, restarted: bool) -> Gener
     for other in range(1, robots):
         feasible &= (free[0, other] & usable[other]).any(axis=1)
     best, num_feasible = float(sums.min()), int(feasible.sum())
-    return Generation(populations, judged, best, num_feasible, restarted)
+    team = tuple(map(int, np.unravel_index(int(sums.argmin()), sums.shape)))
+    found = team if best < np.inf else None
+    return Generation(populations, judged, best, found, num_feasible, restarted)
 
 
 def judge(c: Curkovic, populations: Array) -> Judged:
@@ -234,7 +239,11 @@ def judge(c: Curkovic, populations: Array) -> Judged:
 def points(c: Curkovic, robot: int, path: Array) -> Array:
     """Return elbow x, y and tip x, y of a path (configurations, 2, individuals) of angles."""
     base, lengths = c.bases[robot][:, None], c.link_lengths[robot]
-    arms = np.stack([np.cos(path), np.sin(path)], axis=2)  # (configurations, link, x | y, …)
+    turns = np.round(path / (0.5 * np.pi))  # quarters; of whole ones sine and cosine are integers
+    whole, odd = path == turns * (0.5 * np.pi), turns % 2 == 1
+    cosines = np.where(whole & odd, 0.0, np.cos(path))
+    sines = np.where(whole & ~odd, 0.0, np.sin(path))
+    arms = np.stack([cosines, sines], axis=2)  # (configurations, link, x | y, …)
     elbow = base + lengths[0] * arms[:, 0]
     return np.concatenate([elbow, elbow + lengths[1] * arms[:, 1]], axis=1)
 
@@ -311,39 +320,63 @@ def mutation(c: Curkovic, uniforms: Array, offspring: Array, rate: float) -> Non
 
 
 def renewed_hall(c: Curkovic, generation: Generation, hall: list[Member]) -> list[Member]:
-    """Return the best teams of the hall and of those around the fronts; nobody is in two."""
+    """Return the best teams of the hall and of those around the fronts; nobody is in two.
+
+    With distinct genomes "nobody" means a genome, of robots that move; else an index.
+    """
     if not c.num_hall_teams:
         return []
-    judged, known = generation.judged, [member.team for member in hall]
+    judged, by_genome = generation.judged, c.hall_distinct == "genome"
     for k, member in enumerate(hall):
         member.age += 1
         old = c.hall_memory is not None and member.age > c.hall_memory
         member.rank = k - len(hall) if c.hall_frozen else int(old)
-    teams = [formed(judged, r, i) for r, i in front_members(generation, known)]
-    candidates = hall + [Member(team) for team in teams if team not in known]
+    seeds = front_members(generation, [member.team for member in hall], by_genome)
+    teams = [formed(judged, r, i) for r, i in seeds]
+    if by_genome and generation.best_team is not None:
+        teams.append(generation.best_team)
+    known = {names(generation, member.team, by_genome) for member in hall}
+    new = [Member(team) for team in teams if names(generation, team, by_genome) not in known]
+    candidates = hall + new
     for candidate in candidates:
         candidate.key = judged.key(candidate.team)
     candidates.sort(key=lambda member: (member.rank, member.key))  # stable
-    chosen: list[Member] = []
+    exclusive = [r for r in range(len(c.start)) if c.moving[r] or not by_genome]
+    taken, chosen = set[tuple[int, bytes | int]](), list[Member]()
     for candidate in candidates:
-        taken = [set(candidate.team[r : r + 1]) for r in range(len(c.start))]
-        apart = all(m.team[r] not in taken[r] for m in chosen for r in range(len(c.start)))
-        if apart and len(chosen) < c.num_hall_teams:
+        own = names(generation, candidate.team, by_genome)
+        members = {(r, own[r]) for r in exclusive}
+        if not members & taken and len(chosen) < c.num_hall_teams:
             chosen.append(candidate)
+            taken |= members
     return chosen
 
 
+def names(
+    generation: Generation, team: tuple[int, ...], by_genome: bool
+) -> tuple[bytes | int, ...]:
+    """Return the genome, or the index, of every member of a team."""
+    if not by_genome:
+        return team
+    return tuple(generation.populations[r, :, i].tobytes() for r, i in enumerate(team))
+
+
 def front_members(
-    generation: Generation, known: list[tuple[int, ...]]
+    generation: Generation, hall: list[tuple[int, ...]], by_genome: bool
 ) -> Iterator[tuple[int, int]]:
-    """Yield robot and individual of every front, copies of one another and of the hall left out."""
+    """Yield robot and individual of every front, one of several copies only.
+
+    With distinct genomes members of the hall are on the fronts in any case, else never.
+    """
     for r, criteria in enumerate(generation.judged.criteria):
         genomes = [genome.tobytes() for genome in generation.populations[r].T]
-        seen = {genomes[team[r]] for team in known}
+        in_hall = {genomes[team[r]] for team in hall}
+        seen = set[bytes]() if by_genome else set(in_hall)
         for i, own in enumerate(criteria.T):
             excess = own - criteria.T  # of this individual over every other
-            dominated = (excess >= 0.0).all(axis=1) & (excess > 0.0).any(axis=1)
-            if not dominated.any() and genomes[i] not in seen:
+            dominated = ((excess >= 0.0).all(axis=1) & (excess > 0.0).any(axis=1)).any()
+            offered = by_genome and genomes[i] in in_hall
+            if genomes[i] not in seen and (offered or not dominated):
                 seen.add(genomes[i])
                 yield r, i
 

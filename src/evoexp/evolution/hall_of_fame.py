@@ -80,6 +80,22 @@ class Hall(NamedTuple):
         return self._replace(teams=teams)
 
 
+class HallRules(NamedTuple):
+    """Which teams a hall takes.
+
+    Attributes:
+        memory: A team that entered more than this many generations ago is taken only where no new
+            team can be; the same team formed again is not new. 0: no such rule.
+        frozen: Whether the hall's teams stay, and new ones only fill free places. Overrides
+            `memory`.
+        exclusive: (P,) whether an individual of a population may be in one team only.
+    """
+
+    memory: int
+    frozen: bool
+    exclusive: BoolArray
+
+
 def form_teams(collisions: CollisionCounts, own: FloatArray, front: BoolArray) -> Teams:
     """Give every member of a front its best collaborators.
 
@@ -106,14 +122,14 @@ def update_hall(
     front: BoolArray,
     hall: Hall,
     depth: int,
-    memory: int | None = None,
-    frozen: bool = False,
+    rules: HallRules | None = None,
+    best: IntArray | None = None,
 ) -> Hall:
     """Choose the next hall: the best of its teams and of those formed around the fronts.
 
     Candidates are taken by key; among equals the hall's own come first, in their order, then the
-    new ones in the order of `form_teams`. Nobody is in two teams. Keys of old teams are computed
-    anew from the arrays given.
+    new ones in the order of `form_teams`, then `best`. Keys of old teams are computed anew from the
+    arrays given.
 
     Args:
         collisions: See the module.
@@ -121,10 +137,9 @@ def update_hall(
         front: See the module.
         hall: The present one, its members' places in the present populations.
         depth: Most teams that it holds.
-        memory: A team that entered more than this many generations ago is taken only where no new
-            team can be; the same team formed again is not new. None: no such rule.
-        frozen: Whether the hall's teams stay, and new ones only fill free places. Overrides
-            `memory`.
+        rules: Which teams it takes; None: the best, nobody in two.
+        best: (P,) the best team of all, offered to the hall even if none of its members is on a
+            front; −1: there is none. None: it is not offered.
 
     Returns:
         The next hall, at most `depth` teams, ages counted on; its members' places are in the
@@ -138,9 +153,11 @@ def update_hall(
         raise ValueError(
             f"a hall of {hall.teams.shape} is not one of at most {depth} teams of {len(own)}"
         )
-    renewed, count = hall.with_room(depth), own.shape[1]
+    num, count = own.shape
+    rules = rules or HallRules(memory=0, frozen=False, exclusive=np.ones(num, dtype=np.bool_))
+    best, renewed = np.full(num, -1) if best is None else best, hall.with_room(depth)
     return renewed.first(
-        renew_hall(collisions, own, front, count, renewed, hall.num_teams, memory or 0, frozen)
+        renew_hall(collisions, own, front, count, renewed, hall.num_teams, best, rules)
     )
 
 
@@ -214,8 +231,8 @@ def renew_hall(
     count: int,
     hall: Hall,
     num_teams: int,
-    memory: int,
-    frozen: bool,
+    best: IntArray,
+    rules: HallRules,
 ) -> int:
     """The kernel of `update_hall`, for other kernels, on the first `count` individuals.
 
@@ -227,14 +244,14 @@ def renew_hall(
         hall: With room for as many teams as it may hold; teams and ages are read up to
             `num_teams`, everything is rewritten.
         num_teams: Teams of the hall at present.
-        memory: See `update_hall`; 0: no such rule.
-        frozen: See `update_hall`.
+        best: (P,) see `update_hall`; −1: none.
+        rules: Which teams the hall takes.
 
     Returns:
         Number of teams that the hall holds then.
     """
-    # candidates: the hall's own teams, then one per member of a front
-    most = num_teams
+    # candidates: the hall's own teams, one per member of a front, the best of all
+    most = num_teams + (1 if best[0] >= 0 else 0)
     for p in range(len(own)):
         for i in range(count):
             most += 1 if front[p, i] else 0
@@ -244,12 +261,15 @@ def renew_hall(
     for k in range(num_teams):
         pool[k], ages[k] = hall.teams[k], hall.ages[k] + 1
         hits[k], costs[k] = rate_team(collisions, own, pool[k])
-        if frozen:
+        if rules.frozen:
             ranks[k] = k - num_teams  # before all new ones, in the order they have
-        elif 0 < memory < ages[k]:
+        elif 0 < rules.memory < ages[k]:
             ranks[k] = 1  # behind all new ones
     new = Teams(pool[num_teams:], hits[num_teams:], costs[num_teams:])
     gather_teams(collisions, own, front, count, new)
+    if best[0] >= 0:
+        pool[most - 1] = best
+        hits[most - 1], costs[most - 1] = rate_team(collisions, own, best)
     # those that can still be taken, in order: a team of the hall formed again is not new
     left, num_left = np.empty(most, dtype=np.int64), 0
     for k in range(most):
@@ -258,10 +278,10 @@ def renew_hall(
     # the best by rank and key, again and again; whoever shares a member with it is out
     held = 0
     while held < len(hall.teams) and num_left > 0:
-        best = first_by_key(left[:num_left], ranks, hits, costs)
-        hall.teams[held], hall.ages[held] = pool[best], ages[best]
-        hall.collisions[held], hall.costs[held] = hits[best], costs[best]
-        num_left = drop_rivals(pool, hall.teams[held], left, num_left)
+        taken = first_by_key(left[:num_left], ranks, hits, costs)
+        hall.teams[held], hall.ages[held] = pool[taken], ages[taken]
+        hall.collisions[held], hall.costs[held] = hits[taken], costs[taken]
+        num_left = drop_rivals(pool, hall.teams[held], rules.exclusive, left, num_left)
         held += 1
     return held
 
@@ -296,12 +316,15 @@ def is_among(team: IntArray, teams: IntArray, num_teams: int) -> bool:
 
 
 @kernel
-def drop_rivals(pool: IntArray, team: IntArray, left: IntArray, num_left: int) -> int:
+def drop_rivals(
+    pool: IntArray, team: IntArray, exclusive: BoolArray, left: IntArray, num_left: int
+) -> int:
     """Remove the candidates that share a member with a team (P,) from `left`, in order.
 
     Args:
         pool: (candidates, P) teams.
         team: (P,).
+        exclusive: (P,) false for populations whose individuals may be shared.
         left: (≥ num_left,) indices of candidates, rewritten.
         num_left: Their number.
 
@@ -312,7 +335,7 @@ def drop_rivals(pool: IntArray, team: IntArray, left: IntArray, num_left: int) -
     for c in range(num_left):
         shares = False
         for p in range(len(team)):
-            shares |= pool[left[c], p] == team[p]
+            shares |= exclusive[p] and pool[left[c], p] == team[p]
         left[kept] = left[c]
         kept += 0 if shares else 1
     return kept

@@ -58,6 +58,8 @@ _HALF_PI_HI = (
 )
 _HALF_PI_LO = 6.07710050650619224932e-11
 
+_HALF_PI = 1.5707963267948966  # the nearest float64
+
 _S = (
     -1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04,
     2.75573137070700676789e-06,
@@ -129,6 +131,20 @@ def sincos(x: float) -> tuple[float, float]:
     r, n = _reduce(x)
     s, c = _sin_polynomial(r), _cos_polynomial(r)
     return _quadrant(s, c, n), _quadrant(s, c, n + 1)
+
+
+@inlined
+def exact_sincos(x: float) -> tuple[float, float]:
+    """Return (sin x, cos x) of x [rad], exactly 0 and ±1 where x stands for a multiple of 90°.
+
+    The float64 nearest to π is not π, so `sincos` gives 1.2e-16 for the sine of 180°. Here n times
+    the float64 nearest to π/2, which is also n times 90 times `DEGREE` up to n = 10, counts as n
+    times 90°. All other angles give the bits of `sincos`.
+    """
+    s, c = sincos(x)
+    t = x * _TWO_OVER_PI + _ROUND
+    exact, odd = x == (t - _ROUND) * _HALF_PI, _bits(t) & 1
+    return (0.0 if exact and odd == 0 else s), (0.0 if exact and odd == 1 else c)
 
 
 # -------------------------------------------------------------------------------- inverse functions

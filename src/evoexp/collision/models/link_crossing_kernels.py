@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from evoexp.collision.models.segment_predicates import touching
 from evoexp.numeric.compilation import kernel
-from evoexp.numeric.elementary import sincos
+from evoexp.numeric.elementary import exact_sincos
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.kinematics import U
 
@@ -93,9 +93,9 @@ def link_points(
 def directions(
     angles: FloatArray, a: np.uint64, num: int, out: FloatArray, x: np.uint64, y: np.uint64
 ) -> None:
-    """Write cosines and sines of a row of angles, from offset a, to offsets x and y."""
+    """Write cosines and sines of a row of angles at a to x and y, exact at multiples of 90°."""
     for n in range(num):
-        s, c = sincos(angles[a + U(n)])
+        s, c = exact_sincos(angles[a + U(n)])
         out[x + U(n)] = c
         out[y + U(n)] = s
 

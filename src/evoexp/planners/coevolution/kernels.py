@@ -7,7 +7,7 @@ import numpy as np
 from evoexp.collision.models.link_crossing_kernels import link_points
 from evoexp.evolution.best_team import CollisionCounts
 from evoexp.evolution.crossover import cross_single_point
-from evoexp.evolution.hall_of_fame import Hall, renew_hall
+from evoexp.evolution.hall_of_fame import Hall, HallRules, renew_hall
 from evoexp.evolution.mutation import mutate_allele
 from evoexp.evolution.pareto import non_dominated
 from evoexp.evolution.selection import (
@@ -110,10 +110,11 @@ def renew(
     criteria: FloatArray,
     collisions: CollisionCounts,
     own: FloatArray,
+    best: IntArray,
     hall: Hall,
     num_teams: int,
-    memory: int,
-    frozen: bool,
+    rules: HallRules,
+    by_genome: bool,
 ) -> int:
     """Renew the hall of fame from the Pareto fronts of all populations, without copies.
 
@@ -122,10 +123,12 @@ def renew(
         criteria: (robots, criteria, individuals), all minimised.
         collisions: See `best_team`.
         own: See `best_team`.
-        hall: See `renew_hall`, as the rest.
+        best: (robots,) see `renew_hall`, as the rest.
+        hall: With room for as many teams as it may hold.
         num_teams: Teams of the hall at present.
-        memory: Of the hall; 0: no such rule.
-        frozen: Whether its teams stay.
+        rules: Which teams it takes.
+        by_genome: Whether copies count as one individual, and members of the hall are offered
+            again; else members of the hall and their copies leave the fronts.
 
     Returns:
         Number of teams that the hall holds then.
@@ -134,8 +137,37 @@ def renew(
     fronts = np.empty((len(populations), count), dtype=np.bool_)
     for robot in range(len(populations)):
         non_dominated(criteria[robot], count, fronts[robot])
-    drop_copies(populations, hall.teams[:num_teams], fronts)
-    return int(renew_hall(collisions, own, fronts, count, hall, num_teams, memory, frozen))
+    if by_genome:
+        merge_copies(populations, criteria[:, 1], hall.teams[:num_teams], fronts)
+    else:
+        drop_copies(populations, hall.teams[:num_teams], fronts)
+    return int(renew_hall(collisions, own, fronts, count, hall, num_teams, best, rules))
+
+
+@kernel
+def merge_copies(
+    populations: FloatArray, marks: FloatArray, teams: IntArray, fronts: BoolArray
+) -> None:
+    """Let the first of equal genomes stand for all of them, and offer the hall's members again.
+
+    Args:
+        populations: (robots, genes, individuals).
+        marks: (robots, individuals) a number that equal genomes have in common, to find them by.
+        teams: (teams, robots) members of the hall, rewritten.
+        fronts: (robots, individuals) changed: copies leave them, members of the hall join them.
+    """
+    for robot in range(len(populations)):
+        genes, mark, front = populations[robot], marks[robot], fronts[robot]
+        first = np.arange(genes.shape[1])
+        for member in range(1, genes.shape[1]):
+            for other in range(member):
+                if mark[other] == mark[member] and same_genome(genes, other, member):
+                    first[member] = other
+                    front[member] = False
+                    break
+        for k in range(len(teams)):
+            teams[k, robot] = first[teams[k, robot]]
+            front[teams[k, robot]] = True
 
 
 @kernel
@@ -159,22 +191,20 @@ def drop_copies(populations: FloatArray, teams: IntArray, fronts: BoolArray) -> 
             known[k] = teams[k, robot]
         for member in range(genes.shape[1]):
             if front[member]:
-                front[member] = not any_equal(genes, member, known, num_known)
+                for k in range(num_known):
+                    front[member] &= not same_genome(genes, member, known[k])
             if front[member]:
                 known[num_known] = member
                 num_known += 1
 
 
 @kernel
-def any_equal(genes: FloatArray, member: int, others: IntArray, num_others: int) -> bool:
-    """Return whether an individual's genome (genes, individuals) equals one of some others'."""
-    for k in range(num_others):
-        gene = 0
-        while gene < len(genes) and genes[gene, member] == genes[gene, others[k]]:
-            gene += 1
-        if gene == len(genes):
-            return True
-    return False
+def same_genome(genes: FloatArray, one: int, other: int) -> bool:
+    """Return whether two individuals of a population (genes, individuals) are copies."""
+    gene = 0
+    while gene < len(genes) and genes[gene, one] == genes[gene, other]:
+        gene += 1
+    return gene == len(genes)
 
 
 @kernel

@@ -20,10 +20,10 @@ from pydantic import model_validator
 from evoexp.collision.models.link_collision import LinkCollision, LinkCrossings
 from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
-from evoexp.evolution.best_team import best_team
+from evoexp.evolution.best_team import BestTeam, best_team
 from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.evolution.crossover import num_single_point_uniforms
-from evoexp.evolution.hall_of_fame import Hall
+from evoexp.evolution.hall_of_fame import Hall, HallRules
 from evoexp.evolution.mutation import decayed_rate, num_allele_uniforms
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.motion_criteria import MotionCriteria
@@ -84,6 +84,7 @@ class Coevolution(PlannerDefaults, Component):
     """
 
     component: ClassVar[str] = "coevolution"
+    revision: ClassVar[int] = 2
 
     chromosome_length: Count
     interpolation: Literal["linear", "cubic"]
@@ -141,9 +142,10 @@ class Coevolution(PlannerDefaults, Component):
         populations = self.sample(problem, rng, ga.population_size)
         hall, waiting = Hall.empty(len(problem.start)), 0
         found = self.evaluated(problem, populations)
-        yield self._recorded(keeper, problem, populations, found)
+        best = best_team(found.collisions, found.teamable)
+        yield self._recorded(keeper, problem, populations, found, best)
         for index in range(1, ga.num_generations + 1):
-            hall = self._renewed(populations, found, hall)
+            hall = self._renewed(problem, populations, found, best, hall)
             waiting = 0 if keeper.best.solved else waiting + 1
             if ga.restart_after is not None and waiting >= ga.restart_after:
                 # "If no convergence has occurred, …, the algorithm generates new populations"
@@ -154,13 +156,19 @@ class Coevolution(PlannerDefaults, Component):
                 populations = self._bred(rng, problem, populations, found, hall, index)
                 hall = hall.moved(ga.population_size - hall.num_teams)
             found = self.evaluated(problem, populations)
-            yield self._recorded(keeper, problem, populations, found)
+            best = best_team(found.collisions, found.teamable)
+            yield self._recorded(keeper, problem, populations, found, best)
 
     def _recorded(
-        self, keeper: Keeper, problem: Problem, populations: FloatArray, found: Evaluated
+        self,
+        keeper: Keeper,
+        problem: Problem,
+        populations: FloatArray,
+        found: Evaluated,
+        best: BestTeam,
     ) -> Generation:
         """Keep the best team if it is better, and return the generation's record."""
-        (robots, _, count), best = populations.shape, best_team(found.collisions, found.teamable)
+        robots, _, count = populations.shape
         if keeper.improves(best.cost):
             team = best.individuals if best.found else found.costs.argmin(axis=1)
             solution = self.team_solution(problem, populations, team)
@@ -176,21 +184,38 @@ class Coevolution(PlannerDefaults, Component):
             criteria=found.criteria if keeper.index + 1 == self.ga.num_generations else None,
         )
 
-    def _renewed(self, populations: FloatArray, found: Evaluated, hall: Hall) -> Hall:
-        """Return the hall of fame: members of the Pareto fronts with their best collaborators."""
+    def _renewed(
+        self,
+        problem: Problem,
+        populations: FloatArray,
+        found: Evaluated,
+        best: BestTeam,
+        hall: Hall,
+    ) -> Hall:
+        """Return the hall of fame: members of the Pareto fronts with their best collaborators.
+
+        With distinct genomes the best team of the generation is offered as it is, so that it is
+        never lost; and a robot that stands still, which has one genome, may be in all teams.
+        """
         ga = self.ga
         if not ga.num_hall_teams:
             return hall
-        renewed = hall.with_room(ga.num_hall_teams)
+        by_genome, renewed = ga.hall_distinct == "genome", hall.with_room(ga.num_hall_teams)
+        rules = HallRules(
+            memory=ga.hall_memory or 0,
+            frozen=ga.hall_frozen,
+            exclusive=problem.moving if by_genome else np.ones_like(problem.moving),
+        )
         held = renew(
             populations,
             found.criteria,
             found.collisions,
             found.teamable,
+            best.individuals if by_genome else np.full_like(best.individuals, -1),
             renewed,
             hall.num_teams,
-            ga.hall_memory or 0,
-            ga.hall_frozen,
+            rules,
+            by_genome,
         )
         return renewed.first(held)
 

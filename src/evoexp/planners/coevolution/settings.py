@@ -32,6 +32,11 @@ class CoevolutionSettings(Component):
         hall_memory: Generations after which a team of the hall gives way to any new one [-]; None:
             never.
         hall_frozen: Whether a full hall stays as it is (an ablation).
+        hall_distinct: Nobody is in two teams of the hall. `genome`: copies count as one, and
+            members of the hall are offered again, so that one may find a better partner. `index`:
+            copies count as others, so the hall may fill with copies of one team; members of the
+            hall are not offered again. Runs by index are bit for bit those of revision 1 of `coevolution`,
+            unless a link's angle is exactly a multiple of 90°.
         restart_after: Generations without a feasible team before fresh populations are drawn [-];
             None: never.
     """
@@ -51,6 +56,7 @@ class CoevolutionSettings(Component):
     hall_memory: Count | None
     hall_frozen: bool
     restart_after: Count | None
+    hall_distinct: Literal["genome", "index"] = "genome"
 
     @model_validator(mode="after")
     def _settings_agree(self) -> Self:
@@ -69,6 +75,11 @@ class CoevolutionSettings(Component):
             ),
             (no_hall and self.hall_memory is not None, "hall_memory", no_rule),
             (no_hall and self.hall_frozen, "hall_frozen", no_rule.replace("null", "false")),
+            (
+                no_hall and self.hall_distinct != "genome",
+                "hall_distinct",
+                no_rule.replace("null", "genome"),
+            ),
             (
                 self.hall_frozen and self.hall_memory is not None,
                 "hall_memory",

@@ -1,7 +1,8 @@
 """Selection by scaled costs: expected numbers of copies, and stochastic remainder sampling.
 
 Linear scaling says how many copies of every individual are expected among the parents; sampling
-makes each a parent as often as expected, rounded up or down.
+makes each a parent as often as expected, rounded up or down. Which ones are rounded up is found by
+one systematic scan of the remainders, which is assumed: the paper names the sampling only.
 """
 
 from typing import NamedTuple

@@ -6,6 +6,7 @@ import numpy as np
 
 from evoexp.papers.lavoie import measures
 from evoexp.papers.lavoie.measures import Percentage
+from evoexp.papers.lavoie.rules import RULES
 from evoexp.report.kit import (
     Claim,
     ConditionResults,
@@ -17,17 +18,13 @@ from evoexp.report.kit import (
     markdown,
     newcombe,
     solved,
-    verdicts,
+    success,
 )
 
-SOURCE = "section 5, Fig. 3"
 ELSEWHERE = (
-    (
-        "A smaller stopping value gives a better precision, with more generations",
-        "section 6",
-        "lavoie_stopping",
-    ),
-    ("Real coding performs better than binary coding", "section 2", "lavoie_coding"),
+    ("more_solutions", {"who": "", "control": ""}),
+    ("precision", {"where": ", with more generations"}),
+    ("coding", {"where": ""}),
 )
 
 
@@ -40,7 +37,7 @@ def percentages(judge: Judge, conditions: Sequence[ConditionResults], level: flo
     Args:
         judge: The judge of the experiment.
         conditions: The conditions whose runs they are judged by.
-        level: Level of the tests and intervals.
+        level: Level of the intervals.
     """
     pairs = [(c, printed) for c in conditions for printed in measures.printed(c)]
     ours = [measures.below(condition, printed.bound) for condition, printed in pairs]
@@ -63,30 +60,27 @@ def _percentage(
     num_tests: int,
 ) -> Claim:
     theirs = printed.proportion
-    low, high = newcombe(own, theirs, level)
     within, their_own = own.interval(level), theirs.interval(level)
     place = "within" if within.low <= theirs.share <= within.high else "outside"
-    difference = (
-        f"ours − printed {100 * (own.share - theirs.share):+.1f} "
-        f"[{100 * low:+.1f}, {100 * high:+.1f}]"
-    ).replace("-", "−")
-    return judge.claim(
-        text=(
-            f"{condition.label}: a position error below {printed.bound:g} in "
-            f"{100 * theirs.share:.1f} % of runs"
-        ),
-        source=SOURCE,
-        evidence=(
-            f"{measures.text(own, level)}; the printed share lies {place}, its own thousand runs "
-            f"give [{100 * their_own.low:.1f}, {100 * their_own.high:.1f}]; {difference} points "
-            f"(Newcombe's {100 * level:g} % interval); Fisher's exact p, adjusted by Holm over "
-            f"{num_tests}, {markdown.p_value(p_adjusted)} (contradicted below {1.0 - level:.2g}; "
-            "both are samples)"
-        ),
-        verdict=(
-            verdicts.judged(p_adjusted >= 1.0 - level) if own.total else verdicts.INCONCLUSIVE
-        ),
+    evidence = (
+        f"{measures.text(own, level)}; the printed share lies {place}, its own thousand runs "
+        f"give [{100 * their_own.low:.1f}, {100 * their_own.high:.1f}]; "
+        f"{_difference(own, theirs, level)}; Fisher's exact p, adjusted by Holm over {num_tests}, "
+        f"{markdown.p_value(p_adjusted)}"
     )
+    words = {"bound": f"{printed.bound:g}", "share": f"{100 * theirs.share:.1f}"}
+    hearing = judge.on("share_below", who=condition.label, **words)
+    return hearing.same_share(evidence, own, theirs, p_adjusted)
+
+
+def _difference(own: Proportion, theirs: Proportion, level: float) -> str:
+    """Return how many points more our share has than the paper's, with its interval."""
+    low, high = newcombe(own, theirs, level)
+    points = (
+        f"ours − printed {100 * (own.share - theirs.share):+.1f} "
+        f"[{100 * low:+.1f}, {100 * high:+.1f}] points"
+    ).replace("-", "−")
+    return f"{points} (Newcombe's {100 * level:g} % interval)"
 
 
 def more_joints_are_better(
@@ -96,28 +90,35 @@ def more_joints_are_better(
     by_joints = {measures.num_joints(c): c for c in conditions}
     for bound in measures.BOUNDS if {7, 10} <= set(by_joints) else ():
         ten, seven = (measures.below(by_joints[joints], bound) for joints in (10, 7))
-        yield judge.greater(
-            text=(f"The arm of ten joints does better than that of seven: errors below {bound:g}"),
-            source=SOURCE,
-            evidence=(
-                f"{measures.text(ten, level)} against {measures.text(seven, level)}; Fisher's "
-                "exact p "
-                f"= {markdown.p_value(fisher_exact(ten, seven))}, two-sided"
-            ),
-            one=ten,
-            two=seven,
-        )
+        p = markdown.p_value(fisher_exact(ten, seven))
+        told = " against ".join(measures.text(share, level) for share in (ten, seven))
+        evidence = f"{told}; Fisher's exact p = {p}, two-sided"
+        yield judge.on("longer_arm", bound=f"{bound:g}").greater(evidence, ten, seven)
 
 
-def no_start_needed(judge: Judge, condition: ConditionResults) -> Claim:
-    """Judge that random populations are a good enough start."""
-    told = (
-        f"{markdown.share(condition.solved, condition.done)} runs from uniform random populations "
-        "end with a solution (reproduced: all of them; one without contradicts)"
+def no_start_needed(judge: Judge, condition: ConditionResults, level: float) -> Claim | None:
+    """Judge that random populations are a good enough start.
+
+    The paper's own runs do not all end with a solution. An error of 2 or more is none (the
+    objective is at least the error, and a search is successful below 2), so the share that the
+    paper prints for errors below 2 is its share of runs with a solution.
+
+    Returns:
+        None for an arm of which the paper prints no share.
+    """
+    printed = [one for one in measures.printed(condition) if one.bound == max(measures.BOUNDS)]
+    if not printed:
+        return None
+    own, theirs = success(condition), printed[0].proportion
+    hearing = judge.on("no_start", who=condition.label)
+    low, high = newcombe(own, theirs, level)
+    margin = -0.01 * hearing.rule.limits["margin"]
+    holds = None if low <= margin <= high else low > margin
+    evidence = (
+        f"runs with a solution: {measures.text(own, level)}; the paper's own, errors below "
+        f"{printed[0].bound:g}: {measures.text(theirs, level)}; {_difference(own, theirs, level)}"
     )
-    runs = condition.solved, condition.done, condition.planned
-    text = f"{condition.label}: no starting solution is needed"
-    return judge.every(text, "section 6", told, *runs)
+    return hearing.own(evidence, f"{own.total} and {theirs.total}", holds)
 
 
 def free_of_collision(
@@ -127,23 +128,17 @@ def free_of_collision(
     certified = condition.summaries["certified"].eq(True).fillna(False).to_numpy(dtype=bool)
     free = counted(np.asarray(solved(condition) & certified)).having
     planned = condition.planned if condition.solved == condition.done else 0
-    return judge.every(
-        text=f"{condition.label}: accepted motions avoid the obstacles",
-        source="sections 3 and 4",
-        evidence=(
-            f"{markdown.share(free, refuted.total)} certified; refuted "
-            f"{measures.text(refuted, level)}"
-        ),
-        holds=free,
-        done=refuted.total,
-        planned=planned,
+    evidence = (
+        f"{markdown.share(free, refuted.total)} certified; refuted {measures.text(refuted, level)}"
     )
+    hearing = judge.on("free_of_collision", who=condition.label)
+    return hearing.every(evidence, free, refuted.total, planned)
 
 
-def judged_elsewhere() -> list[Claim]:
-    """Return the claims that need a sweep, not judged."""
-    told = "judged by its sweep: `evoexp run experiment={}`"
+def judged_elsewhere(judge: Judge) -> list[Claim]:
+    """Return the claims that need controls or a sweep, not judged."""
+    told = "judged by `evoexp run experiment={}`"
     return [
-        Claim(text, source, told.format(experiment), verdicts.NOT_JUDGED)
-        for text, source, experiment in ELSEWHERE
+        judge.on(name, **words).elsewhere(told.format(RULES[name].experiments[0]))
+        for name, words in ELSEWHERE
     ]

@@ -8,6 +8,7 @@ from evoexp.papers.lavoie import claims, measures
 from evoexp.papers.lavoie.figures import attempts, error_distribution, reaching_motions
 from evoexp.papers.lavoie.figures.reaching_motions import ShownMotion
 from evoexp.papers.lavoie.measures import RefutedMotions
+from evoexp.papers.lavoie.rules import RULES
 from evoexp.planners.redundant_ga.planner import Problem
 from evoexp.report.kit import (
     Claim,
@@ -120,7 +121,8 @@ def quantities(results: Results) -> tuple[Quantity, ...]:
 def _claims(
     results: Results, settings: ReportSettings, refuted: dict[str, RefutedMotions]
 ) -> tuple[Claim, ...]:
-    judge, level, shown = judging.judge(results, settings), settings.confidence, results.with_data
+    judge, level = judging.judge(results, settings, RULES), settings.confidence
+    shown = results.with_data
     return (
         *claims.percentages(judge, shown, level),
         *claims.more_joints_are_better(judge, shown, level),
@@ -128,11 +130,12 @@ def _claims(
             one
             for c in shown
             for one in (
-                claims.no_start_needed(judge, c),
+                claims.no_start_needed(judge, c, level),
                 claims.free_of_collision(judge, c, refuted[c.label].anywhere, level),
             )
+            if one is not None
         ),
-        *claims.judged_elsewhere(),
+        *claims.judged_elsewhere(judge),
     )
 
 

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from evoexp.papers.lavoie import measures
+from evoexp.papers.lavoie import control_claims, measures
 from evoexp.papers.lavoie.claims import percentages
 from evoexp.papers.lavoie.measures import RefutedMotions
+from evoexp.papers.lavoie.rules import RULES
 from evoexp.report.kit import (
     Claim,
     ConditionResults,
@@ -27,7 +28,6 @@ from evoexp.report.kit import (
     success,
 )
 
-QUESTION = "our question"
 Group = tuple[ConditionResults, ...]
 
 
@@ -35,14 +35,14 @@ def judge_sweep(
     results: Results, settings: ReportSettings, refuted: dict[str, RefutedMotions]
 ) -> tuple[Claim, ...]:
     """Judge the claims about the settings in which conditions differ."""
-    judge = judging.judge(results, settings)
+    judge = judging.judge(results, settings, RULES)
     return (
         *_success(judge, results, settings),
         *_precision(judge, results, settings),
         *_generations(judge, results, settings),
         *_coding(judge, results, settings),
         *_blindness(judge, results, settings, refuted),
-        *_chance(judge, results, settings),
+        *control_claims.judge_controls(judge, results, settings),
         *_positions(judge, results, settings, refuted),
     )
 
@@ -83,17 +83,9 @@ def _precision(judge: Judge, results: Results, settings: ReportSettings) -> Iter
         rows = compared(steps, measures.errors, settings, named=_against)
         medians = (f"{_median(c, measures.errors)} below {c.planner.stop_cost_sp2:g}" for c in own)
         told = "; ".join(f"{row.quantity}: {evidence(row, 'smaller')}" for row in rows)
-        told = (
-            f"median errors: {', '.join(medians)}; {told} (reproduced: every step to a smaller "
-            "value is significantly better)"
-        )
-        most = own[0].planner.ga.num_generations
-        yield judge.better_than_all(
-            text=(f"A smaller stopping value gives a better precision: at most {most} generations"),
-            source="section 6",
-            evidence=told,
-            rows=rows,
-        )
+        where = f": at most {own[0].planner.ga.num_generations} generations"
+        told = f"median errors: {', '.join(medians)}; step by step: {told}"
+        yield judge.on("precision", where=where).better_than_all(told, rows)
 
 
 def _generations(judge: Judge, results: Results, settings: ReportSettings) -> Iterator[Claim]:
@@ -106,21 +98,14 @@ def _generations(judge: Judge, results: Results, settings: ReportSettings) -> It
             continue
         attempts = (f"{c.column('term_attempts').mean():.2f}" for c in (many, few))
         spent = (_median(c, measures.effort) for c in (many, few))
-        yield judge.greater(
-            text=f"More generations find more solutions where the search stops below {least:g}",
-            source="section 6",
-            evidence=(
-                f"runs with a solution: {measures.text(success(many), level)} with at most "
-                f"{many.planner.ga.num_generations} generations, "
-                f"{measures.text(success(few), level)} "
-                f"with {few.planner.ga.num_generations}; "
-                f"{_fisher(success(many), success(few))}; "
-                "mean "
-                f"attempts {' and '.join(attempts)}, median evaluations {' and '.join(spent)}"
-            ),
-            one=success(many),
-            two=success(few),
+        told = (
+            f"runs with a solution: {measures.text(success(many), level)} with at most "
+            f"{many.planner.ga.num_generations} generations, {measures.text(success(few), level)} "
+            f"with {few.planner.ga.num_generations}; {_fisher(success(many), success(few))}; mean "
+            f"attempts {' and '.join(attempts)}, median evaluations {' and '.join(spent)}"
         )
+        hearing = judge.on("generations", least=f"{least:g}")
+        yield hearing.greater(told, success(many), success(few))
 
 
 def _coding(judge: Judge, results: Results, settings: ReportSettings) -> Iterator[Claim]:
@@ -135,16 +120,9 @@ def _coding(judge: Judge, results: Results, settings: ReportSettings) -> Iterato
             ("evaluations to a solution", measures.effort, "fewer"),
         ):
             row = next(iter(compared([pair], values, settings)), None)
-            yield judge.better(
-                text=(
-                    f"Real coding performs better than binary coding, judged by {what}: "
-                    f"{_against(*pair)}"
-                ),
-                source="section 2",
-                row=row,
-                word=word,
-                told=f"median {' against '.join(_median(c, values) for c in pair)}; {{}}",
-            )
+            where = f", judged by {what}: {_against(*pair)}"
+            told = f"median {' against '.join(_median(c, values) for c in pair)}; {{}}"
+            yield judge.on("coding", where=where).better(row, word, told)
 
 
 def _blindness(
@@ -154,31 +132,8 @@ def _blindness(
     for group in groups_but_for(results, "collision", "blind"):
         seeing, blind = sorted(group, key=lambda c: bool(c.planner.collision.blind))
         one, two = refuted[blind.label].anywhere, refuted[seeing.label].anywhere
-        yield judge.greater(
-            text=f"An arm that ignores obstacles collides: {_against(blind, seeing)}",
-            source=QUESTION,
-            evidence=_shares(one, two, settings),
-            one=one,
-            two=two,
-        )
-
-
-def _chance(judge: Judge, results: Results, settings: ReportSettings) -> Iterator[Claim]:
-    """Judge evolution against random search."""
-    for control in (c for c in results.with_data if c.is_control):
-        for own in (c for c in results.with_data if not c.is_control and _wrapped_by(control, c)):
-            one, two = success(own), success(control)
-            spent = (f"{c.spread('evaluations').median:.0f}" for c in (own, control))
-            yield judge.greater(
-                text=f"Evolution finds more solutions than chance: {_against(own, control)}",
-                source=QUESTION,
-                evidence=(
-                    f"runs with a solution: {_shares(one, two, settings)}; median evaluations "
-                    f"{' against '.join(spent)}"
-                ),
-                one=one,
-                two=two,
-            )
+        hearing = judge.on("blind_collides", who=_against(blind, seeing))
+        yield hearing.greater(_shares(one, two, settings), one, two)
 
 
 def _positions(
@@ -200,22 +155,14 @@ def _positions(
     p_values = holm([fisher_exact(one, two) for one, two in counts])
     for (coarse, fine), (one, two), p in zip(pairs, counts, p_values, strict=True):
         told = f"{_shares(two, one, settings)}; adjusted (Holm) {markdown.p_value(p)}"
-        text = f"Fewer accepted motions touch an obstacle: {_against(fine, coarse)}"
-        yield judge.greater(text, QUESTION, told, one, two, p)
+        yield judge.on("fewer_contacts", who=_against(fine, coarse)).greater(told, one, two, p)
     for (_, fine), (_, two) in zip(pairs, counts, strict=True):
         positions = fine.planner.collision.num_positions
         if positions > least:
-            told = f"refuted: {measures.text(two, settings.confidence)} (reproduced: none)"
-            text = f"M = {positions} removes contacts altogether: {fine.label}"
+            told = f"refuted: {measures.text(two, settings.confidence)}"
+            hearing = judge.on("no_contacts", positions=positions, who=fine.label)
             runs = two.total - two.having, two.total, fine.solved
-            yield judge.every(text, QUESTION, told, *runs)
-
-
-def _wrapped_by(control: ConditionResults, other: ConditionResults) -> bool:
-    """Return whether a control stands beside this very planner in the same scene."""
-    same_robot = control.condition.robot == other.condition.robot
-    same_task = control.condition.scenario == other.condition.scenario
-    return same_robot and same_task and control.planner == other.planner
+            yield hearing.every(told, *runs)
 
 
 def _against(one: ConditionResults, two: ConditionResults) -> str:

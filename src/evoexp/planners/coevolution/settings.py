@@ -35,8 +35,8 @@ class CoevolutionSettings(Component):
         hall_distinct: Nobody is in two teams of the hall. `genome`: copies count as one, and
             members of the hall are offered again, so that one may find a better partner. `index`:
             copies count as others, so the hall may fill with copies of one team; members of the
-            hall are not offered again. Runs by index are bit for bit those of revision 1 of `coevolution`,
-            unless a link's angle is exactly a multiple of 90°.
+            hall are not offered again. Runs by index are bit for bit those of revision 1 of
+            `coevolution`, unless a link's angle is exactly a multiple of 90°.
         restart_after: Generations without a feasible team before fresh populations are drawn [-];
             None: never.
     """

@@ -131,6 +131,17 @@ def condition_colour(position: int) -> str:
     return CONDITION_COLOURS[position % len(CONDITION_COLOURS)]
 
 
+def row_colour(position: int, count: int) -> str:
+    """Return the colour of a condition that has a row with its name to itself.
+
+    Where there are more conditions than colours none is repeated, which would join what does not
+    belong together: the first condition has its colour, all others are grey.
+    """
+    if count <= len(CONDITION_COLOURS) or position == 0:
+        return condition_colour(position)
+    return NEUTRAL
+
+
 def joint_symbol(arm: int, joint: int) -> str:
     """Return the name of a joint angle: θ₁, α₂, …, both counted from 0."""
     letter = ARM_SYMBOLS[arm] if arm < len(ARM_SYMBOLS) else f"q{arm + 1},"
@@ -172,8 +183,18 @@ def configuration_axes(axes: Axes, arm: int) -> None:
 
 def legend_below(figure: Figure, axes: Axes, columns: int) -> None:
     """Put the legend of some axes under the whole figure."""
-    handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=columns)
+    _put_below(figure, *axes.get_legend_handles_labels(), columns)
+
+
+def _put_below(
+    figure: Figure, handles: Sequence[Artist], labels: Sequence[str], columns: int
+) -> None:
+    """Put a legend under the whole figure, in as many columns as are wanted and as fit."""
+    for count in range(max(columns, 1), 0, -1):
+        legend = figure.legend(handles, labels, loc="outside lower center", ncols=count)
+        if count == 1 or legend.get_window_extent().width <= figure.bbox.width:
+            return
+        legend.remove()
 
 
 def key(label: str, **look: Any) -> Line2D:
@@ -188,7 +209,7 @@ def arm_keys(arms: Iterable[int], name: str = "arm", **look: Any) -> list[Line2D
 
 def keys_below(figure: Figure, keys: Sequence[Artist], columns: int | None = None) -> None:
     """Put a legend of given entries under the whole figure, in one line if no columns are given."""
-    figure.legend(handles=keys, loc="outside lower center", ncols=columns or len(keys))
+    _put_below(figure, keys, [str(one.get_label()) for one in keys], columns or len(keys))
 
 
 def legend_of_all(figure: Figure, panels: Iterable[Axes], columns: int) -> None:
@@ -197,4 +218,4 @@ def legend_of_all(figure: Figure, panels: Iterable[Axes], columns: int) -> None:
     for axes in panels:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
-    figure.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=columns)
+    _put_below(figure, list(handles.values()), list(handles), columns)

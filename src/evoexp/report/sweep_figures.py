@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from functools import partial
 
+import numpy as np
+
 from evoexp.report.figures import effects, shares
 from evoexp.report.figures.effects import Values
 from evoexp.report.page_parts import Drawing
@@ -12,26 +14,30 @@ from evoexp.report.results import Results
 from evoexp.report.verdicts import Comparison
 
 WHISKERS = "whiskers to the last value within 1.5 interquartile ranges"
+CENSORED = (
+    'A run that never gets there counts as infinite ("never"), so that boxes are of all runs; '
+    "beside: runs that get there, of all."
+)
 BOXES = (
-    f"Boxes: median and quartiles, {WHISKERS}, every replicate a point; dashed: median of the "
-    "first condition"
+    f"Boxes: median and quartiles, {WHISKERS}; points: every replicate, or those beyond where "
+    "there are many; dashed: median of the first condition."
 )
 A12 = "Vargha and Delaney's A12 with its bootstrap interval: the share of pairs of runs in which"
 BETTER = "the first condition is better than the other one; dashed: no difference."
 
 
-def values_drawing(
-    results: Results, values: Mapping[str, Values], caption: str = f"{BOXES}."
-) -> Drawing:
+def values_drawing(results: Results, values: Mapping[str, Values], caption: str = BOXES) -> Drawing:
     """Return the figure of quantities, one panel each: boxes of all conditions.
 
     Args:
         results: Whose conditions are drawn.
         values: Name with unit → its values of a condition, (done,); inf: never.
-        caption: Of the figure.
+        caption: Of the figure; where a run never gets there, it goes on to say how that is drawn.
     """
     table = partial(effects.values_table, results, values)
     shown = results.with_data
+    if any(np.isposinf(of(c)).any() for of in values.values() for c in shown):
+        caption = f"{caption} {CENSORED}"
     return Drawing("values", "Every condition", caption, table, effects.draw_values, shown)
 
 

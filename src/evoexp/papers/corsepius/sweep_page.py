@@ -58,7 +58,6 @@ FLOOR = (
     "drawn is its distance to the goal then. Points: runs; bars: medians and quartiles. A step "
     "has the size of the scope, so it seldom lands nearer than some share of it."
 )
-VALUES = f"{sweep_figures.BOXES}; never: runs that do not meet the goal."
 EFFECTS = (
     f"{sweep_figures.A12} the first condition takes fewer evaluations to the goal than the other "
     "one; dashed: no difference."
@@ -193,7 +192,7 @@ def _drawings(
     if not scopes:
         values = {"evaluations to the goal": effort, "steps of the path": measures.num_steps}
         main = results._replace(conditions=results.main)
-        boxes = sweep_figures.values_drawing(main, values, VALUES)
+        boxes = sweep_figures.values_drawing(main, values)
         by_name = {name: rows for name, _, rows in found}
         first = shown[0].label
         drawn += [

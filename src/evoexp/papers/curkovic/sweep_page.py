@@ -33,10 +33,6 @@ SHORT = {
     measures.LEAVES: "leave [0, π]",
     measures.TOO_FAST: "too fast (Eq. 2)",
 }
-VALUES = (
-    f"Boxes: median and quartiles of the runs that get there, {sweep_figures.WHISKERS}, "
-    "every replicate a point; dashed: median of the first condition, where it has one."
-)
 EFFECTS = f"{sweep_figures.A12} the first one is better than the other one; dashed: no difference."
 
 
@@ -90,7 +86,7 @@ def _drawings(
     }
     bound = markdown.number(threshold / settings.threshold_ratio)
     return (
-        sweep_figures.values_drawing(results, values, VALUES),
+        sweep_figures.values_drawing(results, values),
         sweep_figures.effects_drawing(
             results, settings, by_name, "the first condition of a family", EFFECTS
         ),

@@ -24,7 +24,7 @@ from evoexp.report.kit import (
 ELSEWHERE = (
     ("more_solutions", {"who": "", "control": ""}),
     ("precision", {"where": ", with more generations"}),
-    ("coding", {"where": ""}),
+    ("coding", {"where": "", "word": "better"}),
 )
 
 
@@ -61,12 +61,13 @@ def _percentage(
 ) -> Claim:
     theirs = printed.proportion
     within, their_own = own.interval(level), theirs.interval(level)
+    each = 1.0 - (1.0 - level) / num_tests  # Bonferroni: all intervals together have the level
     place = "within" if within.low <= theirs.share <= within.high else "outside"
     evidence = (
         f"{measures.text(own, level)}; the printed share lies {place}, its own thousand runs "
         f"give [{100 * their_own.low:.1f}, {100 * their_own.high:.1f}]; "
-        f"{_difference(own, theirs, level)}; Fisher's exact p, adjusted by Holm over {num_tests}, "
-        f"{markdown.p_value(p_adjusted)}"
+        f"{_difference(own, theirs, each)}, {100 * level:g} % over the {num_tests} together; "
+        f"Fisher's exact p, adjusted by Holm over {num_tests}, {markdown.p_value(p_adjusted)}"
     )
     words = {"bound": f"{printed.bound:g}", "share": f"{100 * theirs.share:.1f}"}
     hearing = judge.on("share_below", who=condition.label, **words)

@@ -31,10 +31,6 @@ INTRODUCTION = (
     "so there is no common axis to draw convergence on."
 )
 BOUND = 1.0  # x of P(position error < x) by which the paper's percentages differ most
-VALUES = (
-    f"Boxes: median and quartiles of the runs with a solution, {sweep_figures.WHISKERS}; points: "
-    "runs beyond, or all where there are few; dashed: median of the first condition."
-)
 
 
 class Measure(NamedTuple):
@@ -164,8 +160,9 @@ def _drawings(
     stopping_values = Drawing(
         "stopping",
         "Precision against the stopping value",
-        "Medians with quartiles over all runs; one without a solution counts as "
-        "infinite. To the right searches stop at smaller values.",
+        "Medians with quartiles over all runs; one without a solution counts as infinite; a "
+        "triangle on the first quartile: the third one is infinite. To the right searches stop at "
+        "smaller values.",
         partial(stopping.stopping_table, results, measures.errors, measures.effort),
         stopping.draw_stopping,
         results.with_data,
@@ -188,7 +185,7 @@ def _drawings(
     return (
         *([stopping_values] if differ else []),
         sweep_figures.shares_drawing(results, settings, shares, caption, references),
-        sweep_figures.values_drawing(results, values, VALUES),
+        sweep_figures.values_drawing(results, values),
         sweep_figures.effects_drawing(
             results, settings, rows, "the first condition of an arm", a12
         ),

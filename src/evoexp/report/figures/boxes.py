@@ -1,4 +1,4 @@
-"""Tukey's boxes with the points behind them."""
+"""Tukey's boxes with the points behind them; infinite values can have a place of their own."""
 
 from typing import Literal
 
@@ -6,9 +6,11 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from evoexp.records import FloatArray
+from evoexp.report.statistics import quantile
 
 JITTER = 0.16  # [rows] half the width over which points are spread
-POINTS = 50  # up to so many replicates every one is shown
+POINTS = 50  # up to so many finite values every one is shown
+FENCE = 1.5  # [interquartile ranges] how far whiskers may reach
 
 
 def draw_box(
@@ -17,26 +19,39 @@ def draw_box(
     values: FloatArray,
     colour: str,
     orientation: Literal["horizontal", "vertical"] = "horizontal",
+    never: float | None = None,
 ) -> None:
-    """Draw median, quartiles and whiskers of those values that are finite.
+    """Draw median, quartiles and whiskers, and points.
 
     Args:
         axes: To draw on.
         position: Of the box along the axis of conditions.
-        values: (n,); whiskers reach to the last one within 1.5 interquartile ranges.
+        values: (n,); inf: a run that never got there.
         colour: Of the box.
         orientation: Direction in which values grow.
+        never: Where infinite values are drawn: the box is that of all runs, and median, quartile or
+            whisker may lie there. None: they are left out.
     """
-    values = values[np.isfinite(values)]
-    if not len(values):
+    ordered = np.sort(values[np.isfinite(values) if never is None else values > -np.inf])
+    if not len(ordered):
         return
-    axes.boxplot(
-        values,
+    lower, median, upper = (quantile(ordered, share) for share in (0.25, 0.5, 0.75))
+    within = ordered
+    if upper < np.inf:
+        reach = FENCE * (upper - lower)
+        within = ordered[(ordered >= lower - reach) & (ordered <= upper + reach)]
+    drawn = np.where(np.isfinite(ordered), ordered, never or 0.0)
+    many = np.isfinite(ordered).sum() > POINTS
+    low, high = float(within[0]), float(within[-1])
+    beyond = (ordered < low) | (ordered > high)
+    ends = {"q1": lower, "med": median, "q3": upper, "whislo": low, "whishi": high}
+    box = {name: value if value < np.inf else never for name, value in ends.items()}
+    axes.bxp(
+        [box | {"fliers": drawn[beyond] if many else []}],
         positions=[position],
         orientation=orientation,
         widths=0.55,
         manage_ticks=False,
-        showfliers=len(values) > POINTS,
         boxprops={"color": colour},
         whiskerprops={"color": colour},
         capprops={"color": colour},
@@ -49,7 +64,7 @@ def draw_box(
             "alpha": 0.5,
         },
     )
-    if len(values) <= POINTS:
-        beside = position + JITTER * (2.0 * ((np.arange(len(values)) * 0.618034) % 1.0) - 1.0)
-        x, y = (values, beside) if orientation == "horizontal" else (beside, values)
+    if not many:
+        beside = position + JITTER * (2.0 * ((np.arange(len(drawn)) * 0.618034) % 1.0) - 1.0)
+        x, y = (drawn, beside) if orientation == "horizontal" else (beside, drawn)
         axes.plot(x, y, "o", color=colour, markersize=2.6, alpha=0.5, mec="none")

@@ -1,11 +1,13 @@
 """Convergence: a quantity against generations and evaluations, over replicates."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import EngFormatter
 
 from evoexp.report import style
 from evoexp.report.results import ConditionResults, Results
@@ -15,6 +17,8 @@ from evoexp.report.statistics import quantile
 COLUMNS = ("best_cost", "mean_cost")
 NAMES = {"best_cost": "best so far", "mean_cost": "average"}
 REFERENCE = "reference"
+NAMED = 5  # conditions that a panel names beside the first one
+THOUSANDS = 10_000  # from here on numbers along an axis are written with k and M
 DASH_DOTTED = (0, (5, 1.5, 1, 1.5))
 
 
@@ -56,22 +60,44 @@ def draw_cost(table: pd.DataFrame) -> Figure:
 
 
 def draw_best(table: pd.DataFrame) -> Figure:
-    """Draw medians of the best cost only, for many conditions at once."""
-    figure, (axes,) = style.row_of_panels(4.4, 1)
+    """Draw medians of the best cost only, for many conditions at once.
+
+    Of more conditions than colours each panel names some, beside the first one; the others are
+    grey.
+    """
     best = table[table["quantity"] == NAMES["best_cost"]].replace([np.inf, -np.inf], np.nan)
+    positions = sorted(best["position"].unique())
+    if len(positions) <= len(style.CONDITION_COLOURS):
+        figure, (axes,) = style.row_of_panels(4.4, 1)
+        _best_curves(axes, best, {k: style.condition_colour(k) for k in positions})
+        style.legend_below(figure, axes, 3)
+        return figure
+    first, *others = positions
+    named = [[first, *others[k : k + NAMED]] for k in range(0, len(others), NAMED)]
+    colours = style.CONDITION_COLOURS
+    figure, panels = style.lines_of_panels(3.6, len(named), 2, 0.0)
+    for axes, own in zip(panels, named, strict=True):
+        axes.sharex(panels[0])
+        axes.sharey(panels[0])
+        _best_curves(axes, best, dict(zip(own, colours, strict=False)))
+        axes.legend(loc="upper center", bbox_to_anchor=(0.45, -0.16))
+    return figure
+
+
+def _best_curves(axes: Axes, best: pd.DataFrame, named: Mapping[int, str]) -> None:
+    """Draw the curves of all conditions: those with a colour, by position, and the others grey."""
     across = _across(best)
     for (position, condition), curve in groups(best, ["position", "condition"]):
-        axes.plot(
-            curve[across],
-            curve["median"],
-            linestyle="-" if position < len(style.CONDITION_COLOURS) else (0, (4, 1.5)),
-            color=style.condition_colour(position),
-            label=f"{condition} ({_counts(curve)})",
-        )
+        x, y = curve[across], curve["median"]
+        if position in named:
+            label = f"{condition} ({_counts(curve)})"
+            axes.plot(x, y, color=named[position], label=label, zorder=3)
+        else:
+            axes.plot(x, y, color=style.FAINT, alpha=0.5, linewidth=0.8, zorder=2)
     limits = (0, max(1, int(best[across].max())))
     axes.set(xlim=limits, xlabel=across, ylabel="best cost so far (median)")
-    style.legend_below(figure, axes, 3)
-    return figure
+    if limits[1] >= THOUSANDS:
+        axes.xaxis.set_major_formatter(EngFormatter())  # 20 k
 
 
 def draw_fitness(table: pd.DataFrame) -> Figure:
@@ -94,26 +120,29 @@ def draw_fitness(table: pd.DataFrame) -> Figure:
 def _condition(results: Results, condition: ConditionResults, objective: Any) -> pd.DataFrame:
     parts = []
     for column in COLUMNS:
-        rows = condition.generations[["index", "evaluations", column]]
+        rows = condition.generations[["replicate", "index", "evaluations", column]]
         if objective is not None:
             rows = rows.assign(**{column: objective.fitness(rows[column].to_numpy())})
-        generations = list(groups(rows, "index"))
-        values = [group[column].to_numpy() for _, group in generations]
+        wide = rows.pivot(index="index", columns="replicate", values=column)
+        replicates = rows.groupby("index").size().to_numpy()
+        if column == "best_cost":  # a run that has ended keeps its best
+            wide, replicates = wide.ffill(), np.full(len(wide), wide.shape[1])
+        values = wide.to_numpy(np.float64)
         parts.append(
             pd.DataFrame(
                 {
                     "condition": condition.label,
                     "position": results.position(condition.label),
                     "quantity": NAMES[column],
-                    "generation": [index for index, _ in generations],
+                    "generation": wide.index,
                     "evaluations": [
                         quantile(group["evaluations"].to_numpy(np.float64), 0.5)
-                        for _, group in generations
+                        for _, group in groups(rows, "index")
                     ],
                     "median": [quantile(v, 0.5) for v in values],
                     "lower": [quantile(v, 0.25) for v in values],
                     "upper": [quantile(v, 0.75) for v in values],
-                    "replicates": [len(v) for v in values],
+                    "replicates": replicates,
                 }
             )
         )

@@ -5,8 +5,9 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import EngFormatter
+from matplotlib.ticker import EngFormatter, MultipleLocator
 
 from evoexp.records import FloatArray
 from evoexp.report import style
@@ -17,6 +18,8 @@ from evoexp.report.statistics import quantile
 from evoexp.report.verdicts import Comparison
 
 WRAPPED = 24  # characters of a name in a panel, per line
+BEYOND = 0.18  # [-] of the range of finite values: how far beyond it infinity is drawn
+CLEAR = 0.22  # [-] of an axis: no number stands so near to the word "never"
 THOUSANDS = 10_000  # from here on numbers along an axis are written with k and M
 Values = Callable[[ConditionResults], FloatArray]
 
@@ -50,24 +53,22 @@ def values_table(results: Results, quantities: Mapping[str, Values]) -> pd.DataF
 
 
 def draw_values(table: pd.DataFrame) -> Figure:
-    """Draw Tukey's boxes with every replicate's point, the first condition on top."""
+    """Draw Tukey's boxes of all runs, the first condition on top.
+
+    Where some runs never get there, "never" stands for infinity, and each condition says how many
+    of its runs do.
+    """
     quantities = list(dict.fromkeys(table["quantity"]))
     labels = dict(zip(table["position"], table["condition"], strict=True))
     figure, panels = style.row_of_panels(0.32 * len(labels) + 1.1, len(quantities), sharey=True)
     for axes, quantity in zip(panels, quantities, strict=True):
         rows = table[table["quantity"] == quantity]
+        never = _place_of_never(rows["value"].to_numpy())
         for position, own in groups(rows, "position"):
-            draw_box(axes, position, own["value"].to_numpy(), style.condition_colour(position))
-            never = int(np.isinf(own["value"]).sum())
-            if never:
-                place = (1.01, position)
-                axes.annotate(
-                    f"{never} never",
-                    place,
-                    xycoords=axes.get_yaxis_transform(),
-                    fontsize=6.5,
-                    va="center",
-                )
+            values, colour = own["value"].to_numpy(), style.row_colour(position, len(labels))
+            draw_box(axes, position, values, colour, never=never)
+            if never is not None:
+                _annotate_counts(axes, position, values)
         middle = quantile(rows.loc[rows["position"] == 0, "value"].to_numpy(), 0.5)
         if np.isfinite(middle):
             axes.axvline(middle, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
@@ -76,6 +77,8 @@ def draw_values(table: pd.DataFrame) -> Figure:
         axes.xaxis.set_major_locator(style.few_ticks())
         if axes.get_xlim()[1] >= THOUSANDS:
             axes.xaxis.set_major_formatter(EngFormatter())  # 200 k
+        if never is not None:
+            _name_never(axes, never)
     counts = (
         table[table["quantity"] == quantities[0]]
         .groupby("position")
@@ -88,6 +91,40 @@ def draw_values(table: pd.DataFrame) -> Figure:
     panels[0].set_yticks(list(counts.index), names)
     panels[0].set_ylim(len(labels) - 0.4, -0.6)
     return figure
+
+
+def _place_of_never(values: FloatArray) -> float | None:
+    """Return where infinity is drawn: beyond all finite values; None if all are finite."""
+    finite = values[np.isfinite(values)]
+    if not np.isposinf(values).any():
+        return None
+    if not len(finite):
+        return 1.0
+    low, high = float(finite.min()), float(finite.max())
+    return high + BEYOND * ((high - low) or abs(high) or 1.0)
+
+
+def _name_never(axes: Axes, never: float) -> None:
+    """Part infinity from the finite values by a line, and name it on the axis."""
+    low, high = axes.get_xlim()
+    between = never - 0.5 * BEYOND / (1.0 + BEYOND) * (never - low)
+    axes.axvline(between, color=style.FAINT, linewidth=0.7, linestyle=(0, (1, 2)))
+    greatest = never - CLEAR * (never - low)
+    ticks = [tick for tick in axes.get_xticks() if low <= tick <= greatest]
+    words = axes.xaxis.get_major_formatter().format_ticks(ticks)
+    axes.set_xticks([*ticks, never], [*words, "never"])
+    axes.set_xlim(low, high)
+
+
+def _annotate_counts(axes: Axes, position: int, values: FloatArray) -> None:
+    """Write beside a box how many runs of all got there."""
+    axes.annotate(
+        f"{np.isfinite(values).sum()} of {len(values)}",
+        (1.01, position),
+        xycoords=axes.get_yaxis_transform(),
+        fontsize=6.5,
+        va="center",
+    )
 
 
 def effects_table(
@@ -127,11 +164,15 @@ def draw_effects(table: pd.DataFrame) -> Figure:
         level = float(rows["significance"].iloc[0])
         clear = rows["p_adjusted"].to_numpy(np.float64) < level
         for shown, fill, sign in ((clear, style.ARM_COLOURS[0], "<"), (~clear, "white", "≥")):
+            if not shown.any():
+                continue
             label, colour = f"adjusted p {sign} {level:g}", style.ARM_COLOURS[0]
             axes.plot(a12[shown], y[shown], "o", color=colour, mfc=fill, ms=5, label=label)
-        label = "A12: the first condition is better"
-        axes.set(xlim=(-0.03, 1.03), title=textwrap.fill(quantity, WRAPPED), xlabel=label)
+        axes.set_xlim(-0.03, 1.03)
+        axes.set_title(textwrap.fill(quantity, WRAPPED), fontsize=7.5)
+        axes.set_xlabel("A12: the first is better")
+        axes.xaxis.set_major_locator(MultipleLocator(0.25))
     panels[0].set_yticks(range(len(labels)), [f"against {label}" for label in labels])
     panels[0].set_ylim(len(labels) - 0.5, -0.5)
-    style.legend_below(figure, panels[0], 2)
+    style.legend_of_all(figure, panels, 2)
     return figure

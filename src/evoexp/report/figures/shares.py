@@ -11,7 +11,8 @@ from evoexp.report import style
 from evoexp.report.proportions import Proportion
 from evoexp.report.rows import groups
 
-MARGIN = 0.08  # [-] of a panel's range, beyond the intervals
+MARGIN = 0.08  # [-] of the panels' span, beyond the intervals
+NEARLY_ALL = 60.0  # [%] a span from which on the panels show all percentages, 0 to 100
 
 
 def shares_table(
@@ -37,7 +38,9 @@ def shares_table(
 
 
 def draw_shares(table: pd.DataFrame, label: str = "share of runs [%]") -> Figure:
-    """Draw one panel per quantity, one row per condition; each panel has its own range.
+    """Draw one panel per quantity, one row per condition.
+
+    All panels have one scale: as many percentage points, from another least one on.
 
     Args:
         table: Of `shares_table`.
@@ -47,11 +50,12 @@ def draw_shares(table: pd.DataFrame, label: str = "share of runs [%]") -> Figure
     labels = dict(zip(table["position"], table["condition"], strict=True))
     rows_of = {position: row for row, position in enumerate(sorted(labels))}
     figure, panels = style.row_of_panels(0.26 * len(labels) + 1.1, len(quantities), sharey=True)
+    ranges = _ranges(table)
     for axes, quantity in zip(panels, quantities, strict=True):
         every = table[table["quantity"] == quantity]
         own = every[every["total"] > 0]
         for position, rows in groups(every, "position"):
-            colour, y = style.condition_colour(int(position)), rows_of[position]
+            colour, y = style.row_colour(int(position), len(labels)), rows_of[position]
             if rows["total"].iloc[0]:
                 axes.hlines(
                     y, 100 * rows["lower"], 100 * rows["upper"], color=colour, linewidth=1.6
@@ -70,7 +74,7 @@ def draw_shares(table: pd.DataFrame, label: str = "share of runs [%]") -> Figure
                 axes.axvline(
                     100 * printed, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1
                 )
-            axes.set_xlim(*_range(100 * own[["lower", "upper", "printed"]].to_numpy()))
+            axes.set_xlim(*ranges[quantity])
         axes.xaxis.set_major_locator(style.few_ticks())
         axes.set_xlabel(label)
         axes.set_title(quantity, fontsize=7.5)
@@ -79,8 +83,19 @@ def draw_shares(table: pd.DataFrame, label: str = "share of runs [%]") -> Figure
     return figure
 
 
-def _range(values: FloatArray) -> tuple[float, float]:
-    """Return the range of an axis that shows all of some percentages; NaN is ignored."""
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    beyond = MARGIN * (high - low)
-    return low - beyond, high + beyond
+def _ranges(table: pd.DataFrame) -> dict[str, tuple[float, float]]:
+    """Return the range of each quantity's axis [%]; all are equally wide."""
+    found = {}
+    for quantity, rows in groups(table[table["total"] > 0], "quantity"):
+        values: FloatArray = 100 * rows[["lower", "upper", "printed"]].to_numpy()
+        found[str(quantity)] = float(np.nanmin(values)), float(np.nanmax(values))
+    span = max((high - low for low, high in found.values()), default=0.0)
+    beyond = MARGIN * max(span, 1.0)
+    if span >= NEARLY_ALL:
+        return dict.fromkeys(found, (-beyond, 100.0 + beyond))
+    # the middle of a panel's own range is the middle of its axis, but for the ends at 0 and 100
+    ranges = {}
+    for quantity, (low, high) in found.items():
+        first = min(max(0.5 * (low + high - span), 0.0), 100.0 - span)
+        ranges[quantity] = first - beyond, first + span + beyond
+    return ranges

@@ -1,7 +1,7 @@
 """Arms reaching into a box of ellipses (Lavoie & Boudreau 2001, Figs. 1 and 2)."""
 
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -54,6 +54,12 @@ CROSS: dict[str, Any] = {
     "mec": "white",
     "ms": 9,
 }
+# names of the start and of both ends, and where they stand beside the tip: off its markers [pt]
+PLACES: tuple[tuple[str, tuple[int, int], Literal["left", "right"]], ...] = (
+    ("start", (-4, 5), "right"),
+    ("A", (-3, -12), "right"),
+    ("B", (8, 5), "left"),
+)
 HALO = withStroke(linewidth=2.0, foreground="white")
 
 
@@ -103,7 +109,7 @@ def draw_reaching(table: pd.DataFrame) -> Figure:
         for axes in (whole, *close):
             style.operational_axes(axes, rows["length_unit"].iloc[0])
             _draw_scene(axes, rows)
-            _draw_postures(axes, links, named=axes is whole)
+            _draw_postures(axes, links, (0,) if axes is whole else (1, 2))
             axes.plot(contacts["x"], contacts["y"], zorder=9, **CROSS)
         whole.set_title(rows["title"].iloc[0])
         whole.margins(0.06)
@@ -208,13 +214,13 @@ def _near_the_box(axes: Axes, rows: pd.DataFrame) -> None:
     axes.set_title("around the box", fontweight="normal")
 
 
-def _draw_postures(axes: Axes, links: pd.DataFrame, named: bool) -> None:
+def _draw_postures(axes: Axes, links: pd.DataFrame, named: Sequence[int]) -> None:
     """Draw the start in black, each sub-path in a colour of its own, its end strong.
 
     Args:
         axes: To be drawn into.
         links: Rows of links.
-        named: Whether names are written at start, A and B.
+        named: Sub-paths whose ends have their names written beside them; 0: the start.
     """
     for (element, sub_path, instant), rows in groups(links, ["element", "sub_path", "instant"]):
         x, y = ([*rows[name], rows[f"{name}_end"].iloc[-1]] for name in "xy")
@@ -230,7 +236,7 @@ def _draw_postures(axes: Axes, links: pd.DataFrame, named: bool) -> None:
         if element == LINK and sub_path > 0:
             axes.plot(x[-1], y[-1], ".", color=colour, markersize=4, zorder=7)
         if element == LINK and instant == sub_path:
-            _draw_joints(axes, x, y, sub_path, named)
+            _draw_joints(axes, x, y, sub_path, sub_path in named)
     base = links[links["link"] == 0].iloc[0]
     axes.plot(base["x"], base["y"], "s", color=style.NEUTRAL, markersize=7, zorder=4)
 
@@ -240,12 +246,13 @@ def _draw_joints(axes: Axes, x: list[float], y: list[float], sub_path: int, name
     colour = _colour(sub_path)
     axes.plot(x[:-1], y[:-1], "o", color="white", mec=colour, ms=3.6, mew=0.9, zorder=7)
     if named:
+        name, place, side = PLACES[sub_path]
         axes.annotate(
-            ("start", "A", "B")[sub_path],
+            name,
             (x[-1], y[-1]),
-            xytext=(-4, 5),
+            xytext=place,
             textcoords="offset points",
-            ha="right",
+            ha=side,
             zorder=10,
             fontsize=8,
             color=colour,

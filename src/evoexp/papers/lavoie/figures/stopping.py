@@ -3,11 +3,13 @@
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+from matplotlib.ticker import EngFormatter
 
 from evoexp.report.kit import Results, Values, groups, spread, style
 
 ERROR, EFFORT = "position error", "evaluations"
 BESIDE = 0.012  # [-] of the axis by which series are set apart
+THOUSANDS = 10_000  # from here on numbers along an axis are written with k and M
 NAMES = [
     *("quantity", "num_generations", "stop_cost", "condition"),
     *("median", "lower", "upper", "solved", "done"),
@@ -56,7 +58,9 @@ def draw_stopping(table: pd.DataFrame) -> Figure:
             solved, done = rows[["solved", "done"]].sum()
             runs, colour = f"({solved} of {done} runs with a solution)", style.condition_colour(k)
             name = f"at most {int(generations)} generations {runs}"
+            without_end = rows["upper"].isna() & rows["lower"].notna()
             axes.vlines(x, rows["lower"], rows["upper"], color=colour, linewidth=1.2)
+            axes.plot(x[without_end], rows["lower"][without_end], "^", color=colour, ms=6)
             axes.plot(x, rows["median"], "o-", label=name, color=colour, ms=4.5, lw=1.0)
         axes.set(
             ylim=(0.0, None),
@@ -65,6 +69,8 @@ def draw_stopping(table: pd.DataFrame) -> Figure:
             title=title,
         )
         axes.set_xticks(sorted(table["stop_cost"].unique()))
+        if axes.get_ylim()[1] >= THOUSANDS:
+            axes.yaxis.set_major_formatter(EngFormatter())  # 200 k
     panels[0].invert_xaxis()
     style.legend_below(figure, panels[0], 2)
     return figure

@@ -1,50 +1,47 @@
-"""The best path over a grid: Dijkstra for length alone, else a frontier of length and unsafeness.
+"""The best path over a grid: Dijkstra for length alone, else the best known one and a bound.
 
 The cost ε D + λ S of Chen & Zalzala 1995 contains the mean S = ΣS / N, so no shortest-path
-algorithm minimises it. Two things can be computed: good paths, from the frontier of D + μ ΣS over
-all μ; and a bound below all paths, the exact optimum over walks, which may pass nodes again. For a
-given number N of nodes a walk's cost ε D + (λ / N) ΣS is additive, so dynamic programming over 1 …
-N nodes finds the best walk, for every N.
+algorithm minimises it. The truth is enclosed:
+
+- from above, by valid paths: the frontier of D + μ ΣS over all μ, each of its paths improved by
+  exchanges of a few nodes (`grid_exchanges`);
+- from below, by walks, which may pass nodes again. For a given number N of nodes a walk's cost
+  ε D + (λ / N) ΣS is additive, so dynamic programming over 1 … N nodes finds the best walk, for
+  every N. That is the exact optimum where nodes may be passed again. Where they may not,
+  multipliers that punish further visits raise the bound (`grid_relaxation`).
 """
 
-from typing import Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
+from pydantic import Field
 
 from evoexp.errors import SettingError
 from evoexp.numeric.compilation import kernel
 from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.records import FloatArray, IntArray
+from evoexp.references.grid_exchanges import Terrain, improve
+from evoexp.references.grid_networks import (
+    TILE,
+    Arrivals,
+    Network,
+    arrivals_of,
+    hops_of,
+    network_of,
+)
+from evoexp.references.grid_relaxation import relaxed_bounds
 from evoexp.references.reference import Reference, Truth
-from evoexp.validation import Count, Positive
+from evoexp.validation import Count, NonNegativeCount, Positive
 
 BLOCK = 16  # numbers of nodes whose walks are bounded together
 LANES = 32  # numbers of nodes whose walks are looked for together
 VECTOR = 16  # numbers of them are filled up to a multiple
-TILE = 4  # moves that are compared together
 SAFEST_OF_SHORTEST = 1e-6  # [1] weight of ΣS that decides among equally short paths only
-
-
-class Network(NamedTuple):
-    """The permitted moves as edges.
-
-    Attributes:
-        tails: (edges,) node where each edge starts.
-        heads: (edges,) node where it ends.
-        lengths: (edges,) [cell].
-        unsafeness: (nodes,).
-        ends: Start and goal.
-    """
-
-    tails: np.ndarray
-    heads: np.ndarray
-    lengths: FloatArray
-    unsafeness: FloatArray
-    ends: tuple[int, int]
+REACHED = 1e-9  # of a cost: a bound so close to it is reached
 
 
 class GridFrontier(Reference):
-    """The frontier scan, and the bound by walks.
+    """The best path known, and the bound below all paths.
 
     Attributes:
         planner: The path search whose grid and cost it shares.
@@ -54,57 +51,131 @@ class GridFrontier(Reference):
         greatest_weight: Of μ [cell].
         max_nodes: Of the walks; longer walks are not searched, and cannot be better if ε is not
             very small.
+        exchanged_nodes: No exchange of at most so many nodes improves the best path known.
+        forced_nodes: Exchanges of at most so many nodes are made though they cost more, to improve
+            the path from there.
+        bound_gap: The bound is raised until it is within this part of the best cost known, by every
+            number of nodes [-].
+        bound_steps: Most steps that raise it, by every number of nodes; 0: the bound by walks.
     """
 
     component: ClassVar[str] = "grid_frontier"
+    revision: ClassVar[int] = 2
 
     planner: GridPathGa
     num_weights: Count
     least_weight: Positive
     greatest_weight: Positive
     max_nodes: Count
+    exchanged_nodes: Annotated[int, Field(ge=0, le=4)]
+    forced_nodes: Annotated[int, Field(ge=0, le=4)]
+    bound_gap: Annotated[float, Field(ge=0.0, lt=1.0)]
+    bound_steps: NonNegativeCount
 
     def truth(self, problem: Any) -> Truth:
-        """Return the best path of the frontier, or the best walk where nodes may be passed again.
+        """Return the best path known, or the best walk where nodes may be passed again.
 
-        Its terms: `lower_bound`, the cost of the best walk; `walk_nodes`, its number of nodes;
-        `bound_is_reached`, whether a path was found that costs as little. Its arrays: `frontier`
-        (μ, D, S, nodes, cost), one row per distinct path; `walks` (nodes, cost), one row per number
-        of nodes searched; `walk`, nodes of the best one; `goal_field` (NaN where no path can be)
-        and `unsafeness`, (nodes along x, along y[, along z]).
+        Its terms: `lower_bound`, below which no path costs; `walk_cost` and `walk_nodes` of the
+        best walk; `bound_is_reached`, whether a path was found that costs as little as the bound.
+        Its arrays: `frontier` (μ, D, S, nodes, cost), one row per distinct path; `improved`, the
+        same rows after the exchanges; `walks` (nodes, cost), one row per number of nodes searched;
+        `bounds` (nodes, cost) by every number of nodes that the best path can have; `walk`, nodes
+        of the best one; `goal_field` (NaN where no path can be) and `unsafeness`, (nodes along x,
+        along y[, along z]).
         """
-        network, (epsilon, lam) = network_of(problem), self.planner.objective.weights
+        network, lam = network_of(problem), self.planner.objective.unsafeness_weight
         paths = frontier(network, self._weights() if lam else np.array([SAFEST_OF_SHORTEST]))
-        rows = np.array([(mu, *self._judged(problem, path)) for mu, path in paths])
-        best = paths[int(rows[:, 4].argmin())][1]
-        if lam == 0.0:
-            walks, walk = np.array([[len(best), rows[:, 4].min()]]), best
+        better = self._improved(problem, paths)
+        rows, improved = self._rows(problem, paths), self._rows(problem, better)
+        best, known = better[int(improved[:, 4].argmin())][1], float(improved[:, 4].min())
+        if lam == 0.0:  # Dijkstra's path is exact
+            walks, walk = np.array([[len(best), known]]), best
+            bounds, bound = walks, known
         else:
-            walks, walk = best_walk(network, epsilon, lam, float(rows[:, 4].min()), self.max_nodes)
-        bound = float(walks[:, 1].min())
-        simple = len(set(walk.tolist())) == len(walk)
-        if simple or self.planner.revisits:
-            best = walk if self._judged(problem, walk)[3] <= rows[:, 4].min() else best
-        solution = self._solution(problem, best)
-        cost = self._judged(problem, best)[3]
+            walks, walk = self._best_walk(network, float(rows[:, 4].min()))
+            simple = len(set(walk.tolist())) == len(walk)
+            if (simple or self.planner.revisits) and self._judged(problem, walk)[3] <= known:
+                best, known = walk, self._judged(problem, walk)[3]
+            bounds, bound = self._bounds(network, known, walks)
         terms = {
             "lower_bound": bound,
+            "walk_cost": float(walks[:, 1].min()),
             "walk_nodes": len(walk),
-            "bound_is_reached": abs(cost - bound) <= 1e-9 * cost,
+            "bound_is_reached": abs(known - bound) <= REACHED * known,
         }
         fields = problem.fields
         arrays = {
             "frontier": rows,
+            "improved": improved,
             "walks": walks,
+            "bounds": bounds,
             "walk": self._solution(problem, walk).reshape(len(walk), -1),
             "goal_field": fields.grid.inner(fields.goal_field(problem.ends[1])),
             "unsafeness": fields.grid.inner(fields.unsafeness),
         }
-        return Truth(solution, cost, True, len(paths) + len(walks), terms, arrays)
+        solution = self._solution(problem, best)
+        return Truth(solution, known, True, len(paths) + len(walks), terms, arrays)
 
     def _weights(self) -> FloatArray:
         ratios = np.geomspace(self.least_weight, self.greatest_weight, self.num_weights)
         return np.array([SAFEST_OF_SHORTEST, *ratios])
+
+    def _improved(
+        self, problem: Any, paths: list[tuple[float, np.ndarray]]
+    ) -> list[tuple[float, np.ndarray]]:
+        """Return the paths after the exchanges; the same where these cannot help."""
+        epsilon, lam = self.planner.objective.weights
+        if lam == 0.0 or self.planner.revisits:
+            return paths
+        own = problem.fields.grid
+        lengths = epsilon * np.sqrt(own.changes.astype(np.float64))
+        terrain = Terrain(own.neighbours, own.coordinates, lengths, lam * problem.fields.unsafeness)
+        better = improve(
+            terrain, [path for _, path in paths], self.exchanged_nodes, self.forced_nodes
+        )
+        return [(mu, path) for (mu, _), path in zip(paths, better, strict=True)]
+
+    def _best_walk(self, network: Network, known: float) -> tuple[FloatArray, np.ndarray]:
+        return best_walk(network, *self.planner.objective.weights, known, self.max_nodes)
+
+    def _bounds(
+        self, network: Network, known: float, walks: FloatArray
+    ) -> tuple[FloatArray, float]:
+        """Return bounds below all paths: by numbers of nodes (numbers, 2), and of all.
+
+        Args:
+            network: The moves.
+            known: Cost of some path.
+            walks: (numbers, 2) of `best_walk`.
+        """
+        epsilon, lam = self.planner.objective.weights
+        most = most_nodes(network, epsilon, lam, known, self.max_nodes)
+        # a path of more nodes costs as much at least; without loops there may be none
+        beyond, present = (
+            epsilon * most + lam * _least_unsafeness(network),
+            np.unique(network.tails),
+        )
+        if not self.planner.revisits and most >= len(present):
+            beyond, most = np.inf, len(present)
+        # numbers of nodes that are left out have no better walk than the best one
+        floors = np.full(most + 1, walks[:, 1].min())
+        inside = walks[:, 0] <= most
+        floors[walks[inside, 0].astype(np.int64)] = walks[inside, 1]
+        if not self.planner.revisits:
+            floors = relaxed_bounds(
+                arrivals_of(network, epsilon),
+                hops_of(network),
+                lam,
+                known,
+                (1.0 - self.bound_gap) * known,
+                floors,
+                self.bound_steps,
+            )
+        rows = np.column_stack([np.arange(2.0, most + 1.0), floors[2:]])
+        return rows, float(min(floors[2:].min(initial=np.inf), beyond, known))
+
+    def _rows(self, problem: Any, paths: list[tuple[float, np.ndarray]]) -> FloatArray:
+        return np.array([(mu, *self._judged(problem, path)) for mu, path in paths])
 
     def _judged(self, problem: Any, path: np.ndarray) -> tuple[float, float, float, float]:
         """Return D, S, number of nodes and cost of a path."""
@@ -113,16 +184,6 @@ class GridFrontier(Reference):
 
     def _solution(self, problem: Any, path: np.ndarray) -> FloatArray:
         return np.asarray(problem.fields.grid.coordinates[path], dtype=np.float64).ravel()
-
-
-def network_of(problem: Any) -> Network:
-    """Return the permitted moves of a problem of `grid_path_ga`."""
-    own = problem.fields.grid
-    tails, moves = np.nonzero(own.neighbours >= 0)
-    lengths = np.sqrt(own.changes[moves].astype(np.float64))
-    return Network(
-        tails, own.neighbours[tails, moves], lengths, problem.fields.unsafeness, problem.ends
-    )
 
 
 def frontier(network: Network, weights: FloatArray) -> list[tuple[float, np.ndarray]]:
@@ -171,9 +232,7 @@ def best_walk(
     Raises:
         SettingError: If no walk has as few nodes.
     """
-    # how many nodes a better walk has at most
-    slack = known - lam * network.unsafeness[np.unique(network.tails)].min()
-    most = min(max_nodes, int(slack / epsilon) + 2) if epsilon > 0.0 else max_nodes
+    most = most_nodes(network, epsilon, lam, known, max_nodes)
     arrivals = arrivals_of(network, epsilon)
     costs = np.full(most + 1, np.inf)
     # bounds by blocks of numbers: λ / N is at least that of the block's last number
@@ -201,33 +260,14 @@ def best_walk(
     return np.column_stack([numbers.astype(np.float64), costs[numbers]]), walk
 
 
-class Arrivals(NamedTuple):
-    """The permitted moves by the nodes where they end, filled up with moves of infinite length.
-
-    Attributes:
-        tails: (nodes, moves) node where each move starts; a multiple of `TILE` moves.
-        lengths: (nodes, moves) times ε.
-        unsafeness: (nodes,).
-        ends: Start and goal.
-    """
-
-    tails: IntArray
-    lengths: FloatArray
-    unsafeness: FloatArray
-    ends: tuple[int, int]
+def most_nodes(network: Network, epsilon: float, lam: float, known: float, max_nodes: int) -> int:
+    """Return how many nodes a walk of a lower cost than `known` has at most."""
+    slack = known - lam * _least_unsafeness(network)
+    return min(max_nodes, int(slack / epsilon) + 2) if epsilon > 0.0 else max_nodes
 
 
-def arrivals_of(network: Network, epsilon: float) -> Arrivals:
-    """Return the permitted moves by their ends; see `best_walk`."""
-    order = np.argsort(network.heads, kind="stable")
-    heads, count = network.heads[order], len(network.unsafeness)
-    # place of each move among those that end at the same node
-    rank = np.arange(len(heads)) - np.searchsorted(heads, heads)
-    moves = -(-(int(rank.max()) + 1) // TILE) * TILE
-    tails, lengths = np.zeros((count, moves), dtype=np.int64), np.full((count, moves), np.inf)
-    tails[heads, rank] = network.tails[order]
-    lengths[heads, rank] = epsilon * network.lengths[order]
-    return Arrivals(tails, lengths, network.unsafeness, network.ends)
+def _least_unsafeness(network: Network) -> float:
+    return float(network.unsafeness[np.unique(network.tails)].min())
 
 
 def walk_costs(arrivals: Arrivals, weights: FloatArray, count: int) -> FloatArray:

@@ -183,6 +183,35 @@ def test_the_security_margin(margin: float, expected: str) -> None:
         assert (verdict.status, verdict.margin_status) == ("certified", expected)
 
 
+@pytest.mark.parametrize(
+    ("margins", "expected"),
+    [
+        ((0.1, 0.4), "certified"),
+        ((0.1000001, 0.4), "refuted"),
+        ((0.1, 0.4000001), "refuted"),  # of the pair that does not come closest
+        ((0.0, 0.3), "certified"),
+        ((0.4, 0.1), "refuted"),
+    ],
+)
+def test_every_pair_has_its_own_margin(margins: tuple[float, float], expected: str) -> None:
+    """A finger goes up to 0.1 before one wall, and a second finger to 0.4 before another."""
+    robot = Arms(
+        arms=(Slider(base=(0.0, 0.0, 0.0), radius=0.1), Slider(base=(0.0, 9.0, 0.0), radius=0.1))
+    )
+    walls = (
+        wall(3.0, 0.5),
+        BoxObstacle(shape="box", center=(3.25, 9.0, 0.0), size=(0.5, 2.0, 2.0)),
+    )
+    whole = scene(robot.build(), walls)
+    built = whole.of_pairs(np.array([abs(a - b) == 2 for a, b in whole.pairs]))
+    names = [built.pair_names(k) for k in range(len(built.pairs))]
+    assert names == [("arm_1_link_1", "obstacle_1"), ("arm_2_link_1", "obstacle_2")]
+    motion = Motion(np.array([[-1.0, -1.0], [1.8, 1.5], [-1.0, -1.0]]))
+    verdict = certify(built, motion, security_margin=np.array(margins))
+    assert (verdict.status, verdict.margin_status) == ("certified", expected)
+    assert verdict.clearance == pytest.approx(0.1)
+
+
 def test_a_margin_around_a_smooth_minimum() -> None:
     """A tip that turns past a ball.
 
@@ -412,6 +441,8 @@ def test_what_cannot_be_judged_is_refused() -> None:
         certify(built, Motion(np.array([[0.0], [np.nan]])))
     with pytest.raises(ValueError, match=r"security_margin must be at least 0, was -1"):
         certify(built, good, security_margin=-1.0)
+    with pytest.raises(ValueError, match=r"security_margin must be one number, or one per pair"):
+        certify(built, good, security_margin=np.zeros(7))
     with pytest.raises(ValueError, match=r"contact_tolerance must be above 0, was 0"):
         certify(built, good, contact_tolerance=0.0)
     with pytest.raises(ValueError, match=r"resolution must be above 0, was 0"):

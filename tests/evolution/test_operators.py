@@ -19,10 +19,16 @@ def population(seed: int, individuals: int = 12, points: int = 9) -> np.ndarray:
 
 
 def crossed(
-    seed: int, parents: np.ndarray, rate: float, distance: float, strings: np.ndarray
+    seed: int,
+    parents: np.ndarray,
+    rate: float,
+    distance: float,
+    strings: np.ndarray,
+    segment: bool = False,
 ) -> np.ndarray:
     out = np.full((*strings.shape[:2], len(parents) + 4), np.nan)
-    site_crossover(np.random.default_rng(seed), strings, parents, ARMS, rate, distance, out)
+    rng = np.random.default_rng(seed)
+    site_crossover(rng, strings, parents, ARMS, rate, distance, out, segment)
     return out[:, :, : len(parents)]
 
 
@@ -53,6 +59,40 @@ def test_crossover_is_what_the_paper_says(seed: int, count: int) -> None:
     parents = np.random.default_rng(seed + 100).integers(0, strings.shape[2], size=count)
     fast = crossed(seed, parents, 0.9, 45.0, strings)
     assert np.array_equal(fast, crossed_literally(seed, parents, 0.9, 45.0, strings))
+
+
+def crossed_as_one_string(
+    seed: int, parents: np.ndarray, rate: float, distance: float, strings: np.ndarray
+) -> np.ndarray:
+    """Two-point cross-over of p : q, each parent one list of via-points, arm after arm."""
+    rng, num = np.random.default_rng(seed), strings.shape[1]
+    children = strings[:, :, parents].copy()
+    for pair in range(len(parents) // 2):
+        decide, *draws = rng.random(1 + len(ARMS))
+        one, two = 1 + int(draws[0] * (num - 2)), num + 1 + int(draws[1] * (num - 2))
+        a, b = (
+            [strings[f:s, i, parents[2 * pair + k]] for f, s in ARMS for i in range(num)]
+            for k in (0, 1)
+        )
+        near = all(np.linalg.norm(a[site] - b[site]) < distance for site in (one, two))
+        if decide < rate and near:
+            a[one:two], b[one:two] = b[one:two], a[one:two]
+        for k, points in enumerate((a, b)):
+            for arm, (f, s) in enumerate(ARMS):
+                own = points[arm * num : (arm + 1) * num]
+                children[f:s, :, 2 * pair + k] = np.array(own).T
+    return children
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("count", [1, 2, 11, 12])
+def test_crossover_exchanges_the_segment_between_its_sites(seed: int, count: int) -> None:
+    strings = population(seed)
+    parents = np.random.default_rng(seed + 100).integers(0, strings.shape[2], size=count)
+    fast = crossed(seed, parents, 0.9, 45.0, strings, segment=True)
+    assert np.array_equal(fast, crossed_as_one_string(seed, parents, 0.9, 45.0, strings))
+    if count > 2:
+        assert not np.array_equal(fast, crossed(seed, parents, 0.9, 45.0, strings))
 
 
 def test_crossover_of_rate_zero_or_far_parents_copies() -> None:

@@ -69,6 +69,7 @@ def test_generations_agree_to_the_accuracy_of_the_arc_length(chords: int, seed: 
         ("rana_planar", ["planner.spline_end=clamped"]),
         ("rana_planar", ["collision.collision_substeps=3", "ga.num_elites=5"]),
         ("rana_three_arms", []),
+        ("rana_three_arms", ["planner.crossover_reading=segment"]),
     ],
 )
 def test_variants_agree_to_the_accuracy_of_the_arc_length(
@@ -86,6 +87,7 @@ def test_variants_agree_to_the_accuracy_of_the_arc_length(
     [
         ("rana_planar", []),
         ("rana_three_arms", []),
+        ("rana_three_arms", ["planner.crossover_reading=segment"]),
         ("rana_planar", ["collision.collision_substeps=4"]),
         (
             "rana_planar",

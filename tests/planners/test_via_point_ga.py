@@ -9,6 +9,7 @@ import pytest
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import SettingError
+from evoexp.planners.planner import judge_motion
 from evoexp.planners.via_point_ga.planner import Problem, ViaPointGa
 from evoexp.robots.arms import Arms
 from evoexp.robots.serial_chain import SerialChain, SerialJoint
@@ -290,6 +291,41 @@ def test_problems_that_cannot_be_are_refused(overrides: tuple[str, ...], message
 def test_a_start_inside_an_obstacle_is_refused() -> None:
     with pytest.raises(SettingError, match="an arm and an obstacle overlap"):
         prepared("scenario.obstacles=[{shape: sphere, center: [2.8, 2.8], radius: 0.5}]")
+
+
+def test_arms_and_obstacles_have_margins_of_their_own() -> None:
+    """Verdicts on the best strings of some runs, against distances of coal at many instants."""
+    planner, problem = prepared("ga.num_generations=200", experiment="rana_obstacles")
+    assert (problem.security_margin, problem.obstacle_margin) == (1.0, 0.5)
+    bodies = problem.scene
+    among = np.array(["obstacle" in bodies.names[b] for _, b in bodies.pairs])
+    assert np.array_equal(problem.margins, np.where(among, 0.5, 1.0))
+    data, placements = bodies.model.createData(), bodies.geometry.createData()
+    free = 0
+    for seed in range(6):
+        *_, last = planner.evolve(problem, np.random.default_rng(seed))
+        motion = planner.motion(problem, last.best)
+        least = np.full(len(among), np.inf)
+        for t in np.linspace(0.0, motion.num_segments, 401):
+            pin.computeDistances(bodies.model, data, bodies.geometry, placements, motion.at(t))
+            distances = [result.min_distance for result in placements.distanceResults]
+            least = np.minimum(least, distances)
+        arms, obstacles = least[~among].min(), least[among].min()
+        if min(arms, obstacles) < 0.05:
+            continue
+        free += 1
+        for share, other, expected in ((0.8, 0.8, True), (1.01, 0.8, False), (0.8, 1.01, False)):
+            own = {"security_margin": share * arms, "obstacle_margin": other * obstacles}
+            found = judge_motion(planner, problem._replace(**own), motion)
+            assert found.certified_margin is expected
+    assert free >= 3
+
+
+def test_without_a_margin_of_their_own_obstacles_have_that_of_the_arms() -> None:
+    given = condition("scenario.obstacle_margin=null", experiment="rana_obstacles")
+    problem = given.prepare().problem
+    assert np.array_equal(problem.margins, np.ones(len(problem.scene.pairs)))
+    assert "obstacle_margin" not in given.to_json().decode()
 
 
 def test_a_solution_of_another_size_is_refused() -> None:

@@ -48,6 +48,7 @@ class Rana:
     max_turn: float = 120.0
     num_new_trajectories: int = 5
     crossover_distance: float = 100.0
+    crossover_reading: str = "tails"
     relaxation_step: float = 0.5
     redistribution: bool = True
     spline_end: str = "natural"
@@ -283,7 +284,10 @@ def crossover(rana: Rana, rng: np.random.Generator, parents: Array) -> Array:
     pair, arm = np.arange(len(first))[:, None], np.arange(arms)
     gap = np.linalg.norm(first[pair, arm, sites] - second[pair, arm, sites], axis=2)
     crossed = (uniforms[:, 0] < rana.crossover_rate) & (gap < rana.crossover_distance).all(axis=1)
-    after = (np.arange(num + 1) >= sites[:, :, None]) & crossed[:, None, None]
+    exchanged = np.arange(num + 1) >= sites[:, :, None]  # (pairs, arms, N + 1): the tails
+    if rana.crossover_reading == "segment":  # of every second arm the head instead
+        exchanged[:, 1::2] = ~exchanged[:, 1::2]
+    after = exchanged & crossed[:, None, None]
     children[0 : len(parents) // 2 * 2 : 2] = np.where(after[..., None], second, first)
     children[1::2] = np.where(after[..., None], first, second)
     return children

@@ -58,6 +58,14 @@ class Scene(NamedTuple):
         one, two = self.pairs[pair]
         return self.names[one], self.names[two]
 
+    def of_pairs(self, kept: np.ndarray) -> "Scene":
+        """Return the scene with some of its pairs only.
+
+        Args:
+            kept: (pairs,) whether each is kept.
+        """
+        return self._replace(pairs=self.pairs[kept], tolerances=self.tolerances[kept])
+
     def nearest_pair(self, q: FloatArray) -> tuple[str, str]:
         """Return the names of the two bodies that are closest, or overlap most, at q (nq,)."""
         data, placements = self.model.createData(), self.geometry.createData()
@@ -73,11 +81,14 @@ class Part(NamedTuple):
         scene: The bodies.
         first: Instant at which it begins.
         last: At which it ends.
+        margins: (pairs,) clearance that the task requires of each pair [length unit]; None: the
+            planner's security margin of all.
     """
 
     scene: Scene
     first: int
     last: int
+    margins: FloatArray | None = None
 
 
 def scene(
@@ -116,6 +127,11 @@ def scene(
         for k in range(len(table.kind)):
             geometry.addCollisionPair(pin.CollisionPair(a, len(bodies) + k))
     return geometry_scene(assembly.model, geometry, assembly.table)
+
+
+def obstacle_pairs(assembly: Assembly, found: Scene) -> np.ndarray:
+    """Return which pairs of a robot's `scene` are a link and an obstacle, (pairs,)."""
+    return np.asarray(np.any(found.pairs >= len(assembly.geometry.geometryObjects), axis=1))
 
 
 def geometry_scene(model: Any, geometry: Any, table: KinematicTable | None = None) -> Scene:

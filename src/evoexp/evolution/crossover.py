@@ -24,13 +24,19 @@ def site_crossover(
     rate: float,
     max_distance: float,
     out: FloatArray,
+    segment: bool = False,
 ) -> None:
     """Cross strings at one site per arm, where the parents are close (Rana & Zalzala, 3.4b).
 
     Parents 2k and 2k + 1 form a pair; an odd last one stays alone. A pair is crossed with
     probability `rate`, and only if at the sites chosen in both arms' portions the two parents'
-    via-points are closer than `max_distance`. Each child takes the part before the site from one
-    parent and the part from the site on from the other, arm by arm. What is not crossed is copied.
+    via-points are closer than `max_distance`. What is not crossed is copied. "Double cross-over" of
+    the string p : q can be read in two ways:
+
+    - tails: either arm's path is cut in two, and what follows the site is exchanged, arm by arm;
+    - segment: the whole string is cut at both sites, and what lies between them is exchanged: the
+      end of the first arm's path and the beginning of the second arm's. With more arms every second
+      piece of the string is exchanged.
 
     Args:
         rng: Source of `num_uniforms` uniform numbers.
@@ -40,9 +46,10 @@ def site_crossover(
         rate: Probability in [0, 1].
         max_distance: Euclidean, in the units of the via-points.
         out: (nq, N + 1, ≥ offspring), written: the offspring.
+        segment: Whether the segment between the sites is exchanged, instead of the tails.
     """
     uniforms = rng.random(num_uniforms(len(arm_slices), len(parents) // 2))
-    cross_at_sites(uniforms, population, parents, arm_slices, rate, max_distance, out)
+    cross_at_sites(uniforms, population, parents, arm_slices, rate, max_distance, segment, out)
 
 
 @kernel
@@ -53,11 +60,12 @@ def cross_at_sites(
     arm_slices: IntArray,
     rate: float,
     max_distance: float,
+    segment: bool,
     out: FloatArray,
 ) -> None:
     """The kernel of `site_crossover`, for other kernels."""
     num_points, num_arms, num_offspring = population.shape[1], len(arm_slices), len(parents)
-    # mates and sites of every pair; a site beyond the end leaves a copy
+    # mates and sites of every pair; who is not crossed is its own mate
     mates = parents.copy()
     sites = np.full((num_arms, num_offspring), num_points)
     for pair in range(num_offspring // 2):
@@ -75,18 +83,19 @@ def cross_at_sites(
             close = close and np.sqrt(squared) < max_distance
             sites[arm, 2 * pair] = site
             sites[arm, 2 * pair + 1] = site
-        mates[2 * pair], mates[2 * pair + 1] = second, first
-        if not close:
-            sites[:, 2 * pair : 2 * pair + 2] = num_points
-    # every child: its own parent before the site, the mate from the site on
+        if close:
+            mates[2 * pair], mates[2 * pair + 1] = second, first
+    # every child: its own parent before the site, the mate from the site on; where a segment is
+    # exchanged, the other way round for every second arm
     for arm in range(num_arms):
         site = sites[arm]
+        heads, tails = (mates, parents) if segment and arm % 2 == 1 else (parents, mates)
         for j in range(arm_slices[arm, 0], arm_slices[arm, 1]):
             for i in range(num_points):
                 source, target = population[j, i], out[j, i]
                 for k in range(num_offspring):
-                    own, other = source[parents[k]], source[mates[k]]
-                    target[k] = own if i < site[k] else other
+                    head, tail = source[heads[k]], source[tails[k]]
+                    target[k] = head if i < site[k] else tail
 
 
 def num_single_point_uniforms(num_pairs: int) -> int:

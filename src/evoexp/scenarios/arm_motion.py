@@ -20,6 +20,8 @@ class ArmMotion(Component):
         security_margin: Clearance between bodies that the task requires [length unit].
         length_unit: Name of the scene's unit of length.
         obstacles: What does not move.
+        obstacle_margin: Clearance that the task requires between a link and an obstacle; None: the
+            security margin, as between two arms.
     """
 
     component: ClassVar[str] = "arm_motion"
@@ -29,6 +31,7 @@ class ArmMotion(Component):
     security_margin: NonNegative
     length_unit: str
     obstacles: tuple[Obstacle, ...] = ()
+    obstacle_margin: NonNegative | None = None
 
     def ends(self, arm_slices: np.ndarray) -> tuple[FloatArray, FloatArray]:
         """Return start and goal of all arms together, each (nq,) [deg].

@@ -43,7 +43,8 @@ def certificate(parts: Sequence[Part], motion: Motion, security_margin: float) -
     Args:
         parts: Pieces of the motion in the order of time, each with its own bodies.
         motion: The whole motion; instants are counted from its beginning.
-        security_margin: Clearance that the task requires [length unit of the scenes].
+        security_margin: Clearance that the task requires [length unit of the scenes], where a piece
+            has no margins of its own.
     """
     judged = [judged_part(part, motion, security_margin) for part in parts]
     return combined(judged) if judged else Certificate()
@@ -54,7 +55,8 @@ def judged_part(part: Part, motion: Motion, security_margin: float) -> Certifica
     first, last = part.first, part.last
     cubics = motion.coefficients
     piece = Motion(motion.q[first : last + 1], None if cubics is None else cubics[first:last])
-    verdict = certify(part.scene, piece, security_margin)
+    margin = security_margin if part.margins is None else part.margins
+    verdict = certify(part.scene, piece, margin)
     touching = verdict.status == "refuted"
     return Certificate(
         certified=_ANSWER[verdict.status],

@@ -89,7 +89,7 @@ DEFAULT_LIMITS = Limits()
 def certify(
     scene: Scene,
     motion: Motion,
-    security_margin: float = 0.0,
+    security_margin: float | FloatArray = 0.0,
     *,
     contact_tolerance: float | None = None,
     resolution: float = 1e-3,
@@ -101,7 +101,8 @@ def certify(
     Args:
         scene: The bodies; read only.
         motion: In the units of the model: radians, lengths.
-        security_margin: Clearance that the task requires [length unit].
+        security_margin: Clearance that the task requires [length unit]: of every pair of bodies, or
+            (pairs,) of each.
         contact_tolerance: A distance at or below it is contact [length unit]; None:
             `Scene.tolerances`.
         resolution: The clearance is proven up to this part of it [-].
@@ -118,7 +119,8 @@ def certify(
         if contact_tolerance is None
         else np.full(len(scene.pairs), contact_tolerance)
     )
-    verdict = _Judgement(scene, motion, security_margin, tolerances, resolution, limits).verdict()
+    margins = np.broadcast_to(np.asarray(security_margin, np.float64), (len(scene.pairs),))
+    verdict = _Judgement(scene, motion, margins, tolerances, resolution, limits).verdict()
     return verdict._replace(duration_s=(clock() if clock is not None else np.nan) - begin)
 
 
@@ -137,12 +139,12 @@ class _Judgement:
         self,
         scene: Scene,
         motion: Motion,
-        margin: float,
+        margins: FloatArray,
         tolerances: FloatArray,
         resolution: float,
         limits: Limits,
     ) -> None:
-        self.scene, self.motion, self.margin = scene, motion, margin
+        self.scene, self.motion, self.margins = scene, motion, margins
         self.tolerances, self.resolution, self.limits = tolerances, resolution, limits
         self.coal = CoalDistance(scene, motion, limits.queries)
         self.floor = 1e-6 * scene.size
@@ -196,19 +198,17 @@ class _Judgement:
         )
 
     def _too_close(self) -> bool:
-        return (
-            self.best.pair >= 0
-            and self.best.distance < self.margin - self.tolerances[self.best.pair]
-        )
+        """Return whether the closest pair comes closer than its own margin."""
+        pair = self.best.pair
+        return pair >= 0 and bool(self.best.distance < self.margins[pair] - self.tolerances[pair])
 
     def _judge_margin(self, status: Status, proven: float) -> Status:
-        """Compare with the margin; search again where the clearance is not proven far enough."""
+        """Compare with the margins; search again where the clearance is not proven far enough."""
         if self._too_close():
             return "refuted"
-        if status == "undecided" or proven >= self.margin:
+        if status == "undecided" or proven >= self.margins.max():
             return status
-        goal = np.full(len(self.tolerances), self.margin)
-        low, bound = self._search(np.inf, goal, self.margin - self.tolerances)
+        low, bound = self._search(np.inf, self.margins, self.margins - self.tolerances)
         if low is not None:
             if self.task.exact[low.pair]:
                 self._polish_from(np.array([low.pair]), np.array([low.t]))
@@ -320,7 +320,7 @@ class _Judgement:
 def _check(
     scene: Scene,
     motion: Motion,
-    security_margin: float,
+    security_margin: float | FloatArray,
     contact_tolerance: float | None,
     resolution: float,
 ) -> None:
@@ -339,7 +339,11 @@ def _check(
         )
     if not np.isfinite(motion.polynomials).all() or not np.isfinite(motion.q).all():
         raise ValueError("motion: q must be finite, was not")
-    if not 0.0 <= security_margin < np.inf:
+    margins = np.asarray(security_margin, dtype=np.float64)
+    if margins.shape not in ((), (len(scene.pairs),)):
+        text = f"one number, or one per pair ({len(scene.pairs)})"
+        raise ValueError(f"security_margin must be {text}, was of shape {margins.shape}")
+    if not ((margins >= 0.0) & (margins < np.inf)).all():
         raise ValueError(f"security_margin must be at least 0, was {security_margin}")
     if contact_tolerance is not None and not 0.0 < contact_tolerance < np.inf:
         raise ValueError(f"contact_tolerance must be above 0, was {contact_tolerance}")

@@ -45,6 +45,7 @@ class Breeding(NamedTuple):
         fitness_offset: C_max of Eq. 7.
         crossover_rate: Probability that a pair is crossed.
         crossover_distance: Parents are crossed only where they are closer than this [deg].
+        exchanges_segment: Whether cross-over exchanges the segment between its sites.
         mutation_rate: Probability that a slot gets a new trajectory.
         walk_step: Step of a new trajectory, in units of its straight distance over N.
         max_turn: Its largest turn away from the goal [rad].
@@ -55,6 +56,7 @@ class Breeding(NamedTuple):
     fitness_offset: float
     crossover_rate: float
     crossover_distance: float
+    exchanges_segment: bool
     mutation_rate: float
     walk_step: float
     max_turn: float
@@ -212,6 +214,7 @@ def breed(
         arm_slices,
         breeding.crossover_rate,
         breeding.crossover_distance,
+        breeding.exchanges_segment,
         offspring,
     )
     # (d) new trajectories in distinct places, each with the mutation's probability

@@ -16,7 +16,7 @@ from typing import ClassVar
 import numpy as np
 
 from evoexp.collision.models.touching_spheres import Clearance
-from evoexp.collision.scene import scene
+from evoexp.collision.scene import Part, scene
 from evoexp.errors import SettingError
 from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.numeric.elementary import DEGREE
@@ -73,7 +73,9 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
             self.num_via_points, joints, self.spline_end, self.samples_per_segment
         )
         bodies = scene(assembly, collision.obstacles)
-        return Problem(assembly, collision, start, goal, spline, bodies, scenario.security_margin)
+        own, margin = scenario.obstacle_margin, scenario.security_margin
+        margins = margin, margin if own is None else own
+        return Problem(assembly, collision, start, goal, spline, bodies, *margins)
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield the initial population, then one generation after the other."""
@@ -132,6 +134,10 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
     def motion(self, problem: Problem, solution: FloatArray) -> Motion:
         """Return the joint-space motion of a solution: straight, via-points in equal times."""
         return Motion(np.ascontiguousarray(DEGREE * self._strings_of(problem, solution).T))
+
+    def parts(self, problem: Problem, motion: Motion) -> tuple[Part, ...]:
+        """Return the whole motion; arms and obstacles have margins of their own."""
+        return (Part(problem.scene, 0, motion.num_segments, problem.margins),)
 
     def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
         """Return the named terms of a solution, its clearances at and between via-points included.

@@ -30,6 +30,9 @@ class ViaPointSettings(Settings):
         ga: Population, generations, elites, rates.
         objective: Weights of Eq. 7.
         collision: The touching circles or spheres.
+        crossover_reading: How the double cross-over of section 3.4b is read: `tails` exchanges what
+            follows the site in every arm's path; `segment` exchanges what lies between the two
+            sites of the whole string: the end of the first path and the beginning of the second.
     """
 
     num_via_points: Count
@@ -44,6 +47,7 @@ class ViaPointSettings(Settings):
     ga: GeneticSettings
     objective: StringFitness
     collision: TouchingSpheres
+    crossover_reading: Literal["tails", "segment"] = "tails"
 
     @model_validator(mode="after")
     def _samples_halve(self) -> Self:

@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from evoexp.collision.models.touching_spheres import SphereCollision
-from evoexp.collision.scene import Scene
+from evoexp.collision.scene import Scene, obstacle_pairs
 from evoexp.evolution import crossover
 from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.numeric.elementary import DEGREE
@@ -33,7 +33,8 @@ class Problem(NamedTuple):
         goal: (nq,) [deg].
         spline: Factor and memory of the redistribution; for one thread at a time.
         scene: The bodies themselves, for the exact verdict on a motion.
-        security_margin: Clearance that the task requires [length unit].
+        security_margin: Clearance that the task requires between two arms [length unit].
+        obstacle_margin: The same between a link and an obstacle.
     """
 
     assembly: Assembly
@@ -43,11 +44,18 @@ class Problem(NamedTuple):
     spline: Redistribution
     scene: Scene
     security_margin: float
+    obstacle_margin: float
 
     @property
     def arm_slices(self) -> IntArray:
         """(arms, 2) rows of each arm."""
         return self.assembly.arm_slices
+
+    @property
+    def margins(self) -> FloatArray:
+        """(pairs of the scene,) clearance that the task requires of each [length unit]."""
+        among_obstacles = obstacle_pairs(self.assembly, self.scene)
+        return np.where(among_obstacles, self.obstacle_margin, self.security_margin)
 
     @property
     def sphere_radius(self) -> float:
@@ -79,6 +87,17 @@ class Problem(NamedTuple):
             (configurations,) [length unit].
         """
         return np.asarray(self.collision.clearance(q).between_arms + 2.0 * self.sphere_radius)
+
+    def obstacle_distances(self, q: FloatArray) -> FloatArray:
+        """Return the least distance from a centre to the surface of an obstacle.
+
+        Args:
+            q: (nq, configurations) [deg].
+
+        Returns:
+            (configurations,) [length unit].
+        """
+        return np.asarray(self.collision.clearance(q).to_obstacles + self.sphere_radius)
 
 
 class Judgement(NamedTuple):
@@ -135,6 +154,7 @@ class Strings:
             fitness_offset=planner.objective.fitness_offset,
             crossover_rate=ga.crossover_rate,
             crossover_distance=planner.crossover_distance,
+            exchanges_segment=planner.crossover_reading == "segment",
             mutation_rate=ga.mutation_rate,
             walk_step=planner.walk_step,
             max_turn=max_turn,

@@ -289,7 +289,7 @@ def test_a_planner_that_lacks_something_of_the_protocol_is_refused_by_name(
 
 
 def test_replicates_have_streams_of_their_own_that_conditions_share() -> None:
-    first, other = (c for _, c in expanded("rana_planar", "paper").conditions)
+    first, other, _ = (c for _, c in expanded("rana_planar", "paper").conditions)
     draws = [condition.rng(k).random(3).tolist() for condition in (first, other) for k in (0, 1)]
     assert draws[:2] == draws[2:]
     assert draws[0] != draws[1]

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -13,7 +14,7 @@ from evoexp.records import GenerationRow, ReplicateSummary
 from evoexp.store.run_directory import RunDirectory, find_runs
 
 SMALL = ("ga.population_size=8", "ga.num_generations=2", "planner.num_new_trajectories=1")
-LABELS = ["via-point GA", "random search"]
+LABELS = ["via-point GA", "random search", "multi-start"]
 
 
 @pytest.fixture(scope="module")
@@ -39,11 +40,11 @@ def outputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_by_experiment(outputs: Path) -> None:
     generations, summaries = evoexp.load("rana_planar", *SMALL, budget="smoke", outputs=outputs)
-    assert summaries["label"].tolist() == [LABELS[0]] * 2 + [LABELS[1]] * 2
-    assert summaries["replicate"].tolist() == [0, 1, 0, 1]
+    assert summaries["label"].tolist() == np.repeat(LABELS, 2).tolist()
+    assert summaries["replicate"].tolist() == [0, 1] * 3
     assert (summaries["status"] == "done").all()
-    assert generations["label"].tolist() == [LABELS[0]] * 6 + [LABELS[1]] * 6
-    assert generations["index"].tolist() == [0, 1, 2] * 4
+    assert generations["label"].tolist() == np.repeat(LABELS, 6).tolist()
+    assert generations["index"].tolist() == [0, 1, 2] * 6
     assert {*ReplicateSummary._fields, "label"} - {"terms"} <= set(summaries)
     assert {*GenerationRow._fields, "label", "condition", "replicate"} - {"terms", "chain"} <= set(
         generations
@@ -55,7 +56,7 @@ def test_by_experiment(outputs: Path) -> None:
         c.id
         for _, c in compose.expand(["experiment=rana_planar", "budget=smoke", *SMALL])[0].conditions
     ]
-    assert summaries["condition"].tolist() == [ids[0]] * 2 + [ids[1]] * 2
+    assert summaries["condition"].tolist() == np.repeat(ids, 2).tolist()
 
 
 def test_by_hash(outputs: Path) -> None:
@@ -93,10 +94,10 @@ def test_a_sweep_gives_what_is_stored_of_it(outputs: Path) -> None:
 def test_labels_that_share_a_condition_have_its_rows_each(outputs: Path) -> None:
     words = ("rana_planar", *SMALL, "control=null")
     generations, summaries = evoexp.load(*words, budget="smoke", outputs=outputs)
-    assert summaries["label"].tolist() == [LABELS[0]] * 2 + [LABELS[1]] * 2
-    halves = [generations[generations["label"] == label].drop(columns="label") for label in LABELS]
-    assert halves[0].reset_index(drop=True).equals(halves[1].reset_index(drop=True))
-    assert len(halves[0]) == 6
+    assert summaries["label"].tolist() == np.repeat(LABELS, 2).tolist()
+    rows = [generations[generations["label"] == label].drop(columns="label") for label in LABELS]
+    assert all(rows[0].reset_index(drop=True).equals(k.reset_index(drop=True)) for k in rows)
+    assert len(rows[0]) == 6
 
 
 def test_failed_replicates_are_rows(outputs: Path, tmp_path: Path) -> None:
@@ -121,7 +122,7 @@ def test_what_cannot_be_loaded(outputs: Path, tmp_path: Path) -> None:
         match="experiment or hash: no option 'rana_planr'; did you mean 'rana_planar'",
     ):
         evoexp.load("rana_planr", outputs=outputs)
-    with pytest.raises(UnknownHash, match="hash: no run 'abcdef' among the 2 in"):
+    with pytest.raises(UnknownHash, match="hash: no run 'abcdef' among the 3 in"):
         evoexp.load("abcdef", outputs=outputs)
     with pytest.raises(
         NothingStored,

@@ -19,7 +19,7 @@ from evoexp.store.run_directory import RunDirectory
 from evoexp.store.tables import read_summaries
 
 PLANAR = ("experiment=rana_planar", *SMALL)
-LABELS = ("via-point GA", "random search")
+LABELS = ("via-point GA", "random search", "multi-start")
 
 
 @pytest.fixture(scope="module")

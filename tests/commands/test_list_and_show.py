@@ -57,7 +57,7 @@ def test_stored_runs(evoexp: Evoexp, stored: Path, width: int) -> None:
     assert max(map(len, said.out.splitlines())) <= width
     rows = cells(said.out)
     assert list(rows) == [run.hash12 for run in runs]
-    assert [row[1:3] for row in rows.values()] == [["2", "1"], ["2", "0"]]
+    assert [row[1:3] for row in rows.values()] == [["2", "1"], ["2", "0"], ["2", "0"]]
     assert "(changed)" in said.out
     assert "via-point" in said.out
 
@@ -84,7 +84,7 @@ def test_damaged_runs_are_listed_beside_the_others(
         .conditions[0]
         .condition
     )
-    first, second = find_runs(stored)
+    first, second, third = find_runs(stored)
     without_manifest = RunDirectory(stored, condition.id)
     without_manifest.create(condition.to_json(), {})
     (without_manifest.path / "manifest.json").unlink()
@@ -96,7 +96,9 @@ def test_damaged_runs_are_listed_beside_the_others(
     said = evoexp("list")
     assert said.code == 0
     rows = cells(said.out)
-    assert list(rows) == sorted([first.hash12, second.hash12, without_manifest.hash12])
+    assert list(rows) == sorted(
+        [first.hash12, second.hash12, third.hash12, without_manifest.hash12]
+    )
     assert rows[first.hash12][1:] == rows[second.hash12][1:] == ["–", "–", "–", "–"]
     assert rows[without_manifest.hash12] == ["(no manifest)", "0", "0", "0", "–"]
     assert (
@@ -107,7 +109,7 @@ def test_damaged_runs_are_listed_beside_the_others(
 
 
 def test_a_damaged_run_is_refused_by_show(refused: Callable[..., str], stored: Path) -> None:
-    first, second = find_runs(stored)
+    first, second, *_ = find_runs(stored)
     (first.path / "config.json").write_text("{}")
     assert f"{first.path}/config.json: damaged" in refused("show", first.hash12)
     (second.path / "manifest.json").write_text("[")
@@ -143,7 +145,7 @@ def test_a_pipe_gets_wide_tables(
 ) -> None:
     monkeypatch.delenv("COLUMNS", raising=False)
     lines = [line for line in evoexp("list").out.splitlines() if "rana_planar, " in line]
-    assert len(lines) == 2
+    assert len(lines) == 3
     assert all("smoke" in line for line in lines), "a row is a line, for grep"
 
 

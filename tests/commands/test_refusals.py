@@ -248,7 +248,7 @@ def test_an_unknown_hash_lists_what_is_stored(refused: Refused, stored: Path) ->
     names = [run.hash12 for run in find_runs(stored)]
     for command in ("show", "reproduce"):
         said = refused(command, "abcdef")
-        assert "hash: no run 'abcdef' among the 2 in" in said
+        assert "hash: no run 'abcdef' among the 3 in" in said
         assert f"(stored: {', '.join(names)}; see: evoexp list)" in said
     near = names[0][:11] + ("0" if names[0][11] != "0" else "1")
     assert f"did you mean '{names[0]}'?" in refused("show", near)

@@ -23,11 +23,11 @@ def test_a_run_says_what_is_there_and_runs_nothing_twice(
     monkeypatch.setenv("COLUMNS", "80")
     first = evoexp("run", *PLANAR, "--no-report")
     assert (first.code, first.err) == (0, "")
-    assert re.search(r"^replicates: 4 of 4 done, 0 failed, ETA 0 s$", first.out, re.MULTILINE)
+    assert re.search(r"^replicates: 6 of 6 done, 0 failed, ETA 0 s$", first.out, re.MULTILINE)
     for label, condition in compose.expand(PLANAR)[0].conditions:
         assert condition.id[:12] in first.out
         assert label.split(" ")[0] in first.out
-    assert first.out.count("2 of 2") == 2
+    assert first.out.count("2 of 2") == 3
     assert "…" not in first.out
     assert max(map(len, first.out.splitlines())) <= 80
     again = evoexp("run", *PLANAR, "--no-report")

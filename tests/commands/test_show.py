@@ -166,7 +166,7 @@ def test_show_json_has_stable_keys(evoexp: Evoexp, stored: Path) -> None:
     assert facts["condition"] == run.condition_id
     assert facts["settings"] == json.loads(run.config_json())
     several = strictly(evoexp("show", *PLANAR, "--json").out)
-    assert [list(facts) for facts in several] == [list(KEYS)] * 2
+    assert [list(facts) for facts in several] == [list(KEYS)] * 3
     out = " ".join(evoexp("show", "--help").out.split())
     assert all(f"{key}: " in out for key in KEYS)
 
@@ -191,7 +191,7 @@ def test_list_json_has_stable_keys(evoexp: Evoexp, stored: Path, tmp_path: Path)
     (tmp_path / "mine/experiment").mkdir(parents=True)
     head = "# @package _global_\n# evoexp run experiment=mine\n# An experiment of my own.\n"
     (tmp_path / "mine/experiment/mine.yaml").write_text(head)
-    first, _ = find_runs(stored)
+    first, *_ = find_runs(stored)
     (first.path / "config.json").write_text("{}")
     said = evoexp("list", "--json", "--config-dir", str(tmp_path / "mine"))
     listed = strictly(said.out)
@@ -206,6 +206,6 @@ def test_list_json_has_stable_keys(evoexp: Evoexp, stored: Path, tmp_path: Path)
         "path": str(tmp_path / "mine/experiment/mine.yaml"),
     }
     assert by_name["rana_planar"]["origin"] == "evoexp"
-    assert [list(each) for each in listed["runs"]] == [list(RUN_KEYS)] * 2
-    assert [bool(each["damage"]) for each in listed["runs"]] == [True, False]
+    assert [list(each) for each in listed["runs"]] == [list(RUN_KEYS)] * 3
+    assert [bool(each["damage"]) for each in listed["runs"]] == [True, False, False]
     assert listed["runs"][1]["done"] == 2

@@ -61,8 +61,8 @@ def test_what_cannot_be_shown_is_said(refused: Refused, runs: list[str], tmp_pat
     assert refused("view", runs[0], "--replicate", "9") == (
         f"run {runs[0]}: no finished replicate 9 (finished: 0, 1)"
     )
-    assert "hash: no run 'ffffffff' among the 2 in " in refused("view", "ffffffff")
-    assert refused("view", *runs * 3) == "motions: at most 4 go together, got 6"
+    assert "hash: no run 'ffffffff' among the 3 in " in refused("view", "ffffffff")
+    assert refused("view", *runs * 3) == "motions: at most 4 go together, got 9"
     assert refused("view", "experiment=rana_planar") == (
         "motion file: one is needed (.json or .npy), got 0: none"
     )
@@ -75,7 +75,7 @@ def test_what_cannot_be_shown_is_said(refused: Refused, runs: list[str], tmp_pat
         refused("view", runs[0], "--turn-speed", "0")
         == "--turn-speed: must be greater than 0, was 0.0"
     )
-    assert refused("play", *runs) == "motion: one at a time, got 2; choose with --only LABEL"
+    assert refused("play", *runs) == "motion: one at a time, got 3; choose with --only LABEL"
 
 
 def test_a_condition_that_was_not_run_here_says_how(refused: Refused) -> None:

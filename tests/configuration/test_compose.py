@@ -256,13 +256,14 @@ def test_groups_of_an_entry_can_be_taken_back_on_the_command_line() -> None:
     without = ids("experiment=rana_planar", "control=null")
     assert without == {
         "via-point GA": plain["via-point GA"],
+        "multi-start": plain["via-point GA"],
         "random search": plain["via-point GA"],
     }
-    both = ids("experiment=rana_planar", "control=random_search")
-    assert both == {"via-point GA": plain["random search"], "random search": plain["random search"]}
+    every = ids("experiment=rana_planar", "control=random_search")
+    assert every == dict.fromkeys(plain, plain["random search"])
     swept = ids("experiment=rana_planar", "control=null,random_search", multirun=True, only=())
-    assert set(swept.values()) == set(plain.values())
-    assert len(swept) == 4
+    assert set(swept.values()) == {plain["via-point GA"], plain["random search"]}
+    assert len(swept) == 6
 
 
 def test_two_swept_settings_of_one_name_are_told_apart() -> None:
@@ -282,11 +283,12 @@ def test_only_picks_labels() -> None:
     assert ids("experiment=rana_planar", only=("random search",)) == {
         "random search": plain["random search"]
     }
-    assert ids("experiment=rana_planar", only=("random search", "via-point GA")) == plain
+    two = ("random search", "via-point GA")
+    assert ids("experiment=rana_planar", only=two) == {label: plain[label] for label in two}
     (picked,) = expand(["experiment=rana_planar"], only=["random search"])
     assert picked.changed
     assert picked.report_name.startswith("rana_planar+")
-    assert not expand(["experiment=rana_planar"], only=["random search", "via-point GA"])[0].changed
+    assert not expand(["experiment=rana_planar"], only=list(plain))[0].changed
 
 
 def test_a_multirun_drops_no_experiment_and_no_condition() -> None:
@@ -295,8 +297,8 @@ def test_a_multirun_drops_no_experiment_and_no_condition() -> None:
         [f"experiment={','.join(names)}", "budget=smoke", "seed=0,1"], multirun=True
     )
     assert [e.name for e in experiments] == list(names)
-    assert [len(e.conditions) for e in experiments] == [4, 2, 2]
-    assert len({c.id for e in experiments for _, c in e.conditions}) == 8
+    assert [len(e.conditions) for e in experiments] == [6, 2, 2]
+    assert len({c.id for e in experiments for _, c in e.conditions}) == 10
     assert (
         expand(["experiment=choice(rana_planar,rana_obstacles)"], multirun=True)[1].name
         == "rana_obstacles"
@@ -396,7 +398,7 @@ def test_budgets_cap_and_quick_keeps_the_hashes() -> None:
     )
     assert (paper.num_replicates, quick.num_replicates, smoke.num_replicates) == (20, 5, 2)
     assert quick.conditions == paper.conditions
-    assert (generations(paper), generations(smoke)) == ([500, 500], [10, 10])
+    assert (generations(paper), generations(smoke)) == ([500] * 3, [10] * 3)
     assert not {c.id for _, c in smoke.conditions} & {c.id for _, c in paper.conditions}
 
 
@@ -405,7 +407,7 @@ def test_a_budget_caps_and_never_raises(asked: int, effective: int) -> None:
     (experiment,) = expand(
         ["experiment=rana_planar", "budget=smoke", f"ga.num_generations={asked}"]
     )
-    assert generations(experiment) == [effective, effective]
+    assert generations(experiment) == [effective] * 3
     assert experiment.changed is (effective != 10)
     assert one("experiment=rana_planar", "budget=smoke", f"ga.num_generations={asked}") == one(
         "experiment=rana_planar", f"ga.num_generations={effective}"
@@ -485,7 +487,7 @@ def test_a_group_that_the_planner_does_not_take_is_refused(
         (["planner.ga=3"], SettingError, "planner.ga: must be left as it is; set ga"),
         (["ga=null"], SettingError, "ga: must be chosen: "),
         (["~objective"], SettingError, "objective: must be chosen: "),
-        (["+control.x=1"], SettingError, "control: must be chosen: random_search"),
+        (["+control.x=1"], SettingError, "control: must be chosen: multi_start, random_search"),
         (
             ["control=random_search", "+control.planner=1"],
             SettingError,
@@ -499,7 +501,12 @@ def test_a_group_that_the_planner_does_not_take_is_refused(
         (
             ["control=random_search", "+control.x=1"],
             UnknownSetting,
-            "planner.x: unknown setting (known here: planner)",
+            "control.x: unknown setting (known here: planner)",
+        ),
+        (
+            ["control=multi_start", "control.num_sweeps=0"],
+            SettingError,
+            "control.num_sweeps: must be at least 1",
         ),
     ],
 )
@@ -513,6 +520,7 @@ def test_parts_of_a_planner_are_set_in_their_own_group(
 
 def test_unknown_labels_of_only_list_those_that_exist() -> None:
     with pytest.raises(
-        UnknownOption, match=r"--only: no option 'random'.*\(options: random search, via-point GA\)"
+        UnknownOption,
+        match=r"--only: no option 'random'.*\(options: multi-start, random search, via-point GA\)",
     ):
         expand(["experiment=rana_planar"], only=["random"])

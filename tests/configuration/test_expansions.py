@@ -61,7 +61,7 @@ def test_other_words_are_composed(composed: Callable[[], int]) -> None:
         ["experiment=rana_planar", "seed=0,1"], multirun=True, only=["random search · seed=1"]
     )
     assert composed() == 3
-    assert (len(plain[0].conditions), len(seeds[0].conditions), len(one.conditions)) == (2, 4, 1)
+    assert (len(plain[0].conditions), len(seeds[0].conditions), len(one.conditions)) == (3, 6, 1)
     assert one.changed
 
 

@@ -91,9 +91,13 @@ def test_options_of_every_label_are_recorded_and_kept(
     monkeypatch.setenv("EVOEXP_CACHE", str(tmp_path))
     first, kept = (expansions.expand(["experiment=rana_planar"])[0] for _ in range(2))
     assert first == kept
-    assert set(kept.options) == {"via-point GA", "random search"}
+    assert set(kept.options) == {"via-point GA", "random search", "multi-start"}
     controls = [kept.option_names(label).get("control") for label, _ in kept.conditions]
-    assert controls == [None, {"name": "random_search", "origin": "evoexp"}]
+    assert controls == [
+        None,
+        {"name": "random_search", "origin": "evoexp"},
+        {"name": "multi_start", "origin": "evoexp"},
+    ]
 
 
 def test_a_folder_that_is_none_is_refused(

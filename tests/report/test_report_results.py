@@ -37,10 +37,11 @@ def test_nothing_stored_is_one_line_with_the_command(tmp_path: Path) -> None:
 
 
 def test_results_are_what_the_logs_hold(stored: Path, results: Results) -> None:
-    ga, search = results.conditions
-    assert [c.label for c in results.conditions] == ["via-point GA", "random search"]
+    ga, search, starts = results.conditions
+    labels = ["via-point GA", "random search", "multi-start"]
+    assert [c.label for c in results.conditions] == labels
     assert (ga.done, ga.planned, ga.failed) == (2, 2, 0)
-    assert (ga.is_control, search.is_control) == (False, True)
+    assert [c.is_control for c in (ga, search, starts)] == [False, True, True]
     assert results.main == (ga,)
     run = RunDirectory(stored, ga.condition.id)
     logs = [read_log(run.log_path(k)) for k in range(2)]
@@ -90,14 +91,14 @@ def test_replicates_asked_for_when_results_were_there_are_told_apart(tmp_path: P
 def test_failed_and_missing_replicates_are_counted(tmp_path: Path) -> None:
     experiment = expand("rana_planar", "num_replicates=1", "ga.num_generations=1")
     store(tmp_path, experiment)
-    ga, search = (RunDirectory(tmp_path, c.condition.id) for c in experiment.conditions)
+    ga, search, _ = (RunDirectory(tmp_path, c.condition.id) for c in experiment.conditions)
     ga.write_failure(1, "worker died", "traceback")
     search.log_path(0).unlink()
     found = gather(tmp_path, experiment.conditions, 3, "rana_planar", "smoke", "")
-    first, second = found.conditions
+    first, second, third = found.conditions
     assert (first.done, first.failed, first.failures) == (1, 1, {1: "worker died"})
     assert (second.done, second.failed, second.solutions) == (0, 0, {})
-    assert found.with_data == (first,)
+    assert found.with_data == (first, third)
 
 
 def test_a_condition_is_read_back_from_its_run(stored: Path, results: Results) -> None:

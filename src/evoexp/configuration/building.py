@@ -50,6 +50,7 @@ def build_condition(config: dict[str, Any], planner: str) -> Condition:
             must = "left out: it is the chosen planner"
             raise SettingError(f"{group}.planner", must, plain[group]["planner"])
         plain["planner"] = {**plain[group], "planner": plain["planner"]}
+        build(plain["planner"], component_class, group)  # its errors name the group, as typed
     return Condition.from_config({part: plain[part] for part in (*PARTS, "seed")})
 
 

@@ -134,7 +134,7 @@ def test_the_index_says_it_all(page: Path, results: Results) -> None:
     )
     assert "| `ga.crossover_rate` | 0.9 | – | paper: Tab. 1, cross_over_probability |" in text
     assert "| `ga.population_size` | 12 | – | override |" in text
-    assert text.count("not judged (budget smoke)") == 5
+    assert text.count("not judged (budget smoke)") == 4
     assert re.search(r"C5 = [1-9]\d* of 20 instants", text)
     assert "via-point GA against random search" in text
     for link in re.findall(r"\]\(([^)]+)\)", text):
@@ -158,11 +158,13 @@ def test_the_command_in_the_index_makes_this_report(
 def test_partial_results_are_drawn_and_said(tmp_path: Path) -> None:
     experiment = expand("rana_planar", "ga.num_generations=1")
     store(tmp_path, experiment)
-    ga, search = (RunDirectory(tmp_path, c.condition.id) for c in experiment.conditions)
+    runs = [RunDirectory(tmp_path, c.condition.id) for c in experiment.conditions]
+    ga, *controls = runs
     ga.log_path(1).unlink()
     ga.write_failure(1, "ValueError: no luck | at all", "traceback")
-    for replicate in (0, 1):
-        search.log_path(replicate).unlink()
+    for control in controls:
+        for replicate in (0, 1):
+            control.log_path(replicate).unlink()
     page = draw(tmp_path, "rana", "rana_planar", "ga.num_generations=1", formats=("svg",))
     text = page.read_text()
     assert (
@@ -170,7 +172,7 @@ def test_partial_results_are_drawn_and_said(tmp_path: Path) -> None:
         in text
     )
     assert "| via-point GA | 1 | ValueError: no luck \\| at all |" in text
-    assert "no random search beside it" in text
+    assert "no control beside it" in text
     assert (page.parent / "fig_7_distances.svg").is_file()
     sidecar = json.loads((page.parent / "fig_5_fitness.json").read_text())
     assert [(c["done"], c["failed"]) for c in sidecar["conditions"]] == [(1, 1)]
@@ -220,7 +222,7 @@ def test_one_page_holds_the_whole_paper(tmp_path: Path) -> None:
 def test_ablations_are_compared_with_the_first_condition(tmp_path: Path) -> None:
     words = ("ga.num_generations=2", "num_replicates=2")
     experiment = expand("rana_planar_ablations", *words)
-    assert len(experiment.conditions) == 11
+    assert len(experiment.conditions) == 13
     store(tmp_path, experiment)
     page = draw(tmp_path, "ablations", "rana_planar_ablations", *words, formats=("svg",))
     assert {path.stem for path in page.parent.glob("*.svg")} == {"values", "effects", "convergence"}
@@ -228,10 +230,10 @@ def test_ablations_are_compared_with_the_first_condition(tmp_path: Path) -> None
     assert "## best cost: as printed against …" in text
     assert text.count("Relaxation and redistribution improve the search: against") == 3
     effects = pd.read_csv(page.parent / "effects.csv")
-    assert len(effects) == 2 * 10
+    assert len(effects) == 3 * 12
     assert effects["a12"].between(0.0, 1.0).all()
     values = pd.read_csv(page.parent / "values.csv")
-    assert len(values) == 2 * 11 * 2
+    assert len(values) == 3 * 13 * 2
 
 
 def test_methods_of_co_evolution_are_drawn_and_paired(tmp_path: Path) -> None:

@@ -181,7 +181,7 @@ def test_distances_are_best_and_envelope(results: Results) -> None:
     assert links.min() == 0.0
     words = texts(planar_motion.draw_distances(table))
     assert {
-        "below the safety distance of 1 unit",
+        "below the required distance: 1 unit between arms",
         "least distance [unit]",
         planar_motion.AT_VIA_POINTS,
     } <= set(words)

@@ -23,7 +23,7 @@ from evoexp.report import (
     verdicts,
 )
 from evoexp.report.claim_rules import read_rules
-from evoexp.report.comparisons import Values, by_column, compared, compared_with_controls
+from evoexp.report.comparisons import Values, beside, by_column, compared, compared_with_controls
 from evoexp.report.figures import convergence, shares
 from evoexp.report.figures.boxes import draw_box
 from evoexp.report.judging import Judge, evidence
@@ -70,6 +70,7 @@ __all__ = [
     "Results",
     "Table",
     "Values",
+    "beside",
     "body_contacts",
     "by_column",
     "compared",

@@ -17,7 +17,7 @@ from evoexp.paths.motion import Motion
 from evoexp.planners.wrapped_planner import WrappedPlanner
 from evoexp.records import FloatArray
 from evoexp.report.statistics import Spread, spread
-from evoexp.shipped import ORIGIN, Option, config_directory
+from evoexp.shipped import ORIGIN, Option, config_directory, shipped
 from evoexp.store.log_reader import read_array, read_log, read_solution
 from evoexp.store.messages import TERM
 from evoexp.store.run_directory import Plan, RunDirectory
@@ -266,6 +266,23 @@ class Results(NamedTuple):
         for k, condition in enumerate(self.main):
             slug = re.sub(r"[^a-z0-9]+", "_", condition.label.lower()).strip("_") or str(k)
             yield condition, "" if len(self.main) == 1 else f"_{k + 1}_{slug}"
+
+    def beside(self, experiment: str) -> "Results":
+        """Return the stored results of another shipped experiment at the paper's budget.
+
+        Conditions are found by their hashes, those that were never run are missing.
+
+        Args:
+            experiment: Its name.
+        """
+        rows = [row for row in shipped() if (row.experiment, row.budget) == (experiment, "paper")]
+        runs = {row.label: RunDirectory(self.outputs, row.condition_id) for row in rows}
+        found = tuple(
+            _read(self.outputs, label, Condition.from_json(run.config_json()), None, None)
+            for label, run in runs.items()
+            if run.completed()
+        )
+        return Results(experiment, "paper", found, self.outputs)
 
     def position(self, label: str) -> int:
         """Return a condition's place in the experiment, which gives it its colour."""

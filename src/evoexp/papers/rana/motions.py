@@ -5,13 +5,17 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pinocchio as pin
 from matplotlib.lines import Line2D
 
+from evoexp.collision.certifier.verdict import certify
+from evoexp.collision.scene import obstacle_pairs
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.records import FloatArray
 from evoexp.report.kit import ConditionResults, groups, motion_geometry, style
 
 STRAIGHT, OTHERS = "straight line", "replicate"
+ARMS, OBSTACLES = "between arms", "to obstacles"  # kinds of pairs of bodies
 WHITE: dict[str, Any] = {"color": "white", "markeredgecolor": style.NEUTRAL, "zorder": 5}
 
 
@@ -30,6 +34,13 @@ def straight_line(condition: ConditionResults) -> FloatArray:
     """Return the solution that goes straight from start to goal, flat [deg]."""
     found = problem(condition)
     return motion_geometry.straight_line(condition.planner.shape(found), found.start, found.goal)
+
+
+def straight_length(condition: ConditionResults) -> float:
+    """Return the length of the straight paths of all arms together [deg]."""
+    found = problem(condition)
+    gap = found.goal - found.start
+    return float(sum(np.linalg.norm(gap[a:b]) for a, b in found.arm_slices))
 
 
 def paths_table(
@@ -95,6 +106,44 @@ def path_keys(table: pd.DataFrame) -> list[Line2D]:
         style.key("start", marker="s", ms=6.5, color="none", mec=grey, mfc="white"),
         style.key("goal", marker="*", ms=10.5, color="none", mec=grey, mfc="white"),
     ]
+
+
+def kinds_of_pairs(condition: ConditionResults) -> dict[str, tuple[np.ndarray, float]]:
+    """Return the kinds of pairs of bodies: name → (pairs of the scene, required distance)."""
+    found = problem(condition)
+    among = obstacle_pairs(found.assembly, found.scene)
+    kinds = {
+        ARMS: (~among, found.security_margin),
+        OBSTACLES: (among, found.obstacle_margin),
+    }
+    return {name: kind for name, kind in kinds.items() if kind[0].any()}
+
+
+def obstacle_distance(found: Problem) -> motion_geometry.BodyDistance:
+    """Return the exact distances between links and obstacles."""
+    geometry, scene = found.scene.geometry.copy(), found.scene
+    geometry.removeAllCollisionPairs()
+    for one, two in scene.pairs[obstacle_pairs(found.assembly, scene)]:
+        geometry.addCollisionPair(pin.CollisionPair(int(one), int(two)))
+    return motion_geometry.BodyDistance(scene.model, geometry)
+
+
+def approaches(condition: ConditionResults) -> pd.DataFrame:
+    """Return how close the bodies of each kind of pairs come in every replicate's motion, exactly.
+
+    Returns:
+        Columns kind (see `kinds_of_pairs`), replicate, clearance [length unit], clearance_at,
+        refuted_at [instant] (NaN: they touch nowhere), kept (whether the required distance is).
+    """
+    rows = []
+    for name, (kept, margin) in kinds_of_pairs(condition).items():
+        bodies = problem(condition).scene.of_pairs(kept)
+        for k in condition.solutions:
+            verdict = certify(bodies, condition.motion(k), margin)
+            where = verdict.clearance, verdict.clearance_at, verdict.refuted_at
+            rows.append((name, k, *where, verdict.margin_status == "certified"))
+    names = ["kind", "replicate", "clearance", "clearance_at", "refuted_at", "kept"]
+    return pd.DataFrame(rows, columns=names)
 
 
 def colliding_after(condition: ConditionResults, relaxed: bool) -> int:

@@ -1,42 +1,62 @@
 """The page of ablations: the first condition against each of the others, on common seeds."""
 
+from typing import NamedTuple
+
+import numpy as np
+
+from evoexp.papers.rana import crossover_checks, measures
+from evoexp.papers.rana.rules import RULES
 from evoexp.report.kit import (
     Claim,
     Comparison,
+    ConditionResults,
+    Judge,
     Page,
+    Proportion,
     ReportSettings,
     Results,
     Values,
     by_column,
     compared,
+    evidence,
+    fisher_exact,
     generic,
+    holm,
     judging,
     markdown,
     sweep_figures,
 )
 
-COMPARED = (  # name in figures, name, unit, column, whether lower is better
-    ("best cost", "best cost", "–", "best_cost", True),
-    ("clearance", "clearance of the bodies over the whole motion", "length", "clearance", False),
-    (
-        "start",
-        "first generation with a collision-free individual",
-        "generation",
-        "first_feasible_generation",
-        True,
+
+class ComparedQuantity(NamedTuple):
+    """A quantity in which the first condition is compared with the others."""
+
+    short: str  # name in figures; empty: in none
+    name: str
+    unit: str
+    values: Values
+    lower_is_better: bool = True
+
+
+COST, EVENNESS = "best cost", "unevenness of the best, C3 + C4"
+COMPARED = (
+    ComparedQuantity("best cost", COST, "–", by_column("best_cost")),
+    ComparedQuantity("unevenness C3 + C4", EVENNESS, "deg", measures.unevenness),
+    ComparedQuantity(
+        "clearance",
+        "clearance of the bodies over the whole motion",
+        "length",
+        by_column("clearance"),
+        lower_is_better=False,
     ),
+    ComparedQuantity("", measures.FIRST_FREE, "generation", measures.first_free),
 )
-DRAWN = 2  # of them
 INTRODUCTION = (
     "Each condition changes one part of the first one; all share their seeds. Costs are measured "
     "by the same formula, except that collision substeps look for collisions between via-points, "
     "too. Without elites a generation evaluates as many individuals more as there were elites."
 )
-PARTS = (
-    "no redistribution",
-    "no relaxation (δ = 0)",
-    "neither",
-)  # of the claim
+PARTS = ("no redistribution", "no relaxation (δ = 0)", "neither")  # of the claim
 
 
 def page(results: Results, settings: ReportSettings) -> Page:
@@ -47,40 +67,116 @@ def page(results: Results, settings: ReportSettings) -> Page:
     unit = results.with_data[0].condition.length_unit or "–"
     first, *others = results.with_data
     pairs = [(first, other) for other in others]
-    tables, by_name, drawn = {}, {}, dict[str, Values]()
-    for short, name, of, column, lower in COMPARED:
-        values = by_column(column)
-        tables[name] = compared(pairs, values, settings, lower_is_better=lower)
-        if len(drawn) < DRAWN:
-            drawn[f"{short} [{unit if of == 'length' else of}]"] = values
-            by_name[short] = tables[name]
-    cost, *quantities = base.quantities
-    clearance = generic.quantity(results, COMPARED[1][1], unit, by_column("clearance"))
+    tables = {
+        one.name: compared(pairs, one.values, settings, lower_is_better=one.lower_is_better)
+        for one in COMPARED
+    }
+    shown = [one for one in COMPARED if one.short and tables[one.name]]
+    units = {one.name: unit if one.unit == "length" else one.unit for one in COMPARED}
+    cost, _, *effort = base.quantities
+    own = [generic.quantity(results, one.name, units[one.name], one.values) for one in COMPARED[1:]]
     return base._replace(
         title=f"{results.experiment or 'stored runs'}: {first.label} against each other condition",
         introduction=INTRODUCTION,
-        quantities=(cost, clearance, *quantities),
-        claims=_claims(results, settings, tables[COMPARED[0][1]]),
+        quantities=(cost, *own, *effort),
+        claims=tuple(operator_claims(results, settings, judging.judge(results, settings, RULES))),
+        checks=tuple(crossover_checks.checks(results, tables[COST], tables[EVENNESS])),
         comparisons=tuple(
             (f"{name}: {first.label} against …", rows) for name, rows in tables.items() if rows
         ),
         drawings=(
-            sweep_figures.values_drawing(results, drawn),
-            sweep_figures.effects_drawing(results, settings, by_name, first.label),
+            sweep_figures.values_drawing(
+                results, {f"{one.short} [{units[one.name]}]": one.values for one in shown}
+            ),
+            sweep_figures.effects_drawing(
+                results, settings, {one.short: tables[one.name] for one in shown}, first.label
+            ),
             generic.best_drawing(results),
         ),
     )
 
 
-def _claims(
-    results: Results, settings: ReportSettings, costs: tuple[Comparison, ...]
-) -> tuple[Claim, ...]:
-    """Judge the paper's claim about the two operators, part by part."""
-    judge = judging.judge(results, settings)
-    found = []
-    for row in (row for row in costs if row.quantity in PARTS):
-        difference = markdown.number(row.median_difference)
-        text = f"Relaxation and redistribution improve the search: against {row.quantity}"
-        told = f"median difference of the best cost {difference}; with it {{}}"
-        found.append(judge.better(text, "section 5", row, "better", told))
-    return tuple(found)
+def operator_claims(
+    results: Results, settings: ReportSettings, judge: Judge, who: str = "", first: str = ""
+) -> list[Claim]:
+    """Judge the paper's claim about relaxation and redistribution, part by part.
+
+    Args:
+        results: Of an experiment of ablations; conditions that were not run are missing.
+        settings: Levels and resamples.
+        judge: With the rules of the paper.
+        who: Begins each claim.
+        first: Label of the printed setting; empty: the first condition with data.
+
+    Returns:
+        One claim per part that was run beside the printed setting.
+    """
+    named = {condition.label: condition for condition in results.with_data}
+    printed = named.get(first or next(iter(named), ""))
+    if printed is None:
+        return []
+    pairs = [(printed, other) for other in named.values() if other is not printed]
+    rows = {
+        one.name: {row.quantity: row for row in compared(pairs, one.values, settings)}
+        for one in COMPARED[:2]
+    }
+    parts = [other for _, other in pairs if other.label in PARTS]
+    counts = {c.label: refuted(c) for c in (printed, *parts)}
+    own = counts[printed.label]
+    p_values = holm([fisher_exact(own, counts[part.label]) for part in parts])
+    claims = []
+    for part, p_value in zip(parts, p_values, strict=True):
+        other = counts[part.label]
+        compared_rows = [rows[name].get(part.label) for name in rows]
+        found = [row for row in compared_rows if row is not None]
+        says = [row.says(settings.significance) for row in found]
+        says.append(_fewer(own, other, p_value, settings.significance))
+        told = (
+            f"{_told(rows[COST].get(part.label), COST, '–')}; "
+            f"{_told(rows[EVENNESS].get(part.label), EVENNESS, 'deg', (printed, part))}; "
+            f"refuted motions {markdown.share(own.having, own.total)} with, "
+            f"{markdown.share(other.having, other.total)} without, p = {markdown.p_value(p_value)}"
+        )
+        hearing = judge.on("operators_improve", who=who, without=part.label)
+        claims.append(hearing.own(told, printed.done, improves(says)))
+    return claims
+
+
+def improves(says: list[int]) -> bool | None:
+    """Return whether a part improves the search; None: nobody can say, or it is a trade.
+
+    Args:
+        says: Of each quantity: 1 if it is significantly better with the part, −1 if worse, else 0.
+    """
+    better, worse = 1 in says, -1 in says
+    return None if better == worse else better
+
+
+def refuted(condition: ConditionResults) -> Proportion:
+    """Count the motions whose bodies touch."""
+    counts = condition.verdicts
+    return Proportion(counts.refuted, counts.judged)
+
+
+def _fewer(one: Proportion, two: Proportion, p_value: float, significance: float) -> int:
+    if p_value >= significance or not one.total or not two.total:
+        return 0
+    return 1 if one.share < two.share else -1
+
+
+def _told(
+    row: Comparison | None,
+    name: str,
+    unit: str,
+    pair: tuple[ConditionResults, ConditionResults] | None = None,
+) -> str:
+    """Return a comparison in words, with the medians of both where the pair is given."""
+    if row is None:
+        return f"{name}: nothing to compare"
+    shown = "" if unit == "–" else f" {unit}"
+    medians = ""
+    if pair is not None:
+        with_it, without = (markdown.number(float(np.median(measures.unevenness(c)))) for c in pair)
+        medians = f"{with_it}{shown} with, {without}{shown} without, "
+    difference = markdown.number(row.median_difference)
+    return f"{name}: {medians}median difference {difference}{shown}, {evidence(row, 'lower')}"

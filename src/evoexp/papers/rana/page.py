@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from evoexp.papers.rana import drawings, motions
+from evoexp.papers.rana import drawings, measures, motions, operators_page
 from evoexp.papers.rana.drawings import AT, BETWEEN, MeasuredMotions, measure
+from evoexp.papers.rana.rules import RULES
 from evoexp.planners.via_point_ga.strings import Problem
 from evoexp.report.kit import (
     ConditionResults,
@@ -12,9 +13,12 @@ from evoexp.report.kit import (
     Quantity,
     ReportSettings,
     Results,
+    beside,
     by_column,
+    compared,
     compared_with_controls,
     generic,
+    judging,
     markdown,
     overridden,
     parameters,
@@ -23,10 +27,11 @@ from evoexp.report.kit import (
     verdicts,
 )
 
-CLEARANCE = by_column("clearance")
+CLEARANCE, COST = by_column("clearance"), by_column("best_cost")
+PRINTED = "as printed"  # label of the printed setting among the ablations
 ARMS = {True: "two planar arms", False: "two PUMA-like arms"}
 COMPARED = (  # with the controls: name, whether lower is better, values
-    ("best cost", True, by_column("best_cost")),
+    ("best cost", True, COST),
     (
         "path length over that of the straight line",
         True,
@@ -48,7 +53,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
         return generic.page(results, settings)
     comparisons = compared_with_controls(results, settings, COMPARED)
     drawn = [measure(c, suffix, settings) for c, suffix in results.suffixed]
-    found = [claim for one in drawn for claim in _claims(results, settings, one, comparisons)]
+    found = [claim for one in drawn for claim in _claims(results, settings, one)]
     checks = [
         (f"{_who(results, one)}{what}", finding) for one in drawn for what, finding in _checks(one)
     ]
@@ -82,8 +87,7 @@ def _fits(condition: ConditionResults) -> bool:
 
 def _quantities(results: Results) -> tuple[Quantity, ...]:
     unit = results.with_data[0].condition.length_unit
-    cost, first, *effort = generic.quantities(results)
-    first_name = "first generation with a collision-free individual (over the runs that have one)"
+    cost, _, *effort = generic.quantities(results)
     least = "least distance of centres of circles or spheres at via-points"
     clearance = "clearance: least distance of the bodies themselves over the whole motion (exact)"
     rows = (
@@ -97,7 +101,7 @@ def _quantities(results: Results) -> tuple[Quantity, ...]:
     return (
         cost,
         generic.quantity(results, "fitness F of the best", "–", fitness),
-        first._replace(name=first_name),
+        generic.quantity(results, measures.FIRST_FREE, "generation", measures.first_free),
         *(generic.quantity(results, name, of, by_column(column)) for name, of, column in rows),
         *effort,
     )
@@ -115,26 +119,25 @@ def not_judged(results: Results, condition: ConditionResults) -> str:
 
 
 def _claims(
-    results: Results,
-    settings: ReportSettings,
-    one: MeasuredMotions,
-    comparisons: tuple[tuple[str, tuple[verdicts.Comparison, ...]], ...],
+    results: Results, settings: ReportSettings, one: MeasuredMotions
 ) -> list[verdicts.Claim]:
     """Return the paper's claims with verdicts on one condition."""
     c, unit, who = one.condition, one.condition.condition.length_unit, _who(results, one)
-    judge = Judge(not_judged(results, c), settings.significance)
+    judge = Judge(not_judged(results, c), settings.significance, RULES)
     section, figures = ("section 3.5", ("4", "7")) if one.planar else ("section 4.2", ("11", "13"))
     told = f"{markdown.share(c.solved, c.done)} finished runs of {c.planned} planned"
-    text = f"{who}The motion is free of collision at the via-points, in every run"
-    source = f"{section}, Fig. {figures[0]}"
-    found = [judge.every(text, source, told, c.solved, c.done, c.planned)]
+    hearing = judge.on("free_at_via_points", who=who, source=f"{section}, Fig. {figures[0]}")
+    found = [hearing.every(told, c.solved, c.done, c.planned)]
     # the safety distance, where the paper looks and where it does not
     kept = markdown.share(c.verdicts.with_margin, c.verdicts.judged)
     bodies = (
         f"; the bodies themselves come as close as "
         f"{markdown.number(float(c.column('clearance').min()))} {unit} (margin certified in {kept})"
     )
-    for where, column, more in (("at", AT, ""), ("between", BETWEEN, bodies)):
+    for name, column, more in (
+        ("safety_at_via_points", AT, ""),
+        ("safety_between_via_points", BETWEEN, bodies),
+    ):
         values = c.column(column)
         safe = int(np.count_nonzero(values >= one.margin))
         told = (
@@ -142,26 +145,54 @@ def _claims(
             f"{markdown.number(float(np.min(values)))}, median "
             f"{markdown.number(spread(values).median)} {unit}{more}"
         )
-        text = f"{who}The minimum distance never goes below the safety distance: {where} via-points"
-        source = f"{section}, Fig. {figures[1]}"
-        found.append(judge.every(text, source, told, safe, c.done, c.planned))
+        hearing = judge.on(name, who=who, source=f"{section}, Fig. {figures[1]}")
+        found.append(hearing.every(told, safe, c.done, c.planned))
     # the two operators, and evolution besides them
-    text, ablations = (
-        f"{who}Relaxation and redistribution improve the search",
-        "judged by its ablations",
+    return [
+        *found,
+        *_operator_claims(results, settings, one, judge),
+        _evolution_claim(results, settings, one, judge),
+    ]
+
+
+def _operator_claims(
+    results: Results, settings: ReportSettings, one: MeasuredMotions, judge: Judge
+) -> list[verdicts.Claim]:
+    """Judge the claim about the two operators from the stored ablations of the same scene."""
+    experiment = f"rana_{'planar' if one.planar else 'puma'}_ablations"
+    stored, who = results.beside(experiment), _who(results, one)
+    reason = judge.reason or (judging.not_judged(stored) if stored.with_data else "")
+    own = judge._replace(reason=reason)
+    found = operators_page.operator_claims(stored, settings, own, who, PRINTED)
+    if found:
+        return found
+    told = f"its ablations are not stored: `evoexp run experiment={experiment}`"
+    return [judge.on("operators_improve", who=who, without="each alone").elsewhere(told)]
+
+
+def _evolution_claim(
+    results: Results, settings: ReportSettings, one: MeasuredMotions, judge: Judge
+) -> verdicts.Claim:
+    """Judge what evolution adds to every control, and tell how much to the best of them."""
+    c = one.condition
+    controls = [k for k in results.evolved if k.is_control and beside(c.condition, k.condition)]
+    rows = {row.quantity: row for row in compared([(c, k) for k in controls], COST, settings)}
+    shown = [k for k in controls if k.label in rows]
+    shown.sort(key=lambda k: float(np.median(COST(k))))
+    fitness = ", ".join(
+        f"{k.label} {markdown.spread(k.spread('term_fitness'))}" for k in (c, *shown)
     )
-    command = f"`evoexp run experiment=rana_{'planar' if one.planar else 'puma'}_ablations`"
-    told = f"{ablations}: {command}"
-    found.append(judge.claim(text, "section 5", told, verdicts.NOT_JUDGED))
-    text = (
-        f"{who}Evolution adds to that: better than random search that redistributes and relaxes, "
-        "too (our reading)"
-    )
-    own = f"{c.label} against "
-    best = next((rows[0] for heading, rows in comparisons if heading.startswith(own)), None)
-    told = _evidence(best) if best else "no random search beside it"
-    verdict = verdicts.judge_better(best, settings.significance)
-    return [*found, judge.claim(text, "section 5", told, verdict)]
+    straight = markdown.number(c.evaluate(motions.straight_line(c))["fitness"])
+    told = [f"fitness F: {fitness}, straight line {straight}"]
+    for place, k in enumerate(shown):
+        row = rows[k.label]
+        gain = markdown.number(-row.median_difference)
+        which = f"the best control, {k.label}" if place == 0 else k.label
+        told.append(f"to {which}, evolution adds {gain} in the median: {_evidence(row)}")
+    if not shown:
+        told.append("no control beside it")
+    hearing = judge.on("evolution_adds", who=_who(results, one))
+    return hearing.better_than_all("; ".join(told), list(rows.values()))
 
 
 def _who(results: Results, one: MeasuredMotions) -> str:
@@ -181,19 +212,30 @@ def _evidence(comparison: verdicts.Comparison) -> str:
 def _checks(one: MeasuredMotions) -> list[tuple[str, str]]:
     """Return known defects and checks of the scene, as numbers."""
     c, unit = one.condition, one.condition.condition.length_unit
-    collisions = c.evaluate(motions.straight_line(c))["collisions"]
+    line = c.evaluate(motions.straight_line(c))
     straight = one.sampled[one.sampled["replicate"] == -1]
     dips = int(np.count_nonzero(c.column(BETWEEN) < one.margin))
     closer = int(np.count_nonzero(c.column("clearance") < one.margin))
     verdicts = c.verdicts
+    weights, total = c.planner.objective, motions.straight_length(c)
+    longer = spread(total * (c.column("term_path_length_ratio") - 1.0))
     redistributed, both = (motions.colliding_after(c, relaxed) for relaxed in (False, True))
     return [
         (
             "The scene is not trivial: colliding instants of the straight line in configuration "
             "space",
-            f"C5 = {collisions:.0f} of {c.planner.num_via_points} instants; its least distance of "
-            f"centres is {markdown.number(float(straight['centres'].min()))} {unit} (safety "
-            f"{one.margin:g} {unit})",
+            f"C5 = {line['collisions']:.0f} of {c.planner.num_via_points} instants, fitness F = "
+            f"{markdown.number(line['fitness'])}; its least distance of centres is "
+            f"{markdown.number(float(straight['centres'].min()))} {unit} (safety {one.margin:g} "
+            f"{unit})",
+        ),
+        (
+            "A colliding instant against a longer path: how many degrees of path cost as much "
+            "(k3 / k1)",
+            f"{markdown.number(weights.collision_weight / weights.length_weight)}°; the straight "
+            f"paths of all arms are {markdown.number(total)}° long and collide at "
+            f"{line['collisions']:.0f} instants, the best motions are longer by "
+            f"{markdown.spread(longer)}° and collide at none in {c.solved} of {c.done} runs",
         ),
         (
             "Runs that dip below the safety distance between via-points, where the algorithm "

@@ -1,7 +1,6 @@
 """Motions of planar arms: snapshots, paths in configuration space, distances between the arms."""
 
 import itertools
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -22,7 +21,7 @@ STAGES = 5  # panels that a motion is cut into; the sixth holds all of it
 CENTRES, LINKS = "circle centres", "links"
 BEST, AT_VIA_POINTS = "best replicate", "best replicate, at via-points"
 CLOSEST, REFUTED = (
-    "closest over the whole motion, every replicate (exact)",
+    "closest over the whole motion, every replicate that is free (exact)",
     "refuted: first contact of bodies",
 )
 LOOKS: dict[str, dict[str, Any]] = {  # of the series of distances that are drawn as they are
@@ -41,6 +40,11 @@ LOOKS: dict[str, dict[str, Any]] = {  # of the series of distances that are draw
         **{"clip_on": False, "zorder": 5},
     },
 }
+COLUMNS = {  # of `sampled_distances`, by kind of pairs and measure
+    motions.ARMS: {CENTRES: "centres", LINKS: "links"},
+    motions.OBSTACLES: {CENTRES: "centres_to_obstacles", LINKS: "links_to_obstacles"},
+}
+TITLES = {CENTRES: "circle centres", LINKS: "bodies (exact)"}
 LOWEST, HIGHEST = "lowest of all replicates", "highest of all replicates"
 
 
@@ -128,7 +132,7 @@ def draw_paths(table: pd.DataFrame) -> Figure:
 
 
 def sampled_distances(condition: ConditionResults, samples: int) -> pd.DataFrame:
-    """Return the arms' two distances along every replicate's motion and the straight line.
+    """Return the distances along every replicate's motion and the straight line.
 
     Args:
         condition: With data.
@@ -136,10 +140,13 @@ def sampled_distances(condition: ConditionResults, samples: int) -> pd.DataFrame
 
     Returns:
         Columns replicate (−1: the straight line), instant (a fraction between via-points), centres
-        and links: least distances of circle centres and of the links themselves [length unit].
+        and links: least distances between two arms, of circle centres and of the links themselves;
+        where there are obstacles, also centres_to_obstacles and links_to_obstacles [length unit].
     """
     problem = motions.problem(condition)
-    links = motion_geometry.link_distance(problem.assembly)
+    links, to_obstacles = motion_geometry.link_distance(problem.assembly), None
+    if motions.OBSTACLES in motions.kinds_of_pairs(condition):
+        to_obstacles = motions.obstacle_distance(problem)
     parts = []
     for replicate, solution in {
         -1: motions.straight_line(condition),
@@ -153,6 +160,9 @@ def sampled_distances(condition: ConditionResults, samples: int) -> pd.DataFrame
             "centres": problem.centre_distances(q),
             "links": links(DEGREE * q),
         }
+        if to_obstacles is not None:
+            columns["centres_to_obstacles"] = problem.obstacle_distances(q)
+            columns["links_to_obstacles"] = to_obstacles(DEGREE * q)
         parts.append(pd.DataFrame(columns))
     return rounded(pd.concat(parts, ignore_index=True))
 
@@ -165,68 +175,64 @@ def distances_table(condition: ConditionResults, sampled: pd.DataFrame) -> pd.Da
         sampled: Of `sampled_distances`.
 
     Returns:
-        Columns measure (circle centres, links), series, instant, distance, safety_distance [length
-        unit], length_unit.
+        Columns kind (between arms, to obstacles), measure (circle centres, links), series, instant,
+        distance, safety_distance (of the kind) [length unit], length_unit.
     """
     best = sampled[sampled["replicate"] == condition.best_replicate]
     straight = sampled[sampled["replicate"] == -1]
     every = sampled[sampled["replicate"] >= 0].groupby("instant", sort=True)
     at_via_points = best[best["instant"] == best["instant"].round()]
-    parts = []
-    for measure, column in ((CENTRES, "centres"), (LINKS, "links")):
-        for series, values in (
-            (BEST, best.set_index("instant")[column]),
-            (AT_VIA_POINTS, at_via_points.set_index("instant")[column]),
-            (LOWEST, every[column].min()),
-            (HIGHEST, every[column].max()),
-            (STRAIGHT, straight.set_index("instant")[column]),
-        ):
-            columns = {"measure": measure, "series": series, "instant": values.index}
-            parts.append(pd.DataFrame(columns | {"distance": values.to_numpy()}))
-    margin = motions.problem(condition).security_margin
-    table = rounded(pd.concat([*parts, *_exact(condition)], ignore_index=True))
-    return table.assign(safety_distance=margin, length_unit=condition.condition.length_unit)
-
-
-def _exact(condition: ConditionResults) -> Iterator[pd.DataFrame]:
-    """Yield one row per closest approach of two arms, and per contact, found by the certifier."""
-    rows = condition.summaries
-    between = rows["clearance_pair"].str.count("arm_").eq(2) & rows["clearance_at"].notna()
-    for series, kept, at, distance in (
-        (CLOSEST, rows[between], "clearance_at", "clearance"),
-        (REFUTED, rows[rows["refuted_at"].notna()], "refuted_at", None),
-    ):
-        found = np.zeros(len(kept)) if distance is None else kept[distance].to_numpy(np.float64)
-        instants = kept[at].to_numpy(np.float64)
-        yield pd.DataFrame(
-            {"measure": LINKS, "series": series, "instant": instants, "distance": found}
-        )
+    exact, parts = motions.approaches(condition), []
+    for kind, (_, margin) in motions.kinds_of_pairs(condition).items():
+        own = exact[exact["kind"] == kind]
+        for measure, column in COLUMNS[kind].items():
+            series = {
+                BEST: best.set_index("instant")[column],
+                AT_VIA_POINTS: at_via_points.set_index("instant")[column],
+                LOWEST: every[column].min(),
+                HIGHEST: every[column].max(),
+                STRAIGHT: straight.set_index("instant")[column],
+            }
+            if measure == LINKS:
+                free = own[own["refuted_at"].isna()].set_index("clearance_at")["clearance"]
+                touching = own[own["refuted_at"].notna()].set_index("refuted_at")["clearance"]
+                series |= {CLOSEST: free, REFUTED: touching}
+            for name, values in series.items():
+                columns = {"measure": measure, "series": name, "instant": values.index}
+                found = pd.DataFrame(columns | {"distance": values.to_numpy()})
+                parts.append(found.assign(kind=kind, safety_distance=margin))
+    table = rounded(pd.concat(parts, ignore_index=True))
+    return table.assign(length_unit=condition.condition.length_unit)
 
 
 def draw_distances(table: pd.DataFrame) -> Figure:
-    """Draw the least distance of the arms at each instant: of circle centres, and of the links."""
+    """Draw the least distances at each instant: of circle centres, and of the bodies themselves.
+
+    Distances to obstacles stand beside those between arms.
+    """
     figure = style.figure(5.4)
-    panels = figure.subplots(2, 1, sharex=True)
-    unit, safety = table["length_unit"].iloc[0], float(table["safety_distance"].iloc[0])
-    titles = {
-        CENTRES: "a  centres of circles or spheres (the paper's model)",
-        LINKS: "b  the bodies themselves (exact)",
-    }
-    for axes, measure in zip(panels, (CENTRES, LINKS), strict=True):
-        _distances(axes, table[table["measure"] == measure], safety, unit)
-        axes.set(
-            title=titles[measure],
-            ylabel=f"least distance [{unit}]",
-            xlim=(0, table["instant"].max()),
-            ylim=(0, None),
-        )
-    panels[1].xaxis.set_major_locator(MaxNLocator(integer=True, nbins=12))
-    panels[1].set_xlabel("instant (whole numbers: via-points)")
-    style.legend_below(figure, panels[1], 2)
+    kinds = list(dict.fromkeys(table["kind"]))
+    panels = figure.subplots(2, len(kinds), sharex=True, squeeze=False)
+    unit, letters = table["length_unit"].iloc[0], iter("abcd")
+    required = {kind: rows["safety_distance"].iloc[0] for kind, rows in groups(table, "kind")}
+    below = ", ".join(f"{required[kind]:g} {unit} {kind}" for kind in kinds)
+    for axes_of_kind, kind in zip(panels.T, kinds, strict=True):
+        own = table[table["kind"] == kind]
+        for axes, measure in zip(axes_of_kind, (CENTRES, LINKS), strict=True):
+            _distances(axes, own[own["measure"] == measure], required[kind], below)
+            axes.set(
+                title=f"{next(letters)}  {kind}: {TITLES[measure]}",
+                ylabel=f"least distance [{unit}]",
+                xlim=(0, table["instant"].max()),
+                ylim=(0, None),
+            )
+        axes_of_kind[-1].xaxis.set_major_locator(MaxNLocator(integer=True, nbins=12))
+        axes_of_kind[-1].set_xlabel("instant (whole numbers: via-points)")
+    style.legend_of_all(figure, [panels[1, 0]], 2)
     return figure
 
 
-def _distances(axes: Axes, rows: pd.DataFrame, safety: float, unit: str) -> None:
+def _distances(axes: Axes, rows: pd.DataFrame, safety: float, required: str) -> None:
     series = dict(groups(rows, "series"))
     low, high, colour = series[LOWEST], series[HIGHEST], style.ARM_COLOURS[0]
     axes.fill_between(
@@ -239,9 +245,9 @@ def _distances(axes: Axes, rows: pd.DataFrame, safety: float, unit: str) -> None
         label="range over replicates",
     )
     for name, look in LOOKS.items():
-        if name in series:
+        if name in series and len(series[name]):
             axes.plot(series[name]["instant"], series[name]["distance"], **{"label": name} | look)
-    label = f"below the safety distance of {safety:g} {unit}"
+    label = f"below the required distance: {required}"
     axes.axhspan(0.0, safety, color=style.FORBIDDEN, alpha=0.08, linewidth=0, label=label)
     axes.axhline(safety, color=style.FORBIDDEN, linewidth=1.0, linestyle=(0, (5, 2)))
 

@@ -1,0 +1,147 @@
+"""The page of the collision weight k3: what a collision costs beside a longer path."""
+
+import numpy as np
+
+from evoexp.papers.rana import measures, motions
+from evoexp.papers.rana.rules import RULES
+from evoexp.planners.via_point_ga.planner import ViaPointGa
+from evoexp.records import FloatArray
+from evoexp.report.kit import (
+    Claim,
+    ConditionResults,
+    Judge,
+    Page,
+    Proportion,
+    ReportSettings,
+    Results,
+    Table,
+    by_column,
+    compared,
+    generic,
+    judging,
+    markdown,
+    run_measures,
+    sweep_figures,
+)
+
+LENGTH, HITS = "path length of the best, all arms", "colliding instants C5 of the best"
+INTRODUCTION = (
+    "Eq. 7 weighs a colliding instant (k3) against the length of the paths (k1 per degree). All "
+    "conditions share their seeds and differ in k3 alone, so their costs are not comparable: "
+    "lengths and collisions are."
+)
+COLLIDING = (
+    "Share of runs whose best string collides at a via-point by the paper's model, or whose "
+    "bodies touch somewhere on the whole motion, with Wilson's interval."
+)
+
+
+def page(results: Results, settings: ReportSettings) -> Page:
+    """Build the page, or the generic page if other planners were run."""
+    if not run_measures.planned_by(results, ViaPointGa):
+        return generic.page(results, settings)
+    first, *others = results.with_data
+    judge = judging.judge(results, settings, RULES)
+    _, _, *effort = generic.quantities(results)
+    quantities = (
+        generic.quantity(results, LENGTH, "deg", length),
+        generic.quantity(results, HITS, "–", by_column("term_collisions")),
+        generic.quantity(results, measures.FIRST_FREE, "generation", measures.first_free),
+        *effort,
+    )
+    rows = compared([(first, other) for other in others], length, settings)
+    counts = [(c, *_colliding(c)) for c in results.with_data]
+    return Page(
+        title=f"Rana & Zalzala 1995: {results.experiment or 'stored runs'}",
+        introduction=INTRODUCTION,
+        quantities=quantities,
+        claims=tuple(_claims(judge, first)),
+        comparisons=((f"{LENGTH}: {first.label} against …", rows),) if rows else (),
+        tables=(_table(counts),),
+        drawings=(
+            sweep_figures.values_drawing(
+                results,
+                {
+                    "path length [deg]": length,
+                    "colliding instants C5": by_column("term_collisions"),
+                },
+            ),
+            sweep_figures.shares_drawing(
+                results,
+                settings,
+                [
+                    (name, results.position(c.label), c.label, count)
+                    for place, name in enumerate(("collides at a via-point", "bodies touch"))
+                    for c, *both in counts
+                    for count in (both[place],)
+                ],
+                COLLIDING,
+            ),
+        ),
+    )
+
+
+def length(condition: ConditionResults) -> FloatArray:
+    """Return the length of all arms' paths in each run's best string, (done,) [deg]."""
+    ratio = condition.column("term_path_length_ratio")
+    return np.asarray(motions.straight_length(condition) * ratio)
+
+
+def worth(condition: ConditionResults) -> float:
+    """Return how many degrees of path cost as much as one colliding instant, k3 / k1."""
+    weights = condition.planner.objective
+    return float(weights.collision_weight / weights.length_weight)
+
+
+def _colliding(condition: ConditionResults) -> tuple[Proportion, Proportion]:
+    """Count the runs that end in a collision: at a via-point, anywhere."""
+    counts = condition.verdicts
+    return (
+        Proportion(condition.done - condition.solved, condition.done),
+        Proportion(counts.refuted, counts.judged),
+    )
+
+
+def _claims(judge: Judge, printed: ConditionResults) -> list[Claim]:
+    straight = motions.straight_length(printed)
+    line = printed.evaluate(motions.straight_line(printed))
+    told = f"{markdown.share(printed.solved, printed.done)} finished runs end free at via-points"
+    done, planned = printed.done, printed.planned
+    rule = judge.on("collisions_outweigh_paths")
+    share = worth(printed) / straight
+    evidence = (
+        f"one colliding instant costs as much as {markdown.number(worth(printed))}° of path, "
+        f"{100 * share:.1f} % of the straight paths' {markdown.number(straight)}°; the straight "
+        f"line collides at {line['collisions']:.0f} instants, the best strings are longer by "
+        f"{markdown.number(float(np.median(length(printed))) - straight)}° in the median"
+    )
+    least = rule.rule.limits["share"]
+    holds = True if share >= 1.0 else False if share < least else None
+    return [
+        judge.on("collisions_avoided").every(told, printed.solved, done, planned),
+        rule.own(evidence, done, holds),
+    ]
+
+
+def _table(counts: list[tuple[ConditionResults, Proportion, Proportion]]) -> Table:
+    rows = tuple(
+        (
+            c.label,
+            f"{markdown.number(worth(c))}°",
+            markdown.share(at.having, at.total),
+            markdown.share(anywhere.having, anywhere.total),
+            f"{markdown.number(float(np.median(length(c))))}°",
+        )
+        for c, at, anywhere in counts
+    )
+    return Table(
+        "What a collision costs",
+        (
+            "condition",
+            "path that costs as much as one colliding instant",
+            "runs that end in a collision at a via-point",
+            "runs whose bodies touch somewhere",
+            "median path length",
+        ),
+        rows,
+    )

@@ -9,7 +9,7 @@ import pytest
 
 from evoexp.configuration import compose
 from evoexp.papers.curkovic import claims as sweep_claims
-from evoexp.papers.curkovic import families, link_motions, measures, motion_page
+from evoexp.papers.curkovic import families, hall_shares, link_motions, measures, motion_page
 from evoexp.papers.curkovic.figures import link_intersection, pareto_fronts, robot_motions
 from evoexp.papers.curkovic.pareto_page import read_fronts
 from evoexp.report import judging, style, verdicts
@@ -159,20 +159,80 @@ def test_three_radii_are_figure_11(outputs: Path) -> None:
     assert (lines >= condition.column("clearance")).all()  # bodies are thicker than lines
 
 
-def test_a_hall_is_judged_against_what_replaces_it(outputs: Path) -> None:
+@pytest.mark.matrix
+def test_a_hall_is_judged_against_elites_in_every_corner(outputs: Path) -> None:
     found = page(outputs, "curkovic_hall")
-    assert len(found.claims) == 6
-    assert {claim.source for claim in found.claims} == {"section 3", "our question"}
-    assert sum("frozen hall" in claim.evidence for claim in found.claims) == 2
-    assert [heading for heading, _ in found.comparisons if "best cost" in heading] == [
-        "best cost: hall against …"
-    ]
+    corners = ("one-sided, Eq. 10", "one-sided, constant", "symmetric, Eq. 10")
+    corners += ("symmetric, constant",)
+    names = [claim.name for claim in found.claims]
+    assert {name: names.count(name) for name in set(names)} == {
+        "hall_helps": 12,
+        "hall_beyond_elites": 12,
+        "distinct_genomes": 12,
+        "frozen_hall": 3,
+    }
+    assert {claim.text.partition(": ")[0] for claim in found.claims} == set(corners)
     assert {claim.verdict for claim in found.claims} == {"not judged (budget smoke)"}
+    table = found.tables[0]
+    assert [(row[0], row[2]) for row in table.rows[:2]] == [
+        (corners[0], "genome"),
+        (corners[0], "index"),
+    ]
+    assert len(table.rows) == 4 * 4 * 2
+    shares = drawing(found, "elitism")
+    assert list(shares["corner"].unique()) == list(corners)
+    effort = drawing(found, "effort")
+    assert sorted(effort["position"].unique()) == list(range(8))  # as many colours as there are
+    assert effort.groupby("panel")["name"].nunique().tolist() == [8, 5, 5, 5]
+    costs = drawing(found, "costs")
+    assert len(costs) == 23 * 2
+    assert len(drawing(found, "convergence")) == len(effort)
+
+
+def condition_of(outputs: Path, costs: np.ndarray, refuted: np.ndarray) -> ConditionResults:
+    """Return stored runs with other costs and verdicts."""
+    own = smoke_results(outputs, "curkovic_motion").conditions[0]
+    index = pd.RangeIndex(len(costs))
+    verdict = pd.array(~refuted, dtype="boolean")
+    columns = {"best_cost": costs, "certified": verdict, "solved": True}
+    return dataclasses.replace(own, summaries=pd.DataFrame(columns, index=index))
+
+
+def test_a_refuted_run_counts_as_worse_than_any(outputs: Path) -> None:
+    costs, refuted = np.array([3.0, 1.0, 2.0]), np.array([False, True, False])
+    some = condition_of(outputs, costs, refuted)
+    assert measures.certified_cost(some).tolist() == [3.0, np.inf, 2.0]
+    assert measures.exemplar(some) == 2  # the cheapest one that is not refuted
+    none = condition_of(outputs, costs, np.array([True] * 3))
+    assert measures.exemplar(none) == 1
+    assert np.isnan(hall_shares.not_refuted(none)).all()
+
+
+def test_shares_of_a_gain_are_what_medians_say(outputs: Path) -> None:
+    rng, false = np.random.default_rng(0), np.zeros(40, dtype=bool)
+    levels = {"nothing": 10.0, "elites": 9.0, "hall": 8.0}
+    runs = {
+        name: condition_of(outputs, level + 0.1 * rng.random(40), false)
+        for name, level in levels.items()
+    }
+    corner = hall_shares.Corner("", runs["nothing"], (runs["elites"],), runs["hall"], None, ())
+    measure, settings = hall_shares.gain_measures(9.0, "9")[0], page_settings("curkovic_hall")
+    found = hall_shares.share(corner, measure, runs["elites"], runs["hall"], settings)
+    medians = {name: float(np.median(c.column("best_cost"))) for name, c in runs.items()}
+    expected = (medians["nothing"] - medians["elites"]) / (medians["nothing"] - medians["hall"])
+    assert found.value == pytest.approx(expected)
+    assert found.interval.low < expected < found.interval.high
+    assert found.interval.high - found.interval.low < 0.1
+    assert found.n == (40, 40, 40)
+    # a hall that gains nothing leaves no share
+    worse = corner._replace(nothing=runs["hall"], hall=runs["nothing"])
+    nobody = hall_shares.share(worse, measure, runs["elites"], worse.hall, settings)
+    assert np.isnan([nobody.value, *nobody.interval]).all()
 
 
 def test_the_depth_of_the_hall_is_judged_once_per_measure(outputs: Path) -> None:
     found = page(outputs, "curkovic_hall_depth")
-    assert len(found.claims) == 2
+    assert len(found.claims) == 3
     assert all(len(rows) == 7 for _, rows in found.comparisons)
     assert all(
         claim.text.startswith("A hall of at most 15 % of the population is the best")
@@ -193,7 +253,7 @@ def test_mutation_rates_are_compared_within_a_reading(outputs: Path) -> None:
     assert [claim.text.rsplit("; ", 1)[1] for claim in judged] == [
         "Eq. 9 as printed",
         "Eq. 9 read as symmetric",
-    ] * 2
+    ] * 3
 
 
 def test_verdicts_follow_the_rows_of_a_sweep(
@@ -239,13 +299,13 @@ def test_curves_show_three_defects(outputs: Path) -> None:
     assert (table["lower"] <= table["share"]).all()
     assert (table["share"] <= table["upper"]).all()
     assert (table["failing"] <= table["solved"]).all()
-    values = drawing(found, "values")
-    assert set(values["condition"]) == {"straight", "cubic spline"}
-    assert len(drawing(found, "effects")) == 2
+    costs = drawing(found, "costs")
+    assert set(costs["condition"]) == {"straight", "cubic spline"}
+    assert len(drawing(found, "effects")) == 3
 
 
 def test_effort_to_a_threshold_counts_runs_that_never_get_there(outputs: Path) -> None:
-    condition = smoke_results(outputs, "curkovic_hall").conditions[0]
+    condition = smoke_results(outputs, "curkovic_population").conditions[0]
     costs = condition.generations.pivot(index="replicate", columns="index", values="best_cost")
     threshold = float(costs[10].mean())  # one of the two replicates gets there
     reached = (costs <= threshold).to_numpy()

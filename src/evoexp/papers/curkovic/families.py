@@ -106,6 +106,7 @@ def _measures(results: Results, threshold: float) -> tuple[Measure, ...]:
     found = [
         Measure("best cost", by_column("best_cost")),
         Measure(f"generations {to}", partial(measures.generations_to, threshold=threshold)),
+        Measure(measures.CERTIFIED, measures.certified_cost),
     ]
     sizes = [
         tuple(c.planner.ga.population_size for c in pair)

@@ -27,6 +27,7 @@ REFUTED = "collides between its configurations (exact verdict)"
 LEAVES = "executed curve leaves [0, π]"
 TOO_FAST = "a link is faster than Eq. 2 allows"
 DEFECTS = (REFUTED, LEAVES, TOO_FAST)
+CERTIFIED = "best cost, a refuted motion counting as worse than any"
 BOUND = "Lower bound of a team's cost: straight end-effector paths, least turns of the links"
 
 
@@ -122,6 +123,19 @@ def refuted(condition: ConditionResults) -> FloatArray:
     """
     found = condition.summaries["certified"].eq(False).fillna(False).to_numpy(dtype=np.float64)
     return np.where(solved(condition), found, np.nan)
+
+
+def certified_cost(condition: ConditionResults) -> FloatArray:
+    """Return each run's best cost, (done,); inf where the exact verdict refutes its motion."""
+    return np.where(refuted(condition) == 1.0, np.inf, condition.column("best_cost"))
+
+
+def exemplar(condition: ConditionResults) -> int:
+    """Return the replicate of lowest cost that is not refuted; if all are, of lowest cost."""
+    costs = certified_cost(condition)
+    if not np.isfinite(costs).any():
+        return condition.best_replicate
+    return int(condition.summaries.index[int(np.argmin(costs))])
 
 
 def rates(condition: ConditionResults) -> dict[str, Proportion]:

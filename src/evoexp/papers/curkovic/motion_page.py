@@ -12,6 +12,7 @@ from evoexp.papers.curkovic.figures import (
     link_intersection,
     robot_motions,
 )
+from evoexp.papers.curkovic.rules import RULES
 from evoexp.planners.coevolution.planner import Problem
 from evoexp.records import FloatArray
 from evoexp.report.kit import (
@@ -123,20 +124,20 @@ def _pair(largest: ConditionResults, smallest: ConditionResults) -> str:
 def _claims(
     results: Results, settings: ReportSettings, tools: tuple[Comparison, ...]
 ) -> tuple[Claim, ...]:
-    judge, found = judging.judge(results, settings), []
+    judge, found = judging.judge(results, settings, RULES), list[Claim]()
     for c in results.main:
-        text, source = _scene_claim(c)
+        scene, where = _scene_claim(c)
         certified = int((c.summaries["certified"].eq(True) & c.summaries["solved"]).sum())
         for who, holds, judged in (
             ("the paper's model", c.solved, c.done),
             ("the exact verdict on the whole motion", certified, c.done - c.verdicts.undecided),
         ):
-            claim = f"{c.label}: {text}, in every run, by {who}"
+            hearing = judge.on(
+                "free_motion", condition=c.label, scene=scene, judge=who, where=where
+            )
             told = f"{markdown.share(holds, judged)} runs"
-            found.append(judge.every(claim, source, told, holds, judged, c.planned))
-    for row in tools:
-        text = f"A larger radius forces the robots further apart: {row.quantity}"
-        found.append(judge.better(text, "section 4, Fig. 11", row, "larger"))
+            found.append(hearing.every(told, holds, judged, c.planned))
+    found += [judge.on("larger_radius", pair=row.quantity).better(row, "larger") for row in tools]
     return tuple(found)
 
 
@@ -200,8 +201,9 @@ def _drawings(results: Results, settings: ReportSettings) -> list[Drawing]:
                 "fig_11_safety",
                 "Fig. 11: the safety factor of the end-effector",
                 "The paper shows three trajectories, which move away from the other robot by "
-                "various amounts. Here: end-effectors of each condition's best replicate, with a "
-                "circle of its radius at each configuration.",
+                "various amounts. Here: end-effectors of each condition's cheapest motion that the "
+                "exact verdict does not refute (dashed: all are refuted), with a circle of its "
+                "radius at each configuration.",
                 partial(robot_motions.tools_table, shown),
                 robot_motions.draw_tools,
                 shown,

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from evoexp.papers.curkovic import claims, families, measures
 from evoexp.papers.curkovic.families import FamilyComparison
+from evoexp.papers.curkovic.figures import cost_boxes, facets
 from evoexp.report.kit import (
     Drawing,
     Page,
@@ -26,7 +27,9 @@ INTRODUCTION = (
     "Each condition changes one part of a method; all share their seeds. The cost of a team is "
     "C2 + C3 + C4 (end-effector paths, turns of the links, unevenness) summed over the robots, "
     "free of collision, lower is better. Generations and evaluations are those until a team's "
-    "cost is at or below a threshold; a run that never gets there counts as infinite."
+    "cost is at or below a threshold; a run that never gets there counts as infinite. The search "
+    "looks for collisions at the configurations; where costs are compared with a refuted motion "
+    "counting as worse than any, the exact verdict on the motion between them counts, too."
 )
 SHORT = {
     measures.REFUTED: "collide in between",
@@ -79,19 +82,42 @@ def _checks(results: Results, bound: float) -> tuple[tuple[str, str], ...]:
 def _drawings(
     results: Results, settings: ReportSettings, found: Sequence[FamilyComparison], threshold: float
 ) -> tuple[Drawing, ...]:
-    values = {one.measure.name: one.measure.values for one in found if one.measure.converges}
+    names = dict.fromkeys(one.measure.name for one in found if one.measure.converges)
     by_name = {
         name: [row for one in found if one.measure.name == name for row in one.rows]
-        for name in values
+        for name in names
     }
+    told, shown = markdown.number(threshold), results.with_data
     bound = markdown.number(threshold / settings.threshold_ratio)
+    table = partial(facets.facet_table, results, threshold)
     return (
-        sweep_figures.values_drawing(results, values),
+        Drawing(
+            "costs",
+            "Best costs of all runs",
+            f"{cost_boxes.CAPTION} Dashed: the threshold, {told}.",
+            partial(cost_boxes.costs_table, results, threshold),
+            cost_boxes.draw_costs,
+            shown,
+        ),
+        Drawing(
+            "effort",
+            f"Effort to a team of cost ≤ {told}",
+            facets.CURVES,
+            table,
+            facets.draw_effort,
+            shown,
+        ),
+        Drawing(
+            "convergence",
+            "Convergence",
+            f"Median of the best cost so far over all runs. Dashed: the threshold, {told}; lower "
+            f"bound {bound}.",
+            table,
+            facets.draw_convergence,
+            shown,
+        ),
         sweep_figures.effects_drawing(
             results, settings, by_name, "the first condition of a family", EFFECTS
-        ),
-        generic.best_drawing(
-            results, f" Threshold {markdown.number(threshold)}, lower bound {bound}."
         ),
         Drawing(
             "defects",

@@ -1,29 +1,43 @@
 """Methods side by side (Curkovic et al. 2013, Fig. 6): convergence above, boxes below."""
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from evoexp.records import FloatArray
-from evoexp.report.kit import Results, draw_box, groups, style
+from evoexp.papers.curkovic import measures
+from evoexp.papers.curkovic.figures import cost_boxes
+from evoexp.report.kit import Results, groups, style
 
-CURVE, FINAL, BOUND = "best so far", "final", "lower bound"
+CURVE, FINAL, BOUND, THRESHOLD = "best so far", "final", "lower bound", "threshold"
+ORDER = ["series", "position", "method", "panel", "hall", "generation", "replicate", "value"]
+ORDER += ["deviation", "replicates", "refuted"]
+WITH, WITHOUT = style.ARM_COLOURS[0], style.ARM_COLOURS[1]
+DASHED = (0, (4, 1.5))
+LINES = {BOUND: (0, (1, 2)), THRESHOLD: (0, (4, 2))}
 
 
-def methods_table(results: Results, bound: float) -> pd.DataFrame:
+def methods_table(
+    results: Results, pairs: Sequence[tuple[str, str]], bound: float, threshold: float
+) -> pd.DataFrame:
     """Return best costs so far per generation, and at the end.
 
     Args:
         results: With data.
+        pairs: Labels of matched methods, with hall and without, which share a panel.
         bound: Lower bound of the cost.
+        threshold: Cost that counts as reached.
 
     Returns:
         Columns series (best so far: one row per method and generation; final: one per replicate;
-        lower bound), position, method, generation, replicate, value (the mean over the replicates
-        that have a solution by then, or the replicate's own), deviation (standard), replicates
-        (that have a solution).
+        lower bound; threshold), position, method, panel, hall (whether it has one), generation,
+        replicate, value (the mean over the replicates that have a team by then, or the
+        replicate's own), deviation (standard), replicates (that have a team), refuted.
     """
+    panels = {label: k for k, pair in enumerate(pairs) for label in pair}
     parts = []
     for position, c in enumerate(results.with_data):
         costs = c.generations.pivot(index="index", columns="replicate", values="best_cost")
@@ -38,67 +52,86 @@ def methods_table(results: Results, bound: float) -> pd.DataFrame:
             }
         )
         final = pd.DataFrame(
-            {"series": FINAL, "replicate": c.summaries.index, "value": c.column("best_cost")}
+            {
+                "series": FINAL,
+                "replicate": c.summaries.index,
+                "value": c.column("best_cost"),
+                "refuted": measures.refuted(c) == 1.0,
+            }
         )
-        parts += [part.assign(position=position, method=c.label) for part in (curve, final)]
-    table = pd.concat(
-        [*parts, pd.DataFrame({"series": [BOUND], "value": [bound]})], ignore_index=True
-    )
-    order = [
-        "series",
-        "position",
-        "method",
-        "generation",
-        "replicate",
-        "value",
-        "deviation",
-        "replicates",
-    ]
-    return table[order].astype({"value": "float64", "deviation": "float64"})
+        own: dict[str, Any] = {
+            "position": position,
+            "method": c.label,
+            "panel": panels.get(c.label, len(pairs)),
+            "hall": bool(c.planner.ga.hall_depth),
+        }
+        parts += [part.assign(**own) for part in (curve, final)]
+    lines = pd.DataFrame({"series": [BOUND, THRESHOLD], "value": [bound, threshold]})
+    table = pd.concat([*parts, lines], ignore_index=True)
+    return table[ORDER].astype({"value": "float64", "deviation": "float64"})
 
 
 def draw_methods(table: pd.DataFrame) -> Figure:
-    """Draw mean and standard deviation against generations, and the final values as boxes."""
-    figure = style.figure(7.0)
-    above, below = figure.subplots(2, 1, height_ratios=(3, 2))
-    bound = float(table.loc[table["series"] == BOUND, "value"].iloc[0])
-    names = _curves(above, table[table["series"] == CURVE])
-    final = table[table["series"] == FINAL]
+    """Draw mean and standard deviation pair by pair, and the final values as boxes."""
+    curves, final = (table[table["series"] == series] for series in (CURVE, FINAL))
+    panels = sorted(curves["panel"].unique())
+    figure = style.figure(6.4)
+    halves: Any = figure.subfigures(2, 1, height_ratios=(5, 6))
+    above, below = halves
+    row = above.subplots(1, len(panels), sharex=True, sharey=True, squeeze=False)[0]
+    for axes, panel in zip(row, panels, strict=True):
+        _pair(axes, curves[curves["panel"] == panel])
+        _lines(axes, table)
+    row[0].set_ylabel("best C₂ + C₃ + C₄ of a team")
+    above.suptitle(
+        "a  best collision-free team so far: mean ± standard deviation",
+        x=0.01, ha="left", fontsize=9, fontweight="bold",
+    )  # fmt: skip
+    boxes = below.subplots()
     labels = []
     for position, rows in groups(final, "position"):
-        values: FloatArray = rows["value"].to_numpy()
-        draw_box(below, position, values, style.condition_colour(int(position)), "vertical")
-        failed = int(np.count_nonzero(~np.isfinite(values)))
-        labels.append(
-            f"{names[position]}\nn = {len(values)}{f', {failed} without' if failed else ''}"
-        )
-    for axes in (above, below):
-        axes.axhline(
-            bound, color=style.NEUTRAL, linewidth=1.0, linestyle=(0, (1, 2)), label="lower bound"
-        )
-        axes.set_ylabel("best C₂ + C₃ + C₄ of a team")
-    above.set_title("a  mean ± standard deviation of the best collision-free team so far")
-    below.set_title("b  at the end of each run")
-    below.set(xlim=(-0.6, len(labels) - 0.4))
-    below.set_xticks(range(len(labels)), labels)
-    style.legend_below(figure, above, 5)
+        costs, refuted = rows["value"].to_numpy(), rows["refuted"].to_numpy(dtype=bool)
+        colour = WITH if rows["hall"].iloc[0] else WITHOUT
+        cost_boxes.draw_cost_box(boxes, int(position), costs, refuted, colour, "vertical")
+        labels.append(f"{rows['method'].iloc[0]}\n{cost_boxes.counted(costs, refuted)}")
+    _lines(boxes, table)
+    boxes.set_title("b  at the end of each run")
+    boxes.set(xlim=(-0.6, len(labels) - 0.4), ylabel="best C₂ + C₃ + C₄ of a team")
+    boxes.set_xticks(range(len(labels)), labels)
+    keys = [
+        style.key("hall of fame, Eq. 10", color=WITH),
+        style.key("no hall, constant rate", color=WITHOUT, linestyle=DASHED),
+        *cost_boxes.keys(),
+        *(style.key(name, color=style.NEUTRAL, lw=1.0, ls=kind) for name, kind in LINES.items()),
+    ]
+    below.legend(handles=keys, loc="outside lower center", ncols=4)
     return figure
 
 
-def _curves(axes: Axes, table: pd.DataFrame) -> dict[float, str]:
-    """Draw a curve per method and return the names of the methods by position."""
-    names = {}
-    for (position, method), rows in groups(table, ["position", "method"]):
-        colour = style.condition_colour(int(position))
-        names[position] = str(method)
+def _pair(axes: Axes, table: pd.DataFrame) -> None:
+    """Draw the curves of a matched pair of methods."""
+    names = []
+    for _, rows in groups(table, "position"):
+        hall = bool(rows["hall"].iloc[0])
+        colour, kind = (WITH, "-") if hall else (WITHOUT, DASHED)
+        names.append(str(rows["method"].iloc[0]))
         x, mean, deviation = (
             rows[name].to_numpy(np.float64) for name in ("generation", "value", "deviation")
         )
-        kind = "-" if position * 2 > table["position"].max() else (0, (4, 1.5))
         axes.fill_between(
-            x, mean - deviation, mean + deviation, color=colour, alpha=0.10, linewidth=0
+            x, mean - deviation, mean + deviation, color=colour, alpha=0.2, linewidth=0
         )
-        axes.plot(x, mean, color=colour, linestyle=kind, label=str(method))
+        axes.plot(x, mean, color=colour, linestyle=kind)
     axes.set_xlim(0, max(1.0, float(table["generation"].max())))
-    axes.set_xlabel("generation")
-    return names
+    axes.set(xlabel="generation", title=" and ".join(names))
+    axes.xaxis.set_major_locator(style.few_ticks())
+
+
+def _lines(axes: Axes, table: pd.DataFrame) -> None:
+    """Draw lower bound and threshold, with room below the bound."""
+    for name, kind in LINES.items():
+        value = float(table.loc[table["series"] == name, "value"].iloc[0])
+        axes.axhline(value, color=style.NEUTRAL, linewidth=1.0, linestyle=kind, zorder=1)
+    low, high = axes.get_ylim()
+    bound = float(table.loc[table["series"] == BOUND, "value"].iloc[0])
+    axes.set_ylim(min(low, bound - 0.04 * (high - bound)), high)

@@ -13,7 +13,7 @@ from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
 
 from evoexp.condition import Prepared
-from evoexp.papers.curkovic import link_motions
+from evoexp.papers.curkovic import link_motions, measures
 from evoexp.report.kit import (
     ConditionResults,
     body_contacts,
@@ -102,11 +102,13 @@ def tools_table(conditions: Sequence[ConditionResults]) -> pd.DataFrame:
 
     Returns:
         Columns condition, position, tcp_radius, collision_substeps, robot, instant, x, y, x_end,
-        y_end [length unit], at_configuration, length_unit; of each condition's best replicate.
+        y_end [length unit], at_configuration, refuted, length_unit; of each condition's cheapest
+        motion that is not refuted, if there is one.
     """
     parts = []
     for position, c in enumerate(conditions):
-        motion = link_motions.executed(c.prepared, c.solutions[c.best_replicate])
+        shown = measures.exemplar(c)
+        motion = link_motions.executed(c.prepared, c.solutions[shown])
         path = _path(c.prepared, link_motions.sampled(motion, POINTS))
         model = c.planner.collision
         given = path.assign(
@@ -115,6 +117,7 @@ def tools_table(conditions: Sequence[ConditionResults]) -> pd.DataFrame:
             tcp_radius=model.tcp_radius,
             collision_substeps=model.collision_substeps,
             at_configuration=path["instant"] == path["instant"].round(),
+            refuted=shown in body_contacts.refuted(c),
         )
         parts.append(given)
     table = rounded(pd.concat(parts, ignore_index=True)).assign(
@@ -137,7 +140,8 @@ def draw_tools(table: pd.DataFrame) -> Figure:
             table[table["collision_substeps"] == substeps], ["tcp_radius", "robot"]
         ):
             colour = style.condition_colour(radii.index(radius))
-            axes.plot(rows["x_end"], rows["y_end"], color=colour)
+            kind = DASHES if rows["refuted"].any() else "-"
+            axes.plot(rows["x_end"], rows["y_end"], color=colour, linestyle=kind)
             for row in records(rows[rows["at_configuration"]]):
                 tip = row.x_end, row.y_end
                 axes.add_patch(Circle(tip, radius, fill=False, edgecolor=colour, lw=0.7, alpha=0.7))
@@ -161,6 +165,8 @@ def draw_tools(table: pd.DataFrame) -> Figure:
         style.key(f"radius {radius:g} {unit}", color=style.condition_colour(k))
         for k, radius in enumerate(radii)
     ]
+    if table["refuted"].any():
+        keys.append(style.key("refuted", color=style.NEUTRAL, linestyle=DASHES))
     style.keys_below(figure, [*keys, *_end_keys()])
     return figure
 

@@ -1,0 +1,171 @@
+"""Many conditions in panels of few: the best cost so far, and runs that have reached a cost."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from evoexp.papers.curkovic import measures
+from evoexp.records import FloatArray
+from evoexp.report.kit import ConditionResults, Results, groups, quantile, style
+
+MOST = len(style.CONDITION_COLOURS)  # conditions of a panel, each with a colour of its own
+DIRECTIONS = {"one_sided": "Eq. 9 one-sided", "symmetric": "Eq. 9 symmetric"}
+CURVES = (
+    "Share of all runs that have a team of that cost by then; runs that never get there count, so "
+    "such a curve ends below 1. In brackets: runs that get there, of all."
+)
+
+
+class Facet(NamedTuple):
+    """Conditions of one panel.
+
+    Attributes:
+        title: Of the panel; empty if there is one only.
+        conditions: With the part of their labels that differs within the panel.
+    """
+
+    title: str
+    conditions: tuple[tuple[str, ConditionResults], ...]
+
+
+def facets(results: Results) -> tuple[Facet, ...]:
+    """Divide conditions by collision substeps and reading of Eq. 9; by rates if they are many."""
+    traits = [t for t in (_substeps, _direction) if len(set(map(t, results.with_data))) > 1]
+    found = _divided(results, traits)
+    if max(map(len, found.values())) > MOST:
+        found = _divided(results, [*traits, _rate])
+    return tuple(
+        Facet(", ".join(title), tuple(zip(_short(own), own, strict=True)))
+        for title, own in found.items()
+    )
+
+
+def facet_table(results: Results, threshold: float) -> pd.DataFrame:
+    """Return medians of the best cost so far, and shares of runs that have reached a cost.
+
+    Args:
+        results: With data.
+        threshold: The cost.
+
+    Returns:
+        Columns panel, title, position (of the name, over all panels), name, generation, evaluations
+        (median), median, reached (share of runs by then), reaching (runs that ever do), runs.
+    """
+    parts, names = [], dict[str, int]()
+    for panel, facet in enumerate(facets(results)):
+        for name, c in facet.conditions:
+            first = measures.generations_to(c, threshold)
+            rows = c.generations.groupby("index")
+            index = np.unique(c.generations["index"].to_numpy(np.float64))
+            parts.append(
+                pd.DataFrame(
+                    {
+                        "panel": panel,
+                        "title": facet.title,
+                        "position": names.setdefault(name, len(names)),
+                        "name": name,
+                        "generation": index,
+                        "evaluations": _medians(rows, "evaluations"),
+                        "median": _medians(rows, "best_cost"),
+                        "reached": (first <= index[:, None]).mean(axis=1),
+                        "reaching": int(np.isfinite(first).sum()),
+                        "runs": c.done,
+                    }
+                )
+            )
+    return pd.concat(parts, ignore_index=True).assign(threshold=threshold)
+
+
+def draw_convergence(table: pd.DataFrame) -> Figure:
+    """Draw medians of the best cost so far, and the threshold."""
+    finite = table["median"].replace([np.inf], np.nan)
+    figure, panels = _panels(table)
+    for axes, (_, rows) in zip(panels, groups(table.assign(median=finite), "panel"), strict=True):
+        _lines(axes, rows, "median", "default", lambda own: str(own["name"].iloc[0]))
+        threshold = float(rows["threshold"].iloc[0])
+        axes.axhline(threshold, color=style.NEUTRAL, lw=1.0, ls=(0, (4, 2)), label="threshold")
+        axes.set_ylabel("best cost so far (median)")
+        _legend(axes)
+    return figure
+
+
+def draw_effort(table: pd.DataFrame) -> Figure:
+    """Draw the share of all runs that have reached the cost, as steps."""
+    figure, panels = _panels(table)
+    for axes, (_, rows) in zip(panels, groups(table, "panel"), strict=True):
+        _lines(axes, rows, "reached", "steps-post", _counted)
+        axes.set(ylim=(-0.02, 1.02), ylabel="share of runs")
+        _legend(axes)
+    return figure
+
+
+def _counted(rows: pd.DataFrame) -> str:
+    first = rows.iloc[0]
+    return f"{first['name']} ({first['reaching']} of {first['runs']})"
+
+
+def _panels(table: pd.DataFrame) -> tuple[Figure, list[Axes]]:
+    count = table["panel"].nunique()
+    names = int(table.groupby("panel")["name"].nunique().max())
+    figure, panels = style.lines_of_panels(2.4 + 0.09 * names, count, 2, 0.0)
+    for axes in panels[1:]:
+        axes.sharex(panels[0])
+        axes.sharey(panels[0])
+    return figure, panels
+
+
+def _lines(
+    axes: Axes,
+    rows: pd.DataFrame,
+    column: str,
+    steps: Any,
+    label: Callable[[pd.DataFrame], str],
+) -> None:
+    several = rows.groupby("generation")["evaluations"].nunique().max() > 1
+    across = "evaluations" if several else "generation"
+    for position, own in groups(rows, "position"):
+        colour = style.condition_colour(int(position))
+        axes.plot(own[across], own[column], color=colour, drawstyle=steps, label=label(own))
+    axes.set(xlabel=across, xlim=(0, float(rows[across].max())), title=rows["title"].iloc[0])
+
+
+def _legend(axes: Axes) -> None:
+    axes.legend(loc="upper left", bbox_to_anchor=(-0.02, -0.2), ncols=2, fontsize=6.5)
+
+
+def _medians(rows: Any, column: str) -> FloatArray:
+    return np.array([quantile(own.to_numpy(np.float64), 0.5) for _, own in rows[column]])
+
+
+def _divided(
+    results: Results, traits: Sequence[Callable[[ConditionResults], str]]
+) -> dict[tuple[str, ...], list[ConditionResults]]:
+    found: dict[tuple[str, ...], list[ConditionResults]] = {}
+    for c in results.with_data:
+        found.setdefault(tuple(trait(c) for trait in traits), []).append(c)
+    return found
+
+
+def _short(conditions: Sequence[ConditionResults]) -> list[str]:
+    """Return labels without the parts that all of them have."""
+    parts = [c.label.split(", ") for c in conditions]
+    everywhere = set(parts[0]).intersection(*parts[1:]) if len(parts) > 1 else set[str]()
+    return [", ".join(p for p in own if p not in everywhere) or ", ".join(own) for own in parts]
+
+
+def _substeps(condition: ConditionResults) -> str:
+    substeps = condition.planner.collision.collision_substeps
+    return "configurations only" if substeps == 1 else f"{substeps} substeps"
+
+
+def _direction(condition: ConditionResults) -> str:
+    return DIRECTIONS[condition.planner.ga.mutation_direction]
+
+
+def _rate(condition: ConditionResults) -> str:
+    ga = condition.planner.ga
+    return "Eq. 10" if ga.mutation_decay else f"constant rate {ga.mutation_rate:g}"

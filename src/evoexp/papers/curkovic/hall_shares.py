@@ -1,0 +1,211 @@
+"""How much of the gain by a hall of fame elitism alone explains."""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from evoexp.papers.curkovic import measures
+from evoexp.records import FloatArray
+from evoexp.report.kit import (
+    BOOTSTRAP_SEED,
+    ConditionResults,
+    Interval,
+    ReportSettings,
+    grouped,
+    quantile,
+)
+
+EFFORT = "effort (logarithm)"
+Statistic = Callable[[ConditionResults, np.ndarray], FloatArray]
+
+
+class Corner(NamedTuple):
+    """A reading of Eq. 9 with a mutation rate, and what may keep good individuals.
+
+    Attributes:
+        name: "one-sided, Eq. 10".
+        nothing: Neither hall nor elites.
+        elites: With elites instead of a hall, by growing number.
+        hall: With a hall of distinct genomes.
+        by_index: With a hall of distinct indices; None: not run.
+        others: Other halls: those that forget, or never change.
+    """
+
+    name: str
+    nothing: ConditionResults
+    elites: tuple[ConditionResults, ...]
+    hall: ConditionResults
+    by_index: ConditionResults | None
+    others: tuple[ConditionResults, ...]
+
+
+class Measure(NamedTuple):
+    """A quantity whose gain is shared out.
+
+    Attributes:
+        name: With unit where it has one.
+        short: The same in a few words.
+        statistic: (condition, (resamples, runs) numbers of runs) → its value, (resamples,).
+        runs: The number of runs that count.
+    """
+
+    name: str
+    short: str
+    statistic: Statistic
+    runs: Callable[[ConditionResults], int]
+
+
+class Share(NamedTuple):
+    """The share of a hall's gain that elites have, too.
+
+    Attributes:
+        value: (nothing − elites) / (nothing − hall); NaN where the hall gains nothing.
+        interval: Over resampled seeds; NaN where the hall's gain cannot be told from none.
+        n: Runs of nothing, elites and hall that count.
+    """
+
+    value: float
+    interval: Interval
+    n: tuple[int, int, int]
+
+
+def corners(conditions: Sequence[ConditionResults]) -> tuple[Corner, ...]:
+    """Group conditions that differ in hall and elites only; groups that lack one are left out."""
+    found = grouped(
+        conditions,
+        lambda c: [
+            getattr(c.planner.ga, name)
+            for name in ("mutation_direction", "mutation_rate", "mutation_decay")
+        ],
+    )
+    return tuple(corner for own in found if (corner := _corner(own)) is not None)
+
+
+def share(
+    corner: Corner,
+    measure: Measure,
+    elites: ConditionResults,
+    hall: ConditionResults,
+    settings: ReportSettings,
+) -> Share:
+    """Return the share of a hall's gain that elites have, too.
+
+    Runs of one seed are drawn together. Where more than the tail of the interval of resamples have
+    no gain by the hall, the gain cannot be told from none, and there is no interval.
+    """
+    three = (corner.nothing, elites, hall)
+    values = [of_all_runs(measure, c) for c in three]
+    n = tuple(measure.runs(c) for c in three)
+    rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
+    count = min(c.done for c in three)
+    draws = rng.integers(0, count, (settings.num_resamples, count))
+    nothing, some, full = (measure.statistic(c, draws) for c in three)
+    gains = full < nothing
+    tail = 0.5 * (1.0 - settings.confidence)
+    interval = Interval(np.nan, np.nan)
+    if np.mean(~gains) <= tail:
+        shares = _shares(nothing[gains], some[gains], full[gains])
+        interval = Interval(quantile(shares, tail), quantile(shares, 1.0 - tail))
+    one = np.array(values)[:, None]
+    value = float(_shares(*one)[0]) if values[2] < values[0] else np.nan
+    return Share(value, interval, (n[0], n[1], n[2]))
+
+
+def medians(column: Callable[[ConditionResults], FloatArray]) -> Statistic:
+    """Return the statistic "median of a column"; NaN is left out, inf is a value."""
+
+    def statistic(condition: ConditionResults, draws: np.ndarray) -> FloatArray:
+        drawn = column(condition)[draws]
+        found, known = np.full(len(drawn), np.nan), ~np.isnan(drawn).all(axis=1)
+        found[known] = np.nanmedian(drawn[known], axis=1)
+        return found
+
+    return statistic
+
+
+def log_effort(threshold: float) -> Statistic:
+    """Return the statistic "logarithm of the expected running time to a team of that cost"."""
+
+    def statistic(condition: ConditionResults, draws: np.ndarray) -> FloatArray:
+        first = measures.evaluations_to(condition, threshold)
+        reached = np.isfinite(first)
+        spent = np.where(reached, first, condition.column("evaluations"))
+        total, having = spent[draws].sum(axis=1), reached[draws].sum(axis=1)
+        found = np.full(len(draws), np.inf)
+        np.divide(total, having, out=found, where=having > 0)
+        return np.asarray(np.log(found))
+
+    return statistic
+
+
+def gain_measures(threshold: float, told: str) -> tuple[Measure, ...]:
+    """Return the quantities in which gains are shared out.
+
+    Args:
+        threshold: Cost that counts as reached.
+        told: The same in words.
+    """
+    return (
+        Measure(
+            "best cost", "best cost", medians(lambda c: c.column("best_cost")), lambda c: c.done
+        ),
+        Measure(
+            f"evaluations to a team of cost ≤ {told} (expected running time)",
+            EFFORT,
+            log_effort(threshold),
+            lambda c: int(np.isfinite(measures.evaluations_to(c, threshold)).sum()),
+        ),
+        Measure(
+            measures.CERTIFIED,
+            "cost, refuted as worst",
+            medians(measures.certified_cost),
+            lambda c: c.done,
+        ),
+        Measure(
+            "best cost among motions that are not refuted",
+            "cost, not refuted only",
+            medians(not_refuted),
+            lambda c: int(np.isfinite(measures.certified_cost(c)).sum()),
+        ),
+    )
+
+
+def not_refuted(condition: ConditionResults) -> FloatArray:
+    """Return each run's best cost, (done,); NaN where its motion is refuted."""
+    found = measures.certified_cost(condition)
+    return np.where(np.isfinite(found), found, np.nan)
+
+
+def _corner(own: Sequence[ConditionResults]) -> Corner | None:
+    plain = [c for c in own if not c.planner.ga.hall_depth]
+    halls = [c for c in own if c.planner.ga.hall_depth]
+    nothing = [c for c in plain if not c.planner.ga.num_elites]
+    elites = sorted(
+        (c for c in plain if c.planner.ga.num_elites), key=lambda c: int(c.planner.ga.num_elites)
+    )
+    usual = [c for c in halls if not c.planner.ga.hall_frozen and c.planner.ga.hall_memory is None]
+    genomes = [c for c in usual if c.planner.ga.hall_distinct == "genome"]
+    indices = [c for c in usual if c.planner.ga.hall_distinct == "index"]
+    if not (nothing and elites and genomes):
+        return None
+    name = genomes[0].label.rpartition(", ")[0]
+    others = tuple(c for c in halls if c not in usual)
+    by_index = indices[0] if indices else None
+    return Corner(name, nothing[0], tuple(elites), genomes[0], by_index, others)
+
+
+def of_all_runs(measure: Measure, condition: ConditionResults) -> float:
+    """Return a quantity over all runs of a condition."""
+    return float(measure.statistic(condition, np.arange(condition.done)[None, :])[0])
+
+
+def _shares(nothing: FloatArray, some: FloatArray, full: FloatArray) -> FloatArray:
+    """Return (nothing − some) / (nothing − full) of rows with full < nothing.
+
+    Where nothing never gets there, elites explain all of it if they do, and else none.
+    """
+    shares = np.where(np.isfinite(some), 1.0, 0.0)
+    known = np.isfinite(nothing)
+    np.divide(nothing - some, nothing - full, out=shares, where=known)
+    return shares

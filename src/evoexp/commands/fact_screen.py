@@ -143,7 +143,8 @@ def _verdict(verdict: Mapping[str, Any] | None) -> Iterator[str]:
     counts = [f"{verdict[name]} {name}" for name in ("certified", "refuted", "undecided")]
     if verdict["without_motion"]:
         counts.append(f"{verdict['without_motion']} without a motion")
-    yield ", ".join(counts) + f"; {verdict['certified_margin']} keep the security margin"
+    kept, certified = verdict["certified_margin"], verdict["certified"]
+    yield ", ".join(counts) + f"; required margin kept by {kept} of the {certified} certified"
     if verdict["clearance"] is not None:
         place = f" ({verdict['clearance_pair']})" if verdict["clearance_pair"] else ""
         yield (

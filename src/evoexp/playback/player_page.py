@@ -52,6 +52,7 @@ def _motion(recording: Recording) -> dict[str, Any]:
         "title": recording.heading.title,
         "status": {True: "certified", False: "refuted", None: "undecided"}[verdict.certified],
         "verdict": _verdict(recording),
+        **_margin(recording),
         "facts": _facts(recording),
         "legend": _legend(recording),
         "unit": recording.length_unit,
@@ -127,6 +128,19 @@ def _verdict(recording: Recording) -> str:
     if verdict.clearance_at is None:
         return "nothing that could touch"
     return f"least clearance {verdict.clearance:.4g} {unit} at instant {verdict.clearance_at:.4g}"
+
+
+def _margin(recording: Recording) -> dict[str, str]:
+    """Return kind and text of the second badge: whether the required margin is kept.
+
+    Nothing is returned where no margin is required, or the bodies touch.
+    """
+    if recording.margin <= 0.0 or recording.verdict.certified is False:
+        return {}
+    kind, word = {True: ("kept", "kept"), False: ("broken", "not kept"), None: ("", "undecided")}[
+        recording.verdict.certified_margin
+    ]
+    return {"margin": kind or "unsure", "margin_text": f"required margin {word}"}
 
 
 def _facts(recording: Recording) -> list[tuple[str, str]]:

@@ -89,9 +89,7 @@ def _conditions(results: Results, settings: ReportSettings) -> str:
         )
         solved = f"{markdown.share(c.solved, c.done)} ({interval})" if c.done else "–"
         verdicts = c.verdicts
-        margin = (
-            f"{markdown.share(verdicts.with_margin, verdicts.judged)}" if verdicts.judged else "–"
-        )
+        broken = verdicts.margin_broken if verdicts.judged else "–"
         rows.append(
             (
                 c.label,
@@ -101,17 +99,18 @@ def _conditions(results: Results, settings: ReportSettings) -> str:
                 c.failed,
                 solved,
                 *_verdicts(verdicts),
-                margin,
+                broken,
             )
         )
-    exact = ("certified", "refuted", "undecided", "solved, yet refuted", "margin certified")
-    headers = ("condition", "hash", "done", "planned", "failed", "solved", *exact)
+    exact = ("certified", "refuted", "undecided", "solved, yet refuted")
+    own = ("condition", "hash", "done", "planned", "failed", "solved")
+    headers = (*own, *exact, "required margin not kept")
     level = f"{100 * settings.confidence:g} %"
     note = (
         "\"Solved\": the paper's own model accepts the best solution; in brackets Wilson's "
         f'{level} interval. "Certified", "refuted": the exact verdict on the whole continuous '
-        'motion, by the distance of the bodies themselves; "margin certified": they never come '
-        "closer than the scenario's security margin.\n"
+        'motion, by the distance of the bodies themselves; "required margin not kept": certified, '
+        "yet somewhere closer than the scenario's security margin.\n"
     )
     return f"{markdown.table(headers, rows)}\n{note}"
 

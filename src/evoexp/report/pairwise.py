@@ -50,7 +50,7 @@ EFFORTS = (
 SHARES: dict[str, Callable[[ConditionResults], Proportion]] = {
     "solved": success,
     "certified": certified,
-    "margin certified": keeping_margin,
+    "required margin kept": keeping_margin,
 }
 
 

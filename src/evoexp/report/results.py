@@ -43,6 +43,7 @@ class Verdicts(NamedTuple):
         undecided: Neither proven.
         solved_refuted: Accepted by the paper's own model and refuted.
         with_margin: That never come closer than the security margin.
+        margin_broken: That do, and touch nothing: certified, required margin not kept.
     """
 
     judged: int
@@ -51,6 +52,7 @@ class Verdicts(NamedTuple):
     undecided: int
     solved_refuted: int
     with_margin: int
+    margin_broken: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,6 +155,7 @@ class ConditionResults:
             int(certified.isna().sum()),
             int((refuted & motions["solved"]).sum()),
             int(margin.eq(True).sum()),
+            int((margin.eq(False).fillna(False) & certified.eq(True).fillna(False)).sum()),
         )
 
     @property

@@ -1,9 +1,10 @@
 """The registry: the names that installed packages, evoexp among them, give to what they bring.
 
-A package declares entry points in its metadata. Three groups are read:
+A package declares entry points in its metadata. Four groups are read:
 
 - `evoexp.components`: name → `module:class`, the components that a configuration may name;
 - `evoexp.pages`: name → `module:function`, the pages that `report.figures` may name;
+- `evoexp.claims`: paper → `module:RULES`, its claims with their rules (`report.claim_rules`);
 - `evoexp.conf`: any name → `package:folder`, a folder of options (see `configuration.search_path`).
 
 A configuration is data; it can name registered components only, also when it comes out of somebody
@@ -22,7 +23,8 @@ from typing import Any, NamedTuple, cast
 from evoexp.errors import RegistrationError, SettingError, nearest
 from evoexp.validation import TARGET, Component
 
-COMPONENTS, PAGES, CONF = "evoexp.components", "evoexp.pages", "evoexp.conf"
+COMPONENTS, PAGES = "evoexp.components", "evoexp.pages"
+CLAIMS, CONF = "evoexp.claims", "evoexp.conf"
 OWN = "evoexp"  # the distribution whose names are free
 
 
@@ -84,7 +86,9 @@ def registrations(group: str) -> tuple[Registration, ...]:
 @functools.cache
 def _registrations() -> dict[str, tuple[Registration, ...]]:
     """Read the metadata of all installed distributions, once per process."""
-    found: dict[str, list[Registration]] = {COMPONENTS: [], PAGES: [], CONF: []}
+    found: dict[str, list[Registration]] = {
+        group: [] for group in (COMPONENTS, PAGES, CLAIMS, CONF)
+    }
     seen = set()
     for distribution in importlib.metadata.distributions():
         points = [point for point in distribution.entry_points if point.group in found]

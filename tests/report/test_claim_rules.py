@@ -30,6 +30,9 @@ def test_a_rule_fills_in_its_words_and_limits(tmp_path: Path) -> None:
     assert rule.limits["most"] == 2.5
     with pytest.raises(KeyError, match="metric"):
         rules_of(tmp_path, "own", OWN)["told"].about(who="")
+    unjudged = rules_of(tmp_path, "own", OWN)["told"].unjudged()
+    assert unjudged.claim == "…a claim of …"
+    assert unjudged.text == "reproduced if … at most 2.5 times"
 
 
 @pytest.mark.parametrize(

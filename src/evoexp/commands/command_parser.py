@@ -11,6 +11,7 @@ from evoexp.version import __version__
 COMMANDS = {
     "run": "run an experiment: its missing replicates, then its report",
     "report": "draw an experiment's figures and tables again, from outputs alone",
+    "claims": "list the papers' claims: rule, numbers, verdict",
     "reproduce": "run stored replicates again: MATCH, or the first generation that differs",
     "evaluate": "judge a given motion by an experiment's criteria",
     "view": "write a motion as an offline page that plays it",

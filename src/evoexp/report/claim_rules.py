@@ -95,9 +95,19 @@ class Rule(NamedTuple):
         Raises:
             KeyError: If a word is missing.
         """
-        known = {**{name: f"{limit:g}" for name, limit in self.limits.items()}, **words}
+        return self._filled({**self._limit_words, **words})
+
+    def unjudged(self) -> "Rule":
+        """Return the rule with its limits filled in, and "…" for words that a judge would give."""
+        return self._filled(_Blanks(self._limit_words))
+
+    @property
+    def _limit_words(self) -> dict[str, object]:
+        return {name: f"{limit:g}" for name, limit in self.limits.items()}
+
+    def _filled(self, words: Mapping[str, object]) -> "Rule":
         texts = (self.claim, self.source, self.reproduced, self.contradicted)
-        claim, source, reproduced, contradicted = (text.format_map(known) for text in texts)
+        claim, source, reproduced, contradicted = (text.format_map(words) for text in texts)
         return self._replace(
             claim=claim, source=source, reproduced=reproduced, contradicted=contradicted
         )
@@ -107,6 +117,13 @@ class Rule(NamedTuple):
         """The rule in one sentence."""
         against = f"; contradicted if {self.contradicted}" if self.contradicted else ""
         return f"reproduced if {self.reproduced}{against}"
+
+
+class _Blanks(dict[str, object]):
+    """Words of a rule, with "…" for each that is not known."""
+
+    def __missing__(self, word: str) -> str:
+        return "…"
 
 
 Rules = Mapping[str, Rule]

@@ -1,8 +1,10 @@
 """Two proportions of independent runs: how far apart they are, and whether they differ."""
 
 import math
-from fractions import Fraction
 from typing import NamedTuple
+
+import numpy as np
+from scipy import stats
 
 from evoexp.report.statistics import Interval, wilson
 
@@ -56,11 +58,5 @@ def newcombe(one: Proportion, two: Proportion, confidence: float) -> Interval:
 
 def fisher_exact(one: Proportion, two: Proportion) -> float:
     """Return the two-sided p of Fisher's exact test: all tables at most as likely as this one."""
-    count, total = one.having + two.having, one.total + two.total
-    least, greatest = max(0, count - two.total), min(count, one.total)
-    ways = [
-        math.comb(one.total, k) * math.comb(two.total, count - k)
-        for k in range(least, greatest + 1)
-    ]
-    found = ways[one.having - least]
-    return float(Fraction(sum(way for way in ways if way <= found), math.comb(total, count)))
+    table = np.array([[each.having, each.total - each.having] for each in (one, two)])
+    return float(stats.fisher_exact(table).pvalue)

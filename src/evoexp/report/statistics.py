@@ -7,15 +7,17 @@ medians, ranks and effect sizes are defined all the same, and nothing here takes
 import functools
 import math
 from collections.abc import Sequence
-from statistics import NormalDist
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from scipy import stats
 
 from evoexp.records import FloatArray
 
-EXACT_PAIRS = 200  # up to here the signed-rank distribution is computed, beyond it approximated
+EXACT_PAIRS = 200  # up to here the signed-rank distribution is exact, beyond it approximated
 EXACT_VALUES = 100  # of both samples together: the same of the rank-sum distribution
+MOST_SIGNED = 8  # tied differences whose signs are all permuted: 256 ways
+MOST_CHOSEN = 9  # tied values of both samples that are all permuted: at most 126 ways
 BOOTSTRAP_SEED = 20_250_419  # of the report's own generator; any fixed number
 
 
@@ -102,14 +104,8 @@ def wilson(successes: int, trials: int, confidence: float) -> Interval:
     """Return Wilson's score interval of a proportion; [0, 1] without trials."""
     if trials == 0:
         return Interval(0.0, 1.0)
-    z = NormalDist().inv_cdf(0.5 + confidence / 2.0)
-    p, n = successes / trials, trials
-    center = (p + z * z / (2 * n)) / (1 + z * z / n)
-    half = z / (1 + z * z / n) * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
-    return Interval(
-        0.0 if successes == 0 else max(0.0, center - half),
-        1.0 if successes == n else min(1.0, center + half),
-    )
+    found = stats.binomtest(successes, trials).proportion_ci(confidence, method="wilson")
+    return Interval(float(found.low), float(found.high))
 
 
 def signed_rank(x: FloatArray, y: FloatArray) -> SignedRank:
@@ -121,14 +117,13 @@ def signed_rank(x: FloatArray, y: FloatArray) -> SignedRank:
     """
     differing = x != y
     difference = x[differing] - y[differing]
-    ranks = _doubled_midranks(np.abs(difference))
-    doubled = int(ranks[difference > 0.0].sum())
-    if len(ranks) <= EXACT_PAIRS:
-        p_value = _exact_p(_sign_probabilities(ranks), doubled)
-    else:  # ties are accounted for by the ranks themselves
-        variance = float((ranks.astype(np.float64) ** 2).sum()) / 4.0
-        p_value = _normal_p(doubled - ranks.sum() / 2.0, variance)
-    return SignedRank(len(ranks), doubled / 2.0, p_value)
+    if not len(difference):
+        return SignedRank(0, 0.0, 1.0)
+    ranks = stats.rankdata(np.abs(difference))
+    method = _method(np.abs(difference), EXACT_PAIRS, MOST_SIGNED)
+    found = stats.wilcoxon(difference, method=method, correction=True)
+    positive = float(ranks[difference > 0.0].sum())
+    return SignedRank(len(difference), positive, float(found.pvalue))
 
 
 def rank_sum(x: FloatArray, y: FloatArray) -> RankSum:
@@ -138,15 +133,28 @@ def rank_sum(x: FloatArray, y: FloatArray) -> RankSum:
         x: (n,); infinite values are compared as such.
         y: (m,).
     """
-    size, ranks = len(x), _doubled_midranks(np.concatenate([x, y]))
-    doubled, total = int(ranks[:size].sum()), len(ranks)
-    if total <= EXACT_VALUES:
-        p_value = _exact_p(_ways_to_choose(ranks, size), doubled, math.comb(total, size))
-    else:  # ties are accounted for by the ranks themselves
-        mean, spread_of_ranks = float(ranks.mean()), float(np.mean((ranks - ranks.mean()) ** 2))
-        variance = size * (total - size) / (total - 1) * spread_of_ranks
-        p_value = _normal_p(doubled - size * mean, variance)
-    return RankSum((doubled - size * (size + 1)) / 2.0, p_value)
+    values = np.concatenate([x, y])
+    if not len(x) or not len(y) or (values == values[0]).all():
+        return RankSum(0.5 * len(x) * len(y), 1.0)
+    method = _method(values, EXACT_VALUES, MOST_CHOSEN)
+    found = stats.mannwhitneyu(x, y, method=method)
+    return RankSum(float(found.statistic), float(found.pvalue))
+
+
+def _method(values: FloatArray, exact: int, permuted: int) -> Any:
+    """Return how scipy is to find the p-value of a test on ranks.
+
+    Args:
+        values: That are ranked, (n,).
+        exact: Without ties: the exact distribution up to so many values.
+        permuted: With ties, which that distribution does not know: all permutations up to so many
+            values. Otherwise the normal approximation, corrected for ties and continuity.
+    """
+    if len(np.unique(values)) == len(values):
+        return "exact" if len(values) <= exact else "asymptotic"
+    if len(values) <= permuted:
+        return stats.PermutationMethod(n_resamples=10**6)  # all of them
+    return "asymptotic"
 
 
 def holm(p_values: Sequence[float]) -> list[float]:
@@ -201,7 +209,7 @@ def expected_effort(effort: FloatArray, solved: np.ndarray) -> float:
 def expected_interval(
     effort: FloatArray, solved: np.ndarray, confidence: float, num_resamples: int
 ) -> Interval:
-    """Return the percentile interval of the expected running time over resampled runs.
+    """Return an interval of the expected running time; without a success it has no upper end.
 
     Args:
         effort: (runs,).
@@ -209,9 +217,8 @@ def expected_interval(
         confidence: Level of the interval.
         num_resamples: Of the bootstrap.
     """
-    return _percentiles(
-        _resampled_effort(_weights(len(effort), num_resamples), effort, solved), confidence
-    )
+    low, high = _percentiles(_resampled_effort(effort, solved, num_resamples), confidence)
+    return Interval(low, high if solved.any() else math.inf)
 
 
 def effort_ratio(
@@ -222,8 +229,7 @@ def effort_ratio(
 ) -> Interval:
     """Return the percentile interval of the ratio of two expected running times, one over two.
 
-    Both are of the same seeds. Resamples in which neither succeeds are left out; if none is left,
-    the interval is [0, inf].
+    Both are of the same seeds. If neither has a success, the interval is [0, inf].
 
     Args:
         one: Effort and success of every run, (runs,) each.
@@ -231,14 +237,15 @@ def effort_ratio(
         confidence: Level of the interval.
         num_resamples: Of the bootstrap.
     """
-    weights = _weights(len(one[0]), num_resamples)
-    above, below = (_resampled_effort(weights, *given) for given in (one, two))
-    known = np.isfinite(above) | np.isfinite(below)
-    if not known.any():
-        return Interval(0.0, math.inf)
-    ratios = np.full(int(np.count_nonzero(known)), math.inf)
-    np.divide(above[known], below[known], out=ratios, where=np.isfinite(above[known]))
-    return _percentiles(ratios, confidence)
+    (effort_one, solved_one), (effort_two, solved_two) = one, two
+    if not solved_one.any() or not solved_two.any():
+        if solved_one.any() == solved_two.any():
+            return Interval(0.0, math.inf)
+        ratio = 0.0 if solved_one.any() else math.inf
+        return Interval(ratio, ratio)
+    above = _resampled_effort(effort_one, solved_one, num_resamples)
+    below = _resampled_effort(effort_two, solved_two, num_resamples, stream=1)
+    return _percentiles(above / below, confidence)
 
 
 @functools.lru_cache(maxsize=8)
@@ -250,59 +257,39 @@ def _weights(size: int, num_resamples: int) -> np.ndarray:
     )
 
 
-def _resampled_effort(weights: np.ndarray, effort: FloatArray, solved: np.ndarray) -> FloatArray:
-    spent, having = (weights * effort).sum(axis=1), (weights * solved).sum(axis=1)
-    found = np.full(len(weights), math.inf)
-    np.divide(spent, having, out=found, where=having > 0)
-    return found
+def _resampled_effort(
+    effort: FloatArray, solved: np.ndarray, num_resamples: int, stream: int = 0
+) -> FloatArray:
+    """Return resampled expected running times, (resamples,).
+
+    A Bayesian bootstrap (Rubin 1981): every run has a random weight, the same in all conditions of
+    these seeds. Half a success and half a failure that nobody saw are added (Jeffreys' prior of the
+    share), as without them few failures, or none, would say too much. They cost the mean of their
+    kind; a kind that was never seen costs nothing as a success, and twice the dearest run as a
+    failure.
+
+    Args:
+        effort: (runs,).
+        solved: (runs,).
+        num_resamples: Of the bootstrap.
+        stream: Of the added runs' weights; another one for each condition of a comparison.
+    """
+    won = np.asarray(solved, dtype=bool)
+    of_success = float(effort[won].mean()) if won.any() else 0.0
+    of_failure = float(effort[~won].mean()) if not won.all() else 2.0 * float(effort.max())
+    weights = _random_weights(len(effort), num_resamples, 1.0, 0)
+    success, failure = _random_weights(2, num_resamples, 0.5, 1 + stream).T
+    spent = weights @ effort + success * of_success + failure * of_failure
+    return np.asarray(spent / (weights @ won.astype(np.float64) + success))
+
+
+@functools.lru_cache(maxsize=8)
+def _random_weights(size: int, num_resamples: int, shape: float, stream: int) -> FloatArray:
+    """Return gamma-distributed weights, (resamples, size)."""
+    rng = np.random.Generator(np.random.PCG64([BOOTSTRAP_SEED, stream]))
+    return rng.gamma(shape, size=(num_resamples, size))
 
 
 def _percentiles(values: FloatArray, confidence: float) -> Interval:
     tail = 0.5 * (1.0 - confidence)
     return Interval(quantile(values, tail), quantile(values, 1.0 - tail))
-
-
-def _doubled_midranks(values: FloatArray) -> np.ndarray:
-    """Return twice the ranks of values (n,), whole numbers also where ties share a mean rank."""
-    _, group, counts = np.unique(values, return_inverse=True, return_counts=True)
-    last = np.cumsum(counts)
-    return np.asarray((2 * last - counts + 1)[group])
-
-
-def _sign_probabilities(ranks: np.ndarray) -> np.ndarray:
-    """Return the probability of each sum of positive ranks over all signs, (greatest sum + 1,)."""
-    probability = np.zeros(int(ranks.sum()) + 1)
-    probability[0] = 1.0
-    for rank in ranks:
-        shifted = np.zeros_like(probability)
-        shifted[rank:] = probability[: len(probability) - rank]
-        probability = 0.5 * (probability + shifted)
-    return probability
-
-
-def _ways_to_choose(ranks: np.ndarray, size: int) -> np.ndarray:
-    """Return in how many ways `size` of the ranks have each sum, (greatest sum + 1,)."""
-    choices = np.zeros((size + 1, int(ranks.sum()) + 1))  # (ranks chosen, sum)
-    choices[0, 0] = 1.0
-    for k, rank in enumerate(ranks):
-        for chosen in range(min(k + 1, size), 0, -1):
-            choices[chosen, rank:] += choices[chosen - 1, : choices.shape[1] - rank]
-    return np.asarray(choices[size])
-
-
-def _exact_p(weights: np.ndarray, doubled: int, total: int = 1) -> float:
-    """Return the two-sided p of an observed sum.
-
-    Args:
-        weights: Of each sum: its probability, or the number of ways that lead to it.
-        doubled: The observed sum of doubled ranks.
-        total: Sum of the weights.
-    """
-    below, above = math.fsum(weights[: doubled + 1]), math.fsum(weights[doubled:])
-    return min(1.0, 2.0 * min(below, above) / total)
-
-
-def _normal_p(deviation: float, variance: float) -> float:
-    """Return the probability that a normal deviate is as far from its mean."""
-    # erfc keeps the far tail, where a distribution function rounds to 1
-    return math.erfc(abs(deviation) / math.sqrt(2.0 * variance)) if variance else 1.0

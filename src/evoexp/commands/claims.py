@@ -1,0 +1,141 @@
+"""`evoexp claims`: the papers' claims, each with its rule, its numbers and its verdict."""
+
+import argparse
+from collections.abc import Iterator
+from typing import Any, cast
+
+from rich.table import Table
+
+from evoexp.commands.console import new_table, plain_console, print_json
+from evoexp.configuration import expansions
+from evoexp.errors import NothingStored, UnknownOption
+from evoexp.registry import CLAIMS, names, registered
+from evoexp.report.claim_rules import Rule, Rules
+from evoexp.report.pages import page_of
+from evoexp.report.results import gather
+from evoexp.report.verdicts import Claim
+from evoexp.store.run_directory import outputs_root
+
+KEYS = (
+    "paper",
+    "name",
+    "claim",
+    "source",
+    "rule",
+    "evidence",
+    "n",
+    "verdict",
+    "experiment",
+    "command",
+)
+NOT_RUN = "not run"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.add_argument(
+        "papers",
+        metavar="PAPER",
+        nargs="*",
+        help=f"papers ({', '.join(names(CLAIMS))}); all of them if none is named",
+    )
+    parser.add_argument(
+        "--json", action="store_true", help=f"print JSON: a list of claims ({', '.join(KEYS)})"
+    )
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Print the claims that stored runs judge, then those that need a run."""
+    papers = {paper: _rules(paper) for paper in arguments.papers or names(CLAIMS)}
+    found = [row for paper, rules in papers.items() for row in claims_of(paper, rules)]
+    if arguments.json:
+        print_json(found)
+        return 0
+    console = plain_console()
+    for row in found:
+        console.print(_block(row))
+        console.print()
+    verdicts = [row["verdict"].split(" (")[0] for row in found]
+    counts = [f"{verdicts.count(verdict)} {verdict}" for verdict in dict.fromkeys(verdicts)]
+    console.print(f"{len(found)} claim{'s' * (len(found) != 1)}: {', '.join(counts)}")
+    return 0
+
+
+def claims_of(paper: str, rules: Rules) -> Iterator[dict[str, Any]]:
+    """Yield the claims of a paper, experiment by experiment, with `KEYS`.
+
+    A claim of an experiment of which nothing is stored says so, and names the command that runs it.
+    """
+    experiments = dict.fromkeys(name for rule in rules.values() for name in rule.experiments)
+    for experiment in experiments:
+        try:
+            for claim in judged(experiment):
+                yield _judged_row(paper, experiment, claim)
+        except NothingStored:
+            for rule in rules.values():
+                if experiment in rule.experiments:
+                    yield _unjudged_row(paper, experiment, rule.unjudged())
+
+
+def judged(name: str) -> tuple[Claim, ...]:
+    """Return the claims that an experiment's stored runs judge.
+
+    Raises:
+        NothingStored: If nothing of it has been run.
+    """
+    (experiment,) = expansions.expand([f"experiment={name}"])
+    results = gather(
+        outputs_root(),
+        experiment.conditions,
+        experiment.num_replicates,
+        experiment.name,
+        experiment.budget,
+        f"evoexp run experiment={name}",
+        experiment.options,
+    )
+    return page_of(results, experiment.report).claims
+
+
+def _rules(paper: str) -> Rules:
+    """Return the claims that are registered under the name of a paper.
+
+    Raises:
+        UnknownOption: If there is no such paper.
+    """
+    found = registered(CLAIMS, paper)
+    if found is None:
+        raise UnknownOption("paper", paper, names(CLAIMS))
+    return cast(Rules, found.load())
+
+
+def _judged_row(paper: str, experiment: str, claim: Claim) -> dict[str, Any]:
+    values = (
+        paper,
+        claim.name,
+        claim.text,
+        claim.source,
+        claim.rule,
+        claim.evidence,
+        claim.n,
+        claim.verdict,
+        experiment,
+        f"evoexp report {experiment}",
+    )
+    return dict(zip(KEYS, values, strict=True))
+
+
+def _unjudged_row(paper: str, experiment: str, rule: Rule) -> dict[str, Any]:
+    command = f"evoexp run experiment={experiment}"
+    values = (paper, rule.name, rule.claim, rule.source, rule.text, "–", "0", NOT_RUN)
+    return dict(zip(KEYS, (*values, experiment, command), strict=True))
+
+
+def _block(row: dict[str, Any]) -> Table:
+    """Return one claim as a small table: what is claimed, by which rule, from which numbers."""
+    table = new_table(f"{row['paper']} · {row['experiment']} · {row['name'] or 'claim'}")
+    table.show_header = False
+    table.add_column(no_wrap=True)
+    table.add_column(overflow="fold")
+    for key in ("claim", "source", "rule", "evidence", "n", "verdict", "command"):
+        table.add_row({"evidence": "numbers"}.get(key, key), row[key] or "–")
+    return table

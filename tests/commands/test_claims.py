@@ -1,0 +1,48 @@
+"""`evoexp claims`: every claim with rule, numbers, n and verdict, run or not."""
+
+import json
+from pathlib import Path
+
+import pytest
+from command_samples import Evoexp
+
+from evoexp.commands.claims import KEYS, NOT_RUN
+from evoexp.configuration.search_path import options
+from evoexp.registry import CLAIMS, Registration, registrations
+
+
+def test_a_claim_that_nothing_was_run_for_names_the_command(evoexp: Evoexp) -> None:
+    said = evoexp("claims", "chen")
+    assert said.code == 0
+    assert "evoexp run experiment=chen_fields" in said.out
+    assert NOT_RUN in said.out
+    assert "{" not in said.out
+
+
+def test_a_claim_is_traced_to_rule_numbers_and_n(evoexp: Evoexp, outputs: Path) -> None:
+    assert evoexp("run", "experiment=chen_fields", "--no-report").code == 0
+    rows = [
+        row
+        for row in json.loads(evoexp("claims", "chen", "--json").out)
+        if row["experiment"] == "chen_fields"
+    ]
+    assert rows
+    for row in rows:
+        assert list(row) == list(KEYS)
+        assert row["rule"].startswith("reproduced if ")
+        assert row["verdict"] in ("reproduced", "contradicted")
+        assert row["command"] == "evoexp report chen_fields"
+    assert any("nodes as printed" in row["evidence"] for row in rows)
+
+
+def test_an_unknown_paper_is_one_line(evoexp: Evoexp) -> None:
+    said = evoexp("claims", "lavoi")
+    assert said.code == 2
+    assert "paper: no option 'lavoi'; did you mean 'lavoie'?" in said.err
+
+
+@pytest.mark.parametrize("paper", registrations(CLAIMS), ids=lambda each: each.name)
+def test_every_experiment_that_a_rule_names_is_there(paper: Registration) -> None:
+    for rule in paper.load().values():
+        assert rule.experiments, rule.name
+        assert not set(rule.experiments) - set(options("experiment")), rule.name

@@ -22,6 +22,7 @@ COMMANDS = {
     "new": "write a package with a planner of your own, to begin with",
     "completion": "print a script with which the shell completes commands",
 }
+MODULES = {"list": "list_", "claims": "claim_list"}  # where a module has another name
 
 
 class CommandParser(argparse.ArgumentParser):
@@ -61,7 +62,7 @@ class CommandParser(argparse.ArgumentParser):
 
 def command_module(name: str) -> ModuleType:
     """Import the module of a command."""
-    return importlib.import_module(f"evoexp.commands.{'list_' if name == 'list' else name}")
+    return importlib.import_module(f"evoexp.commands.{MODULES.get(name, name)}")
 
 
 def command_parser(name: str) -> CommandParser:

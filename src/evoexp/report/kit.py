@@ -25,7 +25,6 @@ from evoexp.report import (
 from evoexp.report.claim_rules import read_rules
 from evoexp.report.comparisons import Values, beside, by_column, compared, compared_with_controls
 from evoexp.report.figures import convergence, shares
-from evoexp.report.figures.boxes import draw_box
 from evoexp.report.judging import Judge, evidence
 from evoexp.report.page_parts import Drawing, Page, Quantity, Table
 from evoexp.report.pages import generic
@@ -77,7 +76,6 @@ __all__ = [
     "compared_with_controls",
     "convergence",
     "counted",
-    "draw_box",
     "effort_ratio",
     "evidence",
     "expected_effort",

@@ -53,6 +53,26 @@ def test_two_motions_share_a_page_and_a_refuted_one_says_when() -> None:
     assert "touch at instant" in str(second["verdict"])
 
 
+@pytest.mark.parametrize(
+    ("certified", "kept", "margin", "badge"),
+    [
+        (True, True, 0.5, "required margin kept"),
+        (True, False, 0.5, "required margin not kept"),
+        (True, None, 0.5, "required margin undecided"),
+        (True, True, 0.0, None),  # none is required
+        (False, False, 0.5, None),  # in contact: refuted says it all
+    ],
+)
+def test_whether_the_required_margin_is_kept_is_a_badge_of_its_own(
+    certified: bool, kept: bool | None, margin: float, badge: str | None
+) -> None:
+    shown = recording("two arms")
+    verdict = shown.verdict._replace(certified=certified, certified_margin=kept)
+    (motion,) = motions(page([shown._replace(verdict=verdict, margin=margin)]))
+    assert motion["status"] == ("certified" if certified else "refuted")
+    assert motion.get("margin_text") == badge
+
+
 def test_a_title_cannot_end_the_script_or_the_head() -> None:
     shown = recording("two arms")._replace(heading=Heading("</script><b>{{motions}}&"))
     content = page([shown])

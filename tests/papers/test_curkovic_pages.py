@@ -189,6 +189,23 @@ def test_a_hall_is_judged_against_elites_in_every_corner(outputs: Path) -> None:
     assert len(drawing(found, "convergence")) == len(effort)
 
 
+@pytest.mark.matrix
+def test_headline_claims_are_judged_under_every_variation(outputs: Path) -> None:
+    found = page(outputs, "curkovic_assumptions")
+    effects, assumed = found.tables
+    conditions = [row[0] for row in effects.rows]
+    assert conditions[0] == "V"
+    assert all(label.startswith("V") for label in conditions)
+    assert len(conditions) == 13
+    judged = [claim.name for claim in found.claims[:6]]  # capped generations are as assumed
+    assert judged[1::2] == ["survives"] * 3
+    assert judged[::2] == ["faster", "hall_beyond_elites", "free_motion"]
+    varied = {row[0]: row[4] for row in assumed.rows}
+    assert varied["`ga.population_size`"] == "V, 50 individuals; V, 200 individuals"
+    twins = [claim.evidence for claim in found.claims if claim.name != "survives"]
+    assert not any("nothing to compare" in told for told in twins)
+
+
 def condition_of(outputs: Path, costs: np.ndarray, refuted: np.ndarray) -> ConditionResults:
     """Return stored runs with other costs and verdicts."""
     own = smoke_results(outputs, "curkovic_motion").conditions[0]

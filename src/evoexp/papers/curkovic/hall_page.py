@@ -218,6 +218,7 @@ def of_corner(
         shares: What elites explain of the hall's gain, in words.
     """
     who, hall = f"{corner.name}: ", corner.hall
+    elites = " and than ".join(c.label.rpartition(", ")[2] for c in corner.elites)
     over_nothing = compared([(hall, corner.nothing)], values, settings)
     over_elites = compared([(hall, c) for c in corner.elites], values, settings)
     told = "; ".join(
@@ -227,7 +228,7 @@ def of_corner(
         judge.on("hall_helps", who=who, measure=name).better(
             next(iter(over_nothing), None), "lower"
         ),
-        judge.on("hall_beyond_elites", who=who, measure=name).better_than_all(
+        judge.on("hall_beyond_elites", who=who, elites=elites, measure=name).better_than_all(
             told + shares, over_elites
         ),
     ]

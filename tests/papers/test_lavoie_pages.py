@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from evoexp.numeric.elementary import DEGREE
-from evoexp.papers.lavoie import measures
+from evoexp.papers.lavoie import assumptions_page, measures
 from evoexp.papers.lavoie.figures import attempts, error_distribution, reaching_motions
 from evoexp.papers.lavoie.figures.reaching_motions import ShownMotion
 from evoexp.paths.motion import Motion
@@ -17,7 +17,7 @@ from evoexp.report.figures import shares
 from evoexp.report.pages import page_of
 from evoexp.report.proportions import Proportion
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import ConditionResults, Results
+from evoexp.report.results import ConditionResults, Results, gather
 from report_samples import (
     REPORT,
     figure_stems,
@@ -25,6 +25,7 @@ from report_samples import (
     smoke_experiment,
     smoke_report,
     smoke_results,
+    store,
 )
 
 
@@ -82,6 +83,7 @@ def test_no_generation_is_read(outputs: Path, monkeypatch: pytest.MonkeyPatch) -
         ("lavoie_stopping", {"shares", "values", "effects", "stopping"}),
         ("lavoie_coding", {"shares", "values", "effects"}),
         ("lavoie_controls", {"shares", "values", "effects"}),
+        ("lavoie_sweeps_positions", {"shares", "values", "effects"}),
     ],
 )
 def test_sweeps_have_figures_and_a_row_of_shares_per_condition(
@@ -93,11 +95,42 @@ def test_sweeps_have_figures_and_a_row_of_shares_per_condition(
     for label, _ in smoke_experiment(name).conditions:
         assert f"| {label}: shares of runs |" in text
     table = pd.read_csv(directory / "shares.csv")
-    quantities = ["touch an obstacle", "on SP1", "on SP2"]
-    if name != "lavoie_controls":
-        quantities = ["error below 1", "with a solution", "touch an obstacle"]
+    quantities = ["error below 1", "with a solution", "touch an obstacle"]
+    if name == "lavoie_sweeps_positions":
+        quantities = ["touch an obstacle", "on SP1", "on SP2"]
     assert list(dict.fromkeys(table["quantity"])) == quantities
-    assert ("weak evidence" in text) == (name != "lavoie_controls")
+    compares_settings = name in ("lavoie_stopping", "lavoie_coding")
+    assert ("weak evidence" in text) == compares_settings
+
+
+@pytest.mark.matrix
+def test_headline_claims_are_judged_under_every_other_number(outputs: Path) -> None:
+    name = "lavoie_assumptions"
+    experiment = smoke_experiment(name)
+    store(outputs, experiment)
+    results = gather(
+        *(outputs, experiment.conditions, experiment.num_replicates, name, experiment.budget, ""),
+        experiment.options,
+    )
+    page = assumptions_page.page(results, page_settings(name))
+    effects, numbers = page.tables
+    changed = {str(row[0]): row[1] for row in effects.rows}
+    assert list(changed) == [label for label, _ in experiment.conditions]
+    assert {label for label, names in changed.items() if names == "as assumed"} == {
+        "7-DOF",
+        "10-DOF",
+    }
+    assert changed["10-DOF, long lips"].startswith("`scenario.obstacles[3].center`, ")
+    assert "`scenario.box_x`" in changed["narrow box"]
+    rows = {str(row[0]): row for row in numbers.rows}
+    assert rows["`ga.mutation_power`"][4] == "b = 1; b = 5"
+    texts = [claim.text for claim in page.claims]
+    assert texts[0] == "7-DOF: a position error below 1 in 93.5 % of runs"
+    assert texts[1] == f"{texts[0]} — whatever number is assumed"
+    assert len(texts) == 2 * 2 * 3, "arms × (as assumed, survives) × headlines"
+    survives = page.claims[1]
+    assert survives.n == "13 variations"
+    assert len(page.drawings[0].table()) == 3 * len(experiment.conditions)
 
 
 def test_a_sweep_of_one_condition_is_the_page_itself(outputs: Path) -> None:

@@ -27,7 +27,8 @@ from evoexp.report.comparisons import Values, beside, by_column, compared, compa
 from evoexp.report.figures import convergence, shares
 from evoexp.report.judging import Judge, evidence
 from evoexp.report.page_parts import Drawing, Page, Quantity, Table
-from evoexp.report.pages import generic
+from evoexp.report.pages import assumptions, generic
+from evoexp.report.pages.assumptions import Headline
 from evoexp.report.parameters import overridden, parameters, planned_replicates
 from evoexp.report.proportions import Proportion, fisher_exact, newcombe
 from evoexp.report.report_settings import ReportSettings
@@ -60,6 +61,7 @@ __all__ = [
     "Comparison",
     "ConditionResults",
     "Drawing",
+    "Headline",
     "Interval",
     "Judge",
     "Page",
@@ -69,6 +71,7 @@ __all__ = [
     "Results",
     "Table",
     "Values",
+    "assumptions",
     "beside",
     "body_contacts",
     "by_column",

@@ -117,7 +117,9 @@ def _checks(
         if not c.is_control:
             texts.append(f"mean attempts: {c.column('term_attempts').mean():.2f}")
         rows.append((f"{c.label}: shares of runs", "; ".join(texts)))
-    return (*rows, *([] if _paths_differ(results) else _weak_evidence(results, settings)))
+    others = any(c.is_control or c.planner.collision.blind for c in results.with_data)
+    weak = () if others or _paths_differ(results) else _weak_evidence(results, settings)
+    return *rows, *weak
 
 
 def _weak_evidence(results: Results, settings: ReportSettings) -> Iterator[tuple[str, str]]:
@@ -146,8 +148,9 @@ def _weak_evidence(results: Results, settings: ReportSettings) -> Iterator[tuple
 
 
 def _paths_differ(results: Results) -> bool:
-    """Return whether conditions differ in their test of paths for collision."""
-    return len({c.planner.collision for c in results.with_data}) > 1
+    """Return whether conditions differ in the places at which they test paths for collision."""
+    collisions = (c.planner.collision for c in results.with_data)
+    return len({(model.num_positions, model.swept) for model in collisions}) > 1
 
 
 def _drawings(

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+from matplotlib.ticker import MultipleLocator
 
 from evoexp.records import FloatArray
 from evoexp.report import style
@@ -75,7 +76,8 @@ def draw_shares(table: pd.DataFrame, label: str = "share of runs [%]") -> Figure
                     100 * printed, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1
                 )
             axes.set_xlim(*ranges[quantity])
-        axes.xaxis.set_major_locator(style.few_ticks())
+        whole = len(own) and np.ptp(ranges[quantity]) > 100.0
+        axes.xaxis.set_major_locator(MultipleLocator(25.0) if whole else style.few_ticks())
         axes.set_xlabel(label)
         axes.set_title(quantity, fontsize=7.5)
     panels[0].set_yticks(list(rows_of.values()), [labels[position] for position in rows_of])

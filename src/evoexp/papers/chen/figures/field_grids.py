@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
@@ -20,6 +21,7 @@ from evoexp.records import FloatArray
 from evoexp.report.kit import groups, records, style
 
 BLOCKED = "*"
+MOST_LEVELS = 10  # of a map whose colour bar shows them one by one
 WRONG, MISSING, SURPLUS = "wrong", "missing", "surplus"
 NAMES = {
     WRONG: "another number is printed (below, small)",
@@ -110,10 +112,19 @@ def draw_maps(table: pd.DataFrame) -> Figure:
     for axes, (name, rows) in zip(panels, groups(table, "field"), strict=True):
         wide = rows.pivot_table(index="y", columns="x", values="value", dropna=False)
         image = wide.to_numpy(dtype=np.float64)
-        shown = axes.imshow(image, origin="lower", cmap="viridis", interpolation="nearest")
+        look: dict[str, Any] = {"cmap": "viridis", "interpolation": "nearest", "origin": "lower"}
+        levels = np.unique(image[np.isfinite(image)])
+        if 1 < len(levels) <= MOST_LEVELS:  # a colour and a tick for each number that there is
+            middles = 0.5 * (levels[1:] + levels[:-1])
+            ends = 2.0 * levels[0] - middles[0], 2.0 * levels[-1] - middles[-1]
+            look["norm"] = BoundaryNorm([ends[0], *middles, ends[1]], 256)
+        shown = axes.imshow(image, **look)
         bar = figure.colorbar(shown, ax=axes, label="potential [–]", shrink=0.75)
         for axis in (axes.xaxis, axes.yaxis, bar.ax.yaxis):
             axis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
+        if "norm" in look:
+            bar.set_ticks(levels.tolist())
+            bar.minorticks_off()
         axes.grid(visible=False)
         axes.set(title=str(name), xlabel="x [node]", ylabel="y [node]", facecolor=style.NEUTRAL)
     return figure

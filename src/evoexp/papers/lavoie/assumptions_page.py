@@ -1,0 +1,75 @@
+"""The assumed numbers of Lavoie & Boudreau 2001, and which headline claims survive others."""
+
+from functools import partial
+
+from evoexp.papers.lavoie import claims, measures
+from evoexp.papers.lavoie.rules import RULES
+from evoexp.report.kit import (
+    Claim,
+    ConditionResults,
+    Headline,
+    Judge,
+    Page,
+    ReportSettings,
+    Results,
+    assumptions,
+    by_column,
+    counted,
+    generic,
+    solved,
+)
+
+Controls = tuple[ConditionResults, ...]
+
+
+def page(results: Results, settings: ReportSettings) -> Page:
+    """Build the page of assumed numbers, or the generic page if another planner was run."""
+    if not measures.fits(results):
+        return generic.page(results, settings)
+    level, unit = settings.confidence, results.with_data[0].condition.length_unit
+    headlines = (
+        Headline(
+            "share_below",
+            f"position error [{unit}]",
+            measures.errors,
+            partial(_share_below, level=level),
+        ),
+        Headline(
+            "no_start",
+            "evaluations to a solution",
+            measures.effort,
+            partial(_no_start, level=level),
+        ),
+        Headline(
+            "free_of_collision",
+            f"clearance [{unit}]",
+            by_column("clearance"),
+            partial(_free_of_collision, level=level),
+        ),
+    )
+    return assumptions.page(results, settings, RULES, "Lavoie & Boudreau 2001", headlines)
+
+
+def _share_below(
+    judge: Judge, condition: ConditionResults, controls: Controls, level: float
+) -> Claim:
+    """Judge the percentage that is printed for errors below 1, the least bound."""
+    return _unnamed(claims.percentages(judge, [condition], level)[0], condition)
+
+
+def _no_start(judge: Judge, condition: ConditionResults, controls: Controls, level: float) -> Claim:
+    found = claims.no_start_needed(judge, condition, level)
+    assert found is not None, "the paper prints percentages for arms of seven and of ten joints"
+    return _unnamed(found, condition)
+
+
+def _free_of_collision(
+    judge: Judge, condition: ConditionResults, controls: Controls, level: float
+) -> Claim:
+    refuted = counted(measures.touches(condition)[solved(condition)])
+    return _unnamed(claims.free_of_collision(judge, condition, refuted, level), condition)
+
+
+def _unnamed(claim: Claim, condition: ConditionResults) -> Claim:
+    """Return a claim without the name of its condition, which the page puts before it."""
+    return claim._replace(text=claim.text.removeprefix(f"{condition.label}: "))

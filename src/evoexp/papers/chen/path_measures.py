@@ -10,8 +10,6 @@ from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.records import FloatArray
 from evoexp.report.kit import ConditionResults, Results, planned_by, run_measures
 
-NEAR = 0.05  # [-] "nearly shortest": a length within 5 % of the shortest one
-MUCH = 0.25  # [-] "much longer": a length more than 25 % above the shortest one
 # name of a route (A, B, …; A is the most frequent) → keys of its paths
 Routes = dict[str, tuple[Any, ...]]
 
@@ -23,7 +21,7 @@ class Group(NamedTuple):
         name: Label of the first condition: (a), (b), …, as in the paper's Fig. 2.
         weights: ε and λ.
         revisits: Whether nodes may be passed again.
-        conditions: GA first, then with elitism, then random search; without the reference.
+        conditions: GA first, then with elitism, then the controls; without the reference.
         truth: The reference; None if it has no data.
     """
 
@@ -96,6 +94,12 @@ def shortest(groups: tuple[Group, ...]) -> float:
 def gaps(condition: ConditionResults, truth: float) -> FloatArray:
     """Return the gap of each run's cost above a known cost, (done,) [%]."""
     return np.asarray(np.round(100.0 * (condition.column("best_cost") / truth - 1.0), 9))
+
+
+def cost_of(truth: ConditionResults, weights: tuple[float, float]) -> float:
+    """Return the cost of a reference's best path by other weights ε and λ."""
+    terms = (float(truth.column(f"term_{name}")[0]) for name in ("distance", "unsafeness"))
+    return sum(weight * term for weight, term in zip(weights, terms, strict=True))
 
 
 def paths(condition: ConditionResults) -> dict[int, FloatArray]:

@@ -172,6 +172,54 @@ def advance(
 
 
 @kernel
+def climb(
+    draws: Block,
+    first: int,
+    last: int,
+    world: World,
+    weights: tuple[float, float],
+    erase: bool,
+    population: Population,
+    candidate: Population,
+    scratch: Scratch,
+) -> int:
+    """Regenerate a piece of one path after the other as mutation does; keep what costs no more.
+
+    Args:
+        draws: Uniform numbers.
+        first: Number of the first trial: trial k changes path k modulo the number of paths.
+        last: Number behind the last trial.
+        world: Grid and fields.
+        weights: ε and λ of Eq. 1.
+        erase: Whether loops are erased.
+        population: Paths and their results, changed.
+        candidate: Scratch of one path.
+        scratch: Of the operators.
+
+    Returns:
+        The number of the next trial: less than `last` if the draws did not suffice.
+    """
+    draws, world, population, candidate, scratch = borrowed(
+        (draws, world, population, candidate, scratch)
+    )
+    paths, results = population
+    path, values = candidate.paths[0], candidate.results
+    for trial in range(first, last):
+        before, k = draws.taken[0], trial % len(paths)
+        copy_path(paths[k], path)
+        mutate(draws, world, erase, path, scratch)
+        if used_up(draws):
+            draws.taken[0] = before
+            return trial
+        measure(path, world, weights, values, 0)
+        if values[COST, 0] <= results[COST, k]:
+            copy_path(path, paths[k])
+            for row in range(RESULTS):
+                results[row, k] = values[row, 0]
+    return last
+
+
+@kernel
 def copy_paths(paths: NodeArray, out: NodeArray) -> None:
     """Copy paths into another table, whatever the width of either."""
     paths, out = borrowed((paths, out))

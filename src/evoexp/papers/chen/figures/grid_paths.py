@@ -230,7 +230,8 @@ def gaps_table(found: tuple[Group, ...]) -> pd.DataFrame:
     """Return every run's gap to the best path known.
 
     Returns:
-        Columns panel, position, condition, replicate, gap_percent.
+        Columns panel, position, condition, replicate, gap_percent, bound_percent (gap of the bound
+        below all paths).
     """
     parts = [
         pd.DataFrame(
@@ -240,6 +241,7 @@ def gaps_table(found: tuple[Group, ...]) -> pd.DataFrame:
                 "condition": _name(c, group),
                 "replicate": c.summaries.index,
                 "gap_percent": gaps(c, group.optimum),
+                "bound_percent": 100.0 * (group.bound / group.optimum - 1.0),
             }
         )
         for group in found
@@ -251,16 +253,20 @@ def gaps_table(found: tuple[Group, ...]) -> pd.DataFrame:
 def draw_gaps(table: pd.DataFrame) -> Figure:
     """Draw the share of runs whose gap is at most x, one panel per weighting."""
     figure, panels = style.row_of_panels(2.5, table["panel"].nunique(), sharey=True)
+    most = 1.03 * float(table["gap_percent"].max())
+    limits = min(float(table["bound_percent"].min()), -0.03 * most), most  # of all panels
     for axes, (name, rows) in zip(panels, groups(table, "panel"), strict=True):
         for (position, kind), own in groups(rows, ["position", "condition"]):
             values = np.sort(own["gap_percent"].to_numpy())
             x, steps = [min(values[0], 0.0), *values], np.arange(len(values) + 1) / len(values)
             colour = style.condition_colour(int(position))
             axes.step(x, 100.0 * steps, where="post", color=colour, label=str(kind))
-        axes.axvline(0.0, color=style.NEUTRAL, linewidth=1.0, linestyle=":")
-        axes.set(title=str(name), xlabel="cost above best known [%]")
+        look: dict[str, Any] = {"color": style.NEUTRAL, "linewidth": 1.0}
+        axes.axvline(0.0, linestyle=":", label=KNOWN, **look)
+        axes.axvline(rows["bound_percent"].iloc[0], linestyle="-.", label=BOUND, **look)
+        axes.set(title=str(name), xlabel="cost above best known [%]", xlim=limits)
     panels[0].set_ylabel("share of runs [%]")
-    style.legend_below(figure, panels[0], len(set(table["condition"])))
+    style.legend_below(figure, panels[0], 3)
     return figure
 
 

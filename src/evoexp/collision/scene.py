@@ -7,11 +7,11 @@ motions and threads.
 
 from typing import Any, NamedTuple
 
-import coal
 import numpy as np
 import pinocchio as pin
 
 from evoexp.collision.body_table import BodyTable, body_table
+from evoexp.collision.box_support import coal
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.kinematics import KinematicTable, kinematic_table

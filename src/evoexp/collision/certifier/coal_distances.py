@@ -3,10 +3,10 @@
 import threading
 from typing import Any, NamedTuple
 
-import coal
 import numpy as np
 import pinocchio as pin
 
+from evoexp.collision.box_support import coal
 from evoexp.collision.scene import Scene
 from evoexp.errors import EvoexpError
 from evoexp.paths.motion import Motion

@@ -7,10 +7,10 @@ distance by which it reaches beyond the body, bounded from above for every body.
 from itertools import product
 from typing import Any, NamedTuple
 
-import coal
 import numpy as np
 
 from evoexp.collision.body_table import UnsupportedShape
+from evoexp.collision.box_support import coal
 from evoexp.records import FloatArray
 
 # of one body that is neither ball nor capsule; where they do not suffice, the inflation grows

@@ -7,11 +7,11 @@ on coal's geometry.
 
 from typing import Any, ClassVar, NamedTuple
 
-import coal
 import numpy as np
 import pinocchio as pin
 
 from evoexp.collision.body_table import body_table
+from evoexp.collision.box_support import coal
 from evoexp.collision.models.body_covers import Cover, capsule_cover, sphere_cover
 from evoexp.collision.models.primitive_tables import Shapes
 from evoexp.collision.models.primitives import PrimitiveCollision

@@ -4,9 +4,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
 
 from evoexp.report import style
-from evoexp.report.figures import convergence, effects, shares
+from evoexp.report.figures import convergence, effects, matrix, shares
 from evoexp.report.figures.boxes import draw_box
 from evoexp.report.proportions import Proportion
 
@@ -145,3 +146,25 @@ def test_a_legend_takes_as_many_columns_as_fit(length: int, columns: int) -> Non
     assert len(legend.get_texts()) == 6
     assert legend._ncols == columns
     assert legend.get_window_extent().width <= figure.bbox.width or columns == 1
+
+
+@pytest.mark.parametrize(
+    ("count", "name"), [(3, "c{}"), (9, "05cccfce1d2{}"), (5, "w" * 40 + "{}")]
+)
+def test_names_beside_a_matrix_are_not_cut_off(count: int, name: str) -> None:
+    labels = [name.format(k) for k in range(count)]
+    pairs = [(a, b, 0.6, 0.5, 0.7, 0.2, 20) for a in labels for b in labels if a != b]
+    names = ["condition", "other", "a12", "lower", "upper", "p_adjusted", "seeds"]
+    table = pd.DataFrame(pairs, columns=names).assign(significance=0.05)
+    kept: list[Figure] = []
+
+    def draw() -> Figure:
+        kept.append(matrix.draw_matrix(table))
+        return kept[0]
+
+    style.drawn(draw, ("png",), 100)
+    for axes in kept[0].axes:
+        for text in (*axes.get_yticklabels(), *axes.get_xticklabels(), axes.yaxis.label):
+            box = text.get_window_extent()
+            assert box.x0 >= 0.0, text.get_text()
+            assert box.x1 <= kept[0].bbox.width

@@ -54,9 +54,9 @@ def draw_matrix(table: pd.DataFrame) -> Figure:
         f"{k}  {label if len(label) <= LONGEST else f'{label[: LONGEST - 1]}…'}"
         for k, label in enumerate(labels, 1)
     ]
-    beside = LETTER * max(map(len, names)) + 1.2  # [inch] of names and colour bar
+    beside = LETTER * max(map(len, names)) + 1.5  # [inch] of names and colour bar
     width = max(NARROWEST, SIZE * count + beside)
-    figure = style.figure(SIZE * count + 0.9, width)
+    figure = style.figure(SIZE * count + 0.7, width)
     axes = figure.subplots()
     image = axes.imshow(a12, cmap="RdBu", vmin=0.0, vmax=1.0)
     # numbers, white in dark cells

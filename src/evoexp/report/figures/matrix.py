@@ -13,7 +13,7 @@ from evoexp.report.verdicts import Comparison
 
 SIZE = 0.44  # [inch] of a cell
 LONGEST = 28  # characters of a name beside the matrix
-LETTER = 0.065  # [inch] of a character of it
+BESIDE = 1.4  # [inch] of the colour bar with its words, and of gaps
 NARROWEST = 3.2  # [inch] of the figure
 BAR = 0.14  # [inch] width of the colour bar
 LUMINANCE = (0.2126, 0.7152, 0.0722)  # of red, green and blue (ITU-R BT.709)
@@ -54,9 +54,7 @@ def draw_matrix(table: pd.DataFrame) -> Figure:
         f"{k}  {label if len(label) <= LONGEST else f'{label[: LONGEST - 1]}…'}"
         for k, label in enumerate(labels, 1)
     ]
-    beside = LETTER * max(map(len, names)) + 1.5  # [inch] of names and colour bar
-    width = max(NARROWEST, SIZE * count + beside)
-    figure = style.figure(SIZE * count + 0.7, width)
+    figure = style.figure(SIZE * count + 0.7, NARROWEST)
     axes = figure.subplots()
     image = axes.imshow(a12, cmap="RdBu", vmin=0.0, vmax=1.0)
     # numbers, white in dark cells
@@ -72,6 +70,10 @@ def draw_matrix(table: pd.DataFrame) -> Figure:
     axes.tick_params(length=0)
     axes.grid(visible=False)
     axes.set_xlabel(f"bold: adjusted p < {significance:g}")
+    # the figure as wide as its names need, and its colour bar beside it
+    longest = max(name.get_window_extent().width for name in axes.get_yticklabels()) / figure.dpi
+    width = max(NARROWEST, SIZE * count + longest + BESIDE)
+    figure.set_figwidth(width)
     bar: dict[str, Any] = {"fraction": BAR / width, "aspect": SIZE * count / BAR}
     figure.colorbar(image, ax=axes, label="A12: the row is better", ticks=[0.0, 0.5, 1.0], **bar)
     return figure

@@ -24,6 +24,7 @@ from evoexp.report.pages import assumptions
 from evoexp.report.pages.assumptions import Headline
 
 EFFORT = "evaluations to a team whose cost is the threshold"
+CLEARANCE = "least clearance of the bodies (exact; 0: contact)"
 METHOD, PLAIN, ELITES = "V", "I", "15 elites"
 
 
@@ -40,7 +41,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
             by_column("best_cost"),
             partial(_beyond_elites, results, settings),
         ),
-        Headline("free_motion", "refuted motions (1: refuted)", measures.refuted, _free),
+        Headline("free_motion", CLEARANCE, by_column("clearance"), _free),
     )
     own = tuple(c for c in results.conditions if _treatment(c) == METHOD)
     method = results._replace(conditions=own)
@@ -66,10 +67,14 @@ def _against(
     other: str,
     values: Values,
 ) -> tuple[Comparison, ...]:
-    """Compare method V with another treatment under the same numbers, if that was run."""
+    """Compare method V with another treatment under the same numbers.
+
+    Numbers of the hall are no numbers of a treatment without one: that is as assumed then.
+    """
     _, comma, changed = condition.label.partition(", ")
-    twins = [c for c in results.with_data if c.label == f"{other}{comma}{changed}"]
-    return compared([(condition, twin) for twin in twins], values, settings)
+    by_label = {c.label: c for c in results.with_data}
+    twin = by_label.get(f"{other}{comma}{changed}", by_label.get(other))
+    return compared([] if twin is None else [(condition, twin)], values, settings)
 
 
 def _faster(
@@ -107,7 +112,7 @@ def _free(
     judged = condition.done - condition.verdicts.undecided
     hearing = judge.on(
         "free_motion",
-        condition=METHOD,
+        condition="Figs. 8, 9",
         scene="a collision-free motion of two robots in each other's way",
         judge="the exact verdict on the whole motion",
         where="section 4, Figs. 8, 9",

@@ -102,7 +102,7 @@ def _comparisons(
 
 def _value(measure: Measure, condition: ConditionResults) -> str:
     found = hall_shares.of_all_runs(measure, condition)
-    return markdown.number(np.exp(found) if measure.short == EFFORT else found)
+    return markdown.number(float(np.rint(np.exp(found))) if measure.short == EFFORT else found)
 
 
 def _told(share: Share) -> str:

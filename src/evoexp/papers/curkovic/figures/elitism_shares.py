@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from evoexp.report.kit import groups, style
 
 COLUMNS = ["measure", "corner", "elites", "share", "lower", "upper"]
-WRAPPED = 26  # characters of a quantity's name, per line
+WRAPPED = 16  # characters of a quantity's name, per line
 EDGES = (-0.6, 2.6)  # shares beyond stand at the edge, as arrows
 ALL = 1.0  # elites gain as much as the hall does
 

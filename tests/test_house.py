@@ -22,6 +22,7 @@ ROLES = (
     "settings.py",
     "page.py",
     "sweep_page.py",
+    "assumptions_page.py",
     "measures.py",
     "claims.py",
     "rules.py",

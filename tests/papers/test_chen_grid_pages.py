@@ -105,7 +105,8 @@ def test_the_page_of_fig_1_names_every_slip(outputs: Path) -> None:
     text = (directory / "index.md").read_text()
     assert "255 of 256 nodes as printed" in text
     assert "row 9 from the top, column 13: 17 for 13" in text
-    assert "row 6 from the top, column 5: 9 is left out" in text
+    missing = "row 6 from the top, column 5: 9 is left out (or any equal one of columns 5 to 7)"
+    assert missing in text
 
 
 @pytest.mark.parametrize("figures", ["chen_path", "chen_lingering", "chen_fields"])

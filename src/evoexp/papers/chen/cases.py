@@ -23,17 +23,25 @@ class PrintedPosture(NamedTuple):
         term: Name of the printed number, as the planner's `evaluate` names it.
         value: The number; NaN if only angles are printed.
         angles: θ1, θ2 [deg]; None if they are not printed.
+        torques: τ1, τ2, τ3; None if they are not printed.
+        ratio: Greatest over least torque, by size; NaN if it is not printed.
     """
 
     figure: str
     term: str
     value: float
     angles: tuple[float, float] | None = None
+    torques: tuple[float, float, float] | None = None
+    ratio: float = np.nan
 
 
 PRINTED = {
-    "least torque norm": PrintedPosture("Fig. 4", "torque_norm", 1.73),
-    "minimax torque": PrintedPosture("Fig. 5", "torque_max", 0.90, (68.96, 41.74)),
+    "least torque norm": PrintedPosture(
+        "Fig. 4", "torque_norm", 1.73, torques=(-0.61, 1.13, -0.3), ratio=3.73
+    ),
+    "minimax torque": PrintedPosture(
+        "Fig. 5", "torque_max", 0.90, (68.96, 41.74), torques=(-0.90, 0.90, -0.87)
+    ),
     "obstacle and link 2": PrintedPosture("Fig. 6", "torque_norm", 2.08),
     "obstacle and platform": PrintedPosture("Fig. 7", "torque_norm", 3.01),
     "manipulability and torque": PrintedPosture("Fig. 8", "cost", np.nan, (114.24, -36.93)),
@@ -104,6 +112,16 @@ class Case(NamedTuple):
     def measured(self, angles: Any) -> dict[str, float]:
         """Return the named terms of the posture θ1, θ2 [deg]; see `PlacementGa.evaluate`."""
         return self.conditions[0].evaluate(np.asarray(angles, dtype=np.float64))
+
+    def torques(self, angles: Any) -> FloatArray:
+        """Return τ1, τ2, τ3 of the posture θ1, θ2 [deg]."""
+        found = self.measured(angles)
+        return np.array([found[f"torque_{k}"] for k in (1, 2, 3)])
+
+    def mirrored(self) -> list[FloatArray]:
+        """Return the angles θ1, θ2 [deg] of all optima: mirror images cost the same."""
+        best = self.minima[:, 2] <= self.least * (1.0 + 1e-9)
+        return [row[:2] for row in self.minima[best]]
 
     def ends(self) -> dict[str, FloatArray]:
         """Return the postures at which local methods end.

@@ -1,6 +1,7 @@
 """Chen & Zalzala 1995, Fig. 1: two numerical potential fields, and the slips of their print."""
 
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -86,8 +87,24 @@ def _claim(judge: Judge, name: str, table: pd.DataFrame) -> Claim:
 def _slips(name: str, table: pd.DataFrame) -> tuple[str, str]:
     """Return the row of checks on a field: its slips in words."""
     slips = records(table[table["slip"] != ""])
-    told = "; ".join(SLIPS[row.slip].format(row).replace("*", "\\*") for row in slips)
+    told = "; ".join(
+        (SLIPS[row.slip].format(row) + _alike(row, table)).replace("*", "\\*") for row in slips
+    )
     return f"Slips of the print, Fig. 1{name} (counted from 0)", told or "none"
+
+
+def _alike(slip: Any, table: pd.DataFrame) -> str:
+    """Name the equal neighbours of a number left out: it may be any of them that is missing."""
+    if slip.slip != field_grids.MISSING:
+        return ""
+    own = table[(table["row"] == slip.row) & (table["slip"] != field_grids.SURPLUS)]
+    words = own.sort_values("column")["computed"].to_list()
+    first = last = int(slip.column)
+    while first > 0 and words[first - 1] == slip.computed:
+        first -= 1
+    while last < len(words) - 1 and words[last + 1] == slip.computed:
+        last += 1
+    return f" (or any equal one of columns {first} to {last})" if first < last else ""
 
 
 def _numbers(condition: ConditionResults, table: pd.DataFrame) -> Drawing:

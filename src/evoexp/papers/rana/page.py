@@ -3,6 +3,7 @@
 import numpy as np
 
 from evoexp.papers.rana import drawings, measures, motions, operators_page
+from evoexp.papers.rana.claims import evolution_told
 from evoexp.papers.rana.drawings import AT, BETWEEN, MeasuredMotions, measure
 from evoexp.papers.rana.rules import RULES
 from evoexp.planners.via_point_ga.strings import Problem
@@ -15,7 +16,6 @@ from evoexp.report.kit import (
     Results,
     beside,
     by_column,
-    compared,
     compared_with_controls,
     generic,
     judging,
@@ -176,37 +176,14 @@ def _evolution_claim(
     """Judge what evolution adds to every control, and tell how much to the best of them."""
     c = one.condition
     controls = [k for k in results.evolved if k.is_control and beside(c.condition, k.condition)]
-    rows = {row.quantity: row for row in compared([(c, k) for k in controls], COST, settings)}
-    shown = [k for k in controls if k.label in rows]
-    shown.sort(key=lambda k: float(np.median(COST(k))))
-    fitness = ", ".join(
-        f"{k.label} {markdown.spread(k.spread('term_fitness'))}" for k in (c, *shown)
-    )
-    straight = markdown.number(c.evaluate(motions.straight_line(c))["fitness"])
-    told = [f"fitness F: {fitness}, straight line {straight}"]
-    for place, k in enumerate(shown):
-        row = rows[k.label]
-        gain = markdown.number(-row.median_difference)
-        which = f"the best control, {k.label}" if place == 0 else k.label
-        told.append(f"to {which}, evolution adds {gain} in the median: {_evidence(row)}")
-    if not shown:
-        told.append("no control beside it")
+    told, rows = evolution_told(c, controls, settings)
     hearing = judge.on("evolution_adds", who=_who(results, one))
-    return hearing.better_than_all("; ".join(told), list(rows.values()))
+    return hearing.better_than_all(told, rows)
 
 
 def _who(results: Results, one: MeasuredMotions) -> str:
     """Return the label that begins a line about a condition, or nothing if there is one only."""
     return f"{one.condition.label}: " if len(results.main) > 1 else ""
-
-
-def _evidence(comparison: verdicts.Comparison) -> str:
-    low, high = comparison.better.interval
-    return (
-        f"at equal evaluations the best cost is lower in {100 * comparison.better.a12:.0f} % of "
-        f"pairs of runs (A12 {comparison.better.a12:.3f} [{low:.3f}, {high:.3f}]), p = "
-        f"{markdown.p_value(comparison.p_adjusted)} on {comparison.num_seeds} common seeds"
-    )
 
 
 def _checks(one: MeasuredMotions) -> list[tuple[str, str]]:

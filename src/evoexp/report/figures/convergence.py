@@ -204,3 +204,4 @@ def _evaluations_above(axes: Axes, table: pd.DataFrame) -> None:
 
     above = axes.secondary_xaxis("top", functions=(forward, backward))
     above.set_xlabel("evaluations")
+    above.xaxis.set_major_locator(style.few_ticks())

@@ -21,6 +21,10 @@ CLOSEST: dict[str, tuple[str, dict[str, Any]]] = {  # pairs of points: name, loo
     "bodies": ("the links", {"color": style.ARM_COLOURS[3], "ls": ":"}),
 }
 NUMBERED = 5  # every fifth via-point carries its number
+NUMBER_OFFSET, NUMBER_ROOM = (
+    10.0,
+    0.07,
+)  # [points], [-] of the path's extent: from via-point to number
 
 
 def arms_table(condition: ConditionResults) -> pd.DataFrame:
@@ -229,24 +233,34 @@ def _angle(axes: Axes, row: Any) -> None:
 
 
 def _numbers(axes: Axes, x: FloatArray, y: FloatArray, instants: np.ndarray) -> None:
-    """Write the number of every fifth via-point, the start and the goal beside it."""
+    """Write the number of every fifth via-point, the start and the goal where there is room.
+
+    Of eight places around a via-point the one is taken that is farthest from all via-points and
+    from the numbers that stand there already.
+    """
     halo = withStroke(linewidth=2.0, foreground="white")
+    size = max(float(np.ptp(x)), float(np.ptp(y)), 1e-9)
+    taken = [np.array([a, b]) for a, b in zip(x, y, strict=True)]
+    angles = [sincos(DEGREE * 45.0 * k) for k in range(8)]
     for k, instant in enumerate(instants):
-        if instant % NUMBERED == 0 or k == len(instants) - 1:
-            after, before = min(k + 1, len(x) - 1), max(k - 1, 0)
-            along = np.array([x[after] - x[before], y[after] - y[before]])
-            side = 9.0 * np.array([-along[1], along[0]]) / max(float(np.linalg.norm(along)), 1e-9)
-            axes.annotate(
-                str(instant),
-                (x[k], y[k]),
-                xytext=tuple(side),
-                textcoords="offset points",
-                ha="center",
-                va="center",
-                fontsize=7,
-                path_effects=[halo],
-                zorder=6,
-            )
+        if instant % NUMBERED and k < len(instants) - 1:
+            continue
+        here = np.array([x[k], y[k]])
+        places = [here + NUMBER_ROOM * size * np.array([c, s]) for s, c in angles]
+        best = int(np.argmax([min(np.linalg.norm(at - t) for t in taken) for at in places]))
+        s, c = angles[best]
+        taken.append(places[best])
+        axes.annotate(
+            str(instant),
+            (x[k], y[k]),
+            xytext=(NUMBER_OFFSET * c, NUMBER_OFFSET * s),
+            textcoords="offset points",
+            ha="center",
+            va="center",
+            fontsize=7,
+            path_effects=[halo],
+            zorder=6,
+        )
 
 
 def _closest(centres: list[FloatArray]) -> tuple[FloatArray, FloatArray]:

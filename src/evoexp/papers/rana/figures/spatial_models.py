@@ -6,6 +6,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import MaxNLocator
 
 from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.papers.rana import motions
@@ -139,7 +141,14 @@ def draw_snapshots(table: pd.DataFrame) -> Figure:
     lines = -(-len(stages) // 3)
     figure = style.figure(2.1 * lines + 0.4)
     for k, stage in enumerate(stages):
-        axes = _space(figure, (lines, 3, k + 1), [table], table["length_unit"].iloc[0], zoom=1.08)
+        axes = _space(
+            figure,
+            (lines, 3, k + 1),
+            [table],
+            table["length_unit"].iloc[0],
+            zoom=1.08,
+            label_pad=-7.0,
+        )
         rows = table[table["stage"] == stage]
         first, last = rows["first"].iloc[0], rows["last"].iloc[0]
         axes.set_title(motions.stage_title(rows, whole=k == len(stages) - 1))
@@ -173,6 +182,7 @@ def _space(
     unit: str,
     *,
     zoom: float = 1.0,
+    label_pad: float = -3.0,
 ) -> Any:
     """Return axes in space with equal scales that hold all links of the tables."""
     axes: Any = figure.add_subplot(*place, projection="3d")
@@ -184,13 +194,13 @@ def _space(
         low, high = float(values.min()), float(values.max())
         pad = 0.05 + 0.5 * max(0.0, 0.5 - (high - low))
         getattr(axes, f"set_{name}lim")(low - pad, high + pad)
-        getattr(axes, f"set_{name}label")(f"{name} [{unit}]", labelpad=-7, fontsize=7)
+        getattr(axes, f"set_{name}label")(f"{name} [{unit}]", labelpad=label_pad, fontsize=7)
         box.append(high - low + 2.0 * pad)
     axes.set_box_aspect(box, zoom=zoom)
     axes.patch.set_visible(False)  # else it hides the labels of the panel beside it
     axes.tick_params(labelsize=6, pad=-2)
-    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
-        axis.set_major_locator(style.few_ticks())
+    for axis, side in zip((axes.xaxis, axes.yaxis, axes.zaxis), box, strict=True):
+        axis.set_major_locator(MaxNLocator(nbins=3 if side > 0.6 * max(box) else 2))
     axes.view_init(elev=24.0, azim=-35.0)
     return axes
 
@@ -227,7 +237,12 @@ def _name_points(axes: Any, arm: int, rows: pd.DataFrame) -> None:
     points = ([rows[axis].iloc[0], *rows[f"{axis}_end"]] for axis in "xyz")
     for k, (x, y, z) in enumerate(zip(*points, strict=True)):
         text = f"{name}{str(k).translate(style.SUBSCRIPTS)}"
-        axes.text(x, y, z + 0.09, text, color=style.arm_colour(arm), fontsize=8)
+        look = {"color": style.arm_colour(arm), "fontsize": 8.5, "zorder": 10, "ha": "center"}
+        if k == 0:  # beside the square of the base
+            axes.text(x, y, z, f"{text}    ", **look | {"ha": "right", "va": "center"})
+        else:
+            halo = [withStroke(linewidth=2.0, foreground="white")]
+            axes.text(x, y, z + 0.11, text, path_effects=halo, **look)
 
 
 def _ball(row: Any) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -103,10 +103,13 @@ def _best_curves(axes: Axes, best: pd.DataFrame, named: Mapping[int, str]) -> No
 def draw_fitness(table: pd.DataFrame) -> Figure:
     """Draw best and average fitness over the whole range, and the best fitness enlarged."""
     figure, (whole, close) = style.row_of_panels(4.1, 2)
-    for axes, title in ((whole, "a  whole range"), (close, "b  best fitness")):
-        _curves(axes, table)
-        axes.set(ylabel="fitness F [-]", title=title)
     best = table[table["quantity"] == NAMES["best_cost"]]
+    for axes, shown, title in (
+        (whole, table, "a  whole range"),
+        (close, best, "b  best fitness"),
+    ):
+        _curves(axes, shown)
+        axes.set(ylabel="fitness F [-]", title=title)
     finite = best[np.isfinite(best[["median", "lower", "upper"]]).all(axis=1)]
     if len(finite):
         last = finite.groupby("position")["median"].max()
@@ -166,6 +169,8 @@ def _curves(axes: Axes, table: pd.DataFrame) -> None:
         colour = style.condition_colour(position)
         for column in COLUMNS:
             curve = rows[rows["quantity"] == NAMES[column]].replace([np.inf, -np.inf], np.nan)
+            if curve.empty:
+                continue
             kind = "-" if column == "best_cost" else (0, (3, 1.5))
             label = f"{condition}, {NAMES[column]} ({_counts(curve)})"
             axes.fill_between(

@@ -109,7 +109,8 @@ def draw_via_points(table: pd.DataFrame) -> Figure:
         axes.plot(
             *(final[name] for name in ANGLES), **looks[last] | {"color": style.arm_colour(arm)}
         )
-        _numbers(axes, *(final[name].to_numpy() for name in (*ANGLES, "instant")))
+        x, y, instants = (final[name].to_numpy() for name in (*ANGLES, "instant"))
+        _numbers(axes, x, y, instants, rows[ANGLES].to_numpy())
         axes.margins(0.1)
     keys = [
         style.key(first, **looks[first]),
@@ -232,15 +233,17 @@ def _angle(axes: Axes, row: Any) -> None:
     )
 
 
-def _numbers(axes: Axes, x: FloatArray, y: FloatArray, instants: np.ndarray) -> None:
+def _numbers(
+    axes: Axes, x: FloatArray, y: FloatArray, instants: np.ndarray, around: FloatArray
+) -> None:
     """Write the number of every fifth via-point, the start and the goal where there is room.
 
-    Of eight places around a via-point the one is taken that is farthest from all via-points and
-    from the numbers that stand there already.
+    Of eight places around a via-point the one is taken that is farthest from all points `around`,
+    (points, 2), and from the numbers that stand there already.
     """
     halo = withStroke(linewidth=2.0, foreground="white")
     size = max(float(np.ptp(x)), float(np.ptp(y)), 1e-9)
-    taken = [np.array([a, b]) for a, b in zip(x, y, strict=True)]
+    taken = list(around)
     angles = [sincos(DEGREE * 45.0 * k) for k in range(8)]
     for k, instant in enumerate(instants):
         if instant % NUMBERED and k < len(instants) - 1:

@@ -194,7 +194,8 @@ def _space(
         low, high = float(values.min()), float(values.max())
         pad = 0.05 + 0.5 * max(0.0, 0.5 - (high - low))
         getattr(axes, f"set_{name}lim")(low - pad, high + pad)
-        getattr(axes, f"set_{name}label")(f"{name} [{unit}]", labelpad=label_pad, fontsize=7)
+        pad_here = label_pad - (4.0 if name == "z" else 0.0)  # else it meets the panel beside it
+        getattr(axes, f"set_{name}label")(f"{name} [{unit}]", labelpad=pad_here, fontsize=7)
         box.append(high - low + 2.0 * pad)
     axes.set_box_aspect(box, zoom=zoom)
     axes.patch.set_visible(False)  # else it hides the labels of the panel beside it

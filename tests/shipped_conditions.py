@@ -21,6 +21,7 @@ KINDS = range(76)  # numbers of all kinds of conditions; `test_shipped` checks h
 EXAMPLES = (  # (experiment, number of its condition): every planner, and its rarer parts
     ("rana_obstacles", 0),
     ("rana_planar", 1),  # random search
+    ("rana_planar", 2),  # multi-start
     ("curkovic_motion", 1),  # cubic splines
     ("lavoie_7dof", 0),
     ("lavoie_coding", 1),  # binary

@@ -256,7 +256,7 @@ def test_methods_of_co_evolution_are_drawn_and_paired(tmp_path: Path) -> None:
     assert "VI against II |" in text
     assert "VII against III" not in text
     table = pd.read_csv(page.parent / "fig_6_methods.csv")
-    assert set(table["series"]) == {"best so far", "final", "lower bound"}
+    assert set(table["series"]) == {"best so far", "final", "lower bound", "threshold"}
     bound = table.loc[table["series"] == "lower bound", "value"].item()
     assert bound == pytest.approx(7.48, abs=0.005)
     final = table[table["series"] == "final"]

@@ -71,3 +71,12 @@ def grouped(
     for condition in conditions:
         found.setdefault(repr(key(condition)), []).append(condition)
     return tuple(map(tuple, found.values()))
+
+
+def first_feasible(condition: ConditionResults) -> FloatArray:
+    """Return the first generation that has a feasible individual, (done,); inf: none has.
+
+    A run without one is not left out: it took longer than every run that has one.
+    """
+    found = condition.column("first_feasible_generation")
+    return np.where(np.isnan(found), np.inf, found)

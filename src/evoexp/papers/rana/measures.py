@@ -18,12 +18,3 @@ def unevenness(condition: ConditionResults) -> FloatArray:
     if not columns:
         return np.full(condition.done, np.nan)
     return np.asarray(np.sum([condition.column(str(name)) for name in columns], axis=0))
-
-
-def first_free(condition: ConditionResults) -> FloatArray:
-    """Return the first generation that has a collision-free individual, (done,); inf: none has.
-
-    A run without one is not left out: it took longer than every run that has one.
-    """
-    found = condition.column("first_feasible_generation")
-    return np.where(np.isnan(found), np.inf, found)

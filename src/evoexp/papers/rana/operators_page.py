@@ -24,6 +24,7 @@ from evoexp.report.kit import (
     holm,
     judging,
     markdown,
+    run_measures,
     sweep_figures,
 )
 
@@ -49,7 +50,7 @@ COMPARED = (
         by_column("clearance"),
         lower_is_better=False,
     ),
-    ComparedQuantity("", measures.FIRST_FREE, "generation", measures.first_free),
+    ComparedQuantity("", measures.FIRST_FREE, "generation", run_measures.first_feasible),
 )
 INTRODUCTION = (
     "Each condition changes one part of the first one; all share their seeds. Costs are measured "

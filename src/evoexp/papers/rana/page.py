@@ -23,6 +23,7 @@ from evoexp.report.kit import (
     overridden,
     parameters,
     planned_replicates,
+    run_measures,
     spread,
     verdicts,
 )
@@ -101,7 +102,7 @@ def _quantities(results: Results) -> tuple[Quantity, ...]:
     return (
         cost,
         generic.quantity(results, "fitness F of the best", "–", fitness),
-        generic.quantity(results, measures.FIRST_FREE, "generation", measures.first_free),
+        generic.quantity(results, measures.FIRST_FREE, "generation", run_measures.first_feasible),
         *(generic.quantity(results, name, of, by_column(column)) for name, of, column in rows),
         *effort,
     )

@@ -20,6 +20,7 @@ from evoexp.report.kit import (
     generic,
     judging,
     markdown,
+    run_measures,
 )
 
 INTRODUCTION = (
@@ -55,7 +56,9 @@ def page(results: Results, settings: ReportSettings) -> Page:
             drawings.append(distances_drawing(condition, suffix, sampled))
         claims += _claims(judge, condition)
     cost, _, *effort = base.quantities
-    first = generic.quantity(results, measures.FIRST_FREE, "generation", measures.first_free)
+    first = generic.quantity(
+        results, measures.FIRST_FREE, "generation", run_measures.first_feasible
+    )
     return base._replace(
         title=f"Rana & Zalzala 1995: {results.experiment or 'stored runs'}",
         introduction=INTRODUCTION,

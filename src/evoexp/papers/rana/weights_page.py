@@ -46,7 +46,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
     quantities = (
         generic.quantity(results, LENGTH, "deg", length),
         generic.quantity(results, HITS, "–", by_column("term_collisions")),
-        generic.quantity(results, measures.FIRST_FREE, "generation", measures.first_free),
+        generic.quantity(results, measures.FIRST_FREE, "generation", run_measures.first_feasible),
         *effort,
     )
     rows = compared([(first, other) for other in others], length, settings)

@@ -8,7 +8,7 @@ from evoexp.report.figures import convergence
 from evoexp.report.page_parts import Drawing, Page, Quantity
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results
-from evoexp.report.run_measures import search_seconds
+from evoexp.report.run_measures import first_feasible, search_seconds
 from evoexp.report.statistics import spread
 from evoexp.store.messages import TERM
 
@@ -65,10 +65,10 @@ def quantity(results: Results, name: str, unit: str, values: Values) -> Quantity
 
 def quantities(results: Results) -> tuple[Quantity, ...]:
     """Return the rows of the quantities that every planner records."""
-    first = "first generation with a feasible individual (over the runs that have one)"
+    first = "first generation with a feasible individual (∞: none in the whole run)"
     return (
         quantity(results, "best cost", "–", by_column("best_cost")),
-        quantity(results, first, "generation", by_column("first_feasible_generation")),
+        quantity(results, first, "generation", first_feasible),
         quantity(results, "evaluations", "–", by_column("evaluations")),
         quantity(
             results, "configurations judged for collision", "–", by_column("collision_queries")

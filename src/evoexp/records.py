@@ -106,6 +106,10 @@ class ReplicateSummary(NamedTuple):
     certificate_s: float  # its CPU time, part of cpu_s
     cpu_s: float
     wall_s: float
+    allowed_contacts: str = ""  # pairs of bodies that may touch somewhere in the motion
+    # [length_unit] their greatest depth; 0 where they never touch, None without such pairs
+    penetration: float | None = None
+    penetration_pair: str = ""  # which pair
 
 
 def flatten(record: Any) -> dict[str, Any]:

@@ -19,11 +19,13 @@ from evoexp.papers.corsepius.figures import (
     solids,
 )
 from evoexp.papers.corsepius.figures.posture_motions import ShownPath
+from evoexp.papers.corsepius.population_claims import SizeComparison
 from evoexp.report import run_measures, style
 from evoexp.report.pages import page_of
 from evoexp.report.proportions import Proportion
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results, gather
+from evoexp.report.statistics import Interval
 from report_samples import (
     REPORT,
     figure_stems,
@@ -138,7 +140,7 @@ def test_conditions_of_one_task_are_told_by_all_but_the_setting(outputs: Path) -
 
 
 def test_phases_add_up_to_the_cycles_of_the_run(outputs: Path) -> None:
-    condition = solved(outputs, "corsepius_wall").conditions[1]
+    condition = solved(outputs, "corsepius_wall").conditions[2]
     table = measures.phase_cycles(condition)
     assert list(table.groupby("replicate")["cycles"].sum()) == list(measures.cycles(condition))
     expected = {k: bool(v) for k, v in condition.summaries["solved"].items()}
@@ -242,14 +244,18 @@ def test_expected_effort_counts_failures(outputs: Path) -> None:
 
 
 def test_the_slope_of_the_floor_is_that_of_the_medians(outputs: Path) -> None:
-    task = measures.tasks(smoke_results(outputs, "corsepius_scope"), "scope", "")[0]
-    assert task.values == (0.0125, 0.025, 0.05, 0.1, 0.2, 0.4)
-    table = population_effort.floor_table(task)
-    medians = table[table["quantity"] == population_effort.RESIDUAL]["median"].to_numpy(
-        dtype=np.float64
-    )
-    expected = np.polyfit(np.log(task.values), np.log(medians), 1)[0]
-    assert population_effort.slope(task) == pytest.approx(expected)
+    found = measures.tasks(smoke_results(outputs, "corsepius_scope"), "scope", "")
+    assert [task.name for task in found] == ["surface", "point", "snake at a point"]
+    table = population_effort.floor_table(found)
+    for task in found:
+        assert task.values == (0.0125, 0.025, 0.05, 0.1, 0.2, 0.4)
+        own = table[
+            (table["quantity"] == population_effort.RESIDUAL) & (table["task"] == task.name)
+        ]
+        medians = own["median"].to_numpy(dtype=np.float64)
+        expected = np.polyfit(np.log(task.values), np.log(medians), 1)[0]
+        assert population_effort.slope(task) == pytest.approx(expected)
+    assert drawn(table, population_effort.draw_floor)
 
 
 @pytest.mark.matrix
@@ -258,3 +264,31 @@ def test_tables_of_many_conditions_stand_upright(outputs: Path) -> None:
     text = (directory / "index.md").read_text()
     assert "| condition | cycles, all phases | evaluations |" in text
     assert len(smoke_experiment("corsepius_population").conditions) == 56
+
+
+def test_a_series_without_points_is_not_in_the_legend() -> None:
+    rows = {
+        "cycles": [
+            SizeComparison("ball", 200.0, 0.5, Interval(0.4, 0.6), 1.0),
+            SizeComparison("narrow gate", 200.0, 0.0, Interval(0.0, 0.0), 1.0),
+        ]
+    }
+    table = population_effort.ratios_table(rows, ["ball", "narrow gate"], 100.0)
+    figure = population_effort.draw_ratios(table, "λ [-]")
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["ball"]
+
+
+@pytest.mark.matrix
+def test_released_objects_stand_upright_on_the_table(outputs: Path) -> None:
+    results = solved(outputs, "corsepius_pick_and_place")
+    found = measures.releases(results.conditions[0])
+    assert found
+    for one in found:
+        assert abs(one.gap) <= 0.001 + 1e-9
+        assert one.tilt <= 1.0 * DEGREE
+    condition = results.conditions[0]
+    told = measures.allowed_contacts(condition)
+    assert told is not None
+    assert "table – bottle" in told.pairs
+    deepest = condition.summaries["penetration"].max()
+    assert 0.0 <= deepest <= 0.001 + 3e-6

@@ -14,6 +14,7 @@ from evoexp.configuration.experiment import Experiment
 from evoexp.papers.corsepius import claims as task_claims
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius import population_claims as verdicts
+from evoexp.papers.corsepius.rules import RULES
 from evoexp.report import judging
 from evoexp.report.judging import Judge
 from evoexp.report.report_settings import ReportSettings
@@ -66,7 +67,7 @@ def study(effort: Effort) -> dict[str, Claim]:
     }
     return {
         claim.text: claim
-        for claim in verdicts.judge_study(Judge("", 0.05), found, compared, SETTINGS)
+        for claim in verdicts.judge_study(Judge("", 0.05, RULES), found, compared, SETTINGS)
     }
 
 
@@ -173,7 +174,7 @@ def judged(
 
 
 def test_a_wall_that_a_subgoal_opens_is_a_local_minimum(monkeypatch: pytest.MonkeyPatch) -> None:
-    text = "wall: the search gets stuck in a local minimum"
+    text = "wall: the search gets stuck in a local minimum, which a sub-goal opens"
     assert judged("corsepius_wall", task_rows({"wall": 0}), monkeypatch)[text] == REPRODUCED
     assert judged("corsepius_wall", task_rows({}), monkeypatch)[text] == INCONCLUSIVE
     assert (
@@ -186,8 +187,8 @@ def test_one_tilted_or_touching_path_contradicts(monkeypatch: pytest.MonkeyPatch
     name = "corsepius_pick_and_place"
     for free, expected in ((RUNS, REPRODUCED), (RUNS - 1, CONTRADICTED)):
         found = judged(name, task_rows({}, free), monkeypatch)
-        assert found[f"{name}: paths avoid obstacles"] == expected
-        assert found[f"{name}: the grasped object is not tilted"] == expected
+        assert found["pick and place: paths avoid obstacles"] == expected
+        assert found["pick and place: the grasped object is not tilted"] == expected
 
 
 def test_one_certified_path_is_enough_for_redundant_arms(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -195,11 +196,60 @@ def test_one_certified_path_is_enough_for_redundant_arms(monkeypatch: pytest.Mon
     labels = [label for label, _ in conditions_of("corsepius_gate_narrow").conditions]
     nobody = dict.fromkeys(labels, 0)
     assert judged("corsepius_gate_narrow", task_rows(nobody), monkeypatch)[text] == CONTRADICTED
-    assert (
-        judged("corsepius_gate_narrow", task_rows(nobody | {labels[0]: 1}), monkeypatch)[text]
-        == REPRODUCED
-    )
+    one, in_empty_space = ({**nobody, label: 1} for label in labels[:2])
+    assert judged("corsepius_gate_narrow", task_rows(one), monkeypatch)[text] == REPRODUCED
+    found = judged("corsepius_gate_narrow", task_rows(in_empty_space), monkeypatch)
+    assert found[text] == CONTRADICTED, "what happens without the gate is no evidence"
     assert text not in judged("corsepius_pick_and_place", task_rows({}), monkeypatch)
+
+
+@pytest.mark.parametrize(
+    ("having", "expected"),
+    [
+        ({"wall": 0}, REPRODUCED),
+        ({"wall": 0, "wall, empty scene": 0}, CONTRADICTED),
+        ({"wall": RUNS - 1}, INCONCLUSIVE),
+        ({}, CONTRADICTED),
+    ],
+)
+def test_obstacles_are_judged_by_the_same_task_in_an_empty_scene(
+    having: dict[str, int], expected: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = "The search gets stuck at obstacles: the same goals are met without them"
+    assert judged("corsepius_wall", task_rows(having), monkeypatch)[text] == expected
+
+
+def test_empty_scenes_are_controls_and_make_no_claims_of_their_own(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found = judged("corsepius_gate_wide", task_rows({}), monkeypatch)
+    assert found
+    assert not [text for text in found if text.split(":")[0].endswith("empty scene")]
+    results = made_up("corsepius_gate_wide", task_rows({}))
+    pairs = measures.with_empty_scenes(results.main)
+    assert [(c.label, e.label) for c, e in pairs] == [
+        (c.label, f"{c.label}, empty scene") for c in measures.among_obstacles(results.main)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("having", "expected"), [(RUNS, REPRODUCED), (21, REPRODUCED), (20, CONTRADICTED)]
+)
+def test_goals_are_met_if_most_runs_meet_them(
+    having: int, expected: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = "wall: goals in work space are met without inverse kinematics"
+    assert judged("corsepius_wall", task_rows({"wall": having}), monkeypatch)[text] == expected
+
+
+def test_allowed_contacts_are_named_with_the_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
+    def rows(label: str) -> dict[str, object]:
+        return task_rows({})(label) | {"allowed_contacts": ["table – bottle, hand – bottle"] * RUNS}
+
+    monkeypatch.setattr(judging, "not_judged", lambda results: "")
+    found = task_claims.judge_tasks(made_up("corsepius_pick_and_place", rows), SETTINGS)
+    told = next(c.evidence for c in found if c.name == "paths_avoid_obstacles")
+    assert "may touch, 0.001 m deep at most: table – bottle, hand – bottle" in told
 
 
 def test_below_the_papers_budget_nothing_is_judged() -> None:

@@ -89,8 +89,9 @@ def _phase(
             bred * (per_child + (0 if gaussian else nq)) + ga.num_immigrants * nq,
             bred * ((nq if gaussian else 0) + ranked),
         )
-        children = [_bred(problem, ga, numbers, parents, n, fault) for n in range(bred)]
-        children += [_immigrant(problem, numbers, parents) for _ in range(ga.num_immigrants)]
+        scope = problem.scope * stage.phase.scope_share
+        children = [_bred(problem, ga, numbers, parents, n, scope, fault) for n in range(bred)]
+        children += [_immigrant(problem, numbers, parents, scope) for _ in range(ga.num_immigrants)]
         postures = np.array([child[-1] for child in children]).T
         judged = stage.judge(postures)
         feasible = judged.feasible.copy()
@@ -119,8 +120,9 @@ def _phase(
 
 
 def _bred(
-    problem: Problem, ga: Any, numbers: _Numbers, parents: list[Any], n: int, fault: str
-) -> list[Any]:
+    problem: Problem, ga: Any, numbers: _Numbers, parents: list[Any], n: int, scope: Any,
+    fault: str,
+) -> list[Any]:  # fmt: skip
     """Return a child of the n-th choice of a parent: perhaps crossed, then mutated."""
     nq, number = len(problem.scope), n % len(parents)
     if ga.parent_choice == "gaussian":
@@ -132,22 +134,22 @@ def _bred(
         (decision, place), taken = numbers.uniforms(2), numbers.uniforms(nq) < 0.5
         if decision < ga.crossover_rate and fault != "no crossover":
             child = np.where(taken, parents[int(place * len(parents))][1][-1], child)
-    scope = problem.scope * {"half scope": 0.5, "no mutation": 0.0}.get(fault, 1.0)
+    reach = scope * {"half scope": 0.5, "no mutation": 0.0}.get(fault, 1.0)
     gaussian = ga.mutation == "gaussian"
     step = ga.mutation_std * numbers.normals(nq) if gaussian else 2.0 * numbers.uniforms(nq) - 1.0
-    child = np.clip(child + scope * step, *problem.limits.T)
-    return [*(_nearest(problem, parents, child) if ga.crossover_rate > 0.0 else line), child]
+    child = np.clip(child + reach * step, *problem.limits.T)
+    return [*(_nearest(parents, child, scope) if ga.crossover_rate > 0.0 else line), child]
 
 
-def _immigrant(problem: Problem, numbers: _Numbers, parents: list[Any]) -> list[Any]:
+def _immigrant(problem: Problem, numbers: _Numbers, parents: list[Any], scope: Any) -> list[Any]:
     """Return somebody from anywhere, as a child of the nearest parent."""
     low, high = problem.limits.T
     child = low + (high - low) * numbers.uniforms(len(low))
-    return [*_nearest(problem, parents, child), child]
+    return [*_nearest(parents, child, scope), child]
 
 
-def _nearest(problem: Problem, parents: list[Any], child: Any) -> list[Any]:
-    steps = [float((np.abs(child - line[-1]) / problem.scope).max()) for _, line in parents]
+def _nearest(parents: list[Any], child: Any, scope: Any) -> list[Any]:
+    steps = [float((np.abs(child - line[-1]) / scope).max()) for _, line in parents]
     line: list[Any] = parents[int(np.argmin(steps))][1]
     return line
 

@@ -26,6 +26,20 @@ from evoexp.scenarios.obstacles import (
 )
 
 
+class AllowedContact(NamedTuple):
+    """Two bodies that may touch.
+
+    Attributes:
+        one: Index of a body.
+        two: Index of the other.
+        depth: How deep they may overlap [length unit].
+    """
+
+    one: int
+    two: int
+    depth: float
+
+
 class Scene(NamedTuple):
     """Bodies on a Pinocchio model, and the pairs of them that are watched.
 
@@ -41,6 +55,7 @@ class Scene(NamedTuple):
             configuration [length unit].
         tolerances: (pairs,) at or below which a distance counts as contact [length unit]: above
             coal's own error.
+        contacts: Pairs that are none of `pairs`, since they may touch.
     """
 
     model: Any
@@ -52,6 +67,7 @@ class Scene(NamedTuple):
     bodies: BodyTable
     size: float
     tolerances: FloatArray
+    contacts: tuple[AllowedContact, ...] = ()
 
     def pair_names(self, pair: int) -> tuple[str, str]:
         """Return the names of a pair's bodies."""

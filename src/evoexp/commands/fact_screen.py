@@ -151,6 +151,13 @@ def _verdict(verdict: Mapping[str, Any] | None) -> Iterator[str]:
             f"least clearance {_number(verdict['clearance'])} {verdict['length_unit']}, "
             f"replicate {verdict['clearance_replicate']}{place}"
         )
+    if verdict["allowed_contacts"]:
+        deepest = f" ({verdict['penetration_pair']})" if verdict["penetration_pair"] else ""
+        yield f"may touch: {', '.join(verdict['allowed_contacts'])}"
+        yield (
+            f"deepest overlap of these {_number(verdict['penetration'])} "
+            f"{verdict['length_unit']}, replicate {verdict['penetration_replicate']}{deepest}"
+        )
     if verdict["contacts"]:
         contacts = [
             f"replicate {c['replicate']} touches at {c['refuted_at']:.4g} ({c['refuted_pair']})"

@@ -192,6 +192,9 @@ def _verdict(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     nearest = min(moved, key=lambda row: row["clearance"], default=None)
     near = nearest or {}
     touching = [row for row in moved if row["refuted_at"] is not None]
+    pairs = dict.fromkeys(p for row in moved for p in row["allowed_contacts"].split(", ") if p)
+    allowed = (row for row in moved if row["allowed_contacts"])
+    deepest = max(allowed, key=lambda row: row["penetration"], default=None) or {}
     return {
         "certified": sum(row["certified"] is True for row in moved),
         "refuted": sum(row["certified"] is False for row in moved),
@@ -205,6 +208,10 @@ def _verdict(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
             {key: row[key] for key in ("replicate", "refuted_at", "refuted_pair")}
             for row in touching
         ],
+        "allowed_contacts": list(pairs),
+        "penetration": deepest.get("penetration"),
+        "penetration_replicate": deepest.get("replicate"),
+        "penetration_pair": deepest.get("penetration_pair"),
         "length_unit": rows[0]["length_unit"] if rows else None,
     }
 

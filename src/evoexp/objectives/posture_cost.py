@@ -117,7 +117,12 @@ class FreeSpace(RatioTerm):
 
 
 class PostureCost(Component):
-    """Terms and weights; see the module's first lines."""
+    """Terms and weights; see the module's first lines.
+
+    Attributes:
+        grasp_angles: How `axial_approach` and `heading` count: their `sum`, or the `larger` one
+            alone, each times its weight.
+    """
 
     component: ClassVar[str] = "posture_cost"
 
@@ -130,6 +135,7 @@ class PostureCost(Component):
     limit_margin: RatioTerm | None = None
     collision: RatioTerm | None = None
     free_space: FreeSpace | None = None
+    grasp_angles: Literal["sum", "larger"] = "sum"
 
     @model_validator(mode="after")
     def _terms_agree(self) -> Self:

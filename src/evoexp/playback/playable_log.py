@@ -200,6 +200,9 @@ def _log_messages(recording: Recording) -> list[tuple[int, Any]]:
         text = f"least clearance {verdict.clearance:.6g} {unit}: {verdict.clearance_pair}"
         text += "" if kept else f", less than the required {recording.margin:g} {unit}"
         rows.append((verdict.clearance_at, Log.INFO if kept else Log.WARNING, text))
+    if verdict.allowed_contacts:
+        depth = f"deepest overlap {verdict.penetration or 0.0:.6g} {unit}"
+        rows.append((0.0, Log.INFO, f"may touch: {verdict.allowed_contacts}; {depth}"))
     for contact in recording.clearance.contacts:
         rows.append(
             (

@@ -157,6 +157,9 @@ def _facts(recording: Recording) -> list[tuple[str, str]]:
         rows.append(("nearest", verdict.clearance_pair))
     if recording.margin > 0.0:
         rows.append(("required", f"{recording.margin:g} {recording.length_unit}: {margin}"))
+    if verdict.allowed_contacts:
+        depth = f"{_shown(verdict.penetration or 0.0)} {recording.length_unit}"
+        rows += [("may touch", verdict.allowed_contacts), ("deepest overlap of these", depth)]
     rows += [
         (f"contact {k + 1}", f"{contact.begin:.4g} to {contact.end:.4g}: {contact.pair}")
         for k, contact in enumerate(recording.clearance.contacts)

@@ -16,10 +16,17 @@ Point3 = tuple[float, float, float]
 
 
 class PointGoal(Settings):
-    """A point that the controlled frame shall reach."""
+    """A point that the controlled frame shall reach, or the surface of a ball around it.
+
+    Attributes:
+        point: The point.
+        radius: Of the ball, whose surface is the goal; it is no obstacle. 0: the point itself is
+            the goal [length unit].
+    """
 
     kind: Literal["point"]
     point: Point3
+    radius: NonNegative = 0.0
 
 
 class PoseGoal(Settings):
@@ -41,6 +48,19 @@ class SurfaceGoal(Settings):
     object: str
 
 
+class PlaceGoal(Settings):
+    """A disc across the direction up, on which the controlled frame's origin shall come to lie.
+
+    Attributes:
+        point: Its middle.
+        radius: Its radius [length unit].
+    """
+
+    kind: Literal["place"]
+    point: Point3
+    radius: Positive
+
+
 class ShiftGoal(Settings):
     """Where the controlled frame is when the phase begins, moved.
 
@@ -54,7 +74,9 @@ class ShiftGoal(Settings):
     frame: Literal["world", "tool"]
 
 
-AnyGoal = Annotated[PointGoal | PoseGoal | SurfaceGoal | ShiftGoal, Field(discriminator="kind")]
+AnyGoal = Annotated[
+    PointGoal | PoseGoal | SurfaceGoal | PlaceGoal | ShiftGoal, Field(discriminator="kind")
+]
 
 
 class Phase(Settings):
@@ -67,10 +89,15 @@ class Phase(Settings):
         name: For reports.
         goal: Where it ends.
         terms: Cost terms that count in it; empty: all of the objective.
-        contacts: Pairs of names (bodies, obstacles) that may touch in it.
+        contacts: Pairs of names (bodies, obstacles) that may touch in it, as deep as the task's
+            `allowed_penetration`.
         then: Whether the robot takes hold of an object when the goal is met, or lets go of what it
             holds.
         object: What it takes hold of.
+        position_tolerance: In place of the task's.
+        upright_tolerance: The goal is met only with so small a tilt [deg]; None: within the hard
+            limit of `upright`, if that counts.
+        scope_share: Part of the planner's scope that joints may step in it [-].
     """
 
     name: str
@@ -79,6 +106,9 @@ class Phase(Settings):
     contacts: tuple[tuple[str, str], ...] = ()
     then: Literal["go_on", "attach", "detach"] = "go_on"
     object: str = ""
+    position_tolerance: Positive | None = None
+    upright_tolerance: Positive | None = None
+    scope_share: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
 
 
 class PostureTask(Component):
@@ -96,6 +126,10 @@ class PostureTask(Component):
         check_reach: Whether a goal that no posture can reach is refused; false: it is searched all
             the same.
         obstacles: What stands around, things to be grasped included.
+        allowed_penetration: How deep pairs that may touch may overlap; None where no phase has
+            such pairs [length unit].
+        empty_scene: Whether all obstacles are taken away but those that a goal or a grasp names:
+            the control by which obstacles are judged.
     """
 
     component: ClassVar[str] = "posture_task"
@@ -110,11 +144,13 @@ class PostureTask(Component):
     length_unit: str
     check_reach: bool = True
     obstacles: tuple[Obstacle, ...] = ()
+    allowed_penetration: Positive | None = None
+    empty_scene: bool = False
 
     @model_validator(mode="after")
     def _holds_one_thing_at_a_time(self) -> Self:
-        for k, name in enumerate(self.names):
-            if name in self.names[:k]:
+        for k, name in enumerate(self.all_names):
+            if name in self.all_names[:k]:
                 raise SettingError(
                     f"obstacles[{k}].name", "a name that no other obstacle has", name
                 )
@@ -140,25 +176,45 @@ class PostureTask(Component):
             if isinstance(phase.goal, SurfaceGoal):
                 self.index_of(phase.goal.object, f"{field}.goal.object")
             if phase.then == "attach":
-                shape = self.obstacles[self.index_of(phase.object, f"{field}.object")].shape
+                shape = self.objects[self.index_of(phase.object, f"{field}.object")].shape
                 if shape in ("half_space", "ellipse"):
                     raise SettingError(
                         f"{field}.object", "a sphere, box, capsule or cylinder", f"a {shape}"
                     )
             held = {"attach": phase.object, "detach": ""}.get(phase.then, held)
+            if bool(phase.contacts) and self.allowed_penetration is None:
+                raise SettingError(
+                    "allowed_penetration", f"given: {field}.contacts allows contacts", None
+                )
         if not any(self.up):
             raise SettingError("up", "a direction, not (0, 0, 0)", list(self.up))
         return self
 
     @property
+    def objects(self) -> tuple[Obstacle, ...]:
+        """The obstacles that stand around: all, or those of an empty scene."""
+        return tuple(self._named_objects.values())
+
+    @property
+    def all_names(self) -> tuple[str, ...]:
+        """Names of the obstacles, those that an empty scene takes away included."""
+        return tuple(one.name or f"obstacle_{k + 1}" for k, one in enumerate(self.obstacles))
+
+    @property
     def names(self) -> tuple[str, ...]:
-        """Names of the obstacles."""
-        return tuple(
-            obstacle.name or f"obstacle_{k + 1}" for k, obstacle in enumerate(self.obstacles)
-        )
+        """Names of `objects`."""
+        return tuple(self._named_objects)
+
+    @property
+    def _named_objects(self) -> dict[str, Obstacle]:
+        goals = (phase.goal for phase in self.phases)
+        needed = {goal.object for goal in goals if isinstance(goal, SurfaceGoal)}
+        needed |= {phase.object for phase in self.phases}
+        named = zip(self.all_names, self.obstacles, strict=True)
+        return {name: one for name, one in named if name in needed or not self.empty_scene}
 
     def index_of(self, name: str, field: str) -> int:
-        """Return the index of an obstacle.
+        """Return the index of one of `objects`.
 
         Raises:
             SettingError: If none has this name.

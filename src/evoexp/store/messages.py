@@ -187,7 +187,7 @@ def _typed(record: type, row: dict[str, Any]) -> tuple[dict[str, Any], dict[str,
     """Return a row's fields in the types of the record, and its terms by name.
 
     Raises:
-        KeyError: A field is missing.
+        KeyError: A field without a default is missing.
         TypeError: A number is null and no flag says which one it was.
         ValueError: A value is not of its field's type.
     """
@@ -195,7 +195,7 @@ def _typed(record: type, row: dict[str, Any]) -> tuple[dict[str, Any], dict[str,
         restore(row)
     fields: dict[str, Any] = {}
     for name, kind in field_types(record).items():
-        value = row[name]
+        value = row[name] if name in row else record._field_defaults[name]  # type: ignore[attr-defined]
         if kind is float or kind is int:
             fields[name] = kind(value)
         else:

@@ -19,7 +19,7 @@ from evoexp.store.run_directory import RunDirectory
 Runs = RunDirectory | Iterable[RunDirectory]
 Stamps = dict[str, list[int]]  # file name → size [B], modification time [ns]
 
-_VERSION = 2  # of the table's columns; another one is rebuilt
+_VERSION = 3  # of the table's columns; another one is rebuilt
 _KEY = b"evoexp"
 # tables that this process wrote or read
 _KNOWN: dict[Path, tuple[tuple[int, int, int], pa.Table]] = {}

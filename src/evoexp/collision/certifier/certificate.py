@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from evoexp.collision.certifier.allowed_contacts import contact_depths
 from evoexp.collision.certifier.verdict import certify
 from evoexp.collision.scene import Part
 from evoexp.paths.motion import Motion
@@ -15,8 +16,11 @@ _ANSWER = {"certified": True, "refuted": False, "undecided": None}
 class Certificate(NamedTuple):
     """Fields of `ReplicateSummary` that the certifier fills; without a motion they say nothing.
 
+    Pairs that may touch count for `certified` and `refuted_at` alone, by their depth.
+
     Attributes:
-        certified: Whether the bodies never touch; None: undecided.
+        certified: Whether the bodies never touch, and those that may never overlap deeper than
+            they may; None: undecided.
         certified_margin: Whether they never come closer than the security margin; None: undecided.
         clearance: Least distance of the bodies over the whole motion [length unit of the scene]; 0
             where they touch.
@@ -25,6 +29,9 @@ class Certificate(NamedTuple):
         refuted_at: First contact [instant]; None: there is none.
         refuted_pair: Which bodies touch there.
         certificate_queries: Exact distances that were computed.
+        allowed_contacts: The pairs that may touch somewhere in the motion, separated by commas.
+        penetration: Their greatest depth; 0 where they never touch, None without such pairs.
+        penetration_pair: Which pair.
     """
 
     certified: bool | None = None
@@ -35,6 +42,9 @@ class Certificate(NamedTuple):
     refuted_at: float | None = None
     refuted_pair: str = ""
     certificate_queries: int = 0
+    allowed_contacts: str = ""
+    penetration: float | None = None
+    penetration_pair: str = ""
 
 
 def certificate(parts: Sequence[Part], motion: Motion, security_margin: float) -> Certificate:
@@ -58,7 +68,7 @@ def judged_part(part: Part, motion: Motion, security_margin: float) -> Certifica
     margin = security_margin if part.margins is None else part.margins
     verdict = certify(part.scene, piece, margin)
     touching = verdict.status == "refuted"
-    return Certificate(
+    judged = Certificate(
         certified=_ANSWER[verdict.status],
         certified_margin=_ANSWER[verdict.margin_status],
         clearance=float(verdict.clearance),
@@ -68,6 +78,55 @@ def judged_part(part: Part, motion: Motion, security_margin: float) -> Certifica
         refuted_pair=PAIR.join(verdict.refuted_pair or ()),
         certificate_queries=verdict.queries,
     )
+    return _with_depths(judged, part, piece)
+
+
+def _with_depths(judged: Certificate, part: Part, piece: Motion) -> Certificate:
+    """Add to the verdict on a piece how deep the pairs overlap that may touch in it."""
+    depths, queries = contact_depths(part.scene, piece)
+    if not depths:
+        return judged
+    names = part.scene.names
+    pairs = [PAIR.join((names[d.contact.one], names[d.contact.two])) for d in depths]
+    deepest = max(range(len(depths)), key=lambda k: depths[k].greatest)
+    judged = judged._replace(
+        certificate_queries=judged.certificate_queries + queries,
+        allowed_contacts=", ".join(pairs),
+        penetration=depths[deepest].greatest,
+        penetration_pair=pairs[deepest] if depths[deepest].greatest > 0.0 else "",
+    )
+    # a pair that overlaps too deep refutes like one that must not touch
+    at = [math.inf if d.too_deep_at is None else part.first + d.too_deep_at for d in depths]
+    first = min(range(len(depths)), key=lambda k: at[k])
+    if at[first] < (math.inf if judged.refuted_at is None else judged.refuted_at):
+        return judged._replace(
+            certified=False,
+            certified_margin=False,
+            clearance=0.0,
+            clearance_at=at[first],
+            clearance_pair=pairs[first],
+            refuted_at=at[first],
+            refuted_pair=pairs[first],
+        )
+    decided = all(d.decided for d in depths)
+    return judged if decided else judged._replace(certified=_all([judged.certified, None]))
+
+
+class _Allowed(NamedTuple):
+    """The fields of a `Certificate` that tell of pairs that may touch."""
+
+    allowed_contacts: str = ""
+    penetration: float | None = None
+    penetration_pair: str = ""
+
+
+def _allowed(parts: Sequence[Certificate]) -> _Allowed:
+    """Return the pairs of a whole motion that may touch, and their greatest depth."""
+    pairs = dict.fromkeys(p for one in parts for p in one.allowed_contacts.split(", ") if p)
+    if not pairs:
+        return _Allowed()
+    deepest = max(parts, key=lambda one: -1.0 if one.penetration is None else one.penetration)
+    return _Allowed(", ".join(pairs), deepest.penetration, deepest.penetration_pair)
 
 
 def combined(parts: Sequence[Certificate]) -> Certificate:
@@ -75,15 +134,16 @@ def combined(parts: Sequence[Certificate]) -> Certificate:
 
     It has the first contact, or else the least clearance.
     """
-    queries = sum(part.certificate_queries for part in parts)
+    queries, allowed = sum(part.certificate_queries for part in parts), _allowed(parts)
     touched = [part for part in parts if part.refuted_at is not None]
     if touched:
         first = min(touched, key=lambda part: float(part.refuted_at or 0.0))
-        return first._replace(certificate_queries=queries)
+        return first._replace(certificate_queries=queries, **allowed._asdict())
     return min(parts, key=lambda part: part.clearance)._replace(
         certified=_all([part.certified for part in parts]),
         certified_margin=_all([part.certified_margin for part in parts]),
         certificate_queries=queries,
+        **allowed._asdict(),
     )
 
 

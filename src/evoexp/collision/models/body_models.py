@@ -13,6 +13,7 @@ import pinocchio as pin
 from evoexp.collision.body_table import body_table
 from evoexp.collision.box_support import coal
 from evoexp.collision.models.body_covers import Cover, capsule_cover, sphere_cover
+from evoexp.collision.models.inner_balls import inner_balls
 from evoexp.collision.models.primitive_tables import Shapes
 from evoexp.collision.models.primitives import PrimitiveCollision
 from evoexp.collision.motion_bounds import pair_reaches, reaches
@@ -149,6 +150,43 @@ class BodyModel(NamedTuple):
             pairs = (*pairs, *((body, own) for body in carried.watched))
         return PrimitiveCollision.build(model, shapes, obstacles, pairs, ignored, of_joint)
 
+    def touching(
+        self,
+        obstacles: ObstacleTable,
+        allowed: tuple[Pair, ...],
+        depth: float,
+        carried: "Carried | None" = None,
+    ) -> PrimitiveCollision | None:
+        """Return the model of the pairs that may touch: what is inside of bodies must stay free.
+
+        Args:
+            obstacles: The obstacles.
+            allowed: Pairs (body, obstacle) that may touch.
+            depth: How deep they may overlap [length unit].
+            carried: See `collision`.
+
+        Returns:
+            A model whose clearances to obstacles are negative where a pair overlaps too deep; None
+            without such pairs.
+        """
+        items, own = list(self.assembly.geometry.geometryObjects), len(self.covers)
+        found: dict[int, Shapes] = {}
+        for b in sorted({body for body, _ in allowed}):
+            if b == own and carried is not None:
+                found[b] = cover_shapes([carried.inner], [carried.joint], b)
+                continue
+            inner = inner_balls(items[b], depth)
+            if inner is not None:
+                found[b] = cover_shapes([inner], [items[b].parentJoint], b)
+        if not found:
+            return None
+        columns: Any = zip(*found.values(), strict=True)
+        shapes = Shapes(*(np.concatenate(column) for column in columns))
+        every = ((body, k) for body in found for k in range(len(obstacles.kind)))
+        ignored = tuple(pair for pair in every if pair not in allowed)
+        model = self.assembly.model
+        return PrimitiveCollision.build(model, shapes, obstacles, (), ignored, [0] * model.njoints)
+
 
 class Carried(NamedTuple):
     """An object that became part of a robot's geometry.
@@ -156,11 +194,13 @@ class Carried(NamedTuple):
     Attributes:
         joint: That moves it.
         cover: In the joint's frame.
+        inner: Shapes inside it, in the joint's frame, see `inner_balls`.
         watched: Bodies of the robot that it must not touch.
     """
 
     joint: int
     cover: Cover
+    inner: Cover
     watched: tuple[int, ...]
 
 

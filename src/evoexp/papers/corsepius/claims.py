@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from evoexp.papers.corsepius import measures
+from evoexp.papers.corsepius.rules import RULES
 from evoexp.report.kit import (
     Claim,
     ConditionResults,
@@ -11,6 +12,7 @@ from evoexp.report.kit import (
     Results,
     counted,
     fisher_exact,
+    holm,
     judging,
     markdown,
     solved,
@@ -18,17 +20,24 @@ from evoexp.report.kit import (
     verdicts,
 )
 
-MANY_JOINTS = 6  # arms with more joints are redundant
 TILTS = ("upright", "keep_parallel")
 BALL = "ball"  # the object of the task whose planning time the paper prints
 
 
 def judge_tasks(results: Results, settings: ReportSettings) -> tuple[Claim, ...]:
     """Judge the claims that the conditions of an experiment allow to judge."""
-    judge, level, found = judging.judge(results, settings), settings.confidence, results.main
-    arms = [c for c in found if measures.num_joints(c) > MANY_JOINTS]
+    judge, level = judging.judge(results, settings, RULES), settings.confidence
+    found = measures.among_obstacles(results.main)
+    many = RULES["redundant_arms"].limits["joints"]
+    arms = [c for c in found if measures.num_joints(c) > many]
     single = (
-        (_free_of_collision(judge, c, level), *_tilt(judge, c), *_planning_time(c)) for c in found
+        (
+            judge_met(judge, c, level),
+            judge_free(judge, c, level),
+            *_tilt(judge, c),
+            *_planning_time(judge, c),
+        )
+        for c in found
     )
     stuck = (
         _stuck(judge, one, helped, level)
@@ -36,25 +45,32 @@ def judge_tasks(results: Results, settings: ReportSettings) -> tuple[Claim, ...]
         for helped in found
         if measures.only_subgoals_differ(one, helped)
     )
-    redundant = [_redundant(judge, arms, level)] if arms else []
-    return (*(one for own in single for one in own), *redundant, *stuck)
+    pairs = measures.with_empty_scenes(results.main)
+    redundant = [judge_redundant(judge, arms, level)] if arms else []
+    at_obstacles = [_at_obstacles(judge, pairs)] if pairs else []
+    return (*(one for own in single for one in own), *redundant, *stuck, *at_obstacles)
 
 
-def _free_of_collision(judge: Judge, condition: ConditionResults, level: float) -> Claim:
+def judge_met(judge: Judge, condition: ConditionResults, level: float) -> Claim:
+    """Judge that goals given in work space are met by a search in configuration space."""
+    met = success(condition)
+    told = f"goal met {met.with_interval(level)}"
+    return judge.on("goals_met", who=condition.label).majority(told, *met)
+
+
+def judge_free(judge: Judge, condition: ConditionResults, level: float) -> Claim:
     """Judge that binary ratings of distances keep the whole motion free."""
     refuted, free = measures.refuted(condition), measures.certified(condition).having
     planned = refuted.total if condition.done == condition.planned else 0
-    return judge.every(
-        text=f"{condition.label}: paths avoid obstacles",
-        source="section 4.3.3",
-        evidence=(
-            f"{markdown.share(free, refuted.total)} solved runs certified; refuted "
-            f"{refuted.with_interval(level)}: postures are free, motions between them are not rated"
-        ),
-        holds=free,
-        done=refuted.total,
-        planned=planned,
+    told = (
+        f"{markdown.share(free, refuted.total)} solved runs certified; refuted "
+        f"{refuted.with_interval(level)}: postures are free, motions between them are not rated"
     )
+    allowed = measures.allowed_contacts(condition)
+    if allowed:
+        told += f"; may touch, {allowed.limit:g} {allowed.unit} deep at most: {allowed.pairs}"
+    hearing = judge.on("paths_avoid_obstacles", who=condition.label)
+    return hearing.every(told, free, refuted.total, planned)
 
 
 def _tilt(judge: Judge, condition: ConditionResults) -> Iterator[Claim]:
@@ -73,11 +89,10 @@ def _tilt(judge: Judge, condition: ConditionResults) -> Iterator[Claim]:
                 f"the way: {markdown.share(*kept)} solved runs"
             )
             planned = len(at) if condition.done == condition.planned else 0
-            what = f"{condition.label}: the grasped object is not tilted"
-            yield judge.every(what, "section 6", told, *kept, planned)
+            yield judge.on("not_tilted", who=condition.label).every(told, *kept, planned)
 
 
-def _redundant(judge: Judge, arms: list[ConditionResults], level: float) -> Claim:
+def judge_redundant(judge: Judge, arms: list[ConditionResults], level: float) -> Claim:
     """Judge that the approach works for highly redundant arms: it finds a certified path."""
     free = {c.label: measures.certified(c).having for c in arms}
     texts = [
@@ -85,15 +100,11 @@ def _redundant(judge: Judge, arms: list[ConditionResults], level: float) -> Clai
         f"{success(c).with_interval(level)}, {free[c.label]} of them certified"
         for c in arms
     ]
-    return judge.claim(
-        text="The approach works for highly redundant arms",
-        source="section 6",
-        evidence=f"{'; '.join(texts)} (reproduced: a certified path, in one task at least)",
-        verdict=verdicts.judged(any(free.values())),
-    )
+    runs = sum(c.done for c in arms)
+    return judge.on("redundant_arms").own("; ".join(texts), runs, any(free.values()))
 
 
-def _planning_time(condition: ConditionResults) -> Iterator[Claim]:
+def _planning_time(judge: Judge, condition: ConditionResults) -> Iterator[Claim]:
     """Set the planning time that the paper prints beside ours."""
     goals = [phase.goal for phase in condition.condition.scenario.phases]  # type: ignore[attr-defined]
     if [getattr(goal, "object", "") for goal in goals] != [BALL] or not condition.solved:
@@ -105,21 +116,33 @@ def _planning_time(condition: ConditionResults) -> Iterator[Claim]:
         f"{cycles.min():.0f} to {cycles.max():.0f} cycles; theirs: a Pentium III, and some 30 000 "
         f"spheres to this model's {shapes}"
     )
-    what = f"{condition.label}: planning takes a couple of seconds up to a few minutes"
-    yield Claim(what, "section 5", told, f"{verdicts.NOT_JUDGED} (another machine, another model)")
+    verdict = f"{verdicts.NOT_JUDGED} (another machine, another model)"
+    yield judge.on("planning_time", who=condition.label).made(told, condition.done, verdict)
 
 
 def _stuck(judge: Judge, stuck: ConditionResults, helped: ConditionResults, level: float) -> Claim:
     """Judge that the search gets stuck where the same task with a sub-goal finds a way."""
     one, two = success(helped), success(stuck)
-    return judge.greater(
-        text=f"{stuck.label}: the search gets stuck in a local minimum",
-        source="section 6",
-        evidence=(
-            f"goal met {two.with_interval(level)}; {helped.label}: {one.with_interval(level)}; "
-            f"Fisher's exact p = {markdown.p_value(fisher_exact(one, two))}; ended by stagnation: "
-            f"{measures.reasons(stuck)['stagnation'].with_interval(level)}"
-        ),
-        one=one,
-        two=two,
+    told = (
+        f"goal met {two.with_interval(level)}; {helped.label}: {one.with_interval(level)}; "
+        f"Fisher's exact p = {markdown.p_value(fisher_exact(one, two))}; ended by stagnation: "
+        f"{measures.reasons(stuck)['stagnation'].with_interval(level)}"
     )
+    return judge.on("stuck_without_sub_goal", who=stuck.label).greater(told, one, two)
+
+
+def _at_obstacles(judge: Judge, pairs: list[tuple[ConditionResults, ConditionResults]]) -> Claim:
+    """Judge that obstacles, and nothing else, keep the search from its goals."""
+    shares = [(c.label, success(c), success(empty)) for c, empty in pairs]
+    adjusted = holm([fisher_exact(own, empty) for _, own, empty in shares])
+    texts = [
+        f"{label} {markdown.share(*own)}, empty scene {markdown.share(*empty)}, p = "
+        f"{markdown.p_value(p)}"
+        for (label, own, empty), p in zip(shares, adjusted, strict=True)
+    ]
+    less = [own.share < empty.share for _, own, empty in shares]
+    clear = [p < judge.significance for p in adjusted]
+    stuck = any(a and b for a, b in zip(less, clear, strict=True))
+    holds = True if stuck else None if any(less) else False
+    runs = sum(own.total + empty.total for _, own, empty in shares)
+    return judge.on("stuck_at_obstacles").own("; ".join(texts), runs, holds)

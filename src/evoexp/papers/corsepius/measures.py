@@ -5,6 +5,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from evoexp.collision.certifier.coal_distances import CoalDistance
+from evoexp.objectives.posture_cost import UPRIGHT
+from evoexp.paths.motion import Motion
 from evoexp.planners.posture_es.phases import Problem
 from evoexp.records import FloatArray
 from evoexp.report.kit import (
@@ -20,6 +23,7 @@ from evoexp.report.kit import (
     solved,
 )
 
+MANY_QUERIES = 1000  # of coal: more than the pairs that may touch when an object is released
 REASONS = ("goal", "stagnation", "cap")  # why a search ends
 
 cycles = by_column("term_cycles")  # of each run, all phases together, (done,)
@@ -153,6 +157,12 @@ def phase_names(condition: ConditionResults) -> tuple[str, ...]:
     return tuple(phase.name for phase in condition.condition.scenario.all_phases)  # type: ignore[attr-defined]
 
 
+def tolerances(condition: ConditionResults) -> tuple[float, ...]:
+    """Return the distance at which the goal of each phase is met, sub-goals first [length unit]."""
+    task: Any = condition.condition.scenario
+    return tuple(phase.position_tolerance or task.position_tolerance for phase in task.all_phases)
+
+
 def subgoals(condition: ConditionResults) -> tuple[Any, ...]:
     """Return the points that the tool passes before the first phase."""
     return tuple(condition.condition.scenario.subgoals)  # type: ignore[attr-defined]
@@ -164,6 +174,88 @@ def only_subgoals_differ(without: ConditionResults, having: ConditionResults) ->
     one, two = ({**task, "subgoals": None} for task in (one, two))
     added = bool(subgoals(having)) and not subgoals(without)
     return added and (robot, one, without.planner) == (same_robot, two, having.planner)
+
+
+def empty(condition: ConditionResults) -> bool:
+    """Whether the obstacles of a condition are taken away: a control."""
+    return bool(condition.condition.scenario.empty_scene)  # type: ignore[attr-defined]
+
+
+def among_obstacles(conditions: tuple[ConditionResults, ...]) -> tuple[ConditionResults, ...]:
+    """Return the conditions whose obstacles stand."""
+    return tuple(c for c in conditions if not empty(c))
+
+
+def with_empty_scenes(
+    conditions: tuple[ConditionResults, ...],
+) -> list[tuple[ConditionResults, ConditionResults]]:
+    """Return the conditions that have an empty scene as a control, each with its control."""
+
+    def key(condition: ConditionResults) -> tuple[Any, ...]:
+        robot, task = scene(condition)
+        return robot, {**task, "empty_scene": None}, condition.planner
+
+    pairs = ((c, [e for e in conditions if empty(e) and key(e) == key(c)]) for c in conditions)
+    return [(c, controls[0]) for c, controls in pairs if controls and not empty(c)]
+
+
+class AllowedContacts(NamedTuple):
+    """Pairs that may touch in the runs of a condition.
+
+    Attributes:
+        pairs: Their names, separated by commas.
+        limit: How deep they may overlap [length unit].
+        unit: Length unit of the scene.
+    """
+
+    pairs: str
+    limit: float
+    unit: str
+
+
+def allowed_contacts(condition: ConditionResults) -> AllowedContacts | None:
+    """Return the pairs that the exact verdict lets touch; None if there is none."""
+    told = condition.summaries.get("allowed_contacts", pd.Series(dtype=str)).fillna("")
+    pairs = dict.fromkeys(pair for text in told for pair in text.split(", ") if pair)
+    limit = condition.condition.scenario.allowed_penetration  # type: ignore[attr-defined]
+    unit = condition.condition.length_unit
+    return AllowedContacts(", ".join(pairs), float(limit), unit) if pairs and limit else None
+
+
+def lets_go(condition: ConditionResults) -> bool:
+    """Whether the task lets go of an object."""
+    phases = condition.condition.scenario.phases  # type: ignore[attr-defined]
+    return any(phase.then == "detach" for phase in phases)
+
+
+class Release(NamedTuple):
+    """The state of an object when it is let go of.
+
+    Attributes:
+        replicate: Of the run.
+        gap: Signed distance to the nearest body that it may touch; negative: it stands in it
+            [length unit].
+        tilt: Between its axis and the direction up [rad].
+    """
+
+    replicate: int
+    gap: float
+    tilt: float
+
+
+def releases(condition: ConditionResults) -> tuple[Release, ...]:
+    """Return the state of the object in every run that lets go of it, by coal's distances."""
+    own, found = problem(condition), []
+    for replicate, q in paths(condition).items():
+        for span in own.spans(q):
+            if span.stage.phase.then == "detach" and span.reached:
+                bodies = own.scene_of(span.stage)
+                pairs = np.array([contact[:2] for contact in bodies.contacts], dtype=np.int64)
+                distance = CoalDistance(bodies._replace(pairs=pairs), Motion(q), MANY_QUERIES)
+                gaps = [distance(pair, float(span.last)) for pair in range(len(pairs))]
+                tilt = float(span.judged.rows[UPRIGHT, -1])
+                found.append(Release(replicate, min(gaps, default=np.inf), tilt))
+    return tuple(found)
 
 
 def by_robot(conditions: tuple[ConditionResults, ...]) -> tuple[ConditionResults, ...]:

@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 
+from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.corsepius import claims, measures
 from evoexp.papers.corsepius.figures import (
     posture_history,
@@ -26,7 +27,9 @@ from evoexp.report.kit import (
     by_column,
     compared_with_controls,
     counted,
+    fisher_exact,
     generic,
+    holm,
     markdown,
     planned_by,
     run_measures,
@@ -53,6 +56,24 @@ TASKS = (
     "steps",
 )
 PHASES = ("task", "phase", "goal of the phase met, of the runs that began it", "cycles")
+BESIDE = (
+    "task",
+    "goal met",
+    "goal met in the empty scene",
+    "p",
+    "cycles",
+    "cycles in the empty scene",
+)
+BESIDE_NOTE = (
+    "Empty scene: the same robot, goals and seeds, without the obstacles that are neither "
+    "approached nor grasped. A goal that is missed there is not missed because of an obstacle. p: "
+    "Fisher's exact tests, Holm over the tasks."
+)
+RELEASED = ("task", "runs", "deepest in another body", "highest above it", "median tilt", "worst")
+RELEASED_NOTE = (
+    "By exact distances to the nearest body that the object may touch, at the posture at which it "
+    "is let go of."
+)
 CHECKS = (
     (
         "Paths between postures",
@@ -127,13 +148,19 @@ def tables(results: Results, settings: ReportSettings) -> tuple[Table, ...]:
     """Return the tables of tasks, and of the phases of those that have several."""
     level = settings.confidence
     phases = tuple(row for c in _phased(results) for row in _phase_rows(c, level))
+    beside, released = _beside_empty(results, level), tuple(map(_release_row, _releasing(results)))
     note = (
         f"Shares of runs, in brackets Wilson's {100 * level:g} % interval; of others median "
         "[quartiles] over all runs."
     )
     rows = tuple(_task_row(c, level) for c in results.with_data)
-    found = Table("Tasks", TASKS, rows, note), Table("Phases", PHASES, phases)
-    return found if phases else found[:1]
+    found = (
+        Table("Tasks", TASKS, rows, note),
+        Table("With and without obstacles", BESIDE, beside, BESIDE_NOTE),
+        Table("Phases", PHASES, phases),
+        Table("Objects when they are let go of", RELEASED, released, RELEASED_NOTE),
+    )
+    return tuple(table for table in found if table.rows)
 
 
 def _task_row(condition: ConditionResults, level: float) -> tuple[str, ...]:
@@ -149,9 +176,47 @@ def _task_row(condition: ConditionResults, level: float) -> tuple[str, ...]:
     )
 
 
+def _beside_empty(results: Results, level: float) -> tuple[tuple[str, ...], ...]:
+    """Return a row per task that has an empty scene as its control: shares, test, cycles."""
+    pairs = measures.with_empty_scenes(results.main)
+    tested = [fisher_exact(run_measures.success(c), run_measures.success(e)) for c, e in pairs]
+    return tuple(
+        (
+            c.label,
+            *(run_measures.success(one).with_interval(level) for one in (c, e)),
+            markdown.p_value(p),
+            *(markdown.spread(spread(measures.cycles(one))) for one in (c, e)),
+        )
+        for (c, e), p in zip(pairs, holm(tested), strict=True)
+    )
+
+
+def _releasing(results: Results) -> tuple[ConditionResults, ...]:
+    """Return the conditions in which an object is let go of in a run at least."""
+    main = measures.among_obstacles(results.main)
+    detaching = (c for c in main if measures.lets_go(c))
+    return tuple(c for c in detaching if measures.releases(c))
+
+
+def _release_row(condition: ConditionResults) -> tuple[str, ...]:
+    """Return gap and tilt of the objects of a condition: medians and the worst."""
+    found, unit = measures.releases(condition), condition.condition.length_unit
+    gaps, tilts = (np.array([getattr(one, name) for one in found]) for name in ("gap", "tilt"))
+    deepest, highest = max(0.0, -float(gaps.min())), max(0.0, float(gaps.max()))
+    return (
+        condition.label,
+        str(len(found)),
+        f"{markdown.number(float(f'{deepest:.2g}'))} {unit}",
+        f"{markdown.number(float(f'{highest:.2g}'))} {unit}",
+        f"{np.median(tilts) / DEGREE:.2f}°",
+        f"{tilts.max() / DEGREE:.2f}°",
+    )
+
+
 def _phased(results: Results) -> tuple[ConditionResults, ...]:
     """Return the conditions that have several phases."""
-    return tuple(c for c in results.main if len(measures.phase_names(c)) > 1)
+    several = (c for c in results.main if len(measures.phase_names(c)) > 1)
+    return measures.among_obstacles(tuple(several))
 
 
 def _phase_rows(condition: ConditionResults, level: float) -> Iterator[tuple[object, ...]]:
@@ -185,7 +250,8 @@ def checks(results: Results) -> tuple[tuple[str, str], ...]:
 
 def drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
     """Return the figures."""
-    main, level = results.main, f"{100 * settings.confidence:g} %"
+    every, level = results.main, f"{100 * settings.confidence:g} %"
+    main = measures.among_obstacles(every)
     shown = [
         ShownPath(f"{c.label}\nrun {k}{'' if c.solved else ', not solved'}", c, k)
         for c in main
@@ -194,7 +260,7 @@ def drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
     reasons = [
         (f"ended by {reason}", position, c.label, measures.reasons(c)[reason])
         for reason in measures.REASONS
-        for position, c in enumerate(main)
+        for position, c in enumerate(every)
     ]
     return (
         _models(main),
@@ -214,8 +280,9 @@ def drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
             "Approach to the goal",
             "Best so far against cycles: median and quartiles of the runs that began the phase; "
             "a run that has ended keeps its last value. The best posture is the one of least "
-            "cost, so its distance may grow. At the curves: numbers of runs.",
-            partial(posture_history.history_table, results),
+            "cost, so its distance may grow. At the ends of curves: numbers of runs that began "
+            "the phase, equal ones once.",
+            partial(posture_history.history_table, results._replace(conditions=main)),
             posture_history.draw_history,
             main,
         ),
@@ -225,7 +292,7 @@ def drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
             f"Share of runs, with Wilson's {level} interval.",
             partial(shares.shares_table, reasons, {}, settings.confidence),
             shares.draw_shares,
-            main,
+            every,
         ),
         _paths("paths", "Paths", PATHS, shown),
         *_manoeuvres(results, settings),
@@ -234,7 +301,8 @@ def drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
 
 
 def _paths(stem: str, title: str, caption: str, shown: list[ShownPath]) -> Drawing:
-    table, draw = partial(posture_motions.motions_table, shown), posture_motions.draw_motions
+    table = partial(posture_motions.motions_table, shown)
+    draw = partial(posture_motions.draw_motions, same_scene=shown[0].by_phase)
     return Drawing(stem, title, caption, table, draw, tuple(one.condition for one in shown))
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from evoexp.papers.corsepius import measures
 from evoexp.papers.corsepius.measures import Task
+from evoexp.papers.corsepius.rules import RULES
 from evoexp.records import FloatArray
 from evoexp.report.kit import (
     Claim,
@@ -22,14 +23,9 @@ from evoexp.report.kit import (
     markdown,
     solved,
     success,
-    verdicts,
 )
 
 RECOMMENDED = 100.0  # individuals (section 5)
-REASONABLE = (
-    2.0  # [-] no other size takes less than half the effort of a reasonable one; our reading
-)
-SOURCE = "section 5"
 METRICS: dict[str, Values] = {
     "cycles": measures.cycles,
     "evaluations": measures.evaluations,
@@ -145,24 +141,20 @@ def _short(ratio: float) -> str:
     return markdown.number(float(f"{ratio:.2g}")) if np.isfinite(ratio) else "∞"
 
 
-def _unless(against: object, favour: object) -> str:
-    """Return the verdict: contradicted if anything is against, reproduced if anything favours."""
-    return verdicts.judged(False if against else True if favour else None)
+def _unless(against: object, favour: object) -> bool | None:
+    """Return whether a claim holds: not if anything is against, but if anything favours it."""
+    return False if against else True if favour else None
 
 
 def _no_faster(judge: Judge, metric: str, rows: list[SizeComparison]) -> Claim:
     """Judge that nothing larger is faster, on any task."""
     says = [row.says for row in rows]
-    return judge.claim(
-        text=f"Larger populations do not plan faster, on any task: {metric}",
-        source=SOURCE,
-        evidence=(
-            f"expected {metric} over those of 100 individuals, λ in brackets: less for "
-            f"{_ratios(rows, -1)}; more for {_ratios(rows, 1)} (reproduced: none is faster, at "
-            "least one is slower)"
-        ),
-        verdict=_unless(-1 in says, 1 in says),
+    told = (
+        f"expected {metric} over those of 100 individuals, λ in brackets: less for "
+        f"{_ratios(rows, -1)}; more for {_ratios(rows, 1)}"
     )
+    hearing = judge.on("larger_no_faster", metric=metric)
+    return hearing.own(told, f"{len(rows)} ratios", _unless(-1 in says, 1 in says))
 
 
 def _not_necessarily(judge: Judge, metric: str, rows: list[SizeComparison]) -> Claim:
@@ -170,32 +162,24 @@ def _not_necessarily(judge: Judge, metric: str, rows: list[SizeComparison]) -> C
     says = {name: [row.says for row in rows if row.task == name] for name in (r.task for r in rows)}
     never = [name for name, own in says.items() if min(own) >= 0]
     slower = [name for name in never if max(says[name]) > 0]
-    return judge.claim(
-        text=f"Larger populations do not necessarily plan faster: {metric}",
-        source=SOURCE,
-        evidence=(
-            f"of {len(says)} tasks nothing larger than 100 is faster on {len(never)}: "
-            f"{', '.join(never) or '–'}; something larger is slower on {len(slower)} of them "
-            "(reproduced: on one at least)"
-        ),
-        verdict=_unless(not never, slower),
+    told = (
+        f"of {len(says)} tasks nothing larger than 100 is faster on {len(never)}: "
+        f"{', '.join(never) or '–'}; something larger is slower on {len(slower)} of them"
     )
+    hearing = judge.on("larger_not_necessarily_faster", metric=metric)
+    return hearing.own(told, f"{len(says)} tasks", _unless(not never, slower))
 
 
 def _over_proportional(judge: Judge, metric: str, rows: list[SizeComparison]) -> Claim:
     """Judge that on every task every smaller population costs over-proportionally more."""
     says = [row.says for row in rows]
-    exceeds = "100/λ" if metric == "cycles" else "1: time goes with evaluations"
-    return judge.claim(
-        text=f"Smaller populations increase planning times over-proportionally: {metric}",
-        source=SOURCE,
-        evidence=(
-            f"over-proportional: the ratio exceeds {exceeds}. Above: {_ratios(rows, 1)}. Below: "
-            f"{_ratios(rows, -1)}. Not certain: {says.count(0)} of {len(rows)} (reproduced: all "
-            "above)"
-        ),
-        verdict=_unless(-1 in says, says and 0 not in says),
+    exceeds = "100/λ" if metric == "cycles" else "1 (time goes with evaluations)"
+    told = (
+        f"above: {_ratios(rows, 1)}; below: {_ratios(rows, -1)}; not certain: {says.count(0)} of "
+        f"{len(rows)}"
     )
+    hearing = judge.on("smaller_over_proportional", metric=metric, exceeds=exceeds)
+    return hearing.own(told, f"{len(rows)} ratios", _unless(-1 in says, says and 0 not in says))
 
 
 def _converges_less(judge: Judge, found: tuple[Task, ...], settings: ReportSettings) -> Claim:
@@ -208,16 +192,12 @@ def _converges_less(judge: Judge, found: tuple[Task, ...], settings: ReportSetti
         f"{name} {value:g}: {markdown.share(*success(c))} for {markdown.share(*success(own))}"
         for name, value, c, own in clear
     )
-    return judge.claim(
-        text="Smaller populations reduce convergence",
-        source=SOURCE,
-        evidence=(
-            f"goal met less often than with 100 in {less} of {len(pairs)} cases, more often in "
-            f"{len(clear) - less} (Fisher's exact tests, Holm): {'; '.join(texts) or '–'} "
-            "(reproduced: never more often, less often somewhere)"
-        ),
-        verdict=_unless(len(clear) > less, less),
+    told = (
+        f"goal met significantly less often than with 100 in {less} of {len(pairs)} cases, more "
+        f"often in {len(clear) - less}: {'; '.join(texts) or '–'}"
     )
+    hearing = judge.on("smaller_converge_less")
+    return hearing.own(told, f"{len(pairs)} pairs", _unless(len(clear) > less, less))
 
 
 def _reasonable(judge: Judge, metric: str, found: tuple[Task, ...], values: Values) -> Claim:
@@ -229,12 +209,8 @@ def _reasonable(judge: Judge, metric: str, found: tuple[Task, ...], values: Valu
         if RECOMMENDED in efforts and np.isfinite(efforts[best]):
             factors[task.name] = efforts[RECOMMENDED] / efforts[best], best
     texts = (f"{name} {_short(factor)} (best: {b:g})" for name, (factor, b) in factors.items())
-    return judge.claim(
-        text=f"100 individuals are reasonable: {metric}",
-        source=SOURCE,
-        evidence=(
-            f"effort of 100 over that of the best size: {', '.join(texts) or '–'} "
-            f"(reproduced: at most {REASONABLE:g} everywhere; our reading)"
-        ),
-        verdict=_unless(any(factor > REASONABLE for factor, _ in factors.values()), factors),
-    )
+    most = RULES["reasonable"].limits["most"]
+    told = f"effort of 100 over that of the best size: {', '.join(texts) or '–'}"
+    hearing = judge.on("reasonable", metric=metric)
+    against = any(factor > most for factor, _ in factors.values())
+    return hearing.own(told, f"{len(factors)} tasks", _unless(against, factors))

@@ -9,6 +9,7 @@ from evoexp.papers.corsepius import page as whole_page
 from evoexp.papers.corsepius.figures import population_effort
 from evoexp.papers.corsepius.measures import Task
 from evoexp.papers.corsepius.population_claims import METRICS, RECOMMENDED, SizeComparison
+from evoexp.papers.corsepius.rules import RULES
 from evoexp.planners.posture_es.planner import PostureEs
 from evoexp.records import FloatArray
 from evoexp.report.kit import (
@@ -55,8 +56,10 @@ NOTE = (
 )
 FLOOR = (
     "The goal's tolerance is too small to be met, so every search ends by stagnation; "
-    "drawn is its distance to the goal then. Points: runs; bars: medians and quartiles. A step "
-    "has the size of the scope, so it seldom lands nearer than some share of it."
+    "drawn is its distance to the goal then: to the surface of an object, and to a point. Points: "
+    "runs; bars: medians and quartiles. A step has the size of the scope, so it seldom lands "
+    "nearer than some share of it. A surface fixes one coordinate, a point three, which a random "
+    "step must meet at once: its floor is far higher."
 )
 EFFECTS = (
     f"{sweep_figures.A12} the first condition takes fewer evaluations to the goal than the other "
@@ -102,9 +105,9 @@ def page(results: Results, settings: ReportSettings) -> Page:
         title=f"Corsépius 2001: {results.experiment or 'stored runs'}",
         introduction=INTRODUCTION,
         quantities=whole_page.quantities(results),
-        tables=(_table(results, settings),),
+        tables=(_table(results, settings), *_floors(results)),
         checks=tuple(
-            ("Residual floor", slope.format(population_effort.slope(task)))
+            (f"Residual floor, {task.name}", slope.format(population_effort.slope(task)))
             for task in _scopes(results)
         ),
         comparisons=tuple((f"{name}: {first} against …", rows) for name, first, rows in found),
@@ -115,6 +118,11 @@ def page(results: Results, settings: ReportSettings) -> Page:
 def effort(condition: ConditionResults) -> FloatArray:
     """Return the evaluations to the goal of each run, (done,); inf without it."""
     return np.where(solved(condition), measures.evaluations(condition), np.inf)
+
+
+def _steps(condition: ConditionResults) -> FloatArray:
+    """Return the steps of each run's path to the goal, (done,); inf without it."""
+    return np.where(solved(condition), measures.num_steps(condition), np.inf)
 
 
 def comparisons(results: Results, settings: ReportSettings) -> list[FirstComparison]:
@@ -153,6 +161,22 @@ def _table(results: Results, settings: ReportSettings) -> Table:
     return Table("Shares of runs", SHARES, tuple(rows), NOTE)
 
 
+def _floors(results: Results) -> tuple[Table, ...]:
+    """Return the distances at which searches stagnate, if no goal can be met."""
+    if not _scopes(results):
+        return ()
+    rows = tuple(
+        (
+            c.label,
+            markdown.spread(spread(1e3 * measures.residuals(c))),
+            markdown.spread(spread(measures.cycles(c))),
+        )
+        for c in results.main
+    )
+    headers = ("condition", f"residual [1e−3 {results.main[0].condition.length_unit}]", "cycles")
+    return (Table("Residual floors", headers, rows, "Median [quartiles] over all runs."),)
+
+
 def _scopes(results: Results) -> tuple[Task, ...]:
     """Return the tasks whose scopes differ and that never end by reaching the goal."""
     if any(len(set(c.planner.scope)) > 1 for c in results.main):  # joint by joint another one
@@ -171,11 +195,11 @@ def _drawings(
             "floor",
             "Residual floor",
             FLOOR,
-            partial(population_effort.floor_table, task),
+            partial(population_effort.floor_table, scopes),
             population_effort.draw_floor,
-            task.conditions,
+            tuple(c for task in scopes for c in task.conditions),
         )
-        for task in scopes
+        for _ in scopes[:1]
     ]
     if parents:
         return (*drawn, _effort(parents, settings))
@@ -190,7 +214,7 @@ def _drawings(
         caption = f"Wilson's {100 * settings.confidence:g} % intervals."
         drawn.append(sweep_figures.shares_drawing(results, settings, rows, caption))
     if not scopes:
-        values = {"evaluations to the goal": effort, "steps of the path": measures.num_steps}
+        values = {"evaluations to the goal": effort, "steps of the path to it": _steps}
         main = results._replace(conditions=results.main)
         boxes = sweep_figures.values_drawing(main, values)
         by_name = {name: rows for name, _, rows in found}
@@ -224,7 +248,7 @@ def population_page(results: Results, settings: ReportSettings) -> Page:
     if not found:
         return whole_page.page(results, settings)
     sizes = {metric: population_claims.compare_sizes(found, metric, settings) for metric in METRICS}
-    judge = judging.judge(results, settings)
+    judge = judging.judge(results, settings, RULES)
     return Page(
         title=f"Corsépius 2001: {results.experiment or 'stored runs'}",
         introduction=SIZES,

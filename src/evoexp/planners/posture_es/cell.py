@@ -1,14 +1,15 @@
 """A robot cell: the arm, the objects around it, and the bodies that move or stand in a phase."""
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from evoexp.collision.models.body_covers import Cover
 from evoexp.collision.models.body_models import BodyModel, Carried
-from evoexp.collision.scene import Scene, geometry_scene, obstacle_shapes
+from evoexp.collision.models.primitives import PrimitiveCollision
+from evoexp.collision.scene import AllowedContact, Scene, geometry_scene, obstacle_shapes
 from evoexp.objectives.posture_cost import EDGED, POINT, ROD, ROUND, Aim
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
@@ -16,6 +17,7 @@ from evoexp.robots.poses import IDENTITY, compose, frame_pose, pose_of
 from evoexp.scenarios.obstacles import BOX, CYLINDER, ObstacleTable, rotation_matrix
 from evoexp.scenarios.posture_task import (
     Phase,
+    PlaceGoal,
     PointGoal,
     PoseGoal,
     PostureTask,
@@ -49,7 +51,8 @@ class Cell:
         bodies: Its bodies, covered.
         task: The scenario.
         obstacles: The obstacles at the start.
-        covers: Covers of the objects that are grasped, by index, in their own frames.
+        covers: Covers of the objects that are grasped, by index, in their own frames, and shapes
+            inside them.
         tool: Index into the kinematic table of the joint that moves the tool; its local pose (12,).
     """
 
@@ -57,7 +60,7 @@ class Cell:
     bodies: BodyModel
     task: PostureTask
     obstacles: ObstacleTable
-    covers: dict[int, Cover]
+    covers: dict[int, tuple[Cover, Cover]]
     tool: tuple[int, FloatArray]
 
     @property
@@ -70,6 +73,11 @@ class Cell:
         """Return the obstacles in a situation; a held object stands where it was taken."""
         poses = situation.poses
         return self.obstacles._replace(rotation=poses[:, :9].copy(), center=poses[:, 9:].copy())
+
+    @property
+    def allowed_penetration(self) -> float:
+        """How deep pairs that may touch may overlap [length unit]."""
+        return self.task.allowed_penetration or 0.0
 
     def scene_in(self, phase: Phase, situation: Situation) -> Scene:
         """Return the bodies of a phase, for the exact verdict."""
@@ -92,6 +100,7 @@ class Cell:
             )
         allowed = _allowed(phase)
         pairs = list(self.bodies.pairs)
+        touching: list[AllowedContact] = []
         for k in range(len(self.task.names)):
             if k == situation.held:
                 others = [len(items) + j for j in range(len(self.task.names)) if j != k]
@@ -105,15 +114,28 @@ class Cell:
                 ]
         names = [item.name for item in geometry.geometryObjects]
         for a, b in pairs:
-            if frozenset((names[a], names[b])) not in allowed:
+            if frozenset((names[a], names[b])) in allowed:
+                touching.append(AllowedContact(a, b, self.allowed_penetration))
+            else:
                 geometry.addCollisionPair(pin.CollisionPair(a, b))
-        return geometry_scene(assembly.model, geometry, assembly.table)
+        scene = geometry_scene(assembly.model, geometry, assembly.table)
+        return scene._replace(contacts=tuple(touching))
 
-    def surroundings(self, phase: Phase, situation: Situation) -> tuple[Any, ...]:
-        """Return the arguments of `BodyModel.collision`.
+    def collisions(
+        self, phase: Phase, situation: Situation
+    ) -> tuple[PrimitiveCollision, PrimitiveCollision | None]:
+        """Return the collision models of pairs that must not touch, and of those that may."""
+        obstacles, allowed, carried = self.surroundings(phase, situation)
+        depth = self.allowed_penetration
+        return (
+            self.bodies.collision(obstacles, allowed, carried),
+            self.bodies.touching(obstacles, allowed, depth, carried),
+        )
 
-        They are the obstacles, the pairs (body, obstacle) that may touch, and the carried object.
-        """
+    def surroundings(
+        self, phase: Phase, situation: Situation
+    ) -> tuple[ObstacleTable, tuple[tuple[int, int], ...], Carried | None]:
+        """Return the obstacles, the pairs (body, obstacle) that may touch, the carried object."""
         names, bodies = self.task.names, self.bodies.names
         allowed = _allowed(phase)
         held = situation.held
@@ -137,18 +159,14 @@ class Cell:
         )
         if held < 0:
             return table, ignored, None
-        cover, grasp = self.covers[held], situation.grasp
+        grasp = situation.grasp
         joint = self.tool[0] + 1
         pose = compose(pose_of(self.assembly.table.alignment[joint - 1], np.zeros(3)), grasp)
-        start, end = (_moved(pose, points) for points in (cover.start, cover.end))
+        cover, inner = (_moved_cover(pose, one) for one in self.covers[held])
         watched = [
             k for k in self._apart_from_tool() if frozenset((bodies[k], names[held])) not in allowed
         ]
-        return (
-            table,
-            ignored,
-            Carried(joint, Cover(start, end, cover.radius, cover.inflation), tuple(watched)),
-        )
+        return table, ignored, Carried(joint, cover, inner, tuple(watched))
 
     def aim(
         self,
@@ -161,8 +179,14 @@ class Cell:
         goal, rotation = phase.goal, IDENTITY[:9].copy()
         point, axis = np.zeros(3), np.zeros(3)
         surface, half_length, radius, half_edges = POINT, 0.0, 0.0, np.zeros(3)
-        if isinstance(goal, PointGoal | PoseGoal):
+        up = np.array(self.task.up)
+        up = up / np.sqrt(np.sum(up * up))
+        if isinstance(goal, PointGoal | PoseGoal | PlaceGoal):
             point = np.array(goal.point, dtype=np.float64)
+        if isinstance(goal, PointGoal) and goal.radius > 0.0:
+            surface, radius = ROD, goal.radius
+        if isinstance(goal, PlaceGoal):
+            surface, radius, axis = ROUND, goal.radius, up
         if isinstance(goal, PoseGoal):
             rotation = np.array(rotation_matrix(goal.rotation), dtype=np.float64).ravel()
         if isinstance(goal, ShiftGoal):
@@ -181,7 +205,6 @@ class Cell:
                 surface, half_edges = EDGED, size.copy()
             else:
                 surface, half_length, radius = ROUND if kind == CYLINDER else ROD, size[1], size[0]
-        up = np.array(self.task.up)
         return Aim(
             rotation,
             point,
@@ -190,7 +213,7 @@ class Cell:
             float(half_length),
             float(radius),
             half_edges,
-            up / np.sqrt(np.sum(up * up)),
+            up,
             OBJECT_UP if situation.held >= 0 else TOOL_UP,
         )
 
@@ -205,6 +228,10 @@ class Cell:
 
 def _allowed(phase: Phase) -> set[frozenset[str]]:
     return {frozenset(pair) for pair in phase.contacts}
+
+
+def _moved_cover(pose: FloatArray, cover: Cover) -> Cover:
+    return cover._replace(start=_moved(pose, cover.start), end=_moved(pose, cover.end))
 
 
 def _moved(pose: FloatArray, points: FloatArray) -> FloatArray:

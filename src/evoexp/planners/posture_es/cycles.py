@@ -12,7 +12,6 @@ from evoexp.planners.posture_es.kernels import (
     GAUSSIAN,
     NORMAL,
     UNIFORM,
-    Judging,
     Members,
     Memory,
     Strategy,
@@ -70,16 +69,16 @@ class Search:
         self,
         ga: StrategySettings,
         problem: Any,
-        judging: Judging,
+        stage: Any,
         edge_check: int,
         ancestry: Ancestry,
         node: int,
     ) -> None:
         """Begin a phase at a node of the ancestry; `edge_check` as in `kernels.Strategy`."""
-        self.ga, self.judging, self.ancestry = ga, judging, ancestry
+        self.ga, self.judging, self.ancestry = ga, stage.judging, ancestry
         self._nq, room = len(problem.scope), ga.num_parents
         self._strategy = Strategy(
-            problem.scope,
+            problem.scope * stage.phase.scope_share,
             problem.limits,
             GAUSSIAN if ga.mutation == "gaussian" else UNIFORM,
             ga.mutation_std,
@@ -94,7 +93,7 @@ class Search:
         # the posture that the phase begins with is judged, and is the first parent
         self.memory = Memory.of(self._nq, 1)
         self.memory.offspring[:, 0] = self._members.postures[:, 0] = ancestry.postures[node]
-        kernels.judge(self.memory.offspring, judging, *self.memory[2:])
+        kernels.judge(self.memory.offspring, self.judging, *self.memory[2:])
         self.best, self.best_row = node, self.memory.rows[:, 0].copy()
         self._members.costs[0] = self.least_cost = float(self.best_row[COST])
         self.cycles = self.idle = 0

@@ -48,7 +48,11 @@ class Judging(NamedTuple):
         limits: (nq, 2) of the joints.
         tables: Tables of the collision model.
         reach: Of the preference for free space [length unit].
-        tolerances: Of the goal [length unit], [rad].
+        tolerances: (3,) of the goal's distance [length unit], of its angles and of the tilt of the
+            up axis [rad].
+        larger_angle: Whether only the larger one of the two grasping angles counts.
+        touching: Tables of the collision model of pairs that may touch; read only if there are any.
+        may_touch: Whether there are any.
     """
 
     chain: KinematicChain
@@ -61,6 +65,9 @@ class Judging(NamedTuple):
     tables: tuple[Any, ...]
     reach: float
     tolerances: FloatArray
+    larger_angle: bool
+    touching: tuple[Any, ...]
+    may_touch: bool
 
 
 class Strategy(NamedTuple):
@@ -158,6 +165,13 @@ def judge(
             rows[COLLISION, n] = 0.0 if least >= 0.0 else 1.0
             if rated:
                 rows[FREE_SPACE, n] = min(max(1.0 - least / reach, 0.0), 1.0)
+    if weights[COLLISION] > 0.0 and judging.may_touch:
+        overlap = np.empty((3, count))
+        primitive_clearances(judging.touching, 0.0, True, q, overlap)
+        for n in range(count):
+            if overlap[0, n] < 0.0:
+                rows[COLLISION, n] = 1.0
+                rows[FREE_SPACE, n] = 1.0 if weights[FREE_SPACE] > 0.0 else 0.0
     # cost, feasibility, goal
     tilts, tolerances = judging.tilts, judging.tolerances
     for n in range(count):
@@ -165,6 +179,8 @@ def judge(
         for t in range(COST):
             if weights[t] > 0.0:
                 cost += weights[t] * abs(rows[t, n])
+        if judging.larger_angle:
+            cost -= min(weights[AXIAL] * rows[AXIAL, n], weights[HEADING] * rows[HEADING, n])
         upright = weights[UPRIGHT] == 0.0 or rows[UPRIGHT, n] <= tilts[0]
         parallel = weights[PARALLEL] == 0.0 or rows[PARALLEL, n] <= tilts[1]
         rows[COST, n] = cost if upright and parallel else np.inf
@@ -172,6 +188,7 @@ def judge(
         near = abs(rows[DISTANCE, n]) <= tolerances[0]
         for t in TURNS:
             near = near and (weights[t] == 0.0 or rows[t, n] <= tolerances[1])
+        near = near and (weights[UPRIGHT] == 0.0 or rows[UPRIGHT, n] <= tolerances[2])
         met[n] = near and feasible[n]
 
 

@@ -168,8 +168,10 @@ class Problem(Cell):
     def _begun(self, index: int, q: FloatArray, situation: Situation) -> Stage:
         phase, (joint, local) = self.phases[index], self.tool
         controlled = (joint, situation.grasp if situation.held >= 0 else local)
-        collision = self.bodies.collision(*self.surroundings(phase, situation))
+        collision, touching = self.collisions(phase, situation)
         objective, task = self.objective, self.task
+        near = phase.position_tolerance or task.position_tolerance
+        tilt = np.inf if phase.upright_tolerance is None else phase.upright_tolerance
         judging = Judging(
             self.assembly.table.chain,
             joint,
@@ -180,7 +182,10 @@ class Problem(Cell):
             self.limits,
             collision.tables,
             objective.free_space.reach if objective.free_space else 0.0,
-            np.array([task.position_tolerance, DEGREE * task.angle_tolerance]),
+            np.array([near, DEGREE * task.angle_tolerance, DEGREE * tilt]),
+            objective.grasp_angles == "larger",
+            (touching or collision).tables,
+            touching is not None,
         )
         return Stage(index, phase, situation, controlled, judging)
 

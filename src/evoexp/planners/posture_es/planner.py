@@ -101,7 +101,7 @@ class PostureEs(PlannerDefaults, Component):
         situation = problem.first_situation
         for index in range(len(problem.phases)):
             stage = problem.begin(index, ancestry.postures[node], situation)
-            search = Search(self.ga, problem, stage.judging, self.edge_check, ancestry, node)
+            search = Search(self.ga, problem, stage, self.edge_check, ancestry, node)
             last = index == len(problem.phases) - 1
             while True:
                 reason = search.stop_reason

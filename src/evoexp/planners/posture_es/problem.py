@@ -8,10 +8,11 @@ import pinocchio as pin
 
 from evoexp.collision.models.body_covers import Cover
 from evoexp.collision.models.body_models import BodyModel, CollisionModel
+from evoexp.collision.models.inner_balls import inner_balls
 from evoexp.collision.scene import obstacle_shapes
 from evoexp.errors import SettingError, nearest
 from evoexp.numeric.elementary import DEGREE
-from evoexp.objectives.posture_cost import ANGLE, AXIAL, HEADING, TERMS, PostureCost
+from evoexp.objectives.posture_cost import ANGLE, AXIAL, HEADING, TERMS, UPRIGHT, PostureCost
 from evoexp.planners.posture_es.phases import Problem
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly, Robot
@@ -19,6 +20,7 @@ from evoexp.robots.poses import local_pose
 from evoexp.scenarios.obstacles import CAPSULE, CYLINDER, ObstacleTable, obstacle_table
 from evoexp.scenarios.posture_task import (
     Phase,
+    PlaceGoal,
     PointGoal,
     PoseGoal,
     PostureTask,
@@ -46,7 +48,7 @@ def prepare(
         raise SettingError("robot", "one arm", f"{assembly.num_arms} arms")
     limits = _limits(assembly)
     start = _start(task, assembly, limits)
-    obstacles = obstacle_table(task.obstacles).without_ellipses()
+    obstacles = obstacle_table(task.objects).without_ellipses()
     bodies = _bodies(robot, collision)
     tool = assembly.tools[0]
     for k, name in enumerate(task.names):
@@ -71,7 +73,7 @@ def prepare(
         task.security_margin,
         {},
     )
-    _check_contacts(task, (*bodies.names, *task.names))
+    _check_contacts(task, (*bodies.names, *task.all_names))
     if task.check_reach:
         _check_reach(problem)
     stage = problem.begin(0, start, problem.first_situation)
@@ -187,6 +189,12 @@ def _check_terms(
         )
     if isinstance(goal, PoseGoal) and weights[ANGLE] == 0.0:
         raise SettingError(where, "a point, since no goal_angle rates its orientation", "pose")
+    if phase.upright_tolerance is not None and weights[UPRIGHT] == 0.0:
+        raise SettingError(
+            field.removesuffix("terms") + "upright_tolerance",
+            "left out in a phase whose terms do not count upright",
+            phase.upright_tolerance,
+        )
     for term in (AXIAL, HEADING):
         if weights[term] > 0.0 and not isinstance(goal, SurfaceGoal):
             raise SettingError(
@@ -197,7 +205,7 @@ def _check_terms(
             )
     if isinstance(goal, SurfaceGoal):
         kind = obstacles.kind[task.names.index(goal.object)]
-        shape = task.obstacles[task.names.index(goal.object)].shape
+        shape = task.objects[task.names.index(goal.object)].shape
         if shape == "half_space":
             raise SettingError(
                 f"{where}.object", "a sphere, box, capsule or cylinder", "half_space"
@@ -212,16 +220,17 @@ def _check_terms(
 
 def _covers(
     task: PostureTask, obstacles: ObstacleTable, collision: CollisionModel
-) -> dict[int, Cover]:
-    """Return covers of the objects that are grasped, in their own frames."""
+) -> dict[int, tuple[Cover, Cover]]:
+    """Return covers of the objects that are grasped, and shapes inside, in their own frames."""
     taken = {task.names.index(phase.object) for phase in task.phases if phase.then == "attach"}
     shapes = obstacle_shapes(obstacles)
-    return {
-        k: collision.cover(
-            pin.GeometryObject(task.names[k], 0, 0, pin.SE3.Identity(), shapes[k][0])
-        )
-        for k in taken
-    }
+    found = {}
+    for k in taken:
+        item = pin.GeometryObject(task.names[k], 0, 0, pin.SE3.Identity(), shapes[k][0])
+        inner = inner_balls(item, task.allowed_penetration or 0.0)
+        assert inner is not None  # the task lets nothing else be grasped
+        found[k] = collision.cover(item), inner
+    return found
 
 
 def _check_contacts(task: PostureTask, names: tuple[str, ...]) -> None:
@@ -268,8 +277,9 @@ def _check_reach(problem: Problem) -> None:
     for k, phase in enumerate(problem.phases):
         goal, point, size = phase.goal, None, 0.0
         field = f"scenario.subgoals[{k}]" if k < ways else f"scenario.phases[{k - ways}].goal.point"
-        if isinstance(goal, PointGoal | PoseGoal) and not held:
+        if isinstance(goal, PointGoal | PoseGoal | PlaceGoal) and not held:
             point = np.array(goal.point)
+            size = 0.0 if isinstance(goal, PoseGoal) else goal.radius
         elif isinstance(goal, SurfaceGoal):
             index = task.names.index(goal.object)
             point, field = (

@@ -2,6 +2,7 @@
 
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -9,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter, MultipleLocator
 
-from evoexp.records import FloatArray
+from evoexp.records import FloatArray, IntArray
 from evoexp.report import style
 from evoexp.report.figures.boxes import draw_box
 from evoexp.report.results import ConditionResults, Results
@@ -21,6 +22,13 @@ WRAPPED = 24  # characters of a name in a panel, per line
 BEYOND = 0.18  # [-] of the range of finite values: how far beyond it infinity is drawn
 CLEAR = 0.22  # [-] of an axis: no number stands so near to the word "never"
 THOUSANDS = 10_000  # from here on numbers along an axis are written with k and M
+TESTS = ("p_adjusted", "unpaired_adjusted")
+DOT: dict[str, Any] = {"color": style.ARM_COLOURS[0], "markersize": 5}
+LOOKS: tuple[dict[str, Any], ...] = (
+    {"markerfacecolor": "white"},
+    {"fillstyle": "left", "markerfacecoloralt": "white"},
+    {"markerfacecolor": style.ARM_COLOURS[0]},
+)  # looks of differences that are significant by none, one and both of the tests
 Values = Callable[[ConditionResults], FloatArray]
 
 
@@ -137,17 +145,17 @@ def effects_table(
         significance: Below this adjusted p-value a difference counts.
 
     Returns:
-        Columns quantity, condition (the other one), a12, lower, upper, p_adjusted, seeds,
-        significance.
+        Columns quantity, condition (the other one), a12, lower, upper, p_adjusted (signed rank),
+        unpaired_adjusted (rank sum), seeds, significance.
     """
     rows = [
-        (quantity, c.quantity, c.better.a12, *c.better.interval, c.p_adjusted, c.num_seeds)
+        (quantity, c.quantity, c.better.a12, *c.better.interval, *tests, c.num_seeds)
         for quantity, found in comparisons.items()
         for c in found
+        for tests in ((c.p_adjusted, c.unpaired_adjusted),)
     ]
-    return pd.DataFrame(
-        rows, columns=["quantity", "condition", "a12", "lower", "upper", "p_adjusted", "seeds"]
-    ).assign(significance=significance)
+    names = ["quantity", "condition", "a12", "lower", "upper", *TESTS, "seeds"]
+    return pd.DataFrame(rows, columns=names).assign(significance=significance)
 
 
 def draw_effects(table: pd.DataFrame) -> Figure:
@@ -161,18 +169,26 @@ def draw_effects(table: pd.DataFrame) -> Figure:
         a12, low, high = (rows[name].to_numpy(np.float64) for name in ("a12", "lower", "upper"))
         axes.axvline(0.5, color=style.FAINT, linewidth=0.9, linestyle=(0, (4, 2)), zorder=1)
         axes.hlines(y, low, high, color=style.ARM_COLOURS[0], linewidth=1.4)
-        level = float(rows["significance"].iloc[0])
-        clear = rows["p_adjusted"].to_numpy(np.float64) < level
-        for shown, fill, sign in ((clear, style.ARM_COLOURS[0], "<"), (~clear, "white", "≥")):
-            if not shown.any():
-                continue
-            label, colour = f"adjusted p {sign} {level:g}", style.ARM_COLOURS[0]
-            axes.plot(a12[shown], y[shown], "o", color=colour, mfc=fill, ms=5, label=label)
+        clear = _clear(rows)
+        for count, look in enumerate(LOOKS):
+            axes.plot(a12[clear == count], y[clear == count], "o", **DOT, **look)
         axes.set_xlim(-0.03, 1.03)
         axes.set_title(textwrap.fill(quantity, WRAPPED), fontsize=7.5)
         axes.set_xlabel("A12: the first is better")
         axes.xaxis.set_major_locator(MultipleLocator(0.25))
     panels[0].set_yticks(range(len(labels)), [f"against {label}" for label in labels])
     panels[0].set_ylim(len(labels) - 0.5, -0.5)
-    style.legend_of_all(figure, panels, 2)
+    level = float(table["significance"].iloc[0])
+    texts = (f"adjusted p ≥ {level:g}", f"< {level:g} by one test of two", f"< {level:g} by both")
+    counts = sorted(set(_clear(table)))
+    style.keys_below(
+        figure,
+        [style.key(texts[n], marker="o", linestyle="none", **DOT, **LOOKS[n]) for n in counts],
+    )
     return figure
+
+
+def _clear(rows: pd.DataFrame) -> IntArray:
+    """Return by how many of the two tests each row's difference is significant, (rows,)."""
+    below = rows[list(TESTS)].to_numpy(np.float64) < rows[["significance"]].to_numpy(np.float64)
+    return np.asarray(below.sum(axis=1), dtype=np.int64)

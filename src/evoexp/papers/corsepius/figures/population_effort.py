@@ -30,6 +30,7 @@ NUMBERS = "abcdef"
 APART = 0.035  # [-] of a value, by which neighbouring series are set apart on the logarithmic axis
 NAMES = ["quantity", "kind", "position", "task", "value", "expected", "lower", "upper"]
 RESIDUAL, CYCLES, POINT = "residual", "cycles", "point"
+PROPORTIONAL: dict[str, Any] = {"color": style.NEUTRAL, "linewidth": 1.1, "linestyle": ":"}
 
 
 def effort_table(
@@ -127,11 +128,12 @@ def ratios_table(
 def draw_ratios(table: pd.DataFrame, setting: str) -> Figure:
     """Draw one panel per metric; a ratio of 0 or ∞ (one of the two never succeeds) has no point."""
     quantities, reference = list(dict.fromkeys(table["quantity"])), table["reference"].iloc[0]
-    keys = _keys(table)
-    figure, panels = style.row_of_panels(3.3, len(quantities))
+    count = table["position"].nunique()
+    keys = _keys(table[(table["expected"] > 0.0) & np.isfinite(table["expected"])])
+    figure, panels = style.row_of_panels(3.3, len(quantities), sharey=True)
     for k, (axes, quantity) in enumerate(zip(panels, quantities, strict=True)):
         own = table[table["quantity"] == quantity]
-        _draw_series(axes, own[own["expected"] > 0.0], len(keys), float(reference))
+        _draw_series(axes, own[own["expected"] > 0.0], count, float(reference))
         axes.axhline(1.0, color=style.NEUTRAL, linewidth=0.9)
         bounds = own[own["bound"] != 1.0].drop_duplicates("value").sort_values("value")
         if len(bounds):
@@ -187,22 +189,28 @@ def _keys(table: pd.DataFrame) -> list[Line2D]:
     return [style.key(name, **_look(position)) for position, name in tasks]
 
 
-def floor_table(task: Task) -> pd.DataFrame:
-    """Return residual distances and cycles per scope.
+def floor_table(found: Sequence[Task]) -> pd.DataFrame:
+    """Return residual distances and cycles per kind of goal and scope.
 
     Returns:
-        Columns quantity (residual, cycles, point), scope [rad], median, lower, upper (a point: the
-        residual of one run three times), runs, slope (of log residual over log scope, medians),
-        length_unit.
+        Columns position, task (the kind of goal), quantity (residual, cycles, point), scope [rad],
+        median, lower, upper (a point: the residual of one run three times), runs, slope (of log
+        residual over log scope, medians), length_unit.
     """
     rows: list[tuple[object, ...]] = []
-    for scope, c in task.by_value.items():
-        for name, values in ((RESIDUAL, measures.residuals(c)), (CYCLES, measures.cycles(c))):
-            median, lower, upper, _ = spread(values)
-            rows.append((name, scope, median, lower, upper, c.done))
-        rows += [(POINT, scope, value, value, value, 1) for value in measures.residuals(c)]
-    table = pd.DataFrame(rows, columns=["quantity", "scope", "median", "lower", "upper", "runs"])
-    return table.assign(slope=slope(task), length_unit=task.conditions[0].condition.length_unit)
+    for position, task in enumerate(found):
+        for scope, c in task.by_value.items():
+            given = position, task.name
+            for name, values in ((RESIDUAL, measures.residuals(c)), (CYCLES, measures.cycles(c))):
+                median, lower, upper, _ = spread(values)
+                rows.append((*given, name, scope, median, lower, upper, c.done, slope(task)))
+            rows += [
+                (*given, POINT, scope, value, value, value, 1, slope(task))
+                for value in measures.residuals(c)
+            ]
+    names = ["position", "task", "quantity", "scope", "median", "lower", "upper", "runs", "slope"]
+    unit = found[0].conditions[0].condition.length_unit
+    return pd.DataFrame(rows, columns=names).assign(length_unit=unit)
 
 
 def slope(task: Task) -> float:
@@ -219,21 +227,33 @@ def slope(task: Task) -> float:
 
 
 def draw_floor(table: pd.DataFrame) -> Figure:
-    """Draw residuals with every run, and cycles, against the scope."""
-    figure, (left, right) = style.row_of_panels(3.1, 2)
-    colour, unit = style.arm_colour(0), table["length_unit"].iloc[0]
+    """Draw residuals with every run, and cycles, against the scope, a colour per kind of goal."""
+    figure, (left, right) = style.row_of_panels(3.4, 2)
+    unit, keys = table["length_unit"].iloc[0], []
+    for (position, task), own in groups(table, ["position", "task"]):
+        colour = style.arm_colour(int(position))
+        name = f"{task} (slope {own['slope'].iloc[0]:.2f})"
+        keys.append(style.key(name, color=colour, marker="o", markersize=4.5))
+        _draw_floor_of(left, right, own, colour)
+    keys.append(style.key("proportional to the scope", **PROPORTIONAL))
+    scopes = sorted(set(table["scope"]))
+    for axes in (left, right):
+        logarithmic_axis(axes, scopes)
+        axes.set_xlabel("scope of a joint [rad]")
+    left.set_yscale("log")
+    left.set(ylabel=f"distance to the goal at the end [{unit}]", title="a  residual")
+    right.set(ylabel="cycles until it stagnates [-]", title="b  cycles", ylim=(0, None))
+    style.keys_below(figure, keys)
+    return figure
+
+
+def _draw_floor_of(left: Axes, right: Axes, table: pd.DataFrame, colour: str) -> None:
+    """Draw one kind of goal: every run, medians with quartiles, and a proportional line."""
     # every run, beside its scope by a low-discrepancy jitter
     points = table[table["quantity"] == POINT]
     beside = np.exp2(JITTER * (2.0 * ((np.arange(len(points)) * 0.618034) % 1.0) - 1.0))
-    left.plot(
-        points["scope"] * beside,
-        points["median"],
-        "o",
-        color=colour,
-        ms=2.2,
-        alpha=0.35,
-        mec="none",
-    )
+    dots: dict[str, Any] = {"color": colour, "ms": 2.2, "alpha": 0.35, "mec": "none"}
+    left.plot(points["scope"] * beside, points["median"], "o", **dots)
     # medians and quartiles
     residuals, cycles = (
         table[table["quantity"] == quantity].sort_values("scope") for quantity in (RESIDUAL, CYCLES)
@@ -242,15 +262,6 @@ def draw_floor(table: pd.DataFrame) -> Figure:
         x = own["scope"]
         axes.plot(x, own["median"], "o-", color=colour, markersize=4.5, linewidth=1.1)
         axes.vlines(x, own["lower"], own["upper"], color=colour, linewidth=1.6)
-        logarithmic_axis(axes, list(x))
-        axes.set_xlabel("scope of a joint [rad]")
     # a proportional line through the middle
     x, middle = residuals["scope"], len(residuals) // 2
-    line = residuals["median"].iloc[middle] * x / x.iloc[middle]
-    left.plot(x, line, ":", color=style.NEUTRAL, linewidth=1.1, label="proportional to the scope")
-    left.set_yscale("log")
-    title = f"a  residual (slope {table['slope'].iloc[0]:.2f})"
-    left.set(ylabel=f"distance to the goal at the end [{unit}]", title=title)
-    left.legend(loc="upper left")
-    right.set(ylabel="cycles until it stagnates [-]", title="b  cycles", ylim=(0, None))
-    return figure
+    left.plot(x, residuals["median"].iloc[middle] * x / x.iloc[middle], **PROPORTIONAL)

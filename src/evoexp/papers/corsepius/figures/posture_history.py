@@ -33,7 +33,7 @@ def history_table(results: Results) -> pd.DataFrame:
     """
     parts = []
     for position, c in enumerate(results.main):
-        names, scenario = measures.phase_names(c), c.condition.scenario
+        names = measures.phase_names(c)
         for phase, own in groups(c.generations, "term_phase"):
             cycle = own.groupby("replicate")["index"].rank(method="first").astype(int) - 1
             numbered = own.assign(cycle=cycle)
@@ -51,7 +51,7 @@ def history_table(results: Results) -> pd.DataFrame:
                     **dict(zip(("median", "lower", "upper"), quartiles, strict=True)),
                     "begun": wide.shape[1],
                     "running": wide.notna().sum(axis=1).to_numpy(),
-                    "tolerance": scenario.position_tolerance,  # type: ignore[attr-defined]
+                    "tolerance": measures.tolerances(c)[int(phase) - 1],
                     "length_unit": c.condition.length_unit,
                 }
                 parts.append(pd.DataFrame(table))
@@ -79,22 +79,39 @@ def draw_history(table: pd.DataFrame) -> Figure:
             (table["phase"] == name, f"{k + 1}  {name}", DISTANCE) for k, name in enumerate(phases)
         ]
     figure, places = style.lines_of_panels(2.1 if many else 2.4, len(panels), PER_LINE, 0.8)
+    drawn: list[Axes] = []
     for axes, (chosen, title, quantity) in zip(places, panels, strict=True):
         rows = table[chosen & (table["quantity"] == quantity)]
         _draw_curves(axes, rows, by, names)
-        tolerance, unit = rows[["tolerance", "length_unit"]].iloc[0]
-        if quantity == DISTANCE and tolerance >= VISIBLE:
-            axes.axhline(tolerance, **TOLERANCE)
+        unit = rows["length_unit"].iloc[0]
+        if quantity == DISTANCE:
+            drawn.append(axes)
+            for tolerance in sorted(set(rows["tolerance"][rows["tolerance"] >= VISIBLE])):
+                axes.axhline(tolerance, **TOLERANCE)
         axes.set_title(title, fontsize=8)
         label = f"distance [{unit}]" if quantity == DISTANCE else "cost of the best so far [-]"
         axes.set(xlabel="cycle of the phase", ylabel=label)
-    keys = [style.key(name, color=style.condition_colour(k)) for k, name in enumerate(names)]
-    style.keys_below(figure, [*keys, style.key("tolerance", **TOLERANCE)], 4)
+    # distances on one scale
+    low, high = (bound(limit) for bound, limit in zip((min, max), _limits(drawn), strict=True))
+    for axes in drawn:
+        axes.set_ylim(low, high)
+    colours = {name: style.condition_colour(k) for k, name in enumerate(names)}
+    keys = [style.key(name.replace("_", " "), color=c) for name, c in colours.items()]
+    if (table["tolerance"] >= VISIBLE).any():
+        keys.append(style.key("tolerance", **TOLERANCE))
+    style.keys_below(figure, keys, 4)
     return figure
 
 
+def _limits(panels: list[Axes]) -> tuple[list[float], list[float]]:
+    """Return the lower and the upper limits of the vertical axes."""
+    limits = [axes.get_ylim() for axes in panels]
+    return [low for low, _ in limits], [high for _, high in limits]
+
+
 def _draw_curves(axes: Axes, table: pd.DataFrame, by: str, names: list[str]) -> None:
-    """Draw one curve per condition or phase, with its number of runs at the end."""
+    """Draw one curve per condition or phase; numbers of runs at the ends, equal ones once."""
+    longest = {rows["begun"].iloc[0]: name for _, name, rows in _by_length(table, by)}
     for name, curve in groups(table, by):
         x, median, colour = (
             curve["cycle"],
@@ -103,10 +120,19 @@ def _draw_curves(axes: Axes, table: pd.DataFrame, by: str, names: list[str]) -> 
         )
         axes.fill_between(x, curve["lower"], curve["upper"], color=colour, alpha=0.2, linewidth=0)
         axes.plot(x, median, color=colour)
-        at, runs = (x.iloc[-1], median.iloc[-1]), f" {curve['begun'].iloc[0]}"
-        axes.annotate(runs, at, color=colour, annotation_clip=False, fontsize=6, **BESIDE)
+        begun = curve["begun"].iloc[0]
+        if longest[begun] == name:
+            at = x.iloc[-1], median.iloc[-1]
+            look: dict[str, Any] = {"color": colour, "annotation_clip": False, "fontsize": 6}
+            axes.annotate(f" {begun}", at, **look, **BESIDE)
     axes.set(yscale="log", xlim=(0, max(1, int(table["cycle"].max()))))
     axes.xaxis.set_major_locator(MaxNLocator(nbins=4, integer=True))
+
+
+def _by_length(table: pd.DataFrame, by: str) -> list[tuple[int, str, pd.DataFrame]]:
+    """Return length, name and rows of the curves, the longest last."""
+    found = [(int(rows["cycle"].max()), str(name), rows) for name, rows in groups(table, by)]
+    return sorted(found, key=lambda one: one[0])
 
 
 def phases_table(results: Results, confidence: float) -> pd.DataFrame:
@@ -148,7 +174,8 @@ def draw_phases(table: pd.DataFrame) -> Figure:
             axes.plot([middle], [y], "o", color=colour, markersize=4.5)
         left.annotate(f" {row.reached}/{row.begun}", (1.0, y), **at_edge)
     labels = [
-        (f"{row.condition}: " if several else "") + f"{row.order + 1}  {row.phase}"
+        (f"{row.condition}: " if several else "")
+        + f"{row.order + 1}  {row.phase.replace('_', ' ')}"
         for row in records(table)
     ]
     left.set_yticks(range(len(labels)), labels)

@@ -90,17 +90,24 @@ def motions_table(shown: list[ShownPath]) -> pd.DataFrame:
     )
 
 
-def draw_motions(table: pd.DataFrame) -> Figure:
-    """Draw one panel per path or phase; where there are one or two, each from above, too."""
+def draw_motions(table: pd.DataFrame, same_scene: bool = False) -> Figure:
+    """Draw one panel per path or phase; where there are one or two, each from above, too.
+
+    Args:
+        table: As `motions_table` gives it.
+        same_scene: Whether all panels show the same room: the phases of one path.
+    """
     panels = list(groups(table, ["panel", "title"]))
     above = len(panels) <= FEW
     columns = 2 if above else min(PER_LINE, len(panels))
     lines = len(panels) if above else -(-len(panels) // columns)
     figure = style.figure((3.1 if above else 2.6) * lines + 0.3)
     grid = figure.add_gridspec(lines, columns)
+    every = _points(table) if same_scene else None
     for k, ((_, title), rows) in enumerate(panels):
         unit, place = rows["length_unit"].iloc[0], (k, 0) if above else divmod(k, columns)
-        axes = solids.space(figure, grid[place], _points(rows), unit, VIEW)
+        points = _points(rows) if every is None else every
+        axes = solids.space(figure, grid[place], points, unit, VIEW)
         axes.set_title(title, fontsize=8)
         _draw(axes, rows, "xyz")
         if above:

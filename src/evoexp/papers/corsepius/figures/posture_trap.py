@@ -7,7 +7,6 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import ScalarFormatter
 
 from evoexp.collision.scene import obstacle_shapes
 from evoexp.numeric.elementary import DEGREE
@@ -218,7 +217,7 @@ def _draw_ways_out(axes: Axes, escapes: pd.DataFrame) -> None:
     )
     axes.plot(escapes["x"], escapes["value"], "o-", color=style.arm_colour(0), markersize=4)
     axes.set_xscale("log", base=2)
-    axes.xaxis.set_major_formatter(ScalarFormatter())
+    axes.xaxis.set_major_formatter("{x:g}")
     axes.set(
         xlabel="half the edge of the box [scopes]",
         ylabel="least cost found in it [-]",

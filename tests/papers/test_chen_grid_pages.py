@@ -121,3 +121,15 @@ def test_the_page_of_the_mission_shows_path_posture_and_verdict(outputs: Path) -
     text = (directory / "index.md").read_text()
     assert "2 of 2 (34–100 %) free of contact over the whole motion; 0 touch" in text
     assert "from the last node to the docking place" in text
+
+
+@pytest.mark.matrix
+def test_the_page_of_assumptions_judges_three_claims_under_every_variation(outputs: Path) -> None:
+    directory = smoke_report(outputs, "chen_assumptions")
+    assert figure_stems(directory) == {"assumptions"}
+    text = (directory / "index.md").read_text()
+    for name in ("obstacles mirrored", "slow decay of unsafeness", "50 generations"):
+        assert f"| {name} | `" in text
+    claims = text.split("## Claims")[1].split("## ")[0]
+    rows = [row for row in claims.splitlines() if "— whatever number is assumed" in row]
+    assert sum(row.startswith("| (c): ") for row in rows) == 3

@@ -71,6 +71,8 @@ def test_whether_the_required_margin_is_kept_is_a_badge_of_its_own(
     (motion,) = motions(page([shown._replace(verdict=verdict, margin=margin)]))
     assert motion["status"] == ("certified" if certified else "refuted")
     assert motion.get("margin_text") == badge
+    assert motion["margin"] == margin, "the number stays for the line in the chart"
+    assert (motion.get("margin_kind") in ("kept", "broken", "unsure")) == (badge is not None)
 
 
 def test_a_title_cannot_end_the_script_or_the_head() -> None:

@@ -327,7 +327,7 @@
   function card(motion) {
     const box = element("section", { className: "motion" }), head = element("div", { className: "head" });
     head.append(element("h1", { textContent: motion.title }), element("span", { className: `badge ${motion.status}`, textContent: motion.status }),
-      ...(motion.margin ? [element("span", { className: `badge ${motion.margin}`, textContent: motion.margin_text })] : []),
+      ...(motion.margin_text ? [element("span", { className: `badge ${motion.margin_kind}`, textContent: motion.margin_text })] : []),
       element("span", { className: "sub", textContent: motion.verdict }));
     const stage = element("div", { className: "stage" }), side = element("div", { className: "side" }), chart = element("canvas");
     const legend = element("div", { className: "legend" });

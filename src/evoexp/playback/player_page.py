@@ -140,7 +140,7 @@ def _margin(recording: Recording) -> dict[str, str]:
     kind, word = {True: ("kept", "kept"), False: ("broken", "not kept"), None: ("", "undecided")}[
         recording.verdict.certified_margin
     ]
-    return {"margin": kind or "unsure", "margin_text": f"required margin {word}"}
+    return {"margin_kind": kind or "unsure", "margin_text": f"required margin {word}"}
 
 
 def _facts(recording: Recording) -> list[tuple[str, str]]:

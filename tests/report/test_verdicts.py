@@ -1,8 +1,6 @@
 import numpy as np
 import pytest
 
-from evoexp.report.judging import Judge
-from evoexp.report.proportions import Proportion
 from evoexp.report.verdicts import (
     CONTRADICTED,
     INCONCLUSIVE,
@@ -33,21 +31,6 @@ LOW, HIGH = np.arange(12.0), np.arange(12.0) + 20.0
 )
 def test_a_claim_about_every_run(holds: int, done: int, planned: int, verdict: str) -> None:
     assert judge_all(holds, done, planned) == verdict
-
-
-def test_a_claim_that_is_not_judged_names_the_reason() -> None:
-    for reason, verdict in (("budget smoke", "not judged (budget smoke)"), ("", REPRODUCED)):
-        judge = Judge(reason, 0.05)
-        better = compare("cost", LOW, HIGH, True, 0.95, 50)
-        found = [
-            judge.every("", "", "", 2, 2, 2),
-            judge.majority("", "", "", 2, 3),
-            judge.better("", "", better, "lower"),
-            judge.better_than_all("", "", "", [better]),
-            judge.greater("", "", "", Proportion(20, 20), Proportion(0, 20)),
-        ]
-        assert [claim.verdict for claim in found] == [verdict] * 5
-        assert "lower in 100 % of pairs of runs" in found[2].evidence
 
 
 def test_a_claim_about_being_better() -> None:

@@ -114,7 +114,7 @@ def _seeds(rows: Sequence[Comparison]) -> str:
 
 
 class Judge(NamedTuple):
-    """Makes claims with verdicts; where nothing is judged, each claim names the reason instead.
+    """Opens the hearings of claims; where nothing is judged, each claim names the reason instead.
 
     Attributes:
         reason: Why nothing is judged ("budget smoke"); empty: claims are judged.
@@ -139,59 +139,6 @@ class Judge(NamedTuple):
         # a rule that compares names its own word where it is judged
         rule = self.rules[name].about(**{"word": "{word}", **words})
         return Hearing(rule, self.reason, self.significance)
-
-    def claim(self, text: str, source: str, evidence: str, verdict: str) -> Claim:
-        """Make a claim whose verdict the caller has found."""
-        reason = f"{verdicts.NOT_JUDGED} ({self.reason})"
-        return Claim(text, source, evidence, reason if self.reason else verdict)
-
-    def every(
-        self, text: str, source: str, evidence: str, holds: int, done: int, planned: int
-    ) -> Claim:
-        """Make a claim about every run; see `verdicts.judge_all`."""
-        verdict = verdicts.judge_all(holds, done, planned)
-        return self.claim(text, source, evidence, verdict)
-
-    def majority(self, text: str, source: str, evidence: str, holds: int, done: int) -> Claim:
-        """Make a claim that is reproduced if it holds in more than half of the runs."""
-        verdict = verdicts.REPRODUCED if holds > done / 2 else verdicts.CONTRADICTED
-        return self.claim(text, source, evidence, verdict)
-
-    def better(
-        self, text: str, source: str, row: Comparison | None, word: str, told: str = "{}"
-    ) -> Claim:
-        """Make a claim that the first condition of a comparison is better than the second.
-
-        Args:
-            text: The claim.
-            source: Where the paper makes it.
-            row: The comparison; None where the two share no seed.
-            word: Of the one that is better: "lower", "earlier".
-            told: The evidence; its {} stands for the comparison in words.
-        """
-        verdict = verdicts.judge_better(row, self.significance)
-        words = evidence(row, word) if row else "nothing to compare"
-        return self.claim(text, source, told.replace("{}", words), verdict)
-
-    def better_than_all(
-        self, text: str, source: str, evidence: str, rows: Sequence[Comparison]
-    ) -> Claim:
-        """Make a claim that a condition is better than each of several others."""
-        verdict = verdicts.judge_better_than_all(rows, self.significance)
-        return self.claim(text, source, evidence, verdict)
-
-    def greater(
-        self,
-        text: str,
-        source: str,
-        evidence: str,
-        one: Proportion,
-        two: Proportion,
-        p_adjusted: float | None = None,
-    ) -> Claim:
-        """Make a claim that `one` is greater than `two`; see `verdicts.judge_greater`."""
-        verdict = verdicts.judge_greater(one, two, self.significance, p_adjusted)
-        return self.claim(text, source, evidence, verdict)
 
 
 def judge(results: Results, settings: ReportSettings, rules: Rules = NO_RULES) -> Judge:

@@ -8,15 +8,15 @@ from evoexp.records import FloatArray
 from evoexp.report.kit import (
     Claim,
     ConditionResults,
+    Headline,
     Judge,
     Page,
     ReportSettings,
     Results,
+    assumptions,
     by_column,
     solved,
 )
-from evoexp.report.pages import assumptions
-from evoexp.report.pages.assumptions import Headline
 
 LEVEL = 0.95  # of the intervals in the evidence
 

@@ -9,19 +9,19 @@ from evoexp.report.kit import (
     Claim,
     Comparison,
     ConditionResults,
+    Headline,
     Judge,
     Page,
     ReportSettings,
     Results,
     Values,
+    assumptions,
     by_column,
     compared,
     generic,
     judging,
     markdown,
 )
-from evoexp.report.pages import assumptions
-from evoexp.report.pages.assumptions import Headline
 
 EFFORT = "evaluations to a team whose cost is the threshold"
 CLEARANCE = "least clearance of the bodies (exact; 0: contact)"

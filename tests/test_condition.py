@@ -34,6 +34,9 @@ Path_ = tuple[str | int, ...]
 WORDS = (  # that one setting takes
     ("natural", "clamped"),
     ("one_sided", "symmetric"),
+    ("genome", "index"),
+    ("tails", "segment"),
+    ("sum", "larger"),
     ("inverse", "difference"),
     ("threshold", "finite"),
     ("tournament", "roulette", "rank"),
@@ -151,7 +154,7 @@ def test_every_setting_is_part_of_the_hash(shipped: Condition) -> None:
                 "object",
                 "then",
             )  # an obstacle and who names it
-            assert named or path[-1] in ("hall_frozen", "hall_memory"), (
+            assert named or path[-1] in ("hall_frozen", "hall_memory", "hall_distinct"), (
                 f"no other value of {path} is accepted"
             )
             ga = config["planner"].get("ga", {})

@@ -83,7 +83,7 @@ def test_contents(wheel: Path) -> None:
     package = {
         path.relative_to(SOURCE.parent).as_posix()
         for path in SOURCE.rglob("*")
-        if path.suffix in (".py", ".typed")
+        if path.suffix in (".py", ".typed") or path.name == "claims.yaml"
     }
     assets = {
         path.relative_to(SOURCE.parent).as_posix()
@@ -124,4 +124,4 @@ def test_the_installed_package_runs_an_experiment_from_any_directory(
     command = ("-m", "evoexp", "run", "experiment=rana_planar", "budget=smoke", "--no-report")
     printed = execute(sys.executable, *command, cwd=tmp_path, PYTHONPATH=str(installed))
     assert printed.count("2 of 2") >= 2
-    assert len(list(tmp_path.glob("outputs/runs/*/replicates/*.mcap"))) == 4
+    assert len(list(tmp_path.glob("outputs/runs/*/replicates/*.mcap"))) == 6

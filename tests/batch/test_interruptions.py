@@ -96,7 +96,7 @@ def test_ctrl_c_keeps_what_is_finished_and_the_same_command_goes_on(
         # Another process may not write the same run meanwhile.
         assert main([*COMMAND[:-1], "runner=serial", "--no-report"]) == 2
         said = capsys.readouterr()
-        assert said.out == ""
+        assert said.out == "replicates of each condition, fixed before they run: 12\n"
         assert (
             said.err == f"evoexp: run {faulty.id[:12]}: another process is writing it now "
             f"({directory.path})\n"

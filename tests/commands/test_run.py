@@ -48,7 +48,7 @@ def test_a_run_without_report_loads_neither_pandas_nor_matplotlib(outputs: Path)
         [sys.executable, "-c", code], env=environment, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
-    assert len(find_runs(outputs)) == 2
+    assert len(find_runs(outputs)) == 3
 
 
 def test_a_run_ends_with_its_report(evoexp: Evoexp, outputs: Path) -> None:

@@ -80,7 +80,9 @@ def test_the_page_of_a_task_has_its_figures_and_judges_nothing_below_its_budget(
 @pytest.mark.matrix
 def test_a_manoeuvre_is_told_phase_by_phase(outputs: Path) -> None:
     directory = smoke_report(outputs, "corsepius_pick_and_place")
-    assert {"manoeuvre", "phases"} <= figure_stems(directory)
+    stems = figure_stems(directory)
+    for stem in ("manoeuvre", "phases"):
+        assert any(each == stem or each.startswith(f"{stem}_") for each in stems)
     text = (directory / "index.md").read_text()
     for name in ("1  approach", "2  grasp", "3  lift", "4  carry", "5  place", "6  detach"):
         assert f"| {name} |" in text

@@ -8,6 +8,7 @@ import pytest
 from evoexp.papers.rana import crossover_checks, measures, motions, operators_page, weights_page
 from evoexp.papers.rana.figures import planar_motion
 from evoexp.report import results as report_results
+from evoexp.report import run_measures
 from evoexp.report.pages import page_of
 from evoexp.report.results import Results
 from evoexp.shipped import Shipped
@@ -66,7 +67,7 @@ def test_extensions_have_claims_about_points_motions_and_margins(obstacles: Resu
 
 def test_runs_without_a_free_individual_count_as_never(obstacles: Results) -> None:
     condition = obstacles.conditions[0]
-    first = measures.first_free(condition)
+    first = run_measures.first_feasible(condition)
     recorded = condition.column("first_feasible_generation")
     assert np.array_equal(np.isinf(first), np.isnan(recorded))
     assert len(first) == condition.done

@@ -165,7 +165,7 @@ def test_an_infeasible_posture_is_told_as_such() -> None:
         ),
         (
             ["reference=placement_optimum", "reference.num_angles=7"],
-            "planner.num_angles: must be at least 8, was 7",
+            "reference.num_angles: must be at least 8, was 7",
         ),
         (
             ["reference=placement_optimum", "control=random_search"],

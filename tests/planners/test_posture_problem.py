@@ -59,7 +59,7 @@ def phases(text: str) -> str:
             "orientation, was 'pose'",
         ),
         (
-            [phases("[{name: a, goal: {kind: place}}]")],
+            [phases("[{name: a, goal: {kind: places}}]")],
             "scenario.phases[0].goal: must be one of 'point', 'pose', 'surf",
         ),
         (
@@ -89,7 +89,8 @@ def phases(text: str) -> str:
                 phases(
                     "[{name: a, goal: {kind: point, point: [0.4,0.2,0.7]}, contacts: [[hand, "
                     "bal]]}]"
-                )
+                ),
+                "scenario.allowed_penetration=0.001",
             ],
             "scenario.phases[0].contacts[0]: must be names of bodies or obstacles (column, "
             "shoulder",

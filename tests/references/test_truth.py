@@ -81,7 +81,7 @@ def test_the_group_is_no_part_of_other_identities() -> None:
             ["+reference.planner=1"],
             "reference.planner: must be left out: it is the chosen planner, was 1",
         ),
-        (["+reference.rows=x"], "planner.rows: must be a whole number, was 'x'"),
+        (["+reference.rows=x"], "reference.rows: must be a whole number, was 'x'"),
     ],
 )
 def test_what_cannot_be(words: list[str], message: str) -> None:

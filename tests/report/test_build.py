@@ -355,8 +355,9 @@ def test_swept_conditions_are_told_apart_and_compared_with_their_own_control(
     page = build.report(request, settings, tmp_path, 2)
     text = page.read_text()
     assert sorted(re.findall(r"^## (.* against .*)$", text, re.MULTILINE)) == [
-        f"via-point GA · population_size={size} against random search · population_size={size}"
+        f"via-point GA · population_size={size} against {control} · population_size={size}"
         for size in (10, 8)
+        for control in ("multi-start", "random search")
     ]
     assert (
         "### Fig. 4: snapshots of the motion in operational space (via-point GA · "
@@ -365,5 +366,5 @@ def test_swept_conditions_are_told_apart_and_compared_with_their_own_control(
     assert (page.parent / "fig_7_distances_2_via_point_ga_population_size_10.svg").is_file()
     assert (
         "| `ga.population_size` (via-point GA · population_size=8, random search · "
-        "population_size=8) | 8 |" in text
+        "population_size=8, multi-start · population_size=8) | 8 |" in text
     )

@@ -56,7 +56,7 @@ def test_runs_by_prefixes_of_their_hashes(
     ("words", "message"),
     [
         (["rana_plana"], "experiment: no option 'rana_plana'; did you mean 'rana_planar'?"),
-        (["ffffffffffff"], "hash: no run 'ffffffffffff' among the 3"),
+        (["ffffffffffff"], "hash: no run 'ffffffffffff' among the 4"),
         (["rana_planar", "rana_x"], "experiment: no option 'rana_x'"),
         (["rana_planar", "seed=77"], "try: evoexp run experiment=rana_planar seed=77"),
         (["rana_planar", "ga.pop_size=3"], "ga.pop_size: unknown setting"),

@@ -75,8 +75,7 @@ def _much_longer(
     judge: Judge, condition: ConditionResults, controls: Controls, results: Results
 ) -> Claim:
     truth = _truth(results, condition)
-    claim = path_claims.much_longer(judge, condition, "", _shortest(truth), truth)
-    return _unnamed(claim)
+    return path_claims.much_longer(judge, condition, condition.label, _shortest(truth), truth)
 
 
 def _nearly_best(
@@ -84,15 +83,10 @@ def _nearly_best(
 ) -> Claim:
     truth = _truth(results, condition)
     known, bound = (float(truth.column(name)[0]) for name in ("best_cost", "term_lower_bound"))
-    return _unnamed(path_claims.nearly_best(judge, condition, "", known, bound))
+    return path_claims.nearly_best(judge, condition, condition.label, known, bound)
 
 
 def _evolution(
     judge: Judge, condition: ConditionResults, controls: Controls, settings: ReportSettings
 ) -> Claim:
-    return _unnamed(path_claims.evolution(judge, settings, condition, "", controls))
-
-
-def _unnamed(claim: Claim) -> Claim:
-    """Return a claim without the name of its condition, which the page puts before it."""
-    return claim._replace(text=claim.text.removeprefix(": "))
+    return path_claims.evolution(judge, settings, condition, condition.label, controls)

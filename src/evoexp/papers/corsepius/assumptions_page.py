@@ -1,5 +1,7 @@
 """The numbers that Corsépius 2001 does not print, and which headline claims survive others."""
 
+from functools import partial
+
 import numpy as np
 
 from evoexp.papers.corsepius import claims, measures
@@ -18,23 +20,16 @@ from evoexp.report.kit import (
     solved,
 )
 
-LEVEL = 0.95  # of the intervals in the evidence
-
 
 def page(results: Results, settings: ReportSettings) -> Page:
     """Build the page of the assumed numbers."""
-    return assumptions.page(
-        results,
-        settings,
-        RULES,
-        "Corsépius 2001",
-        (
-            Headline("goals_met", "cycles to the goal [-]", cycles_to_goal, judge_met),
-            Headline(
-                "paths_avoid_obstacles", "least distance [m]", by_column("clearance"), judge_free
-            ),
-        ),
+    level, distance = settings.confidence, by_column("clearance")
+    met, free = partial(judge_met, level=level), partial(judge_free, level=level)
+    headlines = (
+        Headline("goals_met", "cycles to the goal [-]", cycles_to_goal, met),
+        Headline("paths_avoid_obstacles", "least distance [m]", distance, free),
     )
+    return assumptions.page(results, settings, RULES, "Corsépius 2001", headlines)
 
 
 def cycles_to_goal(condition: ConditionResults) -> FloatArray:
@@ -42,11 +37,15 @@ def cycles_to_goal(condition: ConditionResults) -> FloatArray:
     return np.where(solved(condition), measures.cycles(condition), np.inf)
 
 
-def judge_met(judge: Judge, condition: ConditionResults, _: tuple[ConditionResults, ...]) -> Claim:
+def judge_met(
+    judge: Judge, condition: ConditionResults, _: tuple[ConditionResults, ...], level: float
+) -> Claim:
     """Judge that goals are met."""
-    return claims.judge_met(judge, condition, LEVEL)
+    return claims.judge_met(judge, condition, level)
 
 
-def judge_free(judge: Judge, condition: ConditionResults, _: tuple[ConditionResults, ...]) -> Claim:
+def judge_free(
+    judge: Judge, condition: ConditionResults, _: tuple[ConditionResults, ...], level: float
+) -> Claim:
     """Judge that the paths to the goals avoid obstacles."""
-    return claims.judge_free(judge, condition, LEVEL)
+    return claims.judge_free(judge, condition, level)

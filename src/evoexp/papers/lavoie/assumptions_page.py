@@ -68,22 +68,17 @@ def _share_below(
     verdict as assumed is that of the experiment itself.
     """
     others = [c for joints, c in shipped.items() if joints != measures.num_joints(condition)]
-    return _unnamed(claims.percentages(judge, [condition, *others], level)[0], condition)
+    return claims.percentages(judge, [condition, *others], level)[0]
 
 
 def _no_start(judge: Judge, condition: ConditionResults, controls: Controls, level: float) -> Claim:
     found = claims.no_start_needed(judge, condition, level)
     assert found is not None, "the paper prints percentages for arms of seven and of ten joints"
-    return _unnamed(found, condition)
+    return found
 
 
 def _free_of_collision(
     judge: Judge, condition: ConditionResults, controls: Controls, level: float
 ) -> Claim:
     refuted = counted(measures.touches(condition)[solved(condition)])
-    return _unnamed(claims.free_of_collision(judge, condition, refuted, level), condition)
-
-
-def _unnamed(claim: Claim, condition: ConditionResults) -> Claim:
-    """Return a claim without the name of its condition, which the page puts before it."""
-    return claim._replace(text=claim.text.removeprefix(f"{condition.label}: "))
+    return claims.free_of_collision(judge, condition, refuted, level)

@@ -202,7 +202,8 @@ def _claims(judge: Judge, judged: Sequence[Judged]) -> Iterator[Claim]:
         first, *others = (
             one for one in judged if one.family is family and one.headline is headline
         )
-        text = f"{first.condition.label}: {first.claim.text}"
+        label = f"{first.condition.label}: "
+        text = label + first.claim.text.removeprefix(label)
         yield first.claim._replace(text=text)
         differing = [
             f"{one.condition.label} ({one.claim.verdict})" for one in others if not one.same

@@ -8,9 +8,10 @@ import matplotlib as mpl
 import pandas as pd
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import EngFormatter, MaxNLocator
 
 ARM_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")  # Okabe & Ito 2008
 CONDITION_COLOURS = (
@@ -27,6 +28,7 @@ NEUTRAL, FAINT, FORBIDDEN = "#333333", "#9a9a9a", "#882255"
 ARM_SYMBOLS = ("θ", "α", "β", "γ", "δ", "ε")  # θ and α are the paper's
 SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 DOTS: dict[str, Any] = {"mec": "white", "ms": 5, "clip_on": False}  # configurations of a path
+THOUSANDS = 10_000  # from here on numbers along an axis are written with k and M
 WIDTH = 7.2  # [inch] of a figure over the whole page
 
 _RC: dict[str, Any] = {
@@ -151,6 +153,12 @@ def joint_symbol(arm: int, joint: int) -> str:
 def few_ticks() -> MaxNLocator:
     """Return ticks that leave room in a small panel."""
     return MaxNLocator(nbins=4)
+
+
+def shorten_thousands(axis: Axis) -> None:
+    """Write the numbers along an axis with k and M where they are large: 200 k."""
+    if axis.get_view_interval()[1] >= THOUSANDS:
+        axis.set_major_formatter(EngFormatter())
 
 
 def operational_axes(axes: Axes, unit: str) -> None:

@@ -7,7 +7,6 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import EngFormatter
 
 from evoexp.report import style
 from evoexp.report.results import ConditionResults, Results
@@ -18,7 +17,6 @@ COLUMNS = ("best_cost", "mean_cost")
 NAMES = {"best_cost": "best so far", "mean_cost": "average"}
 REFERENCE = "reference"
 NAMED = 5  # conditions that a panel names beside the first one
-THOUSANDS = 10_000  # from here on numbers along an axis are written with k and M
 DASH_DOTTED = (0, (5, 1.5, 1, 1.5))
 
 
@@ -96,8 +94,7 @@ def _best_curves(axes: Axes, best: pd.DataFrame, named: Mapping[int, str]) -> No
             axes.plot(x, y, color=style.FAINT, alpha=0.5, linewidth=0.8, zorder=2)
     limits = (0, max(1, int(best[across].max())))
     axes.set(xlim=limits, xlabel=across, ylabel="best cost so far (median)")
-    if limits[1] >= THOUSANDS:
-        axes.xaxis.set_major_formatter(EngFormatter())  # 20 k
+    style.shorten_thousands(axes.xaxis)
 
 
 def draw_fitness(table: pd.DataFrame) -> Figure:

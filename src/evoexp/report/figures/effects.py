@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import EngFormatter, MultipleLocator
+from matplotlib.ticker import MultipleLocator
 
 from evoexp.records import FloatArray, IntArray
 from evoexp.report import style
@@ -21,7 +21,6 @@ from evoexp.report.verdicts import Comparison
 WRAPPED = 24  # characters of a name in a panel, per line
 BEYOND = 0.18  # [-] of the range of finite values: how far beyond it infinity is drawn
 CLEAR = 0.22  # [-] of an axis: no number stands so near to the word "never"
-THOUSANDS = 10_000  # from here on numbers along an axis are written with k and M
 TESTS = ("p_adjusted", "unpaired_adjusted")
 DOT: dict[str, Any] = {"color": style.ARM_COLOURS[0], "markersize": 5}
 LOOKS: tuple[dict[str, Any], ...] = (
@@ -83,8 +82,7 @@ def draw_values(table: pd.DataFrame) -> Figure:
         axes.set_xlabel(textwrap.fill(quantity, WRAPPED))
         axes.margins(x=0.06)
         axes.xaxis.set_major_locator(style.few_ticks())
-        if axes.get_xlim()[1] >= THOUSANDS:
-            axes.xaxis.set_major_formatter(EngFormatter())  # 200 k
+        style.shorten_thousands(axes.xaxis)
         if never is not None:
             _name_never(axes, never)
     counts = (

@@ -58,9 +58,11 @@ def draw_robustness(table: pd.DataFrame) -> Figure:
             look = {"mec": style.ARM_COLOURS[0], "ms": 5, **_mark(row.verdict)}
             axes.plot(min(row.median, edge), row.position, zorder=3, **look)
             if not np.isfinite(row.median):
-                axes.annotate(" never", (edge, row.position), va="center", fontsize=6.5)
+                beside: dict[str, Any] = {"xytext": (5, 0), "textcoords": "offset points"}
+                axes.annotate("never", (edge, row.position), va="center", fontsize=6.5, **beside)
         axes.set_xlim(low - room, edge + (0.25 * (edge - low) if np.isinf(numbers).any() else 0))
         axes.xaxis.set_major_locator(style.few_ticks())
+        style.shorten_thousands(axes.xaxis)
         axes.set_xlabel(textwrap.fill(quantity, WRAPPED))
     panels[0].set_yticks(list(labels), list(labels.values()))
     panels[0].set_ylim(max(labels) + 0.6, -0.6)

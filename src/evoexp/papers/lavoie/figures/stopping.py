@@ -3,13 +3,11 @@
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from matplotlib.ticker import EngFormatter
 
 from evoexp.report.kit import Results, Values, groups, spread, style
 
 ERROR, EFFORT = "position error", "evaluations"
 BESIDE = 0.012  # [-] of the axis by which series are set apart
-THOUSANDS = 10_000  # from here on numbers along an axis are written with k and M
 NAMES = [
     *("quantity", "num_generations", "stop_cost", "condition"),
     *("median", "lower", "upper", "solved", "done"),
@@ -69,8 +67,7 @@ def draw_stopping(table: pd.DataFrame) -> Figure:
             title=title,
         )
         axes.set_xticks(sorted(table["stop_cost"].unique()))
-        if axes.get_ylim()[1] >= THOUSANDS:
-            axes.yaxis.set_major_formatter(EngFormatter())  # 200 k
+        style.shorten_thousands(axes.yaxis)
     panels[0].invert_xaxis()
     style.legend_below(figure, panels[0], 2)
     return figure

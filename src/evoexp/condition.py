@@ -46,6 +46,30 @@ def _component_files(value: Any, field: str) -> Any:
     }
 
 
+def stored_config(text: bytes) -> dict[str, Any]:
+    """Return the plain data of the canonical form that a run or a log stores.
+
+    Whether its components are installed here, in the revision that they had, is not looked at.
+
+    Raises:
+        SettingError: If the text is no condition.
+    """
+    try:
+        config = json.loads(text)
+    except (ValueError, RecursionError):
+        raise SettingError("config.json", "a condition in JSON", text[:40]) from None
+    if not isinstance(config, dict):
+        raise SettingError("config.json", "a condition in JSON", config)
+    for part in PARTS:
+        named = config.get(part)
+        if not isinstance(named, dict) or not isinstance(named.get(TARGET), str):
+            must = f"a component, given by its {TARGET}"
+            raise SettingError(f"config.json: {part}", must, named)
+    if unknown := set(config) - {*PARTS, "seed"}:
+        raise UnknownSetting(min(unknown), (*PARTS, "seed"))
+    return config
+
+
 class Prepared(NamedTuple):
     """A condition ready to run: its planner and the problem that the planner prepared."""
 
@@ -95,12 +119,7 @@ class Condition(NamedTuple):
             RevisionMismatch: If a component has another revision in this installation.
             SettingError: If the text is no condition.
         """
-        try:
-            config = json.loads(text)
-        except (ValueError, RecursionError):
-            raise SettingError("config.json", "a condition in JSON", text[:40]) from None
-        if not isinstance(config, dict):
-            raise SettingError("config.json", "a condition in JSON", config)
+        config = stored_config(text)
         stale = [
             f"{field} was revision {stored}, installed is {installed}"
             for field, stored, installed in revisions(config)

@@ -10,16 +10,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import orjson
 
 from evoexp import shipped
 from evoexp.attachments import PREFIX, keep_all
-from evoexp.condition import Condition
+from evoexp.condition import Condition, stored_config
 from evoexp.configuration.experiment import Experiment
 from evoexp.errors import EvoexpError
 from evoexp.records import flatten
 from evoexp.registry import COMPONENTS, registered
-from evoexp.store.log_reader import array_names, read_array, read_log
+from evoexp.store.log_reader import read_log
 from evoexp.store.manifest import differences, environment
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_table
@@ -90,7 +89,7 @@ def log_facts(path: Path) -> dict[str, Any]:
         "digest": log.summary.digest,
         "generations": len(log.generations) - 1,
         "stop_reason": log.summary.stop_reason,
-        "arrays": _shapes(path),
+        "arrays": {name: list(array.shape) for name, array in log.arrays().items()},
     }
     return found
 
@@ -111,7 +110,7 @@ def _facts(
         rows: Summaries of the replicates.
         planned: How many there shall be; None: unknown.
     """
-    config = orjson.loads(config_json)
+    config = stored_config(config_json)
     condition_id = hashlib.sha256(config_json).hexdigest()
     stored = None if around is None else {k: around.get(k) for k in ("versions", "platform", "cpu")}
     if stored is not None:
@@ -218,7 +217,7 @@ def _verdict(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 def _shapes(path: Path) -> dict[str, list[int]]:
     """Return name → shape of the arrays that references attach to a log."""
-    return {name: list(read_array(path, name).shape) for name in array_names(path)}
+    return {name: list(array.shape) for name, array in read_log(path).arrays().items()}
 
 
 def _notes(config_json: bytes) -> list[str]:

@@ -2,6 +2,10 @@
 
 mcap's own readers check neither the summary section nor that the file ends where it should, and
 cost ten times as much.
+
+A log may come from anybody, and checksums are no proof of good will. Whatever a file claims, what
+is read of it takes memory in proportion to `MAX_LOG` and `MAX_MESSAGE`: sizes are compared with
+these limits before anything is decompressed or decoded.
 """
 
 import struct
@@ -16,15 +20,28 @@ from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Chunk, ChunkIndex
-from mcap.stream_reader import get_chunk_data_stream
 
 from evoexp.errors import CorruptLog
+from evoexp.input_files import MEGABYTE
+
+# Of a log's file, and of all its messages together. The largest log of a shipped experiment holds
+# 2.5 MB of messages; 128 MB are some 350,000 generations without a better solution.
+MAX_LOG = 128 * MEGABYTE
+# One solution or front: 300,000 numbers. The largest of a shipped experiment takes 60 kB.
+MAX_MESSAGE = 8 * MEGABYTE
+MAX_CHUNK = MAX_MESSAGE + 64 * 1024  # a chunk ends with the message that passes 56 KiB
+MAX_METADATA = MEGABYTE  # [B] of a record of metadata, and of one of the summary section
+MAX_ATTACHMENTS = 1000
+# Reading a log takes at most so many times the memory of `MAX_LOG`, whatever the log holds.
+MEMORY_FACTOR = 10
 
 _MAGIC = b"\x89MCAP0\r\n"
 _HEAD = struct.Struct("<BQ")  # opcode, length
 _MESSAGE = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log_time, publish_time
+_CHUNK_SIZE = struct.Struct("<16xQ")  # of a chunk's body: start and end time, uncompressed size
 _FOOTER = struct.Struct("<BQQQI")  # opcode, length, summary start, summary offset start, CRC
 _DATA_END = struct.Struct("<BQI")  # opcode, length, CRC
+_BESIDE_MESSAGES = (int(Opcode.SCHEMA), int(Opcode.CHANNEL))  # in a chunk
 _TAIL = _FOOTER.size + len(_MAGIC)
 
 _UNREADABLE = (
@@ -35,6 +52,7 @@ _UNREADABLE = (
     AttributeError,
     LookupError,
     MemoryError,
+    RecursionError,
     TypeError,
     ValueError,
 )
@@ -79,14 +97,22 @@ def unreadable_is_corrupt(name: str) -> Iterator[None]:
         ) from error
 
 
+def too_large(size: int) -> str:
+    """Say that a log's file or messages are larger than any that is read."""
+    return f"{size / MEGABYTE:.0f} MB; logs of up to {MAX_LOG // MEGABYTE} MB are read"
+
+
 def check(content: bytes, name: str) -> Container:
     """Check magic, footer and both checksums, which together cover every byte.
 
     Raises:
-        CorruptLog: The bytes are empty, no MCAP, cut, altered, or an MCAP without checksums.
+        CorruptLog: The bytes are empty, too many, no MCAP, cut, altered, or an MCAP without
+            checksums.
     """
     if not content:
         raise CorruptLog(f"{name}: empty file")
+    if len(content) > MAX_LOG:
+        raise CorruptLog(f"{name}: too large: {too_large(len(content))}")
     if content[: len(_MAGIC)] != _MAGIC[: len(content)]:
         raise CorruptLog(f"{name}: not an MCAP file")
     smallest = len(_MAGIC) + _DATA_END.size + _TAIL
@@ -120,9 +146,8 @@ def parse(record: Any, body: bytes) -> Any:
 
 def chunk_messages(body: bytes) -> Iterator[Message]:
     """Yield the messages of a chunk record, its checksum verified."""
-    stream, end = get_chunk_data_stream(parse(Chunk, body), validate_crc=True)
-    content = stream.read(end)
-    start, kind = 0, int(Opcode.MESSAGE)
+    content = _decompressed(parse(Chunk, body))
+    start, end, kind = 0, len(content), int(Opcode.MESSAGE)
     while start < end:
         opcode, length = _HEAD.unpack_from(content, start)
         stop = start + _HEAD.size + length
@@ -131,7 +156,30 @@ def chunk_messages(body: bytes) -> Iterator[Message]:
         if opcode == kind:
             _, _, channel_id, sequence, log_time, _ = _MESSAGE.unpack_from(content, start)
             yield channel_id, sequence, log_time, content[start + _MESSAGE.size : stop]
+        elif opcode not in _BESIDE_MESSAGES:
+            raise ValueError(f"a chunk holds a record of kind {opcode}")
         start = stop
+
+
+def uncompressed_size(body: bytes) -> int:
+    """Return the size of a chunk record's content, as it is told; its content has no other."""
+    size: int = _CHUNK_SIZE.unpack_from(body)[0]
+    return size
+
+
+def _decompressed(chunk: Chunk) -> bytes:
+    """Return the content of a chunk; nothing is allocated for one that is too large."""
+    size = chunk.uncompressed_size
+    if chunk.compression != "zstd":
+        raise ValueError(f"a chunk is compressed by {chunk.compression[:20]!r}")
+    if size > MAX_CHUNK:
+        raise ValueError(f"a chunk of {size} bytes; at most {MAX_CHUNK} are read")
+    if zstandard.get_frame_parameters(chunk.data).content_size != size:
+        raise ValueError("a chunk is not of the size that it tells")
+    content = zstandard.ZstdDecompressor().decompress(chunk.data, size) if size else b""
+    if chunk.uncompressed_crc and zlib.crc32(content) != chunk.uncompressed_crc:
+        raise ValueError("the checksum of a chunk is wrong")
+    return content
 
 
 def _records(content: bytes, start: int, end: int) -> Iterator[tuple[int, bytes]]:

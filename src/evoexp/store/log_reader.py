@@ -2,11 +2,11 @@
 
 Every reader first checks the whole file against its checksums (0.1 ms per log), so that none is
 ever silently wrong; only `read_log` also decodes every message and compares the content digest.
+What a log may hold at most, and how much memory reading one takes, stands in `container`.
 """
 
-import io
 import operator
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
@@ -27,19 +27,27 @@ from mcap.records import (
 from numpy.typing import NDArray
 
 from evoexp.errors import CorruptLog
+from evoexp.input_files import read_bounded, read_npy
 from evoexp.records import FrontRow, GenerationRow, ReplicateSummary, SolutionRow
 from evoexp.store import log as written
 from evoexp.store.container import (
+    MAX_ATTACHMENTS,
+    MAX_LOG,
+    MAX_MESSAGE,
+    MAX_METADATA,
     Container,
     Message,
     check,
     chunk_messages,
     parse,
+    too_large,
+    uncompressed_size,
     unreadable_is_corrupt,
 )
 from evoexp.store.messages import (
     NONFINITE,
     TERM,
+    decode_environment,
     decode_front,
     decode_generation,
     decode_solution,
@@ -66,6 +74,18 @@ class LogContents(NamedTuple):
     environment: dict[str, Any]
     attachments: dict[str, bytes]  # without the configuration
     content_digest: str  # 32 hex digits, over all messages
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return the attached arrays by their names, in alphabetical order.
+
+        Raises:
+            CorruptLog: If one of them is none.
+        """
+        return {
+            name.removesuffix(written.ARRAY): decode_array(data)
+            for name, data in sorted(self.attachments.items())
+            if name.endswith(written.ARRAY)
+        }
 
 
 class _Index(NamedTuple):
@@ -110,7 +130,7 @@ def read_log(source: Source) -> LogContents:
             solutions=[decode_solution(data) for data in messages.get(written.SOLUTION_TOPIC, ())],
             fronts=[decode_front(data) for data in messages.get(written.FRONT_TOPIC, ())],
             summary=summary,
-            environment=decode_values(_metadata(container, index, written.ENVIRONMENT, name)),
+            environment=decode_environment(_metadata(container, index, written.ENVIRONMENT, name)),
             attachments=attachments,
             content_digest=content_digest,
         )
@@ -185,9 +205,13 @@ def read_array(source: Source, array: str) -> NDArray[Any]:
 
 
 def decode_array(data: bytes) -> NDArray[Any]:
-    """Return the array that a `.npy` attachment holds."""
-    array: NDArray[Any] = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
-    return array
+    """Return the array that a `.npy` attachment holds.
+
+    Raises:
+        CorruptLog: If it is none.
+    """
+    with unreadable_is_corrupt("attached array"):
+        return read_npy(data)
 
 
 def generation_columns(source: Source) -> dict[str, NDArray[Any]]:
@@ -200,14 +224,57 @@ def generation_columns(source: Source) -> dict[str, NDArray[Any]]:
     """
     with _indexed(source) as (container, index):
         channel_id = index.channels[written.GENERATION_TOPIC].id
-        data = [data for channel, _, _, data in _all_messages(container) if channel == channel_id]
-        return _columns(orjson.loads(b"[" + b",".join(data) + b"]"))
+        messages = (m[3] for m in _all_messages(container) if m[0] == channel_id)
+        parts = [_columns(orjson.loads(text)) for text in _joined(messages)]
+        return parts[0] if len(parts) == 1 else _one_below_another(parts)
+
+
+def _joined(messages: Iterable[bytes]) -> Iterator[bytes]:
+    """Yield messages as JSON lists of about `MAX_MESSAGE` bytes, one list at least.
+
+    Decoded, they take many times that: never all of them together.
+    """
+    size, found = 0, list[bytes]()
+    for data in messages:
+        if size > MAX_MESSAGE:
+            yield b"[" + b",".join(found) + b"]"
+            size, found = 0, []
+        size += len(data)
+        found.append(data)
+    yield b"[" + b",".join(found) + b"]"
+
+
+def _one_below_another(parts: list[dict[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
+    """Return the columns of all parts, NaN where a part does not have one."""
+    lengths = [len(part["index"]) for part in parts]
+    own = list(_own_columns())
+    names = own + sorted({name for part in parts for name in part} - set(own))
+    _refuse_wide(names, sum(lengths))
+    return {
+        name: np.concatenate(
+            [
+                part[name] if name in part else np.full(length, np.nan)
+                for part, length in zip(parts, lengths, strict=True)
+            ]
+        )
+        for name in names
+    }
+
+
+def _own_columns() -> dict[str, Any]:
+    """Return the columns that every generation has, and their kinds."""
+    fields = field_types(GenerationRow).items()
+    return {name: DTYPES[kind] for name, kind in fields if name != "chain"}
+
+
+def _refuse_wide(names: Collection[str], num_rows: int) -> None:
+    """Refuse rows that each have terms of their own: their table would be larger than any log."""
+    if len(names) * num_rows * 8 > MAX_LOG:
+        raise ValueError(f"{num_rows} generations with {len(names)} different terms")
 
 
 def _columns(rows: list[dict[str, Any]]) -> dict[str, NDArray[Any]]:
-    kinds = {
-        name: DTYPES[kind] for name, kind in field_types(GenerationRow).items() if name != "chain"
-    }
+    kinds = _own_columns()
     for row in rows:
         if NONFINITE in row:
             restore(row)
@@ -215,6 +282,7 @@ def _columns(rows: list[dict[str, Any]]) -> dict[str, NDArray[Any]]:
     names = rows[0].keys() if rows else set()
     if not all(row.keys() == names for row in rows):
         names = {name for row in rows for name in row}
+        _refuse_wide(names, len(rows))
         absent = dict.fromkeys((name for name in names if name.startswith(TERM)), np.nan)
         rows = [absent | row for row in rows]
     kinds |= dict.fromkeys(sorted(name for name in names if name.startswith(TERM)), np.float64)
@@ -231,7 +299,7 @@ def _open(source: Source) -> tuple[Container, str]:
     if isinstance(source, bytes):
         return check(source, "log"), "log"
     try:
-        return check(Path(source).read_bytes(), str(source)), str(source)
+        return check(read_bounded(Path(source), MAX_LOG), str(source)), str(source)
     except OSError as error:
         raise CorruptLog(f"{source}: cannot be read: {error.strerror or error}") from error
 
@@ -239,6 +307,7 @@ def _open(source: Source) -> tuple[Container, str]:
 def _index(container: Container) -> _Index:
     index = _Index({}, {}, {}, [], {})
     for opcode, body in container.summary_section():
+        _refuse_long(body)
         if opcode == Opcode.METADATA_INDEX:
             entry = parse(MetadataIndex, body)
             index.metadata[entry.name] = entry.offset
@@ -253,13 +322,22 @@ def _index(container: Container) -> _Index:
         elif opcode == Opcode.ATTACHMENT_INDEX:
             attachment = parse(AttachmentIndex, body)
             index.attachments[attachment.name] = attachment.offset
+    if len(index.attachments) > MAX_ATTACHMENTS:
+        raise ValueError(f"{len(index.attachments)} attachments; {MAX_ATTACHMENTS} are read")
     return index
+
+
+def _refuse_long(body: bytes) -> None:
+    if len(body) > MAX_METADATA:
+        raise ValueError(f"{len(body)} bytes in a record of at most {MAX_METADATA}")
 
 
 def _metadata(container: Container, index: _Index, record: str, name: str) -> dict[str, str]:
     if record not in index.metadata:
         raise CorruptLog(f"{name}: incomplete: no metadata record '{record}'")
-    metadata: dict[str, str] = parse(Metadata, container.record_at(index.metadata[record])).metadata
+    body = container.record_at(index.metadata[record])
+    _refuse_long(body)
+    metadata: dict[str, str] = parse(Metadata, body).metadata
     return metadata
 
 
@@ -295,10 +373,14 @@ def _bodies(container: Container, opcode: int, record: Any) -> Iterator[Any]:
 
 
 def _all_messages(container: Container) -> Iterator[Message]:
-    chunks: Iterable[bytes] = (
-        body for opcode, body in container.data_section() if opcode == Opcode.CHUNK
-    )
-    return (message for chunk in chunks for message in chunk_messages(chunk))
+    """Yield all messages; no chunk is decompressed that would bring them above the limit."""
+    size = 0
+    for opcode, body in container.data_section():
+        if opcode == Opcode.CHUNK:
+            size += uncompressed_size(body)
+            if size > MAX_LOG:
+                raise ValueError(f"too large: {too_large(size)}")
+            yield from chunk_messages(body)
 
 
 def _messages(container: Container, index: _Index) -> tuple[dict[str, list[bytes]], str]:

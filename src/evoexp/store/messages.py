@@ -9,6 +9,7 @@ needed: `{"best_cost": "inf"}` for a field, `{"values": {"3": "nan"}}` for an el
 import math
 from collections.abc import Iterable, Mapping
 from functools import cache
+from sys import intern
 from typing import Any, get_type_hints
 
 import numpy as np
@@ -34,6 +35,11 @@ _JSON_TYPES: dict[Any, dict[str, Any]] = {
     str: {"type": "string"},
     FloatArray: {"type": "array", "items": {"type": "number"}},
 }
+_NUMBER = (int, float)
+# what JSON may hold for a field of each type; true and false are ints to Python only
+_TAKEN: dict[Any, Any] = {int: _NUMBER, float: _NUMBER, bool: bool, str: str, FloatArray: list}
+_TAKEN |= {kind | None: (*_NUMBER, type(None)) for kind in _NUMBER} | {bool | None: bool | None}
+_TRUTHS = (bool, bool | None)
 
 
 @cache
@@ -130,6 +136,19 @@ def decode_values(metadata: Mapping[str, str]) -> dict[str, Any]:
     return {name: orjson.loads(text) for name, text in metadata.items()}
 
 
+def decode_environment(metadata: Mapping[str, str]) -> dict[str, Any]:
+    """Undo `encode_values` of an environment, whose sections are mappings.
+
+    Raises:
+        ValueError: If one is something else.
+    """
+    environment = decode_values(metadata)
+    for section in ("versions", "platform", "cpu", "components"):
+        if not isinstance(environment.get(section, {}), dict):
+            raise ValueError(f"{section} is {str(environment[section])[:40]!r}")
+    return environment
+
+
 def decode_generation(data: bytes) -> GenerationRow:
     """Undo `encode_generation`."""
     fields, terms = _decode(GenerationRow, data)
@@ -196,11 +215,19 @@ def _typed(record: type, row: dict[str, Any]) -> tuple[dict[str, Any], dict[str,
     fields: dict[str, Any] = {}
     for name, kind in field_types(record).items():
         value = row[name] if name in row else record._field_defaults[name]  # type: ignore[attr-defined]
+        if not isinstance(value, _TAKEN[kind]) or (value is True or value is False) is not (
+            kind in _TRUTHS and value is not None
+        ):
+            raise ValueError(f"{name} is {str(value)[:40]!r}")
         if kind is float or kind is int:
-            fields[name] = kind(value)
-        else:
-            fields[name] = np.array(value, dtype=np.float64) if kind == FloatArray else value
-    return fields, {name[5:]: float(value) for name, value in row.items() if name[:5] == TERM}
+            value = kind(value)
+        elif kind == FloatArray:
+            value = np.array(value, dtype=np.float64)
+            if value.ndim != 1:
+                raise ValueError(f"{name} is no list of numbers")
+        fields[name] = value
+    terms = {intern(name[5:]): float(value) for name, value in row.items() if name[:5] == TERM}
+    return fields, terms
 
 
 def restore(row: dict[str, Any]) -> None:

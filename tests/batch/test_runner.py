@@ -309,6 +309,15 @@ def test_what_a_killed_writer_left_is_cleared_away(faulty: Condition, tmp_path: 
 # Workers
 
 
+def test_workers_have_one_thread_per_library_whoever_started_them(fresh_workers: None) -> None:
+    names = ("OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS", "MALLOC_TRIM_THRESHOLD_")
+    before = [os.environ.get(name) for name in names]
+    found = list(in_workers(2, [joblib.delayed(os.getenv)(name) for name in names], True))
+    assert found[:2] == ["1", "1"]
+    assert found[2] == str(2**28)
+    assert [os.environ.get(name) for name in names] == before
+
+
 @pytest.mark.matrix
 def test_a_killed_worker_costs_its_own_replicate_a_retry(
     faulty: Condition,

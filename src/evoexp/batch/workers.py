@@ -71,8 +71,9 @@ def in_workers(num_workers: int, tasks: Iterable[Any], ordered: bool = False) ->
         initializer=leave_with_parent,
         initargs=(os.getpid(), get_start_method() == _SERVED),
     )
-    with _children_ignore_interrupts():
-        results: Iterator[Any] = pool(tasks)  # starts the workers
+    # starts the workers, and the server anew if it died
+    with _children_ignore_interrupts(), _environment_of_workers():
+        results: Iterator[Any] = pool(tasks)
     return results
 
 

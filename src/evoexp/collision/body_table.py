@@ -12,6 +12,7 @@ import coal
 import numpy as np
 
 from evoexp.errors import EvoexpError
+from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.kinematics import KinematicTable
 
@@ -125,7 +126,10 @@ def body_table(table: KinematicTable, items: list[Any]) -> BodyTable:
         core, rotation, translation = _core(item)
         if item.parentJoint > 0:
             alignment = table.alignment[item.parentJoint - 1].T
-            rotation, translation = alignment @ rotation, alignment @ translation
+            rotation, translation = (
+                matrix_product(alignment, rotation),
+                matrix_product(alignment, translation),
+            )
             if core.kind == HALF_SPACE:
                 raise UnsupportedShape(
                     f"scene: half-space '{item.name}' must stand still, moves with a joint"
@@ -152,7 +156,7 @@ def _core(item: Any) -> tuple[_Core, FloatArray, FloatArray]:
     rotation, translation = np.array(placement.rotation), np.array(placement.translation)
     swept = float(shape.getSweptSphereRadius()) if isinstance(shape, coal.ShapeBase) else 0.0
     if isinstance(shape, coal.Halfspace):
-        normal = rotation @ shape.n
+        normal = matrix_product(rotation, shape.n)
         return _Core(HALF_SPACE, radius=swept), _with_z(normal), translation + normal * shape.d
     if isinstance(shape, coal.Sphere):
         core = _Core(SEGMENT, radius=shape.radius + swept)
@@ -202,7 +206,7 @@ def _reach(core: _Core, rotation: FloatArray, translation: FloatArray) -> tuple[
             ball = max(a, b, c)
         elif core.kind in (CYLINDER, CONE):
             ball = float(np.sqrt(a * a + b * b))
-    squares = (corners @ rotation.T + translation) ** 2
+    squares = (matrix_product(corners, rotation.T) + translation) ** 2
     x, y, z = translation**2
     from_origin = min(float(np.sqrt(squares.sum(axis=1).max())), float(np.sqrt(x + y + z)) + ball)
     from_axis = min(float(np.sqrt(squares[:, :2].sum(axis=1).max())), float(np.sqrt(x + y)) + ball)

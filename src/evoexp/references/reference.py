@@ -15,6 +15,7 @@ from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.planners.planner import Candidate, Keeper, Reproducibility
 from evoexp.planners.wrapped_planner import WrappedPlanner
 from evoexp.records import FloatArray, Generation
+from evoexp.references.one_thread import one_thread
 
 
 class Truth(NamedTuple):
@@ -61,7 +62,8 @@ class Reference(WrappedPlanner):
 
     def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield the truth as the one generation that there is; no number is drawn."""
-        found, keeper = self.truth(problem), Keeper()
+        with one_thread():
+            found, keeper = self.truth(problem), Keeper()
         cost = float(found.cost)
         terms = {name: float(value) for name, value in found.terms.items()}
         keeper.keep(cost, Candidate(found.best, terms, found.solved))

@@ -6,6 +6,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from evoexp.numeric.ordered_sums import length
 from evoexp.records import FloatArray
 from evoexp.robots.kinematics import KinematicTable, kinematic_table
 from evoexp.validation import Component
@@ -146,7 +147,7 @@ def link_capsule(link: Link, name: str) -> Any:
         return pin.GeometryObject(
             name, link.joint, 0, pin.SE3(np.eye(3), link.start), coal.Sphere(link.radius)
         )
-    shape = coal.Capsule(link.radius, float(np.linalg.norm(link.end - link.start)))
+    shape = coal.Capsule(link.radius, length(link.end - link.start))
     return pin.GeometryObject(name, link.joint, 0, _along(link.start, link.end), shape)
 
 
@@ -173,10 +174,10 @@ def sphere_geometry(
 def _along(start: FloatArray, end: FloatArray) -> Any:
     """Return the placement of a capsule (coal draws it along z, centred) on a segment."""
     direction = end - start
-    length = np.linalg.norm(direction)
+    reach = length(direction)
     rotation = np.eye(3)
-    if length > 0.0:
+    if reach > 0.0:
         rotation = pin.Quaternion.FromTwoVectors(
-            np.array([0.0, 0.0, 1.0]), direction / length
+            np.array([0.0, 0.0, 1.0]), direction / reach
         ).toRotationMatrix()
     return pin.SE3(rotation, 0.5 * (start + end))

@@ -19,6 +19,7 @@ import pinocchio as pin
 from evoexp.errors import EvoexpError
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import sincos
+from evoexp.numeric.ordered_sums import length, matrix_product
 from evoexp.records import BoolArray, FloatArray, IntArray
 
 BLOCK = 64
@@ -98,7 +99,7 @@ class KinematicTable(NamedTuple):
             joint: Pinocchio's index of the joint, at least 1.
             point: (3,) [length unit].
         """
-        return np.asarray(self.alignment[joint - 1].T @ point)
+        return matrix_product(self.alignment[joint - 1].T, point)
 
 
 def kinematic_table(model: Any) -> KinematicTable:
@@ -120,8 +121,10 @@ def kinematic_table(model: Any) -> KinematicTable:
         alignment[k] = _frame_with_z(axis)
         before = alignment[parent[k]] if parent[k] >= 0 else np.eye(3)
         placement = model.jointPlacements[k + 1]
-        rotation[k] = (before.T @ placement.rotation @ alignment[k]).ravel()
-        translation[k] = before.T @ placement.translation
+        rotation[k] = matrix_product(
+            matrix_product(before.T, placement.rotation), alignment[k]
+        ).ravel()
+        translation[k] = matrix_product(before.T, placement.translation)
     turned = np.array(
         [not np.array_equal(matrix, np.eye(3).ravel()) for matrix in rotation], dtype=np.bool_
     )
@@ -334,21 +337,21 @@ def _axis(model: Any, data: Any, neutral: FloatArray, joint: int) -> tuple[Float
     # one joint alone comes as a vector
     jacobian = np.reshape(jacobian, (6, -1))[:, model.idx_vs[joint]]
     linear, angular = jacobian[:3], jacobian[3:]
-    slides = bool(np.linalg.norm(angular) < 0.5)
-    if not slides and np.linalg.norm(linear) > 1e-12:
+    slides = length(angular) < 0.5
+    if not slides and length(linear) > 1e-12:
         raise UnsupportedJoint(f"robot: joint '{name}' must turn or slide, does both at once")
     return (linear if slides else angular), slides
 
 
 def _frame_with_z(axis: FloatArray) -> FloatArray:
     """Return a rotation whose third column is the axis; the identity for +z itself."""
-    unit = axis / np.linalg.norm(axis)
+    unit = axis / length(axis)
     if unit[2] == 1.0:
         return np.eye(3)
     if unit[2] == -1.0:
         return np.diag([1.0, -1.0, -1.0])
     x = np.cross(np.eye(3)[np.argmin(np.abs(unit))], unit)
-    x /= np.linalg.norm(x)
+    x /= length(x)
     return np.column_stack([x, np.cross(unit, x), unit])
 
 

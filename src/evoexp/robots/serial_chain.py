@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE, sincos
+from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.robots.assembly import Chain, Link
 from evoexp.validation import NonNegative, Settings
 
@@ -76,10 +77,10 @@ class SerialChain(Chain):
         base, parent, links = np.array(self.base_position), 0, []
         for k, joint in enumerate(self.joints):
             offset = np.array(joint.offset)
-            placement = (
-                pin.SE3(turn, base + turn @ offset) if k == 0 else pin.SE3(np.eye(3), offset)
-            )
-            start, end = (base, base + turn @ offset) if k == 0 else (np.zeros(3), offset)
+            placement, start, end = pin.SE3(np.eye(3), offset), np.zeros(3), offset
+            if k == 0:
+                start, end = base, base + matrix_product(turn, offset)
+                placement = pin.SE3(turn, end)
             links.append(Link(arm, parent, start, end, self.link_radius))
             parent = model.addJoint(parent, joint.model(), placement, f"arm_{arm}_joint_{k}")
         links.append(Link(arm, parent, np.zeros(3), np.array(self.tip), self.link_radius))

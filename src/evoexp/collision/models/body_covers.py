@@ -11,6 +11,7 @@ import numpy as np
 
 from evoexp.collision.body_table import UnsupportedShape
 from evoexp.collision.box_support import coal
+from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import FloatArray
 
 # of one body that is neither ball nor capsule; where they do not suffice, the inflation grows
@@ -174,7 +175,7 @@ def _solid(item: Any) -> _Solid:
     planes = ConvexHull(corners).equations  # outward normals, unit length
 
     def near(points: FloatArray) -> FloatArray:
-        return np.asarray((points @ planes[:, :3].T + planes[:, 3]).max(axis=1))
+        return np.asarray((matrix_product(points, planes[:, :3].T) + planes[:, 3]).max(axis=1))
 
     def far(points: FloatArray) -> FloatArray:
         found: FloatArray = near(points)
@@ -255,5 +256,8 @@ def _placed(
 ) -> Cover:
     rotation, translation = np.array(item.placement.rotation), np.array(item.placement.translation)
     return Cover(
-        start @ rotation.T + translation, end @ rotation.T + translation, radius, inflation
+        matrix_product(start, rotation.T) + translation,
+        matrix_product(end, rotation.T) + translation,
+        radius,
+        inflation,
     )

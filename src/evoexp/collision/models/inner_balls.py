@@ -15,6 +15,7 @@ import numpy as np
 
 from evoexp.collision.models.body_covers import Cover
 from evoexp.numeric.elementary import sincos
+from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import FloatArray
 
 AROUND = 24  # points around the axis of a cylinder
@@ -69,8 +70,8 @@ def _of_box(half: FloatArray, inset: float) -> FloatArray:
 def _placed(item: Any, start: FloatArray, end: FloatArray, radius: float) -> Cover:
     rotation, translation = np.array(item.placement.rotation), np.array(item.placement.translation)
     return Cover(
-        start @ rotation.T + translation,
-        end @ rotation.T + translation,
+        matrix_product(start, rotation.T) + translation,
+        matrix_product(end, rotation.T) + translation,
         np.full(len(start), radius),
         0.0,
     )

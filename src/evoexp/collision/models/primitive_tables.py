@@ -105,8 +105,8 @@ def pack_shapes(
     # ends and axes in the table's frames
     world = len(table.parent)
     turn = np.concatenate([np.eye(3)[None], table.alignment.transpose(0, 2, 1)])[shapes.joint]
-    start = np.einsum("nij,nj->ni", turn, shapes.start)
-    axis = np.einsum("nij,nj->ni", turn, shapes.end - shapes.start)
+    start = _turned(turn, shapes.start)
+    axis = _turned(turn, shapes.end - shapes.start)
     square = (axis * axis).sum(axis=1)
     ball = square <= SHORTEST * SHORTEST
     runs: list[tuple[int, int]] = []
@@ -145,6 +145,12 @@ def pack_shapes(
     packed = PackedShapes(bounds, centers, capsules, 0)
     most = max(num_spheres(units, packed, k) for k in range(len(units.ball)))
     return units, packed._replace(most=most), parts
+
+
+def _turned(turn: FloatArray, vectors: FloatArray) -> FloatArray:
+    """Return vectors (n, 3) turned by a rotation each, (n, 3, 3), with terms added in order."""
+    terms = turn * vectors[:, None, :]
+    return np.asarray(terms[..., 0] + terms[..., 1] + terms[..., 2])
 
 
 def num_spheres(units: Units, shapes: PackedShapes, unit: int) -> int:

@@ -155,6 +155,17 @@ def test_a_table_with_other_columns_is_rebuilt(
     assert reads == ["0000.mcap"] * 2
 
 
+def test_a_table_of_another_version_is_rebuilt(
+    run: RunDirectory, add: Add, reads: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    add(0)
+    with monkeypatch.context() as patch:
+        patch.setattr(summaries, "_VERSION", summaries._VERSION - 1)
+        expected = rows(write_summary(run))
+    assert rows(write_summary(run)) == expected
+    assert reads == ["0000.mcap"] * 2
+
+
 @pytest.mark.parametrize("damage", [b"", b"PAR1", b"rubbish" * 100])
 def test_a_damaged_table_is_rebuilt(run: RunDirectory, add: Add, damage: bytes) -> None:
     add(0)

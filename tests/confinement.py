@@ -20,16 +20,10 @@ from typing import Any, TypeVar
 
 Result = TypeVar("Result")
 
-SECONDS = 20.0  # a hostile example takes far less, also on a machine that does other things
+SECONDS = 20.0  # [CPU s] a hostile example takes far less
 MEGABYTE = 2**20
 _STARTS = ("os.system", "os.exec", "os.posix_spawn", "os.spawn", "os.startfile", "subprocess.Popen")
-_FORBIDDEN = (
-    *_STARTS,
-    "socket.connect",
-    "pickle.find_class",
-    "marshal.loads.untrusted",
-    "pty.spawn",
-)
+_FORBIDDEN = (*_STARTS, "socket.connect", "pty.spawn")
 _CHANGES = (
     "os.remove",
     "os.rename",
@@ -51,15 +45,15 @@ def no_longer(seconds: float = SECONDS) -> Iterator[None]:
     """End the body with `Hang` if it takes too long."""
 
     def ring(signum: int, frame: FrameType | None) -> None:
-        raise Hang(f"still at it after {seconds} s")
+        raise Hang(f"still at it after {seconds} s of CPU time")
 
-    before = signal.signal(signal.SIGALRM, ring)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    before = signal.signal(signal.SIGPROF, ring)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
 
 
 def confined(task: Callable[[], Result], folder: Path, memory_mb: int) -> Result:

@@ -13,8 +13,12 @@ import numpy as np
 from evoexp.attachments import attached, with_files
 from evoexp.errors import RevisionMismatch, SettingError, UnknownSetting
 from evoexp.registry import component_class
-from evoexp.validation import TARGET, Component, build
+from evoexp.validation import LARGEST, TARGET, Component, build
 
+# Of robots and scenarios: coal's distances between bodies ten times as far apart or as large as
+# that end in memory that is not theirs.
+_LARGEST = {"robot": 1e7, "scenario": 1e7, "planner": LARGEST}
+MAX_SEED = 2**128  # numpy's own seeds have as many bits
 PARTS = ("robot", "scenario", "planner")
 
 
@@ -100,13 +104,15 @@ class Condition(NamedTuple):
         unknown = set(config) - {*PARTS, "seed"}
         if unknown:
             raise UnknownSetting(min(unknown), (*PARTS, "seed"))
-        parts = [build(config.get(part), component_class, part) for part in PARTS]
+        parts = [build(config.get(part), component_class, part, _LARGEST[part]) for part in PARTS]
         for part, value in zip(PARTS, parts, strict=True):
             if not isinstance(value, Component):
                 raise SettingError(part, f"a component, given by its {TARGET}", config.get(part))
         seed = config.get("seed")
         if type(seed) is not int or seed < 0:
             raise SettingError("seed", "a whole number, at least 0", seed)
+        if seed >= MAX_SEED:
+            raise SettingError("seed", "less than 2^128", seed)
         robot, scenario, planner = parts
         _check_roles(robot, scenario, planner)
         return cls(robot, scenario, planner, seed)
@@ -121,7 +127,7 @@ class Condition(NamedTuple):
         """
         config = stored_config(text)
         stale = [
-            f"{field} was revision {stored}, installed is {installed}"
+            f"{field} was revision {str(stored)[:20]}, installed is {installed}"
             for field, stored, installed in revisions(config)
             if stored != installed
         ]

@@ -5,6 +5,7 @@ file or from the `config.json` of a log) checks every type and range and names t
 by its path; nothing is coerced but whole numbers into float fields and lists into tuples.
 """
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Annotated, Any, ClassVar, get_args
 
@@ -12,8 +13,15 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from evoexp.errors import SettingError, UnknownSetting, nearest
 
-Count = Annotated[int, Field(ge=1)]
-NonNegativeCount = Annotated[int, Field(ge=0)]
+# Counts beyond a thousand million are slips, and overflow where kernels multiply them.
+MAX_COUNT = 10**9
+# Squares and products of larger numbers overflow; no length, angle or weight comes near.
+LARGEST = 1e100
+
+Count = Annotated[int, Field(ge=1, le=MAX_COUNT)]
+NonNegativeCount = Annotated[int, Field(ge=0, le=MAX_COUNT)]
+# Configurations of a path, pieces of a segment: laid out one by one before anything is run.
+LayoutCount = Annotated[int, Field(ge=1, le=10_000)]
 Rate = Annotated[float, Field(ge=0.0, le=1.0)]
 Positive = Annotated[float, Field(gt=0.0)]
 NonNegative = Annotated[float, Field(ge=0.0)]
@@ -59,7 +67,12 @@ class Component(Settings):
         return {TARGET: self.component, "revision": self.revision} | super().canonical()
 
 
-def build(data: Any, lookup: Callable[[str, str], type[Component]], field: str) -> Any:
+def build(
+    data: Any,
+    lookup: Callable[[str, str], type[Component]],
+    field: str,
+    largest: float = LARGEST,
+) -> Any:
     """Build plain data into components, the innermost first.
 
     Args:
@@ -68,6 +81,7 @@ def build(data: Any, lookup: Callable[[str, str], type[Component]], field: str) 
         lookup: Gives the class of a registered name; its second argument is the field, for its
             error.
         field: Dotted path of `data`, for errors.
+        largest: No number may be larger than that, of either sign.
 
     Raises:
         SettingError: If a setting is missing, of a wrong type, out of range or contradicts another.
@@ -75,7 +89,7 @@ def build(data: Any, lookup: Callable[[str, str], type[Component]], field: str) 
     """
     if isinstance(data, Mapping):
         children = {
-            key: build(value, lookup, _join(field, str(key)))
+            key: build(value, lookup, _join(field, str(key)), largest)
             for key, value in data.items()
             if key != TARGET
         }
@@ -83,8 +97,32 @@ def build(data: Any, lookup: Callable[[str, str], type[Component]], field: str) 
             return children
         return _construct(lookup(str(data[TARGET]), field), children, field)
     if isinstance(data, list | tuple):
-        return tuple(build(value, lookup, f"{field}[{k}]") for k, value in enumerate(data))
-    return data + 0.0 if isinstance(data, float) else data  # -0.0 and 0.0 are one setting
+        return tuple(build(value, lookup, f"{field}[{k}]", largest) for k, value in enumerate(data))
+    if isinstance(data, int | float):
+        return _number(data, field, largest)
+    return data
+
+
+def _number(value: float, field: str, largest: float) -> float:
+    """Return a number (or true, or false) that kernels and libraries can reckon with.
+
+    NaN and the infinities are left to the field, which may want something else than a number.
+
+    Raises:
+        SettingError: If it is too large.
+    """
+    if isinstance(value, float):
+        if largest < abs(value) < math.inf:
+            raise SettingError(field, f"between -{largest:g} and {largest:g}", value)
+        return value + 0.0  # -0.0 and 0.0 are one setting
+    if abs(value) > min(largest, 2**62):
+        most = f"{min(largest, 1e18):g}"
+        raise SettingError(field, f"between -{most} and {most}", _digits(value))
+    return value
+
+
+def _digits(value: int) -> object:
+    return value if value.bit_length() < 1000 else f"one of some {value.bit_length() * 3 // 10}"
 
 
 def _construct(kind: type[Component], settings: dict[str, Any], field: str) -> Component:

@@ -31,14 +31,14 @@ def read_map(content: bytes, size: tuple[int, ...], field: str) -> np.ndarray:
     Raises:
         SettingError: If the map has another size or another alphabet, or is no map.
     """
-    rows = _read_png(content, field) if content.startswith(_PNG) else _read_text(content, field)
+    rows = (
+        _read_png(content, size, field) if content.startswith(_PNG) else _read_text(content, field)
+    )
     layers = rows if rows.ndim == 3 else rows[None]
     blocked = layers[:, ::-1, :].transpose(2, 1, 0)  # (x, y, z)
     blocked = blocked[:, :, 0] if len(size) == 2 and blocked.shape[2] == 1 else blocked
     if blocked.shape != tuple(size):
-        raise SettingError(
-            field, f"a map of {_text(size)} nodes, as scenario.size says", _text(blocked.shape)
-        )
+        raise _wrong_size(size, blocked.shape, field)
     return np.ascontiguousarray(blocked)
 
 
@@ -72,13 +72,16 @@ def _read_text(content: bytes, field: str) -> np.ndarray:
     return np.array([[[letter in BLOCKED for letter in row] for row in block] for block in blocks])
 
 
-def _read_png(content: bytes, field: str) -> np.ndarray:
-    """Return rows (rows, columns)."""
+def _read_png(content: bytes, size: tuple[int, ...], field: str) -> np.ndarray:
+    """Return rows (rows, columns); a picture of another size is not unpacked."""
     from PIL import Image  # only pictures need it
 
     try:
-        picture: Any = Image.open(io.BytesIO(content), formats=("PNG",)).convert("L")
-    except (OSError, SyntaxError, ValueError) as error:
+        opened: Any = Image.open(io.BytesIO(content), formats=("PNG",))
+        if len(size) != 2 or opened.size != tuple(size):
+            raise _wrong_size(size, opened.size, field)
+        picture: Any = opened.convert("L")
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise SettingError(field, "a PNG that can be read", str(error)) from None
     pixels = np.asarray(picture)
     if wrong := sorted({int(value) for value in np.unique(pixels)} - {0, 255}):
@@ -86,6 +89,10 @@ def _read_png(content: bytes, field: str) -> np.ndarray:
             field, "a PNG of black (blocked) and white (free) pixels", f"grey {wrong[0]}"
         )
     return np.asarray(pixels == 0)
+
+
+def _wrong_size(size: tuple[int, ...], was: tuple[int, ...], field: str) -> SettingError:
+    return SettingError(field, f"a map of {_text(size)} nodes, as scenario.size says", _text(was))
 
 
 def _text(size: tuple[int, ...]) -> str:

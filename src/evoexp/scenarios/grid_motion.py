@@ -1,5 +1,6 @@
 """A start and a goal on an occupancy grid."""
 
+import math
 from typing import Annotated, ClassVar, Self
 
 import numpy as np
@@ -14,6 +15,7 @@ from evoexp.validation import Component, Count, NonNegative, Positive
 Node = Annotated[tuple[int, ...], Field(min_length=2, max_length=3)]
 Corners = Annotated[tuple[int, ...], Field(min_length=4, max_length=6)]
 
+MOST_NODES = 20_000_000  # of a grid: one of 4000 × 4000, or 250 × 250 × 250
 POST = 0.02  # [cell] thickness of bodies that span one node: a box has some
 
 
@@ -46,6 +48,8 @@ class GridMotion(Component):
 
     @model_validator(mode="after")
     def _nodes_are_inside(self) -> Self:
+        if math.prod(self.size) > MOST_NODES:
+            raise SettingError("size", f"of at most {MOST_NODES:,} nodes", list(self.size))
         for name in ("start", "goal"):
             self._check_node(name, getattr(self, name))
         if self.start == self.goal:

@@ -16,6 +16,7 @@ from evoexp.records import FloatArray
 
 # of one body that is neither ball nor capsule; where they do not suffice, the inflation grows
 MOST_SPHERES = 150
+MOST_IN_A_ROW = 10_000  # spheres on the axis of one body
 WIDER = 1.0 + 1e-9  # covers are made larger by more than rounding
 
 
@@ -56,12 +57,12 @@ def sphere_cover(item: Any, inflation: float) -> Cover:
         half = shape.halfLength if isinstance(shape, coal.Capsule) else 0.0
         radius = shape.radius + (inflation if half > 0.0 else 0.0)
         spacing = 2.0 * np.sqrt(max(radius * radius - shape.radius * shape.radius, 0.0)) / WIDER
-        count = int(np.ceil(2.0 * half / spacing)) + 1 if half > 0.0 else 1
+        count = _in_a_row(item, 2.0 * half, spacing) + 1 if half > 0.0 else 1
         along = np.linspace(-half, half, count) if count > 1 else np.zeros(1)
         centers = np.column_stack([np.zeros((count, 2)), along])
         return _placed(item, centers, centers, np.full(count, radius), radius - shape.radius)
     solid = _solid(item)
-    best = _column(shape) if isinstance(shape, coal.Cylinder | coal.Cone) else None
+    best = _column(item) if isinstance(shape, coal.Cylinder | coal.Cone) else None
     for counts in _lattices(solid.high - solid.low):
         centers, radius = _cells(solid, counts)
         found = _Spheres(centers, radius, float((solid.far(centers) + radius).max()))
@@ -82,10 +83,24 @@ class _Spheres(NamedTuple):
     reach: float
 
 
-def _column(shape: Any) -> _Spheres:
+def _in_a_row(item: Any, length: float, spacing: float) -> int:
+    """Return how many pieces of a length cover it.
+
+    Raises:
+        UnsupportedShape: If they are too many.
+    """
+    if not length < MOST_IN_A_ROW * spacing:
+        raise UnsupportedShape(
+            f"robot: body '{item.name}' must be coverable by {MOST_IN_A_ROW} spheres, was "
+            f"{length:.4g} long and would need one per {spacing:.4g}"
+        )
+    return int(np.ceil(length / spacing))
+
+
+def _column(item: Any) -> _Spheres:
     """Return spheres on the axis of a cylinder, or of one around a cone, one above the other."""
-    radius, half = float(shape.radius), float(shape.halfLength)
-    count = max(1, int(np.ceil(half / radius)))
+    radius, half = float(item.geometry.radius), float(item.geometry.halfLength)
+    count = max(1, _in_a_row(item, half, radius))
     piece = half / count  # half of what a sphere covers
     around = float(np.sqrt(radius * radius + piece * piece))
     along = -half + piece * (2.0 * np.arange(count) + 1.0)

@@ -13,6 +13,7 @@ from typing import Any
 import coal
 import numpy as np
 
+from evoexp.collision.body_table import UnsupportedShape
 from evoexp.collision.models.body_covers import Cover
 from evoexp.numeric.elementary import sincos
 from evoexp.numeric.ordered_sums import matrix_product
@@ -20,6 +21,7 @@ from evoexp.records import FloatArray
 
 AROUND = 24  # points around the axis of a cylinder
 SPACING = 0.02  # [length unit] of points along edges and on faces, at most
+MOST_RINGS = 100_000  # of a cylinder
 MOST = 12  # points along one edge of a box, at most
 
 
@@ -53,6 +55,11 @@ def _of_cylinder(radius: float, half: float, inset: float) -> FloatArray:
     radius, half = max(radius - inset, 0.0), max(half - inset, 0.0)
     turns = [sincos(2.0 * np.pi * k / AROUND) for k in range(AROUND)]
     ring = radius * np.array([(cosine, sine) for sine, cosine in turns])
+    if not 2.0 * half < MOST_RINGS * SPACING:
+        raise UnsupportedShape(
+            f"scenario: a cylinder that is grasped must be at most {MOST_RINGS * SPACING:g} long, "
+            f"was {2.0 * half:.4g}"
+        )
     heights = np.linspace(-half, half, int(np.ceil(2.0 * half / SPACING)) + 1)
     rings = [np.column_stack([ring, np.full(AROUND, height)]) for height in heights]
     return np.vstack([*rings, [[0.0, 0.0, -half], [0.0, 0.0, half]]])

@@ -24,7 +24,7 @@ from evoexp.errors import SettingError
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
 from evoexp.scenarios.obstacles import obstacle_table
-from evoexp.validation import Component, Count, NonNegative
+from evoexp.validation import Component, LayoutCount, NonNegative
 
 
 class LinkCrossings(Component):
@@ -40,7 +40,7 @@ class LinkCrossings(Component):
 
     component: ClassVar[str] = "link_crossings"
 
-    collision_substeps: Count
+    collision_substeps: LayoutCount
     half_width: NonNegative
     tcp_radius: NonNegative
 

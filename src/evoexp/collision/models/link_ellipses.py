@@ -11,7 +11,7 @@ from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.planar_ends import PlanarArm, planar_arm
 from evoexp.scenarios.obstacles import ELLIPSE, ObstacleTable
-from evoexp.validation import Component, Count
+from evoexp.validation import Component, LayoutCount
 
 NUM_FIRST = 1  # positions tested before chords are swept, so that few blocks go all the way
 
@@ -28,7 +28,7 @@ class LinkEllipses(Component):
 
     component: ClassVar[str] = "link_ellipses"
 
-    num_positions: Count
+    num_positions: LayoutCount
     swept: Literal["none", "chords"]
     blind: bool = False
 

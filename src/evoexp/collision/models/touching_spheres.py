@@ -4,9 +4,10 @@ Any number of arms, in the plane or in space, among static obstacles; the kernel
 `sphere_kernels`.
 """
 
-from typing import Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
+from pydantic import Field
 
 from evoexp.collision.models.obstacle_kernels import LinkBalls
 from evoexp.collision.models.sphere_kernels import Space, Spheres, SphereTables, clearances
@@ -15,7 +16,9 @@ from evoexp.numeric.compilation import plain
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.assembly import Assembly, sphere_geometry
 from evoexp.scenarios.obstacles import ObstacleTable, obstacle_table
-from evoexp.validation import Component, Count, Positive
+from evoexp.validation import Component, LayoutCount, Positive
+
+MOST_PER_LINK = 1000  # spheres; every one is tested against those of the other arms
 
 
 class TouchingSpheres(Component):
@@ -33,9 +36,9 @@ class TouchingSpheres(Component):
 
     component: ClassVar[str] = "touching_spheres"
 
-    spheres_per_link: Count
+    spheres_per_link: Annotated[int, Field(ge=1, le=MOST_PER_LINK)]
     sphere_radius: Positive
-    collision_substeps: Count
+    collision_substeps: LayoutCount
 
     def bind(self, assembly: Assembly, obstacles: tuple[Any, ...]) -> "SphereCollision":
         """Return the model of a robot among obstacles, ready for batches.
@@ -55,7 +58,11 @@ class TouchingSpheres(Component):
             if link.joint > 0
             for sphere in self._of_link(assembly, link)
         ]
-        kept = [s for k, s in enumerate(spheres) if not any(map(s.repeats, spheres[:k]))]
+        kept = [
+            s
+            for k, s in enumerate(spheres)
+            if s.center.any() or not any(map(s.repeats, spheres[:k]))
+        ]
         joint = np.array([sphere.joint - 1 for sphere in kept], dtype=np.int64)
         local = np.array([assembly.table.local(sphere.joint, sphere.center) for sphere in kept])
         arms = np.array([sphere.arm for sphere in kept])

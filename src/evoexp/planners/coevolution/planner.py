@@ -37,7 +37,7 @@ from evoexp.planners.planner import Candidate, Keeper, PlannerDefaults
 from evoexp.records import BoolArray, FloatArray, Generation
 from evoexp.robots.assembly import Assembly, Robot
 from evoexp.scenarios.link_motion import LinkMotion
-from evoexp.validation import Component, Count
+from evoexp.validation import Component, LayoutCount
 
 HALF_TURN = DEGREE * 180.0  # genes live in [0, π)
 
@@ -86,7 +86,7 @@ class Coevolution(PlannerDefaults, Component):
     component: ClassVar[str] = "coevolution"
     revision: ClassVar[int] = 2
 
-    chromosome_length: Count
+    chromosome_length: LayoutCount
     interpolation: Literal["linear", "cubic"]
     speed_limit: SpeedLimit
     ga: CoevolutionSettings

@@ -8,7 +8,7 @@ from evoexp.collision.models.touching_spheres import TouchingSpheres
 from evoexp.errors import SettingError
 from evoexp.evolution.genetic_settings import GeneticSettings
 from evoexp.objectives.string_fitness import StringFitness
-from evoexp.validation import Count, NonNegativeCount, Positive, Rate, Settings
+from evoexp.validation import Count, LayoutCount, NonNegativeCount, Positive, Rate, Settings
 
 SAMPLES = tuple(2**k for k in range(3, 11))  # per segment, that the redistribution can take
 
@@ -35,7 +35,7 @@ class ViaPointSettings(Settings):
             sites of the whole string: the end of the first path and the beginning of the second.
     """
 
-    num_via_points: Count
+    num_via_points: LayoutCount
     walk_step: Positive
     max_turn: Annotated[float, Field(ge=0.0, le=180.0)]
     num_new_trajectories: NonNegativeCount

@@ -117,15 +117,16 @@ def attached(config: Any) -> dict[str, bytes]:
 
     The keys are their names in a log.
     """
-    return {PREFIX + sha256: _contents[sha256] for sha256 in _hashes(config) if sha256 in _contents}
+    return {PREFIX + sha256: _contents[sha256] for sha256 in hashes(config) if sha256 in _contents}
 
 
-def _hashes(config: Any) -> Iterator[str]:
+def hashes(config: Any) -> Iterator[str]:
+    """Yield the SHA-256 of every file that a plain configuration refers to."""
     if isinstance(config, dict):
         if set(config) == {SHA256}:
             yield str(config[SHA256])
         for value in config.values():
-            yield from _hashes(value)
+            yield from hashes(value)
     elif isinstance(config, list | tuple):
         for value in config:
-            yield from _hashes(value)
+            yield from hashes(value)

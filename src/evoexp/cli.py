@@ -11,6 +11,7 @@ import sys
 from collections.abc import Sequence
 
 from evoexp.commands.command_parser import COMMANDS, command_module, command_parser, whole_parser
+from evoexp.commands.damage_lines import damage_in_lines
 from evoexp.errors import EvoexpError
 
 WITH_WORKERS = ("run", "reproduce")
@@ -34,6 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 from evoexp.configuration.search_path import searched_first
 
                 stack.enter_context(searched_first(folders))
+            stack.enter_context(damage_in_lines())
             return int(command_module(chosen).main(given))
     except EvoexpError as error:
         print(f"evoexp: {' '.join(str(error).split())}", file=sys.stderr)

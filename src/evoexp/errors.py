@@ -100,6 +100,21 @@ class CorruptLog(EvoexpError):
     """A log that is cut or altered, or that evoexp did not write."""
 
 
+class OtherVersion(CorruptLog):
+    """A log that another version of evoexp wrote: unreadable here, and perhaps whole."""
+
+
+class StoreError(EvoexpError):
+    """A run directory that is damaged, or that belongs to another condition."""
+
+
+class DamagedStore(UserWarning):
+    """A stored file is damaged: it is left out, taken from elsewhere, or set aside.
+
+    The text is one line. The command line prints it on stderr as it is.
+    """
+
+
 class Busy(EvoexpError):
     """Another process writes the same run now."""
 

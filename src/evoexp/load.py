@@ -56,6 +56,9 @@ def load(
         UnknownHash: If no stored run has this hash.
         AmbiguousHash: If several runs begin with it.
         NothingStored: If nothing of it has been run.
+
+    Warns:
+        DamagedStore: If a log is damaged; it is left out.
     """
     root = Path(outputs) if outputs is not None else outputs_root()
     with searched_first(map(str, config_dir)):
@@ -81,9 +84,8 @@ def load(
     else:
         run = _run(root, what, known)
         runs, labels = [run], [(run.hash12, run.condition_id)]
-    return Frames(
-        _labelled(read_generations(runs), labels), _labelled(read_summaries(runs), labels)
-    )
+    summaries = read_summaries(runs, thorough=True)  # first: what is damaged is left out
+    return Frames(_labelled(read_generations(runs), labels), _labelled(summaries, labels))
 
 
 def _run(outputs: Path, what: str, experiments: Sequence[str]) -> RunDirectory:

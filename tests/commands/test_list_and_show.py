@@ -4,6 +4,7 @@ What is stored, what is shipped, what failed, what is damaged.
 """
 
 import re
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -99,20 +100,32 @@ def test_damaged_runs_are_listed_beside_the_others(
     assert list(rows) == sorted(
         [first.hash12, second.hash12, third.hash12, without_manifest.hash12]
     )
-    assert rows[first.hash12][1:] == rows[second.hash12][1:] == ["–", "–", "–", "–"]
+    assert rows[first.hash12][1:3] == ["2", "0"], "its logs know what it is"
+    assert rows[second.hash12][1:3] == ["1", "0"]
     assert rows[without_manifest.hash12] == ["(no manifest)", "0", "0", "0", "–"]
     assert (
-        "config.json: damaged: its hash 44136fa355b3 is not the directory's name"
+        "config.json (damaged: its hash 44136fa355b3 is not the directory's name)"
         in rows[first.hash12][0]
     )
-    assert f"{log}: cut" in rows[second.hash12][0]
+    assert "0001.mcap (cut" in rows[second.hash12][0]
+    assert "0001.mcap (cut" in said.err
 
 
-def test_a_damaged_run_is_refused_by_show(refused: Callable[..., str], stored: Path) -> None:
+def test_show_takes_from_a_log_what_is_damaged(
+    evoexp: Evoexp, refused: Callable[..., str], stored: Path
+) -> None:
     first, second, *_ = find_runs(stored)
+    whole = evoexp("show", first.hash12).out
     (first.path / "config.json").write_text("{}")
-    assert f"{first.path}/config.json: damaged" in refused("show", first.hash12)
+    said = evoexp("show", first.hash12)
+    assert (said.code, said.out) == (0, whole)
+    assert f"{first.path}/config.json: damaged" in said.err
+    assert "taken from 0000.mcap" in said.err
     (second.path / "manifest.json").write_text("[")
+    said = evoexp("show", second.hash12)
+    assert said.code == 0
+    assert f"{second.path}/manifest.json: damaged" in said.err
+    shutil.rmtree(second.replicates)
     assert f"{second.path}/manifest.json: damaged" in refused("show", second.hash12)
 
 

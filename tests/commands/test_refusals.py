@@ -291,9 +291,8 @@ def test_a_damaged_log_is_named(refused: Refused, stored: Path) -> None:
     for damaged in (whole[:-1], whole[:middle], b"", flipped, b"PAR1" * 100):
         log.write_bytes(damaged)
         assert refused("reproduce", str(log)).startswith(f"{log}: ")
-        assert refused("reproduce", run.hash12).startswith(f"{log}: ")
+        assert refused("show", str(log)).startswith(f"{log}: ")
     log.write_bytes(whole[:middle])
-    assert refused("show", run.hash12).startswith(f"{log}: cut")
     log.unlink()
     assert refused("reproduce", str(log)) == f"{log}: cannot be read: No such file or directory"
 

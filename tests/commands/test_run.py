@@ -12,7 +12,7 @@ import pytest
 from command_samples import SERIAL, SMALL, Evoexp
 
 from evoexp.configuration import compose
-from evoexp.store.run_directory import RunDirectory, find_runs
+from evoexp.store.run_directory import find_runs
 
 PLANAR = ("experiment=rana_planar", *SERIAL)
 
@@ -132,17 +132,6 @@ def test_reproduce_matches(evoexp: Evoexp, stored: Path) -> None:
         assert (one.code, one.out.splitlines()[-1]) == (0, "1 of 1 MATCH")
         log = evoexp("reproduce", str(run.log_path(0)))
         assert (log.code, log.out.splitlines()[-1]) == (0, "1 of 1 MATCH")
-
-
-def test_a_corrupt_log_stops_the_summary_but_is_named(evoexp: Evoexp, stored: Path) -> None:
-    run = RunDirectory(stored, compose.expand(PLANAR)[0].conditions[0].condition.id)
-    log = run.log_path(0)
-    log.write_bytes(log.read_bytes()[:100])
-    said = evoexp("run", *PLANAR, "--no-report")
-    assert said.code == 2
-    assert said.err.startswith(f"evoexp: {log}: cut")
-    log.unlink()
-    assert evoexp("run", *PLANAR, "--no-report").code == 0
 
 
 def test_a_stored_configuration_is_the_canonical_form(stored: Path) -> None:

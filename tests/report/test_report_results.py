@@ -6,14 +6,15 @@ import pytest
 
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
-from evoexp.errors import NothingStored
+from evoexp.errors import NothingStored, StoreError
 from evoexp.report import results as results_module
 from evoexp.report.index import render
 from evoexp.report.page_parts import Page
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results, gather
 from evoexp.store.log_reader import read_log
-from evoexp.store.run_directory import Plan, RunDirectory, StoreError
+from evoexp.store.plans import Plan
+from evoexp.store.run_directory import RunDirectory
 from report_samples import REPORT, expand, store
 
 

@@ -13,13 +13,19 @@ from pathlib import Path
 import pytest
 from store_samples import CONDITION, CONFIG
 
-from evoexp.errors import AmbiguousHash, Busy, EvoexpError, UnknownHash
+from evoexp.errors import (
+    AmbiguousHash,
+    Busy,
+    DamagedStore,
+    EvoexpError,
+    StoreError,
+    UnknownHash,
+)
 from evoexp.store.files import NUM_THREADS
 from evoexp.store.log import Finished
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import (
     RunDirectory,
-    StoreError,
     find_runs,
     lock_all,
     outputs_root,
@@ -211,16 +217,14 @@ def test_damage_is_named(run: RunDirectory, tmp_path: Path) -> None:
         run.manifest()
     (run.path / "config.json").write_bytes(CONFIG[:-1])
     damaged = r"config\.json: damaged"
-    for action in (
-        run.check,
-        run.config_json,
-        lambda: run.create(CONFIG, {}),
-        lambda: find_runs(tmp_path),
-    ):
+    for action in (run.check, run.config_json, lambda: run.create(CONFIG, {})):
         with pytest.raises(StoreError, match=damaged):
             action()
-    with pytest.raises(StoreError, match=damaged):
+    with pytest.raises(StoreError, match=f"{damaged}.*; neither a log nor the manifest has it"):
         resolve(tmp_path, run.hash12)
+    other = create(tmp_path, b"other")
+    with pytest.warns(DamagedStore, match=damaged):
+        assert [each.path for each in find_runs(tmp_path)] == [other.path]
     (run.path / "config.json").unlink()
     with pytest.raises(StoreError, match="cannot be read: No such file"):
         run.check()

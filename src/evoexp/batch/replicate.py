@@ -4,6 +4,7 @@ import hashlib
 import time
 
 from evoexp.attachments import SHA256
+from evoexp.collision.box_support import EXACT
 from evoexp.condition import Condition
 from evoexp.planners.planner import judge_motion
 from evoexp.records import Generation, ReplicateSummary
@@ -11,6 +12,7 @@ from evoexp.registry import guests
 from evoexp.store.log import Finished, Log
 from evoexp.store.manifest import environment
 
+EXACT_BOXES = "exact_boxes"  # the entry of a log's environment; logs without it are older
 HASHED = f'"{SHA256}"'.encode()  # stands in configurations that refer to files, and only there
 
 
@@ -29,7 +31,8 @@ def run_replicate(condition: Condition, index: int, config_json: bytes | None = 
     config_json = config_json or condition.to_json()
     condition_id = hashlib.sha256(config_json).hexdigest()
     files = condition.files() if HASHED in config_json else None
-    log = Log(condition_id, config_json, index, rng, files, environment(guests(config_json)))
+    around = environment(guests(config_json)) | {EXACT_BOXES: {"coal": EXACT}}
+    log = Log(condition_id, config_json, index, rng, files, around)
     first_feasible: int | None = None
     last: Generation | None = None
     for last in planner.evolve(problem, rng):

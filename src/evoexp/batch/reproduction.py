@@ -1,7 +1,9 @@
 """Runs stored replicates again and compares: MATCH, or the first generation that differs.
 
-A planner whose reproducibility is `environment` is compared bit by bit in an equal environment, and
-elsewhere by its numbers, to `TOLERANCE`.
+Two things are compared: the search, link by link of the chain, and whatever else a summary says:
+verdict, clearance, lengths, terms, counts; all but times. In an equal environment both must agree
+to the bit, elsewhere numbers of the summary to `TOLERANCE`; the answer says which. A planner whose
+reproducibility is `environment` is compared by all its numbers where bits differ.
 """
 
 import math
@@ -12,17 +14,52 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from evoexp.attachments import PREFIX, keep_all
-from evoexp.batch.replicate import run_replicate
+from evoexp.batch.replicate import EXACT_BOXES, run_replicate
 from evoexp.condition import Condition
 from evoexp.errors import CorruptLog, MissingDistribution
-from evoexp.records import GenerationRow, ReplicateSummary
+from evoexp.records import GenerationRow, ReplicateSummary, flatten
 from evoexp.registry import missing
+from evoexp.store.damage import reason
 from evoexp.store.log import ARRAY
 from evoexp.store.log_reader import LogContents, decode_array, read_log
 from evoexp.store.manifest import differences
 
 TOLERANCE = 1e-9  # [-] by which numbers may differ: of their size, or absolutely if it is below 1
+TIMES = ("certificate_s", "cpu_s", "wall_s")
+ELSEWHERE = "in another environment"
+OLDER = "the log is older than exact boxes"
+_CHAINED = ("digest", "chain")  # compared as the search
+# Rounding decides which of two equally close places is found, and in how many steps: where bits may
+# differ, these are named and decide nothing.
+_UNDECIDED = ("clearance_at", "clearance_pair", "penetration_pair", "certificate_queries")
 _COST = "cost "  # begins a fingerprint that is no digest
+
+
+class FieldDifference(NamedTuple):
+    """A field in which a summary or a generation differs from its re-execution.
+
+    Attributes:
+        name: Of the field.
+        was: Its stored value.
+        now: The value found again.
+        size: Of the difference [-], see `difference`; inf of what is no number.
+    """
+
+    name: str
+    was: Any
+    now: Any
+    size: float
+
+    @property
+    def is_close(self) -> bool:
+        """Whether it is a number that agrees to `TOLERANCE`, or decides nothing."""
+        return self.size <= TOLERANCE or self.name in _UNDECIDED
+
+    def __str__(self) -> str:
+        """Return the difference in words."""
+        if math.isfinite(self.size):
+            return f"{self.name} differs by {self.size:.1e}"
+        return f"{self.name} was {self.was!r}, is {self.now!r}"
 
 
 class Comparison(NamedTuple):
@@ -35,6 +72,8 @@ class Comparison(NamedTuple):
         digest_matches: Whether the ends of both chains agree (they include the last population).
         num_generations: Generations compared, the initial one included.
         environment: Differences between then and now, one line each.
+        fields: Differences of the summary and of the generations, in their order.
+        inexact: Why these are compared to `TOLERANCE`; empty: to the bit.
         farthest: Where numbers are compared instead of chains: the number that differs most, and
             by how much [-]; None: chains are compared.
     """
@@ -45,29 +84,79 @@ class Comparison(NamedTuple):
     digest_matches: bool
     num_generations: int
     environment: tuple[str, ...]
+    fields: tuple[FieldDifference, ...] = ()
+    inexact: str = ""
     farthest: tuple[str, float] | None = None
+
+    @property
+    def search_matches(self) -> bool:
+        """Whether every bit of the search agrees."""
+        return self.diverged_at is None and self.digest_matches
 
     @property
     def matches(self) -> bool:
         """Whether every bit agrees, or every number to `TOLERANCE` where numbers are compared."""
         if self.farthest is not None:
             return self.farthest[1] <= TOLERANCE
-        return self.diverged_at is None and self.digest_matches
+        return self.search_matches and self._decisive is None
 
     @property
     def verdict(self) -> str:
         """MATCH, or where it diverges."""
         if self.farthest is not None:
             name, difference = self.farthest
+            why = self.inexact or "not to the bit"
             if self.matches:
                 most = f"; at most {difference:.1e}, {name}" if difference else ""
-                return f"MATCH to {TOLERANCE:g} (in another environment{most})"
-            return f"DIVERGES by {difference:.1e} in {name} (in another environment)"
-        if self.matches:
+                return f"MATCH to {TOLERANCE:g} ({why}{most})"
+            return f"DIVERGES by {difference:.1e} in {name} ({why})"
+        if not self.search_matches:
+            at = "the last population" if self.diverged_at is None else None
+            return f"DIVERGES in {at}" if at else f"DIVERGES at generation {self.diverged_at}"
+        if not self.fields:
             return "MATCH"
-        if self.diverged_at is None:
-            return "DIVERGES in the last population"
-        return f"DIVERGES at generation {self.diverged_at}"
+        shown = self._decisive or self.fields[0]
+        others = len(self.fields) - 1
+        more = f", and {others} more field{'s' * (others > 1)}" if others else ""
+        if self._decisive is None:
+            return f"MATCH in the search, to {TOLERANCE:g} beyond; {shown}{more} ({self.inexact})"
+        why = f" ({self.inexact})" if self.inexact else ""
+        return f"DIVERGES beyond the search, which matches; {shown}{more}{why}"
+
+    @property
+    def _decisive(self) -> FieldDifference | None:
+        """The first difference that is none of rounding."""
+        found = (each for each in self.fields if not (self.inexact and each.is_close))
+        return next(found, None)
+
+
+class DamagedLog(NamedTuple):
+    """A log in the place of a replicate that cannot be compared.
+
+    Attributes:
+        condition_id: Of the run, 64 hex digits.
+        replicate: The place.
+        reason: What is wrong with it, in one line.
+    """
+
+    condition_id: str
+    replicate: int
+    reason: str
+
+
+def reproduce_stored(path: Path, condition_id: str, replicate: int) -> Comparison | DamagedLog:
+    """Run a replicate of a stored run again, as `reproduce_log` does.
+
+    A log that is damaged, or of another replicate than its place says, is not compared.
+    """
+    try:
+        stored = read_log(path)
+        if (stored.condition_id, stored.replicate) != (condition_id, replicate):
+            theirs = f"replicate {stored.replicate} of {stored.condition_id[:12]}"
+            raise CorruptLog(f"{path}: holds {theirs}, which does not belong here")
+        return _reproduce(path, stored)
+    except CorruptLog as error:
+        return DamagedLog(condition_id, replicate, reason(path, error))
 
 
 def reproduce_log(path: Path) -> Comparison:
@@ -78,7 +167,10 @@ def reproduce_log(path: Path) -> Comparison:
         RevisionMismatch: If a component has another revision in this installation.
         MissingDistribution: If the package of a component is not installed.
     """
-    stored = read_log(path)
+    return _reproduce(path, read_log(path))
+
+
+def _reproduce(path: Path, stored: LogContents) -> Comparison:
     if packages := missing(stored.environment.get("components", {})):
         raise MissingDistribution(str(path), packages)
     keep_all(data for name, data in stored.attachments.items() if name.startswith(PREFIX))
@@ -90,21 +182,51 @@ def reproduce_log(path: Path) -> Comparison:
         )
     again = read_log(run_replicate(condition, stored.replicate).content)
     found = compare(stored, again)
-    if condition.reproducibility == "bits" or not found.environment:
+    if condition.reproducibility == "bits" or (found.search_matches and not found.fields):
         return found
     return found._replace(farthest=farthest(stored, again))
 
 
 def compare(stored: LogContents, again: LogContents) -> Comparison:
-    """Compare two logs of one replicate, link by link."""
+    """Compare two logs of one replicate: link by link, and field by field."""
+    environment = tuple(map(str, differences(stored.environment, again.environment)))
+    is_older = EXACT_BOXES not in stored.environment
     return Comparison(
         stored.condition_id,
         stored.replicate,
         first_divergence(stored.generations, again.generations),
         stored.summary.digest == again.summary.digest,
         len(stored.generations),
-        tuple(map(str, differences(stored.environment, again.environment))),
+        environment,
+        tuple(field_differences(stored, again)),
+        ELSEWHERE if environment else OLDER if is_older else "",
     )
+
+
+def field_differences(stored: LogContents, again: LogContents) -> Iterator[FieldDifference]:
+    """Yield the differences of all that two logs of one replicate say, but for times and chain."""
+    yield from _differing(flatten(stored.summary), flatten(again.summary), "")
+    for before, now in zip(stored.generations, again.generations, strict=False):
+        yield from _differing(flatten(before), flatten(now), f"generation {before.index}: ")
+
+
+def _differing(
+    before: dict[str, Any], now: dict[str, Any], prefix: str
+) -> Iterator[FieldDifference]:
+    for name in dict.fromkeys([*before, *now]):
+        if name in TIMES or name in _CHAINED:
+            continue
+        was, found = before.get(name), now.get(name)
+        if _bits(was) != _bits(found):
+            both = all(isinstance(value, float) for value in (was, found))
+            yield FieldDifference(
+                f"{prefix}{name}", was, found, difference(was, found) if both else math.inf
+            )
+
+
+def _bits(value: Any) -> Any:
+    """Return a value that equals another one's if all bits do; every NaN is one."""
+    return repr(value) if isinstance(value, float) else value
 
 
 def first_divergence(stored: list[GenerationRow], again: list[GenerationRow]) -> int | None:
@@ -124,7 +246,8 @@ def farthest(stored: LogContents, again: LogContents) -> tuple[str, float]:
     if unmatched := sorted(before.keys() ^ now.keys()):
         return unmatched[0], math.inf
     found = [(name, difference(before[name], now[name])) for name in before]
-    return max(found, key=lambda item: item[1])
+    said = _differing(_said(stored), _said(again), "")
+    return max([*found, *((each.name, each.size) for each in said)], key=lambda item: item[1])
 
 
 def difference(one: Any, two: Any) -> float:
@@ -163,21 +286,22 @@ def same_fingerprint(one: str, two: str) -> bool:
     return one == two
 
 
-def _numbers(log: LogContents) -> Iterator[tuple[str, Any]]:
-    """Yield the numbers of a log: costs, terms, solution, arrays.
+def _said(log: LogContents) -> dict[str, Any]:
+    """Return the fields of a summary that rounding cannot change by more than `TOLERANCE`.
 
-    Neither times nor counts of evaluations: rounding decides how many steps a library takes to the
-    same end.
+    Not counts: rounding decides how many steps a library takes to the same end.
     """
-    summary, last = log.summary, log.generations[-1]
-    yield from (("cost", summary.best_cost), ("solved", summary.solved))
-    yield from (("clearance", summary.clearance), ("feasible", last.num_feasible))
+    return {
+        name: value
+        for name, value in flatten(log.summary).items()
+        if type(value) is not int and name not in _UNDECIDED and not name.endswith("evaluations")
+    }
+
+
+def _numbers(log: LogContents) -> Iterator[tuple[str, Any]]:
+    """Yield the numbers of a log beside its summary: costs, solution, arrays."""
+    yield "feasible", log.generations[-1].num_feasible
     yield "best cost of each generation", [row.best_cost for row in log.generations]
-    yield from (
-        (f"term {name}", value)
-        for name, value in summary.terms.items()
-        if not name.endswith("evaluations")
-    )
     yield "solution", log.solutions[-1].values
     yield from (
         (name, decode_array(data)) for name, data in log.attachments.items() if name.endswith(ARRAY)

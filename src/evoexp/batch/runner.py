@@ -9,7 +9,7 @@ import itertools
 import json
 import re
 from collections import deque
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -21,15 +21,16 @@ from evoexp.batch.jobs import Job, Outcome, load, run_jobs
 from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.batch.workers import in_workers, loading, num_cores
 from evoexp.condition import Condition
-from evoexp.errors import CorruptLog
 from evoexp.numeric.kernel_cache import is_compiled, note_compiled
 from evoexp.paths.motion import Motion
 from evoexp.planners.planner import judge_motion
 from evoexp.records import ReplicateSummary
 from evoexp.registry import component_modules, guests
+from evoexp.store.identity import MANIFEST, restored_manifest
 from evoexp.store.manifest import manifest
+from evoexp.store.mending import lost_replicates, mend, needs_mending
 from evoexp.store.run_directory import RunDirectory, create_all, lock_all
-from evoexp.store.summaries import write_summary
+from evoexp.store.summaries import whole_logs, write_summary
 
 # [s] replicates are bundled into tasks of about this length; a task costs the parent some 2 ms
 TASK_S = 0.2
@@ -42,7 +43,8 @@ class Batch:
 
     Attributes:
         runs: One run directory per distinct condition.
-        jobs: The missing replicates, condition by condition.
+        jobs: The missing replicates, condition by condition; those whose log is damaged are, too.
+        is_damaged: Whether stored files of a run are damaged, which `run` mends.
     """
 
     def __init__(
@@ -51,7 +53,7 @@ class Batch:
         settings: RunnerSettings,
         outputs: Path,
     ) -> None:
-        """Plan; nothing is written yet.
+        """Plan; nothing is written yet but summary tables that were out of date.
 
         Args:
             conditions: (condition, number of replicates, notes for the manifest of a new run); one
@@ -69,7 +71,10 @@ class Batch:
                 known[2] if known else notes,
             )
         self.runs = {key: RunDirectory(outputs, key) for key in self._wanted}
-        self.jobs = self._missing()
+        self.jobs = self._missing({key: lost_replicates(run) for key, run in self.runs.items()})
+        self.is_damaged = any(
+            needs_mending(run, self._wanted[key][0].to_json()) for key, run in self.runs.items()
+        )
         self._finished: dict[str, dict[int, ReplicateSummary]] = {}  # by this batch, per condition
         self._summarised: set[str] = set()  # conditions whose table is written
 
@@ -83,7 +88,7 @@ class Batch:
             condition.prepare()
 
     def run(self) -> Generator[Outcome, None, None]:
-        """Run the missing replicates; yield every outcome once it is stored.
+        """Mend the runs, run the missing replicates; yield every outcome once it is stored.
 
         Closing the iterator keeps the finished replicates.
 
@@ -91,14 +96,17 @@ class Batch:
             Busy: If another process writes one of the runs.
         """
         with lock_all(self.runs.values()):
-            self.jobs = self._missing()
+            lost = {key: lost_replicates(run) for key, run in self.runs.items()}
+            for key, run in self.runs.items():
+                mend(run, self._wanted[key][0].to_json())
+            self.jobs = self._missing(lost)
             num_workers = max(1, min(self._settings.num_workers or num_cores(), len(self.jobs)))
             config_jsons = list(dict.fromkeys(job.condition_json for job in self.jobs))
             files = list(dict.fromkeys(content for job in self.jobs for content in job.files))
             with loading(num_workers, load, config_jsons, files):
                 wanted = ((run, *self._wanted[key]) for key, run in self.runs.items())
                 create_all(
-                    (run, text, manifest(own.id, guests(text)) | notes, own.files())
+                    (run, text, _manifest(run, text) | notes, own.files())
                     for run, own, _, notes in wanted
                     for text in (own.to_json(),)
                 )
@@ -112,13 +120,18 @@ class Batch:
                 for key in self.runs.keys() - self._summarised:
                     self._summarise(key)
 
-    def _missing(self) -> list[Job]:
-        """Return the jobs of missing replicates; references, which take longest, come first."""
+    def _missing(self, lost: Mapping[str, set[int]]) -> list[Job]:
+        """Return the jobs of missing replicates; references, which take longest, come first.
+
+        Args:
+            lost: Condition → replicates whose log is damaged, whether or not they are asked for.
+        """
         jobs = []
         ordered = sorted(self._wanted.items(), key=lambda item: not item[1][0].is_reference)
         for key, (condition, count, _) in ordered:
-            config_json, done = condition.to_json(), self.runs[key].completed()
-            files, missing = tuple(condition.files().values()), set(range(count)) - set(done)
+            config_json, run = condition.to_json(), self.runs[key]
+            files = tuple(condition.files().values())
+            missing = (set(range(count)) - whole_logs(run)) | lost[key]
             jobs += [Job(key, config_json, index, files) for index in sorted(missing)]
         return jobs
 
@@ -135,15 +148,24 @@ class Batch:
         for key, contents in by_run.items():
             self.runs[key].write_logs(contents)
             if len(self._finished[key]) == self._wanted[key][1]:
-                # now, while the workers go on; damage of an older log is reported at the end
-                with contextlib.suppress(CorruptLog):
-                    self._summarise(key)
+                self._summarise(key)  # now, while the workers go on
         return [outcome._replace(content=b"") for outcome in outcomes]
 
     def _summarise(self, key: str) -> None:
         write_summary(self.runs[key], self._finished.get(key, {}))
         self._finished.pop(key, None)
         self._summarised.add(key)
+
+
+def _manifest(run: RunDirectory, config_json: bytes) -> dict[str, Any]:
+    """Return the manifest of a run; of one that has lost its own, what a log knows of it."""
+    if not (run.path / MANIFEST).exists() and (known := _restored(run)):
+        return known
+    return manifest(run.condition_id, guests(config_json))
+
+
+def _restored(run: RunDirectory) -> dict[str, Any]:
+    return restored_manifest(run.path, run.condition_id) if run.completed() else {}
 
 
 def fan_out(jobs: Sequence[Job], num_workers: int) -> Iterator[list[Outcome]]:

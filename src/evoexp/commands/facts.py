@@ -21,7 +21,7 @@ from evoexp.registry import COMPONENTS, registered
 from evoexp.store.log_reader import read_log
 from evoexp.store.manifest import differences, environment
 from evoexp.store.run_directory import RunDirectory, outputs_root
-from evoexp.store.summaries import summary_table
+from evoexp.store.summaries import summary_table, whole_logs
 from evoexp.validation import TARGET
 
 KEYS = {
@@ -69,7 +69,7 @@ def stored_facts(run: RunDirectory) -> dict[str, Any]:
     origin |= {"code": manifest.get("git"), "directory": str(run.path)}
     config_json = run.config_json()
     found = _facts(config_json, origin, manifest, summary_table(run).to_pylist(), None)
-    if arrays := [_shapes(run.log_path(k)) for k in sorted(run.completed())[:1]]:
+    if arrays := [_shapes(run.log_path(k)) for k in sorted(whole_logs(run))[:1]]:
         found["result"]["arrays"] = arrays[0]
     return found
 

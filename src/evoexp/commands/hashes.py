@@ -3,26 +3,17 @@
 from pathlib import Path
 
 from evoexp.errors import EvoexpError, UnknownHash
-from evoexp.store.run_directory import HASH_LENGTH, RunDirectory, resolve
+from evoexp.store.run_directory import RunDirectory, open_run, run_names
 
 MAX_LISTED = 8  # candidates in an error; `evoexp list` shows all
-
-
-def stored_names(outputs: Path) -> list[str]:
-    """Return the names of all run directories that were created to the end.
-
-    Damaged ones included.
-    """
-    pattern = "[0-9a-f]" * HASH_LENGTH
-    return sorted(path.parent.name for path in (outputs / "runs").glob(f"{pattern}/config.json"))
 
 
 def stored_runs(outputs: Path) -> list[tuple[str, RunDirectory | EvoexpError]]:
     """Return all stored runs by name; in place of a damaged one, the text of its error."""
     found: list[tuple[str, RunDirectory | EvoexpError]] = []
-    for name in stored_names(outputs):
+    for name in run_names(outputs):
         try:
-            found.append((name, resolve(outputs, name)))
+            found.append((name, open_run(outputs, name)))
         except EvoexpError as error:
             found.append((name, error))
     return found
@@ -30,7 +21,7 @@ def stored_runs(outputs: Path) -> list[tuple[str, RunDirectory | EvoexpError]]:
 
 def with_candidates(error: UnknownHash, outputs: Path) -> UnknownHash:
     """Return an error about a hash with the candidates: the runs that are stored."""
-    names = stored_names(outputs)
+    names = run_names(outputs)
     more = f", … {len(names) - MAX_LISTED} more" if len(names) > MAX_LISTED else ""
     stored = ", ".join(names[:MAX_LISTED]) + more if names else "none"
     return UnknownHash(f"{error}; no shipped condition either (stored: {stored}; see: evoexp list)")

@@ -19,8 +19,10 @@ from evoexp.commands.console import (
 from evoexp.commands.hashes import stored_runs
 from evoexp.configuration.search_path import description, find, options
 from evoexp.errors import EvoexpError
+from evoexp.store.damage import listed
+from evoexp.store.mending import damaged_files
 from evoexp.store.run_directory import RunDirectory, outputs_root
-from evoexp.store.summaries import summary_table
+from evoexp.store.summaries import damaged_logs, summary_table
 
 EXPERIMENT_KEYS = ("name", "description", "origin", "path")
 RUN_KEYS = (
@@ -95,7 +97,14 @@ def _run(name: str, run: RunDirectory | EvoexpError) -> dict[str, Any]:
         | {"solved": sum(bool(each["solved"]) for each in done)}
         | {"median_best_cost": np.median([each["best_cost"] for each in done]) if done else None}
         | _named(run)
+        | {"damage": _damage(run)}
     )
+
+
+def _damage(run: RunDirectory) -> str | None:
+    """Return the names of damaged files in a run that can be read; None if there are none."""
+    damaged = damaged_files(run) | damaged_logs(run)
+    return f"damaged: {listed(damaged)}" if damaged else None
 
 
 def _run_table(runs: list[dict[str, Any]]) -> Table:
@@ -104,16 +113,19 @@ def _run_table(runs: list[dict[str, Any]]) -> Table:
     add_columns(table, "condition")
     add_columns(table, "done", "failed", "solved", "median\nbest cost", right=True)
     for run in runs:
-        if run["damage"]:
+        if run["done"] is None:
             table.add_row(run["hash"][:12], Text(run["damage"], "red"), "–", "–", "–", "–")
             continue
         names = [run[name] or "?" for name in ("experiment", "label", "budget")]
         known = any(run[name] for name in ("experiment", "label", "budget"))
         text = ", ".join(names) + (" (changed)" if run["changed"] else "")
         cost = run["median_best_cost"]
+        named = Text(text if known else "(no manifest)")
+        if run["damage"]:
+            named.append(f" · {run['damage']}", "red")
         table.add_row(
             run["hash"][:12],
-            text if known else "(no manifest)",
+            named,
             *(str(run[name]) for name in ("done", "failed", "solved")),
             "–" if cost is None else f"{cost:.4g}",
         )

@@ -149,9 +149,8 @@ def _stored(
     try:
         return stored_recording(chosen_log(run, choice), titles[run.condition_id], limits)
     except RevisionMismatch as error:
-        known = run.manifest().get("command", "evoexp run experiment=…")
         raise RevisionMismatch(
-            f"run {run.hash12}: {error}; run it anew with what is installed: {known}"
+            f"run {run.hash12}: {error}; run it anew with what is installed: {run.command}"
         ) from None
 
 

@@ -2,6 +2,7 @@
 
 import argparse
 import itertools
+from collections import deque
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -11,7 +12,14 @@ from rich.text import Text
 
 from evoexp import shipped
 from evoexp.batch.replicate import run_replicate
-from evoexp.batch.reproduction import Comparison, fingerprint, reproduce_log, same_fingerprint
+from evoexp.batch.reproduction import (
+    Comparison,
+    DamagedLog,
+    fingerprint,
+    reproduce_log,
+    reproduce_stored,
+    same_fingerprint,
+)
 from evoexp.batch.workers import in_workers, num_cores
 from evoexp.commands.console import add_columns, add_hash_column, new_table, plain_console
 from evoexp.commands.hashes import with_candidates
@@ -43,17 +51,16 @@ def main(arguments: argparse.Namespace) -> int:
     except UnknownHash as error:
         return _without_stored_run(console, arguments.what, arguments.replicate, error)
     try:
-        return _report(console, _compare_all(_logs(run, arguments.replicate)))
+        return _report(console, _compare_all(run, _replicates(run, arguments.replicate)))
     except RevisionMismatch as error:
-        known = run.manifest().get("command", "evoexp run experiment=…")
         text = (
             f"run {run.hash12}: {error}; its results cannot be compared. Run it anew with what is "
-            f"installed: {known}"
+            f"installed: {run.command}"
         )
         raise RevisionMismatch(text) from None
 
 
-def _logs(run: RunDirectory, replicate: int | None) -> list[Path]:
+def _replicates(run: RunDirectory, replicate: int | None) -> list[int]:
     done = sorted(run.completed())
     if replicate is not None and replicate not in done:
         there = ", ".join(_spans(done)) or "none"
@@ -62,7 +69,7 @@ def _logs(run: RunDirectory, replicate: int | None) -> list[Path]:
         )
     if not done:
         raise NothingStored(f"run {run.hash12}: no finished replicate to compare with")
-    return [run.log_path(k) for k in ([replicate] if replicate is not None else done)]
+    return [replicate] if replicate is not None else done
 
 
 def _spans(numbers: Sequence[int]) -> Iterator[str]:
@@ -72,25 +79,33 @@ def _spans(numbers: Sequence[int]) -> Iterator[str]:
         yield from (f"{row[0]}–{row[-1]}",) if len(row) > 2 else map(str, row)
 
 
-def _compare_all(paths: Sequence[Path]) -> list[Comparison]:
-    first = reproduce_log(paths[0])  # compiles, before any worker does
-    if len(paths) < FEW:
-        return [first, *map(reproduce_log, paths[1:])]
-    tasks = (joblib.delayed(reproduce_log)(path) for path in paths[1:])
-    return [first, *in_workers(num_cores(), tasks, ordered=True)]
+def _compare_all(run: RunDirectory, replicates: Sequence[int]) -> list[Comparison | DamagedLog]:
+    waiting = deque((run.log_path(k), run.condition_id, k) for k in replicates)
+    found: list[Comparison | DamagedLog] = []
+    # the first one compiles, before any worker does
+    while waiting and not any(isinstance(each, Comparison) for each in found):
+        found.append(reproduce_stored(*waiting.popleft()))
+    if len(waiting) < FEW:
+        return found + [reproduce_stored(*each) for each in waiting]
+    tasks = (joblib.delayed(reproduce_stored)(*each) for each in waiting)
+    return [*found, *in_workers(num_cores(), tasks, ordered=True)]
 
 
-def _report(console: Console, comparisons: Sequence[Comparison]) -> int:
+def _report(console: Console, rows: Sequence[Comparison | DamagedLog]) -> int:
     table = new_table()
     add_hash_column(table, "run")
     add_columns(table, "replicate", "generations", right=True)
     add_columns(table, "verdict")
-    for comparison in comparisons:
-        style = "green" if comparison.matches else "red"
-        name, generations = comparison.condition_id[:12], str(comparison.num_generations)
-        table.add_row(name, str(comparison.replicate), generations, Text(comparison.verdict, style))
+    for row in rows:
+        if isinstance(row, DamagedLog):
+            verdict, generations = Text(f"damaged: {row.reason}", "red"), "–"
+        else:
+            verdict = Text(row.verdict, "green" if row.matches else "red")
+            generations = str(row.num_generations)
+        table.add_row(row.condition_id[:12], str(row.replicate), generations, verdict)
     console.print(table)
-    diverging = [comparison for comparison in comparisons if not comparison.matches]
+    compared = [row for row in rows if isinstance(row, Comparison)]
+    diverging = [row for row in compared if not row.matches]
     if diverging:
         lines = diverging[0].environment or ("none: the environment is the same",)
         console.print(
@@ -99,8 +114,10 @@ def _report(console: Console, comparisons: Sequence[Comparison]) -> int:
             sep="\n",
             soft_wrap=True,
         )
-    console.print(f"{len(comparisons) - len(diverging)} of {len(comparisons)} MATCH")
-    return 1 if diverging else 0
+    damaged = len(rows) - len(compared)
+    lost = f", {damaged} damaged" if damaged else ""
+    console.print(f"{len(compared) - len(diverging)} of {len(rows)} MATCH{lost}")
+    return 1 if diverging or damaged else 0
 
 
 def _without_stored_run(

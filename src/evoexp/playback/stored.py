@@ -50,15 +50,16 @@ def chosen_log(run: RunDirectory, choice: str | int) -> Path:
     Raises:
         NothingStored: If there is no such replicate.
     """
-    done = sorted(run.completed())
     if isinstance(choice, int):
+        done = sorted(run.completed())
         if choice not in done:
             raise NothingStored(
                 f"run {run.hash12}: no finished replicate {choice} (finished: {_listed(done)})"
             )
         return run.log_path(choice)
-    rows = read_summaries(run)
+    rows = read_summaries(run, thorough=True)
     rows = rows[rows["status"] == "done"].sort_values("replicate")
+    num_done = len(rows)
     if choice == "refuted":
         rows = rows[rows["certified"].fillna(True) == False]  # noqa: E712  # a column, not a truth
     else:
@@ -66,7 +67,7 @@ def chosen_log(run: RunDirectory, choice: str | int) -> Path:
         rows = _finite_first(rows)
     if rows.empty:
         what = "refuted replicate" if choice == "refuted" else "finished replicate"
-        raise NothingStored(f"run {run.hash12}: no {what} among {len(done)}")
+        raise NothingStored(f"run {run.hash12}: no {what} among {num_done}")
     return run.log_path(int(rows["replicate"].iloc[0]))
 
 

@@ -10,6 +10,7 @@ from evoexp.report.results import Results, Verdicts
 from evoexp.report.statistics import wilson
 from evoexp.report.verdicts import Claim, Comparison
 
+FEW = 3  # damaged logs named of each condition
 WIDEST = 20  # conditions side by side; more stand one below the other
 
 
@@ -26,6 +27,7 @@ def render(page: Page, results: Results, settings: ReportSettings, command: str)
         f"# {page.title}\n",
         _made_by(results, command),
         _incomplete(results),
+        _damaged(results),
         _added(results),
         f"{page.introduction}\n" if page.introduction else "",
         _section("Conditions", _conditions(results, settings)),
@@ -64,6 +66,20 @@ def _incomplete(results: Results) -> str:
     return (
         f"> **Partial results.** {'; '.join(missing)}. Everything below is drawn from the "
         "finished replicates.\n" * bool(missing)
+    )
+
+
+def _damaged(results: Results) -> str:
+    """Name the logs that are damaged and left out; empty if none is."""
+    lost = [
+        f"{c.label}: {len(c.damaged)} ({', '.join(list(c.damaged)[:FEW])}"
+        + f"{', …' if len(c.damaged) > FEW else ''})"
+        for c in results.conditions
+        if c.damaged
+    ]
+    return (
+        f"> **Damaged logs.** {'; '.join(lost)} could not be read and are left out; the command "
+        "that ran the experiment runs them again.\n" * bool(lost)
     )
 
 

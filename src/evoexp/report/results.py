@@ -3,7 +3,7 @@
 import functools
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -18,9 +18,13 @@ from evoexp.planners.wrapped_planner import WrappedPlanner
 from evoexp.records import FloatArray
 from evoexp.report.statistics import Spread, spread
 from evoexp.shipped import ORIGIN, Option, config_directory, shipped
+from evoexp.store.damage import warn
+from evoexp.store.identity import DamagedFile
 from evoexp.store.log_reader import read_array, read_log, read_solution
 from evoexp.store.messages import TERM
-from evoexp.store.run_directory import Plan, RunDirectory
+from evoexp.store.plans import Plan
+from evoexp.store.run_directory import RunDirectory
+from evoexp.store.summaries import damaged_logs
 from evoexp.store.tables import read_generations, read_summaries
 
 Kind = TypeVar("Kind")
@@ -74,6 +78,7 @@ class ConditionResults:
         options: The option that was taken of each group; empty where nothing records it.
         plans: The numbers of replicates that were asked for, in order; empty where nothing records
             them.
+        damaged: Name → what is wrong with it, of the logs that are left out.
     """
 
     label: str
@@ -85,6 +90,7 @@ class ConditionResults:
     code: dict[str, Any]
     options: tuple[Option, ...] = ()
     plans: tuple[Plan, ...] = ()
+    damaged: Mapping[str, str] = field(default_factory=dict)
 
     @functools.cached_property
     def generations(self) -> pd.DataFrame:
@@ -335,13 +341,14 @@ def _read(
     options: tuple[Option, ...] | None,
 ) -> ConditionResults:
     run = RunDirectory(outputs, condition.id)
-    stored = run.completed() | run.failed()
-    plans = tuple(run.plans())
+    is_stored = bool(run.completed() or run.failed())
+    if is_stored:
+        run.check_identity()
+    plans = _plans(run)
+    rows = read_summaries(run, thorough=True).sort_values("replicate", kind="stable")
+    rows = rows.set_index("replicate")
     asked = condition.num_replicates(num_replicates) if num_replicates is not None else 0
-    planned = max([asked, *(plan.num_replicates for plan in plans), max(stored, default=-1) + 1])
-    if stored:
-        run.check()
-    rows = read_summaries(run).sort_values("replicate", kind="stable").set_index("replicate")
+    planned = max([asked, *(plan.num_replicates for plan in plans), *(1 + k for k in rows.index)])
     done, failed = rows[rows["status"] == "done"], rows[rows["status"] == "failed"]
     return ConditionResults(
         label,
@@ -350,10 +357,20 @@ def _read(
         done,
         dict(zip(map(int, failed.index), map(str, failed["stop_reason"]), strict=True)),
         run,
-        _code(run) if stored else {},
-        _recorded_options(run) if options is None and stored else options or (),
+        _code(run) if is_stored else {},
+        _recorded_options(run) if options is None and is_stored else options or (),
         plans,
+        damaged_logs(run),
     )
+
+
+def _plans(run: RunDirectory) -> tuple[Plan, ...]:
+    """Return the plans of a run; without its list of plans, which is said, none."""
+    try:
+        return tuple(run.plans())
+    except DamagedFile as error:
+        warn(f"{error}; added replicates are not marked")
+        return ()
 
 
 def _recorded_options(run: RunDirectory) -> tuple[Option, ...]:

@@ -1,10 +1,10 @@
 """Logs read back: whole and verified, or only the part that is asked for.
 
-Every reader first checks the whole file against its checksums (0.1 ms per log), so that none is
-ever silently wrong; only `read_log` also decodes every message and compares the content digest.
-What a log may hold at most, and how much memory reading one takes, stands in `container`.
+Every reader first checks all bytes against their checksums; only `read_log` also decodes every
+message and compares the content digest. Limits of size and memory stand in `container`.
 """
 
+import errno
 import operator
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
@@ -26,7 +26,7 @@ from mcap.records import (
 )
 from numpy.typing import NDArray
 
-from evoexp.errors import CorruptLog
+from evoexp.errors import CorruptLog, OtherVersion
 from evoexp.input_files import read_bounded, read_npy
 from evoexp.records import FrontRow, GenerationRow, ReplicateSummary, SolutionRow
 from evoexp.store import log as written
@@ -301,6 +301,8 @@ def _open(source: Source) -> tuple[Container, str]:
     try:
         return check(read_bounded(Path(source), MAX_LOG), str(source)), str(source)
     except OSError as error:
+        if error.errno in (errno.EMFILE, errno.ENFILE, errno.ENOMEM):  # no fault of the file
+            raise
         raise CorruptLog(f"{source}: cannot be read: {error.strerror or error}") from error
 
 
@@ -354,7 +356,7 @@ def _run(container: Container, index: _Index, name: str) -> dict[str, str]:
     version = int(run["schema_version"])
     if version != written.SCHEMA_VERSION:
         age = "a newer" if version > written.SCHEMA_VERSION else "an older"
-        raise CorruptLog(
+        raise OtherVersion(
             f"{name}: written by {age} evoexp: schema version {version}, this one reads "
             f"{written.SCHEMA_VERSION}"
         )

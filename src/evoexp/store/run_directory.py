@@ -7,33 +7,35 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from filelock import FileLock, Timeout
 
 from evoexp.attachments import PREFIX, keep_all
-from evoexp.errors import AmbiguousHash, Busy, EvoexpError, UnknownHash, nearest
+from evoexp.errors import AmbiguousHash, Busy, StoreError, UnknownHash, nearest
+from evoexp.store.damage import warn
 from evoexp.store.files import remove_stale, sync_directory, write_file, write_files
+from evoexp.store.identity import (
+    CONFIG,
+    MANIFEST,
+    REPLICATES,
+    RESTORED,
+    DamagedFile,
+    checked_manifest,
+    config_id,
+    lost_files,
+    read,
+    read_object,
+    restored_manifest,
+    stored_id,
+    whole_log,
+)
+from evoexp.store.plans import PLANS, Plan, as_json, read_plans
 
 HASH_LENGTH = 12  # hex digits shown, and of a directory's name
-_LOG = re.compile(r"(\d{4,})\.mcap")
-_FAILED = re.compile(r"(\d{4,})\.failed\.json")
-
-
-class StoreError(EvoexpError):
-    """A run directory that is damaged, or that belongs to another condition."""
-
-
-class Plan(NamedTuple):
-    """A number of replicates that was asked for.
-
-    Attributes:
-        num_replicates: All of them, those stored by then included.
-        stored: Logs that were there already, whose results could be known.
-    """
-
-    num_replicates: int
-    stored: int
+COMMAND = "evoexp run experiment=…"  # runs a run whose own command nothing records
+_LOG = re.compile(r"((?:[1-9][0-9]*)?[0-9]{4})\.mcap")
+_FAILED = re.compile(r"((?:[1-9][0-9]*)?[0-9]{4})\.failed\.json")
 
 
 class RunDirectory:
@@ -67,7 +69,7 @@ class RunDirectory:
     @property
     def replicates(self) -> Path:
         """Directory of the logs."""
-        return self.path / "replicates"
+        return self.path / REPLICATES
 
     @property
     def summary_path(self) -> Path:
@@ -112,15 +114,16 @@ class RunDirectory:
             raise ValueError(f"config_json: is not of condition {self.hash12}")
         self.replicates.mkdir(parents=True, exist_ok=True)
         missing = {}
-        if (self.path / "config.json").exists():
-            self.check()
-        else:
-            for name, content in files.items():
+        for name, content in files.items():
+            if not (self.path / name).exists():
                 (self.path / name).parent.mkdir(exist_ok=True)
                 missing[self.path / name] = content
-            missing[self.path / "config.json"] = config_json
-        if not (self.path / "manifest.json").exists():
-            missing[self.path / "manifest.json"] = (
+        if (self.path / CONFIG).exists():
+            self.check()
+        else:
+            missing[self.path / CONFIG] = config_json
+        if not (self.path / MANIFEST).exists():
+            missing[self.path / MANIFEST] = (
                 json.dumps(manifest, indent=2, sort_keys=True).encode() + b"\n"
             )
         return missing
@@ -129,48 +132,85 @@ class RunDirectory:
         """Raise unless `config.json` is this very condition's.
 
         Raises:
-            StoreError: It is missing, damaged, or of a condition that shares the first twelve
-                digits.
+            DamagedFile: It is missing, damaged or foreign.
+            StoreError: It is of a condition that shares the first twelve digits.
         """
-        stored = _stored_id(self.path)
+        stored = config_id(self.path)
         if stored != self.condition_id:
             raise StoreError(
                 f"{self.path}: holds condition {stored}, which shares its first {HASH_LENGTH} "
                 f"digits with {self.condition_id}; keep one of them in another EVOEXP_OUTPUTS"
             )
 
+    def check_identity(self) -> None:
+        """Raise where the directory is another condition's; a lost configuration is only said.
+
+        Raises:
+            StoreError: `config.json` is of a condition that shares the first twelve digits.
+        """
+        try:
+            self.check()
+        except DamagedFile as error:
+            warn(f"{error}. Mend it: {self.command}")
+
     def config_json(self) -> bytes:
-        """Return the canonical form of the condition, checked, and keep the files it refers to."""
-        self.check()
-        keep_all(path.read_bytes() for path in sorted((self.path / PREFIX).glob("*")))
-        return (self.path / "config.json").read_bytes()
+        """Return the canonical form of the condition, checked, and keep the files it refers to.
+
+        Where one of them is lost, a log has it; that is said.
+
+        Raises:
+            StoreError: No log has it, either.
+        """
+        try:
+            self.check()
+            content = read(self.path / CONFIG)
+            keep_all(path.read_bytes() for path in sorted((self.path / PREFIX).glob("*")))
+            lost = [path for path, _ in lost_files(self.path, content)]
+            if not lost:
+                return content
+            error = StoreError(f"{lost[0]}: missing or damaged")
+        except DamagedFile as damaged:
+            error = damaged
+        found = whole_log(self.path, self.condition_id)
+        if found is None:
+            raise error
+        warn(f"{error}; taken from {found.name}. Mend it: {self.command}")
+        attached = found.contents.attachments
+        keep_all(data for name, data in attached.items() if name.startswith(PREFIX))
+        return found.contents.config_json
 
     def manifest(self) -> dict[str, Any]:
         """Return the manifest that was written when the run was created.
 
+        Where it is lost, the environment of a log stands for it; that is said.
+
         Raises:
-            StoreError: `manifest.json` is missing or damaged.
+            StoreError: No log has it, either.
         """
-        return _read_object(self.path / "manifest.json")
+        try:
+            return checked_manifest(self.path, self.condition_id)
+        except DamagedFile as error:
+            restored = restored_manifest(self.path, self.condition_id)
+            if not restored:
+                raise
+            warn(f"{error}; taken from {restored[RESTORED]}. Mend it: {COMMAND}")
+            return restored
+
+    @property
+    def command(self) -> str:
+        """The command that runs the missing replicates, as the manifest has it."""
+        try:
+            return str(checked_manifest(self.path, self.condition_id).get("command") or COMMAND)
+        except DamagedFile:
+            return COMMAND
 
     def plans(self) -> list[Plan]:
         """Return how many replicates were asked for, in the order in which that was done.
 
         Raises:
-            StoreError: `plans.json` is damaged.
+            DamagedFile: `plans.json` is damaged.
         """
-        path = self.path / "plans.json"
-        if not path.exists():
-            return []
-        try:
-            found = [
-                (each["num_replicates"], each["stored"]) for each in _read_object(path)["plans"]
-            ]
-        except (KeyError, TypeError) as error:
-            raise StoreError(f"{path}: damaged: no list of plans") from error
-        if not all(isinstance(number, int) for plan in found for number in plan):
-            raise StoreError(f"{path}: damaged: a plan is two whole numbers")
-        return [Plan(*each) for each in found]
+        return read_plans(self.path / PLANS)
 
     def note_plan(self, num_replicates: int) -> None:
         """Note that so many replicates are asked for, before any of them runs; more than ever."""
@@ -178,8 +218,7 @@ class RunDirectory:
         if num_replicates > max((plan.num_replicates for plan in plans), default=0):
             plans.append(Plan(num_replicates, len(self.completed())))
             self.path.mkdir(parents=True, exist_ok=True)
-            text = json.dumps({"plans": [plan._asdict() for plan in plans]}, indent=2)
-            write_file(self.path / "plans.json", text.encode() + b"\n")
+            write_file(self.path / PLANS, as_json(plans))
 
     def completed(self) -> set[int]:
         """Return the replicates whose finished log is there."""
@@ -195,7 +234,7 @@ class RunDirectory:
         Raises:
             StoreError: The file is missing or damaged.
         """
-        failure = _read_object(self.failure_path(replicate))
+        failure = read_object(self.failure_path(replicate))
         if not (
             isinstance(failure.get("reason"), str) and isinstance(failure.get("traceback"), str)
         ):
@@ -286,12 +325,23 @@ def outputs_root() -> Path:
 
 
 def find_runs(outputs: Path) -> list[RunDirectory]:
-    """Return all stored runs in the order of their hashes.
+    """Return all stored runs in the order of their hashes; one without identity is left out."""
+    found = []
+    for name in run_names(outputs):
+        try:
+            found.append(open_run(outputs, name))
+        except StoreError as error:
+            warn(f"{error}; the run is left out")
+    return found
+
+
+def open_run(outputs: Path, name: str) -> RunDirectory:
+    """Return a stored run by the name of its directory.
 
     Raises:
-        StoreError: The configuration of one is damaged.
+        StoreError: Nothing in it knows its condition.
     """
-    return [RunDirectory(outputs, _stored_id(path)) for path in _run_paths(outputs)]
+    return RunDirectory(outputs, stored_id(Path(outputs) / "runs" / name))
 
 
 def resolve(outputs: Path, prefix: str) -> RunDirectory:
@@ -300,48 +350,30 @@ def resolve(outputs: Path, prefix: str) -> RunDirectory:
     Raises:
         UnknownHash: The text is no hash, or no run here begins with it.
         AmbiguousHash: Several do.
-        StoreError: The configuration of the run is damaged.
+        StoreError: Nothing in the run's directory knows its condition.
     """
     digits = prefix.lower()
     if not re.fullmatch("[0-9a-f]{1,64}", digits):
         raise UnknownHash(f"hash: must be 1 to 64 hexadecimal digits, was '{prefix}'")
-    paths = _run_paths(outputs)
-    candidates = [path for path in paths if path.name.startswith(digits[:HASH_LENGTH])]
+    names = run_names(outputs)
+    candidates = [name for name in names if name.startswith(digits[:HASH_LENGTH])]
     if len(candidates) > 1:
-        raise AmbiguousHash(prefix, [path.name for path in candidates])
-    if candidates and (condition_id := _stored_id(candidates[0])).startswith(digits):
-        return RunDirectory(outputs, condition_id)
-    hint = nearest(digits[:HASH_LENGTH], [path.name[: len(digits)] for path in paths])
-    raise UnknownHash(f"hash: no run '{prefix}' among the {len(paths)} in {outputs}{hint}")
+        raise AmbiguousHash(prefix, candidates)
+    if candidates and (run := open_run(outputs, candidates[0])).condition_id.startswith(digits):
+        return run
+    hint = nearest(digits[:HASH_LENGTH], [name[: len(digits)] for name in names])
+    raise UnknownHash(f"hash: no run '{prefix}' among the {len(names)} in {outputs}{hint}")
 
 
-def _run_paths(outputs: Path) -> list[Path]:
-    """Return the directories that were created to the end, sorted."""
-    pattern = "[0-9a-f]" * HASH_LENGTH
-    return sorted(path.parent for path in (Path(outputs) / "runs").glob(f"{pattern}/config.json"))
+def run_names(outputs: Path) -> list[str]:
+    """Return the names of the directories that hold a run, sorted; damaged ones included."""
+    runs = Path(outputs) / "runs"
+    names = (path.name for path in runs.glob("[0-9a-f]" * HASH_LENGTH))
+    return sorted(name for name in names if is_stored(runs / name))
 
 
-def _stored_id(path: Path) -> str:
-    """Return the full hash of the configuration that a run directory holds."""
-    config = path / "config.json"
-    try:
-        stored = hashlib.sha256(config.read_bytes()).hexdigest()
-    except OSError as error:
-        raise StoreError(f"{config}: cannot be read: {error.strerror or error}") from error
-    if not stored.startswith(path.name):
-        raise StoreError(
-            f"{config}: damaged: its hash {stored[:HASH_LENGTH]} is not the directory's name"
-        )
-    return stored
-
-
-def _read_object(path: Path) -> dict[str, Any]:
-    try:
-        value = json.loads(path.read_bytes())
-    except OSError as error:
-        raise StoreError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (ValueError, RecursionError) as error:
-        raise StoreError(f"{path}: damaged: {error}") from error
-    if not isinstance(value, dict):
-        raise StoreError(f"{path}: damaged: not a JSON object")
-    return value
+def is_stored(path: Path) -> bool:
+    """Return whether a directory holds anything of a run; a killed parent may leave it empty."""
+    if (path / CONFIG).exists() or (path / MANIFEST).exists():
+        return True
+    return any(_LOG.fullmatch(each.name) for each in path.glob(f"{REPLICATES}/*.mcap"))

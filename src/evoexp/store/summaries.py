@@ -1,28 +1,54 @@
-"""`summary.parquet`: one row per replicate, derived from the logs and always rebuildable."""
+"""`summary.parquet`: one row per replicate, derived from the logs and always rebuildable.
 
+It notes size and time of every log behind it, and which ones are damaged and have no row.
+"""
+
+import errno
 import json
+import stat
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from evoexp.errors import Busy, CorruptLog
+from evoexp.errors import Busy, CorruptLog, StoreError
 from evoexp.records import ReplicateSummary, flatten
+from evoexp.store.container import check
+from evoexp.store.damage import checked_summary, listed, reason, set_aside, warn
 from evoexp.store.files import write_file
-from evoexp.store.log_reader import read_summary
 from evoexp.store.messages import field_types
 from evoexp.store.run_directory import RunDirectory
 
 Runs = RunDirectory | Iterable[RunDirectory]
 Stamps = dict[str, list[int]]  # file name → size [B], modification time [ns]
 
-_VERSION = 3  # of the table's columns; another one is rebuilt
+
+class _Summary(NamedTuple):
+    """The table of a run, and what it notes of the files behind it.
+
+    Attributes:
+        table: One row per file that can be used, and per failure.
+        files: Stamps of all files, in the order of the replicates.
+        damaged: Name → what is wrong with it; a damaged log has no row, a damaged failure has one.
+    """
+
+    table: pa.Table
+    files: Stamps
+    damaged: dict[str, str]
+
+    @property
+    def row_names(self) -> list[str]:
+        """The file behind each row."""
+        return [name for name in self.files if not (name in self.damaged and _is_log(name))]
+
+
+_VERSION = 4  # of the table's columns and notes; another one is rebuilt
 _KEY = b"evoexp"
 # tables that this process wrote or read
-_KNOWN: dict[Path, tuple[tuple[int, int, int], pa.Table]] = {}
+_KNOWN: dict[Path, tuple[tuple[int, int, int], _Summary]] = {}
 _PLAIN: dict[Any, pa.DataType] = {
     str: pa.string(),
     int: pa.int64(),
@@ -34,7 +60,10 @@ _BASE = [pa.field(name, _ARROW[kind]) for name, kind in field_types(ReplicateSum
 
 
 def write_summary(
-    run: RunDirectory, written: Mapping[int, ReplicateSummary] | None = None
+    run: RunDirectory,
+    written: Mapping[int, ReplicateSummary] | None = None,
+    *,
+    thorough: bool = False,
 ) -> pa.Table:
     """Bring `summary.parquet` up to date with the logs and failures of a run.
 
@@ -46,48 +75,75 @@ def write_summary(
         run: Whose.
         written: Summaries of logs that the caller has just written, by replicate: those are not
             read again.
+        thorough: As for `summary_table`.
 
     Returns:
         One row per replicate, done or failed, in order; a failed one has condition, replicate,
-        status and stop_reason, everything else is null.
-
-    Raises:
-        CorruptLog: A log is damaged or of another replicate.
+        status and stop_reason, everything else is null. A damaged log has no row.
     """
-    stored = _stored(run)
-    stamps = _stamps(run)
-    if stored is not None and _stored_stamps(stored) == stamps:
-        return stored
+    stored, stamps = _stored(run), _stamps(run)
+    if stored is not None and _is_current(run, stored, stamps, thorough):
+        return stored.table
     rows = {
         run.log_path(replicate).name: flatten(summary)
         for replicate, summary in (written or {}).items()
     }
-    table = _build(run, stored, stamps, rows)
+    summary = _build(run, stored, stamps, rows, thorough)
     sink = pa.BufferOutputStream()
-    pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
+    pq.write_table(summary.table, sink, compression="zstd", write_page_checksum=True)
+    if run.summary_path.is_dir():
+        set_aside(run.summary_path)
     write_file(run.summary_path, sink.getvalue().to_pybytes())
-    _KNOWN[run.summary_path] = _stamp(run.summary_path), table
-    return table
+    _KNOWN[run.summary_path] = _stamp(run.summary_path), summary
+    return summary.table
 
 
-def summary_table(runs: Runs) -> pa.Table:
+def summary_table(runs: Runs, *, thorough: bool = False) -> pa.Table:
     """Return the summaries of one or several runs, one row per replicate.
 
     A missing, damaged or stale `summary.parquet` is rebuilt, and written where nobody else holds
-    the run.
+    the run. Damaged logs have no row, which is said in a line per run.
+
+    Args:
+        runs: One or several.
+        thorough: Whether the checksums of all logs are looked at, not only of those whose size or
+            time changed: for who reads the logs anyway.
 
     Returns:
         Columns as `ReplicateSummary`, `terms` as `term_<name>` in alphabetical order.
-
-    Raises:
-        CorruptLog: A log is damaged or of another replicate.
     """
-    tables = [_current(run) for run in distinct(runs)]
-    table = pa.concat_tables([_table([], pa.schema(_BASE)), *tables], promote_options="default")
+    directories = distinct(runs)
+    summaries = [_current(run, thorough) for run in directories]
+    for run, summary in zip(directories, summaries, strict=True):
+        if summary.damaged:
+            warn(
+                f"run {run.hash12}: left out, damaged: {listed(summary.damaged)}; run again by: "
+                f"{run.command}"
+            )
+    tables = [_table([], pa.schema(_BASE)), *(summary.table for summary in summaries)]
+    table = pa.concat_tables(tables, promote_options="default")
     names = [field.name for field in _BASE]
     return table.select(
         names + sorted(set(table.column_names) - set(names))
     ).replace_schema_metadata(None)
+
+
+def damaged_logs(run: RunDirectory) -> dict[str, str]:
+    """Return name → what is wrong with it, of the damaged logs and failures of a run.
+
+    Only those are read whose size or time is not the one that `summary.parquet` notes.
+    """
+    return _current(run).damaged
+
+
+def whole_logs(run: RunDirectory) -> set[int]:
+    """Return the replicates whose log is there and whole, as far as `damaged_logs` looks."""
+    return {replicate_of(name) for name in _current(run).row_names if _is_log(name)}
+
+
+def replicate_of(name: str) -> int:
+    """Return the replicate of a log or a failure by the name of its file."""
+    return int(name.split(".")[0])
 
 
 def distinct(runs: Runs) -> list[RunDirectory]:
@@ -96,18 +152,43 @@ def distinct(runs: Runs) -> list[RunDirectory]:
     return list({run.path: run for run in given}.values())
 
 
-def _current(run: RunDirectory) -> pa.Table:
+def _current(run: RunDirectory, thorough: bool = False) -> _Summary:
     stored, stamps = _stored(run), _stamps(run)
-    if stored is not None and _stored_stamps(stored) == stamps:
-        return stored
     if not stamps:
-        return _table([], pa.schema(_BASE))
+        return _build(run, None, stamps)
+    if stored is not None and _is_current(run, stored, stamps, thorough):
+        return stored
     try:
         with run.lock():
-            return write_summary(run)
+            write_summary(run, thorough=thorough)
+            return _KNOWN[run.summary_path][1]
     except (Busy, OSError):
         # another process writes the run, or it may only be read: the rows are the same
-        return _build(run, stored, stamps)
+        return _build(run, stored, stamps, thorough=thorough)
+
+
+def _is_current(run: RunDirectory, stored: _Summary, stamps: Stamps, thorough: bool) -> bool:
+    """Return whether the files are as a table notes them; damaged ones are looked at again."""
+    if stored.files != stamps:
+        return False
+    again = {name: why for name in stored.damaged if (why := _row(run, name)[1])}
+    return again == stored.damaged and (not thorough or all(_intact(run, stored).values()))
+
+
+def _intact(run: RunDirectory, stored: _Summary) -> dict[str, bool]:
+    """Return name → whether its checksums are right, of the logs behind the rows of a table."""
+    found = {}
+    for name in filter(_is_log, stored.row_names):
+        try:
+            check((run.replicates / name).read_bytes(), name)
+            found[name] = True
+        except (CorruptLog, OSError):
+            found[name] = False
+    return found
+
+
+def _is_log(name: str) -> bool:
+    return name.endswith(".mcap")
 
 
 def _stamps(run: RunDirectory) -> Stamps:
@@ -118,13 +199,15 @@ def _stamps(run: RunDirectory) -> Stamps:
     for _, path in sorted(paths.items()):
         try:
             status = path.stat()
-        except FileNotFoundError:  # a failure that another process has just replaced by a log
-            continue
+        except OSError:
+            if not path.is_symlink():  # a failure that another process has replaced by a log
+                continue
+            status = path.lstat()  # of a link that leads nowhere
         stamps[path.name] = [status.st_size, status.st_mtime_ns]
     return stamps
 
 
-def _stored(run: RunDirectory) -> pa.Table | None:
+def _stored(run: RunDirectory) -> _Summary | None:
     """Return the table as it was written, or None where there is no valid one of this version.
 
     What this process has written or read is not read again, as long as the file is the same.
@@ -138,46 +221,62 @@ def _stored(run: RunDirectory) -> pa.Table | None:
             table = file.read()
         notes = json.loads(table.schema.metadata[_KEY])
         valid = notes["version"] == _VERSION and notes["condition"] == run.condition_id
-        valid = valid and len(notes["files"]) == table.num_rows
         valid = valid and all(table.schema.field(field.name).equals(field) for field in _BASE)
-    except (pa.ArrowException, OSError, ValueError, LookupError, TypeError):
+        summary = _Summary(table, notes["files"], notes["damaged"])
+        valid = valid and len(summary.row_names) == table.num_rows
+    except (pa.ArrowException, OSError, ValueError, LookupError, TypeError, AttributeError):
         return None
     if not valid:
         return None
-    _KNOWN[run.summary_path] = stamp, table
-    return table
+    _KNOWN[run.summary_path] = stamp, summary
+    return summary
 
 
 def _stamp(path: Path) -> tuple[int, int, int]:
-    """Return the identity, size and time of a file, which change when it is written again."""
+    """Return the identity, size and time of a file, which change when it is written again.
+
+    Raises:
+        OSError: It is no file: a pipe would keep its reader for ever.
+    """
     status = path.stat()
+    if not stat.S_ISREG(status.st_mode):
+        raise OSError(errno.EINVAL, "not a regular file", str(path))
     return status.st_ino, status.st_size, status.st_mtime_ns
-
-
-def _stored_stamps(table: pa.Table) -> Stamps:
-    stamps: Stamps = json.loads(table.schema.metadata[_KEY])["files"]
-    return stamps
 
 
 def _build(
     run: RunDirectory,
-    stored: pa.Table | None,
+    stored: _Summary | None,
     stamps: Stamps,
     written: Mapping[str, dict[str, Any]] | None = None,
-) -> pa.Table:
+    thorough: bool = False,
+) -> _Summary:
     known: dict[str, dict[str, Any]] = {}
     if stored is not None:
-        old = _stored_stamps(stored)
-        rows = zip(old, stored.to_pylist(), strict=True)
-        known = {name: row for name, row in rows if stamps.get(name) == old[name]}
+        old, intact = stored.files, _intact(run, stored) if thorough else {}
+        rows = zip(stored.row_names, stored.table.to_pylist(), strict=True)
+        known = {
+            name: row
+            for name, row in rows
+            if stamps.get(name) == old[name]
+            and name not in stored.damaged
+            and intact.get(name, True)
+        }
     known |= written or {}
-    rows_now = [known.get(name) or _row(run, run.replicates / name) for name in stamps]
+    rows_now: list[dict[str, Any]] = []
+    damaged: dict[str, str] = {}
+    for name in stamps:
+        row, why = (known[name], "") if name in known else _row(run, name)
+        rows_now += [row] if row else []
+        damaged |= {name: why} if why else {}
     base = {field.name for field in _BASE}
     # A stored row has null for the terms that only its neighbours have.
     used = {name for row in rows_now for name, value in row.items() if value is not None} - base
     schema = pa.schema(_BASE + [pa.field(name, pa.float64()) for name in sorted(used)])
-    notes = {"version": _VERSION, "condition": run.condition_id, "files": stamps}
-    return _table(rows_now, schema.with_metadata({_KEY: json.dumps(notes).encode()}))
+    notes = {"version": _VERSION, "condition": run.condition_id}
+    notes |= {"files": stamps, "damaged": damaged}
+    table = _table(rows_now, schema.with_metadata({_KEY: json.dumps(notes).encode()}))
+    return _Summary(table, stamps, damaged)
 
 
 def _table(rows: Sequence[Mapping[str, Any]], schema: pa.Schema) -> pa.Table:
@@ -206,18 +305,18 @@ def _column(values: list[Any], kind: pa.DataType) -> pa.Array:
     return pa.Array.from_buffers(kind, len(values), buffers)
 
 
-def _row(run: RunDirectory, path: Path) -> dict[str, Any]:
-    replicate = int(path.name.split(".")[0])
-    if path.suffix == ".json":
-        reason = run.failure(replicate)["reason"]
-        return {
-            "condition": run.condition_id,
-            "replicate": replicate,
-            "status": "failed",
-            "stop_reason": reason,
-        }
-    summary = read_summary(path)
-    if (summary.condition, summary.replicate) != (run.condition_id, replicate):
-        theirs = f"replicate {summary.replicate} of {summary.condition[:12]}"
-        raise CorruptLog(f"{path}: holds {theirs}, which does not belong here")
-    return flatten(summary)
+def _row(run: RunDirectory, name: str) -> tuple[dict[str, Any], str]:
+    """Return the row of a file, empty for a damaged log, and what is wrong with the file."""
+    replicate, path, why = replicate_of(name), run.replicates / name, ""
+    if _is_log(name):
+        try:
+            return flatten(checked_summary(path, run.condition_id, replicate)), ""
+        except CorruptLog as error:
+            return {}, reason(path, error)
+    try:
+        text = run.failure(replicate)["reason"]
+    except StoreError as error:
+        why = reason(path, error)
+        text = f"unknown: {name}: {why}"
+    row = {"condition": run.condition_id, "replicate": replicate, "status": "failed"}
+    return row | {"stop_reason": text}, why

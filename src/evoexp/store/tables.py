@@ -10,20 +10,21 @@ import pyarrow as pa
 from evoexp.records import GenerationRow
 from evoexp.store.log_reader import DTYPES, generation_columns
 from evoexp.store.messages import field_types
-from evoexp.store.summaries import Runs, distinct, summary_table
+from evoexp.store.summaries import Runs, distinct, summary_table, whole_logs
 
 
-def read_summaries(runs: Runs) -> pd.DataFrame:
+def read_summaries(runs: Runs, *, thorough: bool = False) -> pd.DataFrame:
     """Return the summaries of one or several runs, one row per replicate; see `summary_table`.
+
+    Args:
+        runs: One or several.
+        thorough: Whether the checksums of all logs are looked at: before they are read.
 
     Returns:
         Its columns. Numbers and booleans are Arrow's (`double[pyarrow]`, …), in which ±inf, NaN and
         missing stay three things; text is pandas' own.
-
-    Raises:
-        CorruptLog: A log is damaged or of another replicate.
     """
-    frame: pd.DataFrame = summary_table(runs).to_pandas(
+    frame: pd.DataFrame = summary_table(runs, thorough=thorough).to_pandas(
         types_mapper=lambda kind: None if pa.types.is_string(kind) else pd.ArrowDtype(kind)
     )
     return frame
@@ -32,7 +33,8 @@ def read_summaries(runs: Runs) -> pd.DataFrame:
 def read_generations(runs: Runs, replicates: Collection[int] | None = None) -> pd.DataFrame:
     """Return the generations of completed replicates of one or several runs.
 
-    Logs are read one after the other; of each only its columns are kept.
+    Logs are read one after the other; of each only its columns are kept. Damaged ones are left
+    out; `read_summaries` says so.
 
     Args:
         runs: One or several.
@@ -43,12 +45,12 @@ def read_generations(runs: Runs, replicates: Collection[int] | None = None) -> p
         `term_<name>` in alphabetical order, NaN where a generation lacks the term.
 
     Raises:
-        CorruptLog: A log is damaged.
+        CorruptLog: A log was damaged since `read_summaries` looked at all of them.
     """
     directories = distinct(runs)
     codes, indices, parts = [], [], []
     for code, run in enumerate(directories):
-        done = run.completed()
+        done = whole_logs(run)
         for replicate in sorted(done if replicates is None else done.intersection(replicates)):
             parts.append(generation_columns(run.log_path(replicate)))
             codes.append(code)

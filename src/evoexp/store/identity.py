@@ -1,0 +1,163 @@
+"""The identity of a run directory: its configuration, or where that is lost a log's."""
+
+import hashlib
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from evoexp.attachments import PREFIX, SHA256, hashes
+from evoexp.errors import CorruptLog, StoreError
+from evoexp.input_files import read_bounded
+from evoexp.store.log_reader import LogContents, read_log
+
+CONFIG, MANIFEST, REPLICATES = "config.json", "manifest.json", "replicates"
+RESTORED = "restored_from"  # the entry of a restored manifest that names a log
+_ID = re.compile("[0-9a-f]{64}")
+
+
+class DamagedFile(StoreError):
+    """A file of a run directory that is missing, damaged or foreign, and could be written again."""
+
+
+class FoundLog(NamedTuple):
+    """A log that holds the truth about its run.
+
+    Attributes:
+        name: Of its file.
+        contents: What it holds; its configuration has the hash of the condition.
+    """
+
+    name: str
+    contents: LogContents
+
+
+def stored_id(path: Path) -> str:
+    """Return the full hash of the condition whose run a directory holds.
+
+    Where the configuration is lost, a log knows it, or else the manifest.
+
+    Raises:
+        StoreError: Nothing in the directory knows it.
+    """
+    try:
+        return config_id(path)
+    except DamagedFile as error:
+        found = whole_log(path, path.name)
+        known = found.contents.condition_id if found else _manifest_id(path)
+        if known is None:
+            raise StoreError(f"{error}; neither a log nor the manifest has it, either") from None
+        return known
+
+
+def config_id(path: Path) -> str:
+    """Return the full hash of the configuration that a run directory holds.
+
+    Raises:
+        DamagedFile: The configuration is missing, or its hash does not begin as the directory's
+            name.
+    """
+    config = path / CONFIG
+    stored = hashlib.sha256(read(config)).hexdigest()
+    if not stored.startswith(path.name):
+        raise DamagedFile(f"{config}: damaged: its hash {stored[:12]} is not the directory's name")
+    return stored
+
+
+def whole_log(path: Path, prefix: str) -> FoundLog | None:
+    """Return the first log in a run directory that is whole and of a condition, if there is one.
+
+    Args:
+        path: The run directory.
+        prefix: Of the condition's hash.
+    """
+    for log in sorted((path / REPLICATES).glob("*.mcap")):
+        try:
+            contents = read_log(log)
+        except CorruptLog:
+            continue
+        known = hashlib.sha256(contents.config_json).hexdigest()
+        if known == contents.condition_id and known.startswith(prefix):
+            return FoundLog(log.name, contents)
+    return None
+
+
+def read(path: Path) -> bytes:
+    """Return the content of a file.
+
+    Raises:
+        DamagedFile: It cannot be read, or is empty.
+    """
+    try:
+        content = read_bounded(path)
+    except OSError as error:
+        raise DamagedFile(f"{path}: cannot be read: {error.strerror or error}") from error
+    if not content:
+        raise DamagedFile(f"{path}: damaged: empty file")
+    return content
+
+
+def read_object(path: Path) -> dict[str, Any]:
+    """Return the JSON object that a file holds.
+
+    Raises:
+        DamagedFile: It cannot be read, or is none.
+    """
+    content = read(path)
+    try:
+        value = json.loads(content)
+    except (ValueError, RecursionError) as error:
+        raise DamagedFile(f"{path}: damaged: {error}") from error
+    if not isinstance(value, dict):
+        raise DamagedFile(f"{path}: damaged: not a JSON object")
+    return value
+
+
+def lost_files(path: Path, config_json: bytes) -> Iterator[tuple[Path, str]]:
+    """Yield path and damage of the files that a run's configuration refers to and that are lost.
+
+    Args:
+        path: The run directory.
+        config_json: The configuration.
+    """
+    if SHA256.encode() not in config_json:
+        return
+    for sha256 in dict.fromkeys(hashes(json.loads(config_json))):
+        file = path / PREFIX / sha256
+        try:
+            if hashlib.sha256(read(file)).hexdigest() != sha256:
+                yield file, "damaged: its content does not have the hash that is its name"
+        except DamagedFile as error:
+            yield file, str(error).removeprefix(f"{file}: ")
+
+
+def checked_manifest(path: Path, condition_id: str) -> dict[str, Any]:
+    """Return the content of a run directory's `manifest.json`.
+
+    Raises:
+        DamagedFile: It is missing, damaged, or of another condition than the one given.
+    """
+    found = read_object(path / MANIFEST)
+    if found.get("condition", condition_id) != condition_id:
+        theirs = str(found["condition"])[:12]
+        raise DamagedFile(f"{path / MANIFEST}: is of run {theirs}, which does not belong here")
+    return found
+
+
+def restored_manifest(path: Path, condition_id: str) -> dict[str, Any]:
+    """Return the part of the manifest that a log knows, marked as restored; empty without a log."""
+    found = whole_log(path, condition_id)
+    if found is None:
+        return {}
+    known = {"condition": condition_id, **found.contents.environment}
+    return known | {"git": None, RESTORED: found.name}
+
+
+def _manifest_id(path: Path) -> str | None:
+    try:
+        known = read_object(path / MANIFEST).get("condition")
+    except DamagedFile:
+        return None
+    is_id = isinstance(known, str) and _ID.fullmatch(known) and known.startswith(path.name)
+    return str(known) if is_id else None

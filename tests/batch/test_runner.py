@@ -24,6 +24,7 @@ from evoexp.cli import main
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import Busy, SettingError
+from evoexp.store import damage
 from evoexp.store.log_reader import read_log
 from evoexp.store.plans import Plan
 from evoexp.store.run_directory import RunDirectory
@@ -73,7 +74,7 @@ def test_more_replicates_leave_the_earlier_ones_alone(faulty: Condition, tmp_pat
     assert sorted(directory.completed()) == [0, 1, 2, 3], "fewer replicates take nothing away"
 
 
-def test_of_many_the_missing_ones_are_found_without_opening_a_log(
+def test_of_many_the_missing_ones_are_found_without_decoding_a_log(
     faulty: Condition, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Completion is a whole log under its name: the summary table notes which ones are."""
@@ -87,13 +88,7 @@ def test_of_many_the_missing_ones_are_found_without_opening_a_log(
     canonical = Condition.to_json
     calls: list[Condition] = []
     monkeypatch.setattr(Condition, "to_json", lambda self: calls.append(self) or canonical(self))  # type: ignore[func-returns-value]
-    read = Path.read_bytes
-
-    def no_log(path: Path) -> bytes:
-        assert path.suffix != ".mcap", f"{path} is opened"
-        return read(path)
-
-    monkeypatch.setattr(Path, "read_bytes", no_log)
+    monkeypatch.setattr(damage, "read_summary", lambda path: pytest.fail(f"{path} is decoded"))
     batch = new_batch(tmp_path, (faulty, 10))
     assert [job.replicate for job in batch.jobs] == [0, 5, 7, 8, 9]
     assert not batch.is_damaged

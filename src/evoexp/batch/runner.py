@@ -71,6 +71,8 @@ class Batch:
                 known[2] if known else notes,
             )
         self.runs = {key: RunDirectory(outputs, key) for key in self._wanted}
+        for run in self.runs.values():
+            whole_logs(run, thorough=True)  # what is damaged is known from here on
         self.jobs = self._missing({key: lost_replicates(run) for key, run in self.runs.items()})
         self.is_damaged = any(
             needs_mending(run, self._wanted[key][0].to_json()) for key, run in self.runs.items()

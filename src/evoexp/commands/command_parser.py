@@ -13,6 +13,7 @@ COMMANDS = {
     "report": "draw an experiment's figures and tables again, from outputs alone",
     "claims": "list the papers' claims: rule, numbers, verdict",
     "reproduce": "run stored replicates again: MATCH, or the first generation that differs",
+    "verify": "check stored runs: every log whole and in its place, and the files beside",
     "evaluate": "judge a given motion by an experiment's criteria",
     "view": "write a motion as an offline page that plays it",
     "play": "write a motion as a log that plays in Foxglove",

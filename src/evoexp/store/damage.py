@@ -1,8 +1,9 @@
 """Damage of stored files: named, set aside, never deleted.
 
 A log is checked against its place when it is first seen: its checksums, its condition, its
-replicate. `summary.parquet` then notes its size and time, and it is not read again as long as both
-are the same. Commands that read the logs anyway check every byte again (20 µs per log).
+replicate. `summary.parquet` then notes its size and time, and it is not decoded again as long as
+both are the same. `run`, and whoever reads the logs anyway, compares all checksums besides, which
+takes some 30 µs per log of 70 kB; `list` and `show` do not.
 """
 
 import os

@@ -76,6 +76,12 @@ def sync_directory(path: Path) -> None:
             os.close(descriptor)
 
 
+def is_temporary(name: str) -> bool:
+    """Return whether a file's name, or the last part of its path, is one of a temporary file."""
+    last = name.rsplit("/", 1)[-1]
+    return last.startswith(".") and last.endswith(_SUFFIX)
+
+
 def remove_stale(directories: Iterable[Path]) -> None:
     """Remove the temporary files that killed writers left; only for who holds the lock."""
     for directory in directories:

@@ -220,6 +220,11 @@ class RunDirectory:
             self.path.mkdir(parents=True, exist_ok=True)
             write_file(self.path / PLANS, as_json(plans))
 
+    @staticmethod
+    def is_own(name: str) -> bool:
+        """Return whether a file's name is one of a log or a failure."""
+        return bool(_LOG.fullmatch(name) or _FAILED.fullmatch(name))
+
     def completed(self) -> set[int]:
         """Return the replicates whose finished log is there."""
         return self._matching(_LOG)

@@ -3,8 +3,10 @@
 It notes size and time of every log behind it, and which ones are damaged and have no row.
 """
 
+import contextlib
 import errno
 import json
+import os
 import stat
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -136,9 +138,56 @@ def damaged_logs(run: RunDirectory) -> dict[str, str]:
     return _current(run).damaged
 
 
-def whole_logs(run: RunDirectory) -> set[int]:
-    """Return the replicates whose log is there and whole, as far as `damaged_logs` looks."""
-    return {replicate_of(name) for name in _current(run).row_names if _is_log(name)}
+def whole_logs(run: RunDirectory, *, thorough: bool = False) -> set[int]:
+    """Return the replicates whose log is there and whole.
+
+    Args:
+        run: Whose.
+        thorough: As for `summary_table`.
+    """
+    names = _current(run, thorough).row_names
+    return {replicate_of(name) for name in names if _is_log(name)}
+
+
+def table_damage(run: RunDirectory) -> str:
+    """Return the damage of `summary.parquet` in words; empty if it is whole or only outdated."""
+    path = run.summary_path
+    if not os.path.lexists(path) or _stored(run) is not None:
+        return ""
+    try:
+        _stamp(path)
+        with pq.ParquetFile(path, page_checksum_verification=True) as file:
+            notes = json.loads(file.read().schema.metadata[_KEY])
+        if notes["condition"] != run.condition_id:
+            return f"is of run {str(notes['condition'])[:12]}, which does not belong here"
+        return "" if notes["version"] != _VERSION else "damaged: its columns are others"
+    except (pa.ArrowException, OSError, ValueError, LookupError, TypeError, AttributeError):
+        return "damaged: it is derived from the logs and cannot be read"
+
+
+def altered_rows(run: RunDirectory, summaries: Mapping[str, ReplicateSummary]) -> list[str]:
+    """Return the logs whose row in `summary.parquet` does not repeat the summary they hold.
+
+    Rows of logs that changed since the table was written are not looked at.
+
+    Args:
+        run: Whose.
+        summaries: The logs' own, by the names of their files.
+    """
+    stored, stamps = _stored(run), _stamps(run)
+    if stored is None:
+        return []
+    rows = dict(zip(stored.row_names, stored.table.to_pylist(), strict=True))
+    known = [name for name in summaries if name in rows and stored.files[name] == stamps.get(name)]
+    given = [flatten(summaries[name]) for name in known]
+    columns = {*stored.table.column_names}
+    wider = [name for name, row in zip(known, given, strict=True) if not row.keys() <= columns]
+    expected = _table(given, stored.table.schema).to_pylist()
+    return wider + [
+        name
+        for name, row in zip(known, expected, strict=True)
+        if name not in wider and repr(row) != repr(rows[name])
+    ]
 
 
 def replicate_of(name: str) -> int:
@@ -177,10 +226,11 @@ def _is_current(run: RunDirectory, stored: _Summary, stamps: Stamps, thorough: b
 
 def _intact(run: RunDirectory, stored: _Summary) -> dict[str, bool]:
     """Return name → whether its checksums are right, of the logs behind the rows of a table."""
-    found = {}
+    folder, found = str(run.replicates), {}
     for name in filter(_is_log, stored.row_names):
         try:
-            check((run.replicates / name).read_bytes(), name)
+            with open(f"{folder}/{name}", "rb") as file:
+                check(file.read(), name)
             found[name] = True
         except (CorruptLog, OSError):
             found[name] = False
@@ -193,18 +243,26 @@ def _is_log(name: str) -> bool:
 
 def _stamps(run: RunDirectory) -> Stamps:
     """Return size and time of the files behind the table, in the order of the replicates."""
-    paths = {replicate: run.log_path(replicate) for replicate in run.completed()}
-    paths |= {replicate: run.failure_path(replicate) for replicate in run.failed()}
-    stamps: Stamps = {}
-    for _, path in sorted(paths.items()):
-        try:
-            status = path.stat()
-        except OSError:
-            if not path.is_symlink():  # a failure that another process has replaced by a log
-                continue
-            status = path.lstat()  # of a link that leads nowhere
-        stamps[path.name] = [status.st_size, status.st_mtime_ns]
-    return stamps
+    found: dict[str, os.stat_result] = {}
+    with contextlib.suppress(FileNotFoundError), os.scandir(run.replicates) as entries:
+        for entry in entries:
+            if run.is_own(entry.name):
+                # what is gone was a failure that another process has just replaced by a log
+                with contextlib.suppress(FileNotFoundError):
+                    found[entry.name] = _status(entry)
+    done = {replicate_of(name) for name in found if _is_log(name)}
+    names = [name for name in found if _is_log(name) or replicate_of(name) not in done]
+    return {
+        name: [found[name].st_size, found[name].st_mtime_ns]
+        for name in sorted(names, key=replicate_of)
+    }
+
+
+def _status(entry: os.DirEntry[str]) -> os.stat_result:
+    try:
+        return entry.stat()
+    except OSError:
+        return entry.stat(follow_symlinks=False)  # of a link that leads nowhere
 
 
 def _stored(run: RunDirectory) -> _Summary | None:

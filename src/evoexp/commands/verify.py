@@ -1,0 +1,144 @@
+"""`evoexp verify`: whether a store is whole, and the commands that mend it."""
+
+import argparse
+import itertools
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import joblib
+from rich.table import Table
+
+from evoexp import shipped
+from evoexp.batch.workers import in_workers, num_cores
+from evoexp.commands.console import (
+    add_columns,
+    add_hash_column,
+    new_table,
+    plain_console,
+    print_json,
+)
+from evoexp.commands.hashes import with_candidates
+from evoexp.errors import UnknownHash
+from evoexp.store.run_directory import COMMAND, HASH_LENGTH, outputs_root, resolve, run_names
+from evoexp.store.verification import LogCheck, RunCheck, check_logs, check_rows, check_run
+
+LARGE = 8_000_000  # [B] of logs from which on worker processes check them
+PART = 64  # logs per task of a worker
+SHOWN = 4  # problems of a run
+RUN_KEYS = ("hash", "logs", "problems", "leftovers", "mend")
+
+
+class Checked(NamedTuple):
+    """A run with everything that was found.
+
+    Attributes:
+        name: The first twelve digits of its hash.
+        num_logs: Logs that were looked at.
+        problems: File → what is wrong with it.
+        leftovers: Files that are no part of a run.
+        mend: The command that mends it; empty if nothing is wrong.
+    """
+
+    name: str
+    num_logs: int
+    problems: dict[str, str]
+    leftovers: list[str]
+    mend: str
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.add_argument(
+        "hashes",
+        nargs="*",
+        metavar="HASH",
+        help="any unique prefixes of runs' hashes; by default every stored run",
+    )
+    parser.add_argument(
+        "--json",
+        action="store_true",
+        help=f"print JSON: a list of all runs that were checked ({', '.join(RUN_KEYS)})",
+    )
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Check; exit code 1 if anything is damaged. Nothing is written."""
+    outputs, console = outputs_root(), plain_console()
+    names = [_name(outputs, prefix) for prefix in arguments.hashes] or run_names(outputs)
+    runs = [check_run(outputs, name) for name in dict.fromkeys(names)]
+    with console.status("checking logs"):
+        found = [_checked(run, logs) for run, logs in zip(runs, _all_logs(runs), strict=True)]
+    damaged = [run for run in found if run.problems]
+    if arguments.json:
+        print_json([dict(zip(RUN_KEYS, run, strict=True)) for run in found])
+        return 1 if damaged else 0
+    if damaged:
+        console.print(_table(damaged))
+        for mend in dict.fromkeys(run.mend for run in damaged):
+            console.print(f"mend: {mend}", soft_wrap=True)
+    for run in found:
+        if run.leftovers:
+            listed = ", ".join(run.leftovers[:SHOWN])
+            more = f", … {len(run.leftovers) - SHOWN} more" if run.leftovers[SHOWN:] else ""
+            console.print(f"no part of run {run.name}: {listed}{more}", soft_wrap=True)
+    logs, problems = sum(r.num_logs for r in found), sum(len(r.problems) for r in found)
+    said = f"{problems} damaged files in {len(damaged)} of them" if damaged else "all is well"
+    console.print(f"{len(found)} runs, {logs} logs: {said}", soft_wrap=True)
+    return 1 if damaged else 0
+
+
+def _name(outputs: Path, prefix: str) -> str:
+    """Return the name of the run directory that a prefix names, whatever is damaged in it."""
+    names = [name for name in run_names(outputs) if name.startswith(prefix.lower() or "-")]
+    try:
+        return names[0] if len(names) == 1 else resolve(outputs, prefix).hash12
+    except UnknownHash as error:
+        raise with_candidates(error, outputs) from None
+
+
+def _all_logs(runs: Sequence[RunCheck]) -> Iterator[list[LogCheck]]:
+    """Yield the checks of every run's logs; those of large stores come from worker processes."""
+    paths = [
+        [run.run.log_path(k) for k in sorted(run.run.completed())] if run.run else []
+        for run in runs
+    ]
+    parts = [
+        (own[start : start + PART], run.run.condition_id)
+        for run, own in zip(runs, paths, strict=True)
+        if run.run
+        for start in range(0, len(own), PART)
+    ]
+    size = sum(path.lstat().st_size for own in paths for path in own)
+    if size < LARGE or len(parts) < 2:
+        checks: Iterator[list[LogCheck]] = itertools.starmap(check_logs, parts)
+    else:
+        tasks = (joblib.delayed(check_logs)(*part) for part in parts)
+        checks = in_workers(min(num_cores(), len(parts)), tasks, ordered=True)
+    flat = itertools.chain.from_iterable(checks)
+    for own in paths:
+        yield list(itertools.islice(flat, len(own)))
+
+
+def _checked(found: RunCheck, logs: list[LogCheck]) -> Checked:
+    problems = found.problems | {log.name: log.problem for log in logs if log.problem}
+    if found.run is not None:
+        problems |= check_rows(found.run, logs)
+    mend = ""
+    if problems:
+        known = found.run.command if found.run else COMMAND
+        rows = shipped.find(found.name) if known == COMMAND else []
+        mend = rows[0].command if rows else known
+    return Checked(found.name, len(logs), problems, found.leftovers, mend)
+
+
+def _table(runs: Sequence[Checked]) -> Table:
+    table = new_table(f"damaged runs in {outputs_root()}")
+    add_hash_column(table, "run")
+    add_columns(table, "logs", right=True)
+    add_columns(table, "damaged files")
+    for run in runs:
+        lines = [f"{name}: {problem}" for name, problem in run.problems.items()]
+        more = [f"… {len(lines) - SHOWN} more"] if lines[SHOWN:] else []
+        table.add_row(run.name[:HASH_LENGTH], str(run.num_logs), "\n".join(lines[:SHOWN] + more))
+    return table

@@ -1,0 +1,90 @@
+"""The script that compares interpreters, libraries, processors and surroundings."""
+
+import itertools
+from importlib.machinery import SourceFileLoader
+from importlib.util import module_from_spec, spec_from_loader
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from evoexp.batch.reproduction import TOLERANCE
+
+SCRIPT = Path(__file__).parents[2] / "scripts" / "check-matrix"
+
+
+@pytest.fixture(scope="module")
+def script() -> Any:
+    spec = spec_from_loader("check_matrix", SourceFileLoader("check_matrix", str(SCRIPT)))
+    assert spec is not None
+    assert spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def some_factors(script: Any) -> dict[str, list[Any]]:
+    sizes = {"libraries": 4, "workers": 3, "processor": 3, "locale": 2, "threads": 3}
+    return {name: [script.Level(f"{name} {k}") for k in range(n)] for name, n in sizes.items()}
+
+
+def test_each_factor_is_varied_alone(script: Any) -> None:
+    base, *others = script.alone(some_factors(script))
+    assert len(others) == 3 + 2 + 2 + 1 + 2
+    for cell in others:
+        assert sum(cell[name] != base[name] for name in base) == 1
+
+
+@pytest.mark.parametrize("quick", [False, True])
+def test_a_pairwise_cover_has_every_pair(script: Any, quick: bool) -> None:
+    factors = some_factors(script)
+    cells = list(script.pairwise(factors, quick))
+    assert len(cells) < 30
+    for one, two in itertools.combinations(factors, 2):
+        for first, second in itertools.product(factors[one], factors[two]):
+            compiled = {one, two} == {"libraries", "processor"}
+            both = factors[one][0] != first and factors[two][0] != second
+            met = any(cell[one] == first and cell[two] == second for cell in cells)
+            assert met == (not (quick and compiled and both)), (first, second)
+
+
+def row(**changes: Any) -> dict[str, Any]:
+    plain = {"digest": "d", "best_cost": (1.5).hex(), "clearance": (0.25).hex(), "evaluations": 7}
+    return plain | {"term_length": (2.0).hex(), "term_newton_evaluations": (9.0).hex()} | changes
+
+
+def found(script: Any, libraries: str = "one", **changes: Any) -> dict[str, Any]:
+    cell = {"rows": {"a #0": row(), "b #0": row()}, "composed": ["c"], "processor": "native"}
+    return cell | {"libraries": libraries} | changes
+
+
+def test_differences_are_named(script: Any) -> None:
+    kinds, base = {"a #0": "bits", "b #0": "environment"}, found(script)
+    assert script.compare(base, found(script), kinds) == []
+    assert script.compare(base, found(script, composed=["d"]), kinds) == ["composed conditions"]
+    assert script.compare(base, {"failed": "no numba"}, kinds) == ["failed: no numba"]
+    assert script.compare(base, found(script, rows={"a #0": row()}), kinds) == ["replicates"]
+    off = row(best_cost=(1.5 + 1e-12).hex(), evaluations=8, digest="e")
+    names = "digest, best_cost, evaluations"
+    rows = {"a #0": off, "b #0": off}
+    assert script.compare(base, found(script, rows=rows), kinds) == [
+        f"a #0: {names}",
+        f"b #0: {names}",
+    ]
+    elsewhere = found(script, "other", rows=rows)
+    assert script.compare(base, elsewhere, kinds) == [f"a #0: {names}"], (
+        "a reference by its numbers"
+    )
+    far = row(term_length=(2.0 + 10 * TOLERANCE).hex(), term_newton_evaluations=(8.0).hex())
+    (said,) = script.compare(base, found(script, "other", rows={"a #0": row(), "b #0": far}), kinds)
+    assert said.startswith("b #0: term_length by ")
+
+
+@pytest.mark.matrix
+def test_every_factor_that_needs_no_other_interpreter(script: Any, capsys: Any) -> None:
+    assert script.main(["--alone", "--quick"]) == 0, capsys.readouterr().out
+
+
+def test_an_interpreter_without_the_dependencies_is_left_out(script: Any, capsys: Any) -> None:
+    assert len(list(script.interpreters(["/bin/false"]))) == 1
+    assert capsys.readouterr().out.startswith("left out: /bin/false: ")

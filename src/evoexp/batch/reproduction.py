@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from evoexp.attachments import PREFIX, keep_all
+from evoexp.batch.memory_limit import machine_memory, refuse_large
 from evoexp.batch.replicate import EXACT_BOXES, run_replicate
 from evoexp.condition import Condition
 from evoexp.errors import CorruptLog, MissingDistribution
@@ -180,6 +181,7 @@ def _reproduce(path: Path, stored: LogContents) -> Comparison:
             f"{path}: its configuration has hash {condition.id[:12]}, it claims "
             f"{stored.condition_id[:12]}"
         )
+    refuse_large(condition, machine_memory())
     again = read_log(run_replicate(condition, stored.replicate).content)
     found = compare(stored, again)
     if condition.reproducibility == "bits" or (found.search_matches and not found.fields):

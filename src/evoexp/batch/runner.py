@@ -18,6 +18,7 @@ import numpy as np
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from evoexp.batch.jobs import Job, Outcome, load, run_jobs
+from evoexp.batch.memory_limit import allowed_memory, refuse_large
 from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.batch.workers import in_workers, loading, num_cores
 from evoexp.condition import Condition
@@ -84,10 +85,14 @@ class Batch:
         """Check every condition against its robot and scenario, before anything is written.
 
         Raises:
-            SettingError: If one contradicts itself.
+            SettingError: If one contradicts itself, or takes more memory than there is.
         """
-        for condition, _, _ in self._wanted.values():
+        allowed = allowed_memory(self._settings, self._num_workers())
+        missing = {job.condition_id for job in self.jobs}
+        for key, (condition, _, notes) in self._wanted.items():
             condition.prepare()
+            if key in missing:
+                refuse_large(condition, allowed, notes.get("label", ""))
 
     def run(self) -> Generator[Outcome, None, None]:
         """Mend the runs, run the missing replicates; yield every outcome once it is stored.
@@ -102,7 +107,7 @@ class Batch:
             for key, run in self.runs.items():
                 mend(run, self._wanted[key][0].to_json())
             self.jobs = self._missing(lost)
-            num_workers = max(1, min(self._settings.num_workers or num_cores(), len(self.jobs)))
+            num_workers = self._num_workers()
             config_jsons = list(dict.fromkeys(job.condition_json for job in self.jobs))
             files = list(dict.fromkeys(content for job in self.jobs for content in job.files))
             with loading(num_workers, load, config_jsons, files):
@@ -121,6 +126,9 @@ class Batch:
             finally:
                 for key in self.runs.keys() - self._summarised:
                     self._summarise(key)
+
+    def _num_workers(self) -> int:
+        return max(1, min(self._settings.num_workers or num_cores(), len(self.jobs)))
 
     def _missing(self, lost: Mapping[str, set[int]]) -> list[Job]:
         """Return the jobs of missing replicates; references, which take longest, come first.

@@ -1,6 +1,12 @@
 """How a batch is run; no part of any identity."""
 
-from evoexp.validation import Count, Settings
+from typing import Annotated
+
+from pydantic import Field
+
+from evoexp.validation import Positive, Settings
+
+MOST_WORKERS = 1000  # processes that one machine starts
 
 
 class RunnerSettings(Settings):
@@ -8,6 +14,9 @@ class RunnerSettings(Settings):
 
     Attributes:
         num_workers: Worker processes; None: as many as there are cores.
+        memory_gb: Memory that one replicate may take, by its planner's estimate; what would take
+            more is refused before it begins [GB]. None: the machine's, divided by the workers.
     """
 
-    num_workers: Count | None
+    num_workers: Annotated[int, Field(ge=1, le=MOST_WORKERS)] | None
+    memory_gb: Positive | None = None

@@ -13,6 +13,8 @@ from evoexp.errors import SettingError, UnknownSetting
 from evoexp.registry import component_class
 from evoexp.validation import TARGET, Settings, build, settings_error
 
+MOST_REPLICATES = 1_000_000  # of one condition, each of which is a file
+
 AnySettings = TypeVar("AnySettings", bound=Settings)
 
 
@@ -62,6 +64,8 @@ def planned_replicates(count: Any, budget: Budget) -> int:
     """
     if type(count) is not int or count < 1:
         raise SettingError("num_replicates", "a whole number, at least 1", count)
+    if count > MOST_REPLICATES:
+        raise SettingError("num_replicates", f"at most {MOST_REPLICATES}", count)
     return count if budget.max_replicates is None else min(count, budget.max_replicates)
 
 

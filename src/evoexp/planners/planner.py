@@ -5,6 +5,7 @@ clock or a file; its randomness is an argument. `PlannerDefaults` answers what m
 alike; everything else a planner writes itself. `evoexp.testing` checks every obligation.
 """
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar, Literal, NamedTuple, Protocol, runtime_checkable
 
@@ -18,6 +19,9 @@ from evoexp.paths.motion import Motion
 from evoexp.records import BoolArray, FloatArray, Generation
 
 Reproducibility = Literal["bits", "environment"]
+# Copies of a population that a run of most planners holds: parents, offspring, paths between them.
+COPIES = 5
+LONGEST = 1000  # parts of a solution of any number, as its memory is estimated
 Shape = tuple[Any, ...]  # of a solution: one tuple per part; a leading ... stands for any number
 
 
@@ -165,6 +169,13 @@ class Planner(Protocol):
     def shape(self, problem: Any) -> Shape:
         """Return the documented shape of a solution, part by part."""
 
+    def memory(self, problem: Any) -> int:
+        """Return an estimate of the memory that a run takes beyond that of its problem [B].
+
+        It need not be exact, yet grow as the memory does with populations, paths and generations:
+        a run that would take more than there is is refused before it begins.
+        """
+
     def listing(self, problem: Any, solution: FloatArray) -> Listing | None:
         """Return a table with one row per configuration; None if the planner has none."""
 
@@ -172,8 +183,25 @@ class Planner(Protocol):
         """Return remarks on settings and problem, one per line, for `show` and the report."""
 
 
+def num_values(shape: Shape) -> int:
+    """Return how many numbers a solution of a documented shape has; of any number of parts, many.
+
+    Args:
+        shape: As `Planner.shape` returns it.
+    """
+    if len(shape) and shape[0] is ...:
+        return LONGEST * num_values(shape[1:])
+    return sum(math.prod(part) for part in shape)
+
+
 class _Budgeted(Protocol):
     """A planner with a field `ga`, as most have."""
+
+    def num_evaluations(self, index: int) -> int:
+        """Return how many individuals a generation evaluates."""
+
+    def shape(self, problem: Any) -> Shape:
+        """Return the shape of a solution."""
 
     @property
     def ga(self) -> Any:
@@ -217,6 +245,11 @@ class PlannerDefaults:
     def departures(self, problem: Any, solution: FloatArray) -> Sequence[str]:
         """Return none: every solution of the documented shape is one of the task."""
         return ()
+
+    def memory(self: _Budgeted, problem: Any) -> int:
+        """Return the memory of `COPIES` populations of solutions."""
+        individuals = max(self.num_evaluations(0), self.num_evaluations(1))
+        return 8 * COPIES * num_values(self.shape(problem)) * individuals
 
     def listing(self, problem: Any, solution: FloatArray) -> Listing | None:
         """Return None: there is no table."""

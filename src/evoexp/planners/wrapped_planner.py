@@ -78,6 +78,10 @@ class WrappedPlanner(PlannerDefaults, Component):
         """Return the wrapped planner's shape of a solution."""
         return self.planner.shape(problem)
 
+    def memory(self, problem: Any) -> int:
+        """Return the wrapped planner's estimate; a subclass that takes more adds to it."""
+        return self.planner.memory(problem)
+
     def listing(self, problem: Any, solution: FloatArray) -> Listing | None:
         """Return the wrapped planner's table of a solution."""
         return self.planner.listing(problem, solution)

@@ -31,7 +31,7 @@ from evoexp.references.grid_networks import (
 )
 from evoexp.references.grid_relaxation import relaxed_bounds
 from evoexp.references.reference import Reference, Truth
-from evoexp.validation import Count, NonNegativeCount, Positive
+from evoexp.validation import LayoutCount, NonNegativeCount, Positive
 
 BLOCK = 16  # numbers of nodes whose walks are bounded together
 LANES = 32  # numbers of nodes whose walks are looked for together
@@ -63,10 +63,10 @@ class GridFrontier(Reference):
     revision: ClassVar[int] = 2
 
     planner: GridPathGa
-    num_weights: Count
+    num_weights: LayoutCount
     least_weight: Positive
     greatest_weight: Positive
-    max_nodes: Count
+    max_nodes: LayoutCount
     exchanged_nodes: Annotated[int, Field(ge=0, le=4)]
     forced_nodes: Annotated[int, Field(ge=0, le=4)]
     bound_gap: Annotated[float, Field(ge=0.0, lt=1.0)]

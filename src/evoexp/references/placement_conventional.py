@@ -15,7 +15,7 @@ from evoexp.references.placement_polish import End, descend
 from evoexp.references.placement_programme import Programme
 from evoexp.references.placement_subgradient import LANES, slide
 from evoexp.references.reference import Reference, Truth
-from evoexp.validation import Count, Positive
+from evoexp.validation import Count, LayoutCount, Positive
 
 R2 = np.array([0.7548776662466927, 0.5698402909980532])  # Roberts' sequence: fills a square evenly
 DIGITS = 2  # decimals [deg] of the angles that are kept: beyond them libraries differ
@@ -45,7 +45,7 @@ class PlacementConventional(Reference):
 
     component: ClassVar[str] = "placement_conventional"
 
-    num_starts: Count
+    num_starts: LayoutCount
     num_steps: Count
     first_step: Positive
 

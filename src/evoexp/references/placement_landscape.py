@@ -8,6 +8,8 @@ from pydantic import Field
 from evoexp.objectives.placement_kernels import CRITERIA
 from evoexp.references.reference import Reference, Truth
 
+TERM_VALUES = 20  # numbers measured for one pair of angles
+
 
 class PlacementLandscape(Reference):
     """E over all θ1 and θ2, the better θ3 of each.
@@ -21,7 +23,12 @@ class PlacementLandscape(Reference):
 
     component: ClassVar[str] = "placement_landscape"
 
-    num_angles: Annotated[int, Field(ge=2)]
+    num_angles: Annotated[int, Field(ge=2, le=10_000)]
+
+    def memory(self, problem: Any) -> int:
+        """Return the memory of the terms of every pair of angles, besides the planner's."""
+        terms = 8 * TERM_VALUES * self.num_angles * self.num_angles
+        return terms + self.planner.memory(problem)
 
     def truth(self, problem: Any) -> Truth:
         """Measure the grid; the best of it is the solution."""

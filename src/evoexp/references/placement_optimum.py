@@ -16,6 +16,8 @@ from evoexp.validation import Count
 
 SAME = 1e-3  # [deg] two minima so close are one
 
+TERM_VALUES = 5  # numbers kept for one pair of angles
+
 
 class PlacementOptimum(Reference):
     """The exact optimum of `placement_ga`'s cost, and all local minima that the search saw.
@@ -30,8 +32,12 @@ class PlacementOptimum(Reference):
 
     component: ClassVar[str] = "placement_optimum"
 
-    num_angles: Annotated[int, Field(ge=8)]
+    num_angles: Annotated[int, Field(ge=8, le=10_000)]
     num_polished: Count
+
+    def memory(self, problem: Any) -> int:
+        """Return the memory of the dense search, besides the planner's."""
+        return 8 * TERM_VALUES * self.num_angles**2 + self.planner.memory(problem)
 
     def truth(self, problem: Any) -> Truth:
         """Search, polish, and judge the best by the planner's own kernels."""

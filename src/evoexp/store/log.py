@@ -10,7 +10,10 @@ import xxhash
 from mcap.writer import CompressionType, IndexType, Writer
 from numpy.typing import NDArray
 
+from evoexp.errors import EvoexpError
+from evoexp.input_files import MEGABYTE
 from evoexp.records import FrontRow, Generation, GenerationRow, ReplicateSummary, SolutionRow
+from evoexp.store.container import MAX_LOG
 from evoexp.store.digests import Chain, array_bytes
 from evoexp.store.messages import (
     TERM,
@@ -39,6 +42,10 @@ _CHUNK_SIZE = 56 * 1024  # [B] a chunk ends with the message that passes this, h
 _MESSAGE = struct.Struct("<QIQ")  # log_time, sequence, bytes of data
 _BATCH = 64  # generations encoded together
 _TICK = 1_000_000_000  # [ns] the synthetic clock: one second per generation
+
+
+class LogTooLarge(EvoexpError):
+    """A replicate whose log no reader would take."""
 
 
 class _Pending(NamedTuple):
@@ -145,7 +152,7 @@ class Log:
         self._best = self._written = (
             b""  # of the generation encoded last, and of the last solution written
         )
-        self._best_cost = self._written_cost = np.inf
+        self._best_cost, self._written_cost, self._size = np.inf, np.inf, 0  # [B] of messages
         self._buffer = io.BytesIO()
         self._writer = Writer(
             self._buffer,
@@ -254,6 +261,12 @@ class Log:
             channel = self._channels[topic] = _Channel(self._writer, topic, record, terms)
         log_time = int(generation) * _TICK
         sequence = channel.num_messages
+        self._size += len(data)
+        if self._size > MAX_LOG:
+            raise LogTooLarge(
+                f"log: its generations and solutions take more than {MAX_LOG // MEGABYTE} MB, "
+                "more than any log that is read; run fewer generations"
+            )
         channel.num_messages += 1
         self._writer.add_message(channel.id, log_time, data, log_time, sequence)
         self._content.update(channel.identity, log_time, sequence, data)

@@ -33,12 +33,13 @@ from evoexp.planners.coevolution.kernels import Breeding, breed, measure, renew
 from evoexp.planners.coevolution.settings import CoevolutionSettings
 from evoexp.planners.coevolution.teams import Evaluated, Judgement
 from evoexp.planners.departures import of_limits, of_place
-from evoexp.planners.planner import Candidate, Keeper, PlannerDefaults
+from evoexp.planners.planner import COPIES, Candidate, Keeper, PlannerDefaults, num_values
 from evoexp.records import BoolArray, FloatArray, Generation
 from evoexp.robots.assembly import Assembly, Robot
 from evoexp.scenarios.link_motion import LinkMotion
 from evoexp.validation import Component, LayoutCount
 
+PAIR_BYTES = 5  # of a pair of individuals: their collisions, and whether they are a team
 HALF_TURN = DEGREE * 180.0  # genes live in [0, π)
 
 
@@ -366,6 +367,13 @@ class Coevolution(PlannerDefaults, Component):
         return length_notes(
             self.speed_limit, lengths, problem.start, problem.goal, self.chromosome_length
         )
+
+    def memory(self, problem: Problem) -> int:
+        """Return the memory of all pairs of individuals, and of everybody's path and outlines."""
+        robots, count = len(problem.start), self.ga.population_size
+        copies = COPIES + 4 * self.collision.collision_substeps
+        pairs = robots * (robots - 1) // 2 * PAIR_BYTES * count * count
+        return pairs + 8 * copies * num_values(self.shape(problem)) * count
 
     def shape(self, problem: Problem) -> tuple[tuple[int, int], ...]:
         """Return the documented shape of a solution: per robot, (K + 2, 2)."""

@@ -46,6 +46,7 @@ FEW_NODES = 2048  # the steps between all nodes of smaller grids are worked out 
 FAULTS = "blocked_nodes", "forbidden_moves", "missed_ends"  # with one, a path costs inf
 STRETCH = 8  # generations that are computed in one call of a kernel, at most
 BLOCK = 16384  # uniform numbers drawn at once, at least
+TABLES = 10  # of paths: those of a stretch, and of those that are bred
 STEPS_PER_WALK = 3.5  # times the fewest: random words for so many steps are drawn at first
 FEW_WORDS = 512  # (a multiple of `WORDS`) drawn whenever these do not suffice; a rest is lost
 
@@ -226,6 +227,11 @@ class GridPathGa(PlannerDefaults, Component):
         return [
             f"{name.replace('_', ' ')}: {terms[name]:.0f}" for name in FAULTS if terms[name] > 0.0
         ]
+
+    def memory(self, problem: Problem) -> int:
+        """Return the memory of a table of paths, each as long as there are nodes."""
+        width = 4 * (problem.fields.grid.num_nodes + 1)
+        return TABLES * width * self.ga.population_size
 
     def shape(self, problem: Problem) -> tuple[Any, ...]:
         """Return the documented shape of a solution: any number of nodes, each its coordinates."""

@@ -36,6 +36,7 @@ NAMES = ("torque_norm", "torque_max", "obstacle", "manipulability")  # E1, E2, �
 BRANCHES = ("", "other_")
 FIRST_CRITERION = GENES  # row of the costs; the other criteria and the branch follow it
 STRETCH = 16  # generations that are computed in one call of a kernel, at most
+TERM_VALUES = 200  # numbers kept for an individual: those of the generations of a stretch
 BLOCK = 8192  # uniform numbers drawn at once, at least
 
 
@@ -185,6 +186,10 @@ class PlacementGa(PlannerDefaults, Component):
         beyond = of_limits(["θ1", "θ2"], np.array(angles)[:, None], problem.angle_limits, "deg")
         is_feasible = problem.model.posture(*angles)[0] >= 0
         return beyond + ([] if is_feasible else ["no θ3 reaches the target within all limits"])
+
+    def memory(self, problem: Problem) -> int:
+        """Return the memory of everybody's terms, by which either value of θ3 is judged."""
+        return 8 * TERM_VALUES * self.ga.population_size
 
     def shape(self, problem: Problem) -> tuple[tuple[()], ...]:
         """Return the documented shape of a solution: two numbers, θ1 and θ2."""

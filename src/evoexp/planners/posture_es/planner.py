@@ -30,7 +30,7 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.posture_cost import COLUMNS, PARALLEL, TERMS, UPRIGHT, PostureCost
 from evoexp.paths.motion import Motion
 from evoexp.planners.departures import joint_names, of_limits, of_place
-from evoexp.planners.planner import Candidate, Keeper, Listing, PlannerDefaults
+from evoexp.planners.planner import COPIES, Candidate, Keeper, Listing, PlannerDefaults
 from evoexp.planners.posture_es import problem as posture_problem
 from evoexp.planners.posture_es.cycles import Ancestry, Search
 from evoexp.planners.posture_es.kernels import COST
@@ -41,6 +41,7 @@ from evoexp.robots.assembly import Robot
 from evoexp.scenarios.posture_task import PostureTask
 from evoexp.validation import Component, NonNegativeCount, Positive
 
+TERM_VALUES = 60  # numbers kept for an individual: terms, and what the kernels note of it
 DENSE = 50  # configurations per step at which tilts of the continuous motion are sampled
 OVERSIZED = 1.0 + 1e-9  # steps beyond the scope by more than rounding
 
@@ -184,6 +185,13 @@ class PostureEs(PlannerDefaults, Component):
     def parts(self, problem: Problem, motion: Motion) -> list[Part]:
         """Return the motion phase by phase: what is held changes the bodies."""
         return problem.parts(motion)
+
+    def memory(self, problem: Problem) -> int:
+        """Return the memory of a cycle's postures and their terms, and of all parents so far."""
+        ga, nq = self.ga, len(problem.start)
+        offspring = max(ga.initial_size, ga.num_offspring) + ga.num_immigrants + ga.num_parents
+        parents = min(ga.num_parents, offspring) * ga.num_generations * len(problem.phases)
+        return 8 * (offspring * (COPIES * nq + TERM_VALUES) + 2 * parents * (nq + 1))
 
     def shape(self, problem: Problem) -> tuple[Any, ...]:
         """Return the documented shape of a solution: any number of postures × nq."""

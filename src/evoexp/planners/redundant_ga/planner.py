@@ -26,7 +26,7 @@ from evoexp.errors import SettingError
 from evoexp.objectives.reaching import Reaching
 from evoexp.paths.motion import Motion
 from evoexp.planners.departures import joint_names, of_limits, of_place
-from evoexp.planners.planner import Candidate, Keeper, PlannerDefaults
+from evoexp.planners.planner import COPIES, Candidate, Keeper, PlannerDefaults, num_values
 from evoexp.planners.redundant_ga import kernels
 from evoexp.planners.redundant_ga.kernels import RESULTS, Judging
 from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic, SelectiveSettings
@@ -285,6 +285,12 @@ class RedundantGa(PlannerDefaults, Component):
         """Return cost, position error and joint displacement of both sub-paths, (2, 3)."""
         ends = self._postures(problem, solution)[:, :, None]
         return np.array([self._judge(problem, k, *ends[k : k + 2])[:, 0] for k in range(2)])
+
+    def memory(self, problem: Problem) -> int:
+        """Return the memory of the postures of a search, coded in bits if they are."""
+        ga = self.ga
+        coded = 2 * ga.bits_per_gene if isinstance(ga, BinaryGenetic) else 0
+        return 8 * (COPIES + coded) * num_values(self.shape(problem)) * ga.population_size
 
     def shape(self, problem: Problem) -> tuple[tuple[int], ...]:
         """Return the documented shape of a solution: three postures of (joints,)."""

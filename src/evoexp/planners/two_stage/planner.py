@@ -197,6 +197,11 @@ class TwoStage(PlannerDefaults, Component):
         path = self.path.departures(self._path_problem(problem, angles), nodes.ravel())
         return [*found, *path]
 
+    def memory(self, problem: Problem) -> int:
+        """Return the memory of both stages."""
+        path = self.path.memory(problem.path)
+        return self.placement.memory(problem.placement) + path
+
     def shape(self, problem: Problem) -> tuple[Any, ...]:
         """Return the documented shape of a solution: θ1 and θ2, then nodes, all in pairs."""
         return (..., (ANGLES,))

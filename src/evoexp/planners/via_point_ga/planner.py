@@ -24,7 +24,7 @@ from evoexp.paths.interpolation import interpolate_linear
 from evoexp.paths.motion import Motion
 from evoexp.paths.workspace import prepare_redistribution
 from evoexp.planners.departures import joint_names, of_limits, of_place
-from evoexp.planners.planner import Candidate, Keeper, PlannerDefaults
+from evoexp.planners.planner import COPIES, Candidate, Keeper, PlannerDefaults, num_values
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
 from evoexp.planners.via_point_ga.strings import (
     LANES,
@@ -166,6 +166,12 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
         limits = np.column_stack([model.lowerPositionLimit, model.upperPositionLimit])
         finite = np.clip(limits, -UNLIMITED, UNLIMITED) / DEGREE
         return found + of_limits(joint_names(len(strings)), strings, finite, "deg")
+
+    def memory(self, problem: Problem) -> int:
+        """Return the memory of populations, and of the configurations tested between via-points."""
+        between = 2 * (self.collision.collision_substeps - 1)
+        values = (COPIES + between) * num_values(self.shape(problem))
+        return 8 * self.ga.population_size * values
 
     def shape(self, problem: Problem) -> tuple[tuple[int, int], ...]:
         """Return the documented shape of a solution: per arm, (N + 1, joints)."""

@@ -1,0 +1,108 @@
+"""A replicate that would take too much memory, or too long a log, is refused before it begins."""
+
+import collections
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from evoexp.batch import memory_limit
+from evoexp.batch.memory_limit import allowed_memory, machine_memory, refuse_large
+from evoexp.batch.reproduction import reproduce_log
+from evoexp.batch.runner import Batch
+from evoexp.batch.runner_settings import RunnerSettings
+from evoexp.condition import Condition
+from evoexp.errors import SettingError
+from evoexp.records import Generation
+from evoexp.store import log as log_module
+from evoexp.store.log import Log, LogTooLarge
+from shipped_conditions import of_kind
+
+SHARE = RunnerSettings(num_workers=None)
+
+
+def changed(path: str, value: Any) -> Condition:
+    """Return a small condition with another setting."""
+    config = json.loads(of_kind(("rana_obstacles", 0), "smoke").to_json())
+    node, (*parents, last) = config, path.split(".")
+    for key in parents:
+        node = node[key]
+    node[last] = value
+    return Condition.from_json(json.dumps(config).encode())
+
+
+def batch(condition: Condition, outputs: Path, settings: RunnerSettings) -> Batch:
+    """Return a batch of one replicate."""
+    return Batch([(condition, 1, {"label": "mine"})], settings, outputs)
+
+
+def test_a_population_that_no_machine_holds_is_refused_before_anything_is_written(
+    tmp_path: Path,
+) -> None:
+    condition = changed("planner.ga.population_size", 10**9)
+    with pytest.raises(SettingError) as refusal:
+        batch(condition, tmp_path, SHARE).prepare()
+    text = str(refusal.value)
+    assert text.startswith("runner.memory_gb: must be at least ")
+    assert "the estimate of a replicate of condition mine, was " in text
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_setting_raises_and_lowers_the_limit(tmp_path: Path) -> None:
+    condition = changed("planner.ga.population_size", 10**5)
+    planner, problem = condition.prepare()
+    gigabytes = planner.memory(problem) / 1e9
+    little = batch(condition, tmp_path, RunnerSettings(num_workers=1, memory_gb=gigabytes / 2))
+    with pytest.raises(SettingError, match=r"runner\.memory_gb: must be at least "):
+        little.prepare()
+    batch(condition, tmp_path, RunnerSettings(num_workers=1, memory_gb=1e6)).prepare()
+
+
+def test_workers_share_the_memory_of_the_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert machine_memory() > 1e8
+    monkeypatch.setattr(memory_limit, "machine_memory", lambda: 8e9)
+    assert allowed_memory(SHARE, 4) == 2e9
+    assert allowed_memory(RunnerSettings(num_workers=4, memory_gb=3.0), 4) == 3e9
+
+
+def test_a_container_has_less_memory_than_its_machine(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole, path = machine_memory(), tmp_path / "memory.max"
+    monkeypatch.setattr(memory_limit, "_CONTAINER", path)
+    path.write_text("123456789\n")
+    assert machine_memory() == 123456789
+    path.write_text("max\n")
+    assert machine_memory() >= whole
+
+
+def test_more_generations_than_a_log_holds_are_refused() -> None:
+    condition = changed("planner.ga.num_generations", 10**9)
+    must = "planner: must be of fewer than 512,000 generations: a log holds 128 MB"
+    with pytest.raises(SettingError, match=must):
+        refuse_large(condition, 1e15)
+
+
+def test_a_log_from_elsewhere_is_not_run_again_beyond_the_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from evoexp.batch.replicate import run_replicate
+
+    path = tmp_path / "0000.mcap"
+    path.write_bytes(run_replicate(changed("planner.ga.num_generations", 2), 0).content)
+    monkeypatch.setattr("evoexp.batch.reproduction.machine_memory", lambda: 1000)
+    with pytest.raises(SettingError, match=r"runner\.memory_gb"):
+        reproduce_log(path)
+
+
+def test_a_log_that_no_reader_would_take_ends_its_replicate(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(log_module, "MAX_LOG", 10_000)
+    log = Log("0" * 64, b"{}", 0, np.random.Generator(np.random.PCG64(0)))
+    row = (1.0, 1.0, 1.0, 0.0, 1, 1, 1, True, {}, np.ones(1), np.ones(1))
+    generations = (Generation(index, np.ones(3), *row) for index in range(1000))
+    with pytest.raises(LogTooLarge, match="run fewer generations"):
+        collections.deque(map(log.write, generations), maxlen=0)

@@ -120,9 +120,10 @@ class Comparison(NamedTuple):
         others = len(self.fields) - 1
         more = f", and {others} more field{'s' * (others > 1)}" if others else ""
         if self._decisive is None:
-            return f"MATCH in the search, to {TOLERANCE:g} beyond; {shown}{more} ({self.inexact})"
+            rest = f"to {TOLERANCE:g} in the rest: {shown}{more}"
+            return f"MATCH in the search, {rest} ({self.inexact})"
         why = f" ({self.inexact})" if self.inexact else ""
-        return f"DIVERGES beyond the search, which matches; {shown}{more}{why}"
+        return f"MATCH in the search; DIVERGES in the rest: {shown}{more}{why}"
 
     @property
     def _decisive(self) -> FieldDifference | None:
@@ -301,7 +302,8 @@ def _said(log: LogContents) -> dict[str, Any]:
 
 
 def _numbers(log: LogContents) -> Iterator[tuple[str, Any]]:
-    """Yield the numbers of a log beside its summary: costs, solution, arrays."""
+    """Yield the numbers of a log: costs, solution, arrays; `_said` has the summary's others."""
+    yield "cost", log.summary.best_cost
     yield "feasible", log.generations[-1].num_feasible
     yield "best cost of each generation", [row.best_cost for row in log.generations]
     yield "solution", log.solutions[-1].values

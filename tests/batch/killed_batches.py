@@ -67,7 +67,9 @@ def started(words: Sequence[str], outputs: Path) -> Iterator[subprocess.Popen[st
     """Start a command in a group of its own; nothing of it is left behind."""
     process = subprocess.Popen(
         words,
-        env=os.environ | {"EVOEXP_OUTPUTS": str(outputs)},
+        # what a killed process leaves of joblib's folders goes with the outputs
+        env=os.environ
+        | {"EVOEXP_OUTPUTS": str(outputs), "JOBLIB_TEMP_FOLDER": str(outputs.parent)},
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,

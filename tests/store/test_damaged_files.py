@@ -264,6 +264,16 @@ def test_damaged_plans_are_set_aside(run: RunDirectory, content: str) -> None:
     assert run.plans()[0].num_replicates == 3
 
 
+def test_a_file_for_the_directory_of_the_logs(run: RunDirectory) -> None:
+    run.replicates.rmdir()
+    run.replicates.touch()
+    assert (run.completed(), summary_table(run).num_rows) == (set(), 0)
+    with run.lock(), pytest.warns(DamagedStore, match="replicates .damaged: not a directory"):
+        mend(run, CONFIG)
+    run.create(CONFIG, {})
+    assert run.replicates.is_dir()
+
+
 def test_stray_files_are_no_logs(run: RunDirectory, add: Add) -> None:
     add(1)
     for name in ("00001.mcap", "1.mcap", "notes.txt", "0001.mcap.damaged", "١٢٣٤.mcap", "x.mcap"):

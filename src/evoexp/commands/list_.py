@@ -88,7 +88,7 @@ def _run(name: str, run: RunDirectory | EvoexpError) -> dict[str, Any]:
         if isinstance(run, EvoexpError):
             raise run
         rows = summary_table(run).select(["status", "solved", "best_cost"]).to_pylist()
-    except EvoexpError as error:
+    except (EvoexpError, OSError) as error:
         return row | {"damage": str(error)}
     done = [each for each in rows if each["status"] == "done"]
     return (

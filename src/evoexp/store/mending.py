@@ -8,7 +8,15 @@ from pathlib import Path
 
 from evoexp.errors import StoreError
 from evoexp.store.damage import is_of_another_version, listed, reason, set_aside, warn
-from evoexp.store.identity import CONFIG, MANIFEST, DamagedFile, checked_manifest, lost_files, read
+from evoexp.store.identity import (
+    CONFIG,
+    MANIFEST,
+    REPLICATES,
+    DamagedFile,
+    checked_manifest,
+    lost_files,
+    read,
+)
 from evoexp.store.plans import PLANS
 from evoexp.store.run_directory import RunDirectory, is_stored
 from evoexp.store.summaries import damaged_logs, whole_logs
@@ -27,6 +35,8 @@ def damaged_files(run: RunDirectory, config_json: bytes | None = None) -> dict[s
     if not is_stored(run.path):
         return {}
     found: dict[str, str] = {}
+    if run.replicates.exists() and not run.replicates.is_dir():
+        found[REPLICATES] = "damaged: not a directory"
     try:
         run.check()
         config_json = config_json or read(run.path / CONFIG)

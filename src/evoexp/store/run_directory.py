@@ -288,7 +288,7 @@ class RunDirectory:
     def _matching(self, pattern: re.Pattern[str]) -> set[int]:
         try:
             names = os.listdir(self.replicates)
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):
             return set()
         return {int(match[1]) for name in names if (match := pattern.fullmatch(name))}
 

@@ -244,7 +244,8 @@ def _is_log(name: str) -> bool:
 def _stamps(run: RunDirectory) -> Stamps:
     """Return size and time of the files behind the table, in the order of the replicates."""
     found: dict[str, os.stat_result] = {}
-    with contextlib.suppress(FileNotFoundError), os.scandir(run.replicates) as entries:
+    nothing = contextlib.suppress(FileNotFoundError, NotADirectoryError)
+    with nothing, os.scandir(run.replicates) as entries:
         for entry in entries:
             if run.is_own(entry.name):
                 # what is gone was a failure that another process has just replaced by a log

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from store_samples import CONDITION, CONFIG, ENVIRONMENT, generations, summary, write
 
+from evoexp import attachments
 from evoexp.errors import DamagedStore, StoreError, UnknownHash
 from evoexp.store import damage, summaries
 from evoexp.store import log as log_module
@@ -193,6 +194,44 @@ def test_the_table_of_another_run_is_not_taken(run: RunDirectory, add: Add, tmp_
 
 
 # Configuration and manifest
+
+
+@pytest.mark.parametrize("fault", [Path.unlink, empty, flip, become_a_directory])
+def test_a_lost_file_of_the_configuration_is_taken_from_a_log(
+    tmp_path: Path, fault: Callable[[Path], object]
+) -> None:
+    content = b"<robot/>"
+    sha256 = hashlib.sha256(content).hexdigest()
+    config = json.dumps({"robot": {"path": {"sha256": sha256}}}).encode()
+    run, files = (
+        RunDirectory(tmp_path, hashlib.sha256(config).hexdigest()),
+        {f"files/{sha256}": content},
+    )
+    run.create(config, {}, files)
+    path = run.path / "files" / sha256
+    log = log_module.Log(run.condition_id, config, 0, np.random.default_rng(0), files)
+    log.write(generations(1)[0])
+    row = summary(0, condition=run.condition_id)
+    run.write_logs({0: log.finish(row).content})
+    assert run.config_json() == config
+    fault(path)
+    attachments._contents.pop(sha256)
+    with pytest.warns(DamagedStore, match=f"files/{sha256}: .*; taken from 0000.mcap"):
+        assert run.config_json() == config
+    assert attachments.File(sha256=sha256).content == content
+    assert list(damaged_files(run)) == [f"files/{sha256}"]
+    with run.lock(), pytest.warns(DamagedStore, match="written again"):
+        mend(run, config)
+    run.create(config, {}, files)
+    assert path.read_bytes() == content
+    assert not damaged_files(run)
+
+
+def test_a_configuration_names_no_file_elsewhere(tmp_path: Path) -> None:
+    config = b'{"robot": {"path": {"sha256": "../config.json"}}}'
+    run = RunDirectory(tmp_path, hashlib.sha256(config).hexdigest())
+    run.create(config, {})
+    assert not damaged_files(run)
 
 
 @pytest.mark.parametrize("content", [None, b"", b"{}", b"[", b"\xff\xfe"])

@@ -123,7 +123,7 @@ def lost_files(path: Path, config_json: bytes) -> Iterator[tuple[Path, str]]:
     """
     if SHA256.encode() not in config_json:
         return
-    for sha256 in dict.fromkeys(hashes(json.loads(config_json))):
+    for sha256 in filter(_ID.fullmatch, dict.fromkeys(hashes(json.loads(config_json)))):
         file = path / PREFIX / sha256
         try:
             if hashlib.sha256(read(file)).hexdigest() != sha256:

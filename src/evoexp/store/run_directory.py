@@ -164,9 +164,9 @@ class RunDirectory:
         try:
             self.check()
             content = read(self.path / CONFIG)
-            keep_all(path.read_bytes() for path in sorted((self.path / PREFIX).glob("*")))
             lost = [path for path, _ in lost_files(self.path, content)]
             if not lost:
+                keep_all(map(read, sorted((self.path / PREFIX).glob("[0-9a-f]*"))))
                 return content
             error = StoreError(f"{lost[0]}: missing or damaged")
         except DamagedFile as damaged:

@@ -15,6 +15,7 @@ from evoexp.store.log_reader import LogContents, read_log
 CONFIG, MANIFEST, REPLICATES = "config.json", "manifest.json", "replicates"
 RESTORED = "restored_from"  # the entry of a restored manifest that names a log
 _ID = re.compile("[0-9a-f]{64}")
+_OF_NOTHING = hashlib.sha256().hexdigest()  # an empty file of a configuration has this name
 
 
 class DamagedFile(StoreError):
@@ -93,7 +94,7 @@ def read(path: Path) -> bytes:
         content = read_bounded(path)
     except OSError as error:
         raise DamagedFile(f"{path}: cannot be read: {error.strerror or error}") from error
-    if not content:
+    if not content and path.name != _OF_NOTHING:
         raise DamagedFile(f"{path}: damaged: empty file")
     return content
 

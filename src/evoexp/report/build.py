@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from evoexp.condition import Condition
+from evoexp.report.drawing_processes import on_all_cores
 from evoexp.report.index import render
 from evoexp.report.page_parts import Drawing
 from evoexp.report.pages import page_of
@@ -88,8 +89,8 @@ def report(
     page = page_of(found, settings)
     directory = outputs / "reports" / request.report_name
     files: dict[str, bytes] = {}
-    for drawing in page.drawings:
-        files |= _drawn(drawing, settings)
+    for drawn in on_all_cores(lambda drawing: _drawn(drawing, settings), page.drawings):
+        files |= drawn
     files[INDEX] = render(page, found, settings, f"evoexp report {request.words}").encode()
     directory.mkdir(parents=True, exist_ok=True)
     write_files({directory / name: content for name, content in files.items()})

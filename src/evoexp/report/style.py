@@ -86,8 +86,9 @@ def drawn(draw: Callable[[], Figure], formats: Sequence[str], dpi: int) -> dict[
             mpl.rcParams[name] = value  # type: ignore[index]
         mpl.rcParams["figure.dpi"] = dpi  # arranged with the widths that text has when it is saved
         figure, images = draw(), {}
-        figure.draw_without_rendering()
-        figure.set_layout_engine("none")  # arranged once, for all formats
+        if engine := figure.get_layout_engine():  # arranged once, for all formats
+            engine.execute(figure)
+        figure.set_layout_engine(None)  # with "none" every file would be drawn twice
         for kind in formats:
             buffer = io.BytesIO()
             figure.savefig(buffer, format=kind, dpi=dpi, metadata=_METADATA[kind])

@@ -4,6 +4,7 @@ A body is all shapes that move with one joint. Bodies of many shapes are cut int
 checks between bodies: the balls around parts are smaller, and rule out more.
 """
 
+import functools
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
@@ -107,44 +108,98 @@ def pack_shapes(
     turn = np.concatenate([np.eye(3)[None], table.alignment.transpose(0, 2, 1)])[shapes.joint]
     start = _turned(turn, shapes.start)
     axis = _turned(turn, shapes.end - shapes.start)
+    own = [np.flatnonzero(shapes.labels == number) for number in numbers]
+    bodies = [
+        _pack_body(start[of].tobytes(), axis[of].tobytes(), shapes.radius[of].tobytes())
+        for of in own
+    ]
+    # indices count over all bodies
+    first_run = _before([len(body.runs) for body in bodies])
+    first_center = _before([len(body.centers) for body in bodies])
+    first_rod = _before([len(body.capsules) for body in bodies])
+    rows = [
+        body.rows + np.array([joint - 1 if joint > 0 else world, run, run, rod, rod, 0, 0])
+        for body, joint, run, rod in zip(bodies, joints, first_run, first_rod, strict=True)
+    ]
+    counts = [len(body.rows) - 1 for body in bodies]
+    first_part = len(bodies) + _before(counts)
+    # a body of one part is that part itself
+    parts = [
+        list(range(first, first + count)) if count else [k]
+        for k, (first, count) in enumerate(zip(first_part.tolist(), counts, strict=True))
+    ]
+    units = Units(
+        np.concatenate([row[:1] for row in rows] + [row[1:] for row in rows]),
+        np.concatenate([body.balls[:1] for body in bodies] + [body.balls[1:] for body in bodies]),
+    )
+    packed = PackedShapes(
+        np.concatenate([b.runs + n for b, n in zip(bodies, first_center, strict=True)]),
+        np.concatenate([body.centers for body in bodies]),
+        np.concatenate([body.capsules for body in bodies]),
+        0,
+    )
+    most = max(num_spheres(units, packed, k) for k in range(len(units.ball)))
+    return units, packed._replace(most=most), parts
+
+
+def _before(counts: list[int]) -> IntArray:
+    """Return for each count the sum of those before it."""
+    return np.cumsum([0, *counts])[:-1]
+
+
+class _Body(NamedTuple):
+    """One body's shapes, packed; indices count from its own first run and first capsule.
+
+    Attributes:
+        rows: (1 + parts, 7) columns of `Units.whole`, the frame 0: of the body, then of its parts,
+            which are none where it has only one.
+        balls: (1 + parts, 5) rows of `Units.ball`.
+        runs: (runs, 2) first and one-past-last sphere of equal radius.
+        centers: (spheres, 4) with their radii.
+        capsules: (capsules, 8) start, axis, radius, 1 / length².
+    """
+
+    rows: IntArray
+    balls: FloatArray
+    runs: IntArray
+    centers: FloatArray
+    capsules: FloatArray
+
+
+@functools.lru_cache(maxsize=512)
+def _pack_body(start_bytes: bytes, axis_bytes: bytes, radius_bytes: bytes) -> _Body:
+    """Pack the shapes of one body; a robot's bodies are the same in every scene around it."""
+    radius = np.frombuffer(radius_bytes)
+    start, axis = (np.frombuffer(given).reshape(-1, 3) for given in (start_bytes, axis_bytes))
     square = (axis * axis).sum(axis=1)
     ball = square <= SHORTEST * SHORTEST
+    everything = np.arange(len(radius))
     runs: list[tuple[int, int]] = []
     spheres: list[int] = []
     rods: list[int] = []
-    parts: list[list[int]] = []
-    bodies: list[tuple[Any, ...]] = []
-    cuts: list[tuple[Any, ...]] = []
-    for k, (number, joint) in enumerate(zip(numbers, joints, strict=True)):
-        own, first = np.flatnonzero(shapes.labels == number), (len(runs), len(rods))
-        frame = int(joint) - 1 if joint > 0 else world
-        rows: list[tuple[Any, ...]] = []
-        for cut in _cut(own, start + 0.5 * axis, ball):
-            begin = len(runs), len(rods)
-            # runs of spheres of equal radius, then the capsules
-            for radius in np.unique(shapes.radius[cut[ball[cut]]]):
-                same = cut[ball[cut] & (shapes.radius[cut] == radius)]
-                runs.append((len(spheres), len(spheres) + len(same)))
-                spheres.extend(same)
-            rods.extend(cut[~ball[cut]])
-            around = _ball(start, axis, shapes.radius, cut)
-            rows.append((frame, begin[0], len(runs), begin[1], len(rods), around))
-        around = _ball(start, axis, shapes.radius, own)
-        bodies.append((frame, first[0], len(runs), first[1], len(rods), around))
-        # a body of one part is that part itself
-        only = len(rows) == 1
-        parts.append([k] if only else [len(joints) + len(cuts) + n for n in range(len(rows))])
-        cuts.extend([] if only else rows)
-    rows = bodies + cuts
-    whole = np.array([(*row[:5], 0, 0) for row in rows], dtype=np.int64)
-    units = Units(whole, np.array([row[5] for row in rows]))
-    bounds = np.array(runs, dtype=np.int64).reshape(-1, 2)
+    rows: list[tuple[int, ...]] = []
+    balls = [_ball(start, axis, radius, everything)]
+    cuts = _cut(everything, start + 0.5 * axis, ball)
+    for cut in cuts:
+        begin = len(runs), len(rods)
+        # runs of spheres of equal radius, then the capsules
+        for size in np.unique(radius[cut[ball[cut]]]):
+            same = cut[ball[cut] & (radius[cut] == size)]
+            runs.append((len(spheres), len(spheres) + len(same)))
+            spheres.extend(same)
+        rods.extend(cut[~ball[cut]])
+        rows.append((0, begin[0], len(runs), begin[1], len(rods), 0, 0))
+        balls.append(_ball(start, axis, radius, cut))
     at, of = np.array(spheres, dtype=np.int64), np.array(rods, dtype=np.int64)
-    centers = np.column_stack([start[at], shapes.radius[at]])
-    capsules = np.column_stack([start[of], axis[of], shapes.radius[of], 1.0 / square[of]])
-    packed = PackedShapes(bounds, centers, capsules, 0)
-    most = max(num_spheres(units, packed, k) for k in range(len(units.ball)))
-    return units, packed._replace(most=most), parts
+    count = 1 if len(cuts) == 1 else 1 + len(cuts)
+    whole = (0, 0, len(runs), 0, len(rods), 0, 0)
+    return _Body(
+        np.array([whole, *rows], dtype=np.int64)[:count],
+        np.array(balls)[:count],
+        np.array(runs, dtype=np.int64).reshape(-1, 2),
+        np.column_stack([start[at], radius[at]]),
+        np.column_stack([start[of], axis[of], radius[of], 1.0 / square[of]]),
+    )
 
 
 def _turned(turn: FloatArray, vectors: FloatArray) -> FloatArray:

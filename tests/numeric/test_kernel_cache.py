@@ -1,5 +1,6 @@
 """Where compiled kernels are kept: by content, not by place or time."""
 
+import math
 import os
 import subprocess
 import sys
@@ -8,6 +9,8 @@ from pathlib import Path
 import pytest
 
 from evoexp.numeric import kernel_cache
+from evoexp.numeric.compilation import kernel
+from evoexp.numeric.kernel_cache import code_key
 
 
 def test_words_are_no_part_of_a_module_and_code_is() -> None:
@@ -65,6 +68,15 @@ def test_kernels_are_kept_by_content_not_by_place(tmp_path: Path) -> None:
     assert hits("one", code) == 0
     assert hits("two", "# moved down\n\n" + code) == 1
     assert hits("one", code.replace("1.0", "2.0")) == 0
+
+
+def test_functions_of_one_name_are_told_apart() -> None:
+    one, two = kernel(lambda x: x + 1.0), kernel(lambda x: x + 2.0)
+    other = kernel(lambda x: math.sqrt(x)), kernel(lambda x: math.floor(x))
+    assert (one(0.5), two(0.5), other[0](0.25), other[1](0.25)) == (1.5, 2.5, 0.5, 0.0)
+    # an edit of words is none of the code
+    same = code_key(lambda x: x + 1.0)
+    assert code_key(lambda x: x + 1.0) == same != code_key(lambda x: x + 2.0)
 
 
 def test_what_is_compiled_is_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

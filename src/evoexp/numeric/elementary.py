@@ -3,9 +3,10 @@
 The functions are scalar and meant to be called inside kernels: LLVM inlines them, and an innermost
 loop over an array becomes vector code. They use only `+ − × ÷ sqrt`, comparisons and the bits of
 numbers, which IEEE 754 fixes to the last bit: no libm, no fused multiply-add. So scalar and vector
-code, any vector width and any optimisation level give the same bits. Integer and float32 arguments
-count as float64. Error bounds are the largest error measured against 80-bit arithmetic, rounded up;
-u = 1.11e-16 is half a unit in the last place of 1.
+code, any vector width and any optimisation level give the same bits. `sin`, `cos` and `sincos` take
+vectors (`numeric.vectors`), too. Integer and float32 arguments count as float64. Error bounds are
+the largest error measured against 80-bit arithmetic, rounded up; u = 1.11e-16 is half a unit in the
+last place of 1.
 
 Coefficients and exact-sum tricks: Sun's fdlibm 5.3 (k_sin.c, k_cos.c, s_atan.c, e_asin.c, e_log.c,
 e_exp.c; Copyright (C) 1993 by Sun Microsystems, Inc.: "Permission to use, copy, modify, and
@@ -14,34 +15,19 @@ branches and with short chains of dependent operations.
 """
 
 import math
-from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
-from numba.core import types
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import borrowed, inlined, kernel
+from evoexp.numeric.vectors import Vector, from_bits, select, to_bits
+
+Number = TypeVar("Number", float, Vector)
+"""An argument of the functions that work on vectors, too."""
 
 DEGREE = 0.017453292519943295  # [rad] one degree
 
-
-def _reinterpretation(source: Any, target: Any) -> Any:
-    """Return a function for kernels that reads the 64 bits of one type as another."""
-
-    @intrinsic
-    def reinterpret(typing_context: Any, value: Any) -> Any:
-        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            return builder.bitcast(arguments[0], context.get_value_type(target))
-
-        return target(source), generate
-
-    return reinterpret
-
-
-_bits: Callable[[float], int] = _reinterpretation(types.float64, types.int64)
-_from_bits: Callable[[int], float] = _reinterpretation(types.int64, types.float64)
 
 _SIGN = -(2**63)  # the sign bit of a float64, as int64
 _ROUND = 1.5 * 2.0**52  # adding it rounds to an integer, which then stands in the low bits
@@ -73,25 +59,26 @@ _C = (
 
 
 @inlined
-def _reduce(x: float) -> tuple[float, int]:
+def _reduce(x: Number) -> tuple[Number, Any]:
     """Return r in [−π/4, π/4] and an integer n (modulo 4) with x = r + n π/2 (Cody & Waite)."""
     t = x * _TWO_OVER_PI + _ROUND
     n = t - _ROUND
-    return (x - n * _HALF_PI_HI) - n * _HALF_PI_LO, _bits(t)
+    return (x - n * _HALF_PI_HI) - n * _HALF_PI_LO, to_bits(t)
 
 
 @inlined
-def _sin_polynomial(r: float) -> float:
+def _sin_polynomial(r: Number) -> Number:
     """Return sin r for |r| ≤ π/4 (k_sin.c)."""
     z = r * r
     w = z * z
     p = (_S[1] + z * _S[2]) + w * ((_S[3] + z * _S[4]) + w * _S[5])
     s = r + z * r * (_S[0] + z * p)
-    return r if r == 0.0 else s  # keeps the sign of zero
+    kept: Number = select(r == 0.0, r, s)  # the sign of zero
+    return kept
 
 
 @inlined
-def _cos_polynomial(r: float) -> float:
+def _cos_polynomial(r: Number) -> Number:
     """Return cos r for |r| ≤ π/4 (k_cos.c); the rounding error of 1 − r²/2 is added back."""
     z = r * r
     w = z * z
@@ -102,13 +89,14 @@ def _cos_polynomial(r: float) -> float:
 
 
 @inlined
-def _quadrant(s: float, c: float, n: int) -> float:
+def _quadrant(s: Number, c: Number, n: Any) -> Number:
     """Return sin(r + n π/2) from s = sin r and c = cos r."""
-    return _from_bits(_bits(c if n & 1 else s) ^ ((n & 2) << 62))
+    turned: Number = from_bits(to_bits(select((n & 1) != 0, c, s)) ^ ((n & 2) << 62))
+    return turned
 
 
 @inlined
-def sin(x: float) -> float:
+def sin(x: Number) -> Number:
     """Return the sine of x [rad].
 
     Absolute error ≤ 1.3e-16 for |x| ≤ 1.6e6; it grows beyond, and past 1e15 the result means
@@ -119,14 +107,14 @@ def sin(x: float) -> float:
 
 
 @inlined
-def cos(x: float) -> float:
+def cos(x: Number) -> Number:
     """Return the cosine of x [rad]; error and domain as of `sin`."""
     r, n = _reduce(x)
     return _quadrant(_sin_polynomial(r), _cos_polynomial(r), n + 1)
 
 
 @inlined
-def sincos(x: float) -> tuple[float, float]:
+def sincos(x: Number) -> tuple[Number, Number]:
     """Return (sin x, cos x) of x [rad], the same bits as `sin` and `cos` for the price of one."""
     r, n = _reduce(x)
     s, c = _sin_polynomial(r), _cos_polynomial(r)
@@ -143,7 +131,7 @@ def exact_sincos(x: float) -> tuple[float, float]:
     """
     s, c = sincos(x)
     t = x * _TWO_OVER_PI + _ROUND
-    exact, odd = x == (t - _ROUND) * _HALF_PI, _bits(t) & 1
+    exact, odd = x == (t - _ROUND) * _HALF_PI, to_bits(t) & 1
     return (0.0 if exact and odd == 0 else s), (0.0 if exact and odd == 1 else c)
 
 
@@ -180,8 +168,8 @@ def atan2(y: float, x: float) -> float:
     tan(π/8), (a − b)/(a + b) lies within ±tan(π/8): one polynomial and one division serve all
     octants.
     """
-    sign_x = _bits(x) & _SIGN
-    sign_y = _bits(y) & _SIGN
+    sign_x = to_bits(x) & _SIGN
+    sign_y = to_bits(y) & _SIGN
     x = abs(x * 1.0)
     y = abs(y * 1.0)
     steep = y > x
@@ -199,7 +187,7 @@ def atan2(y: float, x: float) -> float:
     k = 1.0 if upper else 0.0  # the angle is k π/4 ± atan t
     k = 2.0 - k if steep else k
     k = 4.0 - k if sign_x != 0 else k
-    t = _from_bits(_bits(t) ^ sign_x)
+    t = from_bits(to_bits(t) ^ sign_x)
     t = -t if steep else t
     z = t * t
     w = z * z
@@ -207,7 +195,8 @@ def atan2(y: float, x: float) -> float:
     even = _A[2] + w * (_A[4] + w * (_A[6] + w * (_A[8] + w * _A[10])))
     p = z * (_A[0] + z * (odd + z * even))
     angle = k * _QUARTER_PI - ((t * p - k * _QUARTER_PI_LO) - t)
-    return _from_bits(_bits(angle) ^ sign_y)
+    signed: float = from_bits(to_bits(angle) ^ sign_y)
+    return signed
 
 
 @inlined
@@ -237,7 +226,8 @@ def asin(x: float) -> float:
     s, excess = _asin_core(x)
     outer = _QUARTER_PI - ((2.0 * excess - 2.0 * _QUARTER_PI_LO) - (_QUARTER_PI - 2.0 * s))
     angle = s + excess if abs(x) <= 0.5 else outer
-    return _from_bits(_bits(angle) ^ (_bits(x) & _SIGN))
+    signed: float = from_bits(to_bits(angle) ^ (to_bits(x) & _SIGN))
+    return signed
 
 
 @inlined
@@ -279,12 +269,12 @@ def log(x: float) -> float:
     It is −inf for ±0, NaN for x < 0, inf for inf.
     """
     tiny = x < 2.0**-1022
-    bits = _bits(x * 2.0**54 if tiny else x * 1.0)
+    bits = to_bits(x * 2.0**54 if tiny else x * 1.0)
     exponent = (
         (bits + (_ONE_BITS - _SQRT_HALF_BITS)) >> 52
     ) & 0x7FF  # biased: x = 2^k (1 + f), 1 + f in [√½, √2)
-    f = _from_bits(bits - ((exponent - 1023) << 52)) - 1.0
-    k = _from_bits(exponent + _ROUND_BITS) - (_ROUND + (1077.0 if tiny else 1023.0))
+    f = from_bits(bits - ((exponent - 1023) << 52)) - 1.0
+    k = from_bits(exponent + _ROUND_BITS) - (_ROUND + (1077.0 if tiny else 1023.0))
     s = f / (2.0 + f)
     z = s * s
     w = z * z
@@ -314,10 +304,11 @@ def exp(x: float) -> float:
     c = r - (z * (_X[0] + w * (_X[2] + w * _X[4])) + w * (_X[1] + w * _X[3]))
     y = 1.0 - ((lo - (r * c) / (2.0 - c)) - hi)
     doubled = (
-        _bits(t) - _ROUND_BITS + 2048
+        to_bits(t) - _ROUND_BITS + 2048
     )  # 2^n in two factors: 2^n itself may overflow or underflow
     first = (doubled >> 1) & 0xFFF
-    return y * _from_bits((first - 1) << 52) * _from_bits((doubled - first - 1) << 52)
+    power: float = y * from_bits((first - 1) << 52) * from_bits((doubled - first - 1) << 52)
+    return power
 
 
 @inlined

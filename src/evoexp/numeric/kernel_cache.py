@@ -55,9 +55,10 @@ class Source(NamedTuple):
 class ContentLocator(caching._CacheLocator):
     """Tells numba where the kernels of a module are kept: a folder named by the module's key."""
 
-    def __init__(self, module: str, py_file: str) -> None:
+    def __init__(self, module: str, py_file: str, code: str) -> None:
         """Name the folder; nothing is written before a kernel is saved."""
         self._py_file = py_file  # numba names it where a function cannot be kept
+        self._code = code
         self._path = cache_root() / "kernels" / module / module_key(module)[:16]
 
     @classmethod
@@ -66,7 +67,7 @@ class ContentLocator(caching._CacheLocator):
         module = py_func.__module__
         if _file_of(module) is None or not _is_ours(module):
             return None
-        return cls(module, py_file)
+        return cls(module, py_file, code_key(py_func))
 
     def get_cache_path(self) -> str:
         """Return the folder."""
@@ -82,8 +83,8 @@ class ContentLocator(caching._CacheLocator):
         return ""
 
     def get_disambiguator(self) -> str:
-        """Return nothing: numba's index tells apart what has one qualified name by its code."""
-        return ""
+        """Return a hash of the code: several functions may have one qualified name."""
+        return self._code
 
 
 class SharedCache(caching.FunctionCache):
@@ -143,6 +144,28 @@ def _spare_blas() -> None:
         importlib.import_module("numba.np.arraymath")
     finally:
         linalg.ensure_blas = look
+
+
+def code_key(function: Any) -> str:
+    """Return a hash of a function's own code: instructions, names and constants.
+
+    Functions in one place of the source, such as two lambdas, share their qualified name. numba
+    tells them apart by their line, which an edit above would change; or by their instructions,
+    which are alike where only a name or a constant differs.
+    """
+    return hashlib.sha256(repr(_code(function.__code__, function.__doc__)).encode()).hexdigest()[
+        :12
+    ]
+
+
+def _code(code: Any, docstring: str | None = None) -> Any:
+    """Return what a code object does as nested tuples, without file, lines and docstring."""
+    constants = [
+        _code(one) if hasattr(one, "co_code") else (type(one).__name__, repr(one))
+        for k, one in enumerate(code.co_consts)
+        if not (k == 0 and docstring is not None and one == docstring)
+    ]
+    return code.co_code, code.co_names, code.co_varnames, constants
 
 
 @functools.cache

@@ -279,48 +279,6 @@ def _place(
                     placed[c + U(n)] = frames[before + c + U(n)]
 
 
-@kernel
-def block_planar_frames(chain: KinematicChain, q: FloatArray, frames: FloatArray) -> None:
-    """Compute the frames of a planar table, each a turn about z and a point of the plane.
-
-    Args:
-        chain: The joints.
-        q: (nq · BLOCK,) [rad].
-        frames: (joints · PLANAR_ROWS · BLOCK,), written: sine and cosine of the angle from the
-            world's x axis, x, y.
-    """
-    for k in range(len(chain.parent)):
-        own, row = U(k) * U(PLANAR_ROWS * BLOCK), U(chain.index_q[k]) * U(BLOCK)
-        dx, dy = chain.translation[k, 0], chain.translation[k, 1]
-        c0, s0 = chain.rotation[k, 0], chain.rotation[k, 3]
-        if chain.parent[k] < 0:  # a joint on the ground
-            for n in range(BLOCK):
-                lane = U(n)
-                s, c = sincos(q[row + lane])
-                frames[own + lane] = s0 * c + c0 * s
-                frames[own + U(BLOCK) + lane] = c0 * c - s0 * s
-            for n in range(BLOCK):
-                frames[own + U(2 * BLOCK) + U(n)] = dx
-                frames[own + U(3 * BLOCK) + U(n)] = dy
-        else:
-            before = U(chain.parent[k]) * U(PLANAR_ROWS * BLOCK)
-            # angles add up
-            for n in range(BLOCK):
-                lane = U(n)
-                s, c = sincos(q[row + lane])
-                s1, c1 = s0 * c + c0 * s, c0 * c - s0 * s
-                sb, cb = frames[before + lane], frames[before + U(BLOCK) + lane]
-                frames[own + lane] = sb * c1 + cb * s1
-                frames[own + U(BLOCK) + lane] = cb * c1 - sb * s1
-            # the origin stands in the parent's frame
-            for n in range(BLOCK):
-                lane = U(n)
-                sb, cb = frames[before + lane], frames[before + U(BLOCK) + lane]
-                x, y = frames[before + U(2 * BLOCK) + lane], frames[before + U(3 * BLOCK) + lane]
-                frames[own + U(2 * BLOCK) + lane] = x + (cb * dx - sb * dy)
-                frames[own + U(3 * BLOCK) + lane] = y + (sb * dx + cb * dy)
-
-
 def _axis(model: Any, data: Any, neutral: FloatArray, joint: int) -> tuple[FloatArray, bool]:
     """Return a joint's axis in its own frame, and whether it slides.
 

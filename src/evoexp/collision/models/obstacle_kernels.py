@@ -5,9 +5,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.numeric.compilation import borrowed, kernel
+from evoexp.numeric.compilation import inlined, kernel
+from evoexp.numeric.vectors import (
+    Vector,
+    any_lane,
+    load,
+    lower,
+    magnitude,
+    root,
+    spread,
+    upper,
+)
 from evoexp.records import FloatArray, IntArray
-from evoexp.robots.kinematics import BLOCK, U
+from evoexp.robots.kinematics import U
+from evoexp.robots.vector_frames import VECTOR
 from evoexp.scenarios.obstacles import (
     BOX,
     CAPSULE,
@@ -17,7 +28,9 @@ from evoexp.scenarios.obstacles import (
     ObstacleTable,
 )
 
-ROWS = 3 * BLOCK  # x, y, z of a point in a block
+POINT = U(3) * VECTOR
+"""Numbers of a point of eight configurations: x, y, z."""
+
 MARGIN = 1.0 + 1e-9  # bounds are widened by it, so that rounding skips no contact
 
 
@@ -39,119 +52,103 @@ class LinkBalls(NamedTuple):
     arm_links: IntArray
 
 
-@kernel
+@inlined
 def meet(one: FloatArray, i: np.uint64, two: FloatArray, j: np.uint64, within: float) -> bool:
-    """Return whether the points at offsets i and j are closer than `within` in any lane."""
-    squared = within * within
-    count = 0
-    for n in range(BLOCK):
-        a, b = i + U(n), j + U(n)
-        dx, dy = one[a] - two[b], one[a + U(BLOCK)] - two[b + U(BLOCK)]
-        dz = one[a + U(2 * BLOCK)] - two[b + U(2 * BLOCK)]
-        count += dx * dx + dy * dy + dz * dz < squared
-    return count > 0
+    """Return whether the points at i and j are closer than `within` in any lane."""
+    x, y = load(one, i) - load(two, j), load(one, i + VECTOR) - load(two, j + VECTOR)
+    z = load(one, i + U(2) * VECTOR) - load(two, j + U(2) * VECTOR)
+    return any_lane(x * x + y * y + z * z < within * within)
 
 
-@kernel
-def _below(
-    rotation: FloatArray, origin: FloatArray, points: FloatArray, i: np.uint64, within: float
+@inlined
+def _near(
+    obstacles: ObstacleTable, o: int, points: FloatArray, i: np.uint64, within: float
 ) -> bool:
-    """Return whether the point at i is lower than `within` above a frame's z = 0 in any lane."""
-    x, y, z = rotation[2], rotation[5], rotation[8]
-    level = x * origin[0] + y * origin[1] + z * origin[2]
-    level += within + (abs(within) + abs(level)) * (MARGIN - 1.0)
-    count = 0
-    for n in range(BLOCK):
-        a = i + U(n)
-        count += x * points[a] + y * points[a + U(BLOCK)] + z * points[a + U(2 * BLOCK)] < level
-    return count > 0
+    """Return whether the point at i is nearer than `within` to the ball around an obstacle.
+
+    Of a half-space: whether the point is lower above its surface, in any lane.
+    """
+    center, rotation, size = obstacles.center[o], obstacles.rotation[o], obstacles.size[o]
+    x, y, z = load(points, i), load(points, i + VECTOR), load(points, i + U(2) * VECTOR)
+    if obstacles.kind[o] == HALF_SPACE:
+        nx, ny, nz = rotation[2], rotation[5], rotation[8]
+        level = nx * center[0] + ny * center[1] + nz * center[2]
+        level += within + (abs(within) + abs(level)) * (MARGIN - 1.0)
+        return any_lane(nx * x + ny * y + nz * z < level)
+    around = _length(size[0], size[1], size[2])
+    if obstacles.kind[o] == CAPSULE:
+        around = size[0] + size[1]
+    reach = (within + around) * MARGIN
+    x, y, z = x - center[0], y - center[1], z - center[2]
+    return any_lane(x * x + y * y + z * z < reach * reach)
 
 
-@kernel
+@inlined
 def to_obstacles(
     obstacles: ObstacleTable,
     bounds: LinkBalls,
     limit: float,
     centers: FloatArray,
     middles: FloatArray,
-    scratch: FloatArray,
-    place: FloatArray,
-    out: FloatArray,
-) -> None:
-    """Lower `out` to the least signed distance of a centre from an obstacle's surface.
+) -> Vector:
+    """Return the least signed distance of a centre from an obstacle's surface, at most the limit.
 
     Args:
         obstacles: The obstacles.
         bounds: Balls around the spheres of each link.
         limit: Above it nothing is measured [length unit].
-        centers: (spheres · ROWS,) centres of the spheres.
-        middles: (links · ROWS,) centres of the balls.
-        scratch: (≥ ROWS,).
-        place: (ROWS,) scratch.
-        out: (BLOCK,), lowered.
+        centers: (spheres · POINT,) centres of the spheres.
+        middles: (links · POINT,) centres of the balls.
     """
-    bounds, obstacles = borrowed((bounds, obstacles))
     reach, spheres = bounds.radius, bounds.spheres
-    kind, center, rotation = obstacles.kind, obstacles.center, obstacles.rotation
-    size = obstacles.size
-    centers, middles, scratch, place, out = borrowed((centers, middles, scratch, place, out))
-    for o in range(len(kind)):
-        for row in range(3):
-            place[row * BLOCK : (row + 1) * BLOCK] = center[o, row]
-        extent = (
-            size[o, 0] + size[o, 1]
-            if kind[o] == CAPSULE
-            else _length(size[o, 0], size[o, 1], size[o, 2])
-        )
+    least = spread(limit)
+    for o in range(len(obstacles.kind)):
+        kind, size = obstacles.kind[o], obstacles.size[o]
+        center, rotation = obstacles.center[o], obstacles.rotation[o]
         for link in range(len(reach)):
             # the ball around the link decides whether its spheres are measured
-            at, within = U(link) * U(ROWS), limit + reach[link]
-            if kind[o] == HALF_SPACE:
-                near = _below(rotation[o], center[o], middles, at, within)
-            else:
-                near = meet(middles, at, place, U(0), (within + extent) * MARGIN)
-            if near:
-                for i in range(spheres[link, 0], spheres[link, 1]):
-                    _into_frame(center[o], rotation[o], centers, U(i) * U(ROWS), scratch)
-                    _to_obstacle(kind[o], size[o, 0], size[o, 1], size[o, 2], scratch, out)
+            if _near(obstacles, o, middles, U(link) * POINT, limit + reach[link]):
+                for k in range(spheres[link, 0], spheres[link, 1]):
+                    x, y, z = _seen_from(center, rotation, centers, U(k) * POINT)
+                    least = lower(least, _distance(kind, size[0], size[1], size[2], x, y, z))
+    return least
 
 
-@kernel
-def _to_obstacle(
-    kind: int, a: float, b: float, c: float, point: FloatArray, out: FloatArray
-) -> None:
-    """Lower `out` to the signed distance of points in an obstacle's frame to its surface."""
-    for n in range(BLOCK):
-        lane = U(n)
-        x, y, z = point[lane], point[U(BLOCK) + lane], point[U(2 * BLOCK) + lane]
-        if kind == SPHERE:
-            distance = _length(x, y, z) - a
-        elif kind == BOX:
-            u, v, w = abs(x) - a, abs(y) - b, abs(z) - c
-            distance = _length(max(u, 0.0), max(v, 0.0), max(w, 0.0)) + min(max(u, max(v, w)), 0.0)
-        elif kind == CAPSULE:
-            distance = _length(x, y, z - min(max(z, -b), b)) - a
-        elif kind == CYLINDER:
-            u, v = np.sqrt(x * x + y * y) - a, abs(z) - b
-            distance = _length(max(u, 0.0), max(v, 0.0), 0.0) + min(max(u, v), 0.0)
-        else:
-            distance = z
-        out[lane] = min(out[lane], distance)
+@inlined
+def _distance(kind: int, a: float, b: float, c: float, x: Vector, y: Vector, z: Vector) -> Vector:
+    """Return the signed distance of points in an obstacle's frame to its surface."""
+    nothing = spread(0.0)
+    distance = z  # of a half-space
+    if kind == SPHERE:
+        distance = root(x * x + y * y + z * z) - a
+    elif kind == BOX:
+        u, v, w = magnitude(x) - a, magnitude(y) - b, magnitude(z) - c
+        inner = lower(upper(u, upper(v, w)), nothing)
+        u, v, w = upper(u, nothing), upper(v, nothing), upper(w, nothing)
+        distance = root(u * u + v * v + w * w) + inner
+    elif kind == CAPSULE:
+        along = z - lower(upper(z, spread(-b)), spread(b))
+        distance = root(x * x + y * y + along * along) - a
+    elif kind == CYLINDER:
+        u, v = root(x * x + y * y) - a, magnitude(z) - b
+        inner = lower(upper(u, v), nothing)
+        u, v = upper(u, nothing), upper(v, nothing)
+        distance = root(u * u + v * v) + inner
+    return distance
 
 
-@kernel
-def _into_frame(
-    center: FloatArray, rotation: FloatArray, centers: FloatArray, i: np.uint64, out: FloatArray
-) -> None:
-    """Write the centres at offset i as seen from a frame, (ROWS,)."""
-    cx, cy, cz = center[0], center[1], center[2]
-    for row in range(3):
-        a, b, c, e = rotation[row], rotation[3 + row], rotation[6 + row], U(row * BLOCK)
-        for n in range(BLOCK):
-            lane = i + U(n)
-            x, y = centers[lane] - cx, centers[lane + U(BLOCK)] - cy
-            z = centers[lane + U(2 * BLOCK)] - cz
-            out[e + U(n)] = a * x + b * y + c * z
+@inlined
+def _seen_from(
+    center: FloatArray, rotation: FloatArray, centers: FloatArray, i: np.uint64
+) -> tuple[Vector, Vector, Vector]:
+    """Return the point at i as seen from a frame."""
+    x, y = load(centers, i) - center[0], load(centers, i + VECTOR) - center[1]
+    z = load(centers, i + U(2) * VECTOR) - center[2]
+    return (
+        rotation[0] * x + rotation[3] * y + rotation[6] * z,
+        rotation[1] * x + rotation[4] * y + rotation[7] * z,
+        rotation[2] * x + rotation[5] * y + rotation[8] * z,
+    )
 
 
 @kernel

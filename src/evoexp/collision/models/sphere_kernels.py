@@ -1,30 +1,35 @@
 """Kernels of touching spheres: least distances of whole batches of configurations.
 
-One kernel runs a block of configurations through forward kinematics, sphere centres, all pairs of
-spheres of different arms and all obstacles; the configuration is innermost. The arithmetic of the
-pairs limits the speed: per pair six operations in the plane and nine in space, on values that stay
-in the first-level cache; square roots are taken once per pair of arms, of the least squared
-distance. A caller that only asks for collisions (`limit` 0) is spared the pairs of links that are
-far apart in a whole block.
+Eight configurations at a time go through forward kinematics, sphere centres, all pairs of spheres
+of different arms and all obstacles, as vectors (`numeric.vectors`) that stay in registers or in the
+first-level cache. The arithmetic of the pairs limits the speed: six operations in the plane and
+nine in space; square roots are taken once per pair of arms, of the least squared distance. A caller
+that only asks for collisions (`limit` 0) is spared the pairs of links that are far apart in all
+eight configurations.
 """
 
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.obstacle_kernels import MARGIN, ROWS, LinkBalls, meet, to_obstacles
-from evoexp.numeric.compilation import borrowed, kernel
+from evoexp.collision.models.obstacle_kernels import (
+    MARGIN,
+    POINT,
+    LinkBalls,
+    meet,
+    to_obstacles,
+)
+from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.elementary import DEGREE
+from evoexp.numeric.vectors import LANES, Vector, load, lower, root, spread, store
 from evoexp.records import FloatArray, IntArray
-from evoexp.robots.kinematics import (
-    BLOCK,
-    PLANAR_ROWS,
-    SPATIAL_ROWS,
-    KinematicChain,
-    U,
-    block_frames,
-    block_planar_frames,
-    load_block,
+from evoexp.robots.kinematics import KinematicChain, U
+from evoexp.robots.vector_frames import (
+    PLANAR_FRAME,
+    SPATIAL_FRAME,
+    VECTOR,
+    planar_frames,
+    spatial_frames,
 )
 from evoexp.scenarios.obstacles import ObstacleTable
 
@@ -65,27 +70,21 @@ class SphereTables(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """Scratch for one block of configurations.
+    """Scratch for eight configurations.
 
     Attributes:
-        q: (nq · BLOCK,).
-        frames: (joints · SPATIAL_ROWS · BLOCK,).
-        centers: (spheres · ROWS,) of the spheres.
-        middles: (links · ROWS,) of the balls around links.
-        scratch: (SPATIAL_ROWS · BLOCK,).
-        place: (ROWS,).
-        between: (BLOCK,) least distance of centres of two arms.
-        outside: (BLOCK,) least distance of a centre from an obstacle.
+        q: (nq · LANES,) the last ones of a batch, padded.
+        frames: (joints · SPATIAL_FRAME,).
+        centers: (spheres · POINT,) of the spheres.
+        middles: (links · POINT,) of the balls around links.
+        out: (2 · LANES,) results of the last ones.
     """
 
     q: FloatArray
     frames: FloatArray
     centers: FloatArray
     middles: FloatArray
-    scratch: FloatArray
-    place: FloatArray
-    between: FloatArray
-    outside: FloatArray
+    out: FloatArray
 
 
 @kernel
@@ -95,8 +94,8 @@ def clearances(tables: tuple[Any, ...], limit: float, q: FloatArray, out: FloatA
     Args:
         tables: `SphereCollision.tables`: fields of `SphereTables` as plain tuples.
         limit: Above it no clearance is measured [length unit].
-        q: (nq, configurations) [deg].
-        out: (2, configurations), written: between arms, to obstacles.
+        q: (nq, configurations) [deg], contiguous.
+        out: (2, configurations), contiguous, written: between arms, to obstacles.
     """
     chain, space, spheres, bounds, obstacles = tables
     named = SphereTables(
@@ -107,48 +106,76 @@ def clearances(tables: tuple[Any, ...], limit: float, q: FloatArray, out: FloatA
         ObstacleTable(*obstacles),
     )
     memory = Memory(
-        np.zeros(q.shape[0] * BLOCK),
-        np.empty(len(named.chain.parent) * SPATIAL_ROWS * BLOCK),
-        np.empty(len(named.spheres.joint) * ROWS),
-        np.empty(len(named.bounds.joint) * ROWS),
-        np.empty(SPATIAL_ROWS * BLOCK),
-        np.empty(ROWS),
-        np.empty(BLOCK),
-        np.empty(BLOCK),
+        np.zeros(q.shape[0] * LANES),
+        np.empty(U(len(named.chain.parent)) * SPATIAL_FRAME),
+        np.empty(U(len(named.spheres.joint)) * POINT),
+        np.empty(U(len(named.bounds.joint)) * POINT),
+        np.empty(2 * LANES),
     )
-    _clearances(named, limit, q, out, memory)
+    _clearances(named, limit, q.reshape(-1), q.shape[1], out.reshape(-1), memory)
 
 
 @kernel
 def _clearances(
-    tables: SphereTables, limit: float, q: FloatArray, out: FloatArray, memory: Memory
+    tables: SphereTables, limit: float, q: FloatArray, count: int, out: FloatArray, memory: Memory
 ) -> None:
     """Do the work of `clearances` in given memory, so that inner loops count no references."""
     tables, q, out, memory = borrowed((tables, q, out, memory))
+    _heights(tables.space, tables.chain, tables.spheres.joint, tables.spheres.local, memory.centers)
+    _heights(tables.space, tables.chain, tables.bounds.joint, tables.bounds.local, memory.middles)
     chain, space, obstacles = tables.chain, tables.space, tables.obstacles
     spheres, bounds, radius = tables.spheres, tables.bounds, tables.spheres.radius
-    centers, middles, scratch = memory.centers, memory.middles, memory.scratch
-    between, outside = memory.between, memory.outside
-    _heights(space, chain, spheres.joint, spheres.local, centers)
-    _heights(space, chain, bounds.joint, bounds.local, middles)
-    for first in range(0, q.shape[1], BLOCK):
-        count = min(BLOCK, q.shape[1] - first)
+    frames, centers, middles = memory.frames, memory.centers, memory.middles
+    most = max(limit + 2.0 * radius, 0.0)
+    for first in range(0, count, LANES):
+        # the last ones, if they are fewer than eight, are copied and padded
+        whole = first + LANES <= count
+        if not whole:
+            _copy(q, first, count, count - first, memory.q, 0, LANES)
+        angles, place, stride = (q, U(first), U(count)) if whole else (memory.q, U(0), VECTOR)
         # frames of the joints, centres of the spheres and of the balls around links
-        load_block(q, first, count, DEGREE, memory.q)
-        _frames(space, chain, memory.q, memory.frames, scratch)
-        _centers(space, spheres.joint, spheres.local, memory.frames, centers)
-        _centers(space, bounds.joint, bounds.local, memory.frames, middles)
+        if space is None:
+            planar_frames(chain, angles, place, stride, DEGREE, frames)
+            _planar_centers(spheres.joint, spheres.local, frames, centers)
+            _planar_centers(bounds.joint, bounds.local, frames, middles)
+        else:
+            spatial_frames(chain, angles, place, stride, DEGREE, frames)
+            _spatial_centers(spheres.joint, spheres.local, frames, centers)
+            _spatial_centers(bounds.joint, bounds.local, frames, middles)
         # pairs of arms, then obstacles
-        most = max(limit + 2.0 * radius, 0.0)
-        _between_arms(space, bounds, most, centers, middles, scratch, between)
-        outside[:] = limit + radius
-        if len(obstacles.kind) > 0:
-            to_obstacles(
-                obstacles, bounds, limit + radius, centers, middles, scratch, memory.place, outside
-            )
-        for lane in range(count):
-            out[0, first + lane] = between[lane] - 2.0 * radius
-            out[1, first + lane] = outside[lane] - radius
+        between = _between_arms(space, bounds, most, centers, middles) - 2.0 * radius
+        outside = to_obstacles(obstacles, bounds, limit + radius, centers, middles) - radius
+        found = out if whole else memory.out
+        store(found, place, between)
+        store(found, place + stride, outside)
+        if not whole:
+            _copy(memory.out, 0, LANES, count - first, out, first, count)
+
+
+@kernel
+def _copy(
+    source: FloatArray,
+    place: int,
+    stride: int,
+    count: int,
+    target: FloatArray,
+    target_place: int,
+    target_stride: int,
+) -> None:
+    """Copy some neighbours of every row of one flat array to another.
+
+    Args:
+        source: Rows of `stride` numbers.
+        place: Of the first neighbour in a row.
+        stride: Of the source.
+        count: How many neighbours.
+        target: Rows of `target_stride` numbers, written.
+        target_place: Of the first neighbour in a row of the target.
+        target_stride: Of the target.
+    """
+    for row in range(len(source) // stride):
+        for n in range(count):
+            target[row * target_stride + target_place + n] = source[row * stride + place + n]
 
 
 @kernel
@@ -162,160 +189,122 @@ def _heights(
             while j >= 0:
                 height += chain.translation[j, 2]
                 j = chain.parent[j]
-            centers[k * ROWS + 2 * BLOCK : (k + 1) * ROWS] = height
+            store(centers, U(k) * POINT + U(2) * VECTOR, spread(height))
 
 
-@kernel
-def _frames(
-    space: Space, chain: KinematicChain, q: FloatArray, frames: FloatArray, scratch: FloatArray
-) -> None:
-    if space is None:
-        block_planar_frames(chain, q, frames)
-    else:
-        block_frames(chain, q, frames, scratch)
-
-
-@kernel
-def _centers(
-    space: Space, joint: IntArray, local: FloatArray, frames: FloatArray, centers: FloatArray
-) -> None:
-    if space is None:
-        _planar_centers(joint, local, frames, centers)
-    else:
-        _spatial_centers(joint, local, frames, centers)
-
-
-@kernel
+@inlined
 def _planar_centers(
     joint: IntArray, local: FloatArray, frames: FloatArray, centers: FloatArray
 ) -> None:
     for k in range(len(joint)):
-        own, j = U(k) * U(ROWS), U(joint[k]) * U(PLANAR_ROWS * BLOCK)
+        own, j = U(k) * POINT, U(joint[k]) * PLANAR_FRAME
         x, y = local[k, 0], local[k, 1]
-        for n in range(BLOCK):
-            lane = U(n)
-            s, c = frames[j + lane], frames[j + U(BLOCK) + lane]
-            centers[own + lane] = frames[j + U(2 * BLOCK) + lane] + (c * x - s * y)
-            centers[own + U(BLOCK) + lane] = frames[j + U(3 * BLOCK) + lane] + (s * x + c * y)
+        s, c = load(frames, j), load(frames, j + VECTOR)
+        store(centers, own, load(frames, j + U(2) * VECTOR) + (c * x - s * y))
+        store(centers, own + VECTOR, load(frames, j + U(3) * VECTOR) + (s * x + c * y))
 
 
-@kernel
+@inlined
 def _spatial_centers(
     joint: IntArray, local: FloatArray, frames: FloatArray, centers: FloatArray
 ) -> None:
     for k in range(len(joint)):
-        own, j = U(k) * U(ROWS), U(joint[k]) * U(SPATIAL_ROWS * BLOCK)
+        own, j = U(k) * POINT, U(joint[k]) * SPATIAL_FRAME
         x, y, z = local[k, 0], local[k, 1], local[k, 2]
-        for n in range(BLOCK):
-            lane = U(n)
-            for row in range(3):
-                a, o = j + U(3 * row * BLOCK) + lane, j + U((9 + row) * BLOCK) + lane
-                centers[own + U(row * BLOCK) + lane] = frames[o] + (
-                    frames[a] * x + frames[a + U(BLOCK)] * y + frames[a + U(2 * BLOCK)] * z
-                )
+        for row in range(3):
+            a, o = j + U(3 * row) * VECTOR, j + U(9 + row) * VECTOR
+            turned = (
+                load(frames, a) * x
+                + load(frames, a + VECTOR) * y
+                + load(frames, a + U(2) * VECTOR) * z
+            )
+            store(centers, own + U(row) * VECTOR, load(frames, o) + turned)
 
 
-@kernel
+@inlined
 def _between_arms(
-    space: Space,
-    bounds: LinkBalls,
-    limit: float,
-    centers: FloatArray,
-    middles: FloatArray,
-    least: FloatArray,
-    out: FloatArray,
-) -> None:
-    """Write the least centre distance over all pairs of arms (BLOCK,), at most the limit."""
-    bounds, centers, middles, least, out = borrowed((bounds, centers, middles, least, out))
+    space: Space, bounds: LinkBalls, limit: float, centers: FloatArray, middles: FloatArray
+) -> Vector:
+    """Return the least centre distance over all pairs of arms, at most the limit."""
     reach, spheres, arm_links = bounds.radius, bounds.spheres, bounds.arm_links
-    out[:] = limit
+    best = spread(limit)
     for a in range(len(arm_links)):
         for b in range(a + 1, len(arm_links)):
-            least[:BLOCK] = limit * limit
+            least = spread(limit * limit)
             for one in range(arm_links[a, 0], arm_links[a, 1]):
                 for two in range(arm_links[b, 0], arm_links[b, 1]):
                     # the balls around both links
                     within = (limit + reach[one] + reach[two]) * MARGIN
-                    if not meet(middles, U(one) * U(ROWS), middles, U(two) * U(ROWS), within):
-                        continue
-                    first, stop = U(spheres[two, 0]), U(spheres[two, 1])
-                    for i in range(spheres[one, 0], spheres[one, 1]):
-                        _pairs(space, centers, U(i) * U(ROWS), first, stop, least)
+                    if meet(middles, U(one) * POINT, middles, U(two) * POINT, within):
+                        first, stop = U(spheres[two, 0]), U(spheres[two, 1])
+                        i, end = U(spheres[one, 0]), U(spheres[one, 1])
+                        while i < end:
+                            if i + U(3) < end:  # four of them are held in registers
+                                least = _nearest_to_four(space, centers, i, first, stop, least)
+                                i += U(4)
+                            else:
+                                least = _nearest(space, centers, i, first, stop, least)
+                                i += U(1)
             # one square root per pair of arms
-            for n in range(BLOCK):
-                distance, best = np.sqrt(least[U(n)]), out[U(n)]
-                out[U(n)] = distance if distance < best else best
+            best = lower(best, root(least))
+    return best
 
 
-@kernel
-def _pairs(
+@inlined
+def _nearest(
     space: Space,
     centers: FloatArray,
     i: np.uint64,
     first: np.uint64,
     stop: np.uint64,
-    least: FloatArray,
-) -> None:
+    least: Vector,
+) -> Vector:
+    """Return the least squared distance of sphere i from spheres first … stop − 1."""
+    x, y, z = _center(space, centers, i)
+    for j in range(first, stop):
+        least = lower(least, _squared(space, x, y, z, *_center(space, centers, U(j))))
+    return least
+
+
+@inlined
+def _nearest_to_four(
+    space: Space,
+    centers: FloatArray,
+    i: np.uint64,
+    first: np.uint64,
+    stop: np.uint64,
+    least: Vector,
+) -> Vector:
+    """Return the least squared distance of spheres i … i + 3 from spheres first … stop − 1."""
+    ax, ay, az = _center(space, centers, i)
+    bx, by, bz = _center(space, centers, i + U(1))
+    cx, cy, cz = _center(space, centers, i + U(2))
+    dx, dy, dz = _center(space, centers, i + U(3))
+    a, b, c, d = least, least, least, least
+    for j in range(first, stop):
+        x, y, z = _center(space, centers, U(j))
+        a = lower(a, _squared(space, ax, ay, az, x, y, z))
+        b = lower(b, _squared(space, bx, by, bz, x, y, z))
+        c = lower(c, _squared(space, cx, cy, cz, x, y, z))
+        d = lower(d, _squared(space, dx, dy, dz, x, y, z))
+    return lower(lower(a, b), lower(c, d))
+
+
+@inlined
+def _center(space: Space, centers: FloatArray, k: np.uint64) -> tuple[Vector, Vector, Vector]:
+    """Return a sphere's centre; in the plane its height is not looked at."""
+    own = k * POINT
+    x, y = load(centers, own), load(centers, own + VECTOR)
+    return x, y, x if space is None else load(centers, own + U(2) * VECTOR)
+
+
+@inlined
+def _squared(
+    space: Space, ax: Vector, ay: Vector, az: Vector, bx: Vector, by: Vector, bz: Vector
+) -> Vector:
+    """Return the squared distance of two points."""
+    x, y = ax - bx, ay - by
     if space is None:
-        _planar_pairs(centers, i, first, stop, least)
-    else:
-        _spatial_pairs(centers, i, first, stop, least)
-
-
-@kernel
-def _planar_pairs(
-    centers: FloatArray, i: np.uint64, first: np.uint64, stop: np.uint64, least: FloatArray
-) -> None:
-    """Lower `least` to the squared distances of the sphere at i from the spheres first … stop − 1.
-
-    Four of them are held in registers at a time.
-    """
-    j = first
-    while j + U(4) <= stop:
-        for n in range(BLOCK):
-            lane = U(n)
-            x, y, best = centers[i + lane], centers[i + U(BLOCK) + lane], least[lane]
-            for t in range(4):
-                k = j * U(ROWS) + U(t * ROWS) + lane
-                dx, dy = x - centers[k], y - centers[k + U(BLOCK)]
-                squared = dx * dx + dy * dy
-                best = squared if squared < best else best
-            least[lane] = best
-        j += U(4)
-    while j < stop:
-        for n in range(BLOCK):
-            lane, k = U(n), j * U(ROWS) + U(n)
-            dx = centers[i + lane] - centers[k]
-            dy = centers[i + U(BLOCK) + lane] - centers[k + U(BLOCK)]
-            squared, best = dx * dx + dy * dy, least[lane]
-            least[lane] = squared if squared < best else best
-        j += U(1)
-
-
-@kernel
-def _spatial_pairs(
-    centers: FloatArray, i: np.uint64, first: np.uint64, stop: np.uint64, least: FloatArray
-) -> None:
-    j = first
-    while j + U(4) <= stop:
-        for n in range(BLOCK):
-            lane, best = U(n), least[U(n)]
-            x, y = centers[i + lane], centers[i + U(BLOCK) + lane]
-            z = centers[i + U(2 * BLOCK) + lane]
-            for t in range(4):
-                k = j * U(ROWS) + U(t * ROWS) + lane
-                dx, dy = x - centers[k], y - centers[k + U(BLOCK)]
-                dz = z - centers[k + U(2 * BLOCK)]
-                squared = dx * dx + dy * dy + dz * dz
-                best = squared if squared < best else best
-            least[lane] = best
-        j += U(4)
-    while j < stop:
-        for n in range(BLOCK):
-            lane, k = U(n), j * U(ROWS) + U(n)
-            dx = centers[i + lane] - centers[k]
-            dy = centers[i + U(BLOCK) + lane] - centers[k + U(BLOCK)]
-            dz = centers[i + U(2 * BLOCK) + lane] - centers[k + U(2 * BLOCK)]
-            squared, best = dx * dx + dy * dy + dz * dz, least[lane]
-            least[lane] = squared if squared < best else best
-        j += U(1)
+        return x * x + y * y
+    z = az - bz
+    return x * x + y * y + z * z

@@ -159,7 +159,7 @@ def code_key(function: Any) -> str:
 
 
 def _code(code: Any, docstring: str | None = None) -> Any:
-    """Return what a code object does as nested tuples, without file, lines and docstring."""
+    """Return instructions, names and constants of a code object, without its docstring."""
     constants = [
         _code(one) if hasattr(one, "co_code") else (type(one).__name__, repr(one))
         for k, one in enumerate(code.co_consts)

@@ -18,6 +18,8 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, TypeVar
 
+from evoexp.numeric.kernel_cache import cache_root
+
 Result = TypeVar("Result")
 
 SECONDS = 20.0  # [CPU s] a hostile example takes far less
@@ -108,7 +110,13 @@ def _attempt(task: Callable[[], Any], folder: Path, memory_mb: int) -> tuple[Any
 
 def _watcher(folder: Path, deeds: list[str]) -> Callable[[str, tuple[Any, ...]], None]:
     """Return an audit hook that notes deeds which data must not bring about."""
-    allowed = (str(folder.resolve()), tempfile.gettempdir() + "/tmp", "/dev/null")  # `tempfile`'s
+    cache = str(cache_root().resolve())
+    allowed = (
+        str(folder.resolve()),
+        cache,
+        tempfile.gettempdir() + "/tmp",
+        "/dev/null",
+    )  # `tempfile`'s
 
     def watch(event: str, arguments: tuple[Any, ...]) -> None:
         if event in _FORBIDDEN:

@@ -14,6 +14,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from evoexp.errors import EvoexpError, SettingError
+from evoexp.input_files import read_bounded
 from evoexp.validation import Settings
 
 FILE, SHA256 = "file", "sha256"
@@ -102,7 +103,7 @@ def read(path: str, folders: Sequence[Path]) -> str:
     """
     places = [Path(path), *(folder / path for folder in folders)]
     found = next((place for place in places if place.exists()), Path(path))
-    sha256 = keep(found.read_bytes())
+    sha256 = keep(read_bounded(found))
     _origins.setdefault(sha256, set()).add(path)
     return sha256
 

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 from evoexp.commands.command_parser import COMMANDS, command_module, command_parser, whole_parser
 from evoexp.commands.damage_lines import damage_in_lines
-from evoexp.errors import EvoexpError
+from evoexp.errors import EvoexpError, printable
 
 WITH_WORKERS = ("run", "reproduce")
 
@@ -38,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             stack.enter_context(damage_in_lines())
             return int(command_module(chosen).main(given))
     except EvoexpError as error:
-        print(f"evoexp: {' '.join(str(error).split())}", file=sys.stderr)
+        print(f"evoexp: {printable(' '.join(str(error).split()))}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print(

@@ -14,6 +14,19 @@ class EvoexpError(Exception):
     """Base of everything that evoexp raises on purpose."""
 
 
+def printable(text: str) -> str:
+    """Return a text in which nothing steers a terminal: control characters are spelt out.
+
+    Names and reasons may come from somebody else's log. Ends of lines stay.
+    """
+    if text.replace("\n", "").isprintable():
+        return text
+    return "".join(
+        sign if sign.isprintable() or sign == "\n" else sign.encode("unicode_escape").decode()
+        for sign in text
+    )
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """Return `; did you mean 'x'?` for the closest known name, an empty string if none is close."""
     matches = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6)

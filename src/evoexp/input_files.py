@@ -60,7 +60,7 @@ def read_npy(content: bytes) -> NDArray[Any]:
         ValueError: If the bytes are no such file, in one line.
     """
     if content[:6] != _NPY or len(content) < 12:
-        raise ValueError("it does not begin as a .npy file")
+        raise ValueError("it does not begin as one")
     width = 2 if content[6] == 1 else 4
     start = 8 + width
     length = int.from_bytes(content[8:start], "little")

@@ -9,6 +9,9 @@ from typing import Any
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
+
+from evoexp.errors import printable
 
 PIPED_WIDTH = 160  # columns of a table in a pipe, where nobody has to read it on a narrow screen
 
@@ -19,6 +22,10 @@ class _Console(Console):
     The command does the rest of its work, and its exit code is the same.
     """
 
+    def render_str(self, text: str, **look: Any) -> Text:
+        """Render a text as it is, its control characters made visible."""
+        return super().render_str(printable(text), **look)
+
     def on_broken_pipe(self) -> None:
         self.quiet = True
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -27,7 +34,14 @@ class _Console(Console):
 def plain_console() -> Console:
     """Return a console on stdout that prints text as it is: a label like `[4, 4]` is no markup."""
     piped = not sys.stdout.isatty() and "COLUMNS" not in os.environ
-    return _Console(markup=False, highlight=False, width=PIPED_WIDTH if piped else None)
+    return _Console(
+        markup=False, emoji=False, highlight=False, width=PIPED_WIDTH if piped else None
+    )
+
+
+def coloured(text: str, colour: str = "") -> Text:
+    """Return a text for a cell, in a colour, its control characters made visible."""
+    return Text(printable(text), colour)
 
 
 def new_table(title: str = "") -> Table:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TextIO
 
-from evoexp.errors import DamagedStore
+from evoexp.errors import DamagedStore, printable
 
 
 @contextmanager
@@ -28,7 +28,7 @@ def damage_in_lines() -> Iterator[None]:
                 shown(message, category, filename, lineno, file, line)
             elif (text := " ".join(str(message).split())) not in said:
                 said.add(text)
-                print(f"evoexp: {text}", file=sys.stderr)
+                print(f"evoexp: {printable(text)}", file=sys.stderr)
 
         warnings.simplefilter("always", DamagedStore)
         warnings.showwarning = show

@@ -11,11 +11,14 @@ import numpy as np
 from evoexp.commands.arguments import is_override
 from evoexp.condition import Condition
 from evoexp.configuration import expansions
-from evoexp.errors import MotionFileError
+from evoexp.errors import MotionFileError, printable
+from evoexp.input_files import MEGABYTE, read_bounded, read_npy
 from evoexp.records import FloatArray
 
 ENDINGS = (".json", ".npy")
-LARGEST = float(np.finfo(np.float64).max)
+LARGEST = 1e7  # as of the numbers of robots and scenarios, in any unit
+MAX_MOTION = 8 * MEGABYTE
+MOST_VALUES = 200_000  # numbers of a motion; the longest of a shipped experiment has 4,000
 MAX_DEPTH = 16  # nested lists; no planner's shape comes near
 
 
@@ -95,18 +98,19 @@ def read_motion(path: Path) -> Any:
             numbers.
     """
     try:
-        if path.suffix == ".npy":
-            with open(path, "rb") as file:
-                values: Any = np.lib.format.read_array(file, allow_pickle=False).tolist()
-        elif path.suffix == ".json":
-            values = json.loads(path.read_text())
-        else:
+        if path.suffix not in ENDINGS:
             raise MotionFileError(f"{path}: a motion file ends in .json or .npy")
+        content = read_bounded(path, MAX_MOTION)
+        is_array = path.suffix == ".npy"
+        values: Any = read_npy(content).tolist() if is_array else json.loads(content.decode())
     except OSError as error:
         raise MotionFileError(f"{path}: cannot be read: {error.strerror or error}") from None
     except (ValueError, EOFError, RecursionError, MemoryError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise MotionFileError(f"{path}: is no {path.suffix[1:]} of numbers: {reason}") from None
+    if (count := _num_values(values)) > MOST_VALUES:
+        must = f"{path}: must hold at most {MOST_VALUES:,} numbers"
+        raise MotionFileError(f"{must}, was {count:,}")
     if wrong := _not_finite(values, ""):
         raise MotionFileError(f"{path}: must hold nested lists of finite numbers, {wrong}")
     return values
@@ -152,11 +156,25 @@ def _shape_of(values: Any) -> str:
         return f"a ragged list of {len(values)}"
 
 
+def _num_values(values: Any) -> int:
+    """Return how many numbers and lists there are in nested lists, however deep."""
+    count, lists = 0, [values] if isinstance(values, list) else []
+    while lists:
+        inner = lists.pop()
+        count += len(inner)
+        lists += [value for value in inner if isinstance(value, list)]
+    return count
+
+
 def _not_finite(values: Any, place: str) -> str:
     """Return the first entry that is no finite number, and its place; nothing if there is none."""
     if isinstance(values, list) and place.count("[") <= MAX_DEPTH:
         found = (_not_finite(value, f"{place}[{k}]") for k, value in enumerate(values))
         return next(filter(None, found), "")
-    if place and type(values) in (int, float) and abs(values) < math.inf and abs(values) <= LARGEST:
-        return ""
-    return f"was {str(values)[:40]} at {place or 'its top'}"
+    if place and type(values) in (int, float) and abs(values) < math.inf:
+        return "" if abs(values) <= LARGEST else f"of at most {LARGEST:g}, {_was(values, place)}"
+    return _was(values, place)
+
+
+def _was(values: Any, place: str) -> str:
+    return f"was {printable(str(values)[:40])} at {place or 'its top'}"

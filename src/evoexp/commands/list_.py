@@ -5,20 +5,20 @@ from typing import Any
 
 import numpy as np
 from rich.table import Table
-from rich.text import Text
 
 from evoexp import shipped
 from evoexp.commands.arguments import add_config_dir_argument
 from evoexp.commands.console import (
     add_columns,
     add_hash_column,
+    coloured,
     new_table,
     plain_console,
     print_json,
 )
 from evoexp.commands.hashes import stored_runs
 from evoexp.configuration.search_path import description, find, options
-from evoexp.errors import EvoexpError
+from evoexp.errors import EvoexpError, printable
 from evoexp.store.damage import listed
 from evoexp.store.mending import damaged_files
 from evoexp.store.run_directory import RunDirectory, outputs_root
@@ -114,15 +114,15 @@ def _run_table(runs: list[dict[str, Any]]) -> Table:
     add_columns(table, "done", "failed", "solved", "median\nbest cost", right=True)
     for run in runs:
         if run["done"] is None:
-            table.add_row(run["hash"][:12], Text(run["damage"], "red"), "–", "–", "–", "–")
+            table.add_row(run["hash"][:12], coloured(run["damage"], "red"), "–", "–", "–", "–")
             continue
         names = [run[name] or "?" for name in ("experiment", "label", "budget")]
         known = any(run[name] for name in ("experiment", "label", "budget"))
         text = ", ".join(names) + (" (changed)" if run["changed"] else "")
         cost = run["median_best_cost"]
-        named = Text(text if known else "(no manifest)")
+        named = coloured(text if known else "(no manifest)")
         if run["damage"]:
-            named.append(f" · {run['damage']}", "red")
+            named.append(printable(f" · {run['damage']}"), "red")
         table.add_row(
             run["hash"][:12],
             named,

@@ -16,6 +16,7 @@ from evoexp.errors import (
     RevisionMismatch,
     SettingError,
     UnknownHash,
+    printable,
 )
 from evoexp.playback.recording import Heading, Recording, record
 from evoexp.playback.stored import CHOICES, chosen_log, stored_recording
@@ -113,7 +114,9 @@ def write(path: Path, content: bytes) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     write_file(path, content)
     size = len(content) / 1000
-    print(f"{path}  ({f'{size / 1000:.2f} MB' if size >= 1000 else f'{size:.0f} kB'})")
+    print(
+        f"{printable(str(path))}  ({f'{size / 1000:.2f} MB' if size >= 1000 else f'{size:.0f} kB'})"
+    )
 
 
 def speed_limits(arguments: argparse.Namespace) -> SpeedLimits:

@@ -21,7 +21,13 @@ from evoexp.batch.reproduction import (
     same_fingerprint,
 )
 from evoexp.batch.workers import in_workers, num_cores
-from evoexp.commands.console import add_columns, add_hash_column, new_table, plain_console
+from evoexp.commands.console import (
+    add_columns,
+    add_hash_column,
+    coloured,
+    new_table,
+    plain_console,
+)
 from evoexp.commands.hashes import with_candidates
 from evoexp.configuration import expansions
 from evoexp.errors import AmbiguousHash, NothingStored, RevisionMismatch, UnknownHash
@@ -98,9 +104,9 @@ def _report(console: Console, rows: Sequence[Comparison | DamagedLog]) -> int:
     add_columns(table, "verdict")
     for row in rows:
         if isinstance(row, DamagedLog):
-            verdict, generations = Text(f"damaged: {row.reason}", "red"), "–"
+            verdict, generations = coloured(f"damaged: {row.reason}", "red"), "–"
         else:
-            verdict = Text(row.verdict, "green" if row.matches else "red")
+            verdict = coloured(row.verdict, "green" if row.matches else "red")
             generations = str(row.num_generations)
         table.add_row(row.condition_id[:12], str(row.replicate), generations, verdict)
     console.print(table)

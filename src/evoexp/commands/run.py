@@ -20,6 +20,7 @@ from evoexp.commands.progress import BatchProgress
 from evoexp.condition import Condition
 from evoexp.configuration import expansions
 from evoexp.configuration.experiment import Experiment
+from evoexp.errors import printable
 from evoexp.report.pages import page_registration
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_table as stored_summaries
@@ -101,10 +102,8 @@ def _run(
             progress.advance(outcome.failed)
             if outcome.failed:
                 failures.append(outcome)
-                print(
-                    f"failed: {outcome.condition_id[:12]} #{outcome.replicate}: {outcome.reason}",
-                    file=sys.stderr,
-                )
+                failed = f"failed: {outcome.condition_id[:12]} #{outcome.replicate}"
+                print(f"{failed}: {printable(outcome.reason)}", file=sys.stderr)
     return failures
 
 

@@ -27,7 +27,8 @@ from evoexp.condition import Condition
 from evoexp.configuration.assignment import assign_all
 from evoexp.configuration.building import build_condition, build_settings, planned_replicates
 from evoexp.configuration.experiment import Budget, Experiment, Labelled
-from evoexp.configuration.interpolations import MARK, NotWhole, fill_in
+from evoexp.configuration.interpolations import MARK, NotWhole, fill_in, refuse_functions
+from evoexp.configuration.option_files import check_file, check_files
 from evoexp.configuration.overrides import (
     ADD,
     DELETE,
@@ -158,6 +159,9 @@ class _Composer:
         self._known: dict[tuple[str, ...], Composed] = {}
         shutil.copy(shipped.config_directory() / "config.yaml", root)
         (root / EXPERIMENT).mkdir()
+        for folder in folders():
+            if folder.origin != shipped.ORIGIN:
+                check_files(folder.path)
         self._path = ",".join(_quoted(f"file://{folder.path}") for folder in folders())
 
     def __call__(self, overrides: Choice, file: Option | None) -> Composed:
@@ -185,6 +189,7 @@ class _Composer:
         key = tuple(words)
         if key not in self._known:
             if file is not None and is_file(file.origin):
+                check_file(Path(file.path))
                 shutil.copy(file.path, self._root / EXPERIMENT / f"{file.name}.yaml")
             try:
                 self._known[key] = self._by_hydra(words, file)
@@ -323,7 +328,7 @@ def _resolved(config: dict[str, Any]) -> dict[str, Any]:
     try:
         return fill_in(config)
     except NotWhole:
-        pass
+        refuse_functions(config)
     try:
         plain: Any = OmegaConf.to_container(OmegaConf.create(config), resolve=True)
     except (*_COMPOSER, RecursionError) as error:

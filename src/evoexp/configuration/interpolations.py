@@ -4,8 +4,11 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from evoexp.errors import SettingError
+
 MARK = "${"
 _WHOLE = re.compile(r"\$\{([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*)\}")
+_FUNCTION = re.compile(r"\$\{[^{}]*:")
 _MAX_DEPTH = 100  # of settings taken from settings; deeper ones go round in circles
 
 
@@ -40,6 +43,21 @@ def _filled(value: Any, config: Mapping[str, Any], depth: int) -> Any:
     if name is None or depth == 0 or found == "???":
         raise NotWhole
     return _filled(found, config, depth - 1)
+
+
+def refuse_functions(config: Mapping[str, Any]) -> None:
+    """Refuse interpolations that call a function, such as `${oc.env:HOME}`.
+
+    A condition is what is written down: nothing of the environment, which may hold secrets, enters
+    its hash and its logs.
+
+    Raises:
+        SettingError: Naming the first one.
+    """
+    for field, text in interpolations(config):
+        if _FUNCTION.search(text):
+            must = "a value, or the name of another setting in ${…} (no function, as oc.env is)"
+            raise SettingError(field, must, text)
 
 
 def interpolations(value: Any, field: str = "") -> Iterator[tuple[str, str]]:

@@ -15,10 +15,18 @@ import pinocchio as pin
 
 from evoexp.attachments import SHA256, File, keep
 from evoexp.errors import SettingError, nearest
+from evoexp.input_files import read_bounded
 from evoexp.robots.assembly import Chain, Link, Tool
 from evoexp.robots.bodies import Point3, placed
 from evoexp.validation import Settings
 
+MOST_NESTED, MOST_ELEMENTS = 50, 100_000  # of XML
+MOST_LINKS = 300  # and collision bodies: pairs of them are judged
+MESHES = (".stl", ".obj", ".dae", ".ply")  # endings: a URDF makes nobody's other files travel
+LARGEST = 1e7  # [m, rad] as of the numbers of other robots
+SHORTEST = 1e-6  # [-] of an axis
+# attributes of places, bodies and limits
+NUMERIC = {"xyz", "rpy", "size", "scale", "radius", "length", "lower", "upper"}
 MOVING = ("revolute", "prismatic")
 MESH = "link/collision/geometry/mesh"
 
@@ -189,12 +197,16 @@ class Urdf(Chain):
         with tempfile.TemporaryDirectory() as directory:
             places = {}
             for k, mesh in enumerate(self.meshes):
-                place = Path(directory) / f"mesh_{k}{Path(mesh.name).suffix}"
+                ending = Path(mesh.name).suffix.lower()
+                if ending not in MESHES:
+                    must = f"a name that ends in {', '.join(MESHES)}"
+                    raise SettingError(f"robot.meshes[{k}].name", must, mesh.name)
+                place = Path(directory) / f"mesh_{k}{ending}"
                 place.write_bytes(mesh.file.content)
                 places[mesh.name] = str(place)
             try:
                 text = _plain(self.urdf.content, places)
-                return pin.buildGeomFromUrdfString(
+                found = pin.buildGeomFromUrdfString(
                     model, text, pin.GeometryType.COLLISION, None, directory
                 )
             except (ValueError, RuntimeError) as error:
@@ -203,6 +215,14 @@ class Urdf(Chain):
                     "a URDF whose collision bodies can be read",
                     str(error).strip().splitlines()[0].replace(directory, ""),
                 ) from None
+
+        for item in found.geometryObjects:
+            item.geometry.computeLocalAABB()
+            far = np.abs(item.placement.translation).max() + item.geometry.aabb_radius
+            if not 0.0 <= far <= LARGEST:
+                must = f"a URDF whose bodies lie within {LARGEST:g} m"
+                raise SettingError("robot.path", must, f"'{item.name}' that reaches to {far:.3g}")
+        return found
 
     def _base(self, model: Any) -> Any:
         """Return the `pin.SE3` of the root in the world."""
@@ -219,7 +239,7 @@ def _content(path: Any, field: str) -> bytes:
     if path in (None, "???"):
         raise SettingError(field, "given: the path of a URDF", None)
     try:
-        return Path(str(path)).read_bytes()
+        return read_bounded(str(path))
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise SettingError(field, f"a file that can be read ({reason})", str(path)) from None
@@ -227,15 +247,53 @@ def _content(path: Any, field: str) -> bytes:
 
 def _parsed(content: bytes, field: str, tag: str) -> Any:
     try:
-        root = ET.fromstring(content)
-    except ET.ParseError as error:
+        root = ET.fromstring(content, ET.XMLParser(target=_PlainTree(field)))
+    except (ET.ParseError, ValueError, LookupError) as error:
         raise SettingError(field, f"XML with the root <{tag}>", str(error)) from None
     if root.tag != tag:
         raise SettingError(field, f"XML with the root <{tag}>", f"<{root.tag}>")
     return root
 
 
+class _PlainTree(ET.TreeBuilder):
+    """Builds a tree that is neither deep nor large, of a text that declares no entities."""
+
+    def __init__(self, field: str) -> None:
+        super().__init__()
+        self._field, self._depth, self._count = field, 0, 0
+
+    def doctype(self, name: str, public: str | None, system: str | None) -> None:
+        """Refuse document types: their entities unfold to any size, or name other files."""
+        raise SettingError(self._field, "XML without a document type", f"<!DOCTYPE {name}>")
+
+    def start(self, tag: str, attributes: Any) -> Any:
+        """Open an element."""
+        self._depth, self._count = self._depth + 1, self._count + 1
+        if self._depth > MOST_NESTED or self._count > MOST_ELEMENTS:
+            must = f"XML of at most {MOST_ELEMENTS:,} elements, nested {MOST_NESTED} deep"
+            raise SettingError(self._field, must, f"more, at <{tag[:40]}>")
+        return super().start(tag, attributes)
+
+    def end(self, tag: str) -> Any:
+        """Close an element."""
+        self._depth -= 1
+        return super().end(tag)
+
+
 def _check_joints(root: Any, field: str) -> None:
+    counts = {"links": "link", "collision bodies": "link/collision"}
+    for what, path in counts.items():
+        if (count := len(root.findall(path))) > MOST_LINKS:
+            raise SettingError(field, f"a URDF of at most {MOST_LINKS} {what}", count)
+    for element in root.iter():
+        for name in NUMERIC.intersection(element.keys()):
+            if not all(map(_is_number, str(element.get(name)).split())):
+                must = f"a URDF whose numbers are finite, at most {LARGEST:g}"
+                was = f'<{element.tag} {name}="{str(element.get(name))[:40]}"/>'
+                raise SettingError(field, must, was)
+    for axis in root.iterfind("joint/axis"):
+        if not sum(abs(float(word)) for word in str(axis.get("xyz", "1")).split()) > SHORTEST:
+            raise SettingError(field, "a URDF whose axes point somewhere", axis.get("xyz"))
     for joint in root.iterfind("joint"):
         kind = joint.get("type")
         if kind not in (*MOVING, "fixed") or joint.find("mimic") is not None:
@@ -252,23 +310,37 @@ def _check_joints(root: Any, field: str) -> None:
             )
 
 
+def _is_number(word: str) -> bool:
+    """Whether a word is a number that joints and bodies can have."""
+    try:
+        return abs(float(word)) <= LARGEST
+    except ValueError:
+        return False
+
+
 def _mesh(name: str, urdf: Path, field: str) -> bytes:
     """Return the content of a mesh: beside the URDF, or in a package in a directory above it."""
     if name.startswith("package://"):
         rest = name.removeprefix("package://")
+        if rest.startswith("/") or ".." in Path(rest).parts:
+            raise SettingError(field, "a URDF whose meshes lie in their packages", name)
         tried = [parent / rest for parent in urdf.resolve().parents]
         tried += [parent / rest.partition("/")[2] for parent in urdf.resolve().parents]
     else:
         tried = [urdf.parent / name.removeprefix("file://")]
     for place in tried:
-        if place.is_file():
-            return place.read_bytes()
+        if "\0" not in name and place.is_file():
+            if place.resolve().suffix.lower() not in MESHES:
+                must = f"a URDF whose meshes are files that end in {', '.join(MESHES)}"
+                raise SettingError(field, must, name)
+            return _content(place, field)
     raise SettingError(field, "a URDF whose meshes are there", f"a missing mesh '{name}'")
 
 
 def _plain(content: bytes, places: dict[str, str]) -> str:
     """Return a URDF without visual elements, with the present paths of its meshes."""
-    root = ET.fromstring(content)
+    root = _parsed(content, "robot.urdf", "robot")
+    _check_joints(root, "robot.urdf")
     for link in root.iterfind("link"):
         for visual in link.findall("visual"):
             link.remove(visual)
@@ -277,7 +349,9 @@ def _plain(content: bytes, places: dict[str, str]) -> str:
                 if collision.find("geometry/mesh") is not None:
                     link.remove(collision)
     for mesh in root.iterfind(MESH):
-        mesh.set("filename", places[str(mesh.get("filename"))])
+        if (name := str(mesh.get("filename"))) not in places:
+            raise SettingError("robot.meshes", "those that the URDF names", f"without '{name}'")
+        mesh.set("filename", places[name])
     return ET.tostring(root, encoding="unicode")
 
 

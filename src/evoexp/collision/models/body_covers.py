@@ -185,9 +185,16 @@ def _solid(item: Any) -> _Solid:
         raise UnsupportedShape(
             f"robot: body '{item.name}' must be a solid, was a {type(shape).__name__}"
         )
-    from scipy.spatial import ConvexHull  # only meshes need it, and it takes long to load
+    from scipy.spatial import (
+        ConvexHull,
+        QhullError,
+    )  # only meshes need it, and it takes long to load
 
-    planes = ConvexHull(corners).equations  # outward normals, unit length
+    try:
+        planes = ConvexHull(corners).equations  # outward normals, unit length
+    except (ValueError, QhullError):
+        must = f"robot: body '{item.name}' must be a solid"
+        raise UnsupportedShape(f"{must}, was a mesh without an inside") from None
 
     def near(points: FloatArray) -> FloatArray:
         return np.asarray((matrix_product(points, planes[:, :3].T) + planes[:, 3]).max(axis=1))

@@ -83,7 +83,8 @@ def main(arguments: argparse.Namespace) -> int:
             more = f", … {len(run.leftovers) - SHOWN} more" if run.leftovers[SHOWN:] else ""
             console.print(f"no part of run {run.name}: {listed}{more}", soft_wrap=True)
     logs, problems = sum(r.num_logs for r in found), sum(len(r.problems) for r in found)
-    said = f"{problems} damaged files in {len(damaged)} of them" if damaged else "all is well"
+    found_in = f"{problems} damaged file{'s' * (problems > 1)} in {len(damaged)} of them"
+    said = found_in if damaged else "all is well"
     console.print(f"{len(found)} runs, {logs} logs: {said}", soft_wrap=True)
     return 1 if damaged else 0
 

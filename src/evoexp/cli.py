@@ -1,56 +1,97 @@
 """The command line: parses words, calls one command, turns errors into one line and an exit code.
 
 Exit codes: 0 done; 1 a replicate or a comparison failed; 2 the command could not be done;
-130 interrupted.
+130 interrupted by Ctrl-C, 143 by SIGTERM.
 """
 
 import contextlib
+import errno
 import importlib
-import os
 import sys
 from collections.abc import Sequence
 
 from evoexp.commands.command_parser import COMMANDS, command_module, command_parser, whole_parser
 from evoexp.commands.damage_lines import damage_in_lines
-from evoexp.errors import EvoexpError, printable
+from evoexp.commands.interruption import Interrupted, Interruption
+from evoexp.commands.standard_streams import OUTPUT, complain, open_streams, silence_output
+from evoexp.errors import EvoexpError
 
 WITH_WORKERS = ("run", "reproduce")
+KEPT = "finished replicates are kept, the same command runs the others"
+_DISK_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EIO}  # full, or defective
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; return its exit code."""
+    """Run one command; return its exit code.
+
+    Args:
+        arguments: Words of the command; None: those that this process was started with. Its
+            signals, its standard streams and its worker processes are then ours.
+    """
+    interruption, is_process = Interruption(), arguments is None
+    if is_process:
+        open_streams()
+        interruption.hear()
     words = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        try:
+            return _run(words, is_process)
+        finally:
+            sys.stdout.flush()  # here, where an error is explained
+    except BaseException as error:
+        interruption.end()
+        try:
+            return _explain(error, words, interruption)
+        finally:
+            workers = sys.modules.get("evoexp.batch.workers")
+            if is_process and workers is not None:
+                workers.end_all()
+            interruption.leave()
+    finally:
+        interruption.end()
+
+
+def _run(words: Sequence[str], is_process: bool) -> int:
+    """Run one command; return its exit code."""
     if not words or words[0] not in COMMANDS:
         parser = whole_parser()
         parser.parse_args(words)
         parser.print_help()
         return 0
     chosen = words[0]
-    if arguments is None and chosen in WITH_WORKERS and not {"-h", "--help"} & set(words):
-        importlib.import_module("evoexp.batch.workers").start_server()  # this process is all ours
-    try:
-        given = command_parser(chosen).parse_intermixed_args(words[1:])
-        with contextlib.ExitStack() as stack:
-            if folders := getattr(given, "config_dir", ()):
-                from evoexp.configuration.search_path import searched_first
+    if is_process and chosen in WITH_WORKERS and not {"-h", "--help"} & set(words):
+        importlib.import_module("evoexp.batch.workers").start_server()
+    given = command_parser(chosen).parse_intermixed_args(words[1:])
+    with contextlib.ExitStack() as stack:
+        if folders := getattr(given, "config_dir", ()):
+            from evoexp.configuration.search_path import searched_first
 
-                stack.enter_context(searched_first(folders))
-            stack.enter_context(damage_in_lines())
-            return int(command_module(chosen).main(given))
-    except EvoexpError as error:
-        print(f"evoexp: {printable(' '.join(str(error).split()))}", file=sys.stderr)
+            stack.enter_context(searched_first(folders))
+        stack.enter_context(damage_in_lines())
+        return int(command_module(chosen).main(given))
+
+
+def _explain(error: BaseException, words: Sequence[str], interruption: Interruption) -> int:
+    """Say in one line why a command ended; return its exit code.
+
+    Raises:
+        BaseException: The error again, if it is a programming error, or leaves on purpose.
+    """
+    if isinstance(error, SystemExit):
+        raise error
+    if isinstance(error, Interrupted | KeyboardInterrupt) or interruption.number is not None:
+        complain(f"interrupted; {KEPT}")  # and whatever fails after it, fails of it
+        return interruption.exit_code
+    if isinstance(error, EvoexpError):
+        complain(str(error))
         return 2
-    except KeyboardInterrupt:
-        print(
-            "evoexp: interrupted; finished replicates are kept, the same command runs the others",
-            file=sys.stderr,
-        )
-        return 130
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
-    except OSError as error:
-        if error.filename is None:
-            raise
-        print(f"evoexp: {error.filename}: {error.strerror}", file=sys.stderr)
-        return 2
+    if not isinstance(error, OSError) or error.errno is None:
+        raise error
+    path = error.filename2 or error.filename
+    if path == OUTPUT:
+        silence_output()
+        if isinstance(error, BrokenPipeError):
+            return 0
+    kept = f"; {KEPT}" if words[:1] == ["run"] and error.errno in _DISK_ERRORS else ""
+    complain(f"{path or 'the system refused a request'}: {error.strerror}{kept}")
+    return 2

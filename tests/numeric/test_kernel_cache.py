@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from evoexp.numeric import kernel_cache
+from evoexp.numeric import kept_files, kernel_cache, kernel_files
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.kernel_cache import code_key
 
@@ -79,17 +79,91 @@ def test_functions_of_one_name_are_told_apart() -> None:
     assert code_key(lambda x: x + 1.0) == same != code_key(lambda x: x + 2.0)
 
 
+GUEST = "from evoexp.numeric.compilation import kernel\n@kernel\ndef f(x):\n    return x + 1.0\n"
+
+
+def call_guest(tmp_path: Path, cache: Path) -> subprocess.CompletedProcess[str]:
+    """Call a guest's kernel in a process of its own; print the result and the cache's hits."""
+    (tmp_path / "guest.py").write_text(GUEST)
+    paths = [str(tmp_path), str(Path(kernel_cache.__file__).parents[2])]
+    environment = os.environ | {
+        "PYTHONPATH": os.pathsep.join(paths),
+        "EVOEXP_CACHE": str(cache),
+    }
+    call = "import guest; print(guest.f(1.0), sum(guest.f.stats.cache_hits.values()))"
+    command = [sys.executable, "-c", call]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+
+
+def test_damaged_kernels_are_compiled_again_and_that_is_said_once(tmp_path: Path) -> None:
+    cache = tmp_path / "cache"
+    assert call_guest(tmp_path, cache).stdout == "2.0 0\n"
+    for path in cache.rglob("*"):  # sources and kernels
+        if path.is_file() and path.suffix != ".lock":
+            content = bytearray(path.read_bytes())
+            content[len(content) // 2] ^= 1
+            path.write_bytes(content)
+    done = call_guest(tmp_path, cache)
+    assert done.stdout == "2.0 0\n"
+    assert done.stderr.count("\n") == 1
+    assert "damaged" in done.stderr
+    done = call_guest(tmp_path, cache)
+    assert (done.stdout, done.stderr) == ("2.0 1\n", "")
+
+
+def test_where_kernels_cannot_be_kept_they_are_compiled_and_that_is_said_once(
+    tmp_path: Path,
+) -> None:
+    cache = tmp_path / "cache"
+    cache.mkdir()
+    (cache / "kernels").touch()
+    done = call_guest(tmp_path, cache)
+    assert done.stdout == "2.0 0\n"
+    assert done.stderr.count("\n") == 1
+    assert done.stderr.endswith("Not a directory; kernels are not kept\n")
+
+
 def test_what_is_compiled_is_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("EVOEXP_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(kernel_cache, "USED", set())
     modules = ("evoexp.paths.spline",)
     assert not kernel_cache.is_compiled("a planner", modules)
     kernel_cache.note_compiled("a planner", modules)
     assert kernel_cache.is_compiled("a planner", modules)
     assert not kernel_cache.is_compiled("another", modules)
     assert not kernel_cache.is_compiled("a planner", ("evoexp.paths.walk",))
-    monkeypatch.setattr(kernel_cache, "cache_root", lambda: tmp_path / "cache" / "compiled" / "no")
     monkeypatch.setattr(kernel_cache, "_note", lambda *_: Path("/dev/null/no"))
     kernel_cache.note_compiled("a planner", modules)  # cannot be written: no error
+
+
+def test_what_was_compiled_counts_no_longer_when_a_kernel_is_gone_or_damaged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("EVOEXP_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(kernel_files, "USED", used := set[Path]())
+    monkeypatch.setattr(kernel_cache, "USED", used)
+    monkeypatch.setattr(kept_files.MESSAGES, "_said", set())
+    folder = tmp_path / "cache" / "kernels" / "module" / "key"
+    kernel_files.KernelFiles(folder, "f").save("double", b"code")
+    assert len(used) == 2
+
+    def is_compiled() -> bool:
+        kernel_cache._is_whole.cache_clear()  # as in another process
+        return kernel_cache.is_compiled("a planner", ())
+
+    for each in ("f.nbi", next(folder.glob("*.nbc")).name):
+        whole = (folder / each).read_bytes()
+        kernel_cache.note_compiled("a planner", ())
+        assert is_compiled()
+        (folder / each).write_bytes(whole[:-1])
+        assert not is_compiled()
+        (folder / each).unlink()
+        assert not is_compiled()
+        (folder / each).write_bytes(whole)
+    assert capsys.readouterr().err.count("\n") == 1
+    (note,) = (tmp_path / "cache" / "compiled").iterdir()
+    note.write_bytes(note.read_bytes()[:-1])
+    assert not is_compiled()
 
 
 def test_old_states_go_but_recent_and_used_ones_stay(tmp_path: Path) -> None:

@@ -123,9 +123,13 @@ class Batch:
             try:
                 for outcomes in fan_out(self.jobs, num_workers):
                     yield from self._store(outcomes)
-            finally:
-                for key in self.runs.keys() - self._summarised:
-                    self._summarise(key)
+            except OSError:  # a full disk: the table can be built from the logs at any time
+                raise
+            except BaseException:
+                with contextlib.suppress(OSError):
+                    self._summarise_all()
+                raise
+            self._summarise_all()
 
     def _num_workers(self) -> int:
         return max(1, min(self._settings.num_workers or num_cores(), len(self.jobs)))
@@ -160,6 +164,10 @@ class Batch:
             if len(self._finished[key]) == self._wanted[key][1]:
                 self._summarise(key)  # now, while the workers go on
         return [outcome._replace(content=b"") for outcome in outcomes]
+
+    def _summarise_all(self) -> None:
+        for key in self.runs.keys() - self._summarised:
+            self._summarise(key)
 
     def _summarise(self, key: str) -> None:
         write_summary(self.runs[key], self._finished.get(key, {}))

@@ -1,4 +1,4 @@
-"""Worker processes that ignore Ctrl-C and end soon after their parent."""
+"""Worker processes that ignore Ctrl-C and SIGTERM, and end with their parent or soon after it."""
 
 import gc
 import multiprocessing
@@ -10,12 +10,15 @@ import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from multiprocessing import forkserver
+from multiprocessing import forkserver, resource_tracker
 from typing import Any
 
 import joblib
+from joblib.externals.loky import reusable_executor
 from joblib.externals.loky.backend.context import get_start_method, set_start_method
 from joblib.externals.loky.process_executor import TerminatedWorkerError
+
+from evoexp.numeric.kept_files import MESSAGES, cache_root
 
 WATCH_S = 1.0  # [s] between two looks whether the parent is alive
 
@@ -24,6 +27,7 @@ _GIVEN_UP = r"\d+ tasks (which were still being processed|have been successfully
 warnings.filterwarnings("ignore", _GIVEN_UP, UserWarning)
 
 
+_OF_THE_PARENT = ("SIGINT", "SIGTERM", "SIGHUP")  # signals that end a batch in an orderly way
 _PRELOADED = ["evoexp.batch.preloaded"]
 _SERVED = "forkserver"  # the name of this way to start processes
 _NUM_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -44,10 +48,27 @@ def start_server() -> None:
     """
     if num_cores() == 1 or _SERVED not in multiprocessing.get_all_start_methods():
         return
+    cache_root()  # settled here, for the server and the workers too
     set_start_method(_SERVED, force=True)
     multiprocessing.set_forkserver_preload(_PRELOADED)
-    with _children_ignore_interrupts(), _environment_of_workers():
+    resource_tracker.ensure_running()  # lets signals through when it starts
+    with _children_ignore_signals(), _environment_of_workers():
         forkserver.ensure_running()
+
+
+def end_all() -> None:
+    """End all workers and the server at once; for a process that gives up and leaves.
+
+    None of them has anything to save: only this process writes.
+    """
+    pool = reusable_executor._executor
+    if pool is not None:
+        pool.shutdown(wait=True, kill_workers=True)
+    server: Any = forkserver._forkserver
+    if server._forkserver_pid is not None:
+        with suppress(OSError):
+            os.kill(server._forkserver_pid, signal.SIGKILL)
+        server._stop()
 
 
 def num_cores() -> int:
@@ -72,7 +93,7 @@ def in_workers(num_workers: int, tasks: Iterable[Any], ordered: bool = False) ->
         initargs=(os.getpid(), get_start_method() == _SERVED),
     )
     # starts the workers, and the server anew if it died
-    with _children_ignore_interrupts(), _environment_of_workers():
+    with _children_ignore_signals(), _environment_of_workers():
         results: Iterator[Any] = pool(tasks)
     return results
 
@@ -104,6 +125,7 @@ def _load(load: Callable[..., None], *arguments: Any) -> None:
 
 def leave_with_parent(parent: int, served: bool) -> None:
     """End this process soon after its parent died: nobody takes its results any more."""
+    MESSAGES.are_printed = False
     threading.Thread(target=_watch, args=(parent, served), daemon=True).start()
 
 
@@ -118,16 +140,25 @@ def _watch(parent: int, served: bool) -> None:
 
 
 @contextmanager
-def _children_ignore_interrupts() -> Iterator[None]:
-    """Let processes that start meanwhile inherit that Ctrl-C is ignored."""
+def _children_ignore_signals() -> Iterator[None]:
+    """Let processes that start meanwhile inherit that they ignore what is meant for their parent.
+
+    A signal that comes meanwhile is heard by this process at the end.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    numbers = [getattr(signal, name) for name in _OF_THE_PARENT if hasattr(signal, name)]
+    masked = hasattr(signal, "pthread_sigmask")  # elsewhere, a signal that comes now is lost
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, numbers) if masked else set()
+    before = {number: signal.signal(number, signal.SIG_IGN) for number in numbers}
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        if masked:
+            signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
 
 
 @contextmanager

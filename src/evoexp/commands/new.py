@@ -3,6 +3,7 @@
 import argparse
 import keyword
 import re
+import shutil
 from importlib import resources
 from importlib.resources.abc import Traversable
 from importlib.util import find_spec
@@ -43,9 +44,13 @@ def main(arguments: argparse.Namespace) -> int:
     _check(name, root)
     template = resources.files("evoexp").joinpath("assets/new_planner")
     files = {root / _named(path, name): _named(text, name) for path, text in _read(template)}
-    for path in files:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    write_files({path: text.encode() for path, text in files.items()})
+    try:
+        for path in files:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        write_files({path: text.encode() for path, text in files.items()})
+    except BaseException:
+        shutil.rmtree(root, ignore_errors=True)  # so that the same command can be given again
+        raise
     print(f"{root}: {len(files)} files")
     print(f"install it: pip install -e {root}")
     print(f"run it:     evoexp run experiment={name} budget=smoke")

@@ -28,7 +28,7 @@ from evoexp.condition import Condition
 from evoexp.configuration.experiment import Experiment, Labelled
 from evoexp.configuration.interpolations import MARK
 from evoexp.configuration.search_path import EXPERIMENT, file_directories, folders, is_file
-from evoexp.numeric.kernel_cache import cache_root
+from evoexp.numeric.kept_files import cache_root
 from evoexp.registry import COMPONENTS, Registration, registrations
 from evoexp.report.report_settings import ReportSettings
 from evoexp.shipped import Option

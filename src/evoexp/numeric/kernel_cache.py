@@ -16,7 +16,6 @@ import json
 import os
 import shutil
 import sys
-import tempfile
 import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -25,9 +24,18 @@ from typing import Any, NamedTuple
 import llvmlite
 import llvmlite.binding
 import numba
-import platformdirs
 from filelock import BaseFileLock, FileLock, Timeout
 from numba.core import caching
+
+from evoexp.numeric.kept_files import (
+    MESSAGES,
+    Damaged,
+    cache_root,
+    is_kept,
+    read_kept,
+    write_kept,
+)
+from evoexp.numeric.kernel_files import USED, KernelFiles
 
 NUM_KEPT_CACHES = 4  # [-] states of a module whose compiled kernels are kept
 KEPT_S = 86_400.0  # [s] and any that was used so lately
@@ -35,6 +43,8 @@ WAIT_S = 120.0  # [s] for another process that compiles the same kernel; then it
 CERTIFIER = "evoexp.collision.certifier.certificate"  # judges the motions of every planner
 
 _PACKAGE = "evoexp"
+# Modules that keep kernels and change none; their own format is named by the folder `kernels`.
+_KEEPERS = {f"evoexp.numeric.{name}" for name in ("kernel_cache", "kernel_files", "kept_files")}
 _ROOT = Path(__file__).parents[2]
 _files: dict[str, Path] = {}  # of modules that were found; others may be imported later
 _LOCATORS = "UserProvidedCacheLocator,InTreeCacheLocator,UserWideCacheLocator,ZipCacheLocator"
@@ -93,6 +103,8 @@ class SharedCache(caching.FunctionCache):
     def __init__(self, function: Any) -> None:
         """Open the cache; nothing is locked."""
         super().__init__(function)
+        files: Any = KernelFiles(Path(self._cache_path), self._impl.filename_base)
+        self._cache_file = files
         self._held: BaseFileLock | None = None
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
@@ -112,9 +124,15 @@ class SharedCache(caching.FunctionCache):
         return found
 
     def save_overload(self, signature: Any, data: Any) -> None:
-        """Keep a kernel that was compiled, and let those go on that wait for it."""
+        """Keep a kernel that was compiled, and let those go on that wait for it.
+
+        Where it cannot be kept, one line says so, and it serves this process alone.
+        """
         try:
             super().save_overload(signature, data)
+        except OSError as error:
+            text = f"{self._cache_path}: {error.strerror or error}; kernels are not kept"
+            MESSAGES.say("not kept", text)
         finally:
             self._release()
 
@@ -189,7 +207,7 @@ def _reached(module: str) -> set[str]:
         source = _source_of(waiting.pop())
         for name in source.imports if source else ():
             inner = name if _file_of(name) is not None else name.rpartition(".")[0]
-            if inner not in found and _file_of(inner) is not None:
+            if inner not in found | _KEEPERS and _file_of(inner) is not None:
                 found.add(inner)
                 waiting.append(inner)
     return found
@@ -234,15 +252,12 @@ def _read_source(module: str, path: Path) -> Source:
     package = module if path.name == "__init__.py" else module.rpartition(".")[0]
     name = hashlib.sha256(f"{sys.version}\0{package}\0".encode() + content).hexdigest()[:32]
     kept = cache_root() / "sources" / f"{name}.json"
-    with contextlib.suppress(OSError, ValueError, TypeError, KeyError):
-        plain = json.loads(kept.read_bytes())
-        return Source(str(plain["digest"]), tuple(map(str, plain["imports"])))
+    with contextlib.suppress(FileNotFoundError, Damaged):
+        plain = json.loads(read_kept(kept))
+        return Source(plain["digest"], tuple(plain["imports"]))
     source = parse(content, package)
     with contextlib.suppress(OSError):
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        temporary = kept.with_suffix(f".{os.getpid()}.tmp")
-        temporary.write_text(json.dumps(source._asdict()))
-        temporary.replace(kept)
+        write_kept(kept, json.dumps(source._asdict()).encode())
     return source
 
 
@@ -278,21 +293,37 @@ def _without_docstring(body: Iterable[ast.stmt]) -> Iterator[ast.stmt]:
 
 
 def is_compiled(kind: str, modules: Iterable[str]) -> bool:
-    """Return whether `note_compiled` was told so, in this state of the sources.
+    """Return whether `note_compiled` was told so, and the kernels of then are there and whole.
 
     Args:
         kind: What was compiled, as text.
         modules: That it is made of; the certifier's are added.
     """
-    return _note(kind, modules).exists()
+    root = cache_root()
+    try:
+        names = json.loads(read_kept(_note(kind, modules)))
+    except (FileNotFoundError, Damaged):
+        return False
+    return all(map(_is_whole, [root / name for name in names]))
+
+
+@functools.cache
+def _is_whole(path: Path) -> bool:
+    """Return whether a kernel's file is there and undamaged; looked at once per process."""
+    return is_kept(path)
 
 
 def note_compiled(kind: str, modules: Iterable[str]) -> None:
-    """Note that every kernel that something of this kind needs is kept; silent where it cannot."""
-    note = _note(kind, modules)
+    """Note that every kernel that something of this kind needs is kept; silent where it cannot.
+
+    All files that this process used are noted: kernels that it had loaded before may be among those
+    that are needed.
+    """
+    root = cache_root()
+    names = sorted(str(path.relative_to(root)) for path in USED if path.is_relative_to(root))
     with contextlib.suppress(OSError):
-        note.parent.mkdir(parents=True, exist_ok=True)
-        note.touch()
+        write_kept(_note(kind, modules), json.dumps(names).encode())
+    _is_whole.cache_clear()
 
 
 def _note(kind: str, modules: Iterable[str]) -> Path:
@@ -300,17 +331,6 @@ def _note(kind: str, modules: Iterable[str]) -> Path:
     keys = [module_key(module) for module in sorted({*modules, CERTIFIER})]
     parts = repr((llvmlite.binding.get_host_cpu_name(), processor, keys, kind))
     return cache_root() / "compiled" / hashlib.sha256(parts.encode()).hexdigest()[:32]
-
-
-def cache_root() -> Path:
-    """Return a directory that can be written; a temporary one where the user's cannot be."""
-    user = Path(os.environ.get("EVOEXP_CACHE") or platformdirs.user_cache_dir("evoexp"))
-    with contextlib.suppress(OSError):
-        user.mkdir(parents=True, exist_ok=True)
-        if os.access(user, os.W_OK):
-            return user
-    os.environ["EVOEXP_CACHE"] = tempfile.mkdtemp(prefix="evoexp-")  # worker processes inherit it
-    return Path(os.environ["EVOEXP_CACHE"])
 
 
 def _remove_old(current: Path) -> None:

@@ -1,9 +1,9 @@
 """Files that are either whole or not there, whenever the process or the machine dies."""
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
@@ -23,7 +23,9 @@ def write_files(contents: Mapping[Path, bytes]) -> None:
     files = [(path.with_name(f".{path.name}.{os.getpid()}{_SUFFIX}"), path) for path in contents]
     renamed = 0
     try:
-        _write_all([temporary for temporary, _ in files], list(contents.values()))
+        _write_all(
+            [(*file, content) for file, content in zip(files, contents.values(), strict=True)]
+        )
         for temporary, path in files:
             os.replace(temporary, path)
             renamed += 1
@@ -39,12 +41,18 @@ def write_file(path: Path, content: bytes) -> None:
     write_files({path: content})
 
 
-def _write_all(paths: Sequence[Path], contents: Sequence[bytes]) -> None:
-    if len(paths) == 1:
-        _write(paths[0], contents[0])
+def _write_all(files: Sequence[tuple[Path, Path, bytes]]) -> None:
+    if len(files) == 1:
+        _write(*files[0])
         return
-    writing = [_threads().submit(_write, *file) for file in zip(paths, contents, strict=True)]
-    wait(writing)  # for all of them, whatever happens to one
+    writing = [_threads().submit(_write, *file) for file in files]
+    try:
+        wait(writing)  # for all of them, whatever happens to one
+    except BaseException:  # Ctrl-C: no thread writes a file that is then removed
+        for one in writing:
+            one.cancel()
+        wait(writing)
+        raise
     for one in writing:
         one.result()
 
@@ -55,12 +63,22 @@ def _threads() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(NUM_THREADS, "write")
 
 
-def _write(path: Path, content: bytes) -> None:
-    """Write a file; return when it is on the disk."""
-    with open(path, "wb") as file:
+def _write(temporary: Path, path: Path, content: bytes) -> None:
+    """Write a file under its temporary name; return when it is on the disk."""
+    with _named(path), open(temporary, "wb") as file:
         file.write(content)
         file.flush()
         os.fsync(file.fileno())
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """Let errors of the system name a path: those of `write` and `fsync` name none."""
+    try:
+        yield
+    except OSError as error:
+        error.filename = str(path)
+        raise
 
 
 def sync_directory(path: Path) -> None:
@@ -71,7 +89,8 @@ def sync_directory(path: Path) -> None:
     with suppress(PermissionError):  # Windows
         descriptor = os.open(path, os.O_RDONLY)
         try:
-            os.fsync(descriptor)
+            with _named(path):
+                os.fsync(descriptor)
         finally:
             os.close(descriptor)
 

@@ -1,0 +1,87 @@
+"""Ctrl-C, SIGTERM and a terminal that closes: each ends a command in the same orderly way.
+
+The first signal raises `Interrupted`, by which everything is closed that a command has open. While
+that lasts, further signals do nothing: whoever presses Ctrl-C again disturbs nothing. If it takes
+longer than `PATIENCE_S`, the next one ends the process at once.
+
+A library may catch the exception and go on: some look for what they need with a bare `except:`.
+So it is looked after some time whether it is still under way, and raised again if not.
+"""
+
+import os
+import signal
+import sys
+import time
+from types import FrameType
+
+PATIENCE_S = 5.0  # [s] that closing may take before a further signal ends the process at once
+AGAIN_S = 0.25  # [s] between two looks whether the exception is still under way
+_NAMES = ("SIGINT", "SIGTERM", "SIGHUP")  # some systems lack the last one
+
+
+class Interrupted(BaseException):
+    """Ends a command; no `KeyboardInterrupt`, after which Python may end by SIGINT anyhow."""
+
+
+class Interruption:
+    """Hears the signals that ask this process to end.
+
+    Attributes:
+        number: The first signal that was heard; None: none was.
+    """
+
+    def __init__(self) -> None:
+        """Hear nothing yet."""
+        self.number: int | None = None
+        self._since = 0.0  # when it was heard
+        self._ended = False  # whether the command did
+        self._numbers: list[int] = []
+
+    @property
+    def exit_code(self) -> int:
+        """130 after Ctrl-C, 143 after SIGTERM: as a shell counts."""
+        return 128 + (self.number or signal.SIGINT)
+
+    def hear(self) -> None:
+        """Hear signals from now on; one that this process was started to ignore stays ignored."""
+        for name in _NAMES:
+            number = getattr(signal, name, None)
+            if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
+                signal.signal(number, self._heard)
+                self._numbers.append(number)
+        # What a callback cannot raise is printed elsewhere; this is raised again instead.
+        unraised, printed = sys.unraisablehook, sys.excepthook
+        sys.unraisablehook = lambda it: None if it.exc_type is Interrupted else unraised(it)
+        sys.excepthook = lambda *it: None if it[0] is Interrupted else printed(*it)
+
+    def end(self) -> None:
+        """Raise nothing any more: the command has ended, and the process soon will."""
+        self._ended = True
+        if self.number is not None and hasattr(signal, "setitimer"):
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+
+    def leave(self) -> None:
+        """Ignore signals while the interpreter ends: one more would change the exit code."""
+        for number in self._numbers:
+            signal.signal(number, signal.SIG_IGN)
+
+    def _heard(self, number: int, frame: FrameType | None) -> None:
+        if self.number is None and not self._ended:
+            self.number, self._since = number, time.monotonic()
+            if hasattr(signal, "setitimer"):
+                signal.signal(signal.SIGALRM, self._look)
+                signal.setitimer(signal.ITIMER_REAL, AGAIN_S, AGAIN_S)
+            raise Interrupted
+        if self._since and time.monotonic() - self._since > PATIENCE_S:
+            os._exit(self.exit_code)
+        self._look(number, frame)
+
+    def _look(self, number: int, frame: FrameType | None) -> None:
+        """Raise again if the exception was caught somewhere and the command goes on."""
+        if self.number is None or self._ended:
+            return
+        error = sys.exception()
+        while error is not None and not isinstance(error, Interrupted):
+            error = error.__context__
+        if error is None:
+            raise Interrupted

@@ -68,9 +68,10 @@ def test_other_commands_name_the_file_and_leave_nothing(
 ) -> None:
     outputs = tmp_path / "outputs"
     monkeypatch.setenv("EVOEXP_OUTPUTS", str(outputs))
-    assert main([*COMMAND, "num_replicates=2"]) == 0
+    few = [*WORDS[:-1], "num_replicates=2"]
+    assert main(["run", *few, "runner=serial", "--no-report"]) == 0
     words = {
-        "report": ["report", *WORDS, "num_replicates=2", "report=paper", "report.formats=[svg]"],
+        "report": ["report", *few, "report=paper", "report.formats=[svg]"],
         "export": ["export", faulty.id[:12]],
         "new": ["new", "planner", "thing_of_mine", "--directory", str(tmp_path)],
     }[command]
@@ -125,3 +126,29 @@ def test_outputs_that_are_a_file_are_named(
     err = capsys.readouterr().err
     assert err.startswith(f"evoexp: {tmp_path}/file/runs/")
     assert err.endswith(": Not a directory\n")
+
+
+@pytest.mark.parametrize("place", ["deep", "missing"])
+def test_temporary_files_may_be_anywhere(
+    place: str, faulty: Condition, tmp_path: Path, plug_in: Path
+) -> None:
+    """Where no socket can be, as its path is too long, workers are started without a server."""
+    deep = tmp_path / ("d" * 60) / ("e" * 60)
+    deep.mkdir(parents=True)
+    paths = (str(plug_in), str(Path(__file__).parent), os.environ.get("PYTHONPATH", ""))
+    environment = os.environ | {
+        "EVOEXP_OUTPUTS": str(tmp_path / "outputs"),
+        "PYTHONPATH": os.pathsep.join(paths),
+        "TMPDIR": str(deep if place == "deep" else tmp_path / "missing"),
+    }
+    words = ["run", *WORDS, "runner.num_workers=2", "--no-report"]
+    done = subprocess.run(
+        [sys.executable, "-m", "evoexp", *words],
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert len(digests(tmp_path / "outputs", faulty)) == 12
+    assert list(deep.iterdir()) == []

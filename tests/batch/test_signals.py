@@ -7,9 +7,11 @@ import os
 import pty
 import re
 import select
+import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -33,12 +35,13 @@ class Terminal:
     """A command in a terminal of its own, and all that it shows."""
 
     def __init__(self, outputs: Path, plug_in: Path, faults: str) -> None:
+        self.temporary = Path(tempfile.mkdtemp())  # short: a socket's path is
         paths = (str(plug_in), str(HERE), os.environ.get("PYTHONPATH", ""))
         environment = os.environ | {
             "EVOEXP_OUTPUTS": str(outputs),
             "PYTHONPATH": os.pathsep.join(paths),
             "FAULTY": faults,
-            "TMPDIR": str(outputs.parent),
+            "TMPDIR": str(self.temporary),
         }
         self.shown = ""
         self._screen, own = pty.openpty()
@@ -111,6 +114,7 @@ def terminal(outputs: Path, plug_in: Path, faults: str = HANGING) -> Iterator[Te
         with suppress(ProcessLookupError):
             os.killpg(window.process.pid, signal.SIGKILL)
         window.process.wait()
+        shutil.rmtree(window.temporary)
 
 
 def once(window: Terminal) -> None:
@@ -140,7 +144,7 @@ def check_ended(window: Terminal, way: Callable[[Terminal], None], folder: Path)
     said = [line for line in lines.split("\n") if line.strip() and "replicates" not in line[:20]]
     assert said == ["begun", LINE], window.shown
     assert window.left() == []
-    assert not list(folder.glob("pymp-*")), "no socket is left"
+    assert list(window.temporary.iterdir()) == [], "no socket is left"
     assert not list(folder.rglob("*.tmp"))
 
 

@@ -49,11 +49,12 @@ def start_server() -> None:
     if num_cores() == 1 or _SERVED not in multiprocessing.get_all_start_methods():
         return
     cache_root()  # settled here, for the server and the workers too
-    set_start_method(_SERVED, force=True)
     multiprocessing.set_forkserver_preload(_PRELOADED)
     resource_tracker.ensure_running()  # lets signals through when it starts
-    with _children_ignore_signals(), _environment_of_workers():
+    # The path of its socket may be too long, or its folder full.
+    with suppress(OSError), _children_ignore_signals(), _environment_of_workers():
         forkserver.ensure_running()
+        set_start_method(_SERVED, force=True)
 
 
 def end_all() -> None:

@@ -1,5 +1,6 @@
 """`evoexp verify`: a whole store is found whole, and every damage of it is found."""
 
+import errno
 import json
 import os
 import shutil
@@ -17,7 +18,7 @@ from evoexp.commands import verify
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.store import log as log_module
-from evoexp.store import summaries
+from evoexp.store import run_directory, summaries, verification
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
 
@@ -182,3 +183,30 @@ def test_an_empty_store_and_unknown_hashes(
     assert evoexp("verify").out == "0 runs, 0 logs: all is well\n"
     assert not outputs.exists()
     assert "no run 'abc' among the 0" in refused("verify", "abc")
+
+
+def test_a_directory_that_may_not_be_read_hides_no_other(
+    evoexp: Evoexp, run: RunDirectory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As root reads everything, the refusal is played."""
+    known, leftovers = run_directory.stored_id, verification._leftovers
+
+    def forbidden(path: Path) -> Path:
+        if path == run.path:
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        return path
+
+    monkeypatch.setattr(run_directory, "stored_id", lambda path: known(forbidden(path)))
+    monkeypatch.setattr(verification, "_leftovers", lambda path: leftovers(forbidden(path)))
+    said = evoexp("verify", "--json")
+    assert said.code == 1
+    found = {each["hash"]: each for each in json.loads(said.out)}
+    text = f"{run.path}: Permission denied; change its permissions"
+    assert found.pop(run.hash12)["problems"] == {"cannot be read": text}
+    assert [each["problems"] for each in found.values()] == [{}, {}]
+    rows = json.loads(evoexp("list", "--json").out)["runs"]
+    damage = {row["hash"][:12]: row["damage"] for row in rows}
+    assert damage.pop(run.hash12) == f"{run.path}: cannot be read: Permission denied"
+    assert list(damage.values()) == [None, None]
+    said = evoexp("reproduce", run.hash12)
+    assert (said.code, said.out) == (2, "")

@@ -88,8 +88,10 @@ def _run(name: str, run: RunDirectory | EvoexpError) -> dict[str, Any]:
         if isinstance(run, EvoexpError):
             raise run
         rows = summary_table(run).select(["status", "solved", "best_cost"]).to_pylist()
-    except (EvoexpError, OSError) as error:
+    except EvoexpError as error:
         return row | {"damage": str(error)}
+    except OSError as error:
+        return row | {"damage": f"{error.filename}: {error.strerror}"}
     done = [each for each in rows if each["status"] == "done"]
     return (
         row

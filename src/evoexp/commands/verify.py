@@ -20,6 +20,7 @@ from evoexp.commands.console import (
 )
 from evoexp.commands.hashes import with_candidates
 from evoexp.errors import UnknownHash
+from evoexp.store.identity import CONFIG
 from evoexp.store.run_directory import COMMAND, HASH_LENGTH, outputs_root, resolve, run_names
 from evoexp.store.verification import LogCheck, RunCheck, check_logs, check_rows, check_run
 
@@ -37,7 +38,7 @@ class Checked(NamedTuple):
         num_logs: Logs that were looked at.
         problems: File → what is wrong with it.
         leftovers: Files that are no part of a run.
-        mend: The command that mends it; empty if nothing is wrong.
+        mend: The command that mends it; empty if nothing is wrong or no command does.
     """
 
     name: str
@@ -75,7 +76,7 @@ def main(arguments: argparse.Namespace) -> int:
         return 1 if damaged else 0
     if damaged:
         console.print(_table(damaged))
-        for mend in dict.fromkeys(run.mend for run in damaged):
+        for mend in dict.fromkeys(run.mend for run in damaged if run.mend):
             console.print(f"mend: {mend}", soft_wrap=True)
     for run in found:
         if run.leftovers:
@@ -126,7 +127,7 @@ def _checked(found: RunCheck, logs: list[LogCheck]) -> Checked:
     if found.run is not None:
         problems |= check_rows(found.run, logs)
     mend = ""
-    if problems:
+    if problems and (found.run or CONFIG in problems):  # else nothing of it can be read
         known = found.run.command if found.run else COMMAND
         rows = shipped.find(found.name) if known == COMMAND else []
         mend = rows[0].command if rows else known

@@ -346,7 +346,11 @@ def open_run(outputs: Path, name: str) -> RunDirectory:
     Raises:
         StoreError: Nothing in it knows its condition.
     """
-    return RunDirectory(outputs, stored_id(Path(outputs) / "runs" / name))
+    path = Path(outputs) / "runs" / name
+    try:
+        return RunDirectory(outputs, stored_id(path))
+    except OSError as error:
+        raise StoreError(f"{path}: cannot be read: {error.strerror or error}") from error
 
 
 def resolve(outputs: Path, prefix: str) -> RunDirectory:
@@ -379,6 +383,9 @@ def run_names(outputs: Path) -> list[str]:
 
 def is_stored(path: Path) -> bool:
     """Return whether a directory holds anything of a run; a killed parent may leave it empty."""
-    if (path / CONFIG).exists() or (path / MANIFEST).exists():
+    try:
+        if (path / CONFIG).exists() or (path / MANIFEST).exists():
+            return True
+    except PermissionError:
         return True
     return any(_LOG.fullmatch(each.name) for each in path.glob(f"{REPLICATES}/*.mcap"))

@@ -64,6 +64,14 @@ def check_run(outputs: Path, name: str) -> RunCheck:
         outputs: Root of all outputs.
         name: Of the run's directory.
     """
+    try:
+        return _check_files(outputs, name)
+    except OSError as error:
+        problem = f"{error.filename}: {error.strerror}; change its permissions"
+        return RunCheck(name, None, {"cannot be read": problem}, [])
+
+
+def _check_files(outputs: Path, name: str) -> RunCheck:
     path = outputs / "runs" / name
     leftovers = list(_leftovers(path))
     try:

@@ -285,6 +285,8 @@ def _labelled(
         for label, own in expand_entry(template, map(parse, entry)):
             for suffix, chosen_here in swept:
                 joined = JOIN.join(part for part in (label, suffix) if part) or name
+                if not joined.isprintable():
+                    raise SettingError("conditions", "labels of printable characters", joined)
                 if joined in labels:
                     raise SettingError("conditions", "labels that differ", joined)
                 labels[joined], owner[joined] = own | chosen_here, label  # the command line wins

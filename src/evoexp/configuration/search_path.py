@@ -122,7 +122,10 @@ def find(group: str, name: str) -> Option:
     if group == EXPERIMENT and is_file(name):
         if not os.path.isfile(name):
             raise SettingError(EXPERIMENT, "the path of a file, or the name of an experiment", name)
-        return Option(group, Path(name).stem, name, str(Path(name).resolve()))
+        stem = Path(name).stem  # also that of the report's folder
+        if not stem.strip(".") or not stem.isprintable():
+            raise SettingError(EXPERIMENT, "a file with a plain name", name)
+        return Option(group, stem, name, str(Path(name).resolve()))
     for folder in folders() if os.path.basename(name) == name else ():
         path = os.path.join(folder.path, group, f"{name}.yaml")
         if os.path.isfile(path):  # of any text at all, also one that is too long for a path

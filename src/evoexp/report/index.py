@@ -43,7 +43,7 @@ def render(page: Page, results: Results, settings: ReportSettings, command: str)
         _section("Parameters", _parameters(results)),
         _section("Failures", _failures(results)),
     ]
-    return "\n".join(part for part in parts if part)
+    return markdown.inert("\n".join(part for part in parts if part))
 
 
 def _section(heading: str, text: str) -> str:

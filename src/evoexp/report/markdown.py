@@ -1,15 +1,31 @@
 """Pieces of a page in Markdown."""
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 
 from evoexp.report.statistics import Interval, Spread
+
+_HTML = re.compile("<(?=[A-Za-z/!?])")  # begins an element, a comment, an address
+_LINK = re.compile(r"\]\(([^)]*)\)?")
+_OWN_FILE = re.compile(r"[\w.-]+\.(png|svg|pdf|csv|json)")
 
 
 def table(headers: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     """Return a table; bars inside of cells are escaped."""
     lines = [_row(headers), _row(["---"] * len(headers)), *(_row(row) for row in rows)]
     return "\n".join(lines) + "\n"
+
+
+def inert(text: str) -> str:
+    """Return a page in which no name can be more than text: no HTML, no links but to its own files.
+
+    Labels, names of options and reasons of failures may come from anybody.
+    """
+    text = _HTML.sub("&lt;", text)
+    return _LINK.sub(
+        lambda link: link[0] if _OWN_FILE.fullmatch(link[1]) else f"]\\({link[1]})", text
+    )
 
 
 def number(value: float) -> str:

@@ -73,17 +73,27 @@ def drawn(draw: Callable[[], Figure], formats: Sequence[str], dpi: int) -> dict[
     """Draw a figure in evoexp's style, whatever the user's own settings are.
 
     Args:
-        draw: Gives the figure; called once.
+        draw: Gives the figure; called anew where a name is no formula, though it looks like one.
         formats: File formats.
         dpi: Resolution of raster formats [1/inch].
 
     Returns:
         One file per format; the same figure gives the same bytes.
     """
+    try:
+        return _drawn(draw, formats, dpi)
+    except ValueError:  # a name with a $ that begins no formula
+        return _drawn(draw, formats, dpi, formulas=False)
+
+
+def _drawn(
+    draw: Callable[[], Figure], formats: Sequence[str], dpi: int, *, formulas: bool = True
+) -> dict[str, bytes]:
     with mpl.rc_context():
         mpl.rcdefaults()
         for name, value in _RC.items():
             mpl.rcParams[name] = value  # type: ignore[index]
+        mpl.rcParams["text.parse_math"] = formulas
         mpl.rcParams["figure.dpi"] = dpi  # arranged with the widths that text has when it is saved
         figure, images = draw(), {}
         if engine := figure.get_layout_engine():  # arranged once, for all formats

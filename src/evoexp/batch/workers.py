@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from multiprocessing import forkserver, resource_tracker
+from multiprocessing.util import get_temp_dir
 from typing import Any
 
 import joblib
@@ -90,6 +91,8 @@ def in_workers(num_workers: int, tasks: Iterable[Any], ordered: bool = False) ->
         return_as="generator" if ordered else "generator_unordered",
         inner_max_num_threads=1,
         backend="loky",
+        max_nbytes=None,  # tasks are bytes, no arrays to be shared
+        temp_folder=get_temp_dir(),  # where the server's socket is: nobody else may enter it
         initializer=leave_with_parent,
         initargs=(os.getpid(), get_start_method() == _SERVED),
     )

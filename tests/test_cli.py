@@ -100,6 +100,19 @@ def test_a_programming_error_keeps_its_traceback(
         main(["list"])
 
 
+def test_a_machine_without_memory_is_told_in_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(arguments: object) -> int:
+        raise MemoryError("Unable to allocate 1. TiB for an array")
+
+    monkeypatch.setattr("evoexp.commands.list_.main", fail)
+    assert main(["list"]) == 2
+    assert (
+        capsys.readouterr().err == "evoexp: out of memory: Unable to allocate 1. TiB for an array\n"
+    )
+
+
 def test_ctrl_c_is_exit_code_130(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -85,6 +85,9 @@ def _explain(error: BaseException, words: Sequence[str], interruption: Interrupt
     if isinstance(error, EvoexpError):
         complain(str(error))
         return 2
+    if isinstance(error, MemoryError):
+        complain(f"out of memory: {error or 'the system gives no more'}")
+        return 2
     if not isinstance(error, OSError) or error.errno is None:
         raise error
     path = error.filename2 or error.filename

@@ -145,3 +145,8 @@ def test_a_motion_that_takes_more_than_it_is_worth(
     kind = ("rana_obstacles", 0)
     of_kind(kind, "smoke").prepare()
     assert reason in confined(lambda: refusal(kind, path), tmp_path, MEMORY)
+
+
+def test_a_motion_without_postures_does_not_fit() -> None:
+    assert flatten([], (..., (6,))) is None
+    assert flatten([], ((2, 2),)) is None

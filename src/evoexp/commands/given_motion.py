@@ -134,7 +134,7 @@ def flatten(values: list[Any], shape: Any) -> FloatArray | None:
         if array.shape != tuple(expected):
             return None
         parts.append(array.ravel())
-    return np.concatenate(parts)
+    return np.concatenate(parts) if parts else None
 
 
 def shape_text(shape: Any) -> str:

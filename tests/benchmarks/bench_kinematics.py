@@ -10,7 +10,8 @@ import pinocchio as pin
 import pytest
 
 from evoexp.configuration import compose
-from evoexp.robots.kinematics import forward_kinematics, kinematic_table
+from evoexp.robots.forward_kinematics import forward_kinematics
+from evoexp.robots.kinematics import kinematic_table
 
 SIZE = 2000
 

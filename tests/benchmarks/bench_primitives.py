@@ -117,10 +117,7 @@ def bench_clearance(beside: Any, drawn: str, limit: float) -> None:
 
 @pytest.mark.parametrize("shapes", ["spheres"])
 def bench_collides_one_by_one(beside: Any, shapes: str) -> None:
-    """What a planner pays that asks for one configuration at a time.
-
-    A block is computed for a single lane.
-    """
+    """What a planner pays that asks for one configuration at a time: eight are computed."""
     collision, q = collision_of(shapes), arms_6r.random_configurations(SIZE)
     one, broad_phase = np.ascontiguousarray(q[:, :1]), coal_collisions("capsules", broad_phase=True)
     beside(

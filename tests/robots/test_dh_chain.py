@@ -5,7 +5,7 @@ import pytest
 from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.robots.dh_chain import DhChain, DhJoint
-from evoexp.robots.kinematics import forward_kinematics
+from evoexp.robots.forward_kinematics import forward_kinematics
 from evoexp.robots.poses import compose as behind
 from evoexp.robots.poses import frame_pose, invert, local_pose, pose_of
 

@@ -6,7 +6,7 @@ import pytest
 
 from evoexp.errors import SettingError
 from evoexp.robots.arms import Arms
-from evoexp.robots.kinematics import forward_kinematics
+from evoexp.robots.forward_kinematics import forward_kinematics
 from evoexp.robots.planar_chain import PlanarChain
 from evoexp.robots.serial_chain import SerialChain, SerialJoint
 

@@ -7,17 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from evoexp.numeric.compilation import kernel
+from evoexp.numeric.compilation import borrowed, kernel
+from evoexp.numeric.vectors import LANES, load, store
 from evoexp.records import FloatArray
-from evoexp.robots.kinematics import (
-    BLOCK,
-    SPATIAL_ROWS,
-    KinematicChain,
-    KinematicTable,
-    U,
-    block_frames,
-    load_block,
+from evoexp.robots.forward_kinematics import (
+    SPATIAL_FRAME,
+    VECTOR,
+    copy_lanes,
+    spatial_frames,
 )
+from evoexp.robots.kinematics import KinematicChain, KinematicTable, U
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
@@ -84,34 +83,29 @@ def frame_poses(
         q: (nq, configurations) [rad], lengths for prismatic joints.
         out: (12, configurations), written.
     """
-    num_joints = len(chain.parent)
-    block_q = np.zeros(q.shape[0] * BLOCK)
-    frames, scratch = np.empty(num_joints * SPATIAL_ROWS * BLOCK), np.empty(SPATIAL_ROWS * BLOCK)
-    own = U(joint) * U(SPATIAL_ROWS * BLOCK)
-    for first in range(0, q.shape[1], BLOCK):
-        count = min(BLOCK, q.shape[1] - first)
-        load_block(q, first, count, 1.0, block_q)
-        block_frames(chain, block_q, frames, scratch)
+    count, target = q.shape[1], out.reshape(-1)
+    flat, padded = q.reshape(-1), np.zeros(q.shape[0] * LANES)
+    frames, found = np.empty(U(len(chain.parent)) * SPATIAL_FRAME), np.empty(SPATIAL_FRAME)
+    chain, local, flat, target, padded, frames, found = borrowed(
+        (chain, local, flat, target, padded, frames, found)
+    )
+    own = U(joint) * SPATIAL_FRAME
+    for first in range(0, count, LANES):
+        lanes = min(LANES, count - first)
+        copy_lanes(flat, first, count, lanes, padded, 0, LANES)
+        spatial_frames(chain, padded, U(0), VECTOR, 1.0, frames)
         for e in range(3):
-            x, y = own + U(3 * e * BLOCK), own + U((3 * e + 1) * BLOCK)
-            z, o = own + U((3 * e + 2) * BLOCK), own + U((9 + e) * BLOCK)
+            row, at = U(3 * e) * VECTOR, U(9 + e) * VECTOR
+            x, y = load(frames, own + row), load(frames, own + row + VECTOR)
+            z = load(frames, own + row + U(2) * VECTOR)
             # row e of the rotation
             for k in range(3):
-                for n in range(count):
-                    i = U(n)
-                    turned_axis = (
-                        frames[x + i] * local[k]
-                        + frames[y + i] * local[3 + k]
-                        + frames[z + i] * local[6 + k]
-                    )
-                    out[3 * e + k, first + n] = turned_axis
+                turned_axis = x * local[k] + y * local[3 + k] + z * local[6 + k]
+                store(found, row + U(k) * VECTOR, turned_axis)
             # coordinate e of the position
-            for n in range(count):
-                i = U(n)
-                moved = (
-                    frames[x + i] * local[9] + frames[y + i] * local[10] + frames[z + i] * local[11]
-                )
-                out[9 + e, first + n] = frames[o + i] + moved
+            moved = x * local[9] + y * local[10] + z * local[11]
+            store(found, at, load(frames, own + at) + moved)
+        copy_lanes(found, 0, LANES, lanes, target, first, count)
 
 
 def frame_pose(table: KinematicTable, joint: int, local: FloatArray, q: FloatArray) -> FloatArray:

@@ -21,44 +21,42 @@ from evoexp.collision.models.packed_shapes import (
     PackedObstacles,
     Units,
 )
-from evoexp.numeric.compilation import kernel
+from evoexp.numeric.compilation import inlined, kernel
+from evoexp.numeric.vectors import load, store
 from evoexp.records import FloatArray, IntArray
-from evoexp.robots.kinematics import BLOCK, SPATIAL_ROWS, U
+from evoexp.robots.forward_kinematics import SPATIAL_FRAME, VECTOR
+from evoexp.robots.kinematics import U
 
-BLOCKS = 2
-"""Blocks of configurations that are judged together: encounters are gathered over all of them."""
-
-LANES = BLOCKS * BLOCK
+LANES = 128
+"""Configurations that are judged together: encounters are gathered over all of them."""
 
 Bits = NDArray[np.uint64]  # (LANES,) a word of encounters per configuration
 
 
-@kernel
+@inlined
 def middles_of_balls(
     units: Units, frames: FloatArray, first: np.uint64, middles: FloatArray
 ) -> None:
-    """Write the centres of the balls around the units (units · 3 · LANES,) for one block of lanes.
+    """Write the centres of the balls around the units for eight configurations.
 
     Args:
         units: The units.
-        frames: (joints + 1 · SPATIAL_ROWS · BLOCK,) frames of the joints and of the world.
-        first: First lane of the block.
-        middles: Written.
+        frames: (joints + 1 · SPATIAL_FRAME,) frames of the joints and of the world.
+        first: First lane of the eight.
+        middles: (units · 3 · LANES,), written.
     """
     whole, ball = units.whole, units.ball
     for b in range(len(whole)):
-        own, j = U(b) * U(3 * LANES) + first, U(whole[b, JOINT]) * U(SPATIAL_ROWS * BLOCK)
+        own, j = U(b) * U(3 * LANES) + first, U(whole[b, JOINT]) * SPATIAL_FRAME
         x, y, z = ball[b, 0], ball[b, 1], ball[b, 2]
         for row in range(3):
-            a, o, m = j + U(3 * row * BLOCK), j + U((9 + row) * BLOCK), own + U(row * LANES)
-            for n in range(BLOCK):
-                k = U(n)
-                turned = (
-                    frames[a + k] * x
-                    + frames[a + U(BLOCK) + k] * y
-                    + frames[a + U(2 * BLOCK) + k] * z
-                )
-                middles[m + k] = frames[o + k] + turned
+            a, o = j + U(3 * row) * VECTOR, j + U(9 + row) * VECTOR
+            turned = (
+                load(frames, a) * x
+                + load(frames, a + VECTOR) * y
+                + load(frames, a + U(2) * VECTOR) * z
+            )
+            store(middles, own + U(row * LANES), load(frames, o) + turned)
 
 
 @kernel

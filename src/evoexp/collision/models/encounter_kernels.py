@@ -48,7 +48,8 @@ from evoexp.collision.models.segment_distances import (
 )
 from evoexp.numeric.compilation import kernel
 from evoexp.records import FloatArray
-from evoexp.robots.kinematics import BLOCK, SPATIAL_ROWS, U
+from evoexp.robots.forward_kinematics import SPATIAL_FRAME, VECTOR
+from evoexp.robots.kinematics import SPATIAL_ROWS, U
 
 
 @kernel
@@ -183,11 +184,11 @@ def _gather(
     work: FloatArray,
 ) -> None:
     """Copy the frames of one joint in the encounters' configurations to rows at `target`."""
-    j = U(joint) * U(SPATIAL_ROWS * BLOCK)
+    j = U(joint) * SPATIAL_FRAME
     for n in range(width):
         begin, o = place[lane_of[U(n)]] + j, target + U(n)
         for row in range(SPATIAL_ROWS):
-            work[o + U(row) * W] = frames[begin + U(row * BLOCK)]
+            work[o + U(row) * W] = frames[begin + U(row) * VECTOR]
 
 
 @kernel

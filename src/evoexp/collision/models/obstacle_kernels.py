@@ -17,8 +17,8 @@ from evoexp.numeric.vectors import (
     upper,
 )
 from evoexp.records import FloatArray, IntArray
+from evoexp.robots.forward_kinematics import VECTOR
 from evoexp.robots.kinematics import U
-from evoexp.robots.vector_frames import VECTOR
 from evoexp.scenarios.obstacles import (
     BOX,
     CAPSULE,

@@ -10,9 +10,9 @@ The number of encounters limits the speed, here for a 6R arm of 59 spheres and t
 configurations have 0.7 with obstacles and 4 between parts of the arm (fewer where only collisions
 are asked for), each some 40 ns of gathering and arithmetic, in lists of some ten per batch of 128
 that vectors do not fill; they take two thirds of the time. In a population, whose configurations
-are alike, encounters are rare: then forward kinematics and the centres of balls take a third, the
-balls a quarter, and the call itself, which unpacks the tables' arrays, another third. A single
-configuration costs as much as a block of 64, and the call.
+are alike, encounters are rare: then forward kinematics, the balls, and the call itself, which
+unpacks the tables' arrays, take about a third each. A single configuration costs as much as eight,
+and the call.
 """
 
 from typing import Any, NamedTuple
@@ -23,7 +23,6 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from evoexp.collision.models.ball_tests import (
-    BLOCKS,
     LANES,
     Bits,
     bound_obstacles,
@@ -43,15 +42,16 @@ from evoexp.collision.models.packed_shapes import (
 )
 from evoexp.collision.models.primitive_distances import FIXED_ROWS, VALUE, WIDTH
 from evoexp.numeric.compilation import borrowed, kernel
+from evoexp.numeric.vectors import LANES as EIGHT
+from evoexp.numeric.vectors import spread, store
 from evoexp.records import FloatArray, IntArray
-from evoexp.robots.kinematics import (
-    BLOCK,
-    SPATIAL_ROWS,
-    KinematicChain,
-    U,
-    block_frames,
-    load_block,
+from evoexp.robots.forward_kinematics import (
+    SPATIAL_FRAME,
+    VECTOR,
+    copy_lanes,
+    spatial_frames,
 )
+from evoexp.robots.kinematics import SPATIAL_ROWS, KinematicChain, U
 
 WORD = 64
 """Encounters of one configuration that fit a word of bits."""
@@ -85,9 +85,9 @@ class Memory(NamedTuple):
     """Scratch for a batch of `LANES` configurations.
 
     Attributes:
-        q: (nq · BLOCK,).
-        frames: (BLOCKS · (joints + 1) · SPATIAL_ROWS · BLOCK,): the last frame is the world's.
-        scratch: (SPATIAL_ROWS · BLOCK,).
+        q: (nq · 8,) the last ones of a batch, padded.
+        frames: (LANES / 8 · (joints + 1) · SPATIAL_FRAME,): eight configurations behind eight; the
+            last frame is the world's.
         place: (LANES,) offset of each lane in `frames`.
         middles: (units · 3 · LANES,) centres of the balls.
         best: (3 · LANES,) least clearances so far.
@@ -98,7 +98,6 @@ class Memory(NamedTuple):
 
     q: FloatArray
     frames: FloatArray
-    scratch: FloatArray
     place: NDArray[np.uint64]
     middles: FloatArray
     best: FloatArray
@@ -131,9 +130,8 @@ def primitive_clearances(
     )
     num_joints, num_units = len(named.chain.parent), len(named.units.whole)
     memory = Memory(
-        np.zeros(q.shape[0] * BLOCK),
-        np.empty(BLOCKS * (num_joints + 1) * SPATIAL_ROWS * BLOCK),
-        np.empty(SPATIAL_ROWS * BLOCK),
+        np.zeros(U(q.shape[0]) * VECTOR),
+        np.empty(U(LANES * (num_joints + 1)) * SPATIAL_FRAME // VECTOR),
         np.empty(LANES, dtype=np.uint64),
         np.empty(num_units * 3 * LANES),
         np.empty(3 * LANES),
@@ -141,7 +139,7 @@ def primitive_clearances(
         np.empty(_room(named.units.whole, pairs), dtype=np.uint64),
         np.empty((FIXED_ROWS + 3 * named.shapes.most) * WIDTH),
     )
-    _clearances(named, limit, decide, q, out, memory)
+    _clearances(named, limit, decide, q.reshape(-1), q.shape[1], out, memory)
 
 
 @kernel
@@ -150,6 +148,7 @@ def _clearances(
     limit: float,
     decide: bool,
     q: FloatArray,
+    total: int,
     out: FloatArray,
     memory: Memory,
 ) -> None:
@@ -157,26 +156,33 @@ def _clearances(
     tables, q, out, memory = borrowed((tables, q, out, memory))
     units, obstacles, pairs = tables.units, tables.obstacles, tables.pairs
     frames, middles, best = memory.frames, memory.middles, memory.best
-    # the world's frame, behind the joints' of every block
-    size = U(len(tables.chain.parent) + 1) * U(SPATIAL_ROWS * BLOCK)
-    for block in range(BLOCKS):
-        world = U(block + 1) * size - U(SPATIAL_ROWS * BLOCK)
+    # the world's frame, behind the joints'
+    size = U(len(tables.chain.parent) + 1) * SPATIAL_FRAME
+    blocks = min(U(LANES), U(total) + VECTOR - U(1)) // VECTOR
+    for block in range(blocks):
+        world = U(block + 1) * size - SPATIAL_FRAME
         for row in range(SPATIAL_ROWS):
-            frames[world + U(row * BLOCK) : world + U((row + 1) * BLOCK)] = row in (0, 4, 8)
+            store(frames, world + U(row) * VECTOR, spread(1.0 if row in (0, 4, 8) else 0.0))
     for lane in range(LANES):
-        memory.place[lane] = U(lane // BLOCK) * size + U(lane % BLOCK)
-    for first in range(0, q.shape[1], LANES):
-        count = min(LANES, q.shape[1] - first)
-        lanes = (count + BLOCK - 1) // BLOCK * BLOCK
-        # frames of the joints, centres of the balls
-        for block in range(lanes // BLOCK):
-            begin = first + block * BLOCK
-            own = frames[U(block) * size : U(block + 1) * size]
-            load_block(q, begin, min(BLOCK, q.shape[1] - begin), 1.0, memory.q)
-            block_frames(tables.chain, memory.q, own, memory.scratch)
-            middles_of_balls(units, own, U(block * BLOCK), middles)
+        memory.place[lane] = U(lane) // VECTOR * size + U(lane) % VECTOR
+    for first in range(0, total, LANES):
+        count = min(LANES, total - first)
+        # frames of the joints, centres of the balls, for eight configurations at a time
+        lanes = 0
+        while lanes < count:
+            left = count - lanes
+            whole = left >= EIGHT
+            if not whole:
+                copy_lanes(q, first + lanes, total, left, memory.q, 0, EIGHT)
+            own = frames[U(lanes) // VECTOR * size :]
+            angles, place, stride = (
+                (q, U(first + lanes), U(total)) if whole else (memory.q, U(0), VECTOR)
+            )
+            spatial_frames(tables.chain, angles, place, stride, 1.0, own)
+            middles_of_balls(units, own, U(lanes), middles)
+            lanes += EIGHT
         # upper bounds, then exact distances where they are in doubt
-        _begin(len(units.whole), limit, count, middles, best)
+        _begin(len(units.whole), limit, count, lanes, middles, best)
         if not decide:
             bound_obstacles(lanes, units, obstacles, middles, memory.work, best)
             bound_pairs(lanes, units, pairs, middles, best)
@@ -197,13 +203,15 @@ def _room(whole: IntArray, pairs: IntArray) -> int:
 
 
 @kernel
-def _begin(num_units: int, limit: float, count: int, middles: FloatArray, best: FloatArray) -> None:
+def _begin(
+    num_units: int, limit: float, count: int, lanes: int, middles: FloatArray, best: FloatArray
+) -> None:
     """Begin `best`: the limit, NaN where q is NaN, and −inf, which skips a lane, in padding."""
-    best[:] = 0.0
+    best[:lanes] = 0.0
     for b in range(3 * num_units):
-        for lane in range(LANES):
+        for lane in range(lanes):
             best[U(lane)] += middles[U(b * LANES) + U(lane)] * 0.0
-    for lane in range(LANES):
+    for lane in range(lanes):
         k = U(lane)
         best[k] = limit + best[k] if lane < count else -np.inf
         best[k + U(LANES)] = best[k]
@@ -249,7 +257,7 @@ def _judge_obstacles(lanes: int, decide: bool, tables: PrimitiveTables, memory: 
                         work, best,
                     )  # fmt: skip
         if decide:
-            _drop_collided(best)
+            _drop_collided(lanes, best)
 
 
 @kernel
@@ -288,13 +296,13 @@ def _judge_pairs(lanes: int, decide: bool, tables: PrimitiveTables, memory: Memo
                     k = base + near[U(n)]
                     best[k] = min(best[k], work[VALUE + U(n)])
         if decide:
-            _drop_collided(best)
+            _drop_collided(lanes, best)
 
 
 @kernel
-def _drop_collided(best: FloatArray) -> None:
+def _drop_collided(lanes: int, best: FloatArray) -> None:
     """Set the clearances of configurations that collide to −inf, so that they are skipped."""
-    for lane in range(LANES):
+    for lane in range(lanes):
         k = U(lane)
         drop = best[k] < 0.0 or best[k + U(LANES)] < 0.0 or best[k + U(2 * LANES)] < 0.0
         best[k] = -np.inf if drop else best[k]

@@ -23,14 +23,15 @@ from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.elementary import DEGREE
 from evoexp.numeric.vectors import LANES, Vector, load, lower, root, spread, store
 from evoexp.records import FloatArray, IntArray
-from evoexp.robots.kinematics import KinematicChain, U
-from evoexp.robots.vector_frames import (
+from evoexp.robots.forward_kinematics import (
     PLANAR_FRAME,
     SPATIAL_FRAME,
     VECTOR,
+    copy_lanes,
     planar_frames,
     spatial_frames,
 )
+from evoexp.robots.kinematics import KinematicChain, U
 from evoexp.scenarios.obstacles import ObstacleTable
 
 Space = Literal[True] | None
@@ -131,7 +132,7 @@ def _clearances(
         # the last ones, if they are fewer than eight, are copied and padded
         whole = first + LANES <= count
         if not whole:
-            _copy(q, first, count, count - first, memory.q, 0, LANES)
+            copy_lanes(q, first, count, count - first, memory.q, 0, LANES)
         angles, place, stride = (q, U(first), U(count)) if whole else (memory.q, U(0), VECTOR)
         # frames of the joints, centres of the spheres and of the balls around links
         if space is None:
@@ -149,33 +150,7 @@ def _clearances(
         store(found, place, between)
         store(found, place + stride, outside)
         if not whole:
-            _copy(memory.out, 0, LANES, count - first, out, first, count)
-
-
-@kernel
-def _copy(
-    source: FloatArray,
-    place: int,
-    stride: int,
-    count: int,
-    target: FloatArray,
-    target_place: int,
-    target_stride: int,
-) -> None:
-    """Copy some neighbours of every row of one flat array to another.
-
-    Args:
-        source: Rows of `stride` numbers.
-        place: Of the first neighbour in a row.
-        stride: Of the source.
-        count: How many neighbours.
-        target: Rows of `target_stride` numbers, written.
-        target_place: Of the first neighbour in a row of the target.
-        target_stride: Of the target.
-    """
-    for row in range(len(source) // stride):
-        for n in range(count):
-            target[row * target_stride + target_place + n] = source[row * stride + place + n]
+            copy_lanes(memory.out, 0, LANES, count - first, out, first, count)
 
 
 @kernel

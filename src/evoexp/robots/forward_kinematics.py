@@ -1,16 +1,93 @@
-"""Forward kinematics of eight configurations at a time, in vectors."""
+"""Forward kinematics of batches: eight configurations at a time, in vectors.
+
+The rows of a kernel's batch q are flat: coordinate k of a configuration stands at k · stride +
+place. So eight neighbours are read where they stand; the last ones of a batch, if they are fewer,
+are copied to a padded batch of eight first (`copy_lanes`).
+"""
+
+from typing import Any
 
 import numpy as np
 
-from evoexp.numeric.compilation import inlined
+from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.elementary import sincos
 from evoexp.numeric.vectors import LANES, load, spread, store
 from evoexp.records import FloatArray
-from evoexp.robots.kinematics import PLANAR_ROWS, SPATIAL_ROWS, KinematicChain, U
+from evoexp.robots.kinematics import (
+    PLANAR_ROWS,
+    SPATIAL_ROWS,
+    KinematicChain,
+    KinematicTable,
+    U,
+)
 
 VECTOR = U(LANES)
 PLANAR_FRAME, SPATIAL_FRAME = U(PLANAR_ROWS * LANES), U(SPATIAL_ROWS * LANES)
 """Numbers of a frame of eight configurations."""
+
+
+def forward_kinematics(table: KinematicTable, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the frames of all joints for a batch of configurations.
+
+    Args:
+        table: The kinematic table.
+        q: (nq, configurations) [rad], lengths for prismatic joints.
+
+    Returns:
+        Rotations (joints, 3, 3, configurations) and origins (joints, 3, configurations) in the
+        world. The rotations are those of the table's frames; times `alignment` transposed they are
+        Pinocchio's.
+
+    Raises:
+        ValueError: If q has not as many rows as the model has coordinates.
+    """
+    num_joints = len(table.parent)
+    q = np.ascontiguousarray(q, dtype=np.float64)
+    if q.ndim != 2 or q.shape[0] != num_joints:
+        raise ValueError(f"q must have shape ({num_joints}, configurations), was {q.shape}")
+    out = np.empty((num_joints, SPATIAL_ROWS, q.shape[1]))
+    _forward_kinematics(tuple(table.chain), q, out)
+    return out[:, :9].reshape(num_joints, 3, 3, -1), out[:, 9:]
+
+
+@kernel
+def _forward_kinematics(fields: tuple[Any, ...], q: FloatArray, out: FloatArray) -> None:
+    """Run the kernel of `forward_kinematics`; fields of a `KinematicChain` as a plain tuple."""
+    chain, count = KinematicChain(*fields), q.shape[1]
+    frames, padded = np.empty(U(len(chain.parent)) * SPATIAL_FRAME), np.zeros(q.shape[0] * LANES)
+    flat, target = q.reshape(-1), out.reshape(-1)
+    for first in range(0, count, LANES):
+        lanes = min(LANES, count - first)
+        copy_lanes(flat, first, count, lanes, padded, 0, LANES)
+        spatial_frames(chain, padded, U(0), VECTOR, 1.0, frames)
+        copy_lanes(frames, 0, LANES, lanes, target, first, count)
+
+
+@kernel
+def copy_lanes(
+    source: FloatArray,
+    place: int,
+    stride: int,
+    count: int,
+    target: FloatArray,
+    target_place: int,
+    target_stride: int,
+) -> None:
+    """Copy some neighbours of every row of one flat array to another.
+
+    Args:
+        source: Rows of `stride` numbers.
+        place: Of the first neighbour in a row.
+        stride: Of the source.
+        count: How many neighbours.
+        target: Rows of `target_stride` numbers, written.
+        target_place: Of the first neighbour in a row of the target.
+        target_stride: Of the target.
+    """
+    source, target = borrowed((source, target))
+    for row in range(len(source) // stride):
+        for n in range(count):
+            target[row * target_stride + target_place + n] = source[row * stride + place + n]
 
 
 @inlined
@@ -22,13 +99,13 @@ def spatial_frames(
     unit: float,
     frames: FloatArray,
 ) -> None:
-    """Compute the frames of all joints, with the bits of `kinematics.block_frames`.
+    """Compute the frames of all joints of eight configurations.
 
     Args:
         chain: The joints.
-        q: Flat; coordinate k of eight configurations stands at k · stride + place.
-        place: Of the first of them.
-        stride: From one coordinate to the next.
+        q: The batch, flat.
+        place: Of the first of eight neighbours in a row.
+        stride: From one row to the next.
         unit: Factor of every coordinate, which makes it [rad], or a length for prismatic joints.
         frames: (joints · SPATIAL_FRAME,), written: the rotation row by row, then the origin.
     """  # fmt: skip
@@ -73,7 +150,7 @@ def planar_frames(
     unit: float,
     frames: FloatArray,
 ) -> None:
-    """Compute the frames of a planar table, each a turn about z and a point of the plane.
+    """Compute the frames of a planar table: each is a turn about z and a point of the plane.
 
     Args:
         chain: The joints.

@@ -123,7 +123,7 @@ def test_ctrl_c_is_exit_code_130(
 
     monkeypatch.setattr(list_, "main", interrupted)
     assert main(["list"]) == 130
-    assert capsys.readouterr().err.startswith("evoexp: interrupted; finished replicates are kept")
+    assert capsys.readouterr().err.startswith("evoexp: interrupted")
 
 
 def test_a_reader_that_closes_the_pipe_is_no_error(tmp_path: Path) -> None:

@@ -13,7 +13,13 @@ from collections.abc import Sequence
 from evoexp.commands.command_parser import COMMANDS, command_module, command_parser, whole_parser
 from evoexp.commands.damage_lines import damage_in_lines
 from evoexp.commands.interruption import Interrupted, Interruption
-from evoexp.commands.standard_streams import OUTPUT, complain, open_streams, silence_output
+from evoexp.commands.standard_streams import (
+    OUTPUT,
+    complain,
+    open_streams,
+    settle_streams,
+    silence_output,
+)
 from evoexp.errors import EvoexpError
 
 WITH_WORKERS = ("run", "reproduce")
@@ -49,6 +55,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             interruption.leave()
     finally:
         interruption.end()
+        if is_process:
+            settle_streams()
 
 
 def _run(words: Sequence[str], is_process: bool) -> int:
@@ -79,8 +87,9 @@ def _explain(error: BaseException, words: Sequence[str], interruption: Interrupt
     """
     if isinstance(error, SystemExit):
         raise error
+    kept = f"; {KEPT}" if words[:1] == ["run"] else ""
     if isinstance(error, Interrupted | KeyboardInterrupt) or interruption.number is not None:
-        complain(f"interrupted; {KEPT}")  # and whatever fails after it, fails of it
+        complain(f"interrupted{kept}")  # and whatever fails after it, fails of it
         return interruption.exit_code
     if isinstance(error, EvoexpError):
         complain(str(error))
@@ -95,6 +104,7 @@ def _explain(error: BaseException, words: Sequence[str], interruption: Interrupt
         silence_output()
         if isinstance(error, BrokenPipeError):
             return 0
-    kept = f"; {KEPT}" if words[:1] == ["run"] and error.errno in _DISK_ERRORS else ""
+    if error.errno not in _DISK_ERRORS:
+        kept = ""
     complain(f"{path or 'the system refused a request'}: {error.strerror}{kept}")
     return 2

@@ -98,7 +98,10 @@ def test_a_damaged_replicate_beyond_those_asked_for_runs_again(
     assert evoexp("reproduce", run.hash12).code == 0
 
 
-def test_two_logs_that_changed_places(evoexp: Evoexp, run: RunDirectory) -> None:
+def test_two_logs_that_changed_places(
+    evoexp: Evoexp, run: RunDirectory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "160")
     first, second = run.log_path(0), run.log_path(1)
     contents = first.read_bytes(), second.read_bytes()
     first.write_bytes(contents[1])

@@ -59,6 +59,19 @@ def silence_output() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
+def settle_streams() -> None:
+    """Flush what was printed; where that fails, let it vanish.
+
+    Python tries again when it ends, and what fails then changes the exit code to 120.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except (OSError, ValueError):
+            with contextlib.suppress(OSError, ValueError):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
 def complain(text: str) -> None:
     """Print one line of words on standard error, if that can be done."""
     with contextlib.suppress(OSError, ValueError):

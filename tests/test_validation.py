@@ -111,6 +111,12 @@ def test_canonical_form_is_built_from_again_and_leaves_defaults_out() -> None:
     assert build(plain, lookup, "planner") == outer
 
 
+@pytest.mark.parametrize("value", [1e-101, -1e-320, 1e101, -1e300])
+def test_numbers_that_overflow_or_vanish_in_reckoning_are_refused(value: float) -> None:
+    with pytest.raises(SettingError, match="planner.x: must be (0, or at least|between)"):
+        build({"x": value}, lookup, "planner")
+
+
 def test_minus_zero_and_zero_are_one_setting() -> None:
     assert str(make(rate=-0.0).inner.rate) == "0.0"
 

@@ -17,6 +17,7 @@ from evoexp.errors import SettingError, UnknownSetting, nearest
 MAX_COUNT = 10**9
 # Squares and products of larger numbers overflow; no length, angle or weight comes near.
 LARGEST = 1e100
+SMALLEST = 1e-100  # besides 0: the reciprocal of a smaller number overflows, or its square vanishes
 
 Count = Annotated[int, Field(ge=1, le=MAX_COUNT)]
 NonNegativeCount = Annotated[int, Field(ge=0, le=MAX_COUNT)]
@@ -109,11 +110,13 @@ def _number(value: float, field: str, largest: float) -> float:
     NaN and the infinities are left to the field, which may want something else than a number.
 
     Raises:
-        SettingError: If it is too large.
+        SettingError: If it is too large, or too near to 0.
     """
     if isinstance(value, float):
         if largest < abs(value) < math.inf:
             raise SettingError(field, f"between -{largest:g} and {largest:g}", value)
+        if 0.0 < abs(value) < SMALLEST:
+            raise SettingError(field, f"0, or at least {SMALLEST:g} in size", value)
         return value + 0.0  # -0.0 and 0.0 are one setting
     if abs(value) > min(largest, 2**62):
         most = f"{min(largest, 1e18):g}"

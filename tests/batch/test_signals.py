@@ -266,6 +266,16 @@ def test_cleaning_up_is_not_interrupted(heard: Interruption) -> None:
     assert heard.exit_code == 130
 
 
+def test_closing_that_never_ends_ends_the_process() -> None:
+    code = (
+        "import signal, time\nfrom evoexp.commands import interruption\n"
+        "interruption.CLOSING_S = 0.5\ninterruption.Interruption().hear()\n"
+        "try:\n    signal.raise_signal(signal.SIGINT)\nfinally:\n    time.sleep(600)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (130, "\nevoexp: interrupted\n")
+
+
 def test_signals_that_a_process_was_started_to_ignore_stay_ignored() -> None:
     code = (
         "import signal\nsignal.signal(signal.SIGHUP, signal.SIG_IGN)\n"

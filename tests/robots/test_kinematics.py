@@ -4,8 +4,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from evoexp.errors import SettingError
 from evoexp.robots.forward_kinematics import forward_kinematics
-from evoexp.robots.kinematics import UnsupportedJoint, kinematic_table
+from evoexp.robots.kinematics import MAX_JOINTS, UnsupportedJoint, kinematic_table
 
 
 def random_tree(seed: int, num_joints: int = 14) -> pin.Model:
@@ -94,3 +95,11 @@ def test_a_wrong_number_of_rows_is_refused() -> None:
     table = kinematic_table(random_tree(0))
     with pytest.raises(ValueError, match="q must have shape"):
         forward_kinematics(table, np.zeros((3, 5)))
+
+
+def test_a_robot_of_more_joints_than_memory_bears_is_refused() -> None:
+    model, last = pin.Model(), 0
+    for k in range(MAX_JOINTS + 1):
+        last = model.addJoint(last, pin.JointModelRZ(), pin.SE3.Identity(), f"joint{k}")
+    with pytest.raises(SettingError, match="robot: must be of at most 100 joints, was 101"):
+        kinematic_table(model)

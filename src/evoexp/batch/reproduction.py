@@ -2,8 +2,8 @@
 
 Two things are compared: the search, link by link of the chain, and whatever else a summary says:
 verdict, clearance, lengths, terms, counts; all but times. In an equal environment both must agree
-to the bit, elsewhere numbers of the summary to `TOLERANCE`; the answer says which. A planner whose
-reproducibility is `environment` is compared by all its numbers where bits differ.
+to the bit, elsewhere numbers of the summary to `TOLERANCE`; the answer says which. Elsewhere a
+planner whose reproducibility is `environment` is compared by all its numbers where bits differ.
 """
 
 import math
@@ -106,11 +106,10 @@ class Comparison(NamedTuple):
         """MATCH, or where it diverges."""
         if self.farthest is not None:
             name, difference = self.farthest
-            why = self.inexact or "not to the bit"
             if self.matches:
                 most = f"; at most {difference:.1e}, {name}" if difference else ""
-                return f"MATCH to {TOLERANCE:g} ({why}{most})"
-            return f"DIVERGES by {difference:.1e} in {name} ({why})"
+                return f"MATCH to {TOLERANCE:g} ({self.inexact}{most})"
+            return f"DIVERGES by {difference:.1e} in {name} ({self.inexact})"
         if not self.search_matches:
             at = "the last population" if self.diverged_at is None else None
             return f"DIVERGES in {at}" if at else f"DIVERGES at generation {self.diverged_at}"
@@ -185,7 +184,8 @@ def _reproduce(path: Path, stored: LogContents) -> Comparison:
     refuse_large(condition, machine_memory())
     again = read_log(run_replicate(condition, stored.replicate).content)
     found = compare(stored, again)
-    if condition.reproducibility == "bits" or (found.search_matches and not found.fields):
+    is_same = found.search_matches and not found.fields
+    if condition.reproducibility == "bits" or is_same or not found.inexact:
         return found
     return found._replace(farthest=farthest(stored, again))
 

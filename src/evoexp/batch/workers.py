@@ -145,24 +145,37 @@ def _watch(parent: int, served: bool) -> None:
 
 @contextmanager
 def _children_ignore_signals() -> Iterator[None]:
-    """Let processes that start meanwhile inherit that they ignore what is meant for their parent.
+    """Let processes that start meanwhile inherit that what is meant for their parent is blocked.
 
-    A signal that comes meanwhile is heard by this process at the end.
+    A signal that comes meanwhile is heard by this process at the end, whichever of its threads the
+    system gives it to: some are not blocked, and an ignored signal would end there.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     numbers = [getattr(signal, name) for name in _OF_THE_PARENT if hasattr(signal, name)]
-    masked = hasattr(signal, "pthread_sigmask")  # elsewhere, a signal that comes now is lost
-    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, numbers) if masked else set()
-    before = {number: signal.signal(number, signal.SIG_IGN) for number in numbers}
+    noted: list[int] = []
+    before = {number: signal.getsignal(number) for number in numbers}
+    blocked = _block(numbers)
+    for number, handler in before.items():
+        if callable(handler):
+            signal.signal(number, lambda one, frame: noted.append(one))
     try:
         yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-        if masked:
+        if blocked is not None:
             signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+        for number in noted[:1]:
+            signal.raise_signal(number)
+
+
+def _block(numbers: Iterable[int]) -> set[Any] | None:
+    """Block signals in this thread; return those that were, None where that cannot be done."""
+    if not hasattr(signal, "pthread_sigmask"):
+        return None
+    return signal.pthread_sigmask(signal.SIG_BLOCK, numbers)
 
 
 @contextmanager

@@ -2,19 +2,24 @@
 
 The first signal raises `Interrupted`, by which everything is closed that a command has open. While
 that lasts, further signals do nothing: whoever presses Ctrl-C again disturbs nothing. If it takes
-longer than `PATIENCE_S`, the next one ends the process at once.
+longer than `PATIENCE_S`, the next one ends the process at once; if it takes longer than
+`CLOSING_S`, as where a library waits for a task that never ends, no further one is needed. Nothing
+is lost by that: finished files are whole at any moment.
 
 A library may catch the exception and go on: some look for what they need with a bare `except:`.
 So it is looked after some time whether it is still under way, and raised again if not.
 """
 
+import contextlib
 import os
 import signal
 import sys
 import time
 from types import FrameType
+from typing import NoReturn
 
 PATIENCE_S = 5.0  # [s] that closing may take before a further signal ends the process at once
+CLOSING_S = 15.0  # [s] that closing may take at all
 AGAIN_S = 0.25  # [s] between two looks whether the exception is still under way
 _NAMES = ("SIGINT", "SIGTERM", "SIGHUP")  # some systems lack the last one
 
@@ -73,13 +78,22 @@ class Interruption:
                 signal.setitimer(signal.ITIMER_REAL, AGAIN_S, AGAIN_S)
             raise Interrupted
         if self._since and time.monotonic() - self._since > PATIENCE_S:
-            os._exit(self.exit_code)
+            self._leave_at_once()
         self._look(number, frame)
+
+    def _leave_at_once(self) -> NoReturn:
+        """End the process; its workers end with it."""
+        shown_cursor = "\x1b[?25h" if sys.stderr.isatty() else ""
+        with contextlib.suppress(OSError):
+            os.write(2, f"{shown_cursor}\nevoexp: interrupted\n".encode())
+        os._exit(self.exit_code)
 
     def _look(self, number: int, frame: FrameType | None) -> None:
         """Raise again if the exception was caught somewhere and the command goes on."""
         if self.number is None or self._ended:
             return
+        if time.monotonic() - self._since > CLOSING_S:
+            self._leave_at_once()
         error = sys.exception()
         while error is not None and not isinstance(error, Interrupted):
             error = error.__context__

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from evoexp.errors import EvoexpError
+from evoexp.errors import EvoexpError, SettingError
 from evoexp.numeric.ordered_sums import length, matrix_product
 from evoexp.records import BoolArray, FloatArray, IntArray
 
@@ -18,6 +18,8 @@ U = np.uint64
 
 SPATIAL_ROWS = 12
 """Rows of a joint's frame in space: nine of its rotation, three of its origin."""
+
+MAX_JOINTS = 100  # the memory of Pinocchio's data grows with their cube: 70 MB
 
 PLANAR_ROWS = 4
 """Rows of a joint's frame in the plane: sine, cosine, x, y."""
@@ -93,7 +95,10 @@ def kinematic_table(model: Any) -> KinematicTable:
 
     Raises:
         UnsupportedJoint: If a joint has not exactly one coordinate, or turns and slides at once.
+        SettingError: If there are more joints than `MAX_JOINTS`.
     """
+    if model.njoints - 1 > MAX_JOINTS:
+        raise SettingError("robot", f"of at most {MAX_JOINTS} joints", model.njoints - 1)
     data = model.createData()
     neutral = pin.neutral(model)
     pin.computeJointJacobians(model, data, neutral)

@@ -16,6 +16,7 @@ from typing import Any
 
 import joblib
 from joblib.externals.loky import reusable_executor
+from joblib.externals.loky.backend import resource_tracker as loky_tracker
 from joblib.externals.loky.backend.context import get_start_method, set_start_method
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
@@ -97,6 +98,8 @@ def in_workers(num_workers: int, tasks: Iterable[Any], ordered: bool = False) ->
         initargs=(os.getpid(), get_start_method() == _SERVED),
     )
     # starts the workers, and the server anew if it died
+    for tracker in (resource_tracker, loky_tracker):  # they let signals through when they start
+        tracker.ensure_running()
     with _children_ignore_signals(), _environment_of_workers():
         results: Iterator[Any] = pool(tasks)
     return results

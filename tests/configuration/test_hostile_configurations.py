@@ -119,7 +119,7 @@ FOUND: tuple[tuple[Kind, str, Any, str], ...] = (  # tracebacks, hangs and crash
     (("corsepius_ball", 0), "robot.bodies.1.start.0", 2**31, GEOMETRY),  # 214 GB of spheres
     (("corsepius_ball", 0), "robot.bodies.1.start.0", 10**6, "coverable by 10000 spheres"),
     (("corsepius_ball", 0), "robot.bodies.5.size.2", 1e308, GEOMETRY),
-    (("corsepius_ball", 0), "planner.collision.inflation", 1e-320, "coverable by 10000 spheres"),
+    (("corsepius_ball", 0), "planner.collision.inflation", 1e-90, "coverable by 10000 spheres"),
     (("corsepius_ball", 0), "planner.scope", None, "planner.scope: must be a list"),
     (("corsepius_ball", 0), "planner.scope", [float("inf")], "planner.scope[0]: must be a finite"),
     (("corsepius_pick_and_place", 0), "scenario.obstacles.2.end.2", 2.0**31, GEOMETRY),

@@ -99,5 +99,5 @@ def test_export_writes_trajectories(evoexp: Evoexp, stored: Path, runs: list[str
 
 def test_export_refuses_what_cannot_be(refused: Refused, runs: list[str]) -> None:
     said = refused("export", runs[0], "--format", "jsn")
-    assert said == "--format: must be one of csv, json, was 'jsn'; did you mean 'json'?"
+    assert said == "--format: must be one of csv, json, ros, was 'jsn'; did you mean 'json'?"
     assert refused("export", runs[0], "--ramp", "-1") == "--ramp: must be greater than 0, was -1.0"

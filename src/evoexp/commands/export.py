@@ -2,6 +2,9 @@
 
 import argparse
 import math
+from pathlib import Path
+
+import numpy as np
 
 from evoexp.commands.motion_files import (
     add_motion_arguments,
@@ -11,28 +14,48 @@ from evoexp.commands.motion_files import (
     write,
 )
 from evoexp.errors import SettingError
-from evoexp.playback.trajectory import as_csv, as_json, trajectory
+from evoexp.playback.joint_limits import Defaults, JointLimits, joint_limits
+from evoexp.playback.recording import Recording
+from evoexp.playback.trajectory import Trajectory, as_csv, as_json, as_ros, trajectory
+
+ANSWERS = {True: "yes", False: "no", None: "undecided"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     add_motion_arguments(parser, ".json")
     parser.add_argument(
-        "--format", choices=("csv", "json"), default="json", help="json: as ROS's JointTrajectory"
+        "--format",
+        choices=("csv", "json", "ros"),
+        default="json",
+        help="ros: a trajectory_msgs/msg/JointTrajectory in JSON, which is YAML, too; json: with "
+        "origin, units and verdict",
     )
     parser.add_argument(
         "--timing",
-        choices=("uniform", "optimal"),
-        default="uniform",
-        help="equal times from instant to instant, or as fast along the path as speeds and "
-        "accelerations permit",
+        choices=("rest", "optimal", "uniform"),
+        default="rest",
+        help="rest: from rest to rest, also where two straight lines meet, within limits of speed, "
+        "acceleration and jerk; optimal: as fast as speeds and accelerations permit, corners of "
+        "certified motions rounded and certified again; uniform: equal times from instant to "
+        "instant, which jumps",
+    )
+    parser.add_argument(
+        "--no-blend", action="store_true", help="optimal: stop at corners instead of rounding them"
+    )
+    parser.add_argument(
+        "--limits",
+        type=Path,
+        metavar="joint_limits.yaml",
+        help="limits of speed, acceleration and jerk by joint, as MoveIt's file; where it has "
+        "none, the robot's own speeds, then --turn-speed, --slide-speed",
     )
     parser.add_argument(
         "--ramp",
         type=float,
         default=0.5,
         metavar="S",
-        help="time from rest to full speed (optimal)",
+        help="time from rest to full speed, where --limits sets no acceleration",
     )
 
 
@@ -41,7 +64,38 @@ def main(arguments: argparse.Namespace) -> int:
     if not 0.0 < arguments.ramp < math.inf:
         raise SettingError("--ramp", "greater than 0", arguments.ramp)
     found = single(arguments)
-    timed = trajectory(found, arguments.timing, speed_limits(arguments), arguments.ramp)
-    content = as_csv(timed) if arguments.format == "csv" else as_json(found, timed)
-    write(output_path(arguments, [found], f".{arguments.format}"), content)
+    limits = _limits(found, arguments)
+    timed = trajectory(found, arguments.timing, limits, blend=not arguments.no_blend)
+    if arguments.format == "ros":
+        content = as_ros(timed)
+    else:
+        content = as_csv(timed) if arguments.format == "csv" else as_json(found, timed)
+    ending = ".csv" if arguments.format == "csv" else ".json"
+    write(output_path(arguments, [found], ending), content)
+    print(_described(timed, limits))
     return 0
+
+
+def _limits(found: Recording, arguments: argparse.Namespace) -> JointLimits:
+    """Return the limits that the file, the robot or the command line set."""
+    prismatic = np.array([joint.prismatic for joint in found.joints])
+    speeds = speed_limits(arguments).of(prismatic, found.size)
+    defaults = Defaults(speeds, found.velocity_limits, arguments.ramp)
+    return joint_limits(tuple(joint.name for joint in found.joints), arguments.limits, defaults)
+
+
+def _described(timed: Trajectory, limits: JointLimits) -> str:
+    """Say how long the motion takes, how near it comes to the limits, and what is proven of it."""
+    speed, acceleration, _ = (
+        float((rate / limit).max()) for rate, limit in zip(timed.rates(), limits, strict=True)
+    )
+    if timed.interpolation == "linear":
+        rates = f"at most {speed:.0%} of a joint's speed, which jumps at every point"
+    else:
+        rates = f"at most {speed:.0%} of a joint's speed, {acceleration:.0%} of its acceleration"
+    corners = f", {timed.num_corners} corners rounded" if timed.num_corners else ""
+    verdict = timed.verdict
+    return (
+        f"{timed.times[-1]:.2f} s, {len(timed.times)} points{corners}; {rates}; certified: "
+        f"{ANSWERS[verdict.certified]}, margin kept: {ANSWERS[verdict.certified_margin]}"
+    )

@@ -95,6 +95,8 @@ class Recording(NamedTuple):
         margin: Clearance that the task requires [length unit].
         verdict: Verdict of the certifier.
         view: Room that a picture has to show.
+        parts: Pieces of the motion that have bodies of their own.
+        velocity_limits: (nq,) those of the robot itself [rad/s, length unit/s]; inf: it has none.
     """
 
     heading: Heading
@@ -117,6 +119,8 @@ class Recording(NamedTuple):
     margin: float
     verdict: Certificate
     view: View
+    parts: tuple[Part, ...]
+    velocity_limits: FloatArray
 
 
 def record(
@@ -178,7 +182,15 @@ def record(
         margin=margin,
         verdict=certificate(parts, motion, margin),
         view=_view(shapes, where.world, places),
+        parts=tuple(parts),
+        velocity_limits=_velocity_limits(assembly),
     )
+
+
+def _velocity_limits(assembly: Assembly) -> FloatArray:
+    """Return the limits that the robot's model has; Pinocchio's default is no limit."""
+    limits = np.array(assembly.model.velocityLimit, dtype=np.float64)
+    return np.where((limits > 0.0) & (limits < 1e6), limits, np.inf)
 
 
 def _carried(parts: list[Part]) -> list[str]:

@@ -1,25 +1,39 @@
-"""A motion as a joint trajectory, for a robot or MoveIt: names, times, positions, velocities.
+"""A motion as a joint trajectory, for a robot or MoveIt: names, times, positions, rates.
 
 A controller that interpolates the points moves as the motion that was judged. Without velocities it
-goes straight from point to point. With velocities it follows the cubics that they determine: the
-pieces of the spline (uniform timing), or speeding up, constant speed and slowing down on a straight
-piece (optimal timing).
+goes straight from point to point. With velocities it follows the cubics that they determine; with
+accelerations, too, polynomials of fifth degree along straight lines. The motion that is executed is
+certified again wherever it is another curve than the stored one.
 """
 
 import csv
 import io
 import json
+from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from evoexp.collision.certifier.certificate import Certificate, certificate
+from evoexp.collision.scene import Part
 from evoexp.errors import EvoexpError
-from evoexp.playback.optimal_timing import along_curve, along_lines
+from evoexp.paths.motion import Motion
+from evoexp.playback.blending import BlendedMotion, blended
+from evoexp.playback.joint_limits import JointLimits
+from evoexp.playback.optimal_timing import (
+    Timed,
+    along_curve,
+    along_lines,
+    greatest_rates,
+    hermite_motion,
+)
 from evoexp.playback.recording import Recording
-from evoexp.playback.timing import SpeedLimits, velocities
+from evoexp.playback.rest_timing import rest_on_curve, rest_on_lines
+from evoexp.playback.timing import seconds_per_instant, velocities
 from evoexp.records import FloatArray
 
-Timing = Literal["uniform", "optimal"]
+Timing = Literal["rest", "optimal", "uniform"]
+Interpolation = Literal["linear", "cubic", "quintic"]
 
 
 class BadTiming(EvoexpError):
@@ -35,6 +49,10 @@ class Trajectory(NamedTuple):
         times: (points,) from the start [s].
         positions: (points, nq) [rad or length unit].
         velocities: (points, nq) per second; None: straight from point to point.
+        interpolation: Degree of the polynomials that a controller puts between the points; quintic:
+            accelerations are 0 at every point.
+        verdict: The certifier's, on the motion that is executed.
+        num_corners: Corners that were rounded.
     """
 
     joints: tuple[str, ...]
@@ -42,49 +60,138 @@ class Trajectory(NamedTuple):
     times: FloatArray
     positions: FloatArray
     velocities: FloatArray | None
+    interpolation: Interpolation
+    verdict: Certificate
+    num_corners: int = 0
+
+    def rates(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the greatest speed, acceleration and jerk of every joint, each (nq,).
+
+        Where the speed of a motion jumps, accelerations are not counted.
+        """
+        widths = np.diff(self.times)
+        if self.interpolation == "quintic":
+            ways, w = np.abs(np.diff(self.positions, axis=0)), widths[:, None]
+            factors = (1.875, 10.0 / np.sqrt(3.0), 60.0)  # of s = 10 u³ − 15 u⁴ + 6 u⁵
+            speed, acceleration, jerk = (
+                (factor * ways / w ** (k + 1)).max(axis=0) for k, factor in enumerate(factors)
+            )
+            return speed, acceleration, jerk
+        if self.velocities is None:
+            return greatest_rates(Motion(self.positions), widths)
+        return greatest_rates(hermite_motion(self.times, self.positions, self.velocities), widths)
 
 
 def trajectory(
-    recording: Recording, timing: Timing, limits: SpeedLimits, ramp: float
+    recording: Recording, timing: Timing, limits: JointLimits, blend: bool = True
 ) -> Trajectory:
     """Return the points of a motion in time.
 
     Args:
-        recording: The motion; its `seconds` come from the same limits.
-        timing: uniform: equal times from instant to instant, as short as the speed limits permit |
-            optimal: as fast as limits of speed and acceleration permit along the path, with a stop
-            wherever two straight lines meet.
-        limits: Limits of speed.
-        ramp: Time from rest to a joint's greatest speed [s]; it limits the accelerations of the
-            optimal timing.
+        recording: The motion.
+        timing: rest: at rest at both ends, and wherever two straight lines meet, within limits of
+            speed, acceleration and jerk | optimal: as fast as limits of speed and acceleration
+            permit | uniform: equal times from instant to instant, as short as the limits of speed
+            permit; its speed jumps.
+        limits: Limits of the joints.
+        blend: Whether the optimal timing rounds the corners of a certified motion, as far as the
+            rounded motion is certified; if not, it stops at each.
 
     Raises:
         BadTiming: If the timing needs a package that is not installed.
     """
     motion = recording.motion
-    prismatic = np.array([joint.prismatic for joint in recording.joints])
-    if timing == "uniform":
-        instants = np.arange(float(motion.num_segments + 1))
-        speeds = (
-            None if motion.coefficients is None else velocities(motion, instants, recording.seconds)
-        )
-        times, positions = recording.seconds * instants, motion.q
-    else:
-        speed = limits.of(prismatic, recording.size)
-        along = along_lines if motion.coefficients is None else along_curve
-        found = along(motion, speed, speed / ramp)
-        if found is None:
-            raise BadTiming(
-                "--timing optimal of a curve needs toppra: pip install 'evoexp[timing]'"
-            )
-        times, positions, speeds = found
     names = tuple(joint.name for joint in recording.joints)
-    units = tuple(recording.length_unit if slides else "rad" for slides in prismatic)
-    return Trajectory(names, units, times, positions, speeds)
+    units = tuple(recording.length_unit if joint.prismatic else "rad" for joint in recording.joints)
+    straight = motion.coefficients is None or motion.num_segments == 0
+    rounded: BlendedMotion | None = None
+    if timing == "uniform":
+        times, positions, speeds = _uniform(motion, limits.velocity)
+        kind: Interpolation = "linear" if straight else "cubic"
+        rates = None if straight else speeds
+        return Trajectory(names, units, times, positions, rates, kind, recording.verdict)
+    if timing == "rest" and straight:
+        return Trajectory(
+            names, units, *rest_on_lines(motion, limits), "quintic", recording.verdict
+        )
+    if timing == "rest":
+        found: Timed | None = rest_on_curve(motion, limits)
+    elif not straight:
+        found = along_curve(motion, limits.velocity, limits.acceleration)
+    elif blend and recording.verdict.certified and (motion.q != motion.q[0]).any():
+        rounded = blended(motion, recording.parts, recording.margin, limits.velocity)
+        found = along_curve(
+            rounded.motion, limits.velocity, limits.acceleration, rounded.lengths, rounded.stops
+        )
+    else:
+        points = along_lines(motion, limits.velocity, limits.acceleration)
+        return Trajectory(names, units, *points, "cubic", recording.verdict)
+    if found is None:
+        must = "--timing optimal of a curve needs toppra: pip install 'evoexp[timing]'"
+        raise BadTiming(must + ("; --no-blend stops at corners, without it" if rounded else ""))
+    parts = recording.parts if rounded is None else rounded.parts
+    path = motion if rounded is None else rounded.motion
+    verdict = _executed_verdict(found, path, parts, recording.margin)
+    corners = 0 if rounded is None else rounded.num_corners
+    return Trajectory(names, units, *found, "cubic", verdict, corners)
+
+
+def _uniform(motion: Motion, speeds: FloatArray) -> Timed:
+    """Time a motion by equal times from instant to instant."""
+    instants = np.arange(float(motion.num_segments + 1))
+    seconds = seconds_per_instant(motion, speeds)
+    return seconds * instants, motion.q, velocities(motion, instants, seconds)
+
+
+def _executed_verdict(
+    timed: Timed, path: Motion, parts: Sequence[Part], margin: float
+) -> Certificate:
+    """Certify the cubics that a controller puts between points on a path."""
+    executed = hermite_motion(*timed)
+    places = [_point_at(timed[1], path.q[part.last]) for part in parts[:-1]]
+    borders = [0, *places, executed.num_segments]
+    moved = [
+        part._replace(first=first, last=last)
+        for part, first, last in zip(parts, borders[:-1], borders[1:], strict=True)
+    ]
+    return certificate(moved, executed, margin)
+
+
+def _point_at(positions: FloatArray, q: FloatArray) -> int:
+    """Return the point at a configuration."""
+    return int(np.argmin(((positions - q) ** 2).sum(axis=1)))
+
+
+def as_ros(found: Trajectory) -> bytes:
+    """Return a trajectory as a `trajectory_msgs/msg/JointTrajectory`, in JSON, which is YAML, too.
+
+    Raises:
+        BadTiming: If joints slide by another unit of length than ROS's metre.
+    """
+    others = sorted(set(found.units) - {"rad", "m"})
+    if others:
+        raise BadTiming(f"--format ros: joints that slide must do so in m, was {others[0]}")
+    nothing = [0.0] * len(found.joints)
+    points = []
+    nanoseconds = np.rint(found.times * 1e9).astype(np.int64)
+    for k, time in enumerate(nanoseconds.tolist()):
+        rates = [] if found.velocities is None else found.velocities[k].tolist()
+        points.append(
+            {
+                "positions": found.positions[k].tolist(),
+                "velocities": rates,
+                "accelerations": nothing if found.interpolation == "quintic" else [],
+                "effort": [],
+                "time_from_start": {"sec": time // 10**9, "nanosec": time % 10**9},
+            }
+        )
+    header = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
+    data = {"header": header, "joint_names": list(found.joints), "points": points}
+    return json.dumps(data, indent=1, allow_nan=False).encode() + b"\n"
 
 
 def as_json(recording: Recording, found: Trajectory) -> bytes:
-    """Return a trajectory as JSON, with the fields of `trajectory_msgs/JointTrajectory`."""
+    """Return a trajectory as JSON, with its origin, its units and its verdict."""
     points = []
     for k, time in enumerate(found.times.tolist()):
         point: dict[str, Any] = {"time_from_start": time, "positions": found.positions[k].tolist()}
@@ -94,7 +201,9 @@ def as_json(recording: Recording, found: Trajectory) -> bytes:
     data = {
         "condition": recording.condition_id,
         "replicate": recording.heading.replicate,
-        "interpolation": "linear" if found.velocities is None else "cubic",
+        "interpolation": found.interpolation,
+        "certified": found.verdict.certified,
+        "certified_margin": found.verdict.certified_margin,
         "joint_names": list(found.joints),
         "units": list(found.units),
         "points": points,

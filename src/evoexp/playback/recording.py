@@ -150,23 +150,20 @@ def record(
     assembly = robot.build()
     margin = planner.security_margin(problem)
     model, size = parts[0].scene.model, parts[0].scene.size
-    prismatic = np.zeros(model.nq, dtype=bool)
-    prismatic[assembly.table.index_q[assembly.table.prismatic]] = True
+    joints = _joints(assembly)
+    prismatic = np.array([joint.prismatic for joint in joints])
     carried = _carried(parts)
     times = ticks(motion, prismatic, size)
     where = poses(model, motion, times, parts, carried)
     seconds = seconds_per_instant(motion, (limits or SpeedLimits()).of(prismatic, size))
     shapes = _shapes(parts[0].scene, assembly, carried)
     places = targets(condition.scenario, robot)
-    names = [str(model.names[int(joint)]) for joint in np.argsort(assembly.table.index_q) + 1]
     return Recording(
         heading=heading,
         condition_id=condition.id,
         config_json=condition.to_json(),
         length_unit=condition.length_unit,
-        joints=tuple(
-            Joint(name, bool(slides)) for name, slides in zip(names, prismatic, strict=True)
-        ),
+        joints=joints,
         motion=motion,
         times=times,
         q=np.array([motion.at(float(t)) for t in times]),
@@ -184,6 +181,14 @@ def record(
         view=_view(shapes, where.world, places),
         parts=tuple(parts),
         velocity_limits=_velocity_limits(assembly),
+    )
+
+
+def _joints(assembly: Assembly) -> tuple[Joint, ...]:
+    """Return the joints in the order of their coordinates."""
+    table, names = assembly.table, assembly.model.names
+    return tuple(
+        Joint(str(names[int(k) + 1]), bool(table.prismatic[k])) for k in np.argsort(table.index_q)
     )
 
 

@@ -13,6 +13,7 @@ from evoexp.numeric.elementary import sincos
 from evoexp.numeric.vectors import (
     LANES,
     any_lane,
+    ceiling,
     load,
     lower,
     magnitude,
@@ -76,9 +77,11 @@ def test_roots_magnitudes_and_choices() -> None:
     with np.errstate(invalid="ignore"):
         assert same(over_lanes(kernel(lambda a, b: root(a)))(x, y), np.sqrt(x))
     assert same(over_lanes(kernel(lambda a, b: magnitude(a)))(x, y), np.abs(x))
+    assert same(over_lanes(kernel(lambda a, b: ceiling(a)))(x, y), np.ceil(x))
     assert same(over_lanes(kernel(lambda a, b: spread(2.5)))(x, y), np.full_like(x, 2.5))
     # a comparison with NaN is false: the second of the choices, the first of lower and upper
     assert same(over_lanes(kernel(lambda a, b: select(a < b, a, b)))(x, y), np.where(x < y, x, y))
+    assert same(over_lanes(kernel(lambda a, b: select(a > b, a, b)))(x, y), np.where(x > y, x, y))
     assert same(over_lanes(kernel(lambda a, b: select(a == b, a, b)))(x, y), np.where(x == y, x, y))
     assert same(over_lanes(lower)(x, y), np.where(y < x, y, x))
     assert same(over_lanes(upper)(x, y), np.where(x < y, y, x))

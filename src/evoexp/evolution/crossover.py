@@ -87,15 +87,17 @@ def cross_at_sites(
             mates[2 * pair], mates[2 * pair + 1] = second, first
     # every child: its own parent before the site, the mate from the site on; where a segment is
     # exchanged, the other way round for every second arm
+    source = np.empty(num_offspring, dtype=np.uint64)  # unsigned: not to be counted from the end
     for arm in range(num_arms):
         site = sites[arm]
         heads, tails = (mates, parents) if segment and arm % 2 == 1 else (parents, mates)
-        for j in range(arm_slices[arm, 0], arm_slices[arm, 1]):
-            for i in range(num_points):
-                source, target = population[j, i], out[j, i]
+        for i in range(num_points):
+            for k in range(num_offspring):
+                source[k] = heads[k] if i < site[k] else tails[k]
+            for j in range(arm_slices[arm, 0], arm_slices[arm, 1]):
+                given, target = population[j, i], out[j, i]
                 for k in range(num_offspring):
-                    head, tail = source[heads[k]], source[tails[k]]
-                    target[k] = head if i < site[k] else tail
+                    target[k] = given[source[k]]
 
 
 def num_single_point_uniforms(num_pairs: int) -> int:

@@ -47,6 +47,7 @@ class Vector(Protocol):
     def __truediv__(self, other: "Vector | float") -> "Vector": ...
     def __rtruediv__(self, other: float) -> "Vector": ...
     def __lt__(self, other: "Vector | float") -> Mask: ...
+    def __gt__(self, other: "Vector | float") -> Mask: ...
 
 
 class _VectorType(types.Type):
@@ -134,6 +135,9 @@ def _define_operators() -> None:
     def less(builder: Any, one: Any, two: Any) -> Any:
         return builder.fcmp_ordered("<", one, two)
 
+    def greater(builder: Any, one: Any, two: Any) -> Any:
+        return builder.fcmp_ordered(">", one, two)
+
     def equal(builder: Any, one: Any, two: Any) -> Any:
         return builder.fcmp_ordered("==", one, two)
 
@@ -141,6 +145,7 @@ def _define_operators() -> None:
         return builder.icmp_signed("!=", one, two)
 
     _define(operator.lt, vector_type, types.float64, mask_type, less)
+    _define(operator.gt, vector_type, types.float64, mask_type, greater)
     _define(operator.eq, vector_type, types.float64, mask_type, equal)
     _define(operator.ne, word_type, types.int64, mask_type, unequal)
 
@@ -270,6 +275,9 @@ root: Callable[[Vector], Vector] = _of_llvm("sqrt")
 
 magnitude: Callable[[Vector], Vector] = _of_llvm("fabs")
 """Return the absolute value of every lane."""
+
+ceiling: Callable[[Vector], Vector] = _of_llvm("ceil")
+"""Return the least whole number not below the value of every lane."""
 
 to_bits: Callable[[Any], Any] = _reinterpretation(
     {types.float64: types.int64, vector_type: word_type}

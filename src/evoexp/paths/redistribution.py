@@ -1,10 +1,10 @@
 """Redistribution of via-points to equal arc length (Rana & Zalzala 1995, section 3.3).
 
-Per arm and block of 64 lanes: fit the splines, integrate the speed (`arc_length`), then find for
-the targets L·i/N their segment (every segment is entered in the bucket of the first target at or
-after its begin; a running maximum fills the gaps) and within it the sample, by a bisection without
-branches. Between two samples the speed is taken as linear, which inverts in closed form; the point
-is the spline's there.
+Eight paths of an arm at a time, as vectors: fit the splines, integrate the speed (`arc_length`),
+then find for the targets L·i/N their segment (every segment is entered at the first target at or
+after its begin; a running maximum fills the gaps) and within it the sample, by counting the lengths
+that are not beyond. Between two samples the speed is taken as linear, which inverts in closed form;
+the point is the spline's there.
 
 Accuracy: root mean square (and largest) distance from the converged points in units of their
 spacing, 100 paths of 21 points in the plane, fresh walks and populations just crossed over:
@@ -14,198 +14,178 @@ spacing, 100 paths of 21 points in the plane, fresh walks and populations just c
     16 chords               0.8e-3 … 1.1e-3   (0.4e-2 … 0.5e-2)
 
 Gauss's rule with a polynomial inverse needs as many roots for that: near a cusp, which crossed-over
-paths have, the speed is hardly smooth. What limits it (Xeon at 2.5 to 3 GHz, 50 lanes, 2 arms, 21
-points, 2 joints, 8 samples: about 70 µs): the speeds and their integral 30 µs, of which the square
-roots alone (3 cycles each) take 18; copying records from each lane's own place, which no loop can
-vectorise, 14 µs; the bisection 9 µs; splines 3 µs; and arithmetic.
+paths have, the speed is hardly smooth. What limits it is the speeds and their integral, half of the
+time, of which the square roots alone take two thirds; a quarter is finding the targets' samples and
+a fifth the points there, whose numbers stand at another place in every path.
 """
 
 import numpy as np
 
-from evoexp.numeric.compilation import borrowed, kernel
+from evoexp.numeric.compilation import borrowed, inlined, kernel
+from evoexp.numeric.vector_rows import (
+    lane_numbers,
+    load_pairs,
+    load_quads,
+    num_up_to,
+    store_places,
+)
+from evoexp.numeric.vectors import (
+    Vector,
+    any_lane,
+    ceiling,
+    load,
+    root,
+    select,
+    spread,
+    store,
+    upper,
+)
 from evoexp.paths.arc_length import integrate_speed
 from evoexp.paths.layout import check_arm_slices, check_via_points, padded
-from evoexp.paths.spline import fit_spline
+from evoexp.paths.spline import fit_splines, write_rows
 from evoexp.paths.workspace import (
-    R2,
-    R3,
-    R4,
-    R5,
-    R6,
-    R7,
-    R8,
-    ROW,
-    ROW_SHIFT,
     U0,
     U1,
-    U3,
+    U2,
+    U4,
+    VECTOR,
+    Layout,
     Offsets,
     Redistribution,
+    layout,
 )
 from evoexp.records import FloatArray, IntArray
 
 _LONGEST = 1e300  # a longer path has overflowed (garbage in a padded lane) and stays as it is
 
 
-@kernel
+@inlined
 def enter_segments(
+    w: FloatArray, N: np.uint64, at: Layout, origin: Vector, total: Vector, places: Offsets
+) -> None:
+    """Enter every segment in the first target at or after its begin, of several the last one.
+
+    Targets without one have 0.
+    """
+    n = np.float64(N)
+    per_part, nothing = n / total, spread(0.0)
+    for i in range(N + U1):
+        store(w, at.entered + i * VECTOR, nothing)
+    for k in range(U1, N):
+        target = ceiling((load(w, at.begins + k * VECTOR) - origin) * per_part)
+        target = select(target < n, target, spread(n))  # so that NaN, too, becomes a valid index
+        target = select(target > 0.0, target, nothing)
+        store_places(places, U0, 8.0 * target + lane_numbers())
+        for lane in range(VECTOR):
+            w[at.entered + places[lane]] = np.float64(k)
+
+
+@inlined
+def find_samples(
     w: FloatArray,
     N: np.uint64,
     S: np.uint64,
-    count: np.uint64,
-    samples: np.uint64,
-    work: np.uint64,
-    entered: Offsets,
-    at: Offsets,
+    at: Layout,
+    origin: Vector,
+    total: Vector,
+    places: Offsets,
 ) -> None:
-    """Write to row i of `entered` the last segment that begins at or before target i.
+    """Write every target and the last sample of its segment not beyond it, or the first.
 
-    A row may also hold an earlier segment, or 0. The origin of L, the path's length and the
-    reciprocal of its N-th part are written to the work rows 5, 6 and 7.
+    Their places, and those of the segments, are written, too.
     """
-    end = samples + ROW + N * S * R2
-    n = np.float64(N)
-    for lane in range(count):
-        origin = w[samples + ROW + lane]
-        total = w[end + lane] - origin
-        w[work + R5 + lane] = origin
-        w[work + R6 + lane] = total
-        w[work + R7 + lane] = n / total
-    for x in range((N + U1) * ROW):
-        entered[x] = U0
-    for k in range(U1, N):
-        begin = samples + ROW + k * S * R2
-        for lane in range(count):
-            target = np.ceil((w[begin + lane] - w[work + R5 + lane]) * w[work + R7 + lane])
-            target = target if target < n else n  # so that NaN, too, becomes a valid index
-            target = target if target > 0.0 else 0.0
-            at[lane] = np.uint64(np.int64(target)) * ROW + lane
-        for lane in range(count):
-            entered[at[lane]] = k
+    segment = spread(0.0)
+    for i in range(U1, N):
+        own = i * VECTOR
+        target = origin + total * (np.float64(i) / np.float64(N))
+        store(w, at.targets + own, target)
+        # the last segment entered up to here
+        segment = upper(segment, load(w, at.entered + own))
+        store_places(places, at.knots + own, np.float64(at.row) * lane_numbers() + 2.0 * segment)
+        begin = np.float64(at.sample) * lane_numbers() + np.float64(S) * segment
+        store_places(places, at.samples + own, begin)
+        # bisection down to eight samples, among which lengths are counted
+        sample = spread(0.0) if S == VECTOR else halve(w, S, at, target, own, places)
+        sample = sample + num_up_to(w, places, at.samples + own, at.lengths + U2, target, 7)
+        store(w, at.found + own, sample)
+        store_places(places, at.samples + own, begin + sample)
 
 
-@kernel
-def find_samples(
-    w: FloatArray,
-    fraction: float,
-    S: np.uint64,
-    count: np.uint64,
-    samples: np.uint64,
-    work: np.uint64,
-    segment: Offsets,
-    at: Offsets,
-) -> None:
-    """Write target lengths to work row 0, and to `at` the last sample not beyond each of them."""
-    for lane in range(count):
-        w[work + lane] = w[work + R5 + lane] + w[work + R6 + lane] * fraction
-        at[lane] = segment[lane] * S * R2 + lane
-    lengths = samples + ROW
-    step = S // np.uint64(2)
-    while step > np.uint64(4):
-        for lane in range(count):
-            at[lane] += np.uint64(w[lengths + at[lane] + step * R2] <= w[work + lane]) * (step * R2)
-        step //= np.uint64(2)
-    for lane in range(count):
-        target = w[work + lane]
-        f = at[lane]
-        f += np.uint64(w[lengths + f + R8] <= target) * R8
-        f += np.uint64(w[lengths + f + R4] <= target) * R4
-        f += np.uint64(w[lengths + f + R2] <= target) * R2
-        at[lane] = f
+@inlined
+def halve(
+    w: FloatArray, S: np.uint64, at: Layout, target: Vector, own: np.uint64, places: Offsets
+) -> Vector:
+    """Return the first of the eight samples among which each target lies; move its place there."""
+    for lane in range(VECTOR):
+        limit, begin, step = w[at.targets + own + lane], places[at.samples + own + lane], S >> U1
+        place = begin
+        while step > U4:
+            if w[at.lengths + U1 + place + step] <= limit:
+                place += step
+            step >>= U1
+        places[at.samples + own + lane] = place
+        w[at.found + own + lane] = np.float64(place - begin)
+    return load(w, at.found + own)
 
 
-@kernel
-def gather(w: FloatArray, base: np.uint64, work: np.uint64, count: np.uint64, at: Offsets) -> None:
-    """Copy four consecutive rows, each lane from its own place, to the work rows 1..4."""
-    for lane in range(count):
-        f = base + at[lane]
-        # all loads first: a store could alias
-        x0, x1, x2, x3 = w[f], w[f + ROW], w[f + R2], w[f + R3]
-        w[work + ROW + lane] = x0
-        w[work + R2 + lane] = x1
-        w[work + R3 + lane] = x2
-        w[work + R4 + lane] = x3
+@inlined
+def parameter(
+    target: Vector, sample: Vector, speeds: tuple[Vector, Vector], lengths: tuple[Vector, Vector]
+) -> Vector:
+    """Return where a target lies between two samples, in samples from the segment's begin.
 
-
-@kernel
-def find_parameters(
-    w: FloatArray, S: np.uint64, count: np.uint64, work: np.uint64, at: Offsets
-) -> None:
-    """Replace the target lengths by u in [0, 1] within their segments, from the gathered rows."""
-    h = 1.0 / np.float64(S)
-    mask = S - U1
-    for lane in range(count):
-        sample = np.float64(np.int64(((at[lane] - lane) >> (ROW_SHIFT + U1)) & mask))
-        v0, L0, v1 = w[work + ROW + lane], w[work + R2 + lane], w[work + R3 + lane]
-        length = w[work + R4 + lane] - L0
-        r = w[work + lane] - L0
-        r = r if r > 0.0 else 0.0
-        r = r if r < length else length
-        both = v0 + v1
-        begin = length * v0
-        below = begin + np.sqrt(begin * begin + r * length * (v1 - v0) * both)
-        x = r * both / below
-        x = x if below > 0.0 else 0.0
-        x = x if x < 1.0 else 1.0
-        w[work + lane] = (sample + x) * h
-
-
-@kernel
-def evaluate(
-    via_points: FloatArray,
-    joint: np.uint64,
-    i: int,
-    lane0: np.uint64,
-    w: FloatArray,
-    work: np.uint64,
-    count: np.uint64,
-) -> None:
-    """Move point i of one joint to the spline's value at u.
-
-    Paths without length and paths that overflowed keep it.
+    Args:
+        target: Lengths.
+        sample: The first of both, counted within its segment.
+        speeds: Of both.
+        lengths: Up to both.
     """
-    for lane in range(count):
-        a0, m0 = w[work + ROW + lane], w[work + R2 + lane]
-        a1, m1 = w[work + R3 + lane], w[work + R4 + lane]
-        u = w[work + lane]
-        x = a0 + u * ((a1 - a0 - 2.0 * m0 - m1) + u * (3.0 * m0 + u * (m1 - m0)))
-        old = via_points[joint, i, lane0 + lane]
-        total = w[work + R6 + lane]
-        via_points[joint, i, lane0 + lane] = x if (total > 0.0) & (total < _LONGEST) else old
+    v0, v1 = speeds
+    length = lengths[1] - lengths[0]
+    r = target - lengths[0]
+    r = select(r > 0.0, r, spread(0.0))
+    r = select(r < length, r, length)
+    both = v0 + v1
+    begin = length * v0
+    below = begin + root(begin * begin + r * length * (v1 - v0) * both)
+    x = r * both / below
+    x = select(below > 0.0, x, spread(0.0))
+    inside: Vector = select(x < 1.0, x, spread(1.0))
+    return sample + inside
 
 
-@kernel
+@inlined
 def move_points(
     via_points: FloatArray,
     first: np.uint64,
+    pitch: np.uint64,
     joints: np.uint64,
-    lane0: np.uint64,
-    count: np.uint64,
     N: np.uint64,
     S: np.uint64,
     w: FloatArray,
-    samples: np.uint64,
-    work: np.uint64,
-    entered: Offsets,
-    segment: Offsets,
-    at: Offsets,
+    at: Layout,
+    total: Vector,
+    places: Offsets,
 ) -> None:
-    """Move the points 1..N−1 of one arm in one block of lanes."""
-    pitch = (N + U1) * R2
-    for lane in range(count):
-        segment[lane] = U0
+    """Move the points 1..N−1 of eight paths; those without length or overflown stay."""
+    h = 1.0 / np.float64(S)
+    moves = select(total > 0.0, select(total < _LONGEST, spread(1.0), spread(0.0)), spread(0.0))
+    any_stays = any_lane(moves < 1.0)
     for i in range(U1, N):
-        for lane in range(count):
-            k, new = segment[lane], entered[i * ROW + lane]
-            segment[lane] = new if new > k else k
-        find_samples(w, np.float64(i) / np.float64(N), S, count, samples, work, segment, at)
-        gather(w, samples, work, count, at)
-        find_parameters(w, S, count, work, at)
-        for lane in range(count):
-            at[lane] = segment[lane] * R2 + lane
+        own = i * VECTOR
+        # between two samples the speed is linear
+        speeds = load_pairs(w, places, at.samples + own, at.speeds)
+        lengths = load_pairs(w, places, at.samples + own, at.lengths + U1)
+        target, sample = load(w, at.targets + own), load(w, at.found + own)
+        u = parameter(target, sample, speeds, lengths) * h
+        # the splines there
         for joint in range(joints):
-            gather(w, joint * pitch, work, count, at)
-            evaluate(via_points, first + joint, i, lane0, w, work, count)
+            a0, m0, a1, m1 = load_quads(w, places, at.knots + own, at.rows + joint * at.joint)
+            x = a0 + u * ((a1 - a0 - 2.0 * m0 - m1) + u * (3.0 * m0 + u * (m1 - m0)))
+            place = first + (joint * (N + U1) + i) * pitch
+            if any_stays:
+                x = select(moves < 1.0, load(via_points, place), x)
+            store(via_points, place, x)
 
 
 @kernel
@@ -219,42 +199,22 @@ def redistribute_arms(
     integers: Offsets,
 ) -> None:
     """See `redistribute`; num_lanes is a multiple of eight here."""
-    via_points, pivots, w, integers = borrowed((via_points, pivots, w, integers))
     N, S = np.uint64(via_points.shape[1] - 1), np.uint64(samples_per_segment)
-    entered = integers[: (N + U1) * ROW]
-    segment = integers[(N + U1) * ROW : (N + np.uint64(2)) * ROW]
-    at = integers[(N + np.uint64(2)) * ROW :]
-    groups = np.uint64(num_lanes) >> U3
-    blocks = (groups + np.uint64(7)) >> U3
-    size = ((groups + blocks - U1) // blocks) << U3
+    pitch = np.uint64(via_points.shape[2])
+    flat, pivots, w, integers = borrowed((via_points.reshape(-1), pivots, w, integers))
     for arm in range(arm_slices.shape[0]):
-        first = np.uint64(arm_slices[arm, 0])
-        joints = np.uint64(arm_slices[arm, 1]) - first
-        pitch = (N + U1) * R2
-        samples = joints * pitch + R6
-        work = samples + (N * S + np.uint64(2)) * R2
-        for block in range(blocks):
-            lane0 = block * size
-            count = min(size, np.uint64(num_lanes) - lane0)
-            for joint in range(joints):
-                fit_spline(via_points, first + joint, lane0, count, N, pivots, w, joint * pitch)
-            integrate_speed(w, joints, N, S, count, samples, work)
-            enter_segments(w, N, S, count, samples, work, entered, at)
-            move_points(
-                via_points,
-                first,
-                joints,
-                lane0,
-                count,
-                N,
-                S,
-                w,
-                samples,
-                work,
-                entered,
-                segment,
-                at,
-            )
+        joint = np.uint64(arm_slices[arm, 0])
+        joints = np.uint64(arm_slices[arm, 1]) - joint
+        at = layout(joints, N, S)
+        for lane in range(U0, np.uint64(num_lanes), VECTOR):
+            first = joint * (N + U1) * pitch + lane
+            fit_splines(flat, first, pitch, joints, N, pivots, w, at)
+            write_rows(joints, w, at)
+            origin, last = integrate_speed(w, joints, N, S, at)
+            total = last - origin
+            enter_segments(w, N, at, origin, total, integers)
+            find_samples(w, N, S, at, origin, total, integers)
+            move_points(flat, first, pitch, joints, N, S, w, at, total, integers)
 
 
 def redistribute(

@@ -1,4 +1,4 @@
-"""Cubic splines through the via-points over their index: second derivatives and squared speeds.
+"""Cubic splines through the via-points over their index: second derivatives and speeds.
 
 On segment k, with u in [0, 1], a and m (a sixth of the second derivative) at both ends:
 
@@ -8,99 +8,145 @@ On segment k, with u in [0, 1], a and m (a sixth of the second derivative) at bo
 
 import numpy as np
 
-from evoexp.numeric.compilation import kernel
-from evoexp.paths.workspace import R2, R3, R4, ROW, U1, U2
+from evoexp.numeric.compilation import inlined
+from evoexp.numeric.vector_rows import Eight, transposed
+from evoexp.numeric.vectors import Vector, load, root, select, spread, store
+from evoexp.paths.workspace import U0, U1, U2, U3, U4, U5, U6, U7, VECTOR, Layout
 from evoexp.records import FloatArray
 
+PAIR = U2 * VECTOR  # distance of two knots
 
-@kernel
-def fit_spline(
+
+@inlined
+def fit_splines(
     via_points: FloatArray,
-    joint: np.uint64,
-    lane0: np.uint64,
-    count: np.uint64,
+    first: np.uint64,
+    pitch: np.uint64,
+    joints: np.uint64,
     N: np.uint64,
     pivots: FloatArray,
     w: FloatArray,
-    knots: np.uint64,
+    at: Layout,
 ) -> None:
-    """Copy one joint's coordinates to `knots` in w and solve for m (Thomas algorithm)."""
-    pivot = pivots[0]
-    for lane in range(count):
-        a, a_next = via_points[joint, 0, lane0 + lane], via_points[joint, 1, lane0 + lane]
-        w[knots + lane] = a
-        w[knots + ROW + lane] = (a_next - a) * pivot
-    for i in range(U1, N):
-        row = knots + i * R2
-        pivot = pivots[i]
-        for lane in range(count):
-            a_last, a = via_points[joint, i - U1, lane0 + lane], via_points[joint, i, lane0 + lane]
-            a_next = via_points[joint, i + U1, lane0 + lane]
-            w[row + lane] = a
-            w[row + ROW + lane] = ((a_last - a) + (a_next - a) - w[row - ROW + lane]) * pivot
-    row = knots + N * R2
-    pivot = pivots[N]
-    for lane in range(count):
-        a_last, a = via_points[joint, N - U1, lane0 + lane], via_points[joint, N, lane0 + lane]
-        w[row + lane] = a
-        w[row + ROW + lane] = ((a_last - a) - w[row - ROW + lane]) * pivot
-    for back in range(N):
-        k = N - U1 - back
-        row = knots + k * R2
-        pivot = pivots[k]
-        for lane in range(count):
-            w[row + ROW + lane] -= pivot * w[row + R3 + lane]
+    """Copy the coordinates of eight paths to the knots in w and solve for m (Thomas algorithm).
 
-
-@kernel
-def square_speed(w: FloatArray, knot: np.uint64, out: np.uint64, count: np.uint64) -> None:
-    """Write the five coefficients of s'(u)² of one joint on the segment that begins at `knot`."""
-    for lane in range(count):
-        a0, m0 = w[knot + lane], w[knot + ROW + lane]
-        a1, m1 = w[knot + R2 + lane], w[knot + R3 + lane]
-        b0, b1, b2 = a1 - a0 - 2.0 * m0 - m1, 6.0 * m0, 3.0 * (m1 - m0)
-        w[out + lane] = b0 * b0
-        w[out + ROW + lane] = 2.0 * b0 * b1
-        w[out + R2 + lane] = b1 * b1 + 2.0 * b0 * b2
-        w[out + R3 + lane] = 2.0 * b1 * b2
-        w[out + R4 + lane] = b2 * b2
-
-
-@kernel
-def add_square_speed(
-    w: FloatArray, knot: np.uint64, given: np.uint64, out: np.uint64, count: np.uint64
-) -> None:
-    """Write to `out` the coefficients at `given` plus those of one joint more.
-
-    Written in place, the loop would not vectorise.
+    Args:
+        via_points: Flat.
+        first: Place of point 0 of the arm's first joint there, for the first of the paths.
+        pitch: Distance of two points there.
+        joints: Of the arm.
+        N: Number of segments.
+        pivots: Factor of the splines' system.
+        w: Scratch.
+        at: Places in it.
     """
-    for lane in range(count):
-        a0, m0 = w[knot + lane], w[knot + ROW + lane]
-        a1, m1 = w[knot + R2 + lane], w[knot + R3 + lane]
-        b0, b1, b2 = a1 - a0 - 2.0 * m0 - m1, 6.0 * m0, 3.0 * (m1 - m0)
-        w[out + lane] = w[given + lane] + b0 * b0
-        w[out + ROW + lane] = w[given + ROW + lane] + 2.0 * b0 * b1
-        w[out + R2 + lane] = w[given + R2 + lane] + (b1 * b1 + 2.0 * b0 * b2)
-        w[out + R3 + lane] = w[given + R3 + lane] + 2.0 * b1 * b2
-        w[out + R4 + lane] = w[given + R4 + lane] + b2 * b2
+    to_joint = (N + U1) * pitch
+    for joint in range(joints):
+        source, knot = first + joint * to_joint, joint * at.joint * VECTOR
+        before = load(via_points, source)
+        here = load(via_points, source + pitch)
+        m = (here - before) * pivots[0]
+        store(w, knot, before)
+        store(w, knot + VECTOR, m)
+        for i in range(U1, N):
+            after = load(via_points, source + (i + U1) * pitch)
+            m = ((before - here) + (after - here) - m) * pivots[i]
+            store(w, knot + i * PAIR, here)
+            store(w, knot + i * PAIR + VECTOR, m)
+            before, here = here, after
+        m = ((before - here) - m) * pivots[N]
+        store(w, knot + N * PAIR, here)
+        store(w, knot + N * PAIR + VECTOR, m)
+        for back in range(N):
+            k = N - U1 - back
+            m = load(w, knot + k * PAIR + VECTOR) - m * pivots[k]
+            store(w, knot + k * PAIR + VECTOR, m)
 
 
-@kernel
-def square_speeds(
-    w: FloatArray,
-    knot: np.uint64,
-    joints: np.uint64,
-    pitch: np.uint64,
-    work: np.uint64,
-    count: np.uint64,
-) -> np.uint64:
-    """Write the coefficients of |s'(u)|² over all joints of an arm; return their row.
+@inlined
+def write_rows(joints: np.uint64, w: FloatArray, at: Layout) -> None:
+    """Write the knots of eight paths as rows, four knots at a time; the last ones are padding."""
+    for joint in range(joints):
+        for place in range(U0, at.joint, VECTOR):
+            block = (joint * at.joint + place) * VECTOR
+            store_rows(
+                w,
+                at.rows + joint * at.joint + place,
+                at.row,
+                (
+                    load(w, block),
+                    load(w, block + VECTOR),
+                    load(w, block + U2 * VECTOR),
+                    load(w, block + U3 * VECTOR),
+                    load(w, block + U4 * VECTOR),
+                    load(w, block + U5 * VECTOR),
+                    load(w, block + U6 * VECTOR),
+                    load(w, block + U7 * VECTOR),
+                ),
+            )
 
-    It is `work`, or eight rows on.
-    """
-    here, there = work, work + U2 * R4
-    square_speed(w, knot, here, count)
+
+@inlined
+def store_rows(w: FloatArray, place: np.uint64, pitch: np.uint64, vectors: Eight) -> None:
+    """Write eight vectors side by side into the rows of their lanes."""
+    rows = transposed(vectors)
+    store(w, place, rows[0])
+    store(w, place + pitch, rows[1])
+    store(w, place + U2 * pitch, rows[2])
+    store(w, place + U3 * pitch, rows[3])
+    store(w, place + U4 * pitch, rows[4])
+    store(w, place + U5 * pitch, rows[5])
+    store(w, place + U6 * pitch, rows[6])
+    store(w, place + U7 * pitch, rows[7])
+
+
+@inlined
+def slope(w: FloatArray, knot: np.uint64) -> tuple[Vector, Vector, Vector]:
+    """Return b0, b1, b2 of one joint on the segment that begins at `knot`."""
+    a0, m0 = load(w, knot), load(w, knot + VECTOR)
+    a1, m1 = load(w, knot + PAIR), load(w, knot + PAIR + VECTOR)
+    return a1 - a0 - 2.0 * m0 - m1, 6.0 * m0, 3.0 * (m1 - m0)
+
+
+@inlined
+def speed_of_two(
+    x: tuple[Vector, Vector, Vector], y: tuple[Vector, Vector, Vector], u: float
+) -> Vector:
+    """Return |s'(u)| of two joints from their slopes."""
+    one, two = x[0] + u * (x[1] + u * x[2]), y[0] + u * (y[1] + u * y[2])
+    return root(one * one + two * two)
+
+
+@inlined
+def square_speed(
+    w: FloatArray, knot: np.uint64, joints: np.uint64, at: Layout
+) -> tuple[Vector, Vector, Vector, Vector, Vector]:
+    """Return the five coefficients of |s'(u)|² over all joints on the segment after `knot`."""
+    b0, b1, b2 = slope(w, knot)
+    q0, q1, q2 = b0 * b0, 2.0 * b0 * b1, b1 * b1 + 2.0 * b0 * b2
+    q3, q4 = 2.0 * b1 * b2, b2 * b2
     for joint in range(U1, joints):
-        add_square_speed(w, knot + joint * pitch, here, there, count)
-        here, there = there, here
-    return here
+        b0, b1, b2 = slope(w, knot + joint * at.joint * VECTOR)
+        q0, q1, q2 = q0 + b0 * b0, q1 + 2.0 * b0 * b1, q2 + (b1 * b1 + 2.0 * b0 * b2)
+        q3, q4 = q3 + 2.0 * b1 * b2, q4 + b2 * b2
+    return q0, q1, q2, q3, q4
+
+
+@inlined
+def speed_of_all(q: tuple[Vector, Vector, Vector, Vector, Vector], u: float) -> Vector:
+    """Return |s'(u)| from the coefficients of its square, which rounding may make negative."""
+    square = q[0] + u * (q[1] + u * (q[2] + u * (q[3] + u * q[4])))
+    return root(select(square > 0.0, square, spread(0.0)))
+
+
+@inlined
+def speed_at_goal(w: FloatArray, N: np.uint64, joints: np.uint64, at: Layout) -> Vector:
+    """Return |s'(1)| on the last segment."""
+    squares = spread(0.0)
+    for joint in range(joints):
+        knot = joint * at.joint * VECTOR + (N - U1) * PAIR
+        a0, m0 = load(w, knot), load(w, knot + VECTOR)
+        a1, m1 = load(w, knot + PAIR), load(w, knot + PAIR + VECTOR)
+        end = (a1 - a0) + m0 + 2.0 * m1
+        squares = squares + end * end
+    return root(squares)

@@ -2,9 +2,12 @@
 
 import numpy as np
 
-from evoexp.numeric.compilation import kernel
+from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.elementary import sincos
+from evoexp.numeric.vectors import LANES, Vector, load, magnitude, root, select, spread, store
 from evoexp.records import FloatArray, IntArray
+
+VECTOR, ONE = np.uint64(LANES), np.uint64(1)
 
 
 def num_uniforms(arm_slices: np.ndarray, num_via_points: int) -> int:
@@ -80,66 +83,108 @@ def walk_strings(
     for s in range(len(lanes)):
         if not 0 <= lanes[s] < via_points.shape[2]:
             return False
-    here, direction = np.empty(len(start)), np.empty(len(start))
-    for s in range(len(lanes)):
-        lane, taken = lanes[s], 0
-        for arm in range(len(arm_slices)):
-            first, stop = arm_slices[arm, 0], arm_slices[arm, 1]
-            squared = 0.0
-            for j in range(first, stop):
-                here[j] = start[j]
-                squared += (goal[j] - start[j]) * (goal[j] - start[j])
-                via_points[j, 0, lane] = start[j]
-                via_points[j, num, lane] = goal[j]
-            length = step * np.sqrt(squared) / num
-            for i in range(1, num):
-                for j in range(first, stop):
-                    direction[j] = goal[j] - here[j]
-                scale = _turn(direction, first, stop, uniforms, s, taken, max_turn)
-                taken += stop - first - 1
-                for j in range(first, stop):
-                    here[j] += length * scale * direction[j]
-                    via_points[j, i, lane] = here[j]
+    memory = np.empty((3, len(start) * LANES))
+    for first in range(0, len(lanes), LANES):
+        count = min(LANES, len(lanes) - first)
+        _walk_eight(
+            via_points,
+            lanes[first : first + count],
+            uniforms[first : first + count],
+            start,
+            goal,
+            arm_slices,
+            step,
+            max_turn,
+            memory[0],
+            memory[1],
+            memory[2],
+        )
     return True
 
 
 @kernel
-def _turn(
-    direction: FloatArray,
-    first: int,
-    stop: int,
+def _walk_eight(
+    via_points: FloatArray,
+    lanes: IntArray,
     uniforms: FloatArray,
-    s: int,
-    taken: int,
+    start: FloatArray,
+    goal: FloatArray,
+    arm_slices: IntArray,
+    step: float,
     max_turn: float,
-) -> float:
-    """Turn the hyperspherical angles of a direction; return the factor to unit length.
+    here: FloatArray,
+    direction: FloatArray,
+    drawn: FloatArray,
+) -> None:
+    """Write up to eight strings, as vectors; the last three arguments are scratch."""
+    via_points, lanes, uniforms = borrowed((via_points, lanes, uniforms))
+    here, direction, drawn = borrowed((here, direction, drawn))
+    num, count, taken = via_points.shape[1] - 1, len(lanes), 0
+    drawn[:] = 0.0  # for the lanes without a string
+    for arm in range(len(arm_slices)):
+        first, stop = np.uint64(arm_slices[arm, 0]), np.uint64(arm_slices[arm, 1])
+        squared = 0.0
+        for j in range(first, stop):
+            store(here, j * VECTOR, spread(start[j]))
+            squared += (goal[j] - start[j]) * (goal[j] - start[j])
+            for s in range(count):
+                via_points[j, 0, lanes[s]] = start[j]
+                via_points[j, num, lanes[s]] = goal[j]
+        length = step * np.sqrt(squared) / num
+        for i in range(1, num):
+            # one angle less than joints
+            for t in range(stop - first - ONE):
+                for s in range(count):
+                    drawn[t * VECTOR + np.uint64(s)] = uniforms[s, taken]
+                taken += 1
+            # the direction of the goal, turned
+            for j in range(first, stop):
+                store(direction, j * VECTOR, goal[j] - load(here, j * VECTOR))
+            scale = length * _turn(direction, first, stop, drawn, max_turn)
+            for j in range(first, stop):
+                there = load(here, j * VECTOR) + scale * load(direction, j * VECTOR)
+                store(here, j * VECTOR, there)
+                for s in range(count):
+                    via_points[j, i, lanes[s]] = here[j * VECTOR + np.uint64(s)]
+
+
+@inlined
+def _turn(
+    direction: FloatArray, first: np.uint64, stop: np.uint64, drawn: FloatArray, max_turn: float
+) -> Vector:
+    """Turn the hyperspherical angles of eight directions; return the factors to unit length.
 
     The azimuth is turned first. The angle of coordinate k stands between the axis k and the vector
     of the coordinates before it, of length `below`. Turning it takes (below, direction[k]) around;
     the coordinates before keep their proportions. A direction straight along a later axis has
     azimuth 0.
     """
-    x = direction[first]
-    if stop - first == 1:
-        return 0.0 if x == 0.0 else 1.0 / abs(x)
-    y = direction[first + 1]
-    sine, cosine = sincos((2.0 * uniforms[s, taken] - 1.0) * max_turn)
-    below = np.sqrt(x * x + y * y)
-    direction[first], direction[first + 1] = x * cosine - y * sine, x * sine + y * cosine
-    if below == 0.0:
-        unit_x, unit_y = cosine, sine
-    else:
-        unit_x, unit_y = direction[first] / below, direction[first + 1] / below
-    for k in range(first + 2, stop):
-        sine, cosine = sincos((2.0 * uniforms[s, taken + k - first - 1] - 1.0) * max_turn)
-        here = direction[k]
-        turned = below * cosine - here * sine
-        direction[k] = below * sine + here * cosine
-        if below == 0.0:
-            direction[first], direction[first + 1] = turned * unit_x, turned * unit_y
-        else:
-            for j in range(first, k):
-                direction[j] *= turned / below
-        below = np.sqrt(turned * turned + direction[k] * direction[k])
-    return 0.0 if below == 0.0 else 1.0 / below
+    x, nothing = load(direction, first * VECTOR), spread(0.0)
+    if stop - first == ONE:
+        scale: Vector = select(x == nothing, nothing, 1.0 / magnitude(x))
+        return scale
+    second = (first + ONE) * VECTOR
+    y = load(direction, second)
+    sine, cosine = sincos((2.0 * load(drawn, np.uint64(0)) - 1.0) * max_turn)
+    flat = below = root(x * x + y * y)
+    azimuth_x, azimuth_y = cosine, sine
+    turned_x, turned_y = x * cosine - y * sine, x * sine + y * cosine
+    store(direction, first * VECTOR, turned_x)
+    store(direction, second, turned_y)
+    for k in range(first + ONE + ONE, stop):
+        sine, cosine = sincos((2.0 * load(drawn, (k - first - ONE) * VECTOR) - 1.0) * max_turn)
+        here = load(direction, k * VECTOR)
+        turned, lies_on_axis = below * cosine - here * sine, below == nothing
+        store(direction, k * VECTOR, below * sine + here * cosine)
+        for j in range(first, k):
+            before = load(direction, j * VECTOR)
+            alone = before
+            if j == first:
+                alone = turned * select(flat == nothing, azimuth_x, turned_x / flat)
+            elif j == first + ONE:
+                alone = turned * select(flat == nothing, azimuth_y, turned_y / flat)
+            store(direction, j * VECTOR, select(lies_on_axis, alone, before * (turned / below)))
+        beyond = load(direction, k * VECTOR)
+        below = root(turned * turned + beyond * beyond)
+    found: Vector = select(below == nothing, nothing, 1.0 / below)
+    return found

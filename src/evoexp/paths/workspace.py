@@ -1,14 +1,21 @@
 """The constant factor of the splines and the scratch memory of redistribution.
 
-The scratch is one flat array of rows of 64 lanes; a kernel addresses it as `floats[base + r * ROW +
-lane]` with a constant r. Only with such constant distances does LLVM see that rows do not overlap
-and vectorise loops that read and write several of them. Indices are unsigned: a signed one would be
-tested for wrap-around, which prevents vectorising. Rows, for J joints, N segments and S samples per
-segment:
+Eight paths of one arm are treated at a time, as vectors. The scratch is one flat array. Vectors
+hold one number of each of the eight paths (lanes); rows hold the numbers of one path side by side,
+for reading them at a place that differs from path to path. For J joints, N segments and S samples
+per segment:
 
-- knot i of joint j: a (the coordinate), then m (a sixth of the spline's second derivative there);
-- sample −3 … N·S + 1: v (the speed), then L (the arc length up to there);
-- 16 rows of work.
+- `knots`: vectors a (the coordinate) and m (a sixth of the spline's second derivative there) of
+  knot i of joint j;
+- `begins`: vectors of arc length up to the begin of each segment;
+- `targets`, `entered`, `found`: vectors of each target's length, of the last segment that it is the
+  first to follow, and of its sample;
+- `rows`: per lane a and m again, joint by joint and knot by knot;
+- `speeds`: per lane the speed at every sample;
+- `lengths`: per lane the arc length up to every sample, one place later than its speed.
+
+Another array holds places: eight for a moment, then per target those of its segment in `rows`
+(`knots`) and of its sample in `speeds` (`samples`).
 """
 
 from typing import Literal, NamedTuple
@@ -16,13 +23,12 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from evoexp.numeric.compilation import inlined
+from evoexp.numeric.vectors import LANES
 from evoexp.records import FloatArray
 
-ROW = np.uint64(64)  # lanes per block, and distance of two rows of scratch
-R2, R3, R4, R5, R6, R7, R8 = (np.uint64(rows * 64) for rows in range(2, 9))
-ROW_SHIFT = np.uint64(6)  # ROW = 2^6
-U0, U1, U2, U3, U4 = (np.uint64(u) for u in range(5))
-WORK_ROWS = 16
+VECTOR = np.uint64(LANES)  # places of a vector
+U0, U1, U2, U3, U4, U5, U6, U7 = (np.uint64(u) for u in range(8))
 MAX_SAMPLES = 1024
 
 Offsets = NDArray[np.uint64]
@@ -49,6 +55,71 @@ class Redistribution(NamedTuple):
     pivots: FloatArray
     floats: FloatArray
     integers: Offsets
+
+
+class Layout(NamedTuple):
+    """Places in the scratch; see the module's first lines.
+
+    Attributes:
+        joint: Distance of two joints, in `knots` of vectors and in `rows` of numbers.
+        row: Distance of two lanes in `rows`.
+        sample: Distance of two lanes in `speeds` and in `lengths`.
+        begins: `knots` begin at 0.
+        targets: In all, one per point.
+        entered: As `targets`.
+        found: As `targets`.
+        rows: Of lane 0.
+        speeds: Of lane 0.
+        lengths: Of lane 0.
+        size: Of all.
+        knots: In the other array.
+        samples: In the other array.
+        num_places: Size of the other array.
+    """
+
+    joint: np.uint64
+    row: np.uint64
+    sample: np.uint64
+    begins: np.uint64
+    targets: np.uint64
+    entered: np.uint64
+    found: np.uint64
+    rows: np.uint64
+    speeds: np.uint64
+    lengths: np.uint64
+    size: np.uint64
+    knots: np.uint64
+    samples: np.uint64
+    num_places: np.uint64
+
+
+@inlined
+def layout(joints: np.uint64, N: np.uint64, S: np.uint64) -> Layout:
+    """Return the places for paths of so many joints, segments, and samples per segment."""
+    points = (N + U1) * VECTOR
+    joint = ((N + U4) >> U2) << U3  # two numbers per knot, knots in fours
+    row, sample = joints * joint, N * S + VECTOR
+    begins = row * VECTOR
+    targets = begins + points
+    entered, found, rows = targets + points, targets + U2 * points, targets + U3 * points
+    speeds = rows + row * VECTOR
+    lengths = speeds + sample * VECTOR
+    return Layout(
+        joint,
+        row,
+        sample,
+        begins,
+        targets,
+        entered,
+        found,
+        rows,
+        speeds,
+        lengths,
+        lengths + sample * VECTOR,
+        VECTOR,
+        VECTOR + points,
+        VECTOR + U2 * points,
+    )
 
 
 def spline_pivots(num_segments: int, end_condition: EndCondition) -> FloatArray:
@@ -105,13 +176,13 @@ def prepare_redistribution(
         raise ValueError(
             f"samples_per_segment: must be a power of two from 8 to {MAX_SAMPLES}, was {samples}"
         )
-    rows = 2 * max_joints * (num_via_points + 1) + 2 * (num_via_points * samples + 5) + WORK_ROWS
+    at = layout(*(np.uint64(size) for size in (max_joints, num_via_points, samples)))
     return Redistribution(
         num_via_points,
         max_joints,
         end_condition,
         samples,
         spline_pivots(num_via_points, end_condition),
-        aligned_zeros(rows * int(ROW)),
-        aligned_zeros((num_via_points + 3) * int(ROW)).view(np.uint64),
+        aligned_zeros(int(at.size)),
+        aligned_zeros(int(at.num_places)).view(np.uint64),
     )

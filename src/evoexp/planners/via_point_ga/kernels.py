@@ -221,18 +221,22 @@ def breed(
     slots = np.arange(count)
     shuffle_head(uniforms[first : first + new], slots)
     walks = uniforms[first + 2 * new :].reshape((new, -1)) if new else np.empty((0, 0))
+    num = 0
     for k in range(new):
         if uniforms[first + new + k] < breeding.mutation_rate:
-            walk_strings(
-                offspring,
-                slots[k : k + 1],
-                walks[k : k + 1],
-                breeding.start,
-                breeding.goal,
-                arm_slices,
-                breeding.walk_step,
-                breeding.max_turn,
-            )
+            slots[num] = slots[k]
+            walks[num] = walks[k]
+            num += 1
+    walk_strings(
+        offspring,
+        slots[:num],
+        walks[:num],
+        breeding.start,
+        breeding.goal,
+        arm_slices,
+        breeding.walk_step,
+        breeding.max_turn,
+    )
 
 
 @kernel

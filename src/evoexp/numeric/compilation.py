@@ -9,6 +9,7 @@ from typing import Any, Protocol, TypeVar, cast
 import numba
 from numba.core import cgutils, types
 from numba.extending import intrinsic
+from numba.np.arrayobj import populate_array
 
 from evoexp.numeric.kernel_cache import SharedCache, use_content_cache
 
@@ -76,6 +77,48 @@ def plain(value: Any) -> Any:
     2 µs each); so a kernel that is called often takes plain ones and names them itself.
     """
     return tuple(map(plain, value)) if isinstance(value, tuple) else value
+
+
+def _viewing(num_widths: int) -> Any:
+    """Return a function for kernels that views part of a flat array, with rows or without."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        whole, first, *shape = arguments
+        data = context.make_array(signature.args[0])(context, builder, whole).data
+        itemsize = context.get_constant(types.intp, 8)
+        made = context.make_array(signature.return_type)(context, builder)
+        populate_array(
+            made,
+            data=builder.gep(data, [first]),
+            shape=cgutils.pack_array(builder, shape),
+            strides=cgutils.pack_array(
+                builder, [*(builder.mul(width, itemsize) for width in shape[1:]), itemsize]
+            ),
+            itemsize=itemsize,
+            meminfo=None,
+        )
+        return made._getvalue()
+
+    def flat(typing_context: Any, array: Any, first: Any, count: Any) -> Any:
+        return types.Array(array.dtype, 1, "C")(array, types.intp, types.intp), generate
+
+    def rows(typing_context: Any, array: Any, first: Any, count: Any, width: Any) -> Any:
+        view = types.Array(array.dtype, 2, "C")
+        return view(array, types.intp, types.intp, types.intp), generate
+
+    return intrinsic(rows if num_widths else flat)
+
+
+view_part: Callable[..., Any] = _viewing(0)
+"""Return part of a flat contiguous array of eight-byte items, as a view that owns nothing.
+
+Its arguments: the array, the place of the first item, how many. Nothing is checked. It takes the
+time of an addition; numba's slices take some 20 ns. An array born in a kernel must be used once
+more behind the last use of its views.
+"""
+
+view_rows: Callable[..., Any] = _viewing(1)
+"""Return rows in a flat array: as `view_part`, the width of a row as fourth argument."""
 
 
 class _Borrowing(Protocol):

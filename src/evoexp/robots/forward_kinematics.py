@@ -1,17 +1,16 @@
 """Forward kinematics of batches: eight configurations at a time, in vectors.
 
-The rows of a kernel's batch q are flat: coordinate k of a configuration stands at k · stride +
-place. So eight neighbours are read where they stand; the last ones of a batch, if they are fewer,
-are copied to a padded batch of eight first (`copy_lanes`).
+Eight neighbours are read where they stand in a batch; the last ones, if they are fewer, are copied
+to a batch of eight first (`eight_of`).
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.elementary import sincos
-from evoexp.numeric.vectors import LANES, load, spread, store
+from evoexp.numeric.vectors import LANES, Vector, load, spread, store
 from evoexp.records import FloatArray
 from evoexp.robots.kinematics import (
     PLANAR_ROWS,
@@ -24,6 +23,20 @@ from evoexp.robots.kinematics import (
 VECTOR = U(LANES)
 PLANAR_FRAME, SPATIAL_FRAME = U(PLANAR_ROWS * LANES), U(SPATIAL_ROWS * LANES)
 """Numbers of a frame of eight configurations."""
+
+
+class Eight(NamedTuple):
+    """Eight neighbours of a batch of configurations.
+
+    Attributes:
+        q: The batch, flat: coordinate k of the first one stands at k · stride + place.
+        place: Of the first one.
+        stride: From one coordinate to the next.
+    """
+
+    q: FloatArray
+    place: np.uint64
+    stride: np.uint64
 
 
 def forward_kinematics(table: KinematicTable, q: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -59,7 +72,7 @@ def _forward_kinematics(fields: tuple[Any, ...], q: FloatArray, out: FloatArray)
     for first in range(0, count, LANES):
         lanes = min(LANES, count - first)
         copy_lanes(flat, first, count, lanes, padded, 0, LANES)
-        spatial_frames(chain, padded, U(0), VECTOR, 1.0, frames)
+        spatial_frames(chain, Eight(padded, U(0), VECTOR), 1.0, frames)
         copy_lanes(frames, 0, LANES, lanes, target, first, count)
 
 
@@ -91,26 +104,42 @@ def copy_lanes(
 
 
 @inlined
-def spatial_frames(
-    chain: KinematicChain,
-    q: FloatArray,
-    place: np.uint64,
-    stride: np.uint64,
-    unit: float,
-    frames: FloatArray,
-) -> None:
+def eight_of(q: FloatArray, first: int, count: int, padded: FloatArray) -> Eight:
+    """Return eight neighbours of a batch; where fewer are left, the last one counts repeatedly.
+
+    Args:
+        q: Rows of `count` numbers, flat.
+        first: Of the eight.
+        count: Configurations.
+        padded: (nq · LANES,) written where fewer are left.
+    """
+    if first + LANES <= count:
+        return Eight(q, U(first), U(count))
+    for row in range(U(len(q)) // U(count)):
+        for lane in range(LANES):
+            place = row * count + min(first + lane, count - 1)
+            padded[row * LANES + lane] = q[place]
+    return Eight(padded, U(0), VECTOR)
+
+
+@inlined
+def coordinate(eight: Eight, k: int) -> Vector:
+    """Return coordinate k of eight configurations."""
+    return load(eight.q, U(k) * eight.stride + eight.place)
+
+
+@inlined
+def spatial_frames(chain: KinematicChain, eight: Eight, unit: float, frames: FloatArray) -> None:
     """Compute the frames of all joints of eight configurations.
 
     Args:
         chain: The joints.
-        q: The batch, flat.
-        place: Of the first of eight neighbours in a row.
-        stride: From one row to the next.
+        eight: The configurations.
         unit: Factor of every coordinate, which makes it [rad], or a length for prismatic joints.
         frames: (joints · SPATIAL_FRAME,), written: the rotation row by row, then the origin.
-    """  # fmt: skip
+    """
     for k in range(len(chain.parent)):
-        own, moved = U(k) * SPATIAL_FRAME, load(q, U(chain.index_q[k]) * stride + place) * unit
+        own, moved = U(k) * SPATIAL_FRAME, coordinate(eight, chain.index_q[k]) * unit
         before = U(chain.parent[k]) * SPATIAL_FRAME
         rotation, translation = chain.rotation[k], chain.translation[k]
         dx, dy, dz = translation[0], translation[1], translation[2]
@@ -142,30 +171,17 @@ def spatial_frames(
 
 
 @inlined
-def planar_frames(
-    chain: KinematicChain,
-    q: FloatArray,
-    place: np.uint64,
-    stride: np.uint64,
-    unit: float,
-    frames: FloatArray,
-) -> None:
+def planar_frames(chain: KinematicChain, eight: Eight, unit: float, frames: FloatArray) -> None:
     """Compute the frames of a planar table: each is a turn about z and a point of the plane.
 
-    Args:
-        chain: The joints.
-        q: See `spatial_frames`, as for the next three.
-        place: See there.
-        stride: See there.
-        unit: See there.
-        frames: (joints · PLANAR_FRAME,), written: sine and cosine of the angle from the world's x
-            axis, x, y.
-    """  # fmt: skip
+    Arguments are those of `spatial_frames`; a frame (PLANAR_FRAME) is the sine and the cosine of
+    the angle from the world's x axis, then x and y.
+    """
     for k in range(len(chain.parent)):
         own, before = U(k) * PLANAR_FRAME, U(chain.parent[k]) * PLANAR_FRAME
         dx, dy = chain.translation[k, 0], chain.translation[k, 1]
         c0, s0 = chain.rotation[k, 0], chain.rotation[k, 3]
-        s, c = sincos(load(q, U(chain.index_q[k]) * stride + place) * unit)
+        s, c = sincos(coordinate(eight, chain.index_q[k]) * unit)
         s, c = s0 * c + c0 * s, c0 * c - s0 * s
         x, y = spread(dx), spread(dy)
         if chain.parent[k] >= 0:  # angles add up; the origin stands in the parent's frame

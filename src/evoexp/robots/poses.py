@@ -13,6 +13,7 @@ from evoexp.records import FloatArray
 from evoexp.robots.forward_kinematics import (
     SPATIAL_FRAME,
     VECTOR,
+    Eight,
     copy_lanes,
     spatial_frames,
 )
@@ -93,7 +94,7 @@ def frame_poses(
     for first in range(0, count, LANES):
         lanes = min(LANES, count - first)
         copy_lanes(flat, first, count, lanes, padded, 0, LANES)
-        spatial_frames(chain, padded, U(0), VECTOR, 1.0, frames)
+        spatial_frames(chain, Eight(padded, U(0), VECTOR), 1.0, frames)
         for e in range(3):
             row, at = U(3 * e) * VECTOR, U(9 + e) * VECTOR
             x, y = load(frames, own + row), load(frames, own + row + VECTOR)

@@ -7,6 +7,7 @@ box around them. Bounds are widened by `MARGIN`, so rounding rules out no contac
 import numpy as np
 from numpy.typing import NDArray
 
+from evoexp.collision.models.center_kernels import spatial_point
 from evoexp.collision.models.obstacle_kernels import MARGIN
 from evoexp.collision.models.packed_shapes import (
     AROUND,
@@ -22,9 +23,7 @@ from evoexp.collision.models.packed_shapes import (
     Units,
 )
 from evoexp.numeric.compilation import inlined, kernel
-from evoexp.numeric.vectors import load, store
 from evoexp.records import FloatArray, IntArray
-from evoexp.robots.forward_kinematics import SPATIAL_FRAME, VECTOR
 from evoexp.robots.kinematics import U
 
 LANES = 128
@@ -45,18 +44,9 @@ def middles_of_balls(
         first: First lane of the eight.
         middles: (units · 3 · LANES,), written.
     """
-    whole, ball = units.whole, units.ball
-    for b in range(len(whole)):
-        own, j = U(b) * U(3 * LANES) + first, U(whole[b, JOINT]) * SPATIAL_FRAME
-        x, y, z = ball[b, 0], ball[b, 1], ball[b, 2]
-        for row in range(3):
-            a, o = j + U(3 * row) * VECTOR, j + U(9 + row) * VECTOR
-            turned = (
-                load(frames, a) * x
-                + load(frames, a + VECTOR) * y
-                + load(frames, a + U(2) * VECTOR) * z
-            )
-            store(middles, own + U(row * LANES), load(frames, o) + turned)
+    for b in range(len(units.whole)):
+        own, joint = U(b) * U(3 * LANES) + first, units.whole[b, JOINT]
+        spatial_point(frames, joint, units.ball[b], middles, own, U(LANES))
 
 
 @kernel

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from evoexp.collision.models.center_kernels import POINT
 from evoexp.numeric.compilation import inlined, kernel
 from evoexp.numeric.vectors import (
     Vector,
@@ -27,9 +28,6 @@ from evoexp.scenarios.obstacles import (
     SPHERE,
     ObstacleTable,
 )
-
-POINT = U(3) * VECTOR
-"""Numbers of a point of eight configurations: x, y, z."""
 
 MARGIN = 1.0 + 1e-9  # bounds are widened by it, so that rounding skips no contact
 
@@ -103,25 +101,56 @@ def to_obstacles(
     reach, spheres = bounds.radius, bounds.spheres
     least = spread(limit)
     for o in range(len(obstacles.kind)):
-        kind, size = obstacles.kind[o], obstacles.size[o]
-        center, rotation = obstacles.center[o], obstacles.rotation[o]
         for link in range(len(reach)):
             # the ball around the link decides whether its spheres are measured
             if _near(obstacles, o, middles, U(link) * POINT, limit + reach[link]):
-                for k in range(spheres[link, 0], spheres[link, 1]):
-                    x, y, z = _seen_from(center, rotation, centers, U(k) * POINT)
-                    least = lower(least, _distance(kind, size[0], size[1], size[2], x, y, z))
+                least = nearest_to_obstacle(
+                    obstacles, o, centers, U(spheres[link, 0]), U(spheres[link, 1]), least
+                )
+    return least
+
+
+@inlined
+def nearest_to_obstacle(
+    obstacles: ObstacleTable,
+    o: int,
+    centers: FloatArray,
+    first: np.uint64,
+    stop: np.uint64,
+    least: Vector,
+) -> Vector:
+    """Lower a distance to the least signed one of some centres from an obstacle's surface.
+
+    Args:
+        obstacles: The obstacles.
+        o: Which of them.
+        centers: (spheres · POINT,).
+        first: First sphere.
+        stop: One past the last.
+        least: The distance so far [length unit].
+    """
+    kind, size = obstacles.kind[o], obstacles.size[o]
+    center, rotation = obstacles.center[o], obstacles.rotation[o]
+    if kind == SPHERE:  # one square root for all
+        square = spread(np.inf)
+        for k in range(first, stop):
+            own = U(k) * POINT
+            x, y = load(centers, own) - center[0], load(centers, own + VECTOR) - center[1]
+            z = load(centers, own + U(2) * VECTOR) - center[2]
+            square = lower(square, x * x + y * y + z * z)
+        return lower(least, root(square) - size[0])
+    for k in range(first, stop):
+        x, y, z = _seen_from(center, rotation, centers, U(k) * POINT)
+        least = lower(least, _distance(kind, size[0], size[1], size[2], x, y, z))
     return least
 
 
 @inlined
 def _distance(kind: int, a: float, b: float, c: float, x: Vector, y: Vector, z: Vector) -> Vector:
-    """Return the signed distance of points in an obstacle's frame to its surface."""
+    """Return the signed distance of points in an obstacle's frame to its surface; no sphere."""
     nothing = spread(0.0)
     distance = z  # of a half-space
-    if kind == SPHERE:
-        distance = root(x * x + y * y + z * z) - a
-    elif kind == BOX:
+    if kind == BOX:
         u, v, w = magnitude(x) - a, magnitude(y) - b, magnitude(z) - c
         inner = lower(upper(u, upper(v, w)), nothing)
         u, v, w = upper(u, nothing), upper(v, nothing), upper(w, nothing)

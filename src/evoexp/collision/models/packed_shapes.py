@@ -63,6 +63,24 @@ class PackedObstacles(NamedTuple):
     listed: IntArray
 
 
+class ContactTables(NamedTuple):
+    """A robot made of spheres among obstacles, as two arrays: see `contact_tables`.
+
+    Attributes:
+        numbers: All numbers, block by block.
+        indices: For each block its place and its rows, then all integers; of no length for robots
+            that are not made of spheres alone.
+    """
+
+    numbers: FloatArray
+    indices: IntArray
+
+    @property
+    def known(self) -> bool:
+        """Whether the robot is made of spheres alone."""
+        return len(self.indices) > 0
+
+
 class PrimitiveTables(NamedTuple):
     """All tables of a robot among obstacles.
 
@@ -72,6 +90,7 @@ class PrimitiveTables(NamedTuple):
         shapes: Of the units.
         obstacles: The obstacles, and which body is checked against which.
         pairs: (pairs, 3) two units, and the row of the result that they count for.
+        contacts: The same once more, for `find_contacts`.
     """
 
     chain: KinematicChain
@@ -79,3 +98,4 @@ class PrimitiveTables(NamedTuple):
     shapes: PackedShapes
     obstacles: PackedObstacles
     pairs: IntArray
+    contacts: ContactTables

@@ -31,10 +31,12 @@ from evoexp.collision.models.ball_tests import (
     mark_pairs,
     middles_of_balls,
 )
+from evoexp.collision.models.contact_kernels import find_contacts
 from evoexp.collision.models.encounter_kernels import body_meets_body, body_meets_obstacles
 from evoexp.collision.models.packed_shapes import (
     FIRST_LISTED,
     STOP_LISTED,
+    ContactTables,
     PackedObstacles,
     PackedShapes,
     PrimitiveTables,
@@ -48,7 +50,7 @@ from evoexp.records import FloatArray, IntArray
 from evoexp.robots.forward_kinematics import (
     SPATIAL_FRAME,
     VECTOR,
-    copy_lanes,
+    eight_of,
     spatial_frames,
 )
 from evoexp.robots.kinematics import SPATIAL_ROWS, KinematicChain, U
@@ -116,17 +118,20 @@ def primitive_clearances(
         tables: `PrimitiveCollision.tables`: fields of `PrimitiveTables` as plain tuples.
         limit: Above it no clearance is measured [length unit].
         decide: Whether the first clearance below 0 ends the judgement of a configuration: all rows
-            are −inf then.
+            are −inf then. The limit is 0.
         q: (nq, configurations) [rad].
         out: (3, configurations), written: rows OBSTACLES, BETWEEN, SELF.
     """
-    chain, units, shapes, obstacles, pairs = tables
+    chain, units, shapes, obstacles, pairs, contacts = tables
+    if decide and len(contacts[1]) > 0 and _decide(contacts, limit, q, out):
+        return
     named = PrimitiveTables(
         KinematicChain(*chain),
         Units(*units),
         PackedShapes(*shapes),
         PackedObstacles(*obstacles),
         pairs,
+        ContactTables(*contacts),
     )
     num_joints, num_units = len(named.chain.parent), len(named.units.whole)
     memory = Memory(
@@ -140,6 +145,20 @@ def primitive_clearances(
         np.empty((FIXED_ROWS + 3 * named.shapes.most) * WIDTH),
     )
     _clearances(named, limit, decide, q.reshape(-1), q.shape[1], out, memory)
+
+
+@kernel
+def _decide(
+    contacts: tuple[FloatArray, IntArray], limit: float, q: FloatArray, out: FloatArray
+) -> bool:
+    """Write the rows of a robot made of spheres; false if a configuration is in doubt."""
+    hits = np.empty(q.shape[1], dtype=np.bool_)
+    if find_contacts(contacts[0], contacts[1], False, q, hits) != 0:
+        return False
+    for row in range(3):
+        for n in range(len(hits)):
+            out[row, n] = -np.inf if hits[n] else limit
+    return True
 
 
 @kernel
@@ -170,15 +189,11 @@ def _clearances(
         # frames of the joints, centres of the balls, for eight configurations at a time
         lanes = 0
         while lanes < count:
-            left = count - lanes
-            whole = left >= EIGHT
-            if not whole:
-                copy_lanes(q, first + lanes, total, left, memory.q, 0, EIGHT)
-            own = frames[U(lanes) // VECTOR * size :]
-            angles, place, stride = (
-                (q, U(first + lanes), U(total)) if whole else (memory.q, U(0), VECTOR)
+            own, eight = (
+                frames[U(lanes) // VECTOR * size :],
+                eight_of(q, first + lanes, total, memory.q),
             )
-            spatial_frames(tables.chain, angles, place, stride, 1.0, own)
+            spatial_frames(tables.chain, eight, 1.0, own)
             middles_of_balls(units, own, U(lanes), middles)
             lanes += EIGHT
         # upper bounds, then exact distances where they are in doubt

@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 import coal
 import numpy as np
 
+from evoexp.collision.models.contact_kernels import HIT, find_contacts
+from evoexp.collision.models.contact_tables import contact_tables
 from evoexp.collision.models.packed_shapes import (
     FIRST_LISTED,
     PackedObstacles,
@@ -168,8 +170,13 @@ class PrimitiveCollision(NamedTuple):
             )
         around, lists = pack_obstacles(obstacles, numbers, joints, tuple(ignored))
         units.whole[: len(joints), FIRST_LISTED:] = lists
-        rows = _pair_table(numbers, chosen, [arm[joint] for joint in joints], parts, units, own)
-        packed = PrimitiveTables(table.chain, units, own, around, rows)
+        rows, of_bodies = _pair_table(
+            numbers, chosen, [arm[joint] for joint in joints], parts, units, own
+        )
+        contacts = contact_tables(
+            table.chain, units, own, around.listed, obstacles, rows, of_bodies, parts
+        )
+        packed = PrimitiveTables(table.chain, units, own, around, rows, contacts)
         return cls(table, joints, packed, plain(packed))
 
     @classmethod
@@ -205,9 +212,10 @@ class PrimitiveCollision(NamedTuple):
         """
         if np.isnan(limit):
             raise ValueError("limit must be a number, was nan")
-        out = self._rows(q)
-        primitive_clearances(self.tables, float(limit), False, *out)
-        return Clearances(*out[1])
+        q = self._checked(q)
+        out = np.empty((3, q.shape[1]))
+        primitive_clearances(self.tables, float(limit), False, q, out)
+        return Clearances(*out)
 
     def collides(self, q: FloatArray) -> BoolArray:
         """Return which configurations collide, (configurations,); true for NaN.
@@ -217,16 +225,36 @@ class PrimitiveCollision(NamedTuple):
         Raises:
             ValueError: If q has another number of rows than the model has coordinates.
         """
-        out = self._rows(q)
-        primitive_clearances(self.tables, 0.0, True, *out)
-        return np.asarray(~(out[1][0] >= 0.0))  # all rows say the same
+        q, contacts = self._checked(q), self.packed.contacts
+        out = np.empty(q.shape[1], dtype=np.bool_)
+        if contacts.known and find_contacts(*contacts, False, q, out) == 0:
+            return out
+        rows = np.empty((3, q.shape[1]))
+        primitive_clearances(self.tables, 0.0, True, q, rows)
+        return np.asarray(~(rows[0] >= 0.0))  # all rows say the same
 
-    def _rows(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def any_collides(self, q: FloatArray) -> bool:
+        """Return whether any configuration of a batch collides, as the edges of a planner's graph.
+
+        A robot made of spheres alone is tested until one is found, eight configurations at a time:
+        those that are likely to collide should come first. Others are tested to the end.
+
+        Raises:
+            ValueError: If q has another number of rows than the model has coordinates.
+        """
+        q, contacts = self._checked(q), self.packed.contacts
+        if contacts.known:
+            found = find_contacts(*contacts, True, q, np.empty(q.shape[1], dtype=np.bool_))
+            if found in (HIT, 0):
+                return found == HIT
+        return bool(self.collides(q).any())
+
+    def _checked(self, q: FloatArray) -> FloatArray:
         num_joints = len(self.table.parent)
         q = np.ascontiguousarray(q, dtype=np.float64)
         if q.ndim != 2 or q.shape[0] != num_joints:
             raise ValueError(f"q must have shape ({num_joints}, configurations), was {q.shape}")
-        return q, np.empty((3, q.shape[1]))
+        return q
 
 
 def _pair_table(
@@ -236,13 +264,14 @@ def _pair_table(
     parts: list[list[int]],
     units: Units,
     shapes: PackedShapes,
-) -> IntArray:
-    """Return all pairs of parts of the bodies that are paired, (pairs, 3).
+) -> tuple[IntArray, list[tuple[int, int]]]:
+    """Return all pairs of parts of the bodies that are paired, (pairs, 3), and these bodies.
 
     The part with more spheres comes first: it stays in its frame.
     """
     body = {int(number): k for k, number in enumerate(numbers)}
     rows: list[tuple[int, int, int]] = []
+    of_bodies: list[tuple[int, int]] = []
     for one, two in pairs:
         if one not in body or two not in body or one == two:
             raise ValueError(
@@ -255,4 +284,5 @@ def _pair_table(
                 keep = num_spheres(units, shapes, a) >= num_spheres(units, shapes, b)
                 more, fewer = (a, b) if keep else (b, a)
                 rows.append((more, fewer, BETWEEN if between else SELF))
-    return np.array(rows, dtype=np.int64).reshape(-1, 3)
+                of_bodies.append((body[one], body[two]))
+    return np.array(rows, dtype=np.int64).reshape(-1, 3), of_bodies

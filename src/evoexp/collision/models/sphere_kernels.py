@@ -12,22 +12,22 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.obstacle_kernels import (
-    MARGIN,
+from evoexp.collision.models.center_kernels import (
     POINT,
-    LinkBalls,
-    meet,
-    to_obstacles,
+    nearest,
+    planar_point,
+    spatial_point,
 )
+from evoexp.collision.models.obstacle_kernels import MARGIN, LinkBalls, meet, to_obstacles
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.elementary import DEGREE
-from evoexp.numeric.vectors import LANES, Vector, load, lower, root, spread, store
+from evoexp.numeric.vectors import LANES, Vector, any_lane, lower, root, spread, store
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.forward_kinematics import (
-    PLANAR_FRAME,
     SPATIAL_FRAME,
     VECTOR,
     copy_lanes,
+    eight_of,
     planar_frames,
     spatial_frames,
 )
@@ -98,29 +98,61 @@ def clearances(tables: tuple[Any, ...], limit: float, q: FloatArray, out: FloatA
         q: (nq, configurations) [deg], contiguous.
         out: (2, configurations), contiguous, written: between arms, to obstacles.
     """
+    named = _named(tables)
+    memory = _memory(named)
+    _clearances(named, limit, False, q.reshape(-1), q.shape[1], out.reshape(-1), memory)
+
+
+@kernel
+def any_contact(tables: tuple[Any, ...], q: FloatArray) -> bool:
+    """Return whether any of some configurations collides; leave at the first eight with one.
+
+    Args:
+        tables: See `clearances`.
+        q: (nq, configurations) [deg], contiguous.
+    """
+    named = _named(tables)
+    memory = _memory(named)
+    return _clearances(named, 0.0, True, q.reshape(-1), q.shape[1], memory.out, memory)
+
+
+@inlined
+def _named(tables: tuple[Any, ...]) -> SphereTables:
     chain, space, spheres, bounds, obstacles = tables
-    named = SphereTables(
+    return SphereTables(
         KinematicChain(*chain),
         space,
         Spheres(*spheres),
         LinkBalls(*bounds),
         ObstacleTable(*obstacles),
     )
-    memory = Memory(
-        np.zeros(q.shape[0] * LANES),
-        np.empty(U(len(named.chain.parent)) * SPATIAL_FRAME),
-        np.empty(U(len(named.spheres.joint)) * POINT),
-        np.empty(U(len(named.bounds.joint)) * POINT),
+
+
+@inlined
+def _memory(tables: SphereTables) -> Memory:
+    return Memory(
+        np.empty(U(len(tables.chain.parent)) * VECTOR),
+        np.empty(U(len(tables.chain.parent)) * SPATIAL_FRAME),
+        np.empty(U(len(tables.spheres.joint)) * POINT),
+        np.empty(U(len(tables.bounds.joint)) * POINT),
         np.empty(2 * LANES),
     )
-    _clearances(named, limit, q.reshape(-1), q.shape[1], out.reshape(-1), memory)
 
 
 @kernel
 def _clearances(
-    tables: SphereTables, limit: float, q: FloatArray, count: int, out: FloatArray, memory: Memory
-) -> None:
-    """Do the work of `clearances` in given memory, so that inner loops count no references."""
+    tables: SphereTables,
+    limit: float,
+    at_first: bool,
+    q: FloatArray,
+    count: int,
+    out: FloatArray,
+    memory: Memory,
+) -> bool:
+    """Do the work of `clearances` or, if `at_first`, of `any_contact`, in given memory.
+
+    So inner loops count no references.
+    """
     tables, q, out, memory = borrowed((tables, q, out, memory))
     _heights(tables.space, tables.chain, tables.spheres.joint, tables.spheres.local, memory.centers)
     _heights(tables.space, tables.chain, tables.bounds.joint, tables.bounds.local, memory.middles)
@@ -129,28 +161,30 @@ def _clearances(
     frames, centers, middles = memory.frames, memory.centers, memory.middles
     most = max(limit + 2.0 * radius, 0.0)
     for first in range(0, count, LANES):
-        # the last ones, if they are fewer than eight, are copied and padded
-        whole = first + LANES <= count
-        if not whole:
-            copy_lanes(q, first, count, count - first, memory.q, 0, LANES)
-        angles, place, stride = (q, U(first), U(count)) if whole else (memory.q, U(0), VECTOR)
+        eight = eight_of(q, first, count, memory.q)
         # frames of the joints, centres of the spheres and of the balls around links
         if space is None:
-            planar_frames(chain, angles, place, stride, DEGREE, frames)
-            _planar_centers(spheres.joint, spheres.local, frames, centers)
-            _planar_centers(bounds.joint, bounds.local, frames, middles)
+            planar_frames(chain, eight, DEGREE, frames)
         else:
-            spatial_frames(chain, angles, place, stride, DEGREE, frames)
-            _spatial_centers(spheres.joint, spheres.local, frames, centers)
-            _spatial_centers(bounds.joint, bounds.local, frames, middles)
+            spatial_frames(chain, eight, DEGREE, frames)
+        _centers(space, spheres.joint, spheres.local, frames, centers)
+        _centers(space, bounds.joint, bounds.local, frames, middles)
         # pairs of arms, then obstacles
         between = _between_arms(space, bounds, most, centers, middles) - 2.0 * radius
+        if at_first and any_lane(between < 0.0):
+            return True
         outside = to_obstacles(obstacles, bounds, limit + radius, centers, middles) - radius
-        found = out if whole else memory.out
-        store(found, place, between)
-        store(found, place + stride, outside)
-        if not whole:
+        if at_first:
+            if any_lane(outside < 0.0):
+                return True
+        elif first + LANES <= count:
+            store(out, U(first), between)
+            store(out, U(first) + U(count), outside)
+        else:  # the last ones, fewer than eight
+            store(memory.out, U(0), between)
+            store(memory.out, VECTOR, outside)
             copy_lanes(memory.out, 0, LANES, count - first, out, first, count)
+    return False
 
 
 @kernel
@@ -168,32 +202,15 @@ def _heights(
 
 
 @inlined
-def _planar_centers(
-    joint: IntArray, local: FloatArray, frames: FloatArray, centers: FloatArray
+def _centers(
+    space: Space, joint: IntArray, local: FloatArray, frames: FloatArray, centers: FloatArray
 ) -> None:
+    """Write the centres of all spheres, or of the balls around links."""
     for k in range(len(joint)):
-        own, j = U(k) * POINT, U(joint[k]) * PLANAR_FRAME
-        x, y = local[k, 0], local[k, 1]
-        s, c = load(frames, j), load(frames, j + VECTOR)
-        store(centers, own, load(frames, j + U(2) * VECTOR) + (c * x - s * y))
-        store(centers, own + VECTOR, load(frames, j + U(3) * VECTOR) + (s * x + c * y))
-
-
-@inlined
-def _spatial_centers(
-    joint: IntArray, local: FloatArray, frames: FloatArray, centers: FloatArray
-) -> None:
-    for k in range(len(joint)):
-        own, j = U(k) * POINT, U(joint[k]) * SPATIAL_FRAME
-        x, y, z = local[k, 0], local[k, 1], local[k, 2]
-        for row in range(3):
-            a, o = j + U(3 * row) * VECTOR, j + U(9 + row) * VECTOR
-            turned = (
-                load(frames, a) * x
-                + load(frames, a + VECTOR) * y
-                + load(frames, a + U(2) * VECTOR) * z
-            )
-            store(centers, own + U(row) * VECTOR, load(frames, o) + turned)
+        if space is None:
+            planar_point(frames, joint[k], local[k, 0], local[k, 1], centers, U(k) * POINT)
+        else:
+            spatial_point(frames, joint[k], local[k], centers, U(k) * POINT, VECTOR)
 
 
 @inlined
@@ -211,75 +228,9 @@ def _between_arms(
                     # the balls around both links
                     within = (limit + reach[one] + reach[two]) * MARGIN
                     if meet(middles, U(one) * POINT, middles, U(two) * POINT, within):
-                        first, stop = U(spheres[two, 0]), U(spheres[two, 1])
                         i, end = U(spheres[one, 0]), U(spheres[one, 1])
-                        while i < end:
-                            if i + U(3) < end:  # four of them are held in registers
-                                least = _nearest_to_four(space, centers, i, first, stop, least)
-                                i += U(4)
-                            else:
-                                least = _nearest(space, centers, i, first, stop, least)
-                                i += U(1)
+                        first, stop = U(spheres[two, 0]), U(spheres[two, 1])
+                        least = nearest(space, centers, i, end, first, stop, least)
             # one square root per pair of arms
             best = lower(best, root(least))
     return best
-
-
-@inlined
-def _nearest(
-    space: Space,
-    centers: FloatArray,
-    i: np.uint64,
-    first: np.uint64,
-    stop: np.uint64,
-    least: Vector,
-) -> Vector:
-    """Return the least squared distance of sphere i from spheres first … stop − 1."""
-    x, y, z = _center(space, centers, i)
-    for j in range(first, stop):
-        least = lower(least, _squared(space, x, y, z, *_center(space, centers, U(j))))
-    return least
-
-
-@inlined
-def _nearest_to_four(
-    space: Space,
-    centers: FloatArray,
-    i: np.uint64,
-    first: np.uint64,
-    stop: np.uint64,
-    least: Vector,
-) -> Vector:
-    """Return the least squared distance of spheres i … i + 3 from spheres first … stop − 1."""
-    ax, ay, az = _center(space, centers, i)
-    bx, by, bz = _center(space, centers, i + U(1))
-    cx, cy, cz = _center(space, centers, i + U(2))
-    dx, dy, dz = _center(space, centers, i + U(3))
-    a, b, c, d = least, least, least, least
-    for j in range(first, stop):
-        x, y, z = _center(space, centers, U(j))
-        a = lower(a, _squared(space, ax, ay, az, x, y, z))
-        b = lower(b, _squared(space, bx, by, bz, x, y, z))
-        c = lower(c, _squared(space, cx, cy, cz, x, y, z))
-        d = lower(d, _squared(space, dx, dy, dz, x, y, z))
-    return lower(lower(a, b), lower(c, d))
-
-
-@inlined
-def _center(space: Space, centers: FloatArray, k: np.uint64) -> tuple[Vector, Vector, Vector]:
-    """Return a sphere's centre; in the plane its height is not looked at."""
-    own = k * POINT
-    x, y = load(centers, own), load(centers, own + VECTOR)
-    return x, y, x if space is None else load(centers, own + U(2) * VECTOR)
-
-
-@inlined
-def _squared(
-    space: Space, ax: Vector, ay: Vector, az: Vector, bx: Vector, by: Vector, bz: Vector
-) -> Vector:
-    """Return the squared distance of two points."""
-    x, y = ax - bx, ay - by
-    if space is None:
-        return x * x + y * y
-    z = az - bz
-    return x * x + y * y + z * z

@@ -10,10 +10,16 @@ import numpy as np
 from pydantic import Field
 
 from evoexp.collision.models.obstacle_kernels import LinkBalls
-from evoexp.collision.models.sphere_kernels import Space, Spheres, SphereTables, clearances
+from evoexp.collision.models.sphere_kernels import (
+    Space,
+    Spheres,
+    SphereTables,
+    any_contact,
+    clearances,
+)
 from evoexp.errors import SettingError
 from evoexp.numeric.compilation import plain
-from evoexp.records import FloatArray, IntArray
+from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.assembly import Assembly, sphere_geometry
 from evoexp.scenarios.obstacles import ObstacleTable, obstacle_table
 from evoexp.validation import Component, LayoutCount, Positive
@@ -181,15 +187,36 @@ class SphereCollision(NamedTuple):
         Raises:
             ValueError: If q has another number of rows than the robot has joints.
         """
-        table = self.assembly.table
-        q = np.ascontiguousarray(q, dtype=np.float64)
-        if q.ndim != 2 or q.shape[0] != len(table.parent):
-            raise ValueError(
-                f"q must have shape ({len(table.parent)}, configurations), was {q.shape}"
-            )
+        q = self._checked(q)
         out = np.empty((2, q.shape[1]))
         clearances(self.tables, limit, q, out)
         return Clearance(out[0], out[1])
+
+    def collides(self, q: FloatArray) -> BoolArray:
+        """Return which configurations collide, (configurations,): where `clearance` is negative.
+
+        Raises:
+            ValueError: If q has another number of rows than the robot has joints.
+        """
+        return self.clearance(q, limit=0.0).least < 0.0
+
+    def any_collides(self, q: FloatArray) -> bool:
+        """Return whether any configuration of a batch collides, as the edges of a planner's graph.
+
+        The batch, (nq, configurations) [deg], is tested until one is found, eight at a time: those
+        that are likely to collide should come first.
+
+        Raises:
+            ValueError: If q has another number of rows than the robot has joints.
+        """
+        return any_contact(self.tables, self._checked(q))
+
+    def _checked(self, q: FloatArray) -> FloatArray:
+        num_joints = len(self.assembly.table.parent)
+        q = np.ascontiguousarray(q, dtype=np.float64)
+        if q.ndim != 2 or q.shape[0] != num_joints:
+            raise ValueError(f"q must have shape ({num_joints}, configurations), was {q.shape}")
+        return q
 
     @property
     def radius(self) -> float:

@@ -7,6 +7,7 @@ Exit codes: 0 done; 1 a replicate or a comparison failed; 2 the command could no
 import contextlib
 import errno
 import importlib
+import os
 import sys
 from collections.abc import Sequence
 
@@ -36,6 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     interruption, is_process = Interruption(), arguments is None
     if is_process:
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # no threads that have nothing to do
         open_streams()
         interruption.hear()
     words = list(sys.argv[1:] if arguments is None else arguments)

@@ -4,7 +4,9 @@ Every function returns one mapping with the keys of `KEYS`; `show --json` prints
 """
 
 import hashlib
+import json
 import math
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,9 +17,10 @@ from evoexp import shipped
 from evoexp.attachments import PREFIX, keep_all
 from evoexp.condition import Condition, stored_config
 from evoexp.configuration.experiment import Experiment
+from evoexp.configuration.kept_facts import kept_fact
 from evoexp.errors import EvoexpError
 from evoexp.records import flatten
-from evoexp.registry import COMPONENTS, registered
+from evoexp.registry import COMPONENTS, Registration, component_modules, registered
 from evoexp.store.log_reader import read_log
 from evoexp.store.manifest import differences, environment
 from evoexp.store.run_directory import RunDirectory, outputs_root
@@ -134,19 +137,27 @@ def _facts(
 
 def _components(config: Any) -> Iterator[dict[str, Any]]:
     """Yield every component once, with its revision here and as stored, and its package."""
-    known: dict[str, dict[str, Any]] = {}
-    for name, revision in _named(config):
-        registration = registered(COMPONENTS, name)
-        known.setdefault(
-            name,
-            {
-                "component": name,
-                "revision": revision,
-                "installed_revision": registration and registration.load().revision,
-                "package": registration and registration.package,
-            },
-        )
-    yield from known.values()
+    stored = dict(reversed(list(_named(config))))  # of one that occurs twice the first
+    found = {name: registered(COMPONENTS, name) for name in dict(_named(config))}
+    here = _installed_revisions([each for each in found.values() if each is not None])
+    for name, registration in found.items():
+        yield {
+            "component": name,
+            "revision": stored[name],
+            "installed_revision": here.get(name),
+            "package": registration and registration.package,
+        }
+
+
+def _installed_revisions(registrations: Sequence[Registration]) -> dict[str, Any]:
+    """Return component → its revision in this installation."""
+
+    def find() -> dict[str, Any]:
+        return {each.name: each.load().revision for each in registrations}
+
+    if all(each.module in sys.modules for each in registrations):  # nothing is to be loaded
+        return find()
+    return dict(kept_fact("revisions", repr(registrations).encode(), find))
 
 
 def _named(config: Any) -> Iterator[tuple[str, Any]]:
@@ -222,8 +233,14 @@ def _shapes(path: Path) -> dict[str, list[int]]:
 
 def _notes(config_json: bytes) -> list[str]:
     """Return the planner's remarks on its settings, or the reason why there can be none."""
-    try:
+
+    def find() -> list[str]:
         planner, problem = Condition.from_json(config_json).prepare()
+        return list(planner.notes(problem))
+
+    try:
+        if set(component_modules(json.loads(config_json))) <= sys.modules.keys():
+            return find()
+        return list(kept_fact("notes", config_json, find))
     except EvoexpError as error:  # of another revision, or a package that is not installed
         return [str(error)]
-    return list(planner.notes(problem))

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml
 from rich.console import Console
 from rich.table import Table
 
@@ -125,6 +124,8 @@ def _print_all(console: Console, facts: Mapping[str, Any], run: RunDirectory | N
 
 
 def _print_yaml(console: Console, data: Mapping[str, Any]) -> None:
+    import yaml  # which only `--all` needs
+
     text = yaml.safe_dump(
         dict(data), sort_keys=False, default_flow_style=None, allow_unicode=True, width=110
     )

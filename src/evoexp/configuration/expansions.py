@@ -11,13 +11,12 @@ expansion is not kept where more than this decides: URDF files with their meshes
 import contextlib
 import hashlib
 import importlib.metadata
-import importlib.util
 import json
 import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import orjson
 import pydantic
@@ -27,9 +26,10 @@ from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.condition import Condition
 from evoexp.configuration.experiment import Experiment, Labelled
 from evoexp.configuration.interpolations import MARK
+from evoexp.configuration.kept_condition import KeptCondition
+from evoexp.configuration.kept_facts import add_files, installed_code
 from evoexp.configuration.search_path import EXPERIMENT, file_directories, folders, is_file
 from evoexp.numeric.kept_files import cache_root
-from evoexp.registry import COMPONENTS, Registration, registrations
 from evoexp.report.report_settings import ReportSettings
 from evoexp.shipped import Option
 
@@ -69,19 +69,15 @@ def _path(overrides: Sequence[str], *others: Any) -> Path | None:
     """Return the file that an expansion is kept in; None where it may not be kept."""
     if any(MARK in word for word in overrides):
         return None
-    components = registrations(COMPONENTS)
     versions = [importlib.metadata.version(name) for name in _COMPOSERS]
-    asked = [list(overrides), others, components, [each.origin for each in folders()], versions]
+    asked = [list(overrides), others, [each.origin for each in folders()], versions]
     digest = hashlib.sha256(json.dumps([*asked, pydantic.VERSION]).encode())
-    code = [Path(__file__).parents[1], *(root for each in components for root in _sources(each))]
+    digest.update(installed_code())
     places = [(folder.path, "*/*") for folder in folders()]
-    places += [(shipped.config_directory(), "*.yaml"), *((root, "**/*.py") for root in code)]
+    places += [(shipped.config_directory(), "*.yaml")]
     files = [path for root, pattern in places for path in sorted(root.glob(pattern))]
     files += [path for word in overrides for path in _experiments(word)]
-    for path in files:
-        if path.is_file():
-            content = path.read_bytes()
-            digest.update(f"{path}\0{len(content)}\0".encode(errors="surrogateescape") + content)
+    add_files(digest, files)
     return cache_root() / "expansions" / f"{digest.hexdigest()[:32]}.json"
 
 
@@ -90,19 +86,6 @@ def _experiments(word: str) -> list[Path]:
     key, _, typed = word.partition("=")
     names = [typed, *re.split(r"[\s,()'\"]+", typed)] if key == EXPERIMENT else []
     return [Path(name).resolve() for name in names if is_file(name)]
-
-
-def _sources(registration: Registration) -> list[Path]:
-    """Return the folders with the code of a guest's component; nothing is imported."""
-    if registration.is_own:
-        return []
-    with contextlib.suppress(ImportError, ValueError):
-        spec = importlib.util.find_spec(registration.module.partition(".")[0])
-        if spec is not None and spec.submodule_search_locations:
-            return [Path(location) for location in spec.submodule_search_locations]
-        if spec is not None and spec.origin:
-            return [Path(spec.origin).parent]
-    return []
 
 
 def _read(path: Path) -> list[Experiment] | None:
@@ -128,7 +111,8 @@ def _read(path: Path) -> list[Experiment] | None:
 
 def _experiment(plain: dict[str, Any]) -> Experiment:
     conditions = (
-        Labelled(label, Condition.from_json(text.encode())) for label, text in plain["conditions"]
+        Labelled(label, cast(Condition, KeptCondition(text.encode(), is_reference)))
+        for label, text, is_reference in plain["conditions"]
     )
     runner = RunnerSettings.model_validate_json(plain["runner"])
     report = ReportSettings.model_validate_json(plain["report"])
@@ -154,7 +138,8 @@ def _write(path: Path, experiments: Sequence[Experiment], files: Sequence[tuple[
 def _plain(experiment: Experiment) -> dict[str, Any]:
     return experiment._asdict() | {
         "conditions": [
-            (label, condition.to_json().decode()) for label, condition in experiment.conditions
+            (label, condition.to_json().decode(), condition.is_reference)
+            for label, condition in experiment.conditions
         ],
         "runner": experiment.runner.model_dump_json(),
         "report": experiment.report.model_dump_json(),

@@ -1,0 +1,94 @@
+"""Facts about conditions that follow from the installed code, kept on disk under its content.
+
+To find them, a condition's components are loaded, which takes most of a second. What they are kept
+under is the content of all code that has a say, so an edit or another version finds them anew.
+"""
+
+import contextlib
+import functools
+import hashlib
+import importlib.metadata
+import importlib.util
+import json
+import os
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
+from evoexp.registry import COMPONENTS, Registration, registrations
+
+_LIBRARIES = ("numpy", "numba", "scipy", "pin", "coal")
+
+
+def kept_fact(kind: str, about: bytes, find: Callable[[], Any]) -> Any:
+    """Return a fact, from where it is kept if it was found before.
+
+    Args:
+        kind: Of the fact.
+        about: Everything but the code that it follows from.
+        find: Finds it, as plain data; what it raises is not kept.
+    """
+    digest = hashlib.sha256(installed_code())
+    digest.update(json.dumps([kind, *_versions()]).encode())
+    digest.update(about)
+    path = cache_root() / "facts" / digest.hexdigest()[:32]
+    with contextlib.suppress(FileNotFoundError, Damaged):
+        return json.loads(read_kept(path))
+    found = find()
+    with contextlib.suppress(OSError):
+        write_kept(path, json.dumps(found).encode())
+    return found
+
+
+@functools.cache
+def _versions() -> list[str]:
+    return [importlib.metadata.version(name) for name in _LIBRARIES]
+
+
+def installed_code() -> bytes:
+    """Return the hash of the code of evoexp and of all guests, as it is now."""
+    components = registrations(COMPONENTS)
+    code = [Path(__file__).parents[1], *(root for each in components for root in _sources(each))]
+    stamps = sorted(stamp for root in dict.fromkeys(code) for stamp in _stamps(str(root)))
+    return _hash_of_code(json.dumps(components), tuple(stamps))
+
+
+@functools.lru_cache(maxsize=1)
+def _hash_of_code(components: str, stamps: tuple[tuple[str, int, int], ...]) -> bytes:
+    """Read all code, once per process as long as no file is written again."""
+    digest = hashlib.sha256(components.encode())
+    add_files(digest, (Path(path) for path, _, _ in stamps))
+    return digest.digest()
+
+
+def _stamps(root: str) -> Iterator[tuple[str, int, int]]:
+    """Yield path, size and time of every Python file in a folder and those within."""
+    with contextlib.suppress(OSError), os.scandir(root) as entries:
+        for entry in entries:
+            if entry.name.endswith(".py"):
+                status = entry.stat()
+                yield entry.path, status.st_size, status.st_mtime_ns
+            elif entry.is_dir() and entry.name != "__pycache__":
+                yield from _stamps(entry.path)
+
+
+def add_files(digest: Any, paths: Iterable[Path]) -> None:
+    """Add names and contents of files, of those that are there, to a hash."""
+    for path in paths:
+        if path.is_file():
+            content = path.read_bytes()
+            digest.update(f"{path}\0{len(content)}\0".encode(errors="surrogateescape") + content)
+
+
+def _sources(registration: Registration) -> list[Path]:
+    """Return the folders with the code of a guest's component; nothing is imported."""
+    if registration.is_own:
+        return []
+    with contextlib.suppress(ImportError, ValueError):
+        spec = importlib.util.find_spec(registration.module.partition(".")[0])
+        if spec is not None and spec.submodule_search_locations:
+            return [Path(location) for location in spec.submodule_search_locations]
+        if spec is not None and spec.origin:
+            return [Path(spec.origin).parent]
+    return []

@@ -9,6 +9,8 @@ import pytest
 from evoexp.references.grid_exchanges import (
     Pieces,
     Terrain,
+    best_exchange,
+    best_single,
     descend,
     improve,
     list_pieces,
@@ -23,9 +25,7 @@ from shipped_conditions import expanded
 
 
 def terrain_of(own: Any, problem: Any) -> Terrain:
-    grid, (epsilon, lam) = problem.fields.grid, own.objective.weights
-    lengths = epsilon * np.sqrt(grid.changes.astype(float))
-    return Terrain(grid.neighbours, grid.coordinates, lengths, lam * problem.fields.unsafeness)
+    return Terrain.of(problem.fields.grid, problem.fields.unsafeness, own.objective.weights)
 
 
 def shortest_path(problem: Any) -> np.ndarray:
@@ -108,6 +108,20 @@ def test_a_descent_ends_where_no_exchange_helps(seed: int) -> None:
     path, cost = descend(terrain, shortest_path(problem), Pieces.of(terrain, 2))
     assert cost == pytest.approx(path_cost(own, problem, path), rel=1e-12)
     assert better_exchanges(own, problem, path.tolist(), 2) == []
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_exchanges_of_single_nodes_need_no_table(seed: int) -> None:
+    own, rng = planner((0.05, 2.0)), np.random.default_rng(seed)
+    problem = solvable((6, 5), 0.2, seed, own)
+    terrain = terrain_of(own, problem)
+    pieces, some_help = Pieces.of(terrain, 1), 0
+    for row in own.sample(problem, rng, 20):
+        path = row[1 : row[0] + 1].astype(np.int64)
+        found, expected = best_single(terrain, path), best_exchange(terrain, path, pieces)
+        assert tuple(found) == tuple(expected)
+        some_help += found.place >= 0
+    assert some_help > 5
 
 
 @pytest.mark.examples(4)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from evoexp.references.grid_frontier import GridFrontier
-from evoexp.references.grid_networks import arrivals_of, hops_of, network_of
+from evoexp.references.grid_networks import Shifts, arrivals_of, hops_of, network_of, shifts_of
 from evoexp.references.grid_relaxation import Walks, count_excess, find_walks, relaxed_bounds
 from planners.grid_samples import planner, solvable
 from references.all_paths import all_simple_paths, path_cost
@@ -30,15 +30,20 @@ def all_walks(problem: Any, number: int) -> list[list[int]]:
     return [walk for walk in walks if walk[-1] == goal]
 
 
+def padded(values: np.ndarray, shifts: Shifts) -> np.ndarray:
+    """Return values of nodes as long as the rows of the moves."""
+    return np.pad(values, (0, shifts.lengths.shape[1] - len(values)))
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_walks_are_the_best_of_all_that_never_go_straight_back(seed: int) -> None:
     epsilon, most, rng = 0.3, 8, np.random.default_rng(seed)
     problem = solvable((4, 3), 0.2, seed, planner())
     network = network_of(problem)
-    arrivals, hops = arrivals_of(network, epsilon), hops_of(network)
+    shifts = shifts_of(arrivals_of(network, epsilon), hops_of(network))
     weights = rng.uniform(0.0, 2.0, len(network.unsafeness))
-    walks = Walks.of(most, len(weights))
-    find_walks(arrivals, hops, weights, most, walks)
+    walks = Walks.of(most, shifts)
+    find_walks(shifts, padded(weights, shifts), most, walks)
     lengths = dict(
         zip(zip(network.tails, network.heads, strict=True), network.lengths, strict=True)
     )
@@ -53,7 +58,7 @@ def test_walks_are_the_best_of_all_that_never_go_straight_back(seed: int) -> Non
         if number == most:
             # the excess of visits is that of the best walk
             excess = np.empty(len(weights))
-            count_excess(arrivals, walks, most, np.ones(len(weights)), excess)
+            count_excess(shifts, walks, most, np.ones(len(weights)), excess)
             visits = Counter(min(costs, key=lambda walk: costs[walk]))
             expected = [visits[node] - 1.0 for node in range(len(weights))]
             np.testing.assert_array_equal(excess, expected)
@@ -66,9 +71,10 @@ def test_any_multipliers_give_a_bound_for_every_number_of_nodes(seed: int) -> No
     problem = solvable((4, 4), 0.2, seed, own)
     network, rng = network_of(problem), np.random.default_rng(seed)
     multipliers = rng.exponential(0.1, len(network.unsafeness))
-    walks = Walks.of(most, len(multipliers))
+    shifts = shifts_of(arrivals_of(network, weights[0]), hops_of(network))
+    walks = Walks.of(most, shifts)
     passing = weights[1] / most * network.unsafeness + multipliers
-    find_walks(arrivals_of(network, weights[0]), hops_of(network), passing, most, walks)
+    find_walks(shifts, padded(passing, shifts), most, walks)
     bounds = walks.best[:, network.ends[1]] - multipliers.sum()
     for path in all_simple_paths(problem):
         if len(path) <= most:

@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.numeric.compilation import kernel
-from evoexp.paths.grids import NodeArray
+from evoexp.numeric.compilation import borrowed, inlined, kernel
+from evoexp.paths.grids import Grid, NodeArray
 from evoexp.records import BoolArray, FloatArray, IntArray
 
 NONE = -1
@@ -32,10 +32,38 @@ class Terrain(NamedTuple):
         coordinates: (nodes, dimensions).
         lengths: (moves,) length of each move, times ε.
         unsafeness: (nodes,) times λ.
+        moves: (2 nodes − 1,) the move from one node to another, if it is permitted, by the
+            difference of their indices plus nodes − 1; `NONE` where there is no such move.
     """
 
     neighbours: NodeArray
     coordinates: NodeArray
+    lengths: FloatArray
+    unsafeness: FloatArray
+    moves: IntArray
+
+    @classmethod
+    def of(cls, grid: Grid, unsafeness: FloatArray, weights: tuple[float, float]) -> "Terrain":
+        """Return a grid's moves and nodes, weighed by ε and λ."""
+        lengths = weights[0] * np.sqrt(grid.changes.astype(np.float64))
+        moves = np.full(2 * grid.num_nodes - 1, NONE, dtype=np.int64)
+        nodes, kinds = np.nonzero(grid.neighbours >= 0)
+        moves[grid.neighbours[nodes, kinds] - nodes + grid.num_nodes - 1] = kinds
+        return cls(grid.neighbours, grid.coordinates, lengths, weights[1] * unsafeness, moves)
+
+
+class Trail(NamedTuple):
+    """The nodes on the way from a kept node, as `list_pieces` tries them: scratch.
+
+    Attributes:
+        nodes: (longest + 1,) the kept node first.
+        tried: (longest + 1,) the move last tried from each.
+        lengths: (longest + 1,) ε times the length up to each.
+        unsafeness: (longest + 1,) λ times the sum up to each, the kept node left out.
+    """
+
+    nodes: IntArray
+    tried: IntArray
     lengths: FloatArray
     unsafeness: FloatArray
 
@@ -48,12 +76,14 @@ class Pieces(NamedTuple):
         counts: (most pieces,) number of nodes of each.
         lengths: (most pieces,) ε times the length from the kept node before to the one behind.
         unsafeness: (most pieces,) λ times the sum over the nodes.
+        trail: Scratch.
     """
 
     nodes: IntArray
     counts: IntArray
     lengths: FloatArray
     unsafeness: FloatArray
+    trail: Trail
 
     @classmethod
     def of(cls, terrain: Terrain, longest: int) -> "Pieces":
@@ -61,7 +91,8 @@ class Pieces(NamedTuple):
         most = sum(terrain.neighbours.shape[1] ** count for count in range(longest + 1))
         shape = (most, longest)
         integers = np.zeros(shape, dtype=np.int64), np.zeros(most, dtype=np.int64)
-        return cls(*integers, np.zeros(most), np.zeros(most))
+        trail = Trail(*np.zeros((2, longest + 1), dtype=np.int64), *np.zeros((2, longest + 1)))
+        return cls(*integers, np.zeros(most), np.zeros(most), trail)
 
 
 class Exchange(NamedTuple):
@@ -112,7 +143,8 @@ def improve(
 def descend(terrain: Terrain, path: IntArray, pieces: Pieces) -> tuple[IntArray, float]:
     """Make the best exchange until none lowers the cost; return the path and its cost."""
     while True:
-        exchange = best_exchange(terrain, path, pieces)
+        single = pieces.nodes.shape[1] == 1
+        exchange = best_single(terrain, path) if single else best_exchange(terrain, path, pieces)
         if exchange.place == NONE:
             return path, exchange.cost
         # the pieces of that place are listed once more: the table has those of the last one
@@ -152,6 +184,7 @@ def descend_beyond(
 @kernel
 def best_exchange(terrain: Terrain, path: IntArray, pieces: Pieces) -> Exchange:
     """Return the exchange that lowers the cost most; its place is `NONE` if none does."""
+    terrain, path, pieces = borrowed((terrain, path, pieces))
     used = used_nodes(terrain, path)
     length, unsafeness = measure(terrain, path)
     best = Exchange(length + unsafeness / len(path), NONE, 0, 0)
@@ -174,6 +207,49 @@ def best_exchange(terrain: Terrain, path: IntArray, pieces: Pieces) -> Exchange:
 
 
 @kernel
+def best_single(terrain: Terrain, path: IntArray) -> Exchange:
+    """Return `best_exchange` for pieces of one node at most, without a table: the same bits."""
+    terrain, path = borrowed((terrain, path))
+    neighbours, lengths, own = terrain.neighbours, terrain.lengths, terrain.unsafeness
+    used = used_nodes(terrain, path)
+    length, unsafeness = measure(terrain, path)
+    best = Exchange(length + unsafeness / len(path), NONE, 0, 0)
+    lowest = best.cost * (1.0 - SMALLEST_GAIN)
+    for removed in range(2):
+        for place in range(len(path) - 1 - removed):
+            # the path without the piece and the moves to it
+            one, middle, two = path[place], path[place + 1], path[place + removed + 1]
+            old_length = lengths[move_between(terrain, one, middle)]
+            old_unsafeness = own[one] + own[middle]
+            if removed == 1:
+                old_length += lengths[move_between(terrain, middle, two)]
+                old_unsafeness += own[two]
+            rest_length = length - old_length
+            rest_unsafeness = unsafeness - ((old_unsafeness - own[one]) - own[two])
+            num, row = len(path) - removed, 0
+            # with the move from one kept node to the other
+            last = move_between(terrain, one, two)
+            if last != NONE:
+                cost = rest_length + lengths[last] + rest_unsafeness / num
+                if cost < lowest:
+                    lowest, best = cost, Exchange(cost, place, removed, row)
+                row += 1
+            # with a node between them
+            for move in range(neighbours.shape[1]):
+                other = neighbours[one, move]
+                if other < 0 or (used[other] and (removed == 0 or other != middle)):
+                    continue
+                last = move_between(terrain, other, two)
+                if last != NONE:
+                    total = rest_unsafeness + own[other]
+                    cost = rest_length + (lengths[move] + lengths[last]) + total / (num + 1)
+                    if cost < lowest:
+                        lowest, best = cost, Exchange(cost, place, removed, row)
+                    row += 1
+    return best
+
+
+@kernel
 def list_pieces(
     terrain: Terrain, path: IntArray, place: int, removed: int, used: BoolArray, pieces: Pieces
 ) -> int:
@@ -190,20 +266,22 @@ def list_pieces(
     Returns:
         The number of pieces.
     """
+    terrain, path, used, pieces = borrowed((terrain, path, used, pieces))
     longest, moves = pieces.nodes.shape[1], terrain.neighbours.shape[1]
     behind = path[place + removed + 1]
     for k in range(removed):
         used[path[place + 1 + k]] = False
     # depth first: a trail of nodes from the kept node before, and the next move to try from each
-    trail, tried = np.empty(longest + 1, np.int64), np.full(longest + 1, NONE)
-    length, unsafeness = np.zeros(longest + 1), np.zeros(longest + 1)
-    trail[0], depth, count = path[place], 0, 0
+    trail, tried, length, unsafeness = pieces.trail
+    trail[0], tried[0], length[0], unsafeness[0] = path[place], NONE, 0.0, 0.0
+    depth, count = 0, 0
     while depth >= 0:
         node = trail[depth]
         if tried[depth] == NONE:  # a new node: does a move close the trail?
             last = move_between(terrain, node, behind)
             if last != NONE:
-                pieces.nodes[count, :depth] = trail[1 : depth + 1]
+                for k in range(depth):
+                    pieces.nodes[count, k] = trail[1 + k]
                 pieces.counts[count] = depth
                 pieces.lengths[count] = length[depth] + terrain.lengths[last]
                 pieces.unsafeness[count] = unsafeness[depth]
@@ -256,19 +334,17 @@ def used_nodes(terrain: Terrain, path: IntArray) -> BoolArray:
     return used
 
 
-@kernel
+@inlined
 def move_between(terrain: Terrain, one: int, two: int) -> int:
     """Return the move from a node to another one; `NONE` if it is not permitted."""
-    for move in range(terrain.neighbours.shape[1]):
-        if terrain.neighbours[one, move] == two:
-            return move
-    return NONE
+    move = terrain.moves[two - one + len(terrain.unsafeness) - 1]
+    return move if move != NONE and terrain.neighbours[one, move] == two else NONE
 
 
-@kernel
+@inlined
 def near(terrain: Terrain, one: int, two: int, reach: int) -> bool:
     """Return whether two nodes differ by at most `reach` in every coordinate."""
+    found = True
     for axis in range(terrain.coordinates.shape[1]):
-        if abs(terrain.coordinates[one, axis] - terrain.coordinates[two, axis]) > reach:
-            return False
-    return True
+        found &= abs(terrain.coordinates[one, axis] - terrain.coordinates[two, axis]) <= reach
+    return found

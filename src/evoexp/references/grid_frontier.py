@@ -127,9 +127,7 @@ class GridFrontier(Reference):
         epsilon, lam = self.planner.objective.weights
         if lam == 0.0 or self.planner.revisits:
             return paths
-        own = problem.fields.grid
-        lengths = epsilon * np.sqrt(own.changes.astype(np.float64))
-        terrain = Terrain(own.neighbours, own.coordinates, lengths, lam * problem.fields.unsafeness)
+        terrain = Terrain.of(problem.fields.grid, problem.fields.unsafeness, (epsilon, lam))
         better = improve(
             terrain, [path for _, path in paths], self.exchanged_nodes, self.forced_nodes
         )

@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from evoexp.numeric.vectors import LANES
 from evoexp.records import FloatArray, IntArray
 
 TILE = 4  # moves to a node are filled up to a multiple
@@ -89,4 +90,68 @@ def hops_of(network: Network) -> Hops:
     return Hops(
         dijkstra(graph, indices=start, unweighted=True),
         dijkstra(graph.T, indices=goal, unweighted=True),
+    )
+
+
+class Shifts(NamedTuple):
+    """The permitted moves by the difference of their nodes' indices, for vectors of nodes.
+
+    Rows are `width` long: the nodes, and as many places behind them as vectors read; no move ends
+    there.
+
+    Attributes:
+        differences: (moves,) index where each kind of move ends, less that where it starts;
+            descending, so that nodes where moves start ascend.
+        lengths: (moves, width) times ε, of the move that ends at each node; inf where there is
+            none, and of moves from the goal or to the start.
+        unsafeness: (nodes,).
+        indices: (width,) 0, 1, 2, ….
+        from_start: (width,) fewest moves from the start; inf where no path leads.
+        to_goal: (width,) fewest moves to the goal.
+        first: The first node where a move ends.
+        last: The last one.
+        ends: Start and goal.
+    """
+
+    differences: IntArray
+    lengths: FloatArray
+    unsafeness: FloatArray
+    indices: FloatArray
+    from_start: FloatArray
+    to_goal: FloatArray
+    first: int
+    last: int
+    ends: tuple[int, int]
+
+
+def shifts_of(arrivals: Arrivals, hops: Hops) -> Shifts:
+    """Return the permitted moves by their differences.
+
+    Raises:
+        ValueError: If a node of the first ones has no ring of nodes around it.
+    """
+    (start, goal), nodes = arrivals.ends, len(arrivals.unsafeness)
+    heads, moves = np.nonzero(np.isfinite(arrivals.lengths))
+    tails = arrivals.tails[heads, moves]
+    lengths = np.where(tails == goal, np.inf, arrivals.lengths[heads, moves])
+    differences = np.unique(heads - tails)[::-1].copy()
+    first, last, farthest = int(heads.min()), int(heads.max()), int(np.abs(differences).max())
+    if first < farthest:
+        raise ValueError(f"node {first} is no node within a ring: moves go {farthest} nodes on")
+    width = nodes + farthest + LANES
+    table = np.full((len(differences), width), np.inf)
+    table[np.searchsorted(-differences, tails - heads), heads] = lengths
+    table[:, start] = np.inf
+    from_start, to_goal = np.full((2, width), np.inf)
+    from_start[:nodes], to_goal[:nodes] = hops.from_start, hops.to_goal
+    return Shifts(
+        differences,
+        table,
+        arrivals.unsafeness,
+        np.arange(float(width)),
+        from_start,
+        to_goal,
+        first,
+        last,
+        arrivals.ends,
     )

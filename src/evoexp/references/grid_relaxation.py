@@ -16,6 +16,10 @@ another, which is the one to go on with where the best would go straight back.
 Walks of n ≤ N nodes at the weight λ / N cost no more than at their own λ / n: one pass of dynamic
 programming bounds the paths of all these numbers at once.
 
+Nodes of a grid are counted so that the difference of two neighbours' indices tells the move
+(`paths.grids`). So eight nodes side by side are looked at together: the nodes from which one move
+leads to them stand side by side, too.
+
 The multipliers are raised at nodes that the best walk passes more than once, and lowered at nodes
 that it leaves out, by subgradient steps of Polyak's length (Held & Karp 1971). Any π gives a true
 bound, however good the steps are.
@@ -25,34 +29,36 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.numeric.compilation import kernel
-from evoexp.records import FloatArray, IntArray
-from evoexp.references.grid_networks import Arrivals, Hops
+from evoexp.numeric.compilation import borrowed, inlined, kernel
+from evoexp.numeric.vectors import LANES, any_lane, load, select, spread, store
+from evoexp.records import FloatArray
+from evoexp.references.grid_networks import Arrivals, Hops, Shifts, shifts_of
+from evoexp.robots.kinematics import U
 
 PATIENCE = 10  # steps without a better bound after which they are halved
 SHORTEST_STEP = 1.0 / 64.0  # of Polyak's length, at which a number of nodes is left
-NO_NODE = -1
+NO_NODE = -1.0
 
 
 class Walks(NamedTuple):
     """The best walks to every node by every number of nodes, written by `find_walks`.
 
     Attributes:
-        best: (numbers, nodes) values of the best walks.
-        second: (numbers, nodes) of the best whose last but one node is another.
-        before: (numbers, nodes) last but one node of the best.
-        second_before: (numbers, nodes) of the second best.
+        best: (numbers, width) values of the best walks; see `Shifts` for the width.
+        second: (numbers, width) of the best whose last but one node is another.
+        before: (numbers, width) last but one node of the best, a whole number.
+        second_before: (numbers, width) of the second best.
     """
 
     best: FloatArray
     second: FloatArray
-    before: IntArray
-    second_before: IntArray
+    before: FloatArray
+    second_before: FloatArray
 
     @classmethod
-    def of(cls, most: int, nodes: int) -> "Walks":
-        """Return memory for walks of at most so many nodes on a grid of so many."""
-        shape = most + 1, nodes
+    def of(cls, most: int, shifts: Shifts) -> "Walks":
+        """Return memory for walks of at most so many nodes on a grid."""
+        shape = most + 1, shifts.lengths.shape[1]
         values = np.full(shape, np.inf), np.full(shape, np.inf)
         return cls(*values, np.full(shape, NO_NODE), np.full(shape, NO_NODE))
 
@@ -80,21 +86,19 @@ def relaxed_bounds(
     Returns:
         (numbers,) bounds, none below its floor.
     """
-    bounds, nodes = floors.copy(), len(arrivals.unsafeness)
-    walks, multipliers = Walks.of(len(floors) - 1, nodes), np.zeros(nodes)
+    bounds, shifts = floors.copy(), shifts_of(arrivals, hops)
+    walks = Walks.of(len(floors) - 1, shifts)
+    multipliers = np.zeros(len(arrivals.unsafeness))
     # from the greatest number down: the multipliers of one are good ones of the next
     for number in range(len(floors) - 1, 1, -1):
         if bounds[number] < enough:
-            raise_bound(
-                arrivals, hops, lam, known, enough, number, most_steps, multipliers, walks, bounds
-            )
+            raise_bound(shifts, lam, known, enough, number, most_steps, multipliers, walks, bounds)
     return bounds
 
 
 @kernel
 def raise_bound(
-    arrivals: Arrivals,
-    hops: Hops,
+    shifts: Shifts,
     lam: float,
     known: float,
     enough: float,
@@ -107,8 +111,7 @@ def raise_bound(
     """Raise the bounds of a number of nodes and of all smaller ones by subgradient steps.
 
     Args:
-        arrivals: The moves.
-        hops: Fewest moves between nodes.
+        shifts: The moves.
         lam: λ.
         known: Cost of some path.
         enough: A bound as great ends the steps.
@@ -118,13 +121,13 @@ def raise_bound(
         walks: Scratch.
         bounds: (numbers,) raised.
     """
-    goal, length, since, best = arrivals.ends[1], 1.0, 0, -np.inf
+    goal, length, since, best = shifts.ends[1], 1.0, 0, -np.inf
     best_multipliers = multipliers.copy()
-    weights, excess = np.empty(len(multipliers)), np.empty(len(multipliers))
+    weights, excess = np.zeros(shifts.lengths.shape[1]), np.empty(len(multipliers))
     for _ in range(most_steps):
-        for node in range(len(weights)):
-            weights[node] = lam / number * arrivals.unsafeness[node] + multipliers[node]
-        find_walks(arrivals, hops, weights, number, walks)
+        for node in range(len(multipliers)):
+            weights[node] = lam / number * shifts.unsafeness[node] + multipliers[node]
+        find_walks(shifts, weights, number, walks)
         # L_N(π), and bounds of smaller numbers
         total = multipliers.sum()
         value = walks.best[number, goal] - total
@@ -141,7 +144,7 @@ def raise_bound(
         if bounds[number] >= enough or length < SHORTEST_STEP:
             break
         # a step along the excess of visits
-        square = count_excess(arrivals, walks, number, multipliers, excess)
+        square = count_excess(shifts, walks, number, multipliers, excess)
         if square == 0.0:
             break
         step = length * max(known - value, 1e-9 * abs(known)) / square
@@ -151,51 +154,99 @@ def raise_bound(
 
 
 @kernel
-def find_walks(
-    arrivals: Arrivals, hops: Hops, weights: FloatArray, number: int, walks: Walks
-) -> None:
+def find_walks(shifts: Shifts, weights: FloatArray, number: int, walks: Walks) -> None:
     """Write the best walks of 1 … `number` nodes that never go straight back.
 
     Walks that cannot reach the goal by `number` nodes any more are left out.
 
     Args:
-        arrivals: The moves.
-        hops: Fewest moves between nodes.
-        weights: (nodes,) cost of passing a node.
+        shifts: The moves.
+        weights: (width,) cost of passing a node.
         number: Most nodes.
         walks: Written.
     """
-    (start, goal), nodes, moves = arrivals.ends, len(weights), arrivals.tails.shape[1]
-    best, second, before, second_before = walks
-    best[:2], second[:2], before[:2], second_before[:2] = np.inf, np.inf, NO_NODE, NO_NODE
-    best[1, start] = weights[start]
+    shifts, weights, walks = borrowed((shifts, weights, walks))
+    start, lengths = shifts.ends[0], shifts.lengths.reshape(-1)
+    walks.best[:2], walks.second[:2] = np.inf, np.inf
+    walks.before[:2], walks.second_before[:2] = NO_NODE, NO_NODE
+    walks.best[1, start] = weights[start]
+    flat = borrowed(
+        Walks(
+            walks.best.reshape(-1),
+            walks.second.reshape(-1),
+            walks.before.reshape(-1),
+            walks.second_before.reshape(-1),
+        )
+    )
     for k in range(2, number + 1):
-        for node in range(nodes):
-            one, two, tail_one, tail_two = np.inf, np.inf, NO_NODE, NO_NODE
-            in_time = hops.from_start[node] < k and hops.to_goal[node] <= number - k
-            for move in range(moves if in_time and node != start else 0):
-                tail = arrivals.tails[node, move]
-                if tail == goal:
-                    continue
-                is_back = before[k - 1, tail] == node
-                value = second[k - 1, tail] if is_back else best[k - 1, tail]
-                value += arrivals.lengths[node, move]
-                if value < one:
-                    one, two, tail_one, tail_two = value, one, tail, tail_one
-                elif value < two:
-                    two, tail_two = value, tail
-            best[k, node], second[k, node] = one + weights[node], two + weights[node]
-            before[k, node], second_before[k, node] = tail_one, tail_two
+        for node in range(shifts.first, shifts.last + 1, LANES):
+            _extend_walks(shifts, lengths, weights, k, number, node, flat)
+
+
+@inlined
+def _extend_walks(
+    shifts: Shifts,
+    lengths: FloatArray,
+    weights: FloatArray,
+    k: int,
+    number: int,
+    node: int,
+    walks: Walks,
+) -> None:
+    """Write the best walks of k nodes to eight nodes from one on, from those of one node less.
+
+    Args:
+        shifts: The moves.
+        lengths: (moves · width,) theirs, flat.
+        weights: (width,) cost of passing a node.
+        k: Number of nodes of the walks.
+        number: Most nodes of a walk to the goal.
+        node: The first of the eight.
+        walks: (numbers · width,) each, flat.
+    """
+    best, second, before, second_before = walks
+    width = len(weights)
+    own, to = load(shifts.indices, U(node)), k * width + node
+    nowhere = spread(np.inf)
+    one, two = nowhere, nowhere
+    tail_one, tail_two = spread(NO_NODE), spread(NO_NODE)
+    # nodes that the start reaches, and from which the goal is reached, in time
+    left = select(
+        load(shifts.from_start, U(node)) < k * 1.0, load(shifts.to_goal, U(node)), nowhere
+    )
+    in_time = left < number - k + 0.5
+    if any_lane(in_time):
+        for move in range(len(shifts.differences)):
+            difference = shifts.differences[move]
+            at = U(to - width - difference)
+            is_back = load(before, at) == own
+            value = select(is_back, load(second, at), load(best, at))
+            value = value + load(lengths, U(move * width + node))
+            tail = own - 1.0 * difference
+            # the best so far, then the second best
+            is_one, is_two = value < one, value < two
+            two = select(is_one, one, select(is_two, value, two))
+            tail_two = select(is_one, tail_one, select(is_two, tail, tail_two))
+            one, tail_one = select(is_one, value, one), select(is_one, tail, tail_one)
+        weight, none = load(weights, U(node)), spread(NO_NODE)
+        one = select(in_time, one + weight, nowhere)
+        two = select(in_time, two + weight, nowhere)
+        tail_one = select(in_time, tail_one, none)
+        tail_two = select(in_time, tail_two, none)
+    store(best, U(to), one)
+    store(second, U(to), two)
+    store(before, U(to), tail_one)
+    store(second_before, U(to), tail_two)
 
 
 @kernel
 def count_excess(
-    arrivals: Arrivals, walks: Walks, number: int, multipliers: FloatArray, excess: FloatArray
+    shifts: Shifts, walks: Walks, number: int, multipliers: FloatArray, excess: FloatArray
 ) -> float:
     """Write how much oftener than once the best walk passes each node.
 
     Args:
-        arrivals: The moves.
+        shifts: The moves.
         walks: Of `find_walks`.
         number: Nodes of the walk.
         multipliers: (nodes,); nodes that the walk leaves out count if theirs can still be lowered.
@@ -205,15 +256,15 @@ def count_excess(
         The sum of squares; 0 if there is no walk of so many nodes.
     """
     excess[:] = -1.0
-    node, is_second = arrivals.ends[1], False
+    node, is_second = shifts.ends[1], False
     if walks.best[number, node] == np.inf:
         return 0.0
     for k in range(number, 0, -1):
         excess[node] += 1.0
         tail = walks.second_before[k, node] if is_second else walks.before[k, node]
         # the walk to `tail` that does not come from `node`
-        is_second = k > 1 and walks.before[k - 1, tail] == node
-        node = tail
+        is_second = k > 1 and walks.before[k - 1, int(tail)] == node
+        node = int(tail)
     square = 0.0
     for other in range(len(excess)):
         if excess[other] < 0.0 and multipliers[other] == 0.0:

@@ -111,7 +111,7 @@ def test_killed_before_finish() -> None:
     log = Log(CONDITION, CONFIG, 7, np.random.default_rng(0))
     for generation in generations(400):
         log.write(generation)
-    unfinished = log._buffer.getvalue()
+    unfinished = b"".join(log._writer._parts)
     assert len(unfinished) > 10_000
     assert "cut" in refusal(read_log, unfinished)
 

@@ -2,9 +2,12 @@
 
 import numpy as np
 
-from evoexp.numeric.compilation import kernel
-from evoexp.paths.layout import check_arm_slices
+from evoexp.numeric.compilation import borrowed, kernel
+from evoexp.numeric.vectors import LANES, load, magnitude, root, spread, store
+from evoexp.paths.layout import check_arm_slices, check_via_points
 from evoexp.records import FloatArray, IntArray
+
+VECTOR, ONE = np.uint64(LANES), np.uint64(1)
 
 
 def path_lengths(
@@ -13,14 +16,16 @@ def path_lengths(
     """Write length and unevenness of every arm's path.
 
     Args:
-        via_points: (nq, N + 1, lanes).
+        via_points: (nq, N + 1, lanes), lanes a multiple of eight.
         arm_slices: (arms, 2) rows of each arm.
         lengths: (arms, lanes), written: the sum of the distances d_i of neighbours (Eqs. 2, 3).
         unevenness: (arms, lanes), written: the sum of |d_i − their mean| (Eqs. 4, 5).
 
     Raises:
-        ValueError: If an output has another shape.
+        ValueError: If the via-points have not the layout that kernels need, or an output has
+            another shape.
     """
+    check_via_points(via_points)
     check_arm_slices(arm_slices, len(via_points))
     expected = (len(arm_slices), via_points.shape[2])
     if lengths.shape != expected or unevenness.shape != expected:
@@ -35,26 +40,48 @@ def measure_paths(
     via_points: FloatArray, arm_slices: IntArray, lengths: FloatArray, unevenness: FloatArray
 ) -> None:
     """Run the kernel of `path_lengths`."""
-    num, lanes = via_points.shape[1] - 1, via_points.shape[2]
-    steps = np.empty((num, lanes))
+    num, pitch = np.uint64(via_points.shape[1] - 1), np.uint64(via_points.shape[2])
+    steps = np.empty(num * VECTOR)
+    _measure(
+        via_points.reshape(-1),
+        num,
+        pitch,
+        arm_slices,
+        lengths.reshape(-1),
+        unevenness.reshape(-1),
+        steps,
+    )
+
+
+@kernel
+def _measure(
+    points: FloatArray,
+    num: np.uint64,
+    pitch: np.uint64,
+    arm_slices: IntArray,
+    lengths: FloatArray,
+    unevenness: FloatArray,
+    steps: FloatArray,
+) -> None:
+    """Measure eight paths at a time, in given memory."""
+    points, lengths, unevenness, steps = borrowed((points, lengths, unevenness, steps))
     for arm in range(len(arm_slices)):
-        a, first, stop = np.uint64(arm), arm_slices[arm, 0], arm_slices[arm, 1]
-        lengths[a, :] = 0.0
-        unevenness[a, :] = 0.0
-        for k in range(num):
-            i, before = np.uint64(k), np.uint64(k)
-            after = np.uint64(k + 1)
-            steps[i, :] = 0.0
-            for joint in range(first, stop):
-                j = np.uint64(joint)
-                for lane in range(lanes):
-                    d = via_points[j, after, lane] - via_points[j, before, lane]
-                    steps[i, lane] += d * d
-            for lane in range(lanes):
-                steps[i, lane] = np.sqrt(steps[i, lane])
-            for lane in range(lanes):
-                lengths[a, lane] += steps[i, lane]
-        for k in range(num):
-            i = np.uint64(k)
-            for lane in range(lanes):
-                unevenness[a, lane] += abs(steps[i, lane] - lengths[a, lane] / num)
+        first, stop = np.uint64(arm_slices[arm, 0]), np.uint64(arm_slices[arm, 1])
+        for lane in range(np.uint64(0), pitch, VECTOR):
+            # Eqs. 2, 3: distances of neighbours
+            length = spread(0.0)
+            for i in range(num):
+                squared = spread(0.0)
+                for j in range(first, stop):
+                    place = (j * (num + ONE) + i) * pitch + lane
+                    d = load(points, place + pitch) - load(points, place)
+                    squared = squared + d * d
+                step = root(squared)
+                store(steps, i * VECTOR, step)
+                length = length + step
+            # Eqs. 4, 5
+            mean, uneven = length / np.float64(num), spread(0.0)
+            for i in range(num):
+                uneven = uneven + magnitude(load(steps, i * VECTOR) - mean)
+            store(lengths, np.uint64(arm) * pitch + lane, length)
+            store(unevenness, np.uint64(arm) * pitch + lane, uneven)

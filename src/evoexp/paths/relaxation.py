@@ -2,26 +2,28 @@
 
 import numpy as np
 
-from evoexp.numeric.compilation import kernel
+from evoexp.numeric.compilation import borrowed, kernel
+from evoexp.numeric.vectors import LANES, load, store
 from evoexp.paths.layout import check_via_points, padded
 from evoexp.records import FloatArray
 
 
 @kernel
 def relax_points(via_points: FloatArray, delta: float, num_lanes: int) -> None:
-    """Run the kernel of `relax`.
-
-    There are two loops per point, because one that reads and writes neighbouring rows does not
-    vectorise.
-    """
-    middle = np.empty(num_lanes)
-    for j in range(via_points.shape[0]):
-        for i in range(1, via_points.shape[1] - 1):
-            for lane in range(num_lanes):
-                middle[lane] = (via_points[j, i - 1, lane] + via_points[j, i + 1, lane]) / 2.0
-            for lane in range(num_lanes):
-                a = via_points[j, i, lane]
-                via_points[j, i, lane] = a + delta * (middle[lane] - a)  # (Eqs 8, 9)
+    """Run the kernel of `relax`; num_lanes is a multiple of eight here."""
+    flat, pitch = borrowed(via_points.reshape(-1)), np.uint64(via_points.shape[2])
+    num_points = np.uint64(via_points.shape[1])
+    for joint in range(via_points.shape[0]):
+        for lane in range(0, num_lanes, LANES):
+            start = np.uint64(joint) * num_points * pitch + np.uint64(lane)
+            before, a = load(flat, start), load(flat, start + pitch)
+            for i in range(1, via_points.shape[1] - 1):
+                place = start + np.uint64(i) * pitch
+                after = load(flat, place + pitch)
+                middle = (before + after) / 2.0
+                before = a + delta * (middle - a)  # (Eqs 8, 9)
+                store(flat, place, before)
+                a = after
 
 
 def relax(via_points: FloatArray, delta: float, num_lanes: int) -> None:

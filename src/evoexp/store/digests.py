@@ -1,7 +1,7 @@
 """The chain of digests, which tells from which generation on two runs differ."""
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache
 from typing import Any
 
@@ -64,6 +64,11 @@ def array_bytes(array: NDArray[Any]) -> bytes:
     if array.size and array.dtype.char == "d" and (least := array.item(array.argmin())) != least:
         array = np.where(np.isnan(array), np.nan, array)
     return array.tobytes()
+
+
+def any_nan(arrays: Iterable[bytes]) -> bool:
+    """Return whether float64 arrays, given as bytes, hold any NaN."""
+    return bool(np.isnan(np.frombuffer(b"".join(arrays))).any())
 
 
 def state_bytes(bit_generator: np.random.PCG64) -> bytes:

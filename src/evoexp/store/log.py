@@ -2,23 +2,24 @@
 
 import io
 import struct
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
 import xxhash
-from mcap.writer import CompressionType, IndexType, Writer
 from numpy.typing import NDArray
 
 from evoexp.errors import EvoexpError
 from evoexp.input_files import MEGABYTE
 from evoexp.records import FrontRow, Generation, GenerationRow, ReplicateSummary, SolutionRow
 from evoexp.store.container import MAX_LOG
-from evoexp.store.digests import Chain, array_bytes
+from evoexp.store.container_writer import ContainerWriter, Messages
+from evoexp.store.digests import Chain, any_nan, array_bytes
 from evoexp.store.messages import (
     TERM,
     encode_front,
-    encode_generation,
+    encode_generations,
     encode_solution,
     encode_summary,
     encode_values,
@@ -41,6 +42,7 @@ GENERATION_TOPIC, SOLUTION_TOPIC, FRONT_TOPIC = "/generation", "/solution", "/fr
 _CHUNK_SIZE = 56 * 1024  # [B] a chunk ends with the message that passes this, hence within 64 KiB
 _MESSAGE = struct.Struct("<QIQ")  # log_time, sequence, bytes of data
 _BATCH = 64  # generations encoded together
+_NUM_VALUES = Generation._fields.index("terms")  # fields of a generation before its terms
 _TICK = 1_000_000_000  # [ns] the synthetic clock: one second per generation
 
 
@@ -49,10 +51,23 @@ class LogTooLarge(EvoexpError):
 
 
 class _Pending(NamedTuple):
-    """The part of a generation that waits to be encoded, without views of the planner's memory."""
+    """The part of a generation that waits to be encoded, without views of the planner's memory.
 
-    row: dict[str, Any]
+    Attributes:
+        values: Of its fields from `index` to `solved`.
+        terms: A copy.
+        columns: (name, column) of every term.
+        costs: Their bytes; of floats every NaN still has the bits that it had.
+        are_floats: Whether the costs are float64.
+        best: `array_bytes` of the best so far.
+        state: Of the generator.
+    """
+
+    values: tuple[Any, ...]
+    terms: dict[str, float]
+    columns: Iterable[tuple[str, str]]
     costs: bytes
+    are_floats: bool
     best: bytes
     state: bytes
 
@@ -74,6 +89,12 @@ class ContentDigest:
     def update(self, channel: bytes, log_time: int, sequence: int, data: bytes) -> None:
         """Append one message; `channel` comes from `channel_identity`."""
         self._hash.update(channel + _MESSAGE.pack(log_time, sequence, len(data)) + data)
+
+    def update_all(self, channels: Iterable[bytes], messages: Messages) -> None:
+        """Append messages; `channels` has one entry for each of them."""
+        heads = map(_MESSAGE.pack, messages.times, messages.sequences, map(len, messages.data))
+        parts = zip(channels, heads, messages.data, strict=True)
+        self._hash.update(b"".join(chain.from_iterable(parts)))
 
     def hexdigest(self) -> str:
         """Return the digest so far as 32 hex digits."""
@@ -99,11 +120,11 @@ class _Channel:
     """A channel of the log: its id, its part in the content digest, its number of messages."""
 
     def __init__(
-        self, writer: Writer, topic: str, record: type, terms: tuple[str, ...] = ()
+        self, writer: ContainerWriter, topic: str, record: type, terms: tuple[str, ...] = ()
     ) -> None:
         name = f"evoexp.{record.__name__.removesuffix('Row')}"
-        schema_id = writer.register_schema(name, "jsonschema", json_schema(record, terms))
-        self.id = writer.register_channel(topic, "json", schema_id)
+        schema_id = writer.add_schema(name, "jsonschema", json_schema(record, terms))
+        self.id = writer.add_channel(topic, "json", schema_id)
         self.identity = channel_identity(topic, name, "json")
         self.num_messages = 0
 
@@ -153,28 +174,19 @@ class Log:
             b""  # of the generation encoded last, and of the last solution written
         )
         self._best_cost, self._written_cost, self._size = np.inf, np.inf, 0  # [B] of messages
-        self._buffer = io.BytesIO()
-        self._writer = Writer(
-            self._buffer,
-            chunk_size=_CHUNK_SIZE,
-            compression=CompressionType.ZSTD,
-            index_types=IndexType.ALL,
-            use_summary_offsets=False,
-            enable_crcs=True,
-            enable_data_crcs=True,
-        )
-        self._writer.start(profile="", library=LIBRARY)
+        self._messages = Messages([], [], [], [])  # that wait to be written
+        self._writer = ContainerWriter(LIBRARY, _CHUNK_SIZE)
         run = {
             "condition": condition_id,
             "replicate": str(replicate),
             "schema_version": str(SCHEMA_VERSION),
         }
         self._writer.add_metadata(RUN, run)
-        self._attach(CONFIG, config_json)
+        self._writer.add_attachment(CONFIG, config_json)
         for name, data in sorted((attachments or {}).items()):
             if name == CONFIG:
                 raise ValueError(f"attachments: '{CONFIG}' is the configuration's own name")
-            self._attach(name, data)
+            self._writer.add_attachment(name, data)
 
     def write(self, generation: Generation) -> None:
         """Append a generation, and its best solution where that is better than the last written.
@@ -187,27 +199,65 @@ class Log:
             self._terms = {name: TERM + name for name in sorted(generation.terms)}
         if self._last is None or generation.best is not self._last.best:
             self._best_bytes = array_bytes(np.asarray(generation.best, dtype=np.float64))
-        row, costs = generation_row(generation, self._terms.items()), array_bytes(generation.costs)
-        self._pending.append(_Pending(row, costs, self._best_bytes, self._chain.state()))
+        costs = generation.costs
+        are_floats = costs.dtype.char == "d"
+        self._pending.append(
+            _Pending(
+                generation[:_NUM_VALUES],
+                generation.terms.copy(),
+                self._terms.items(),
+                costs.tobytes() if are_floats else array_bytes(costs),
+                are_floats,
+                self._best_bytes,
+                self._chain.state(),
+            )
+        )
         self._last = generation
         if len(self._pending) >= _BATCH:
             self._flush()
         if generation.arrays:
+            self._send()  # an attachment comes behind the chunks that end before it
             for name, array in sorted(generation.arrays.items()):
-                self._attach(name + ARRAY, array_file(array))
+                self._writer.add_attachment(name + ARRAY, array_file(array))
         if generation.criteria is not None:
             for population, criteria in enumerate(generation.criteria):
                 self.write_front(FrontRow(generation.index, population, criteria.T))
 
     def _flush(self) -> None:
-        for row, costs, best, state in self._pending:
-            first, index = GENERATION_TOPIC not in self._channels, row["index"]
-            self._best, self._best_cost = best, row["best_cost"]
-            data = encode_generation(row, self._chain.update(costs, best, state))
+        if not self._pending:
+            return
+        # rows, with the links of the chain
+        update, rows = self._chain.update, []
+        nan = any_nan(each.costs for each in self._pending if each.are_floats)
+        for values, terms, columns, costs, are_floats, best, state in self._pending:
+            if nan and are_floats:
+                costs = array_bytes(np.frombuffer(costs))
+            row = generation_row(values, terms, columns)
+            row["chain"] = update(costs, best, state)
+            rows.append(row)
+        # messages; a better solution stands behind its generation
+        for row, each, data in zip(rows, self._pending, encode_generations(rows), strict=True):
+            index, self._best, self._best_cost = row["index"], each.best, row["best_cost"]
+            first = GENERATION_TOPIC not in self._channels
             self._add(GENERATION_TOPIC, GenerationRow, index, data)
             if first or self._best_cost < self._written_cost:
                 self._write_solution(index)
         self._pending.clear()
+        self._send()
+
+    def _send(self) -> None:
+        """Write the messages that wait."""
+        self._size += sum(map(len, self._messages.data))
+        if self._size > MAX_LOG:
+            raise LogTooLarge(
+                f"log: its generations and solutions take more than {MAX_LOG // MEGABYTE} MB, "
+                "more than any log that is read; run fewer generations"
+            )
+        self._writer.add_messages(self._messages)
+        identities = {channel.id: channel.identity for channel in self._channels.values()}
+        channels = map(identities.__getitem__, self._messages.channels)
+        self._content.update_all(channels, self._messages)
+        self._messages = Messages([], [], [], [])
 
     def write_front(self, front: FrontRow) -> None:
         """Append the front of a population of the generation last written."""
@@ -236,18 +286,12 @@ class Log:
             )
         if self._best != self._written or self._best_cost != self._written_cost:
             self._write_solution(self._last.index)
+        self._send()
         summary = summary._replace(digest=self._chain.finish(self._last.population))
         self._writer.add_metadata(ENVIRONMENT, encode_values(self._environment))
         content = encode_values({CONTENT_DIGEST: self._content.hexdigest()})
         self._writer.add_metadata(SUMMARY, encode_summary(summary) | content)
-        self._writer.finish()
-        return Finished(self._buffer.getvalue(), summary)
-
-    def _attach(self, name: str, data: bytes) -> None:
-        media_type = "application/json" if name.endswith(".json") else "application/octet-stream"
-        self._writer.add_attachment(
-            create_time=0, log_time=0, name=name, media_type=media_type, data=data
-        )
+        return Finished(self._writer.finish(), summary)
 
     def _write_solution(self, index: int) -> None:
         self._written, self._written_cost = self._best, self._best_cost
@@ -257,16 +301,12 @@ class Log:
     def _add(self, topic: str, record: type, generation: int, data: bytes) -> None:
         channel = self._channels.get(topic)
         if channel is None:  # registered with its first message, when the terms are known
+            self._send()  # the channel comes behind the messages before
             terms = tuple(self._terms) if record is GenerationRow else ()
             channel = self._channels[topic] = _Channel(self._writer, topic, record, terms)
-        log_time = int(generation) * _TICK
-        sequence = channel.num_messages
-        self._size += len(data)
-        if self._size > MAX_LOG:
-            raise LogTooLarge(
-                f"log: its generations and solutions take more than {MAX_LOG // MEGABYTE} MB, "
-                "more than any log that is read; run fewer generations"
-            )
+        channels, sequences, times, contents = self._messages
+        channels.append(channel.id)
+        sequences.append(channel.num_messages)
+        times.append(int(generation) * _TICK)
+        contents.append(data)
         channel.num_messages += 1
-        self._writer.add_message(channel.id, log_time, data, log_time, sequence)
-        self._content.update(channel.identity, log_time, sequence, data)

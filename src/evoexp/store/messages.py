@@ -7,7 +7,7 @@ needed: `{"best_cost": "inf"}` for a field, `{"values": {"3": "nan"}}` for an el
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from sys import intern
 from typing import Any, get_type_hints
@@ -18,7 +18,6 @@ import orjson
 from evoexp.records import (
     FloatArray,
     FrontRow,
-    Generation,
     GenerationRow,
     ReplicateSummary,
     SolutionRow,
@@ -63,42 +62,47 @@ def json_schema(record: type, terms: tuple[str, ...] = ()) -> bytes:
     return orjson.dumps({"title": title, "type": "object", "properties": properties})
 
 
-def generation_row(generation: Generation, terms: Iterable[tuple[str, str]]) -> dict[str, Any]:
-    """Return the recorded part of a generation as plain values, for `encode_generation`.
+def generation_row(
+    values: Sequence[Any], terms: Mapping[str, Any], columns: Iterable[tuple[str, str]]
+) -> dict[str, Any]:
+    """Return the recorded part of a generation as plain values, for `encode_generations`.
 
     Args:
-        generation: What the planner yielded; its arrays are left out.
-        terms: (name, column) of every term, in the order of the columns.
+        values: Of the fields of `Generation`, from `index` to `solved`.
+        terms: Its terms.
+        columns: (name, column) of every term, in the order of the columns.
     """
+    index, _, best, lowest, mean, std, num_feasible, evaluations, queries, solved = values
     row: dict[str, Any] = {
-        "index": int(generation.index),
-        "best_cost": float(generation.best_cost),
-        "best_cost_in_generation": float(generation.best_cost_in_generation),
-        "mean_cost": float(generation.mean_cost),
-        "std_cost": float(generation.std_cost),
-        "num_feasible": int(generation.num_feasible),
-        "evaluations": int(generation.evaluations),
-        "collision_queries": int(generation.collision_queries),
-        "solved": bool(generation.solved),
+        "index": int(index),
+        "best_cost": float(best),
+        "best_cost_in_generation": float(lowest),
+        "mean_cost": float(mean),
+        "std_cost": float(std),
+        "num_feasible": int(num_feasible),
+        "evaluations": int(evaluations),
+        "collision_queries": int(queries),
+        "solved": bool(solved),
     }
-    values = generation.terms
-    for name, column in terms:
-        row[column] = float(values[name])
+    for name, column in columns:
+        row[column] = float(terms[name])
     return row
 
 
-def encode_generation(row: dict[str, Any], chain: str) -> bytes:
-    """Return the message of one generation.
+def encode_generations(rows: Sequence[dict[str, Any]]) -> list[bytes]:
+    """Return the messages of generations.
+
+    All rows together take little more than half the time that they take one by one.
 
     Args:
-        row: Of `generation_row`; becomes complete here.
-        chain: The generation's link, 32 hex digits.
+        rows: Of `generation_row`, with `chain`, the generation's link as 32 hex digits.
     """
-    # One addition per number decides the usual case; a sum that overflows only takes the longer
-    # way.
-    total = sum(row.values())
-    row["chain"] = chain
-    return orjson.dumps(row if math.isfinite(total) else _flagged(row))
+    text = orjson.dumps(rows)
+    if b"null" not in text:  # every number is finite
+        parts = text[2:-2].split(b"},{")
+        if len(parts) == len(rows):  # no name of a term looks like the end of a row
+            return [b"{%b}" % part for part in parts]
+    return [orjson.dumps(_flagged(row)) for row in rows]
 
 
 def encode_solution(generation: int, cost: float, values: FloatArray) -> bytes:
@@ -150,7 +154,7 @@ def decode_environment(metadata: Mapping[str, str]) -> dict[str, Any]:
 
 
 def decode_generation(data: bytes) -> GenerationRow:
-    """Undo `encode_generation`."""
+    """Undo `encode_generations`."""
     fields, terms = _decode(GenerationRow, data)
     return GenerationRow(**fields, terms=terms)
 

@@ -85,6 +85,14 @@ def test_the_generic_page_holds_all_of_it(results: Results, settings: ReportSett
     headings = [heading for heading, _ in page.comparisons]
     quantities = ("best cost", "CPU time, search [s]")  # all took as many evaluations
     assert headings == [f"{name}: pairs of conditions" for name in quantities]
-    assert [drawing.stem for drawing in page.drawings] == ["convergence", "values", "matrix"]
+    assert [drawing.stem for drawing in page.drawings] == [
+        "convergence",
+        "values",
+        "matrix",
+        "scene",
+        "stages",
+        "joints",
+        "covers",
+    ]
     assert page.tables[0].headers == ("condition", "solved", "certified", "required margin kept")
     assert {"best cost", "CPU time of the search"} <= {q.name for q in page.quantities}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from evoexp.condition import Condition
-from evoexp.planners.planner import Listing
+from evoexp.planners.answers import Listing
 from evoexp.planners.via_point_ga.planner import ViaPointGa
 from evoexp.records import Generation
 from evoexp.testing import CHECKS, Check, ContractBroken, check_planner, conditions

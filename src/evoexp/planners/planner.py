@@ -16,6 +16,7 @@ from evoexp.collision.certifier.certificate import Certificate, certificate
 from evoexp.collision.scene import Part, Scene
 from evoexp.evolution.cost_statistics import CostStatistics, cost_statistics
 from evoexp.paths.motion import Motion
+from evoexp.planners.answers import CoverShape, Listing
 from evoexp.records import BoolArray, FloatArray, Generation
 
 Reproducibility = Literal["bits", "environment"]
@@ -62,18 +63,6 @@ class JudgementArrays(NamedTuple):
     def named_terms(self, individual: int) -> dict[str, float]:
         """Return the terms of one individual."""
         return {name: float(values[individual]) for name, values in self.terms.items()}
-
-
-class Listing(NamedTuple):
-    """A table with one row per configuration of a solution.
-
-    Attributes:
-        names: Names of the columns.
-        rows: Values, row by row.
-    """
-
-    names: list[str]
-    rows: list[list[Any]]
 
 
 @runtime_checkable
@@ -182,6 +171,13 @@ class Planner(Protocol):
     def notes(self, problem: Any) -> Sequence[str]:
         """Return remarks on settings and problem, one per line, for `show` and the report."""
 
+    def covers(self, problem: Any) -> Sequence[CoverShape]:
+        """Return the spheres and capsules that the search tests in place of the robot's bodies.
+
+        They are drawn beside the bodies. A search that tests other shapes, or the bodies
+        themselves, returns none.
+        """
+
 
 def num_values(shape: Shape) -> int:
     """Return how many numbers a solution of a documented shape has; of any number of parts, many.
@@ -257,6 +253,10 @@ class PlannerDefaults:
 
     def notes(self, problem: Any) -> Sequence[str]:
         """Return no remarks."""
+        return ()
+
+    def covers(self, problem: Any) -> Sequence[CoverShape]:
+        """Return none: the search tests no spheres and capsules."""
         return ()
 
 

@@ -8,7 +8,8 @@ from pydantic import GetPydanticSchema
 
 from evoexp.collision.scene import Part
 from evoexp.paths.motion import Motion
-from evoexp.planners.planner import Judgement, Listing, Planner, PlannerDefaults, Shape
+from evoexp.planners.answers import CoverShape, Listing
+from evoexp.planners.planner import Judgement, Planner, PlannerDefaults, Shape
 from evoexp.records import FloatArray, Generation
 from evoexp.validation import Component
 
@@ -89,3 +90,7 @@ class WrappedPlanner(PlannerDefaults, Component):
     def notes(self, problem: Any) -> Sequence[str]:
         """Return the wrapped planner's remarks."""
         return self.planner.notes(problem)
+
+    def covers(self, problem: Any) -> Sequence[CoverShape]:
+        """Return the wrapped planner's covers."""
+        return self.planner.covers(problem)

@@ -91,6 +91,8 @@ def report(
     files: dict[str, bytes] = {}
     for drawn in on_all_cores(lambda drawing: _drawn(drawing, settings), page.drawings):
         files |= drawn
+    for motion in page.motions:
+        files[f"{motion.stem}.html"] = motion.content()
     files[INDEX] = render(page, found, settings, f"evoexp report {request.words}").encode()
     directory.mkdir(parents=True, exist_ok=True)
     write_files({directory / name: content for name, content in files.items()})

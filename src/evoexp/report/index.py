@@ -39,6 +39,7 @@ def render(page: Page, results: Results, settings: ReportSettings, command: str)
         _section("Claims", _claims(page.claims)),
         _section("Known defects and checks", _checks(page.checks)),
         *(_section(heading, _comparison(rows, settings)) for heading, rows in page.comparisons),
+        _section("Motions", _motions(page)),
         _section("Figures", "\n".join(_figure(drawing, settings) for drawing in page.drawings)),
         _section("Parameters", _parameters(results)),
         _section("Failures", _failures(results)),
@@ -196,6 +197,16 @@ def _comparison(rows: Iterable[Comparison], settings: ReportSettings) -> str:
         "samples; adjusted: Holm over the rows of this table, test by test.\n"
     )
     return f"{markdown.table(headers, cells)}\n{note}"
+
+
+def _motions(page: Page) -> str:
+    """Link the pages that play motions."""
+    links = [f"- [{motion.title}]({motion.stem}.html)" for motion in page.motions]
+    return (
+        "\n".join(["Played in a browser, with every exact distance:\n", *links, ""])
+        if links
+        else ""
+    )
 
 
 def _figure(drawing: Drawing, settings: ReportSettings) -> str:

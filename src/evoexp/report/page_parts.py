@@ -57,6 +57,20 @@ class Table(NamedTuple):
     note: str = ""
 
 
+class MotionPage(NamedTuple):
+    """A page that plays a motion in any browser, offline; `evoexp view` writes the same.
+
+    Attributes:
+        stem: Of its file.
+        title: Names the motion.
+        content: Gives the HTML.
+    """
+
+    stem: str
+    title: str
+    content: Callable[[], bytes]
+
+
 class Page(NamedTuple):
     """A report before it is written.
 
@@ -69,6 +83,7 @@ class Page(NamedTuple):
         comparisons: Of conditions on common seeds, by heading.
         drawings: The figures.
         tables: Of its own, shown behind the table of results.
+        motions: Pages that play motions.
     """
 
     title: str
@@ -79,3 +94,4 @@ class Page(NamedTuple):
     comparisons: tuple[tuple[str, tuple[Comparison, ...]], ...] = ()
     drawings: tuple[Drawing, ...] = ()
     tables: tuple[Table, ...] = ()
+    motions: tuple[MotionPage, ...] = ()

@@ -29,8 +29,9 @@ from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.posture_cost import COLUMNS, PARALLEL, TERMS, UPRIGHT, PostureCost
 from evoexp.paths.motion import Motion
+from evoexp.planners.answers import CoverShape, Listing
 from evoexp.planners.departures import joint_names, of_limits, of_place
-from evoexp.planners.planner import COPIES, Candidate, Keeper, Listing, PlannerDefaults
+from evoexp.planners.planner import COPIES, Candidate, Keeper, PlannerDefaults
 from evoexp.planners.posture_es import problem as posture_problem
 from evoexp.planners.posture_es.cycles import Ancestry, Search
 from evoexp.planners.posture_es.kernels import COST
@@ -200,6 +201,12 @@ class PostureEs(PlannerDefaults, Component):
     def notes(self, problem: Problem) -> tuple[str, ...]:
         """Describe the collision model and list the body pairs that it skips."""
         return posture_problem.notes(problem)
+
+    def covers(self, problem: Problem) -> tuple[CoverShape, ...]:
+        """Return the spheres or capsules around the robot's bodies."""
+        shapes = problem.bodies.shapes
+        columns = shapes.joint.tolist(), shapes.start, shapes.end, shapes.radius.tolist()
+        return tuple(CoverShape(*shape) for shape in zip(*columns, strict=True))
 
     def _tilts(self, found: list[Span], postures: FloatArray) -> dict[str, float]:
         """Return the greatest limited tilts, at postures and on the motion between them."""

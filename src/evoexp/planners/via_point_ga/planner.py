@@ -23,6 +23,7 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.interpolation import interpolate_linear
 from evoexp.paths.motion import Motion
 from evoexp.paths.workspace import prepare_redistribution
+from evoexp.planners.answers import CoverShape
 from evoexp.planners.departures import joint_names, of_limits, of_place
 from evoexp.planners.planner import COPIES, Candidate, Keeper, PlannerDefaults, num_values
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
@@ -166,6 +167,15 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
         limits = np.column_stack([model.lowerPositionLimit, model.upperPositionLimit])
         finite = np.clip(limits, -UNLIMITED, UNLIMITED) / DEGREE
         return found + of_limits(joint_names(len(strings)), strings, finite, "deg")
+
+    def covers(self, problem: Problem) -> tuple[CoverShape, ...]:
+        """Return the circles or spheres on the links."""
+        found = []
+        for item in problem.collision.geometry.geometryObjects:
+            center = np.array(item.placement.translation)
+            radius = float(item.geometry.radius)
+            found.append(CoverShape(item.parentJoint, center, center, radius))
+        return tuple(found)
 
     def memory(self, problem: Problem) -> int:
         """Return the memory of populations, and of the configurations tested between via-points."""

@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from evoexp.report import pairwise, sweep_figures
+from evoexp.report import motion_pictures, pairwise, sweep_figures
 from evoexp.report.comparisons import Values, by_column, compared_with_controls
 from evoexp.report.figures import convergence
 from evoexp.report.page_parts import Drawing, Page, Quantity
@@ -33,6 +33,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
     boxes = {one.name: one.values for one in pairwise.differing(results)}
     if boxes:
         drawn.append(sweep_figures.values_drawing(results, boxes))
+    shown = motion_pictures.best_motions(results)
     return base._replace(
         introduction=SCENES if len(scenes) > 1 else "",
         quantities=(
@@ -41,7 +42,12 @@ def page(results: Results, settings: ReportSettings) -> Page:
         ),
         tables=pairwise.share_tables(results, settings),
         comparisons=pairwise.comparisons(results, settings),
-        drawings=(*drawn, *pairwise.matrix_drawing(results, settings)),
+        drawings=(
+            *drawn,
+            *pairwise.matrix_drawing(results, settings),
+            *motion_pictures.drawings(shown),
+        ),
+        motions=motion_pictures.pages(shown),
     )
 
 

@@ -1,0 +1,234 @@
+"""Pictures of any motion: the scene with start and goal, stages, joints, and bodies beside covers.
+
+The functions draw the tables of `motion_tables` and need nothing else.
+"""
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
+
+from evoexp.playback.colours import OBJECT, OBSTACLE
+from evoexp.records import FloatArray
+from evoexp.report import style
+from evoexp.report.figures import surfaces
+from evoexp.report.figures.motion_tables import POSE, SIZE
+from evoexp.report.rows import groups, records
+
+VIEW = (22.0, -58.0)  # [deg] elevation and azimuth
+OPACITY = {"start": 1.0, "goal": 0.35, "body": 1.0, "cover": 0.5, "obstacle": 0.3, "object": 0.9}
+LINE = 0.012  # [-] of the picture's radius: half the width of links without thickness
+FLOOR = 1.1  # [-] of the picture's radius: half the edge of the part of a half-space that is drawn
+
+
+def draw_scenes(table: pd.DataFrame) -> Figure:
+    """Draw one panel per motion; with one motion alone it is seen from above, too."""
+    panels = list(groups(table, ["panel", "title"]))
+    planar = bool(table["planar"].all())
+    alone = len(panels) == 1 and not planar
+    count = 2 if alone else len(panels)
+    lines = -(-count // 2)
+    figure = style.figure(3.5 * lines + 0.3)
+    for k, ((_, title), rows) in enumerate(panels):
+        _panel(figure, (lines, min(count, 2), k + 1), title, rows, planar=planar)
+    if alone:
+        (_, title), rows = panels[0]
+        _panel(figure, (1, 2, 2), "from above", rows, planar=True)
+    _key(figure, table)
+    return figure
+
+
+def draw_stages(table: pd.DataFrame) -> Figure:
+    """Draw one panel per instant, three side by side, all of the same scale."""
+    panels = list(groups(table, ["panel", "title"]))
+    lines = -(-len(panels) // 3)
+    figure = style.figure(2.4 * lines + 0.3)
+    planar = bool(table["planar"].all())
+    for k, ((_, title), rows) in enumerate(panels):
+        _panel(figure, (lines, 3, k + 1), title, rows, planar=planar, room=table)
+    _key(figure, table)
+    return figure
+
+
+def draw_covers(table: pd.DataFrame) -> Figure:
+    """Draw the exact bodies of each robot beside their covers, in the same scale."""
+    panels = list(groups(table, ["panel", "title"]))
+    lines = len(panels) // 2
+    figure = style.figure(3.2 * lines)
+    planar = bool(table["planar"].all())
+    for k, ((panel, title), rows) in enumerate(panels):
+        both = table[table["panel"] // 2 == panel // 2]
+        _panel(figure, (lines, 2, k + 1), title, rows, planar=planar, room=both)
+    return figure
+
+
+def draw_joints(table: pd.DataFrame) -> Figure:
+    """Draw every joint in a panel of its own, four side by side, with its limits."""
+    joints = list(table.groupby("joint", sort=False))
+    lines = -(-len(joints) // 4)
+    figure = style.figure(1.4 * lines + 0.2)
+    for k, (joint, own) in enumerate(joints):
+        axes = figure.add_subplot(lines, 4, k + 1)
+        axes.plot(own["instant"], own["value"], color=style.arm_colour(0))
+        for bound in own[["low", "high"]].iloc[0]:
+            if np.isfinite(bound):
+                axes.axhline(bound, color=style.FORBIDDEN, linestyle=(0, (3, 2)), linewidth=0.9)
+        axes.set_title(str(joint), fontsize=7, fontweight="normal")
+        axes.set_ylabel(f"[{own['unit'].iloc[0]}]", fontsize=7)
+        axes.tick_params(labelsize=6.5)
+        axes.yaxis.set_major_locator(style.few_ticks())
+        axes.xaxis.set_major_locator(MaxNLocator(nbins=4, integer=True))
+        if k >= len(joints) - 4:
+            axes.set_xlabel("instant", fontsize=7)
+    return figure
+
+
+def _surface(row: Any, radius: float, middle: FloatArray) -> FloatArray:
+    """Return the triangles of a row in the world."""
+    pose = np.array([getattr(row, name) for name in POSE], dtype=np.float64)
+    size = np.array([getattr(row, name) for name in SIZE], dtype=np.float64)
+    if row.kind == "half_space":
+        square = FLOOR * radius * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float)
+        found = surfaces.placed(square[[[0, 1, 2], [0, 2, 3]]], pose)
+        normal = np.cross(found[0, 1] - found[0, 0], found[0, 2] - found[0, 0])
+        normal /= np.sqrt((normal**2).sum())
+        away = middle - pose[:3]
+        return np.asarray(found + away - normal * float(normal @ away))
+    if row.kind == "capsule" and size[0] == 0.0:  # a link that is a line
+        size[0] = max(LINE * radius, 1e-4 * size[1])
+    text = row.corners if isinstance(row.corners, str) else ""
+    corners = np.array([c.split() for c in text.split(";")], dtype=np.float64) if text else None
+    return surfaces.placed(surfaces.triangles_of(row.kind, size, corners), pose)
+
+
+def _look(row: Any) -> tuple[Any, float]:
+    """Return colour and opacity of a body."""
+    alpha = OPACITY[row.element]
+    if row.element in ("obstacle", "object"):
+        return (OBSTACLE if row.element == "obstacle" else OBJECT), alpha
+    return style.arm_colour(int(row.arm)), alpha
+
+
+def _room(table: pd.DataFrame) -> tuple[FloatArray, FloatArray]:
+    """Return the least and greatest corner of a picture: of bodies, and of obstacles near them."""
+    solid = table[table["kind"].notna() & (table["kind"] != "half_space")]
+    points = {name: [np.empty((0, 3))] for name in ("robot", "obstacle")}
+    for row in records(solid):
+        kind = "obstacle" if row.element == "obstacle" else "robot"
+        points[kind].append(_surface(row, 0.0, np.zeros(3)).reshape(-1, 3))
+    ways = table[table["element"].isin(["way", "target"])][["x", "y", "z"]].to_numpy(np.float64)
+    own = np.vstack([*points["robot"], ways])
+    low, high = own.min(axis=0), own.max(axis=0)
+    wide = float((high - low).max())
+    for body in points["obstacle"][1:]:
+        if float(np.ptp(body, axis=0).max()) < 2.5 * wide:
+            low, high = np.minimum(low, body.min(axis=0)), np.maximum(high, body.max(axis=0))
+    return low, high
+
+
+def _panel(
+    figure: Figure,
+    place: tuple[int, int, int],
+    title: str,
+    rows: pd.DataFrame,
+    *,
+    planar: bool,
+    room: pd.DataFrame | None = None,
+) -> None:
+    low, high = _room(rows if room is None else room)
+    draw = _flat if planar else _deep
+    axes = draw(figure, place, rows, low, high)
+    axes.set_title(title, fontsize=8)
+
+
+def _flat(
+    figure: Figure,
+    place: tuple[int, int, int],
+    rows: pd.DataFrame,
+    low: FloatArray,
+    high: FloatArray,
+) -> Any:
+    """Draw a scene as seen along z."""
+    axes = figure.add_subplot(*place)
+    pad = 0.05 * float((high - low)[:2].max())
+    style.operational_axes(axes, rows["length_unit"].iloc[0])
+    axes.set_xlim(low[0] - pad, high[0] + pad)
+    axes.set_ylim(low[1] - pad, high[1] + pad)
+    middle, radius = 0.5 * (low + high), float(np.sqrt(((high - low) ** 2).sum())) / 2.0
+    for row in records(rows[rows["kind"].notna()]):
+        if row.kind == "half_space" and abs(row.qx) + abs(row.qy) < 1e-6:
+            continue  # a floor seen from above
+        colour, alpha = _look(row)
+        seen = surfaces.outline_from_above(_surface(row, radius, middle))
+        axes.fill(*seen.T, facecolor=colour, edgecolor=colour, alpha=alpha, linewidth=0.8)
+    _lines(axes, rows, ["x", "y"])
+    return axes
+
+
+def _deep(
+    figure: Figure,
+    place: tuple[int, int, int],
+    rows: pd.DataFrame,
+    low: FloatArray,
+    high: FloatArray,
+) -> Any:
+    """Draw a scene in space: all surfaces in one collection, which sorts them by depth."""
+    axes: Any = figure.add_subplot(*place, projection="3d")
+    middle, radius = 0.5 * (low + high), float(np.sqrt(((high - low) ** 2).sum())) / 2.0
+    found, colours = [], []
+    for row in records(rows[rows["kind"].notna()]):
+        triangles = _surface(row, radius, middle)
+        found.append(triangles)
+        colours.append(surfaces.shaded(triangles, *_look(row)))
+    surface = Poly3DCollection(
+        np.concatenate(found), facecolors=np.concatenate(colours), linewidth=0
+    )
+    surface.set_rasterized(True)  # tens of thousands of triangles
+    axes.add_collection3d(surface)
+    _lines(axes, rows, ["x", "y", "z"])
+    spans = high - low
+    least = np.maximum(0.5 * (0.3 * spans.max() - spans), 0.0) + 0.03 * spans.max()
+    for name, a, b in zip("xyz", low - least, high + least, strict=True):
+        getattr(axes, f"set_{name}lim")(a, b)
+        unit = rows["length_unit"].iloc[0]
+        getattr(axes, f"set_{name}label")(f"{name} [{unit}]", labelpad=-7, fontsize=7)
+    axes.set_box_aspect(spans + 2.0 * least, zoom=1.05)
+    axes.patch.set_visible(False)
+    axes.tick_params(labelsize=6, pad=-2)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_major_locator(MaxNLocator(nbins=3))
+        axis.set_pane_color((0.97, 0.97, 0.97, 1.0))
+    axes.view_init(elev=VIEW[0], azim=VIEW[1])
+    return axes
+
+
+def _lines(axes: Any, rows: pd.DataFrame, columns: list[str]) -> None:
+    """Draw the ways of tools, and targets."""
+    for arm, way in groups(rows[rows["element"] == "way"], "arm"):
+        values = [way[name] for name in columns]
+        axes.plot(*values, color=style.arm_colour(int(arm)), linewidth=1.0, linestyle=":", zorder=9)
+    targets = rows[rows["element"] == "target"]
+    if len(targets):
+        values = [targets[name] for name in columns]
+        axes.plot(*values, "*", color=style.FORBIDDEN, markersize=7, linestyle="none", zorder=10)
+
+
+def _key(figure: Figure, table: pd.DataFrame) -> None:
+    """Name the elements below the figure."""
+    there = set(table["element"])
+    colour = style.arm_colour(0)
+    keys: list[Any] = []
+    if "goal" in there:
+        keys += [Patch(color=colour, label="start"), Patch(color=colour, alpha=0.35, label="goal")]
+    if "obstacle" in there:
+        keys.append(Patch(color=OBSTACLE, alpha=0.4, label="obstacle"))
+    if "object" in there:
+        keys.append(Patch(color=OBJECT, label="carried"))
+    keys.append(style.key("way of the tool", color=style.NEUTRAL, linewidth=1.0, linestyle=":"))
+    if "target" in there:
+        keys.append(style.key("target", color=style.FORBIDDEN, marker="*", linestyle="none"))
+    style.keys_below(figure, keys)

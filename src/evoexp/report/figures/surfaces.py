@@ -1,0 +1,143 @@
+"""Surfaces of drawn bodies as triangles, shaded, for figures in space and in the plane."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from matplotlib.colors import to_rgb
+from scipy.spatial import ConvexHull, QhullError
+
+from evoexp.playback.shapes import Outline
+from evoexp.records import FloatArray
+
+AROUND, ALONG = 14, 4  # pieces of a round surface around its axis, and of each of its ends
+MOST_CORNERS = 150  # of a mesh, which is drawn by the hull of the corners farthest out
+LIGHT = np.array([-0.35, -0.55, 0.76])  # direction to the light, length 1
+DARKEST = 0.45  # [-] of a colour's brightness, where a surface is turned from the light
+
+
+def corners_of(outline: Outline) -> FloatArray | None:
+    """Return the corners (corners, 3) by which a mesh is drawn; None for another body.
+
+    Of a mesh of more than `MOST_CORNERS` those are taken that lie farthest out in as many
+    directions, evenly spread.
+    """
+    if outline.points is None:
+        return None
+    points = np.unique(outline.points, axis=0)
+    if len(points) <= MOST_CORNERS:
+        return points
+    farthest = (points @ _directions(MOST_CORNERS).T).argmax(axis=0)
+    return np.asarray(points[np.unique(farthest)])
+
+
+def triangles_of(kind: str, size: FloatArray, corners: FloatArray | None) -> FloatArray:
+    """Return the triangles of a body in its own frame, (triangles, 3 corners, 3).
+
+    Args:
+        kind: See `Outline`.
+        size: (3,) see there; what a kind does not need is ignored.
+        corners: Of a mesh.
+    """
+    if kind == "mesh" and corners is not None:
+        return _hull(corners)
+    if kind == "box":
+        return _hull(0.5 * size * _cube())
+    if kind in ("sphere", "ellipsoid"):
+        half = size if kind == "ellipsoid" else np.full(3, size[0])
+        return _turned(*_round_ends(1.0, 0.0)) * half
+    radius, middle = float(size[0]), 0.5 * float(size[1])
+    if kind == "capsule":
+        return _turned(*_round_ends(radius, middle))
+    tip = radius if kind == "cylinder" else 0.0
+    return _turned(np.array([0.0, tip, radius, 0.0]), np.array([middle, middle, -middle, -middle]))
+
+
+def placed(triangles: FloatArray, pose: FloatArray) -> FloatArray:
+    """Return triangles moved by a pose: position, quaternion x, y, z, w, (7,)."""
+    x, y, z, w = pose[3:]
+    rotation = np.array(
+        [
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
+            [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
+            [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
+        ]
+    )
+    return np.asarray(triangles @ rotation.T + pose[:3])
+
+
+def shaded(triangles: FloatArray, colour: Any, alpha: float) -> FloatArray:
+    """Return the colours of triangles as the light falls on them, (triangles, 4)."""
+    a, b, c = triangles.transpose(1, 0, 2)
+    normals = np.cross(b - a, c - a)
+    lengths = np.sqrt((normals**2).sum(axis=1))
+    facing = (normals @ LIGHT) / np.where(lengths > 0.0, lengths, 1.0)
+    brightness = DARKEST + (1.0 - DARKEST) * 0.5 * (1.0 + facing)
+    rgb = np.array(to_rgb(colour))[None] * brightness[:, None]
+    return np.column_stack([np.clip(rgb, 0.0, 1.0), np.full(len(rgb), alpha)])
+
+
+def outline_from_above(triangles: FloatArray) -> FloatArray:
+    """Return the closed outline (points, 2) of a convex body as seen along z."""
+    points = triangles.reshape(-1, 3)[:, :2]
+    try:
+        around = points[ConvexHull(points).vertices]
+    except (QhullError, ValueError):  # it is seen as a line
+        spread = np.ptp(points, axis=0)
+        order = np.argsort(points[:, int(np.argmax(spread))], kind="stable")
+        around = points[order[[0, -1]]]
+    return np.vstack([around, around[:1]])
+
+
+@cache
+def _directions(count: int) -> FloatArray:
+    """Return directions spread evenly over a sphere, (count, 3)."""
+    k = np.arange(count) + 0.5
+    height, turn = 1.0 - 2.0 * k / count, np.pi * (1.0 + np.sqrt(5.0)) * k
+    wide = np.sqrt(1.0 - height**2)
+    return np.column_stack([wide * np.cos(turn), wide * np.sin(turn), height])
+
+
+@cache
+def _cube() -> FloatArray:
+    return np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], np.float64)
+
+
+def _hull(points: FloatArray) -> FloatArray:
+    """Return the hull's triangles, each counter-clockwise as seen from outside; none if flat."""
+    try:
+        hull = ConvexHull(points)
+    except (QhullError, ValueError):
+        return np.empty((0, 3, 3))
+    triangles = points[hull.simplices]
+    a, b, c = triangles.transpose(1, 0, 2)
+    inward = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) < 0.0
+    triangles[inward] = triangles[inward, ::-1]
+    return np.asarray(triangles)
+
+
+def _round_ends(radius: float, half: float) -> tuple[FloatArray, FloatArray]:
+    """Return radii and heights of a capsule's outline, from its upper end to its lower one."""
+    rise = np.linspace(0.5 * np.pi, 0.0, ALONG + 1)
+    wide, high = radius * np.cos(rise), half + radius * np.sin(rise)
+    return np.concatenate([wide, wide[::-1]]), np.concatenate([high, -high[::-1]])
+
+
+def _turned(radii: FloatArray, heights: FloatArray) -> FloatArray:
+    """Return the triangles of an outline turned around z, given from its upper end on."""
+    turn = np.linspace(0.0, 2.0 * np.pi, AROUND + 1)
+    rings = np.stack(
+        [
+            np.outer(radii, np.cos(turn)),
+            np.outer(radii, np.sin(turn)),
+            np.outer(heights, np.ones(AROUND + 1)),
+        ],
+        axis=-1,
+    )
+    a, b = rings[:-1, :-1], rings[1:, :-1]
+    c, d = rings[1:, 1:], rings[:-1, 1:]
+    found = np.concatenate([np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2)])
+    found = found.reshape(-1, 3, 3)
+    x, y, z = found.transpose(1, 0, 2)
+    areas = np.cross(y - x, z - x)
+    return np.asarray(found[(areas**2).sum(axis=1) > 0.0])

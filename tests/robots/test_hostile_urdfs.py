@@ -11,7 +11,7 @@ from confinement import confined, no_longer
 from evoexp.condition import Condition
 from evoexp.configuration.building import build_condition
 from evoexp.errors import EvoexpError
-from evoexp.robots import urdf as urdf_module
+from evoexp.robots.mesh_files import MESHES
 from evoexp.testing.small_conditions import conditions
 from matrix import counts, matrices_are_asked_for
 
@@ -141,7 +141,7 @@ def test_no_other_file_travels_as_a_mesh(
 def test_a_mesh_that_is_damaged_is_refused(tmp_path: Path, config: dict) -> None:  # type: ignore[type-arg]
     path = tmp_path / "arm.urdf"
     for content in (b"", b"solid x", b"\0" * 80 + b"\xff\xff\xff\xff", b"v nan 0 0\nf 1 1 1\n"):
-        for ending in urdf_module.MESHES:
+        for ending in MESHES:
             (tmp_path / f"hand{ending}").write_bytes(content)
             path.write_text(whole().replace("hand.obj", f"hand{ending}"))
             assert confined(lambda: refusal(config, path), tmp_path, MEMORY)

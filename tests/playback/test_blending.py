@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from playback_samples import recording
 
 from evoexp.collision.certifier.certificate import certificate
 from evoexp.paths.motion import Motion
 from evoexp.playback.blending import blended
+from playback_samples import recording
 
 SPEEDS = np.array([0.5, 1.0])
 

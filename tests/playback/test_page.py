@@ -4,10 +4,10 @@ import re
 
 import numpy as np
 import pytest
-from playback_samples import SAMPLES, recording, refuted
 
 from evoexp.playback.player_page import page
 from evoexp.playback.recording import Heading
+from playback_samples import SAMPLES, recording, refuted
 
 LARGEST = 2_000_000  # [B]
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 from chromium import CHROMIUM, PATIENCE, Browser
-from playback_samples import SAMPLES, recording, refuted
 
 from evoexp.playback.player_page import page
+from playback_samples import SAMPLES, recording, refuted
 
 pytestmark = [
     pytest.mark.browser,

@@ -11,9 +11,9 @@ import pinocchio as pin
 import pytest
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from mcap.reader import make_reader
-from playback_samples import SAMPLES, condition, half_extent, matrix, recording, refuted
 
 from evoexp.playback.playable_log import LAYOUT, SECOND, layout, playable_log
+from playback_samples import SAMPLES, condition, half_extent, matrix, recording, refuted
 
 PUBLISHED = {
     "/tf": "foxglove.FrameTransforms",

@@ -2,7 +2,6 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
-from playback_samples import SAMPLES, condition, half_extent, matrix, recording, refuted
 
 from evoexp.collision.scene import Part, geometry_scene
 from evoexp.paths.motion import Motion, clamped_cubic
@@ -12,6 +11,7 @@ from evoexp.playback.contacts import at_instant, clearance, remainder
 from evoexp.playback.recording import Recording
 from evoexp.playback.shapes import outline
 from evoexp.playback.timing import SpeedLimits, seconds_per_instant, velocities
+from playback_samples import SAMPLES, condition, half_extent, matrix, recording, refuted
 
 NAMES = sorted(SAMPLES)
 

@@ -5,7 +5,6 @@ import json
 import numpy as np
 import pytest
 import scipy
-from playback_samples import SAMPLES, recording, refuted
 
 from evoexp.paths.motion import Motion, clamped_cubic
 from evoexp.playback.joint_limits import JointLimits
@@ -21,6 +20,7 @@ from evoexp.playback.trajectory import (
     as_ros,
     trajectory,
 )
+from playback_samples import SAMPLES, recording, refuted
 
 
 def limits_of(shown: Recording, jerk: float = np.inf) -> JointLimits:

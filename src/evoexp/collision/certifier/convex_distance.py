@@ -163,7 +163,7 @@ def _support(
 ) -> None:
     """Write the farthest point of a body's core in a direction times a sign, in the world."""
     kind, size = bodies.kind[body], bodies.size
-    corners, points = bodies.corners, bodies.corner_points
+    points = bodies.corner_points
     dx, dy, dz = sign * direction[0], sign * direction[1], sign * direction[2]
     w = world[body]
     z = w[2] * dx + w[5] * dy + w[8] * dz
@@ -192,14 +192,37 @@ def _support(
     elif kind == HALF_SPACE:
         x, y, z = 0.0, 0.0, 0.0
     elif kind == HULL:
-        best, chosen = -np.inf, corners[body, 0]
-        for k in range(corners[body, 0], corners[body, 1]):
-            height = x * points[k, 0] + y * points[k, 1] + z * points[k, 2]
-            if height > best:
-                best, chosen = height, k
+        chosen = _farthest_corner(bodies, body, x, y, z)
         x, y, z = points[chosen, 0], points[chosen, 1], points[chosen, 2]
     for e in range(3):
         out[e] = w[9 + e] + (w[3 * e] * x + w[3 * e + 1] * y + w[3 * e + 2] * z)
+
+
+@inlined
+def _farthest_corner(bodies: BodyTable, body: int, x: float, y: float, z: float) -> int:
+    """Return the corner of a hull that is farthest in a direction, given in the hull's frame."""
+    points, edges, neighbours = bodies.corner_points, bodies.edges, bodies.neighbours
+    cell = int(x > 0.0) + 2 * int(y > 0.0) + 4 * int(z > 0.0)  # as `hull_graph.cell_of`
+    a, b, c = abs(x), abs(y), abs(z)
+    chosen = int(bodies.starts[body, cell + 8 * int(a > b) + 16 * int(b > c) + 32 * int(a > c)])
+    if chosen < 0:
+        best, chosen = -np.inf, int(bodies.corners[body, 0])
+        for k in range(bodies.corners[body, 0], bodies.corners[body, 1]):
+            height = x * points[k, 0] + y * points[k, 1] + z * points[k, 2]
+            if height > best:
+                best, chosen = height, k
+        return chosen
+    # uphill along the edges: a convex body has no summit but the highest
+    best = x * points[chosen, 0] + y * points[chosen, 1] + z * points[chosen, 2]
+    climbs = True
+    while climbs:
+        climbs, here = False, chosen
+        for e in range(edges[here], edges[here + 1]):
+            k = int(neighbours[e])
+            height = x * points[k, 0] + y * points[k, 1] + z * points[k, 2]
+            if height > best:
+                best, chosen, climbs = height, k, True
+    return chosen
 
 
 @inlined

@@ -52,6 +52,21 @@ class Spheres(NamedTuple):
     radius: float
 
 
+class LinkLines(NamedTuple):
+    """Spheres of every link as equal steps along a line.
+
+    Attributes:
+        line: (links, 10) first centre; step to the next; number of steps; 1 / squared step; squared
+            step, 1 where there is none; half the length.
+        turn: (joints,) angle of the placement of each joint of a planar robot [rad].
+        scale: Bound of all coordinates [length unit]; inf where steps are not equal.
+    """
+
+    line: FloatArray
+    turn: FloatArray
+    scale: float
+
+
 class SphereTables(NamedTuple):
     """The tables that `clearances` reads.
 
@@ -61,6 +76,7 @@ class SphereTables(NamedTuple):
         spheres: The spheres.
         bounds: Balls around the spheres of each link.
         obstacles: The obstacles.
+        lines: For `planar_contacts`.
     """
 
     chain: KinematicChain
@@ -68,6 +84,7 @@ class SphereTables(NamedTuple):
     spheres: Spheres
     bounds: LinkBalls
     obstacles: ObstacleTable
+    lines: LinkLines
 
 
 class Memory(NamedTuple):
@@ -98,9 +115,10 @@ def clearances(tables: tuple[Any, ...], limit: float, q: FloatArray, out: FloatA
         q: (nq, configurations) [deg], contiguous.
         out: (2, configurations), contiguous, written: between arms, to obstacles.
     """
-    named = _named(tables)
-    memory = _memory(named)
-    _clearances(named, limit, False, q.reshape(-1), q.shape[1], out.reshape(-1), memory)
+    named = named_tables(tables)
+    memory = memory_for(named)
+    flat, count = q.reshape(-1), q.shape[1]
+    write_clearances(named, limit, False, flat, count, 0, count, out.reshape(-1), memory)
 
 
 @kernel
@@ -111,25 +129,29 @@ def any_contact(tables: tuple[Any, ...], q: FloatArray) -> bool:
         tables: See `clearances`.
         q: (nq, configurations) [deg], contiguous.
     """
-    named = _named(tables)
-    memory = _memory(named)
-    return _clearances(named, 0.0, True, q.reshape(-1), q.shape[1], memory.out, memory)
+    named = named_tables(tables)
+    memory = memory_for(named)
+    flat, count = q.reshape(-1), q.shape[1]
+    return write_clearances(named, 0.0, True, flat, count, 0, count, memory.out, memory)
 
 
 @inlined
-def _named(tables: tuple[Any, ...]) -> SphereTables:
-    chain, space, spheres, bounds, obstacles = tables
+def named_tables(tables: tuple[Any, ...]) -> SphereTables:
+    """Return plain tuples as the tables that they are."""
+    chain, space, spheres, bounds, obstacles, lines = tables
     return SphereTables(
         KinematicChain(*chain),
         space,
         Spheres(*spheres),
         LinkBalls(*bounds),
         ObstacleTable(*obstacles),
+        LinkLines(*lines),
     )
 
 
 @inlined
-def _memory(tables: SphereTables) -> Memory:
+def memory_for(tables: SphereTables) -> Memory:
+    """Return scratch for a robot."""
     return Memory(
         np.empty(U(len(tables.chain.parent)) * VECTOR),
         np.empty(U(len(tables.chain.parent)) * SPATIAL_FRAME),
@@ -140,18 +162,32 @@ def _memory(tables: SphereTables) -> Memory:
 
 
 @kernel
-def _clearances(
+def write_clearances(
     tables: SphereTables,
     limit: float,
     at_first: bool,
     q: FloatArray,
     count: int,
+    start: int,
+    stop: int,
     out: FloatArray,
     memory: Memory,
 ) -> bool:
-    """Do the work of `clearances` or, if `at_first`, of `any_contact`, in given memory.
+    """Do the work of `clearances` or `any_contact` in given memory, so that no references count.
 
-    So inner loops count no references.
+    Args:
+        tables: The tables.
+        limit: See `clearances`.
+        at_first: Whether to leave as soon as a configuration collides; then nothing is written.
+        q: (nq · count,) rows of a batch.
+        count: Configurations of the batch.
+        start: The first that is asked for.
+        stop: One past the last.
+        out: (2 · (stop − start),) written.
+        memory: Scratch.
+
+    Returns:
+        Whether it left.
     """
     tables, q, out, memory = borrowed((tables, q, out, memory))
     _heights(tables.space, tables.chain, tables.spheres.joint, tables.spheres.local, memory.centers)
@@ -160,7 +196,8 @@ def _clearances(
     spheres, bounds, radius = tables.spheres, tables.bounds, tables.spheres.radius
     frames, centers, middles = memory.frames, memory.centers, memory.middles
     most = max(limit + 2.0 * radius, 0.0)
-    for first in range(0, count, LANES):
+    width = stop - start
+    for first in range(start, stop, LANES):
         eight = eight_of(q, first, count, memory.q)
         # frames of the joints, centres of the spheres and of the balls around links
         if space is None:
@@ -177,13 +214,13 @@ def _clearances(
         if at_first:
             if any_lane(outside < 0.0):
                 return True
-        elif first + LANES <= count:
-            store(out, U(first), between)
-            store(out, U(first) + U(count), outside)
+        elif first + LANES <= stop:
+            store(out, U(first - start), between)
+            store(out, U(first - start + width), outside)
         else:  # the last ones, fewer than eight
             store(memory.out, U(0), between)
             store(memory.out, VECTOR, outside)
-            copy_lanes(memory.out, 0, LANES, count - first, out, first, count)
+            copy_lanes(memory.out, 0, LANES, stop - first, out, first - start, width)
     return False
 
 

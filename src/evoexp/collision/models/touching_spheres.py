@@ -9,8 +9,10 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from evoexp.collision.models.obstacle_kernels import LinkBalls
+from evoexp.collision.models.obstacle_kernels import MARGIN, LinkBalls
+from evoexp.collision.models.planar_contacts import contacts
 from evoexp.collision.models.sphere_kernels import (
+    LinkLines,
     Space,
     Spheres,
     SphereTables,
@@ -19,8 +21,10 @@ from evoexp.collision.models.sphere_kernels import (
 )
 from evoexp.errors import SettingError
 from evoexp.numeric.compilation import plain
+from evoexp.numeric.elementary import atan2
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.assembly import Assembly, sphere_geometry
+from evoexp.robots.kinematics import KinematicChain
 from evoexp.scenarios.obstacles import ObstacleTable, obstacle_table
 from evoexp.validation import Component, LayoutCount, Positive
 
@@ -79,12 +83,13 @@ class TouchingSpheres(Component):
         around = obstacle_table(obstacles).without_ellipses()
         space: Space = None if table.planar else True
         balls = _balls(joint, local, of_links, of_arms)
+        lines = sphere_lines(table.chain, fixed, of_links)
         return SphereCollision(
             assembly,
             fixed,
             _ranges(arms, assembly.num_arms),
             around,
-            plain(SphereTables(table.chain, space, fixed, balls, around)),
+            plain(SphereTables(table.chain, space, fixed, balls, around, lines)),
             sphere_geometry(
                 assembly,
                 np.array([sphere.center for sphere in kept]),
@@ -125,6 +130,28 @@ def _balls(joint: IntArray, local: FloatArray, spheres: IntArray, arm_links: Int
         for (a, b), center in zip(spheres, middle, strict=True)
     ]
     return LinkBalls(joint[spheres[:, 0]], middle, np.sqrt(squares), spheres, arm_links)
+
+
+def sphere_lines(chain: KinematicChain, spheres: Spheres, of_links: IntArray) -> LinkLines:
+    """Return the spheres of every link as equal steps along a line."""
+    rows = np.zeros((len(of_links), 10))
+    reach = np.sqrt((chain.translation**2).sum(axis=1)).sum() + 2.0 * spheres.radius
+    reach += np.sqrt((spheres.local**2).sum(axis=1)).max()
+    scale = 2.0 * float(reach)
+    for row, (first, stop) in zip(rows, of_links, strict=True):
+        own = spheres.local[first:stop]
+        steps = len(own) - 1
+        row[:3], row[6] = own[0], steps
+        row[7], row[8] = 1.0, 1.0  # of a sphere alone
+        if steps and (own[-1] != own[0]).any():
+            row[3:6] = (own[-1] - own[0]) / steps
+            squared = (row[3:6] ** 2).sum()
+            row[7], row[8] = 1.0 / squared, squared
+            row[9] = 0.5 * steps * np.sqrt(squared) * MARGIN
+        if np.abs(own - (own[0] + np.outer(np.arange(steps + 1), row[3:6]))).max() > 1e-14 * scale:
+            scale = np.inf  # nothing is sure then
+    turn = np.array([atan2(row[3], row[0]) for row in chain.rotation])
+    return LinkLines(rows, turn, scale)
 
 
 def _ranges(owners: np.ndarray, count: int) -> np.ndarray:
@@ -198,7 +225,10 @@ class SphereCollision(NamedTuple):
         Raises:
             ValueError: If q has another number of rows than the robot has joints.
         """
-        return self.clearance(q, limit=0.0).least < 0.0
+        q = self._checked(q)
+        out = np.empty(q.shape[1])
+        contacts(self.tables, q, 0, out)
+        return out < 0.0
 
     def any_collides(self, q: FloatArray) -> bool:
         """Return whether any configuration of a batch collides, as the edges of a planner's graph.

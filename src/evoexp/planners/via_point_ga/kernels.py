@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.sphere_kernels import clearances
+from evoexp.collision.models.planar_contacts import contacts
 from evoexp.evolution.cost_statistics import summarise
 from evoexp.evolution.crossover import cross_at_sites
 from evoexp.evolution.selection import choose_elites, shuffle_head, spin_roulette
@@ -90,7 +90,7 @@ class Judging(NamedTuple):
     Attributes:
         substeps: Configurations tested per segment.
         weights: k1, k2, k3 of Eq. 7.
-        tables: Of the collision model; see `clearances`.
+        tables: Of the collision model; see `contacts`.
     """
 
     substeps: int
@@ -277,12 +277,15 @@ def judge(strings: FloatArray, arm_slices: IntArray, judging: Judging, terms: St
     substeps, (nq, num_points, lanes) = judging.substeps, strings.shape
     # Eqs. 2–5: lengths, and how uneven the distances of via-points are
     measure_paths(strings, arm_slices, terms.lengths, terms.unevenness)
-    # Eq. 6: clearances at the instants and at the substeps before them
-    between = np.empty((nq, (num_points - 1) * substeps, lanes))
-    interpolate(strings, substeps, between)
-    clearance = np.empty((2, (num_points - 1) * substeps * lanes))
-    clearances(judging.tables, 0.0, between.reshape((nq, -1)), clearance)
-    by_instant = clearance.reshape((2, num_points - 1, substeps, lanes))
+    # Eq. 6: contacts at the instants, which follow the start, and at the substeps before them
+    hits = np.empty((num_points - 1) * substeps * lanes)
+    if substeps == 1:
+        contacts(judging.tables, strings.reshape((nq, -1)), lanes, hits)
+    else:
+        between = np.empty((nq, (num_points - 1) * substeps, lanes))
+        interpolate(strings, substeps, between)
+        contacts(judging.tables, between.reshape((nq, -1)), 0, hits)
+    by_instant = hits.reshape((1, num_points - 1, substeps, lanes))
     count_collisions(by_instant, terms.collisions)
     # Eq. 7
     weigh(judging.weights, terms.lengths, terms.unevenness, terms.collisions, terms.cost)

@@ -14,9 +14,11 @@ from evoexp.numeric.vectors import (
     LANES,
     any_lane,
     ceiling,
+    least_lane,
     load,
     lower,
     magnitude,
+    mask_bits,
     root,
     select,
     spread,
@@ -141,3 +143,16 @@ def test_other_arrays_are_refused() -> None:
     for array in others:
         with pytest.raises(TypingError, match="contiguous float64 of one dimension"):
             first(array)
+
+
+def test_lanes_become_one_number() -> None:
+    @kernel
+    def run(x: FloatArray, limit: float) -> tuple[float, int]:
+        vector = load(x, np.uint64(0))
+        return least_lane(vector), mask_bits(vector < limit)
+
+    rng = np.random.default_rng(3)
+    for x in (*rng.normal(size=(50, LANES)), np.full(LANES, np.inf), np.arange(LANES) * -1.0):
+        least, bits = run(np.ascontiguousarray(x), 0.1)
+        assert least == x.min()
+        assert bits == sum(2**lane for lane in range(LANES) if x[lane] < 0.1)

@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from evoexp.numeric.vectors import LANES
 from evoexp.objectives.reaching import measure_reach, measure_reach_from
-from evoexp.robots.planar_ends import LANES, PlanarArm
+from evoexp.robots.planar_ends import PlanarArm
 
 
 @pytest.mark.parametrize("count", [1, LANES, 2 * LANES + 5, 300])

@@ -5,9 +5,11 @@ import pinocchio as pin
 import pytest
 
 from evoexp.errors import SettingError
+from evoexp.numeric.compilation import kernel
+from evoexp.numeric.vectors import LANES
 from evoexp.robots.planar_chain import PlanarChain
 from evoexp.robots.planar_ends import (
-    LANES,
+    PlanarArm,
     begin_turning,
     block_ends,
     load_lanes,
@@ -17,6 +19,38 @@ from evoexp.robots.planar_ends import (
 
 ARM = PlanarChain(link_lengths=(3.0, 2.0, 1.0), base_position=(0.5, -1.0), base_angle=30.0)
 NUM_POSITIONS = 40
+
+
+@kernel
+def ends_at(
+    starts: np.ndarray,
+    ends: np.ndarray,
+    arm: PlanarArm,
+    position: int,
+    num_positions: int,
+    x: np.ndarray,
+    y: np.ndarray,
+) -> None:
+    block_ends(starts, ends, arm, position, num_positions, x, y)
+
+
+@kernel
+def turn_from(
+    starts: np.ndarray,
+    ends: np.ndarray,
+    arm: PlanarArm,
+    position: int,
+    num_positions: int,
+    turn: np.ndarray,
+    x: np.ndarray,
+    y: np.ndarray,
+) -> None:
+    begin_turning(starts, ends, arm, position, num_positions, turn, x, y)
+
+
+@kernel
+def turn_on(arm: PlanarArm, turn: np.ndarray, x: np.ndarray, y: np.ndarray) -> None:
+    turned_ends(arm, turn, x, y)
 
 
 @pytest.fixture
@@ -39,7 +73,7 @@ def test_link_ends_agree_with_pinocchio(paths: np.ndarray) -> None:
     arm = planar_arm(ARM.build())
     x, y = np.empty((2, 4 * LANES))
     for position in (0, 1, 13, NUM_POSITIONS):
-        block_ends(starts, ends, arm, position, NUM_POSITIONS, *np.empty((3, LANES)), x, y)
+        ends_at(starts, ends, arm, position, NUM_POSITIONS, x, y)
         for lane in range(LANES):
             q = paths[0, :, lane] + position / NUM_POSITIONS * (
                 paths[1, :, lane] - paths[0, :, lane]
@@ -52,8 +86,8 @@ def test_the_last_position_is_the_end_to_the_last_bit(paths: np.ndarray) -> None
     starts, ends = (np.ascontiguousarray(q).ravel() for q in paths)
     arm = planar_arm(ARM.build())
     x, y, u, v = np.empty((4, 4 * LANES))
-    block_ends(starts, ends, arm, NUM_POSITIONS, NUM_POSITIONS, *np.empty((3, LANES)), x, y)
-    block_ends(ends, ends, arm, 0, 1, *np.empty((3, LANES)), u, v)
+    ends_at(starts, ends, arm, NUM_POSITIONS, NUM_POSITIONS, x, y)
+    ends_at(ends, ends, arm, 0, 1, u, v)
     assert np.array_equal(x, u)
     assert np.array_equal(y, v)
 
@@ -61,16 +95,14 @@ def test_the_last_position_is_the_end_to_the_last_bit(paths: np.ndarray) -> None
 def test_turned_on_directions_agree_with_computed_ones(paths: np.ndarray) -> None:
     """32 turns, after which the kernels begin anew, at 2e-16 each."""
     starts, ends = (np.ascontiguousarray(q).ravel() for q in paths)
-    arm, scratch, turn = (
-        planar_arm(ARM.build()),
-        np.empty((3, LANES)),
-        np.empty((4, 3 * LANES)),
-    )
+    arm, turn = planar_arm(ARM.build()), np.empty(4 * 3 * LANES)
     x, y, u, v = np.empty((4, 4 * LANES))
-    begin_turning(starts, ends, arm, 5, NUM_POSITIONS, scratch[0], scratch[1], turn)
+    turn_from(starts, ends, arm, 5, NUM_POSITIONS, turn, u, v)
+    ends_at(starts, ends, arm, 5, NUM_POSITIONS, x, y)
+    assert np.array_equal(x, u) and np.array_equal(y, v)
     for position in range(6, 38):
-        block_ends(starts, ends, arm, position, NUM_POSITIONS, *scratch, x, y)
-        turned_ends(arm, scratch[0], scratch[1], turn, u, v)
+        ends_at(starts, ends, arm, position, NUM_POSITIONS, x, y)
+        turn_on(arm, turn, u, v)
         assert max(np.abs(x - u).max(), np.abs(y - v).max()) < 6.0 * 32 * 3e-16
 
 

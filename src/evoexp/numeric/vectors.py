@@ -215,6 +215,31 @@ def _any_lane(typing_context: Any, mask: Any) -> Any:
     return types.boolean(mask_type), generate
 
 
+@intrinsic
+def _mask_bits(typing_context: Any, mask: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        word = builder.bitcast(arguments[0], ir.IntType(LANES))
+        return builder.zext(word, ir.IntType(64))
+
+    return types.int64(mask_type), generate
+
+
+@intrinsic
+def _least_lane(typing_context: Any, vector: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        (value,), index, half = arguments, ir.IntType(32), LANES // 2
+        while half > 0:  # the upper half of the lanes that are left onto the lower one
+            order = [(lane + half) % LANES for lane in range(LANES)]
+            moved = builder.shuffle_vector(
+                value, value, ir.Constant(ir.VectorType(index, LANES), order)
+            )
+            value = builder.select(builder.fcmp_ordered("<", moved, value), moved, value)
+            half //= 2
+        return builder.extract_element(value, ir.Constant(index, 0))
+
+    return types.float64(vector_type), generate
+
+
 def _of_llvm(name: str) -> Any:
     """Return a function for kernels: an operation of LLVM on every lane."""
 
@@ -269,6 +294,12 @@ select: Callable[[Any, Any, Any], Any] = _for_kernels(_select)
 
 any_lane: Callable[[Mask], bool] = _for_kernels(_any_lane)
 """Return whether a condition holds in any lane."""
+
+mask_bits: Callable[[Mask], int] = _for_kernels(_mask_bits)
+"""Return the lanes in which a condition holds as the bits of a whole number, the first lowest."""
+
+least_lane: Callable[[Vector], float] = _for_kernels(_least_lane)
+"""Return the least number of a vector without NaN."""
 
 root: Callable[[Vector], Vector] = _of_llvm("sqrt")
 """Return the square root of every lane, correctly rounded."""

@@ -6,9 +6,10 @@ import numpy as np
 
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import sincos
+from evoexp.numeric.vectors import LANES, load, root, select, spread, store
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.kinematics import U
-from evoexp.robots.planar_ends import LANES, PlanarArm, block_ends, load_lanes
+from evoexp.robots.planar_ends import VECTOR, PlanarArm, block_ends, load_lanes
 from evoexp.validation import Component, NonNegative
 
 
@@ -62,35 +63,35 @@ def measure_reach(
     """
     rows = len(starts) * LANES
     begin, end = np.empty(rows), np.empty(rows)
-    x, y = np.empty(rows + LANES), np.empty(rows + LANES)
-    value, off, turned = np.empty(LANES), np.empty(LANES), np.empty(LANES)
+    x, y, found = np.empty(rows + LANES), np.empty(rows + LANES), np.empty(3 * LANES)
     for first in range(0, count, LANES):
         # tips of a block
         load_lanes(starts, lanes, first, count, begin)
         load_lanes(ends, lanes, first, count, end)
-        block_ends(begin, end, arm, 1, 1, value, off, turned, x, y)
+        block_ends(begin, end, arm, 1, 1, x, y)
         # displacement (Eq. 2)
-        turned[:] = 0.0
+        squares = spread(0.0)
         for k in range(len(starts)):
-            for n in range(LANES):
-                turn = begin[U(k) * U(LANES) + U(n)] - end[U(k) * U(LANES) + U(n)]
-                turned[n] += turn * turn
+            turn = load(begin, U(k) * VECTOR) - load(end, U(k) * VECTOR)
+            squares = squares + turn * turn
         # position error (Eq. 1), cost (Eq. 4)
-        for n in range(LANES):
-            tip_x, tip_y = x[U(rows) + U(n)], y[U(rows) + U(n)]
-            off_x, off_y = tip_x - target[0], tip_y - target[1]
-            off[n], turned[n] = np.sqrt(off_x * off_x + off_y * off_y), np.sqrt(turned[n])
-            worth = weights[0] * off[n] + weights[1] * turned[n]
-            worth = worth if box[0] <= tip_x else np.inf
-            worth = worth if tip_x <= box[1] else np.inf
-            worth = worth if box[2] <= tip_y else np.inf
-            value[n] = worth if tip_y <= box[3] else np.inf
+        tip_x, tip_y, outside = load(x, U(rows)), load(y, U(rows)), spread(np.inf)
+        off_x, off_y = tip_x - target[0], tip_y - target[1]
+        off, turned = root(off_x * off_x + off_y * off_y), root(squares)
+        worth = weights[0] * off + weights[1] * turned
+        worth = select(tip_x < box[0], outside, worth)
+        worth = select(box[1] < tip_x, outside, worth)
+        worth = select(tip_y < box[2], outside, worth)
+        worth = select(box[3] < tip_y, outside, worth)
+        store(found, U(0), worth)
+        store(found, VECTOR, off)
+        store(found, U(2) * VECTOR, turned)
         for n in range(min(LANES, count - first)):
             individual = lanes[first + n]
             cost[individual], error[individual], displacement[individual] = (
-                value[n],
-                off[n],
-                turned[n],
+                found[n],
+                found[LANES + n],
+                found[2 * LANES + n],
             )
 
 

@@ -1,4 +1,4 @@
-"""Link ends of a planar arm along straight joint-space paths, for whole populations.
+"""Link ends of a planar arm along straight joint-space paths, eight individuals at a time.
 
 Eq. 3 below is that of Lavoie & Boudreau 2001: position j of M is `start + j/M (end − start)`.
 """
@@ -8,13 +8,14 @@ from typing import NamedTuple
 import numpy as np
 
 from evoexp.errors import SettingError
-from evoexp.numeric.compilation import kernel
+from evoexp.numeric.compilation import inlined, kernel
 from evoexp.numeric.elementary import atan2, sincos
+from evoexp.numeric.vectors import LANES, load, spread, store
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.kinematics import U
 
-LANES = 32  # individuals per block
+VECTOR = U(LANES)
 
 
 class PlanarArm(NamedTuple):
@@ -60,16 +61,13 @@ def planar_arm(assembly: Assembly) -> PlanarArm:
     return PlanarArm(np.array([link.end[0] for link in links]), float(x), float(y), angle)
 
 
-@kernel
+@inlined
 def block_ends(
     starts: FloatArray,
     ends: FloatArray,
     arm: PlanarArm,
     position: int,
     num_positions: int,
-    angle: FloatArray,
-    at_x: FloatArray,
-    at_y: FloatArray,
     x: FloatArray,
     y: FloatArray,
 ) -> None:
@@ -81,40 +79,35 @@ def block_ends(
         arm: The arm.
         position: j of Eq. 3; at j = M the end itself is taken, without any rounding.
         num_positions: M.
-        angle: (LANES,) scratch: running sums are kept apart from what is written, or the loop stays
-            scalar.
-        at_x: (LANES,) likewise.
-        at_y: (LANES,) likewise.
         x: ((N + 1) × LANES) written.
         y: Likewise.
     """
     share, last = position / num_positions, position == num_positions
-    angle[:], at_x[:], at_y[:] = arm.base_angle, arm.base_x, arm.base_y
-    x[:LANES], y[:LANES] = arm.base_x, arm.base_y
+    angle, at_x, at_y = spread(arm.base_angle), spread(arm.base_x), spread(arm.base_y)
+    store(x, U(0), at_x)
+    store(y, U(0), at_y)
     for k in range(len(arm.lengths)):
-        row, length = U(k) * U(LANES), arm.lengths[k]
-        for n in range(LANES):
-            lane, to = U(n), row + U(LANES) + U(n)
-            begin, end = starts[row + lane], ends[row + lane]
-            between = begin + share * (end - begin)
-            turned = angle[lane] + (end if last else between)
-            s, c = sincos(turned)
-            tip_x, tip_y = at_x[lane] + length * c, at_y[lane] + length * s
-            angle[lane], at_x[lane], at_y[lane], x[to], y[to] = turned, tip_x, tip_y, tip_x, tip_y
+        row = U(k) * VECTOR
+        begin, end = load(starts, row), load(ends, row)
+        angle = angle + (end if last else begin + share * (end - begin))
+        s, c = sincos(angle)
+        at_x, at_y = at_x + arm.lengths[k] * c, at_y + arm.lengths[k] * s
+        store(x, row + VECTOR, at_x)
+        store(y, row + VECTOR, at_y)
 
 
-@kernel
+@inlined
 def begin_turning(
     starts: FloatArray,
     ends: FloatArray,
     arm: PlanarArm,
     position: int,
     num_positions: int,
-    angle: FloatArray,
-    step: FloatArray,
     turn: FloatArray,
+    x: FloatArray,
+    y: FloatArray,
 ) -> None:
-    """Write the directions of the links at one position, and their turns to the next.
+    """Write the directions and the ends of the links at one position, and their turns to the next.
 
     Args:
         starts: (N × LANES) joint angles [rad].
@@ -122,33 +115,34 @@ def begin_turning(
         arm: See `block_ends`.
         position: j of Eq. 3.
         num_positions: M.
-        angle: (LANES,) scratch.
-        step: (LANES,) scratch.
-        turn: (4, N × LANES) written: sine and cosine of every link's direction, and of its turn per
-            position.
+        turn: (N × 4 × LANES) written: sine and cosine of every link's direction, and of its turn
+            per position.
+        x: ((N + 1) × LANES) written as `block_ends` does, to the last bit.
+        y: Likewise.
     """
-    sine, cosine, turn_sine, turn_cosine = turn[0], turn[1], turn[2], turn[3]
-    share = position / num_positions
-    angle[:], step[:] = arm.base_angle, 0.0
+    share, step = position / num_positions, spread(0.0)
+    angle, at_x, at_y = spread(arm.base_angle), spread(arm.base_x), spread(arm.base_y)
+    store(x, U(0), at_x)
+    store(y, U(0), at_y)
     for k in range(len(arm.lengths)):
-        for n in range(LANES):
-            lane, place = U(n), U(k) * U(LANES) + U(n)
-            begin, way = starts[place], ends[place] - starts[place]
-            angle[lane] += begin + share * way
-            step[lane] += way / num_positions
-            sine[place], cosine[place] = sincos(angle[lane])
-            turn_sine[place], turn_cosine[place] = sincos(step[lane])
+        row, place = U(k) * VECTOR, U(4 * k) * VECTOR
+        begin = load(starts, row)
+        way = load(ends, row) - begin
+        angle = angle + (begin + share * way)
+        step = step + way / num_positions
+        sine, cosine = sincos(angle)
+        at_x, at_y = at_x + arm.lengths[k] * cosine, at_y + arm.lengths[k] * sine
+        store(x, row + VECTOR, at_x)
+        store(y, row + VECTOR, at_y)
+        turn_sine, turn_cosine = sincos(step)
+        store(turn, place, sine)
+        store(turn, place + VECTOR, cosine)
+        store(turn, place + U(2) * VECTOR, turn_sine)
+        store(turn, place + U(3) * VECTOR, turn_cosine)
 
 
-@kernel
-def turned_ends(
-    arm: PlanarArm,
-    at_x: FloatArray,
-    at_y: FloatArray,
-    turn: FloatArray,
-    x: FloatArray,
-    y: FloatArray,
-) -> None:
+@inlined
+def turned_ends(arm: PlanarArm, turn: FloatArray, x: FloatArray, y: FloatArray) -> None:
     """Turn all links on by one position and write their ends, as `block_ends`, without sines.
 
     Every turn adds some 2e-16 to the error of a direction, so callers begin anew by
@@ -156,25 +150,24 @@ def turned_ends(
 
     Args:
         arm: See `block_ends`.
-        at_x: (LANES,) scratch.
-        at_y: (LANES,) scratch.
         turn: See `begin_turning`, changed.
-        x: ((N + 1) × LANES) written but for the base.
+        x: ((N + 1) × LANES) written.
         y: Likewise.
     """
-    sine, cosine, turn_sine, turn_cosine = turn[0], turn[1], turn[2], turn[3]
-    at_x[:], at_y[:] = arm.base_x, arm.base_y
-    x[:LANES], y[:LANES] = arm.base_x, arm.base_y
+    at_x, at_y = spread(arm.base_x), spread(arm.base_y)
+    store(x, U(0), at_x)
+    store(y, U(0), at_y)
     for k in range(len(arm.lengths)):
-        row, length = U(k) * U(LANES), arm.lengths[k]
-        for n in range(LANES):
-            lane, place, to = U(n), row + U(n), row + U(LANES) + U(n)
-            # the angle-sum formulas
-            s, c, u, v = sine[place], cosine[place], turn_sine[place], turn_cosine[place]
-            next_s, next_c = s * v + c * u, c * v - s * u
-            tip_x, tip_y = at_x[lane] + length * next_c, at_y[lane] + length * next_s
-            sine[place], cosine[place], at_x[lane], at_y[lane] = next_s, next_c, tip_x, tip_y
-            x[to], y[to] = tip_x, tip_y
+        row, place = U(k + 1) * VECTOR, U(4 * k) * VECTOR
+        # the angle-sum formulas
+        s, c = load(turn, place), load(turn, place + VECTOR)
+        u, v = load(turn, place + U(2) * VECTOR), load(turn, place + U(3) * VECTOR)
+        next_s, next_c = s * v + c * u, c * v - s * u
+        at_x, at_y = at_x + arm.lengths[k] * next_c, at_y + arm.lengths[k] * next_s
+        store(turn, place, next_s)
+        store(turn, place + VECTOR, next_c)
+        store(x, row, at_x)
+        store(y, row, at_y)
 
 
 @kernel

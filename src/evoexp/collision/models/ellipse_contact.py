@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from evoexp.collision.models.ellipse_kernels import CONTACT, Ellipses, between
+from evoexp.collision.models.ellipse_kernels import Ellipses, gap
 from evoexp.numeric.compilation import kernel
+from evoexp.numeric.vectors import LANES
 from evoexp.records import FloatArray
-from evoexp.robots.planar_ends import LANES, PlanarArm, block_ends
+from evoexp.robots.planar_ends import PlanarArm, block_ends
 
 
 @kernel
@@ -33,12 +34,11 @@ def first_contact(
     """
     num = len(start)
     begin, stop = np.repeat(start, LANES), np.repeat(end, LANES)
-    angle, at_x, at_y = np.empty(LANES), np.empty(LANES), np.empty(LANES)
     x, y = np.empty((2, (num + 1) * LANES)), np.empty((2, (num + 1) * LANES))
-    block_ends(begin, stop, arm, 0, num_positions, angle, at_x, at_y, x[0], y[0])
+    block_ends(begin, stop, arm, 0, num_positions, x[0], y[0])
     for position in range(1, num_positions + 1):
         old, new = (position + 1) % 2, position % 2
-        block_ends(begin, stop, arm, position, num_positions, angle, at_x, at_y, x[new], y[new])
+        block_ends(begin, stop, arm, position, num_positions, x[new], y[new])
         for e in range(len(ellipses.maps)):
             ellipse = ellipses.maps[e]
             for k in range(num + 1):
@@ -52,14 +52,12 @@ def first_contact(
 
 
 @kernel
-def _mapped(ellipse: FloatArray, x: float, y: float) -> tuple[float, float, float]:
-    """Return a point in an ellipse's frame, and its squared distance from the centre."""
-    p, q = ellipse[0] * x + ellipse[1] * y + ellipse[2], ellipse[3] * y + ellipse[4]
-    return p, q, p * p + q * q
+def _mapped(ellipse: FloatArray, x: float, y: float) -> tuple[float, float]:
+    """Return a point in an ellipse's frame."""
+    return ellipse[0] * x + ellipse[1] * y + ellipse[2], ellipse[3] * y + ellipse[4]
 
 
 @kernel
-def _meets(one: tuple[float, float, float], two: tuple[float, float, float]) -> bool:
+def _meets(one: tuple[float, float], two: tuple[float, float]) -> bool:
     """Return whether a segment, given by its `_mapped` ends, touches the unit circle."""
-    (u, v, r), (p, q, s) = one, two
-    return between(u, v, r, p, q, s) <= 0.0 or r - CONTACT <= 0.0 or s - CONTACT <= 0.0
+    return bool(gap(one[0], one[1], two[0], two[1]) <= 0.0)

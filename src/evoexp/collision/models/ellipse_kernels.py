@@ -9,19 +9,30 @@ touching counts as touching, so that rounding never lets a contact pass.
 Any order of tests gives the same answer, because only the existence of a collision is asked for.
 First some positions are tested one after the other, beginning with those that find most collisions;
 individuals that collide are not tested again. The others go through all positions, and the chords
-of their link ends are tested on the way. Individuals are innermost, in blocks gathered by
-`load_lanes`.
+of their link ends are tested on the way. Eight individuals at a time are gathered by `load_lanes`;
+most ellipses are excluded for all eight of them at once, by boxes around both.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.numeric.compilation import borrowed, kernel
+from evoexp.numeric.compilation import borrowed, inlined, kernel
+from evoexp.numeric.vectors import (
+    LANES,
+    Vector,
+    least_lane,
+    load,
+    lower,
+    mask_bits,
+    select,
+    spread,
+    store,
+)
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.kinematics import U
 from evoexp.robots.planar_ends import (
-    LANES,
+    VECTOR,
     PlanarArm,
     begin_turning,
     block_ends,
@@ -31,7 +42,7 @@ from evoexp.robots.planar_ends import (
 
 AFRESH = 32  # positions after which sines are computed anew; between them directions are turned on
 CONTACT = 1.0 + 1e-9  # [-] squared distance to the unit circle's centre that counts as contact
-BEYOND = CONTACT  # [-] distance from an axis at which nothing counts as contact any more
+WIDER = 1e-6  # [-] by which boxes are larger than ellipses: far more than CONTACT and rounding
 
 
 class Ellipses(NamedTuple):
@@ -60,48 +71,49 @@ class TestedPath(NamedTuple):
     chords: bool
 
 
-class Mapped(NamedTuple):
-    """The link ends of a block in the frames of all ellipses, at one position.
+class Boxes(NamedTuple):
+    """Boxes around ellipses, along x and y, filled up to whole vectors by boxes without a point.
 
     Attributes:
-        ends: (2, E · (N + 1) · LANES).
-        codes: (E, N + 1) outcodes, see `_map`.
+        least_x: (ellipses,), as the rest.
+        greatest_x: See `least_x`.
+        least_y: See `least_x`.
+        greatest_y: See `least_x`.
+        first: The first link end that any ellipse needs.
+        reached: (vectors of ellipses, N + 1) bits of those that the link before each end, or the
+            end itself, may reach.
     """
 
-    ends: FloatArray
-    codes: IntArray
+    least_x: FloatArray
+    greatest_x: FloatArray
+    least_y: FloatArray
+    greatest_y: FloatArray
+    first: int
+    reached: IntArray
 
 
 class Memory(NamedTuple):
-    """Scratch for a block of individuals.
+    """Scratch for eight individuals.
 
     Attributes:
         alive: (count + LANES,) individuals that have not collided.
         begin: (N · LANES,) angles at the start.
         end: (N · LANES,) angles at the end.
-        least: (LANES,) at or below 0 where a contact was found.
-        angle: (LANES,) of `block_ends`, as the next two.
-        at_x: (LANES,).
-        at_y: (LANES,).
-        x: ((N + 1) · LANES,) link ends.
-        y: ((N + 1) · LANES,).
-        turn: (4, N · LANES) of `begin_turning`.
-        mapped: The link ends at this position.
-        other: The link ends at the position before.
+        gaps: (LANES,) at or below 0 where a contact was found.
+        x: (2, (N + 1) · LANES) link ends at even and odd positions.
+        y: Likewise.
+        codes: (2, vectors of ellipses, N + 1) outcodes of the link ends, see `_write_codes`.
+        turn: (N · 4 · LANES) of `begin_turning`.
     """
 
     alive: IntArray
     begin: FloatArray
     end: FloatArray
-    least: FloatArray
-    angle: FloatArray
-    at_x: FloatArray
-    at_y: FloatArray
+    gaps: FloatArray
     x: FloatArray
     y: FloatArray
+    codes: IntArray
     turn: FloatArray
-    mapped: Mapped
-    other: Mapped
 
 
 @kernel
@@ -127,30 +139,46 @@ def paths_collide(
         path: The positions that are tested.
         hit: (individuals,) written for those tested: whether each collides.
     """
-    rows = len(starts) * LANES
+    num, rows = len(starts), len(starts) * LANES
+    vectors = (len(ellipses.maps) + LANES - 1) // LANES
     memory = Memory(
         np.empty(count + LANES, dtype=np.int64),
         np.empty(rows),
         np.empty(rows),
         np.empty(LANES),
-        np.empty(LANES),
-        np.empty(LANES),
-        np.empty(LANES),
-        np.empty(rows + LANES),
-        np.empty(rows + LANES),
-        np.empty((4, rows)),
-        _empty_ends(len(ellipses.maps), len(starts) + 1),
-        _empty_ends(len(ellipses.maps), len(starts) + 1),
+        np.empty((2, rows + LANES)),
+        np.empty((2, rows + LANES)),
+        np.empty((2, vectors, num + 1), dtype=np.int64),
+        np.empty(4 * rows),
     )
-    _test_paths(starts, ends, lanes, count, arm, ellipses, path, hit, memory)
+    boxes = _boxes(ellipses, num, vectors)
+    _test_paths(starts, ends, lanes, count, arm, ellipses, boxes, path, hit, memory)
 
 
 @kernel
-def _empty_ends(num_ellipses: int, num_ends: int) -> Mapped:
-    return Mapped(
-        np.empty((2, num_ellipses * num_ends * LANES)),
-        np.empty((num_ellipses, num_ends), dtype=np.int64),
+def _boxes(ellipses: Ellipses, num: int, vectors: int) -> Boxes:
+    """Return boxes around ellipses for an arm of `num` links."""
+    size = vectors * LANES
+    boxes = Boxes(
+        np.full(size, np.inf),
+        np.full(size, -np.inf),
+        np.full(size, np.inf),
+        np.full(size, -np.inf),
+        max(0, min(num + 1, ellipses.first_links.min() if size > 0 else num + 1) - 1),
+        np.zeros((vectors, num + 1), dtype=np.int64),
     )
+    for e in range(len(ellipses.maps)):
+        # (x, y) as a function of the place on the unit circle
+        a, b, c, d, f = ellipses.maps[e]
+        middle_x, middle_y = (b * f / d - c) / a, -f / d
+        half_x, half_y = np.sqrt(1.0 + b / d * (b / d)) / abs(a), 1.0 / abs(d)
+        half_x += WIDER * half_x + 1e-9 * abs(middle_x)
+        half_y += WIDER * half_y + 1e-9 * abs(middle_y)
+        boxes.least_x[e], boxes.greatest_x[e] = middle_x - half_x, middle_x + half_x
+        boxes.least_y[e], boxes.greatest_y[e] = middle_y - half_y, middle_y + half_y
+        for k in range(ellipses.first_links[e], num + 1):
+            boxes.reached[e // LANES, k] |= 1 << e % LANES
+    return boxes
 
 
 @kernel
@@ -161,203 +189,157 @@ def _test_paths(
     count: int,
     arm: PlanarArm,
     ellipses: Ellipses,
+    boxes: Boxes,
     path: TestedPath,
     hit: BoolArray,
     memory: Memory,
 ) -> None:
     """Do the work of `paths_collide` in given memory, so that inner loops count no references."""
-    starts, ends, lanes, arm, ellipses, hit, memory = borrowed(
-        (starts, ends, lanes, arm, ellipses, hit, memory)
+    starts, ends, lanes, arm, ellipses, boxes, hit, memory = borrowed(
+        (starts, ends, lanes, arm, ellipses, boxes, hit, memory)
     )
-    memory.alive[:count] = lanes[:count]
+    alive, begin, end, x, y = memory.alive, memory.begin, memory.end, memory.x, memory.y
+    alive[:count] = lanes[:count]
     for k in range(count):
         hit[lanes[k]] = False
     left, num_positions = count if len(ellipses.maps) > 0 else 0, path.num_positions
+    # single positions, of those that have not collided so far
     for position in path.first_positions:
-        left = _drop_colliding(
-            starts, ends, left, arm, ellipses, position, num_positions, hit, memory
-        )
-    if path.chords:
-        _sweep(starts, ends, left, arm, ellipses, num_positions, hit, memory)
+        kept = 0
+        for first in range(0, left, LANES):
+            load_lanes(starts, alive, first, left, begin)
+            load_lanes(ends, alive, first, left, end)
+            block_ends(begin, end, arm, position, num_positions, x[0], y[0])
+            _write_codes(boxes, x[0], y[0], memory.codes[0])
+            gaps = _test_links(ellipses, boxes, memory, 0, False, spread(1.0))
+            kept = _note(gaps, memory, first, left, kept, hit)
+        left = kept
+    # all positions, with chords
+    for first in range(0, left if path.chords else 0, LANES):
+        load_lanes(starts, alive, first, left, begin)
+        load_lanes(ends, alive, first, left, end)
+        _note(_sweep(arm, ellipses, boxes, num_positions, memory), memory, first, left, first, hit)
 
 
-@kernel
-def _drop_colliding(
-    starts: FloatArray,
-    ends: FloatArray,
-    count: int,
-    arm: PlanarArm,
-    ellipses: Ellipses,
-    position: int,
-    num_positions: int,
-    hit: BoolArray,
-    memory: Memory,
-) -> int:
-    """Test one position and mark the individuals that collide.
-
-    Moves the others to the front of `alive`, and returns their number.
-    """
-    memory = borrowed(memory)
-    alive, begin, end, least = memory.alive, memory.begin, memory.end, memory.least
-    angle, at_x, at_y, x, y = memory.angle, memory.at_x, memory.at_y, memory.x, memory.y
-    mapped, codes = memory.mapped.ends, memory.mapped.codes[0]
-    num, kept = len(starts), 0
-    for first in range(0, count, LANES):
-        load_lanes(starts, alive, first, count, begin)
-        load_lanes(ends, alive, first, count, end)
-        block_ends(begin, end, arm, position, num_positions, angle, at_x, at_y, x, y)
-        least[:] = 1.0
-        for e in range(len(ellipses.maps)):
-            reached = ellipses.first_links[e]
-            _map(ellipses.maps[e], reached, num, x, y, U(0), mapped, codes)
-            _test_links(reached, num, U(0), mapped, codes, least)
-        for n in range(min(LANES, count - first)):
-            individual, free = alive[first + n], least[n] > 0.0
-            hit[individual] = not free
-            alive[kept] = individual
-            kept += free
+@inlined
+def _note(gaps: Vector, memory: Memory, first: int, count: int, kept: int, hit: BoolArray) -> int:
+    """Write which of a block collide, move the others to `kept` among those alive, and count on."""
+    alive = memory.alive
+    store(memory.gaps, U(0), gaps)
+    for n in range(min(LANES, count - first)):
+        individual, free = alive[first + n], memory.gaps[n] > 0.0
+        hit[individual] = not free
+        alive[kept] = individual
+        kept += free
     return kept
 
 
-@kernel
+@inlined
 def _sweep(
-    starts: FloatArray,
-    ends: FloatArray,
-    count: int,
-    arm: PlanarArm,
-    ellipses: Ellipses,
-    num_positions: int,
-    hit: BoolArray,
-    memory: Memory,
-) -> None:
-    """Test all positions, and the chords of all link ends between them."""
-    memory = borrowed(memory)
-    alive, begin, end, least = memory.alive, memory.begin, memory.end, memory.least
-    angle, at_x, at_y, x, y = memory.angle, memory.at_x, memory.at_y, memory.x, memory.y
-    num, rows, turn = len(starts), len(starts) * LANES, memory.turn
-    before, now = memory.other.ends, memory.mapped.ends
-    codes_before, codes = memory.other.codes, memory.mapped.codes
-    for first in range(0, count, LANES):
-        load_lanes(starts, alive, first, count, begin)
-        load_lanes(ends, alive, first, count, end)
-        least[:] = 1.0
-        for position in range(num_positions + 1):
-            # link ends: computed anew at the ends of the path, else turned on
-            before, now, codes_before, codes = now, before, codes, codes_before
-            if position == 0 or position == num_positions:
-                block_ends(begin, end, arm, position, num_positions, angle, at_x, at_y, x, y)
-            else:
-                if position % AFRESH == 1:
-                    begin_turning(begin, end, arm, position - 1, num_positions, angle, at_x, turn)
-                turned_ends(arm, at_x, at_y, turn, x, y)
-            # links here, chords since the position before
-            for e in range(len(ellipses.maps)):
-                reached, place = ellipses.first_links[e], U(e) * U(rows + LANES)
-                _map(ellipses.maps[e], reached, num, x, y, place, now, codes[e])
-                if position > 0:
-                    _test_links(reached, num, place, now, codes[e], least)
-                    _test_chords(reached, num, place, before, now, codes_before[e], codes[e], least)
-        for n in range(min(LANES, count - first)):
-            hit[alive[first + n]] = not least[n] > 0.0
+    arm: PlanarArm, ellipses: Ellipses, boxes: Boxes, num_positions: int, memory: Memory
+) -> Vector:
+    """Test all positions of a block, and the chords of all link ends between them."""
+    gaps, x, y, turn = spread(1.0), memory.x, memory.y, memory.turn
+    begin, end = memory.begin, memory.end
+    for position in range(num_positions + 1):
+        now = position % 2
+        # link ends: computed anew at the ends of the path and now and then, else turned on
+        if position == num_positions:
+            block_ends(begin, end, arm, position, num_positions, x[now], y[now])
+        elif position == 0:
+            begin_turning(begin, end, arm, 0, num_positions, turn, x[now], y[now])
+        else:
+            if position % AFRESH == 1 and position > 1:
+                begin_turning(begin, end, arm, position - 1, num_positions, turn, x[now], y[now])
+            turned_ends(arm, turn, x[now], y[now])
+        _write_codes(boxes, x[now], y[now], memory.codes[now])
+        # links here, chords since the position before
+        if position > 0:
+            gaps = _test_links(ellipses, boxes, memory, now, True, gaps)
+    return gaps
 
 
-@kernel
-def _map(
-    ellipse: FloatArray,
-    reached: int,
-    num: int,
-    x: FloatArray,
-    y: FloatArray,
-    place: np.uint64,
-    mapped: FloatArray,
-    codes: IntArray,
-) -> None:
-    """Write link ends in an ellipse's frame, and their outcodes (Newman & Sproull 1979).
+@inlined
+def _write_codes(boxes: Boxes, x: FloatArray, y: FloatArray, codes: IntArray) -> None:
+    """Write the outcodes of all link ends of a block (Newman & Sproull 1979).
 
-    The outcode of a link end tells beyond which sides of the unit circle it lies in all lanes of
-    the block. Where two ends share a side, nothing between them meets the circle; as the arms of a
-    block are alike, most tests need not be done.
+    The outcode tells for eight ellipses, one per bit, whether the end lies beyond the left, the
+    right, the lower or the upper side of their boxes in all lanes; each side has eight bits. Where
+    two ends share a side, nothing between them meets the ellipse.
     """
-    a, b, c, d, e = ellipse[0], ellipse[1], ellipse[2], ellipse[3], ellipse[4]
-    u, v = mapped[0], mapped[1]
-    for k in range(reached - 1, num + 1):
-        row, to = U(k) * U(LANES), place + U(k) * U(LANES)
-        not_right, not_left, not_above, not_below = 0, 0, 0, 0
-        for n in range(LANES):
-            lane = U(n)
-            p, q = a * x[row + lane] + b * y[row + lane] + c, d * y[row + lane] + e
-            u[to + lane], v[to + lane] = p, q
-            not_right |= p <= BEYOND
-            not_left |= p >= -BEYOND
-            not_above |= q <= BEYOND
-            not_below |= q >= -BEYOND
-        codes[k] = 15 - (not_right + 2 * not_left + 4 * not_above + 8 * not_below)
+    for k in range(boxes.first, codes.shape[1]):
+        u, v = load(x, U(k) * VECTOR), load(y, U(k) * VECTOR)
+        left, right = least_lane(u), -least_lane(0.0 - u)
+        low, high = least_lane(v), -least_lane(0.0 - v)
+        for vector in range(codes.shape[0]):
+            at = U(vector) * VECTOR
+            codes[vector, k] = (
+                mask_bits(right < load(boxes.least_x, at))
+                | mask_bits(load(boxes.greatest_x, at) < left) << 8
+                | mask_bits(high < load(boxes.least_y, at)) << 16
+                | mask_bits(load(boxes.greatest_y, at) < low) << 24
+            )
 
 
-@kernel
+@inlined
 def _test_links(
-    reached: int, num: int, place: np.uint64, mapped: FloatArray, codes: IntArray, least: FloatArray
-) -> None:
-    """Lower `least` to 0 or less where a link meets the ellipse."""
-    u, v = mapped[0], mapped[1]
-    for k in range(reached, num + 1):
-        if codes[k - 1] & codes[k] == 0:
-            _test(u, v, place + U(k - 1) * U(LANES), u, v, place + U(k) * U(LANES), least)
-
-
-@kernel
-def _test_chords(
-    reached: int,
-    num: int,
-    place: np.uint64,
-    before: FloatArray,
-    now: FloatArray,
-    codes_before: IntArray,
-    codes: IntArray,
-    least: FloatArray,
-) -> None:
-    """Lower `least` to 0 or less where a chord since the position before meets the ellipse."""
-    for k in range(reached, num + 1):
-        if codes_before[k] & codes[k] == 0:
-            row = place + U(k) * U(LANES)
-            _test(before[0], before[1], row, now[0], now[1], row, least)
-
-
-@kernel
-def _test(
-    u: FloatArray,
-    v: FloatArray,
-    row: np.uint64,
-    p: FloatArray,
-    q: FloatArray,
-    to: np.uint64,
-    least: FloatArray,
-) -> None:
-    """Lower `least` to 0 or less where a segment from (u, v) to (p, q) touches the unit circle."""
-    for n in range(LANES):
-        lane = U(n)
-        x_0, y_0, x_1, y_1 = u[row + lane], v[row + lane], p[to + lane], q[to + lane]
-        lowest = least[lane]
-        r, s = x_0 * x_0 + y_0 * y_0, x_1 * x_1 + y_1 * y_1
-        inner, nearer = between(x_0, y_0, r, x_1, y_1, s), (r if r < s else s) - CONTACT
-        value = inner if inner < nearer else nearer
-        least[lane] = value if value < lowest else lowest
-
-
-@kernel
-def between(u: float, v: float, r: float, p: float, q: float, s: float) -> float:
-    """Return a number ≤ 0 if a segment touches the unit circle between its ends.
+    ellipses: Ellipses, boxes: Boxes, memory: Memory, now: int, chords: bool, gaps: Vector
+) -> Vector:
+    """Lower `gaps` where a link, or a chord since the position before, meets an ellipse.
 
     Args:
-        u: Of one end (u, v), at the squared distance r from the centre.
-        v: See u.
-        r: See u.
-        p: Of the other end (p, q), at the squared distance s.
-        q: See p.
-        s: See p.
+        ellipses: The ellipses.
+        boxes: Theirs.
+        memory: With link ends and outcodes.
+        now: Where the link ends of this position are.
+        chords: Whether chords are tested.
+        gaps: The least so far.
     """
+    x, y, codes, before = memory.x[now], memory.y[now], memory.codes, 1 - now
+    for vector in range(codes.shape[1]):
+        for k in range(boxes.first + 1, codes.shape[2]):
+            # bits of the ellipses that no box excludes
+            reached, here = boxes.reached[vector, k], codes[now, vector, k]
+            by_link = reached & ~_excluded(codes[now, vector, k - 1] & here)
+            by_chord = reached & ~_excluded(codes[before, vector, k] & here) if chords else 0
+            if by_link | by_chord == 0:
+                continue
+            to, root = U(k) * VECTOR, U(k - 1) * VECTOR
+            for e in range(vector * LANES, min(len(ellipses.maps), (vector + 1) * LANES)):
+                bit = 1 << e % LANES
+                if (by_link | by_chord) & bit == 0:
+                    continue
+                a, b, c = ellipses.maps[e, 0], ellipses.maps[e, 1], ellipses.maps[e, 2]
+                d, f = ellipses.maps[e, 3], ellipses.maps[e, 4]
+                q = load(y, to)
+                p, q = a * load(x, to) + b * q + c, d * q + f
+                if by_link & bit != 0:
+                    v = load(y, root)
+                    gaps = lower(gaps, gap(a * load(x, root) + b * v + c, d * v + f, p, q))
+                if by_chord & bit != 0:
+                    v = load(memory.y[before], to)
+                    u = a * load(memory.x[before], to) + b * v + c
+                    gaps = lower(gaps, gap(u, d * v + f, p, q))
+    return gaps
+
+
+@inlined
+def _excluded(shared: int) -> int:
+    """Return the bits of the ellipses of which two outcodes share a side."""
+    return (shared | shared >> 8 | shared >> 16 | shared >> 24) & 255
+
+
+@inlined
+def gap(u: Any, v: Any, p: Any, q: Any) -> Any:
+    """Return a number ≤ 0 if a segment from (u, v) to (p, q) touches the unit circle.
+
+    Numbers are floats or vectors.
+    """
+    r, s = u * u + v * v, p * p + q * q
     turned, along = u * q - v * p, u * p + v * q
     one, two = r - along, s - along
-    value = turned * turned - CONTACT * (one + two)
-    value = value if one > 0.0 else 1.0
-    return value if two > 0.0 else 1.0
+    at_ends = lower(r, s) - CONTACT
+    between = turned * turned - CONTACT * (one + two)
+    between = select(one > 0.0, between, at_ends)
+    between = select(two > 0.0, between, at_ends)
+    return lower(between, at_ends)

@@ -23,6 +23,7 @@ import numpy as np
 from evoexp.collision.models.link_ellipses import EllipseCollision, LinkEllipses
 from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
+from evoexp.numeric.vectors import LANES
 from evoexp.objectives.reaching import Reaching
 from evoexp.paths.motion import Motion
 from evoexp.planners.departures import joint_names, of_limits, of_place
@@ -33,7 +34,6 @@ from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic, Se
 from evoexp.planners.redundant_ga.sub_path import BestEnd, Search
 from evoexp.records import BoolArray, FloatArray, Generation
 from evoexp.robots.assembly import Assembly, Robot
-from evoexp.robots.planar_ends import LANES
 from evoexp.scenarios.pick_and_place import PickAndPlace
 from evoexp.validation import Component, Count, Positive
 

@@ -22,11 +22,11 @@ from evoexp.evolution.mutation import (
     num_mutation_uniforms,
 )
 from evoexp.numeric.elementary import standard_normal
+from evoexp.numeric.vectors import LANES
 from evoexp.planners.redundant_ga import kernels
 from evoexp.planners.redundant_ga.kernels import RESULTS, Breeding, Draws, Judging, Memory
 from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic, SelectiveSettings
 from evoexp.records import FloatArray
-from evoexp.robots.planar_ends import LANES
 
 SELECTIONS = ("tournament", "roulette", "rank")  # in the order of the kernels' numbers
 _NO_NORMALS = np.empty((0, 0))

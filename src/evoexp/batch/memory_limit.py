@@ -32,6 +32,13 @@ def allowed_memory(settings: RunnerSettings, num_workers: int) -> float:
     return machine_memory() / num_workers
 
 
+def replicate_memory(condition: Condition) -> int:
+    """Estimate the memory that a replicate of a condition takes, its log included [B]."""
+    planner, problem = condition.prepare()
+    log = min((planner.num_generations + 1) * USUAL_RECORD, MAX_LOG)
+    return int(planner.memory(problem) + log)
+
+
 def refuse_large(condition: Condition, allowed: float, label: str = "") -> None:
     """Refuse a condition whose replicates would take too much memory, or too long a log.
 
@@ -43,13 +50,13 @@ def refuse_large(condition: Condition, allowed: float, label: str = "") -> None:
     Raises:
         SettingError: If they would.
     """
-    planner, problem = condition.prepare()
+    planner, _ = condition.prepare()
     generations = planner.num_generations + 1
     if generations * LEAST_RECORD > MAX_LOG:
         most = MAX_LOG // LEAST_RECORD
         must = f"of fewer than {most:,} generations: a log holds {MAX_LOG // MEGABYTE} MB"
         raise SettingError("planner", must, generations)
-    needed = planner.memory(problem) + min(generations * USUAL_RECORD, MAX_LOG)
+    needed = replicate_memory(condition)
     if needed > allowed:
         whose = f"condition {label or condition.id[:12]}"
         must = f"at least {needed / GIGABYTE:,.2f}, the estimate of a replicate of {whose}"

@@ -10,10 +10,14 @@ from evoexp.version import __version__
 
 COMMANDS = {
     "run": "run an experiment: its missing replicates, then its report",
+    "plan": "list what a run would start: there, missing, failed, damaged; time and memory",
     "report": "draw an experiment's figures and tables again, from outputs alone",
     "claims": "list the papers' claims: rule, numbers, verdict",
     "reproduce": "run stored replicates again: MATCH, or the first generation that differs",
     "verify": "check stored runs: every log whole and in its place, and the files beside",
+    "diff": "compare two runs: settings, environment, results",
+    "clean": "list files that no command needs, and delete them if told so",
+    "pack": "write stored runs as one file, for another machine",
     "evaluate": "judge a given motion by an experiment's criteria",
     "view": "write a motion as an offline page that plays it",
     "play": "write a motion as a log that plays in Foxglove",

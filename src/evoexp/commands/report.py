@@ -10,6 +10,7 @@ from pathlib import Path
 from rich.console import Console
 
 from evoexp.commands.arguments import add_experiment_arguments, folder_words, is_override
+from evoexp.commands.pack import unpacked
 from evoexp.condition import Condition
 from evoexp.configuration import expansions
 from evoexp.configuration.experiment import Experiment
@@ -32,7 +33,7 @@ _SILENT = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     words = add_experiment_arguments(parser)
-    words.metavar, words.nargs = "EXPERIMENT | HASH ... [KEY=VALUE ...]", "+"
+    words.metavar, words.nargs = "EXPERIMENT | HASH | RUNS.tar ... [KEY=VALUE ...]", "+"
     words.help = (
         "an experiment and overrides as for run, or prefixes of the hashes of stored runs; "
         f"`{ASSUMPTIONS}`: every paper's page of assumed numbers"
@@ -42,6 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Draw; exit code 0."""
     console = Console()
+    arguments.overrides = unpacked(arguments.overrides)
     if ASSUMPTIONS in arguments.overrides:
         arguments.overrides = _with_assumptions(arguments.overrides, console)
     for page in _pages(arguments):

@@ -29,6 +29,7 @@ from evoexp.commands.console import (
     plain_console,
 )
 from evoexp.commands.hashes import with_candidates
+from evoexp.commands.pack import is_archive, unpacked
 from evoexp.configuration import expansions
 from evoexp.errors import AmbiguousHash, NothingStored, RevisionMismatch, UnknownHash
 from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
@@ -40,8 +41,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     parser.add_argument(
         "what",
-        metavar="HASH|LOG.mcap",
-        help="any unique prefix of a run's hash, or a replicate's log",
+        metavar="HASH|LOG.mcap|RUNS.tar",
+        help="any unique prefix of a run's hash, a replicate's log, or an archive of runs",
     )
     parser.add_argument("--replicate", type=int, metavar="K", help="only this replicate of the run")
 
@@ -50,14 +51,23 @@ def main(arguments: argparse.Namespace) -> int:
     """Compare; exit code 1 if anything diverges, 2 if there is nothing to compare."""
     console = plain_console()
     path = Path(arguments.what)
+    if is_archive(arguments.what):
+        runs = [resolve(outputs_root(), name) for name in unpacked([arguments.what])]
+        rows = [row for run in runs for row in _of_run(run, arguments.replicate)]
+        return _report(console, rows)
     if path.suffix == ".mcap" or path.is_file():
         return _report(console, [reproduce_log(path)])
     try:
         run = resolve(outputs_root(), arguments.what)
     except UnknownHash as error:
         return _without_stored_run(console, arguments.what, arguments.replicate, error)
+    return _report(console, _of_run(run, arguments.replicate))
+
+
+def _of_run(run: RunDirectory, replicate: int | None) -> list[Comparison | DamagedLog]:
+    """Run the finished replicates of a run again, or one of them."""
     try:
-        return _report(console, _compare_all(run, _replicates(run, arguments.replicate)))
+        return _compare_all(run, _replicates(run, replicate))
     except RevisionMismatch as error:
         text = (
             f"run {run.hash12}: {error}; its results cannot be compared. Run it anew with what is "

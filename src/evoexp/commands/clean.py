@@ -1,0 +1,151 @@
+"""`evoexp clean`: files that no command needs, named and, if told so, deleted."""
+
+import argparse
+import json
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from evoexp.commands.console import add_columns, new_table, plain_console, print_json
+from evoexp.condition import revisions
+from evoexp.errors import Busy, StoreError, UnknownOption
+from evoexp.store.damage import is_set_aside
+from evoexp.store.files import is_temporary
+from evoexp.store.identity import CONFIG, REPLICATES, read
+from evoexp.store.run_directory import RunDirectory, outputs_root, run_names
+
+SHOWN = 20
+KEYS = ("kind", "path", "bytes")
+
+
+class Waste(NamedTuple):
+    """A file or folder that no command needs; fields as in `KEYS`.
+
+    Attributes:
+        kind: Why, one of `KINDS`.
+        path: Its place.
+        size: [B] of it, with everything in it.
+    """
+
+    kind: str
+    path: Path
+    size: int
+
+
+KINDS = {
+    "temporary": "left by a process that was killed while it wrote",
+    "damaged": "set aside by run, which ran it again",
+    "failed": "reasons of failed replicates, which run tries again",
+    "old_revision": "whole runs by components of another revision, which this version cannot use",
+    "empty": "folders of runs without anything",
+}
+USUAL = ("temporary", "damaged", "empty")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    told = "; ".join(f"{kind}: {why}" for kind, why in KINDS.items())
+    parser.add_argument(
+        "kinds",
+        nargs="*",
+        metavar="KIND",
+        help=f"{told} (by default {', '.join(USUAL)}; all: every kind)",
+    )
+    parser.add_argument("--yes", action="store_true", help="delete; without it nothing is changed")
+    parser.add_argument(
+        "--json", action="store_true", help=f"print JSON: a list of files ({', '.join(KEYS)})"
+    )
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """List, and delete if told so."""
+    kinds = list(dict.fromkeys(arguments.kinds)) or list(USUAL)
+    for kind in kinds:
+        if kind not in (*KINDS, "all"):
+            raise UnknownOption("kind", kind, [*KINDS, "all"])
+    wanted = set(KINDS) if "all" in kinds else set(kinds)
+    outputs = outputs_root()
+    found = [each for each in waste(outputs) if each.kind in wanted]
+    if arguments.json:
+        print_json([dict(zip(KEYS, each, strict=True)) for each in found])
+    else:
+        _print(found, outputs)
+    if arguments.yes:
+        _delete(found, outputs)
+    return 0
+
+
+def waste(outputs: Path) -> Iterator[Waste]:
+    """Yield everything that no command needs, run by run; nothing is deleted."""
+    runs = outputs / "runs"
+    for path in sorted(runs.iterdir()) if runs.is_dir() else ():
+        if path.is_dir() and path.name not in run_names(outputs):
+            others = [each for each in path.rglob("*") if each.is_file() and each.name != ".lock"]
+            if all(is_temporary(each.name) for each in others):
+                yield Waste("empty", path, _size(path))
+            continue
+        if _is_old(path):
+            yield Waste("old_revision", path, _size(path))
+            continue
+        for folder in (path, path / REPLICATES):
+            for each in sorted(folder.iterdir()) if folder.is_dir() else ():
+                if kind := _kind(each):
+                    yield Waste(kind, each, _size(each))
+
+
+def _kind(path: Path) -> str:
+    if is_temporary(path.name):
+        return "temporary"
+    if is_set_aside(path.name):
+        return "damaged"
+    return "failed" if path.name.endswith(".failed.json") else ""
+
+
+def _is_old(path: Path) -> bool:
+    """Return whether a run's components have other revisions here."""
+    try:
+        config = json.loads(read(path / CONFIG))
+        return any(stored != installed for _, stored, installed in revisions(config))
+    except (StoreError, ValueError, TypeError):
+        return False
+
+
+def _size(path: Path) -> int:
+    if path.is_dir() and not path.is_symlink():
+        return sum(each.lstat().st_size for each in path.rglob("*") if not each.is_dir())
+    return path.lstat().st_size
+
+
+def _print(found: list[Waste], outputs: Path) -> None:
+    console = plain_console()
+    if not found:
+        console.print(f"{outputs}: nothing to delete")
+        return
+    table = new_table()
+    add_columns(table, "kind", "file")
+    add_columns(table, "kB", right=True)
+    for each in found[:SHOWN]:
+        table.add_row(each.kind, str(each.path.relative_to(outputs)), f"{each.size / 1000:.0f}")
+    console.print(table)
+    more = f" ({len(found) - SHOWN} more than shown)" if len(found) > SHOWN else ""
+    size = sum(each.size for each in found) / 1e6
+    console.print(f"{len(found)} files or folders{more}, {size:.2f} MB")
+
+
+def _delete(found: list[Waste], outputs: Path) -> None:
+    """Delete, run by run; a run that another process writes is left alone."""
+    console, deleted = plain_console(), 0
+    for each in found:
+        name = each.path.relative_to(outputs / "runs").parts[0]
+        lock = RunDirectory(outputs, name + "0" * (64 - len(name))).lock()
+        try:
+            with lock:
+                if each.path.is_dir() and not each.path.is_symlink():
+                    shutil.rmtree(each.path)
+                else:
+                    each.path.unlink(missing_ok=True)
+                deleted += 1
+        except Busy:
+            console.print(f"run {name}: another process is writing it now; left alone")
+    console.print(f"deleted: {deleted}")

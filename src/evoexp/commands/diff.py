@@ -1,0 +1,174 @@
+"""`evoexp diff A B`: two stored runs beside each other: settings, environment, results."""
+
+import argparse
+import json
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from rich.console import Console
+
+from evoexp import shipped
+from evoexp.commands.console import add_columns, new_table, plain_console, print_json
+from evoexp.commands.hashes import with_candidates
+from evoexp.condition import Condition
+from evoexp.configuration import expansions
+from evoexp.errors import AmbiguousHash, UnknownHash
+from evoexp.store.manifest import differences
+from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
+from evoexp.store.summaries import summary_table
+
+ABSENT = "–"
+QUANTITIES = ("best_cost", "evaluations", "collision_queries", "clearance", "cpu_s")
+ORIGIN = ("condition", "experiment", "label", "budget", "options", "command", "git")
+KEYS = ("a", "b", "settings", "environment", "results", "same_replicates")
+
+
+class Side(NamedTuple):
+    """A condition, with its run where it was run here.
+
+    Attributes:
+        condition_id: 64 hex digits.
+        settings: Its canonical form as plain data.
+        manifest: Environment of its run; None: it was not run here.
+        rows: Its replicates, done ones only.
+    """
+
+    condition_id: str
+    settings: dict[str, Any]
+    manifest: dict[str, Any] | None
+    rows: dict[int, dict[str, Any]]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    for name in ("a", "b"):
+        parser.add_argument(
+            name,
+            metavar=name.upper(),
+            help="any unique prefix of a run's hash, or of a shipped condition's",
+        )
+    parser.add_argument(
+        "--json", action="store_true", help=f"print JSON: one mapping ({', '.join(KEYS)})"
+    )
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Compare; exit code 0 if nothing differs, 1 if anything does, as `diff` does."""
+    one, two = _side(arguments.a), _side(arguments.b)
+    settings = list(changed(one.settings, two.settings))
+    environment = _environment(one, two)
+    results = list(_results(one, two))
+    common = sorted(one.rows.keys() & two.rows.keys())
+    same = [k for k in common if one.rows[k]["digest"] == two.rows[k]["digest"]]
+    if arguments.json:
+        values = (one.condition_id, two.condition_id, settings, environment, results, same)
+        print_json(dict(zip(KEYS, values, strict=True)))
+    else:
+        console = plain_console()
+        heads = one.condition_id[:12], two.condition_id[:12]
+        _print(console, "settings", heads, settings)
+        if one.manifest is not None and two.manifest is not None:
+            _print(console, "environment", heads, environment)
+        _print(console, "results: median over replicates", heads, results)
+        if common:
+            console.print(
+                f"{len(same)} of {len(common)} common replicates are the same, bit for bit",
+                soft_wrap=True,
+            )
+    differ = settings or environment or len(same) < len(common) or one.rows.keys() ^ two.rows.keys()
+    return 1 if differ else 0
+
+
+def changed(one: Any, two: Any, name: str = "") -> Iterator[tuple[str, Any, Any]]:
+    """Yield (dotted name, value, other value) where plain data differ; None: not there."""
+    if isinstance(one, Mapping) and isinstance(two, Mapping):
+        for key in [*one, *(key for key in two if key not in one)]:
+            yield from changed(one.get(key), two.get(key), f"{name}.{key}" if name else str(key))
+    elif isinstance(one, list) and isinstance(two, list) and len(one) == len(two):
+        for k, (a, b) in enumerate(zip(one, two, strict=True)):
+            yield from changed(a, b, f"{name}[{k}]")
+    elif one != two:
+        yield name, one, two
+
+
+def _side(prefix: str) -> Side:
+    """Find a condition: stored here, else shipped.
+
+    Raises:
+        UnknownHash: If it is neither.
+        AmbiguousHash: If a prefix means several.
+    """
+    try:
+        run = resolve(outputs_root(), prefix)
+    except UnknownHash as error:
+        found = shipped.find(prefix)
+        if len(found) > 1:
+            raise AmbiguousHash(prefix, [row.condition_id[:12] for row in found]) from None
+        if not found:
+            raise with_candidates(error, outputs_root()) from None
+        row = found[0]
+        words = [f"experiment={row.experiment}", f"budget={row.budget}"]
+        condition: Condition = expansions.expand(words, only=[row.label])[0].conditions[0].condition
+        return Side(condition.id, json.loads(condition.to_json()), None, {})
+    return Side(run.condition_id, json.loads(run.config_json()), run.manifest(), _rows(run))
+
+
+def _rows(run: RunDirectory) -> dict[int, dict[str, Any]]:
+    rows = summary_table(run).to_pylist()
+    return {int(row["replicate"]): row for row in rows if row["status"] == "done"}
+
+
+def _environment(one: Side, two: Side) -> list[tuple[str, Any, Any]]:
+    """Return the entries in which the environments of two runs differ."""
+    if one.manifest is None or two.manifest is None:
+        return []
+    found = [
+        (str(each.name), each.was, each.now)
+        for each in differences(one.manifest, two.manifest)
+        if each.name.split(".")[0] not in ORIGIN
+    ]
+    code = one.manifest.get("git"), two.manifest.get("git")
+    return [*found, *(changed(*code, "git"))]
+
+
+def _results(one: Side, two: Side) -> Iterator[tuple[str, Any, Any]]:
+    """Yield the counts and medians of two runs, the same ones, too."""
+    yield "replicates", len(one.rows), len(two.rows)
+    for name in ("solved", "certified"):
+        yield name, _count(one, name), _count(two, name)
+    terms = [key for side in (one, two) for row in side.rows.values() for key in row]
+    for name in dict.fromkeys([*QUANTITIES, *(key for key in terms if key.startswith("term_"))]):
+        yield name.removeprefix("term_"), _median(one, name), _median(two, name)
+
+
+def _count(side: Side, name: str) -> int:
+    return sum(row[name] is True for row in side.rows.values())
+
+
+def _median(side: Side, name: str) -> float | None:
+    values = [row.get(name) for row in side.rows.values()]
+    known = [float(value) for value in values if value is not None]
+    return float(np.median(known)) if known else None
+
+
+def _print(
+    console: Console, title: str, heads: tuple[str, str], rows: list[tuple[str, Any, Any]]
+) -> None:
+    if not rows:
+        console.print(f"{title}: the same")
+        return
+    table = new_table(title)
+    add_columns(table, "", *heads)
+    for name, one, two in rows:
+        table.add_row(name, _text(one), _text(two))
+    console.print(table)
+
+
+def _text(value: Any) -> str:
+    if value is None:
+        return ABSENT
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
+    return text if len(text) <= 200 else f"{text[:200]}…"

@@ -1,0 +1,83 @@
+"""`evoexp pack`: stored runs as one file, which `reproduce` and `report` accept elsewhere."""
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from evoexp.commands.console import plain_console
+from evoexp.commands.hashes import with_candidates
+from evoexp.errors import NothingStored, UnknownHash, printable
+from evoexp.store.archive import pack, take_in
+from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
+
+ENDING = ".tar"
+NAMED = 3  # runs whose hashes the name of an archive spells out
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    parser.add_argument(
+        "hashes", nargs="+", metavar="HASH", help="any unique prefixes of runs' hashes"
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar=f"FILE{ENDING}",
+        help="by default named by the hashes, in the current directory",
+    )
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Write the archive."""
+    outputs = outputs_root()
+    runs = {run.condition_id: run for run in (_run(outputs, text) for text in arguments.hashes)}
+    for run in runs.values():
+        if not run.completed():
+            raise NothingStored(f"run {run.hash12}: no finished replicate to pack")
+    names = [run.hash12 for run in runs.values()]
+    more = f"+{len(names) - NAMED}" if len(names) > NAMED else ""
+    path = arguments.output or Path("+".join(names[:NAMED]) + more + ENDING)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    count = pack(list(runs.values()), path)
+    size = path.stat().st_size / 1e6
+    plain_console().print(
+        f"{printable(str(path))}: {len(runs)} run{'s' * (len(runs) > 1)}, {count} logs, "
+        f"{size:.2f} MB; elsewhere: evoexp reproduce {printable(path.name)}, or evoexp report "
+        f"{printable(path.name)}",
+        soft_wrap=True,
+    )
+    return 0
+
+
+def is_archive(word: str) -> bool:
+    """Return whether a word of a command is an archive of runs."""
+    return word.endswith(ENDING) and Path(word).is_file()
+
+
+def unpacked(words: Sequence[str]) -> list[str]:
+    """Take the archives among the words of a command into the store.
+
+    Returns:
+        The words, with the hashes of its runs in place of each archive.
+    """
+    found: list[str] = []
+    for word in words:
+        if not is_archive(word):
+            found.append(word)
+            continue
+        for taken in take_in(Path(word), outputs_root()):
+            found.append(taken.run.condition_id)
+            plain_console().print(
+                f"{printable(word)}: run {taken.run.hash12}: {taken.added} replicates added to "
+                f"{outputs_root()}, {taken.kept} there already",
+                soft_wrap=True,
+            )
+    return found
+
+
+def _run(outputs: Path, prefix: str) -> RunDirectory:
+    try:
+        return resolve(outputs, prefix)
+    except UnknownHash as error:
+        raise with_candidates(error, outputs) from None

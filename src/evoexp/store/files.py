@@ -1,17 +1,30 @@
 """Files that are either whole or not there, whenever the process or the machine dies."""
 
 import os
+import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 NUM_THREADS = 8  # that write files at the same time
 _SUFFIX = ".tmp"
+_NEW = (
+    os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
+)
 
 
-def write_files(contents: Mapping[Path, bytes]) -> None:
+class _File(NamedTuple):
+    """A file to be written: its temporary path, its final one, its content."""
+
+    temporary: str
+    final: str
+    content: bytes
+
+
+def write_files(contents: Mapping[Path, bytes] | Mapping[str, bytes]) -> None:
     """Write files, each atomically and durably.
 
     Each goes through a temporary file, fsync and rename; then the directory is synced.
@@ -20,20 +33,22 @@ def write_files(contents: Mapping[Path, bytes]) -> None:
     is cheaper than its files one by one: they are synced at once, which the disk answers together,
     and the directory once.
     """
-    files = [(path.with_name(f".{path.name}.{os.getpid()}{_SUFFIX}"), path) for path in contents]
+    ending, files = f".{os.getpid()}{_SUFFIX}", []
+    for path, content in contents.items():
+        folder, name = os.path.split(path)
+        files.append(_File(os.path.join(folder, f".{name}{ending}"), os.fspath(path), content))
     renamed = 0
     try:
-        _write_all(
-            [(*file, content) for file, content in zip(files, contents.values(), strict=True)]
-        )
-        for temporary, path in files:
-            os.replace(temporary, path)
+        _write_all(files)
+        for temporary, final, _ in files:
+            os.replace(temporary, final)
             renamed += 1
     finally:
-        for temporary, _ in files[renamed:]:
-            temporary.unlink(missing_ok=True)
-    for directory in {path.parent for path in contents}:
-        sync_directory(directory)
+        for temporary, _, _ in files[renamed:]:
+            with suppress(FileNotFoundError):
+                os.unlink(temporary)
+    for directory in {os.path.dirname(final) for _, final, _ in files}:
+        sync_directory(directory or ".")
 
 
 def write_file(path: Path, content: bytes) -> None:
@@ -41,14 +56,18 @@ def write_file(path: Path, content: bytes) -> None:
     write_files({path: content})
 
 
-def _write_all(files: Sequence[tuple[Path, Path, bytes]]) -> None:
+def _write_all(files: Sequence[_File]) -> None:
     if len(files) == 1:
-        _write(*files[0])
+        _write(files[0])
         return
-    writing = [_threads().submit(_write, *file) for file in files]
+    # one task per thread, not per file: handing a task over takes as long as writing a file
+    shares = (files[k::NUM_THREADS] for k in range(min(NUM_THREADS, len(files))))
+    stop = threading.Event()
+    writing = [_threads().submit(_write_share, share, stop) for share in shares]
     try:
         wait(writing)  # for all of them, whatever happens to one
     except BaseException:  # Ctrl-C: no thread writes a file that is then removed
+        stop.set()
         for one in writing:
             one.cancel()
         wait(writing)
@@ -57,31 +76,44 @@ def _write_all(files: Sequence[tuple[Path, Path, bytes]]) -> None:
         one.result()
 
 
+def _write_share(files: Sequence[_File], stop: threading.Event) -> None:
+    """Write files one after the other until one fails or nobody wants them any more."""
+    for file in files:
+        if stop.is_set():
+            return
+        _write(file)
+
+
 @cache
 def _threads() -> ThreadPoolExecutor:
     """Return the threads that write; they stay, as starting them takes as long as two files."""
     return ThreadPoolExecutor(NUM_THREADS, "write")
 
 
-def _write(temporary: Path, path: Path, content: bytes) -> None:
+def _write(file: _File) -> None:
     """Write a file under its temporary name; return when it is on the disk."""
-    with _named(path), open(temporary, "wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
+    with _named(file.final):
+        descriptor = os.open(file.temporary, _NEW, 0o666)
+        try:
+            rest = memoryview(file.content)
+            while rest:
+                rest = rest[os.write(descriptor, rest) :]
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
 
 
 @contextmanager
-def _named(path: Path) -> Iterator[None]:
+def _named(path: str) -> Iterator[None]:
     """Let errors of the system name a path: those of `write` and `fsync` name none."""
     try:
         yield
     except OSError as error:
-        error.filename = str(path)
+        error.filename = path
         raise
 
 
-def sync_directory(path: Path) -> None:
+def sync_directory(path: Path | str) -> None:
     """Make renames and new names in a directory durable.
 
     Nothing is done where the system cannot open directories.
@@ -89,7 +121,7 @@ def sync_directory(path: Path) -> None:
     with suppress(PermissionError):  # Windows
         descriptor = os.open(path, os.O_RDONLY)
         try:
-            with _named(path):
+            with _named(os.fspath(path)):
                 os.fsync(descriptor)
         finally:
             os.close(descriptor)

@@ -5,7 +5,7 @@ import json
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +34,7 @@ from evoexp.store.plans import PLANS, Plan, as_json, read_plans
 
 HASH_LENGTH = 12  # hex digits shown, and of a directory's name
 COMMAND = "evoexp run experiment=…"  # runs a run whose own command nothing records
+_log_name, _failure_name = "{:04d}.mcap".format, "{:04d}.failed.json".format
 _LOG = re.compile(r"((?:[1-9][0-9]*)?[0-9]{4})\.mcap")
 _FAILED = re.compile(r"((?:[1-9][0-9]*)?[0-9]{4})\.failed\.json")
 
@@ -78,11 +79,11 @@ class RunDirectory:
 
     def log_path(self, replicate: int) -> Path:
         """Return where the finished log of a replicate is or will be."""
-        return self.replicates / f"{replicate:04d}.mcap"
+        return self.replicates / _log_name(replicate)
 
     def failure_path(self, replicate: int) -> Path:
         """Return where the reason of a failed replicate is or will be."""
-        return self.replicates / f"{replicate:04d}.failed.json"
+        return self.replicates / _failure_name(replicate)
 
     def create(
         self,
@@ -252,9 +253,11 @@ class RunDirectory:
         Several at once are cheaper than one by one.
         """
         self.replicates.mkdir(parents=True, exist_ok=True)
-        write_files({self.log_path(replicate): content for replicate, content in contents.items()})
+        folder = os.fspath(self.replicates)  # joining Paths takes as long as a rename
+        write_files({f"{folder}/{_log_name(k)}": content for k, content in contents.items()})
         for replicate in contents:
-            self.failure_path(replicate).unlink(missing_ok=True)
+            with suppress(FileNotFoundError):
+                os.unlink(f"{folder}/{_failure_name(replicate)}")
 
     def write_failure(self, replicate: int, reason: str, traceback: str) -> None:
         """Keep why a replicate failed: one line, and the traceback."""

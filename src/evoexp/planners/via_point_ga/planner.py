@@ -20,7 +20,6 @@ from evoexp.collision.scene import Part, scene
 from evoexp.errors import SettingError
 from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.numeric.elementary import DEGREE
-from evoexp.paths.interpolation import interpolate_linear
 from evoexp.paths.motion import Motion
 from evoexp.paths.workspace import prepare_redistribution
 from evoexp.planners.answers import CoverShape
@@ -28,7 +27,6 @@ from evoexp.planners.departures import joint_names, of_limits, of_place
 from evoexp.planners.planner import COPIES, Candidate, Keeper, PlannerDefaults, num_values
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
 from evoexp.planners.via_point_ga.strings import (
-    LANES,
     JudgedGeneration,
     Judgement,
     Problem,
@@ -208,7 +206,9 @@ def sampled(strings: FloatArray, samples: int) -> FloatArray:
     Returns:
         (nq, N · samples + 1).
     """
-    inside = interpolate_linear(np.repeat(strings[:, :, None], LANES, axis=2), samples)[..., 0]
+    before, after = strings[:, :-1, None], strings[:, 1:, None]
+    inside = before + np.arange(1, samples + 1) / samples * (after - before)
+    inside[:, :, -1] = strings[:, 1:]
     return np.hstack([strings[:, :1], inside.reshape(len(strings), -1)])
 
 

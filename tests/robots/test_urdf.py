@@ -174,21 +174,23 @@ def test_the_base_frame_stands_at_the_base_pose(tmp_path: Path) -> None:
         ),
         (
             lambda text: text.replace(
-                '"elbow_joint" type="revolute"', '"elbow_joint" type="continuous"'
+                '"elbow_joint" type="revolute"', '"elbow_joint" type="spherical"'
             ),
-            "robot.path: must be a URDF whose joints are revolute, prismatic or fixed; a "
-            "continuous joint can be given",
+            "robot.path: must be a URDF whose joints are revolute, continuous, prismatic, fixed, "
+            "floating or planar, was \"joint 'elbow_joint' of type spherical\"",
         ),
         (
             lambda text: text.replace(
-                '"elbow_joint" type="revolute"', '"elbow_joint" type="floating"'
+                '<limit lower="-2.8" upper="2.8"', '<limit lower="1" upper="1"'
             ),
-            "was \"joint 'elbow_joint' of type floating\"",
-        ),
-        (
-            lambda text: text.replace('<limit lower="-2.8" upper="2.8"', "<limit "),
             "robot.joint_limits: must be given for every joint: postures are drawn between them, "
             "and margins rated",
+        ),
+        (
+            lambda text: text.replace(
+                '<limit lower="-2.8"', '<mimic joint="elbow"/><limit lower="-2.8"'
+            ),
+            "robot.path: must be a URDF whose joints follow joints that are there, was \"'",
         ),
         (
             lambda text: text.replace('<child link="tool0"/>', '<child link="nothing"/>'),

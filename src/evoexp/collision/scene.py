@@ -138,7 +138,10 @@ def scene(
     for a, one in enumerate(joints):
         for b, two in enumerate(joints[a + 1 :], start=a + 1):
             neighbours = one in (two, parents[two]) or two == parents[one]
-            if arms[a] != arms[b] or (self_pairs and not neighbours):
+            apart = frozenset((bodies[a].name, bodies[b].name)) in assembly.disabled
+            if (arms[a] != arms[b] and not apart) or (
+                arms[a] == arms[b] and self_pairs and not neighbours
+            ):
                 geometry.addCollisionPair(pin.CollisionPair(a, b))
         for k in range(len(table.kind)):
             geometry.addCollisionPair(pin.CollisionPair(a, len(bodies) + k))

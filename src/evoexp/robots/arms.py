@@ -4,7 +4,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from evoexp.robots.assembly import Chain, Robot
+from evoexp.robots.assembly import Arm, Chain, Robot
 from evoexp.validation import TARGET
 
 
@@ -31,6 +31,6 @@ class Arms(Robot):
             ]
         return settings
 
-    def chains(self) -> tuple[Chain, ...]:
-        """Return the arms."""
-        return self.arms
+    def chains(self) -> tuple[Arm, ...]:
+        """Return the arms; a URDF may bring several."""
+        return tuple(arm for chain in self.arms for arm in chain.chains())

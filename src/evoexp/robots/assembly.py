@@ -1,6 +1,6 @@
 """The product of a robot description: one Pinocchio model, with the arms as slices of q."""
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import coal
 import numpy as np
@@ -8,7 +8,7 @@ import pinocchio as pin
 
 from evoexp.numeric.ordered_sums import length
 from evoexp.records import FloatArray
-from evoexp.robots.kinematics import KinematicTable, kinematic_table
+from evoexp.robots.kinematics import KinematicTable, check_size, kinematic_table
 from evoexp.validation import Component
 
 
@@ -65,10 +65,41 @@ class Assembly(NamedTuple):
         return len(self.arm_slices)
 
 
+class Follower(NamedTuple):
+    """A joint that follows another: its coordinate is multiplier · q of the source + offset."""
+
+    joint: int  # index of the Pinocchio joint
+    source: int
+    multiplier: float
+    offset: float  # [rad], a length for a prismatic joint
+
+
+class Arm(Protocol):
+    """What a robot is built from: `Chain` says what each function does."""
+
+    def append_to(self, model: Any, arm: int) -> list[Link]:
+        """Add the joints."""
+
+    def append_bodies(self, model: Any, arm: int, first_joint: int, links: list[Link]) -> list[Any]:
+        """Return the bodies."""
+
+    def tool(self, model: Any, first_joint: int, links: list[Link]) -> Tool:
+        """Return the tool's frame."""
+
+    def disabled_pairs(self) -> set[frozenset[str]]:
+        """Return pairs that are never judged."""
+
+    def own_names(self) -> tuple[set[str], set[str]]:
+        """Return the names of joints and of bodies that a file gives."""
+
+    def followers(self, first_joint: int) -> list[Follower]:
+        """Return the joints that follow others."""
+
+
 class Robot(Component):
     """Base of every robot description: names its arms, which are built together."""
 
-    def chains(self) -> tuple["Chain", ...]:
+    def chains(self) -> tuple[Arm, ...]:
         """Return the arms, in the order of their slices of q."""
         raise NotImplementedError
 
@@ -79,38 +110,68 @@ class Robot(Component):
             The model with q = (arm 0, arm 1, …), its exact geometry and its kinematic table.
         """
         model, geometry = pin.Model(), pin.GeometryModel()
+        chains = self.chains()
+        prefixed = _needs_prefix(chains)
         links: list[Link] = []
-        slices, arms, tools, disabled = [], [], [], set()
-        for k, chain in enumerate(self.chains()):
-            first, joint = model.nq, model.njoints
+        ranges, arms, tools, disabled, followers = [], [], [], set(), []
+        for k, chain in enumerate(chains):
+            joint, prefix = model.njoints, f"arm_{k + 1}_" if prefixed[k] else ""
             own = chain.append_to(model, k)
+            if any(chain.own_names()):
+                for added in range(joint, model.njoints):
+                    name = str(model.names[added]).removeprefix(f"arm_{k}_")
+                    model.names[added] = prefix + name
             bodies = chain.append_bodies(model, k, joint, own)
             for body in bodies:
-                several = f"arm_{k + 1}_" if len(self.chains()) > 1 else ""
-                body.name = several + body.name if body.name else f"link_{geometry.ngeoms}"
+                body.name = prefix + body.name if body.name else f"link_{geometry.ngeoms}"
                 geometry.addGeometryObject(body)
             links += own
             arms += [k] * len(bodies)
             tools.append(chain.tool(model, joint, own))
-            disabled |= chain.disabled_pairs()
-            slices.append((first, model.nq))
-        ranges, table = np.array(slices, dtype=np.int64), kinematic_table(model)
+            pairs = chain.disabled_pairs()
+            disabled |= {frozenset(prefix + name for name in pair) for pair in pairs}
+            followers += chain.followers(joint)
+            ranges.append((joint, model.njoints))
+        check_size(model)
+        for follower in followers:
+            source, joint, *rule = follower.source, follower.joint, *follower[2:]
+            model = pin.transformJointIntoMimic(model, source, joint, *rule)
         return Assembly(
             model,
             geometry,
             tuple(links),
-            ranges,
-            table,
+            _slices(model, ranges),
+            kinematic_table(model),
             tuple(arms),
             tuple(tools),
             frozenset(disabled),
         )
 
 
+def _needs_prefix(arms: tuple[Arm, ...]) -> list[bool]:
+    """Return which arms' names get the arm's number before them: where names would be the same."""
+    names = [arm.own_names() for arm in arms]
+    several = [
+        sum(len(each[kind]) for each in names) > len(set[str]().union(*(n[kind] for n in names)))
+        for kind in range(2)
+    ]
+    return [len(arms) > 1 and (any(several) or not any(own)) for own in names]
+
+
+def _slices(model: Any, ranges: list[tuple[int, int]]) -> np.ndarray:
+    """Return (arms, 2) first and one-past-last place in q of the joints of each arm."""
+    slices, first = [], 0
+    for start, stop in ranges:
+        after = first + sum(int(model.nqs[joint]) for joint in range(start, stop))
+        slices.append((first, after))
+        first = after
+    return np.array(slices, dtype=np.int64)
+
+
 class Chain(Robot):
     """Base of a single arm, which can stand as a robot of its own."""
 
-    def chains(self) -> tuple["Chain", ...]:
+    def chains(self) -> tuple[Arm, ...]:
         """Return the arm itself."""
         return (self,)
 
@@ -139,6 +200,18 @@ class Chain(Robot):
     def disabled_pairs(self) -> set[frozenset[str]]:
         """Return pairs of bodies' names that are never judged."""
         return set()
+
+    def own_names(self) -> tuple[set[str], set[str]]:
+        """Return the names of joints and of bodies that a file gives, which are kept; or none."""
+        return set(), set()
+
+    def followers(self, first_joint: int) -> list[Follower]:
+        """Return the joints that follow others.
+
+        Args:
+            first_joint: Index of the arm's first joint.
+        """
+        return []
 
 
 def link_capsule(link: Link, name: str) -> Any:

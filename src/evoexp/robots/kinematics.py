@@ -97,8 +97,7 @@ def kinematic_table(model: Any) -> KinematicTable:
         UnsupportedJoint: If a joint has not exactly one coordinate, or turns and slides at once.
         SettingError: If there are more joints than `MAX_JOINTS`.
     """
-    if model.njoints - 1 > MAX_JOINTS:
-        raise SettingError("robot", f"of at most {MAX_JOINTS} joints", model.njoints - 1)
+    check_size(model)
     data = model.createData()
     neutral = pin.neutral(model)
     pin.computeJointJacobians(model, data, neutral)
@@ -124,6 +123,16 @@ def kinematic_table(model: Any) -> KinematicTable:
     return KinematicTable(
         parent, index_q, prismatic, turned, rotation, translation, alignment, planar
     )
+
+
+def check_size(model: Any) -> None:
+    """Refuse a model of more joints than `MAX_JOINTS`.
+
+    Raises:
+        SettingError: If there are more.
+    """
+    if model.njoints - 1 > MAX_JOINTS:
+        raise SettingError("robot", f"of at most {MAX_JOINTS} joints", model.njoints - 1)
 
 
 def _axis(model: Any, data: Any, neutral: FloatArray, joint: int) -> tuple[FloatArray, bool]:

@@ -7,18 +7,23 @@ identity.
 
 import tempfile
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 import pinocchio as pin
+from pydantic import BeforeValidator
 
 from evoexp.attachments import SHA256, File, keep
 from evoexp.errors import SettingError, nearest
-from evoexp.robots.assembly import Chain, Link, Tool
+from evoexp.robots.assembly import Arm, Chain
 from evoexp.robots.bodies import Point3, placed
+from evoexp.robots.joint_choice import joint_roles, standing_values
 from evoexp.robots.mesh_files import MESHES, mesh_content
-from evoexp.robots.urdf_text import LARGEST, MESH, check_urdf, file_content, parsed_xml, plain_urdf
-from evoexp.validation import Settings
+from evoexp.robots.srdf import Srdf
+from evoexp.robots.urdf_arms import UrdfArm, UrdfTree
+from evoexp.robots.urdf_rewriting import JointRules, plain_urdf
+from evoexp.robots.urdf_text import LARGEST, MESH, check_urdf, file_content, parsed_xml, read_joints
+from evoexp.validation import Positive, Settings
 
 
 class Mesh(Settings):
@@ -33,6 +38,14 @@ class Mesh(Settings):
     file: File
 
 
+def _pairs(value: Any) -> Any:
+    """Turn a mapping of names to values into pairs in the order of the names."""
+    return tuple(sorted(value.items())) if isinstance(value, dict) else value
+
+
+StandingValues = Annotated[tuple[tuple[str, float], ...], BeforeValidator(_pairs)]
+
+
 class Urdf(Chain):
     """An arm out of a URDF; in a configuration `path` (and `srdf`) name the files that are read.
 
@@ -43,8 +56,18 @@ class Urdf(Chain):
         base_frame: The link, fixed to the ground, whose frame stands at the base; empty: the root.
         base_position: Where the base stands in the world [m].
         base_rotation: Its roll, pitch, yaw [deg].
-        tool_frame: The link or joint whose frame is the tool's; empty: the link farthest down the
-            tree.
+        tool_frame: The link or joint whose frame is the tool's; empty: the tip of the group, or the
+            link farthest down the tree.
+        joints: Names of those that move; empty: those of the group, or all.
+        group: The SRDF's group whose joints move; empty: none.
+        groups: The SRDF's groups that are an arm each, the first with all that stands still.
+        tool_frames: The tool's frame of each of these arms; empty: the tips of the groups.
+        fixed: Values of joints that stand still [deg, m]; of others 0, or the limit nearest to it.
+        continuous_turns: How far a continuous joint turns to either side [turns].
+        turn_limit: How far a turning joint does whose limits the URDF does not give [deg].
+        slide_limit: How far a sliding joint moves to either side, then [m].
+        base: Whether planar and floating joints stand still (fixed) or move (free); or the whole
+            robot moves, as by a planar or floating joint below its root.
     """
 
     component: ClassVar[str] = "urdf"
@@ -56,6 +79,15 @@ class Urdf(Chain):
     base_position: Point3 = (0.0, 0.0, 0.0)
     base_rotation: Point3 = (0.0, 0.0, 0.0)
     tool_frame: str = ""
+    joints: tuple[str, ...] = ()
+    group: str = ""
+    groups: tuple[str, ...] = ()
+    tool_frames: tuple[str, ...] = ()
+    fixed: StandingValues = ()
+    continuous_turns: Positive = 1.0
+    turn_limit: Positive = 180.0
+    slide_limit: Positive = 1.0
+    base: Literal["fixed", "free", "planar", "floating"] = "fixed"
 
     @classmethod
     def read_files(cls, settings: dict[str, Any], field: str) -> dict[str, Any]:
@@ -85,99 +117,50 @@ class Urdf(Chain):
             settings["srdf"] = {SHA256: keep(content)}
         return settings
 
-    def append_to(self, model: Any, arm: int) -> list[Link]:
-        """Add the joints; a link is the line from a joint to one behind it.
+    def chains(self) -> tuple[Arm, ...]:
+        """Return the arms: one, or one per group."""
+        root = parsed_xml(self.urdf.content, "robot.urdf", "robot")
+        check_urdf(root, "robot.urdf")
+        joints = read_joints(root, "robot.urdf")
+        srdf = None if self.srdf is None else Srdf(self.srdf.content, joints)
+        groups = self.groups or ((self.group,) if self.group else ())
+        roles = joint_roles(joints, srdf, self.joints, groups, self.base, several=bool(self.groups))
+        values = standing_values(self.fixed, joints, roles)
+        model = self._model()
+        tree = UrdfTree(
+            model,
+            self._geometry(model),
+            self._base(model),
+            roles,
+            values,
+            [] if srdf is None else srdf.disabled_links(),
+            self._tips(roles.tips),
+        )
+        return tuple(UrdfArm(tree, k) for k in range(len(roles.arms)))
 
-        The last to the tool.
+    def _tips(self, found: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
+        """Return the frame of each arm's tool, empty if none is named, and the field that chose it.
+
+        Raises:
+            SettingError: If there are not as many frames as arms.
         """
-        own, first = self._model(), model.njoints
-        base = self._base(own)
-        for joint in range(1, own.njoints):
-            parent, placement = own.parents[joint], own.jointPlacements[joint]
-            before = (0, base * placement) if parent == 0 else (first + parent - 1, placement)
-            added = model.addJoint(
-                before[0], own.joints[joint], before[1], f"arm_{arm}_{own.names[joint]}"
-            )
-            index = own.idx_qs[joint]
-            model.lowerPositionLimit[model.idx_qs[added]] = own.lowerPositionLimit[index]
-            model.upperPositionLimit[model.idx_qs[added]] = own.upperPositionLimit[index]
-        links = []
-        for joint in range(1, own.njoints):
-            parent, end = own.parents[joint], own.jointPlacements[joint].translation
-            if parent == 0:
-                links.append(
-                    Link(
-                        arm,
-                        0,
-                        np.array(base.translation),
-                        np.array((base * own.jointPlacements[joint]).translation),
-                        0.0,
-                    )
-                )
-            else:
-                links.append(Link(arm, first + parent - 1, np.zeros(3), np.array(end), 0.0))
-        tool = self.tool(model, first, links)
-        links.append(Link(arm, tool.joint, np.zeros(3), tool.position, 0.0))
-        return [link for link in links if not np.array_equal(link.start, link.end)]
+        if self.tool_frame and self.groups:
+            raise SettingError("robot.tool_frame", "left out beside robot.groups", self.tool_frame)
+        if self.tool_frame:
+            return ((self.tool_frame, "robot.tool_frame"),)
+        if not self.tool_frames:
+            return tuple((name, "robot.srdf") for name in found)
+        if len(self.tool_frames) != len(self.groups):
+            must = f"a frame per group ({len(self.groups)})"
+            raise SettingError("robot.tool_frames", must, list(self.tool_frames))
+        return tuple((name, f"robot.tool_frames[{k}]") for k, name in enumerate(self.tool_frames))
 
-    def append_bodies(self, model: Any, arm: int, first_joint: int, links: list[Link]) -> list[Any]:
-        """Return the collision bodies."""
-        own = self._model()
-        base = self._base(own)
-        items = list(self._geometry(own).geometryObjects)
-        stems = [item.name.rpartition("_")[0] for item in items]
-        bodies = []
-        for item, stem in zip(items, stems, strict=True):
-            name = stem if stems.count(stem) == 1 else item.name
-            joint = item.parentJoint
-            where = (
-                (first_joint + joint - 1, item.placement) if joint else (0, base * item.placement)
-            )
-            bodies.append(pin.GeometryObject(name, where[0], 0, where[1], item.geometry))
-        if not bodies:
-            raise SettingError("robot.path", "a URDF with collision bodies", None)
-        return bodies
-
-    def tool(self, model: Any, first_joint: int, links: list[Link]) -> Tool:
-        """Return the tool's frame."""
-        own = self._model()
-        frames = [
-            frame
-            for frame in own.frames
-            if frame.type in (pin.FrameType.BODY, pin.FrameType.FIXED_JOINT)
-        ]
-        name = self.tool_frame or max(frames, key=lambda frame: frame_depth(own, frame)).name
-        frame = frame_named(own, name, "tool_frame")
-        if frame.parentJoint == 0:
-            raise SettingError("robot.tool_frame", "a frame that moves", name)
-        placement = frame.placement
-        joint = first_joint + frame.parentJoint - 1
-        return Tool(joint, np.array(placement.rotation), np.array(placement.translation))
-
-    def disabled_pairs(self) -> set[frozenset[str]]:
-        """Return pairs of bodies that the SRDF switches off."""
-        if self.srdf is None:
-            return set()
-        root = parsed_xml(self.srdf.content, "robot.srdf", "robot")
-        names = [item.name for item in self._geometry(self._model()).geometryObjects]
-        stems = [name.rpartition("_")[0] for name in names]
-        of_link: dict[str, set[str]] = {}
-        for name, stem in zip(names, stems, strict=True):
-            of_link.setdefault(stem, set()).add(stem if stems.count(stem) == 1 else name)
-        pairs = [
-            (str(pair.get("link1")), str(pair.get("link2")))
-            for pair in root.iterfind("disable_collisions")
-        ]
-        return {
-            frozenset((a, b))
-            for one, two in pairs
-            for a in of_link.get(one, ())
-            for b in of_link.get(two, ())
-        }
+    def _rules(self) -> JointRules:
+        return JointRules(self.continuous_turns, self.turn_limit, self.slide_limit, self.base)
 
     def _model(self) -> Any:
         try:
-            return pin.buildModelFromXML(plain_urdf(self.urdf.content, {}))
+            return pin.buildModelFromXML(plain_urdf(self.urdf.content, {}, self._rules()))
         except (ValueError, RuntimeError) as error:
             raise SettingError(
                 "robot.path", "a URDF that Pinocchio reads", str(error).strip().splitlines()[0]
@@ -195,7 +178,7 @@ class Urdf(Chain):
                 place.write_bytes(mesh.file.content)
                 places[mesh.name] = str(place)
             try:
-                text = plain_urdf(self.urdf.content, places)
+                text = plain_urdf(self.urdf.content, places, self._rules())
                 found = pin.buildGeomFromUrdfString(
                     model, text, pin.GeometryType.COLLISION, None, directory
                 )
@@ -219,35 +202,12 @@ class Urdf(Chain):
         base = placed(self.base_position, self.base_rotation)
         if not self.base_frame:
             return base
-        frame = frame_named(model, self.base_frame, "base_frame")
+        names = [frame.name for frame in model.frames]
+        if self.base_frame not in names:
+            must = f"a frame of the URDF ({', '.join(names)})"
+            hint = nearest(self.base_frame, names)
+            raise SettingError("robot.base_frame", must, self.base_frame, hint)
+        frame = model.frames[names.index(self.base_frame)]
         if frame.parentJoint != 0:
             raise SettingError("robot.base_frame", "a frame that does not move", self.base_frame)
         return base * frame.placement.inverse()
-
-
-def frame_named(model: Any, name: str, field: str) -> Any:
-    """Find a `pin.Frame` of a model by its name.
-
-    Raises:
-        SettingError: If there is none; the names of all are listed.
-    """
-    names = [frame.name for frame in model.frames]
-    if name not in names:
-        raise SettingError(
-            f"robot.{field}",
-            f"a frame of the URDF ({', '.join(names)})",
-            name,
-            nearest(name, names),
-        )
-    return model.frames[names.index(name)]
-
-
-def frame_depth(model: Any, frame: Any) -> tuple[int, int]:
-    """Return how many joints carry a frame, and how many frames."""
-    joint, count = frame.parentJoint, 0
-    while joint > 0:
-        joint, count = model.parents[joint], count + 1
-    steps, index = 0, frame.parentFrame
-    while index > 0:
-        index, steps = model.frames[index].parentFrame, steps + 1
-    return count, steps

@@ -1,7 +1,7 @@
 """XML of a URDF or an SRDF: read within bounds, checked, without elements that are not used."""
 
 import xml.etree.ElementTree as ET
-from typing import Any
+from typing import Any, NamedTuple
 
 from evoexp.errors import SettingError
 from evoexp.input_files import read_bounded
@@ -10,10 +10,39 @@ MOST_NESTED, MOST_ELEMENTS = 50, 100_000  # of XML
 MOST_LINKS = 300  # and collision bodies: pairs of them are judged
 LARGEST = 1e7  # [m, rad] as of the numbers of other robots
 SHORTEST = 1e-6  # [-] of an axis
-# attributes of places, bodies and limits
-NUMERIC = {"xyz", "rpy", "size", "scale", "radius", "length", "lower", "upper"}
-MOVING = ("revolute", "prismatic")
+# attributes of places, bodies, limits and joints that follow others
+NUMERIC = {
+    *("xyz", "rpy", "size", "scale", "radius", "length", "lower", "upper"),
+    *("multiplier", "offset"),
+}
+KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 MESH = "link/collision/geometry/mesh"
+
+
+class Mimic(NamedTuple):
+    """The rule of a joint that follows another: q = multiplier · q of the source + offset."""
+
+    source: str
+    multiplier: float
+    offset: float
+
+
+class JointText(NamedTuple):
+    """A joint as the URDF names it.
+
+    Attributes:
+        name: Its name.
+        kind: Its type.
+        parent: The link that carries it.
+        child: The link that it carries.
+        mimic: The rule by which it follows another joint; None: it moves of its own.
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    mimic: Mimic | None
 
 
 def file_content(path: Any, field: str) -> bytes:
@@ -92,23 +121,57 @@ def check_urdf(root: Any, field: str) -> None:
                 must = f"a URDF whose numbers are finite, at most {LARGEST:g}"
                 was = f'<{element.tag} {name}="{str(element.get(name))[:40]}"/>'
                 raise SettingError(field, must, was)
-    for axis in root.iterfind("joint/axis"):
+    for joint in root.iterfind("joint"):
+        kind, name = joint.get("type"), joint.get("name")
+        if kind not in KINDS:
+            must = f"a URDF whose joints are {', '.join(KINDS[:-1])} or {KINDS[-1]}"
+            raise SettingError(field, must, f"joint '{name}' of type {kind}")
+        axis = joint.find("axis")
+        if axis is None or kind in ("fixed", "floating"):
+            continue
         if not sum(abs(float(word)) for word in str(axis.get("xyz", "1")).split()) > SHORTEST:
             raise SettingError(field, "a URDF whose axes point somewhere", axis.get("xyz"))
+
+
+def read_joints(root: Any, field: str) -> dict[str, JointText]:
+    """Read the joints of a checked URDF.
+
+    Returns:
+        Them by their names, in the file's order.
+
+    Raises:
+        SettingError: If a joint follows one that is not there, or itself.
+    """
+    found = {}
     for joint in root.iterfind("joint"):
-        kind = joint.get("type")
-        if kind not in (*MOVING, "fixed") or joint.find("mimic") is not None:
-            what = "mimic" if joint.find("mimic") is not None else kind
-            hint = (
-                "; a continuous joint can be given limits, as a revolute one"
-                if kind == "continuous"
-                else ""
-            )
-            raise SettingError(
-                field,
-                f"a URDF whose joints are {', '.join(MOVING)} or fixed{hint}",
-                f"joint '{joint.get('name')}' of type {what}",
-            )
+        name, kind = str(joint.get("name")), str(joint.get("type"))
+        rule, mimic = joint.find("mimic"), None
+        if rule is not None and kind != "fixed":
+            numbers = (rule.get("multiplier", "1"), rule.get("offset", "0"))
+            if not all(len(number.split()) == 1 for number in numbers):
+                must = "a URDF whose multipliers and offsets are numbers"
+                raise SettingError(field, must, f"joint '{name}'")
+            mimic = Mimic(str(rule.get("joint")), *map(float, numbers))
+        ends = (joint.find("parent"), joint.find("child"))
+        parent, child = ("" if end is None else str(end.get("link")) for end in ends)
+        found[name] = JointText(name, kind, parent, child, mimic)
+    for joint in found.values():
+        _check_rule(joint, found, field)
+    return found
+
+
+def _check_rule(joint: JointText, joints: dict[str, JointText], field: str) -> None:
+    """Follow the rules from one joint to another, to one that moves of its own or stands."""
+    passed = [joint.name]
+    while joint.mimic is not None:
+        if joint.mimic.source not in joints:
+            must = "a URDF whose joints follow joints that are there"
+            raise SettingError(field, must, f"'{joint.name}' follows '{joint.mimic.source}'")
+        joint = joints[joint.mimic.source]
+        if joint.name in passed:
+            must = "a URDF whose joints do not follow themselves"
+            raise SettingError(field, must, " → ".join([*passed, joint.name]))
+        passed.append(joint.name)
 
 
 def _is_number(word: str) -> bool:
@@ -117,21 +180,3 @@ def _is_number(word: str) -> bool:
         return abs(float(word)) <= LARGEST
     except ValueError:
         return False
-
-
-def plain_urdf(content: bytes, places: dict[str, str]) -> str:
-    """Return a URDF without visual elements, with the present paths of its meshes."""
-    root = parsed_xml(content, "robot.urdf", "robot")
-    check_urdf(root, "robot.urdf")
-    for link in root.iterfind("link"):
-        for visual in link.findall("visual"):
-            link.remove(visual)
-        if not places:
-            for collision in link.findall("collision"):
-                if collision.find("geometry/mesh") is not None:
-                    link.remove(collision)
-    for mesh in root.iterfind(MESH):
-        if (name := str(mesh.get("filename"))) not in places:
-            raise SettingError("robot.meshes", "those that the URDF names", f"without '{name}'")
-        mesh.set("filename", places[name])
-    return ET.tostring(root, encoding="unicode")

@@ -1,0 +1,135 @@
+"""An SRDF: groups of joints, named states, end effectors, pairs that are never judged."""
+
+from typing import NamedTuple
+
+from evoexp.errors import SettingError, nearest
+from evoexp.robots.urdf_text import JointText, parsed_xml
+
+MOST_GROUPS = 300  # nested in one another
+
+
+class NamedState(NamedTuple):
+    """A configuration that the SRDF names.
+
+    Attributes:
+        name: Its name.
+        group: The group that it is of.
+        values: Of joints by their names [rad, m].
+    """
+
+    name: str
+    group: str
+    values: dict[str, float]
+
+
+class Srdf:
+    """What an SRDF says of the robot of a URDF."""
+
+    def __init__(self, content: bytes, joints: dict[str, JointText]) -> None:
+        """Read the text.
+
+        Args:
+            content: Of the file.
+            joints: Of the URDF, by their names.
+        """
+        self._root = parsed_xml(content, "robot.srdf", "robot")
+        self._joints = joints
+        self._above = {joint.child: joint for joint in joints.values()}
+        self._groups = {str(group.get("name")): group for group in self._root.iterfind("group")}
+
+    def group_joints(self, group: str, field: str) -> set[str]:
+        """Find the joints of a group: of its chains, joints, links and groups.
+
+        Args:
+            group: Its name.
+            field: That names it, for errors.
+
+        Raises:
+            SettingError: If there is no such group, or it names something that is not there.
+        """
+        return self._members(group, field, ())
+
+    def tip(self, group: str) -> str:
+        """Find the link at the end of a group: of its only chain, or where a hand is mounted.
+
+        Returns:
+            The link's name, empty if the SRDF names none.
+        """
+        if group not in self._groups:
+            return ""
+        chains = self._groups[group].findall("chain")
+        if len(chains) == 1:
+            return str(chains[0].get("tip_link"))
+        hands = [
+            str(hand.get("parent_link"))
+            for hand in self._root.iterfind("end_effector")
+            if hand.get("parent_group") == group
+        ]
+        return hands[0] if len(hands) == 1 else ""
+
+    def states(self) -> list[NamedState]:
+        """Read the named states.
+
+        Raises:
+            SettingError: If a value is no number.
+        """
+        found = []
+        for state in self._root.iterfind("group_state"):
+            values = {}
+            for joint in state.iterfind("joint"):
+                name, text = str(joint.get("name")), str(joint.get("value"))
+                try:
+                    values[name] = float(text.split()[0]) if len(text.split()) == 1 else None
+                except ValueError:
+                    must = "an SRDF whose states are numbers"
+                    raise SettingError("robot.srdf", must, f"'{text}' of '{name}'") from None
+            own = {name: value for name, value in values.items() if value is not None}
+            found.append(NamedState(str(state.get("name")), str(state.get("group")), own))
+        return found
+
+    def disabled_links(self) -> list[tuple[str, str]]:
+        """List the pairs of links that are never judged."""
+        return [
+            (str(pair.get("link1")), str(pair.get("link2")))
+            for pair in self._root.iterfind("disable_collisions")
+        ]
+
+    def _members(self, group: str, field: str, above: tuple[str, ...]) -> set[str]:
+        if group not in self._groups:
+            names = list(self._groups)
+            must = f"a group of the SRDF ({', '.join(names) or 'it has none'})"
+            raise SettingError(field, must, group, nearest(group, names))
+        if group in above or len(above) > MOST_GROUPS:
+            raise SettingError(field, "a group that does not contain itself", group)
+        found: set[str] = set()
+        for part in self._groups[group]:
+            match part.tag:
+                case "chain":
+                    found |= self._chain(str(part.get("base_link")), str(part.get("tip_link")))
+                case "joint":
+                    found |= self._joint(str(part.get("name")), group)
+                case "link" if (above_it := self._above.get(str(part.get("name")))) is not None:
+                    found.add(above_it.name)
+                case "group":
+                    found |= self._members(str(part.get("name")), field, (*above, group))
+        return found
+
+    def _joint(self, name: str, group: str) -> set[str]:
+        """Check that a joint is there; joints that tie the robot to the world are left out."""
+        if name in self._joints:
+            return {name}
+        if name in {joint.get("name") for joint in self._root.iterfind("virtual_joint")}:
+            return set()
+        must = f"an SRDF whose group '{group}' names joints of the URDF"
+        raise SettingError("robot.srdf", must, name, nearest(name, list(self._joints)))
+
+    def _chain(self, base: str, tip: str) -> set[str]:
+        found, link = set(), tip
+        while link != base:
+            joint = self._above.get(link)
+            if joint is None or joint.name in found:
+                must = "an SRDF whose chains lead from a tip down to a base"
+                raise SettingError("robot.srdf", must, f"'{tip}' does not hang on '{base}'")
+            found.add(joint.name)
+            link = joint.parent
+        return found

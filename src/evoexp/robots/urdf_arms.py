@@ -1,0 +1,363 @@
+"""The arms of one URDF: parts of one tree, whose other joints stand still or follow."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from evoexp.errors import SettingError, nearest
+from evoexp.numeric.elementary import DEGREE, sincos
+from evoexp.numeric.ordered_sums import matrix_product
+from evoexp.records import FloatArray
+from evoexp.robots.assembly import Follower, Link, Tool
+from evoexp.robots.joint_choice import JointRoles
+
+SLIDING = ("JointModelPX", "JointModelPY", "JointModelPZ", "JointModelPrismaticUnaligned")
+AXES = {"X": 0, "Y": 1, "Z": 2}
+
+
+class Carrier(NamedTuple):
+    """What carries the frame of a joint of the URDF.
+
+    Attributes:
+        joint: Index of the robot's joint, 0: the world.
+        placement: The frame's place in the joint's frame; None: it is the joint's.
+    """
+
+    joint: int
+    placement: Any  # pin.SE3 or None
+
+    def place(self, local: Any) -> Any:
+        """Return the `pin.SE3` of a place in the frame, seen from the robot's joint."""
+        return local if self.placement is None else self.placement * local
+
+
+class UrdfTree:
+    """A URDF as Pinocchio reads it, and which of its joints move, in which arm.
+
+    Attributes:
+        model: Of all joints.
+        items: Collision bodies, with the joints of that model.
+        names: Of the bodies.
+        base: `pin.SE3` of the root in the world.
+        order: Joints of each arm, in the order in which they are added.
+        rules: Joints that follow: index of the source, multiplier, offset.
+        disabled: Pairs of bodies' names that are never judged.
+        tips: The link at the end of each arm, or the frame that is chosen.
+    """
+
+    def __init__(
+        self,
+        model: Any,
+        geometry: Any,
+        base: Any,
+        roles: JointRoles,
+        values: dict[str, float],
+        disabled: list[tuple[str, str]],
+        tips: tuple[tuple[str, str], ...],
+    ) -> None:
+        """Find out which joints move.
+
+        Args:
+            model: Of all joints, one coordinate each.
+            geometry: Its collision bodies.
+            base: `pin.SE3` of the root in the world.
+            roles: Which joints move, which follow.
+            values: Of joints that stand [deg, m].
+            disabled: Pairs of links that are never judged.
+            tips: Frame of each arm's tool, empty where none is chosen, and the field that chose it.
+        """
+        self.model, self.base, self.tips = model, base, tips
+        self.items = list(geometry.geometryObjects)
+        stems = [item.name.rpartition("_")[0] for item in self.items]
+        self.names = [
+            stem if stems.count(stem) == 1 else item.name
+            for item, stem in zip(self.items, stems, strict=True)
+        ]
+        of_link: dict[str, set[str]] = {}
+        for name, stem in zip(self.names, stems, strict=True):
+            of_link.setdefault(stem, set()).add(name)
+        self.disabled = {
+            frozenset((a, b))
+            for one, two in disabled
+            for a in of_link.get(one, ())
+            for b in of_link.get(two, ())
+        }
+        index = {str(name): k for k, name in enumerate(model.names)}
+        self.rules = {
+            # a source that is fixed stands at 0, as the universe does
+            index[name]: (index.get(rule.source, 0), rule.multiplier, rule.offset)
+            for name, rule in roles.rules.items()
+            if name in index
+        }
+        self._arms = [{index[name] for name in arm} for arm in roles.arms]
+        self.order = self._ordered()
+        moving = [joint for arm in self.order for joint in arm]
+        self._values = self._standing(moving, {index[n]: v for n, v in values.items()})
+        self._place_in = {joint: k for k, joint in enumerate(moving)}
+        if len(self.order) > 1:
+            self.disabled |= self._neighbours_between_arms()
+
+    def carriers(self, first: int) -> list[Carrier]:
+        """Return what carries each joint's frame, the root's first.
+
+        Args:
+            first: Index of the first joint of the robot that comes from this URDF.
+        """
+        found = [Carrier(0, self.base)]
+        for joint in range(1, self.model.njoints):
+            if joint in self._place_in:
+                found.append(Carrier(first + self._place_in[joint], None))
+                continue
+            before = found[self.model.parents[joint]]
+            place = before.place(self.model.jointPlacements[joint])
+            found.append(
+                Carrier(before.joint, place * _motion(self.model, joint, self._values[joint]))
+            )
+        return found
+
+    def frame(self, name: str, field: str) -> Any:
+        """Find a `pin.Frame` by its name.
+
+        Raises:
+            SettingError: If there is none; the names of all are listed.
+        """
+        names = [frame.name for frame in self.model.frames]
+        if name not in names:
+            must = f"a frame of the URDF ({', '.join(names)})"
+            raise SettingError(field, must, name, nearest(name, names))
+        return self.model.frames[names.index(name)]
+
+    def last_frame(self, arm: int) -> Any:
+        """Return the frame that most joints of an arm carry, the farthest down the tree."""
+        own = self.order[arm]
+        frames = [
+            frame
+            for frame in self.model.frames
+            if frame.type in (pin.FrameType.BODY, pin.FrameType.FIXED_JOINT)
+            and any(joint in own for joint in self._path(frame.parentJoint))
+        ]
+        return max(frames, key=lambda frame: self._depth(frame))
+
+    def _path(self, joint: int) -> list[int]:
+        """Return a joint and those that carry it."""
+        found = []
+        while joint > 0:
+            found.append(joint)
+            joint = self.model.parents[joint]
+        return found
+
+    def _depth(self, frame: Any) -> tuple[int, int]:
+        """Return how many moving joints carry a frame, and how many frames."""
+        count = sum(joint in self._place_in for joint in self._path(frame.parentJoint))
+        steps, index = 0, frame.parentFrame
+        while index > 0:
+            index, steps = self.model.frames[index].parentFrame, steps + 1
+        return count, steps
+
+    def arm_of(self, joint: int) -> int:
+        """Return the arm that moves a joint of the URDF, the first one of what stands still."""
+        while joint > 0:
+            for k, arm in enumerate(self.order):
+                if joint in arm:
+                    return k
+            joint = self.model.parents[joint]
+        return 0
+
+    def _neighbours_between_arms(self) -> set[frozenset[str]]:
+        """Return pairs of bodies of different arms that meet at a joint, or that one carries."""
+        carriers, found = self.carriers(1), set()
+        above = {0: -1}
+        for joint, place in self._place_in.items():
+            above[1 + place] = carriers[self.model.parents[joint]].joint
+        bodies = [
+            (name, self.arm_of(item.parentJoint), carriers[item.parentJoint].joint)
+            for name, item in zip(self.names, self.items, strict=True)
+        ]
+        for k, (name, arm, joint) in enumerate(bodies):
+            for other, other_arm, by in bodies[k + 1 :]:
+                if arm != other_arm and (joint == by or above[joint] == by or above[by] == joint):
+                    found.add(frozenset((name, other)))
+        return found
+
+    def _ordered(self) -> tuple[tuple[int, ...], ...]:
+        """Return the joints of each arm: behind what carries them, and behind what they follow.
+
+        Raises:
+            SettingError: If an arm hangs on joints of a later one.
+        """
+        arms = []
+        whole = [
+            own | {joint for joint, (source, *_) in self.rules.items() if source in own}
+            for own in self._arms
+        ]
+        everything = set[int]().union(*whole)
+        added: set[int] = set()
+        for k, own in enumerate(whole):
+            order: list[int] = []
+            left = sorted(own)
+            while left:
+                ready = [joint for joint in left if self._needs(joint) & everything <= added]
+                if not ready:
+                    name = self.model.names[left[0]]
+                    must = "groups in an order in which none hangs on a later one"
+                    raise SettingError("robot.groups", must, f"'{name}' in number {k + 1}")
+                # one at a time: an arm without followers keeps Pinocchio's order
+                order.append(ready[0])
+                added.add(ready[0])
+                left.remove(ready[0])
+            arms.append(tuple(order))
+        return tuple(arms)
+
+    def _needs(self, joint: int) -> set[int]:
+        """Return the joints that must be there before a joint is added."""
+        source = {self.rules[joint][0]} if joint in self.rules else set()
+        return set(self._path(self.model.parents[joint])) | source
+
+    def _standing(self, moving: list[int], given: dict[int, float]) -> dict[int, float]:
+        """Return the values of the joints that stand [rad, m]."""
+        model, found = self.model, {0: 0.0}
+        for joint in range(1, model.njoints):
+            low, high = (
+                float(limits[model.idx_qs[joint]])
+                for limits in (model.lowerPositionLimit, model.upperPositionLimit)
+            )
+            unit = 1.0 if _axis(model, joint)[1] else DEGREE
+            if joint in moving or joint in self.rules:
+                continue
+            if joint in given:
+                value = given[joint] * unit
+                slack = 1e-9 * max(1.0, abs(value))
+                if not low - slack <= value <= high + slack:
+                    must = f"within the joint's limits [{low / unit:g}, {high / unit:g}]"
+                    raise SettingError(f"robot.fixed.{model.names[joint]}", must, given[joint])
+                found[joint] = value
+            else:
+                found[joint] = min(max(0.0, low), high)
+        for joint, (source, multiplier, offset) in self.rules.items():
+            if joint not in moving:
+                found[joint] = multiplier * found[source] + offset
+        return found
+
+
+class UrdfArm:
+    """One arm of a URDF; the first one brings the bodies that stand still."""
+
+    def __init__(self, tree: UrdfTree, index: int) -> None:
+        """Take a part of a tree.
+
+        Args:
+            tree: The URDF.
+            index: The arm's number in it.
+        """
+        self._tree, self._index = tree, index
+        self._own = tree.order[index]
+        self._before = sum(len(arm) for arm in tree.order[:index])
+
+    def own_names(self) -> tuple[set[str], set[str]]:
+        """Return the names of the joints and of the bodies, as the URDF has them."""
+        tree = self._tree
+        joints = {str(tree.model.names[joint]) for joint in self._own}
+        return joints, {name for name, _ in self._own_bodies()}
+
+    def append_to(self, model: Any, arm: int) -> list[Link]:
+        """Add the joints; a link is the line from a joint to one behind it.
+
+        The last to the tool.
+        """
+        tree, own, first = self._tree, self._tree.model, model.njoints
+        carriers = tree.carriers(first - self._before)
+        starts: list[tuple[Carrier, Any]] = []
+        for joint in self._own:
+            before = carriers[own.parents[joint]]
+            place = before.place(own.jointPlacements[joint])
+            name = f"arm_{arm}_{own.names[joint]}"
+            added = model.addJoint(before.joint, own.joints[joint], place, name)
+            index = own.idx_qs[joint]
+            model.lowerPositionLimit[model.idx_qs[added]] = own.lowerPositionLimit[index]
+            model.upperPositionLimit[model.idx_qs[added]] = own.upperPositionLimit[index]
+            starts.append((before, place))
+        links = []
+        for before, place in starts:
+            start = self.base_of(before)
+            links.append(Link(arm, before.joint, start, np.array(place.translation), 0.0))
+        tool = self.tool(model, first, links)
+        links.append(Link(arm, tool.joint, np.zeros(3), tool.position, 0.0))
+        return [link for link in links if not np.array_equal(link.start, link.end)]
+
+    def base_of(self, before: Carrier) -> FloatArray:
+        """Return where a link begins: at the joint that carries it, or at the robot's base."""
+        return np.zeros(3) if before.joint else np.array(self._tree.base.translation)
+
+    def append_bodies(self, model: Any, arm: int, first_joint: int, links: list[Link]) -> list[Any]:
+        """Return the collision bodies."""
+        carriers = self._tree.carriers(first_joint - self._before)
+        bodies = []
+        for name, item in self._own_bodies():
+            carrier = carriers[item.parentJoint]
+            place = carrier.place(item.placement)
+            bodies.append(pin.GeometryObject(name, carrier.joint, 0, place, item.geometry))
+        if not self._tree.items:
+            raise SettingError("robot.path", "a URDF with collision bodies", None)
+        return bodies
+
+    def tool(self, model: Any, first_joint: int, links: list[Link]) -> Tool:
+        """Return the tool's frame."""
+        name, field = self._tree.tips[self._index]
+        frame = self._tree.frame(name, field) if name else self._tree.last_frame(self._index)
+        carrier = self._tree.carriers(first_joint - self._before)[frame.parentJoint]
+        if carrier.joint == 0:
+            raise SettingError(field, "a frame that moves", name)
+        place = carrier.place(frame.placement)
+        return Tool(carrier.joint, np.array(place.rotation), np.array(place.translation))
+
+    def disabled_pairs(self) -> set[frozenset[str]]:
+        """Return pairs of bodies that the SRDF switches off."""
+        return self._tree.disabled
+
+    def followers(self, first_joint: int) -> list[Follower]:
+        """Return the joints that follow others.
+
+        Args:
+            first_joint: Of this arm in the robot.
+        """
+        first, rules = first_joint - self._before, self._tree.rules
+        moving = [joint for arm in self._tree.order for joint in arm]
+        return [
+            Follower(first + moving.index(joint), first + moving.index(source), multiplier, offset)
+            for joint in self._own
+            if joint in rules
+            for source, multiplier, offset in [rules[joint]]
+        ]
+
+    def _own_bodies(self) -> list[tuple[str, Any]]:
+        """Return the bodies that this arm's joints carry, the first arm's with those that stand."""
+        tree = self._tree
+        bodies = zip(tree.names, tree.items, strict=True)
+        return [(n, item) for n, item in bodies if tree.arm_of(item.parentJoint) == self._index]
+
+
+def _axis(model: Any, joint: int) -> tuple[FloatArray, bool]:
+    """Return the axis (3,) of a joint of one coordinate, and whether it slides."""
+    kind = model.joints[joint].shortname()
+    if kind.endswith("Unaligned"):
+        return np.array(model.joints[joint].extract().axis), kind in SLIDING
+    return np.eye(3)[AXES[kind[-1]]], kind in SLIDING
+
+
+def _motion(model: Any, joint: int, value: float) -> Any:
+    """Return the `pin.SE3` by which a joint moves what it carries.
+
+    Args:
+        model: The joint's.
+        joint: Its index.
+        value: Its coordinate [rad, m].
+    """
+    axis, slides = _axis(model, joint)
+    if slides:
+        return pin.SE3(np.eye(3), axis * value)
+    s, c = sincos(value)
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    square = matrix_product(cross, cross)
+    return pin.SE3(np.eye(3) + s * cross + (1.0 - c) * square, np.zeros(3))

@@ -1,0 +1,184 @@
+"""Joints of a URDF that move, stand and follow: against Pinocchio's reading of the whole file."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from evoexp.errors import EvoexpError
+from evoexp.numeric.elementary import DEGREE
+from evoexp.robots.assembly import Assembly
+from evoexp.robots.forward_kinematics import forward_kinematics
+from evoexp.robots.poses import frame_pose, local_pose
+from evoexp.robots.urdf import Urdf
+from evoexp.testing.small_conditions import conditions
+
+DATA = Path(__file__).parent / "data" / "two_arms"
+URDF, SRDF = DATA / "two_arms.urdf", DATA / "two_arms.srdf"
+FOLLOWING = {"left_coupler": ("left_elbow", -0.5, 0.2), "a_left_thumb": ("left_finger", 1.0, 0.0)}
+
+
+def robot(path: Path = URDF, **settings: Any) -> Urdf:
+    given = {"path": str(path), "srdf": str(SRDF), **settings}
+    found = Urdf.read_files(given, "robot")
+    for name in ("urdf", "srdf"):
+        found[name] = {"sha256": found[name]["sha256"]}
+    return Urdf.model_validate(found, strict=False)
+
+
+def whole_placements(path: Path, values: dict[str, float]) -> tuple[Any, Any, dict[str, Any]]:
+    """Return model, data and placements of the bodies by the whole URDF, every joint by name."""
+    text, no_limit = path.read_text(), '<limit effort="1" velocity="1"/></joint>'
+    # Pinocchio reads neither leftovers of fixed joints nor joints without a limit
+    text = text.replace('<limit lower="1" upper="-1"/><mimic joint="nothing"/>', "")
+    for name in ("right_upper", "left_thumb"):
+        head, tail = text.split(f'<child link="{name}"/>')
+        text = head + f'<child link="{name}"/>' + tail.replace("</joint>", no_limit, 1)
+    model = pin.buildModelFromXML(text)
+    geometry = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.COLLISION)
+    q = pin.neutral(model)
+    for joint in range(1, model.njoints):
+        value, place = values[model.names[joint]], model.idx_qs[joint]
+        if model.nqs[joint] == 2:
+            q[place : place + 2] = np.cos(value), np.sin(value)
+        else:
+            q[place] = value
+    data, placed = model.createData(), geometry.createData()
+    pin.updateGeometryPlacements(model, data, geometry, placed, q)
+    pin.updateFramePlacements(model, data)
+    names = [item.name.rpartition("_")[0] for item in geometry.geometryObjects]
+    return model, data, dict(zip(names, placed.oMg, strict=True))
+
+
+def agrees(assembly: Assembly, standing: dict[str, float], tool: str = "") -> None:
+    """Compare bodies, joints of the table and the tool's frame at random configurations."""
+    model = assembly.model
+    low, high = model.lowerPositionLimit, model.upperPositionLimit
+    free = [joint for joint in range(1, model.njoints) if model.nqs[joint] == 1]
+    for seed in range(20):
+        q = low + (high - low) * np.random.default_rng(seed).random(model.nq)
+        values = {model.names[joint]: float(q[model.idx_qs[joint]]) for joint in free}
+        values = standing | values
+        for name, (source, multiplier, offset) in FOLLOWING.items():
+            values[name] = multiplier * values[source] + offset
+        whole, data, expected = whole_placements(URDF, values)
+        own, placed = model.createData(), assembly.geometry.createData()
+        pin.updateGeometryPlacements(model, own, assembly.geometry, placed, q)
+        names = [item.name for item in assembly.geometry.geometryObjects]
+        assert sorted(names) == sorted(expected)
+        for name, placement in zip(names, placed.oMg, strict=True):
+            assert np.abs(placement.homogeneous - expected[name].homogeneous).max() < 1e-12
+        rotations, origins = forward_kinematics(assembly.table, q[:, None])
+        for joint in range(1, model.njoints):
+            frame = data.oMi[whole.getJointId(model.names[joint])]
+            turned = rotations[joint - 1, :, :, 0] @ assembly.table.alignment[joint - 1].T
+            assert np.abs(turned - frame.rotation).max() < 1e-12
+            assert np.abs(origins[joint - 1, :, 0] - frame.translation).max() < 1e-12
+        if tool:
+            end = assembly.tools[0]
+            local = local_pose(assembly.table, end.joint, end.rotation, end.position)
+            pose = frame_pose(assembly.table, end.joint - 1, local, q)
+            frame = data.oMf[whole.getFrameId(tool)]
+            assert np.abs(pose[9:] - frame.translation).max() < 1e-12
+            assert np.abs(pose[:9] - frame.rotation.ravel()).max() < 1e-12
+
+
+STANDING = {
+    "trunk_lift": 0.05,
+    "left_shoulder": 0.0,
+    "left_elbow": 0.0,
+    "left_finger": 0.01,
+    "right_shoulder": 0.0,
+    "right_elbow": 0.0,
+}
+
+
+def test_a_group_moves_and_the_other_joints_stand_at_the_limit_nearest_to_0() -> None:
+    assembly = robot(group="right_arm").build()
+    assert list(assembly.model.names) == ["universe", "right_shoulder", "right_elbow"]
+    agrees(assembly, STANDING, "right_fore")
+
+
+def test_joints_that_are_named_move_and_the_others_stand_where_they_are_told() -> None:
+    fixed = {"left_elbow": 30.0, "trunk_lift": 0.2, "left_finger": 0.03, "left_shoulder": -100.0}
+    found = robot(joints=["right_elbow", "right_shoulder"], fixed=fixed)
+    turned = {"left_elbow": 30.0 * DEGREE, "left_shoulder": -100.0 * DEGREE}
+    told = fixed | turned
+    agrees(found.build(), STANDING | told)
+
+
+def test_fields_at_their_defaults_are_no_part_of_the_identity() -> None:
+    plain = robot().canonical()
+    assert set(plain) == {"_target_", "revision", "urdf", "srdf"}
+    assert robot(fixed={"b": 1.0, "a": 2}).canonical()["fixed"] == [["a", 2.0], ["b", 1.0]]
+
+
+def test_limits_that_are_missing_are_given_by_settings() -> None:
+    model = (
+        robot(joints=["left_shoulder", "right_shoulder"], continuous_turns=2.5, turn_limit=90.0)
+        .build()
+        .model
+    )
+    assert model.upperPositionLimit / DEGREE == pytest.approx([900.0, 90.0])
+    assert np.array_equal(model.lowerPositionLimit, -model.upperPositionLimit)
+
+
+def test_two_groups_are_two_arms_and_share_the_trunk() -> None:
+    assembly = robot(groups=["right_arm", "torso"], tool_frames=["right_fore", "chest"])
+    with pytest.raises(EvoexpError, match="in which none hangs on a later one"):
+        assembly.build()
+    assembly = robot(groups=["torso", "right_arm"], tool_frames=["chest", "right_fore"]).build()
+    assert assembly.arm_slices.tolist() == [[0, 1], [1, 3]]
+    assert list(assembly.model.names)[1:] == ["trunk_lift", "right_shoulder", "right_elbow"]
+    names = [item.name for item in assembly.geometry.geometryObjects]
+    assert len(names) == len(set(names)) == 9 and "trunk" in names
+    assert frozenset(("chest", "right_upper")) in assembly.disabled
+    agrees(assembly, STANDING)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"group": "right_arms"}, "robot.group: must be a group of the SRDF (left_arm, left_gripp"),
+        ({"group": "hollow"}, "robot.group: must be a group with a joint that moves, was 'hollow'"),
+        ({"group": "loop"}, "robot.group: must be a group that does not contain itself, was 'loop"),
+        ({"groups": ["left_arm", "left"]}, "robot.groups: must be groups that have no joint in co"),
+        ({"groups": ["left_arm", "lift"]}, "robot.groups[1]: must be a group of the SRDF"),
+        ({"joints": ["right_elbo"]}, "was 'right_elbo'; did you mean 'right_elbow'?"),
+        ({"joints": ["left_mount"]}, "robot.joints: must be names of joints that move, was"),
+        ({"joints": ["left_coupler"]}, "move of their own, was \"'left_coupler', which follows 'l"),
+        (
+            {"joints": ["left_elbow"], "fixed": {"left_elbow": 1.0}},
+            "robot.fixed.left_elbow: must be left out: this joint moves, was 1.0",
+        ),
+        ({"fixed": {"left_elbo": 1.0}, "group": "torso"}, "did you mean 'left_elbow'?"),
+        (
+            {"fixed": {"trunk_lift": 0.4}, "group": "left_arm"},
+            "robot.fixed.trunk_lift: must be within the joint's limits [0.05, 0.3], was 0.4",
+        ),
+        (
+            {"fixed": {"left_coupler": 0.4}, "group": "torso"},
+            "robot.fixed.left_coupler: must be left out: this joint follows 'left_elbow'",
+        ),
+        ({"group": "left_arm", "joints": ["left_elbow"]}, "robot.joints: must be left out beside"),
+        ({"tool_frame": "trunk", "group": "left_arm"}, "robot.tool_frame: must be a frame that m"),
+        ({"groups": ["left_arm"], "tool_frames": ["a", "b"]}, "robot.tool_frames: must be a frame"),
+    ],
+)
+def test_refusals(settings: dict[str, Any], message: str) -> None:
+    with pytest.raises(EvoexpError) as found:
+        robot(**settings).build()
+    assert message in str(found.value)
+    assert "\n" not in str(found.value)
+
+
+def test_by_the_command_line() -> None:
+    words = (
+        *("scenario=urdf_reach", "planner=posture_es", "ga=corsepius", "robot=urdf"),
+        *("objective=corsepius_reach", "collision=corsepius_spheres", f"robot.path={URDF}"),
+        *(f"robot.srdf={SRDF}", "robot.group=left_arm", "robot.fixed={left_finger: 0.02}"),
+    )
+    (condition,) = conditions(*words).values()
+    assert condition.robot.canonical()["fixed"] == [["left_finger", 0.02]]

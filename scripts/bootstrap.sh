@@ -2,8 +2,9 @@
 #
 # A script that needs more than evoexp itself sets lock=requirements-test.lock first. The environment is built anew when
 # a lock or the checkout's place changes; where only the project's own metadata changed (entry points, say), evoexp alone
-# is installed again. With uv where it is installed (several times faster), with pip otherwise. Nothing but
-# Python >= 3.11 is needed beforehand.
+# is installed again. With uv, which is several times faster than pip: the one that is installed, or the one that
+# requirements-uv.lock names, which pip fetches from where it is set up to look; with pip alone where that cannot be had.
+# Nothing but Python >= 3.11 is needed beforehand.
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd -P)
 venv="$root/.venv"
@@ -38,39 +39,89 @@ find_python() {  # never that of a virtual environment: it might be the one that
   return 1
 }
 
-choose_tool() {
-  if command -v uv >/dev/null 2>&1; then
-    # Bytecode ahead of use only where Python may not write it on first use; every start would take seconds longer.
-    tool=(uv pip install --quiet ${PYTHONDONTWRITEBYTECODE:+--compile-bytecode} --python "$PYTHON")
+find_pip() {  # that of the environment, or the wheel that comes with Python: an environment without pip is made faster
+  if "$PYTHON" -c 'import pip' 2>/dev/null; then
+    pip=("$PYTHON" -m pip)
   else
-    tool=("$PYTHON" -m pip install --quiet --disable-pip-version-check)
+    pip=("$PYTHON" "$("$PYTHON" -c \
+      'import ensurepip, pathlib; print(*sorted(pathlib.Path(ensurepip.__file__).parent.glob("_bundled/pip-*.whl"))[-1:])')/pip")
+    [ -e "${pip[1]%/pip}" ] || { "$PYTHON" -m ensurepip >/dev/null && pip=("$PYTHON" -m pip); }
   fi
+}
+
+# pip's settings as uv's: whoever told pip where packages are, and how to get there, need not tell uv.
+settings_for_uv='
+import ast, os, shlex, sys
+found = {}
+lines = [line.partition("=")[::2] for line in sys.stdin.read().splitlines() if "=" in line]
+for section in ("global", "install", ":env:"):  # the later ones count more
+    for key, value in lines:
+        if key.rpartition(".")[0] == section:
+            found[key.rpartition(".")[2]] = str(ast.literal_eval(value)).split()
+names = {"index-url": "UV_DEFAULT_INDEX", "extra-index-url": "UV_INDEX", "find-links": "UV_FIND_LINKS",
+         "cert": "SSL_CERT_FILE", "client-cert": "SSL_CLIENT_CERT", "timeout": "UV_HTTP_TIMEOUT",
+         "trusted-host": "UV_INSECURE_HOST", "proxy": "ALL_PROXY"}
+given = {names[key]: ("," if key == "find-links" else " ").join(words) for key, words in found.items() if key in names}
+if found.get("no-index", ["0"])[0].lower() in ("1", "true", "yes", "on"):
+    given["UV_NO_INDEX"] = "1"
+given["UV_INDEX_STRATEGY"] = "unsafe-best-match"  # as pip: all places count alike, the hashes decide
+for name, value in given.items():
+    if not os.environ.get(name) and not (name == "UV_DEFAULT_INDEX" and os.environ.get("UV_INDEX_URL")):
+        print(f"export {name}={shlex.quote(value)}")
+'
+
+find_uv() {  # sets uv and its settings, if there is one
+  uv=$(command -v uv || true)
+  if [ -z "$uv" ] && [ ! -x "$venv/bin/uv" ] && [ "${#pip[@]}" -gt 0 ]; then
+    "${pip[@]}" install --quiet --disable-pip-version-check --require-hashes --no-deps --only-binary :all: \
+      -r "$root/requirements-uv.lock" >/dev/null 2>&1 || rm -f "$venv/bin/uv"
+  fi
+  [ -n "$uv" ] || [ ! -x "$venv/bin/uv" ] || uv="$venv/bin/uv"
+  if [ -n "$uv" ] && [ "${#pip[@]}" -gt 0 ]; then
+    uv_settings=$("${pip[@]}" --disable-pip-version-check config list 2>/dev/null | "$PYTHON" -c "$settings_for_uv" || true)
+  fi
+}
+
+with_uv() {  # whatever fails is tried again with pip, which says what is wrong
+  # Bytecode ahead of use only where Python may not write it on first use; every start would take seconds longer.
+  (
+    eval "$uv_settings"
+    exec "$uv" pip install --quiet ${PYTHONDONTWRITEBYTECODE:+--compile-bytecode} --python "$PYTHON" "$@" 2>/dev/null
+  ) || with_pip "$@"
+}
+
+with_pip() {
+  "$PYTHON" -m pip --version >/dev/null 2>&1 || "$PYTHON" -m ensurepip >/dev/null || return
+  "$PYTHON" -m pip install --quiet --disable-pip-version-check "$@"
+}
+
+choose_tool() {
+  pip=() uv="" uv_settings=""
+  find_pip 2>/dev/null || pip=()
+  find_uv
+  tool=with_pip
+  [ -z "$uv" ] || tool=with_uv
 }
 
 create() {
   local base
   base=$(find_python) || return
   rm -rf "$venv"
-  if command -v uv >/dev/null 2>&1; then
-    echo "evoexp: creating $venv with uv (once, about a minute)" >&2
-    uv venv --quiet --python "$base" "$venv" || return
-  else
-    echo "evoexp: creating $venv with pip (once, some minutes; uv is faster)" >&2
-    "$base" -m venv "$venv" || return
-  fi
+  echo "evoexp: creating $venv (once; about a minute, some minutes where uv cannot be had)" >&2
+  "$base" -m venv --without-pip "$venv" || return
   mkdir -p "$marks"
 }
 
 install_lock() {  # $1: name of the lock
   # The build tools first: one dependency exists only as a source archive, and its build must not fetch others.
   awk '/^[^ ]/ { wanted = /^(packaging|setuptools|wheel)==/ } wanted' "$root/$1" >"$venv/build.lock" &&
-    "${tool[@]}" --require-hashes --no-deps -r "$venv/build.lock" &&
-    "${tool[@]}" --require-hashes --no-build-isolation -r "$root/$1" &&
+    "$tool" --require-hashes --no-deps -r "$venv/build.lock" &&
+    "$tool" --require-hashes --no-build-isolation -r "$root/$1" &&
     note_installed "$1"
 }
 
 install() {
-  local tool one
+  local tool one pip uv uv_settings
   exec 9<"$root/requirements.lock" || return
   "$(find_python)" -c 'import fcntl; fcntl.flock(9, fcntl.LOCK_EX)' || return  # one process at a time; freed at its end
   is_complete && return
@@ -81,7 +132,7 @@ install() {
   choose_tool
   is_installed requirements.lock || install_lock requirements.lock || return
   is_installed "$lock" || install_lock "$lock" || return
-  is_installed evoexp || { "${tool[@]}" --no-deps --no-build-isolation -e "$root" && note_installed evoexp; }
+  is_installed evoexp || { "$tool" --no-deps --no-build-isolation -e "$root" && note_installed evoexp; }
 }
 
 if ! is_complete; then

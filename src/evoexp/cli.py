@@ -23,7 +23,7 @@ from evoexp.commands.standard_streams import (
 )
 from evoexp.errors import EvoexpError
 
-WITH_WORKERS = ("run", "reproduce")
+WITH_WORKERS = ("reproduce",)  # `run` starts them by itself, if there is anything to run
 KEPT = "finished replicates are kept, the same command runs the others"
 _DISK_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EIO}  # full, or defective
 
@@ -72,6 +72,7 @@ def _run(words: Sequence[str], is_process: bool) -> int:
     if is_process and chosen in WITH_WORKERS and not {"-h", "--help"} & set(words):
         importlib.import_module("evoexp.batch.workers").start_server()
     given = command_parser(chosen).parse_intermixed_args(words[1:])
+    given.is_process = is_process
     with contextlib.ExitStack() as stack:
         if folders := getattr(given, "config_dir", ()):
             from evoexp.configuration.search_path import searched_first

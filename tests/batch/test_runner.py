@@ -15,10 +15,11 @@ from batch_samples import WORDS, digests, new_batch, run
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoexp.batch import jobs, runner
+from evoexp.batch import fan_out as fanning
+from evoexp.batch import jobs
+from evoexp.batch.fan_out import MAX_BUNDLE, TASK_S, _Bundles, compile_all, fan_out
 from evoexp.batch.jobs import Job, Outcome, run_jobs
 from evoexp.batch.replicate import run_replicate
-from evoexp.batch.runner import MAX_BUNDLE, TASK_S, _Bundles, fan_out
 from evoexp.batch.workers import in_workers, loading
 from evoexp.cli import main
 from evoexp.condition import Condition
@@ -132,17 +133,17 @@ def test_kernels_are_compiled_once_for_conditions_that_differ_in_numbers(
     noted: set[str] = set()
     asked: list[bytes] = []
     from_json = Condition.from_json
-    monkeypatch.setattr(runner, "is_compiled", lambda kind, modules: kind in noted)
-    monkeypatch.setattr(runner, "note_compiled", lambda kind, modules: noted.add(kind))
+    monkeypatch.setattr(fanning, "is_compiled", lambda kind, modules: kind in noted)
+    monkeypatch.setattr(fanning, "note_compiled", lambda kind, modules: noted.add(kind))
     monkeypatch.setattr(
         Condition, "from_json", lambda text: (asked.append(text), from_json(text))[1]
     )
     texts = [faulty._replace(seed=seed).to_json() for seed in (0, 7, 12345)]
-    runner._compile([texts[0], *texts])
+    compile_all([texts[0], *texts])
     assert asked == texts[:1]
     assert len(noted) == 1
-    runner._compile([b"{}"])  # no condition: nothing is noted, and it is asked again
-    runner._compile([b"{}"])
+    compile_all([b"{}"])  # no condition: nothing is noted, and it is asked again
+    compile_all([b"{}"])
     assert asked[1:] == [b"{}", b"{}"]
     assert len(noted) == 1
 

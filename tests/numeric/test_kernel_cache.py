@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from evoexp.numeric import kept_files, kernel_cache, kernel_files
+from evoexp.numeric import code_keys, compiled_kinds, kept_files, kernel_cache, kernel_files
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.kernel_cache import code_key
 
@@ -24,29 +24,29 @@ def f(x: int) -> int:
     '''Add one.'''
     return x + 1
 """
-    plain = kernel_cache.parse(code, "evoexp")
-    assert kernel_cache.parse(worded, "evoexp") == plain
+    plain = code_keys.parse(code, "evoexp")
+    assert code_keys.parse(worded, "evoexp") == plain
     assert plain.imports == ("evoexp.records",)
-    assert kernel_cache.parse(code.replace(b"+ 1", b"+ 2"), "evoexp").digest != plain.digest
+    assert code_keys.parse(code.replace(b"+ 1", b"+ 2"), "evoexp").digest != plain.digest
 
 
 def test_a_module_is_known_by_all_code_that_it_imports(monkeypatch: pytest.MonkeyPatch) -> None:
-    reached = kernel_cache._reached("evoexp.planners.via_point_ga.planner")
+    reached = code_keys._reached("evoexp.planners.via_point_ga.planner")
     assert {
         "evoexp.collision.models.sphere_kernels",
         "evoexp.numeric.elementary",
         "evoexp.planners.via_point_ga.kernels",
     } <= reached
     assert "evoexp.planners.coevolution.kernels" not in reached
-    before = kernel_cache.module_key.__wrapped__("evoexp.paths.spline")
-    other = kernel_cache.Source("changed", ())
-    source_of = kernel_cache._source_of
+    before = code_keys.module_key.__wrapped__("evoexp.paths.spline")
+    other = code_keys.Source("changed", ())
+    source_of = code_keys._source_of
     monkeypatch.setattr(
-        kernel_cache,
+        code_keys,
         "_source_of",
         lambda name: other if name == "evoexp.numeric.compilation" else source_of(name),
     )
-    assert kernel_cache.module_key.__wrapped__("evoexp.paths.spline") != before
+    assert code_keys.module_key.__wrapped__("evoexp.paths.spline") != before
 
 
 def test_kernels_are_kept_by_content_not_by_place(tmp_path: Path) -> None:
@@ -125,15 +125,15 @@ def test_where_kernels_cannot_be_kept_they_are_compiled_and_that_is_said_once(
 
 def test_what_is_compiled_is_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("EVOEXP_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(kernel_cache, "USED", set())
+    monkeypatch.setattr(kernel_files, "USED", set())
     modules = ("evoexp.paths.spline",)
-    assert not kernel_cache.is_compiled("a planner", modules)
-    kernel_cache.note_compiled("a planner", modules)
-    assert kernel_cache.is_compiled("a planner", modules)
-    assert not kernel_cache.is_compiled("another", modules)
-    assert not kernel_cache.is_compiled("a planner", ("evoexp.paths.walk",))
-    monkeypatch.setattr(kernel_cache, "_note", lambda *_: Path("/dev/null/no"))
-    kernel_cache.note_compiled("a planner", modules)  # cannot be written: no error
+    assert not compiled_kinds.is_compiled("a planner", modules)
+    compiled_kinds.note_compiled("a planner", modules)
+    assert compiled_kinds.is_compiled("a planner", modules)
+    assert not compiled_kinds.is_compiled("another", modules)
+    assert not compiled_kinds.is_compiled("a planner", ("evoexp.paths.walk",))
+    monkeypatch.setattr(compiled_kinds, "_note", lambda *_: Path("/dev/null/no"))
+    compiled_kinds.note_compiled("a planner", modules)  # cannot be written: no error
 
 
 def test_what_was_compiled_counts_no_longer_when_a_kernel_is_gone_or_damaged(
@@ -141,19 +141,18 @@ def test_what_was_compiled_counts_no_longer_when_a_kernel_is_gone_or_damaged(
 ) -> None:
     monkeypatch.setenv("EVOEXP_CACHE", str(tmp_path / "cache"))
     monkeypatch.setattr(kernel_files, "USED", used := set[Path]())
-    monkeypatch.setattr(kernel_cache, "USED", used)
     monkeypatch.setattr(kept_files.MESSAGES, "_said", set())
     folder = tmp_path / "cache" / "kernels" / "module" / "key"
     kernel_files.KernelFiles(folder, "f").save("double", b"code")
     assert len(used) == 2
 
     def is_compiled() -> bool:
-        kernel_cache._is_whole.cache_clear()  # as in another process
-        return kernel_cache.is_compiled("a planner", ())
+        compiled_kinds._is_whole.cache_clear()  # as in another process
+        return compiled_kinds.is_compiled("a planner", ())
 
     for each in ("f.nbi", next(folder.glob("*.nbc")).name):
         whole = (folder / each).read_bytes()
-        kernel_cache.note_compiled("a planner", ())
+        compiled_kinds.note_compiled("a planner", ())
         assert is_compiled()
         (folder / each).write_bytes(whole[:-1])
         assert not is_compiled()

@@ -64,8 +64,8 @@ def run_here(jobs: list[Job], files: tuple[bytes, ...]) -> list[Any]:
 
 def run_in_workers(jobs: list[Job], files: tuple[bytes, ...], num_workers: int) -> Iterable[Any]:
     from evoexp.attachments import keep_all
-    from evoexp.batch.runner import Job as Task
-    from evoexp.batch.runner import fan_out
+    from evoexp.batch.fan_out import fan_out
+    from evoexp.batch.jobs import Job as Task
     from evoexp.condition import Condition
     from evoexp.store.log_reader import read_log
 

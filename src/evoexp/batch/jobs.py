@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from evoexp.attachments import keep_all
-from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.records import ReplicateSummary
 
@@ -69,6 +68,8 @@ def run_jobs(jobs: Sequence[Job]) -> list[Outcome]:
     Returns:
         Their outcomes, one at least; no further replicate begins after `LONGEST_TASK_S`.
     """
+    from evoexp.batch.replicate import run_replicate  # and numba: a parent needs neither
+
     outcomes: list[Outcome] = []
     begun = time.perf_counter()
     for job in jobs:

@@ -1,5 +1,6 @@
 """Replicates that would take more memory than there is are refused before they begin."""
 
+import json
 import os
 from contextlib import suppress
 from pathlib import Path
@@ -8,7 +9,9 @@ from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.input_files import MEGABYTE
+from evoexp.registry import component_modules
 from evoexp.store.container import MAX_LOG
+from evoexp.store.kept_facts import kept_fact
 
 GIGABYTE = 1000 * MEGABYTE
 LEAST_RECORD = 250  # [B] of a generation in a log, without the paper's own terms
@@ -34,24 +37,22 @@ def allowed_memory(settings: RunnerSettings, num_workers: int) -> float:
 
 def replicate_memory(condition: Condition) -> int:
     """Estimate the memory that a replicate of a condition takes, its log included [B]."""
-    planner, problem = condition.prepare()
-    log = min((planner.num_generations + 1) * USUAL_RECORD, MAX_LOG)
-    return int(planner.memory(problem) + log)
+    generations, memory = _needs(condition)
+    return int(memory + min(generations * USUAL_RECORD, MAX_LOG))
 
 
 def refuse_large(condition: Condition, allowed: float, label: str = "") -> None:
     """Refuse a condition whose replicates would take too much memory, or too long a log.
 
     Args:
-        condition: Can be prepared.
+        condition: The condition.
         allowed: Memory of one replicate [B].
         label: Of the condition, for the error.
 
     Raises:
-        SettingError: If they would.
+        SettingError: If they would, or if the condition contradicts itself.
     """
-    planner, _ = condition.prepare()
-    generations = planner.num_generations + 1
+    generations, _ = _needs(condition)
     if generations * LEAST_RECORD > MAX_LOG:
         most = MAX_LOG // LEAST_RECORD
         must = f"of fewer than {most:,} generations: a log holds {MAX_LOG // MEGABYTE} MB"
@@ -61,3 +62,15 @@ def refuse_large(condition: Condition, allowed: float, label: str = "") -> None:
         whose = f"condition {label or condition.id[:12]}"
         must = f"at least {needed / GIGABYTE:,.2f}, the estimate of a replicate of {whose}"
         raise SettingError("runner.memory_gb", must, float(f"{allowed / GIGABYTE:.3g}"))
+
+
+def _needs(condition: Condition) -> tuple[int, float]:
+    """Return the records of a replicate's log, and the planner's estimate of its memory [B]."""
+
+    def find() -> list[float]:
+        planner, problem = condition.prepare()
+        return [planner.num_generations + 1, planner.memory(problem)]
+
+    text = condition.to_json()
+    generations, memory = kept_fact("needs", text, component_modules(json.loads(text)), find)
+    return int(generations), float(memory)

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio  # noqa: F401
 from joblib.externals.loky import process_executor  # noqa: F401
 
-from evoexp.batch import jobs  # noqa: F401
+from evoexp.batch import jobs, replicate  # noqa: F401
 from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.numeric.kept_files import damage_left_alone
 

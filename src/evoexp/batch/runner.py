@@ -5,38 +5,22 @@ mark of completion, so an interrupted batch is resumed by asking for it again.
 """
 
 import contextlib
-import itertools
-import json
-import re
-from collections import deque
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
-import joblib
-import numpy as np
-from joblib.externals.loky.process_executor import TerminatedWorkerError
-
-from evoexp.batch.jobs import Job, Outcome, load, run_jobs
+from evoexp.batch.jobs import Job, Outcome, load
+from evoexp.batch.known_times import LongestTimes, are_short
 from evoexp.batch.memory_limit import allowed_memory, refuse_large
 from evoexp.batch.runner_settings import RunnerSettings
-from evoexp.batch.workers import in_workers, loading, num_cores
 from evoexp.condition import Condition
-from evoexp.numeric.kernel_cache import is_compiled, note_compiled
-from evoexp.paths.motion import Motion
-from evoexp.planners.planner import judge_motion
 from evoexp.records import ReplicateSummary
-from evoexp.registry import component_modules, guests
+from evoexp.registry import guests
 from evoexp.store.identity import MANIFEST, restored_manifest
 from evoexp.store.manifest import manifest
 from evoexp.store.mending import lost_replicates, mend, needs_mending
 from evoexp.store.run_directory import RunDirectory, create_all, lock_all
 from evoexp.store.summaries import whole_logs, write_summary
-
-# [s] replicates are bundled into tasks of about this length; a task costs the parent some 2 ms
-TASK_S = 0.2
-MAX_BUNDLE = 64  # replicates per task at most, so that results keep streaming
-_NUMBER = re.compile(r"-?\d+(\.\d+)?([eE][-+]?\d+)?")
 
 
 class Batch:
@@ -82,15 +66,16 @@ class Batch:
         self._summarised: set[str] = set()  # conditions whose table is written
 
     def prepare(self) -> None:
-        """Check every condition against its robot and scenario, before anything is written.
+        """Check conditions against robot and scenario, before anything is written.
+
+        Those that nothing is missing of were checked when they were run.
 
         Raises:
             SettingError: If one contradicts itself, or takes more memory than there is.
         """
-        allowed = allowed_memory(self._settings, self._num_workers())
+        allowed = allowed_memory(self._settings, self.num_workers)
         missing = {job.condition_id for job in self.jobs}
         for key, (condition, _, notes) in self._wanted.items():
-            condition.prepare()
             if key in missing:
                 refuse_large(condition, allowed, notes.get("label", ""))
 
@@ -102,12 +87,14 @@ class Batch:
         Raises:
             Busy: If another process writes one of the runs.
         """
+        from evoexp.batch.fan_out import compile_all, fan_out, loading
+
         with lock_all(self.runs.values()):
             lost = {key: lost_replicates(run) for key, run in self.runs.items()}
             for key, run in self.runs.items():
                 mend(run, self._wanted[key][0].to_json())
             self.jobs = self._missing(lost)
-            num_workers = self._num_workers()
+            num_workers = self.num_workers
             config_jsons = list(dict.fromkeys(job.condition_json for job in self.jobs))
             files = list(dict.fromkeys(content for job in self.jobs for content in job.files))
             with loading(num_workers, load, config_jsons, files):
@@ -119,10 +106,13 @@ class Batch:
                 )
                 for key in dict.fromkeys(job.condition_id for job in self.jobs):
                     self.runs[key].note_plan(self._wanted[key][1])
-                _compile(config_jsons)
+                compile_all(config_jsons)
+            times = LongestTimes()
             try:
                 for outcomes in fan_out(self.jobs, num_workers):
+                    times.add(outcomes)
                     yield from self._store(outcomes)
+                times.keep({key: each[0].to_json() for key, each in self._wanted.items()})
             except OSError:  # a full disk: the table can be built from the logs at any time
                 raise
             except BaseException:
@@ -131,8 +121,15 @@ class Batch:
                 raise
             self._summarise_all()
 
-    def _num_workers(self) -> int:
-        return max(1, min(self._settings.num_workers or num_cores(), len(self.jobs)))
+    @property
+    def num_workers(self) -> int:
+        """Number of worker processes; 1: the replicates are run by this process."""
+        asked = self._settings.num_workers
+        if asked is None and are_short(self.jobs):
+            return 1
+        from evoexp.batch.workers import num_cores  # and joblib
+
+        return max(1, min(asked or num_cores(), len(self.jobs)))
 
     def _missing(self, lost: Mapping[str, set[int]]) -> list[Job]:
         """Return the jobs of missing replicates; references, which take longest, come first.
@@ -184,107 +181,3 @@ def _manifest(run: RunDirectory, config_json: bytes) -> dict[str, Any]:
 
 def _restored(run: RunDirectory) -> dict[str, Any]:
     return restored_manifest(run.path, run.condition_id) if run.completed() else {}
-
-
-def fan_out(jobs: Sequence[Job], num_workers: int) -> Iterator[list[Outcome]]:
-    """Run jobs in worker processes; yield outcomes as they come.
-
-    A worker that dies takes the pool with it, and everything in flight: each of those jobs then
-    runs alone, so that only the one that kills its worker fails; the others go on in a new pool.
-    """
-    waiting = deque(jobs)
-    while waiting:
-        if num_workers == 1:
-            yield run_jobs([waiting.popleft()])
-            continue
-        in_flight: dict[tuple[str, int], Job] = {}
-        bundles = _Bundles(waiting, in_flight, num_workers)
-        try:
-            for outcomes in in_workers(
-                num_workers, (joblib.delayed(run_jobs)(bundle) for bundle in bundles)
-            ):
-                bundles.took(outcomes)
-                yield outcomes
-        except TerminatedWorkerError:
-            for job in list(in_flight.values()):
-                yield [_run_alone(job)]
-
-
-class _Bundles:
-    """Takes waiting jobs into tasks of about `TASK_S`, by the times seen of late.
-
-    Before any is seen, tasks are long, and end when they take too long: replicates that need the
-    same library stand together, and are best run where it is loaded.
-    """
-
-    def __init__(
-        self, waiting: deque[Job], in_flight: dict[tuple[str, int], Job], num_workers: int
-    ) -> None:
-        self._waiting, self._in_flight, self._num_workers = waiting, in_flight, num_workers
-        self._bundles: dict[tuple[str, int], list[Job]] = {}  # those in flight, by their first jobs
-        self._seconds, self._count = 0.0, 0.0
-
-    def __iter__(self) -> Iterator[list[Job]]:
-        while self._waiting:
-            mean = self._seconds / self._count if self._count else 0.0
-            fair = -(-len(self._waiting) // (2 * self._num_workers))
-            size = max(1, min(MAX_BUNDLE, fair, int(TASK_S / max(mean, 1e-6))))
-            bundle = [self._waiting.popleft() for _ in range(min(size, len(self._waiting)))]
-            for job in bundle:
-                self._in_flight[job.key] = job
-            self._bundles[bundle[0].key] = bundle
-            yield bundle
-
-    def took(self, outcomes: Sequence[Outcome]) -> None:
-        """Note the outcomes of a task; jobs that it did not begin wait again.
-
-        Earlier times count half from now on, so that slow first jobs are soon forgotten.
-        """
-        left = self._bundles.pop((outcomes[0].condition_id, outcomes[0].replicate))[len(outcomes) :]
-        for job in reversed(left):
-            del self._in_flight[job.key]
-            self._waiting.appendleft(job)
-        self._seconds, self._count = self._seconds / 2.0, self._count / 2.0
-        for outcome in outcomes:
-            self._seconds += outcome.wall_s
-            self._count += 1
-            self._in_flight.pop((outcome.condition_id, outcome.replicate), None)
-
-
-def _run_alone(job: Job) -> Outcome:
-    """Run one job in a process of its own, and once more if that dies.
-
-    Which job had brought the pool down is not known.
-    """
-    trace = ""
-    for _ in range(2):
-        try:
-            ((outcome,),) = in_workers(2, [joblib.delayed(run_jobs)([job])])
-            return cast(Outcome, outcome)
-        except TerminatedWorkerError as error:
-            trace = str(error)
-    return Outcome(job.condition_id, job.replicate, "worker process died twice", trace, b"", 0.0)
-
-
-def _compile(config_jsons: Iterable[bytes]) -> None:
-    """Compile every kernel that some conditions need, once and here, unless they are kept."""
-    for text in config_jsons:
-        kind = _NUMBER.sub("0", text.decode())  # another number needs no other kernel
-        modules = set(component_modules(json.loads(text)))
-        if is_compiled(kind, modules):
-            continue
-        # A planner that fails does so again in its replicate, and is noted there.
-        with contextlib.suppress(Exception):
-            condition = Condition.from_json(text)
-            planner, problem = condition.prepare()
-            # A reference takes long, and mostly needs the kernels of the planner beside it.
-            if condition.is_reference:
-                planner = planner.planner
-            for generation in itertools.islice(planner.evolve(problem, condition.rng(0)), 2):
-                planner.evaluate(problem, generation.best)
-                motion = planner.motion(problem, generation.best)
-                judge_motion(planner, problem, motion)
-                # A motion that touches nothing needs the kernels of the closest approach.
-                if motion is not None:
-                    judge_motion(planner, problem, Motion(np.repeat(motion.q[:1], 2, axis=0)))
-            note_compiled(kind, modules)

@@ -111,9 +111,6 @@ def loading(num_workers: int, load: Callable[..., None], *arguments: Any) -> Ite
 
     A worker that dies meanwhile is no error: whoever gives work to workers starts new ones.
     """
-    if num_workers == 1:
-        yield
-        return
     loaded = in_workers(
         num_workers, (joblib.delayed(_load)(load, *arguments) for _ in range(num_workers))
     )

@@ -6,7 +6,6 @@ Every function returns one mapping with the keys of `KEYS`; `show --json` prints
 import hashlib
 import json
 import math
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,10 +16,10 @@ from evoexp import shipped
 from evoexp.attachments import PREFIX, keep_all
 from evoexp.condition import Condition, stored_config
 from evoexp.configuration.experiment import Experiment
-from evoexp.configuration.kept_facts import kept_fact
 from evoexp.errors import EvoexpError
 from evoexp.records import flatten
 from evoexp.registry import COMPONENTS, Registration, component_modules, registered
+from evoexp.store.kept_facts import kept_fact
 from evoexp.store.log_reader import read_log
 from evoexp.store.manifest import differences, environment
 from evoexp.store.run_directory import RunDirectory, outputs_root
@@ -155,9 +154,8 @@ def _installed_revisions(registrations: Sequence[Registration]) -> dict[str, Any
     def find() -> dict[str, Any]:
         return {each.name: each.load().revision for each in registrations}
 
-    if all(each.module in sys.modules for each in registrations):  # nothing is to be loaded
-        return find()
-    return dict(kept_fact("revisions", repr(registrations).encode(), find))
+    modules = [each.module for each in registrations]
+    return dict(kept_fact("revisions", repr(registrations).encode(), modules, find))
 
 
 def _named(config: Any) -> Iterator[tuple[str, Any]]:
@@ -239,8 +237,7 @@ def _notes(config_json: bytes) -> list[str]:
         return list(planner.notes(problem))
 
     try:
-        if set(component_modules(json.loads(config_json))) <= sys.modules.keys():
-            return find()
-        return list(kept_fact("notes", config_json, find))
+        modules = component_modules(json.loads(config_json))
+        return list(kept_fact("notes", config_json, modules, find))
     except EvoexpError as error:  # of another revision, or a package that is not installed
         return [str(error)]

@@ -16,7 +16,6 @@ from evoexp.batch.jobs import Outcome
 from evoexp.batch.runner import Batch
 from evoexp.commands.arguments import add_experiment_arguments, folder_words
 from evoexp.commands.console import add_columns, add_hash_column, new_table, plain_console
-from evoexp.commands.progress import BatchProgress
 from evoexp.condition import Condition
 from evoexp.configuration import expansions
 from evoexp.configuration.experiment import Experiment
@@ -35,9 +34,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Run; exit code 1 if a replicate failed."""
     console = plain_console()
-    experiments = expansions.expand(
-        arguments.overrides, multirun=arguments.multirun, only=arguments.only
-    )
+    asked: Any = {"multirun": arguments.multirun, "only": arguments.only}
+    if not expansions.is_kept(arguments.overrides, **asked):
+        _start_server(arguments)  # while experiments are composed
+    experiments = expansions.expand(arguments.overrides, **asked)
     for experiment in experiments:
         page_registration(experiment.report)  # refuses an unknown page before anything is run
     command = _command(arguments)
@@ -51,6 +51,8 @@ def main(arguments: argparse.Namespace) -> int:
         for labelled in experiment.conditions
     ]
     batch = Batch(wanted, experiments[0].runner, outputs_root())
+    if batch.num_workers > 1:
+        _start_server(arguments)
     batch.prepare()
     failures = _run(batch, wanted, console)
     try:
@@ -73,6 +75,14 @@ def main(arguments: argparse.Namespace) -> int:
     return 1 if failures else 0
 
 
+def _start_server(arguments: argparse.Namespace) -> None:
+    """Let workers be forked from a server that loads what they need meanwhile."""
+    if arguments.is_process:
+        from evoexp.batch.workers import start_server  # and joblib
+
+        start_server()
+
+
 def _command(arguments: argparse.Namespace) -> str:
     """Return the command as it can be typed again."""
     swept = ["-m"] if arguments.multirun else []
@@ -93,6 +103,8 @@ def _run(
     console.print(
         f"replicates of each condition, fixed before they run: {' or '.join(map(str, planned))}"
     )
+    from evoexp.commands.progress import BatchProgress
+
     failures = []
     with (
         BatchProgress(console, len(batch.jobs)) as progress,

@@ -27,11 +27,11 @@ from evoexp.condition import Condition
 from evoexp.configuration.experiment import Experiment, Labelled
 from evoexp.configuration.interpolations import MARK
 from evoexp.configuration.kept_condition import KeptCondition
-from evoexp.configuration.kept_facts import add_files, installed_code
 from evoexp.configuration.search_path import EXPERIMENT, file_directories, folders, is_file
 from evoexp.numeric.kept_files import cache_root
 from evoexp.report.report_settings import ReportSettings
 from evoexp.shipped import Option
+from evoexp.store.kept_facts import add_files, installed_code
 
 NUM_KEPT = 200  # [-] expansions, the newest ones
 _COMPOSERS = ("hydra-core", "omegaconf")
@@ -54,6 +54,12 @@ def expand(
     if path is not None and (files := _files(experiments)) is not None:
         _write(path, experiments, files)
     return experiments
+
+
+def is_kept(overrides: Sequence[str], *, multirun: bool = False, only: Sequence[str] = ()) -> bool:
+    """Return whether an expansion is kept, so that nothing has to be composed."""
+    path = _path(overrides, multirun, list(only))
+    return path is not None and path.is_file()
 
 
 def _files(experiments: Sequence[Experiment]) -> list[tuple[str, str]] | None:

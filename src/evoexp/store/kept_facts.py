@@ -11,6 +11,7 @@ import importlib.metadata
 import importlib.util
 import json
 import os
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -21,14 +22,17 @@ from evoexp.registry import COMPONENTS, Registration, registrations
 _LIBRARIES = ("numpy", "numba", "scipy", "pin", "coal")
 
 
-def kept_fact(kind: str, about: bytes, find: Callable[[], Any]) -> Any:
+def kept_fact(kind: str, about: bytes, modules: Iterable[str], find: Callable[[], Any]) -> Any:
     """Return a fact, from where it is kept if it was found before.
 
     Args:
         kind: Of the fact.
         about: Everything but the code that it follows from.
+        modules: Modules that are loaded to find it; where all of them are, it is found again.
         find: Finds it, as plain data; what it raises is not kept.
     """
+    if set(modules) <= sys.modules.keys():
+        return find()
     digest = hashlib.sha256(installed_code())
     digest.update(json.dumps([kind, *_versions()]).encode())
     digest.update(about)

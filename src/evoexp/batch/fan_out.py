@@ -1,0 +1,148 @@
+"""Fans jobs out to worker processes, once every kernel that they need is compiled."""
+
+import contextlib
+import itertools
+import json
+import re
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, cast
+
+from evoexp.batch.jobs import Job, Outcome, run_jobs
+from evoexp.condition import Condition
+from evoexp.numeric.compiled_kinds import is_compiled, note_compiled
+from evoexp.registry import component_modules
+
+# [s] replicates are bundled into tasks of about this length; a task costs the parent some 2 ms
+TASK_S = 0.2
+MAX_BUNDLE = 64  # replicates per task at most, so that results keep streaming
+_NUMBER = re.compile(r"-?\d+(\.\d+)?([eE][-+]?\d+)?")
+
+
+def fan_out(jobs: Sequence[Job], num_workers: int) -> Iterator[list[Outcome]]:
+    """Run jobs in worker processes; yield outcomes as they come.
+
+    A worker that dies takes the pool with it, and everything in flight: each of those jobs then
+    runs alone, so that only the one that kills its worker fails; the others go on in a new pool.
+    """
+    if num_workers == 1:
+        for job in jobs:
+            yield run_jobs([job])
+        return
+    import joblib  # which takes long to load
+    from joblib.externals.loky.process_executor import TerminatedWorkerError
+
+    from evoexp.batch.workers import in_workers
+
+    waiting = deque(jobs)
+    while waiting:
+        in_flight: dict[tuple[str, int], Job] = {}
+        bundles = _Bundles(waiting, in_flight, num_workers)
+        try:
+            for outcomes in in_workers(
+                num_workers, (joblib.delayed(run_jobs)(bundle) for bundle in bundles)
+            ):
+                bundles.took(outcomes)
+                yield outcomes
+        except TerminatedWorkerError:
+            for job in list(in_flight.values()):
+                yield [_run_alone(job)]
+
+
+def loading(
+    num_workers: int, load: Callable[..., None], *arguments: Any
+) -> contextlib.AbstractContextManager[None]:
+    """Call `load` in every worker while the body runs; without workers do nothing."""
+    if num_workers == 1:
+        return contextlib.nullcontext()
+    from evoexp.batch import workers
+
+    return workers.loading(num_workers, load, *arguments)
+
+
+class _Bundles:
+    """Takes waiting jobs into tasks of about `TASK_S`, by the times seen of late.
+
+    Before any is seen, tasks are long, and end when they take too long: replicates that need the
+    same library stand together, and are best run where it is loaded.
+    """
+
+    def __init__(
+        self, waiting: deque[Job], in_flight: dict[tuple[str, int], Job], num_workers: int
+    ) -> None:
+        self._waiting, self._in_flight, self._num_workers = waiting, in_flight, num_workers
+        self._bundles: dict[tuple[str, int], list[Job]] = {}  # those in flight, by their first jobs
+        self._seconds, self._count = 0.0, 0.0
+
+    def __iter__(self) -> Iterator[list[Job]]:
+        while self._waiting:
+            mean = self._seconds / self._count if self._count else 0.0
+            fair = -(-len(self._waiting) // (2 * self._num_workers))
+            size = max(1, min(MAX_BUNDLE, fair, int(TASK_S / max(mean, 1e-6))))
+            bundle = [self._waiting.popleft() for _ in range(min(size, len(self._waiting)))]
+            for job in bundle:
+                self._in_flight[job.key] = job
+            self._bundles[bundle[0].key] = bundle
+            yield bundle
+
+    def took(self, outcomes: Sequence[Outcome]) -> None:
+        """Note the outcomes of a task; jobs that it did not begin wait again.
+
+        Earlier times count half from now on, so that slow first jobs are soon forgotten.
+        """
+        left = self._bundles.pop((outcomes[0].condition_id, outcomes[0].replicate))[len(outcomes) :]
+        for job in reversed(left):
+            del self._in_flight[job.key]
+            self._waiting.appendleft(job)
+        self._seconds, self._count = self._seconds / 2.0, self._count / 2.0
+        for outcome in outcomes:
+            self._seconds += outcome.wall_s
+            self._count += 1
+            self._in_flight.pop((outcome.condition_id, outcome.replicate), None)
+
+
+def _run_alone(job: Job) -> Outcome:
+    """Run one job in a process of its own, and once more if that dies.
+
+    Which job had brought the pool down is not known.
+    """
+    import joblib
+    from joblib.externals.loky.process_executor import TerminatedWorkerError
+
+    from evoexp.batch.workers import in_workers
+
+    trace = ""
+    for _ in range(2):
+        try:
+            ((outcome,),) = in_workers(2, [joblib.delayed(run_jobs)([job])])
+            return cast(Outcome, outcome)
+        except TerminatedWorkerError as error:
+            trace = str(error)
+    return Outcome(job.condition_id, job.replicate, "worker process died twice", trace, b"", 0.0)
+
+
+def compile_all(config_jsons: Iterable[bytes]) -> None:
+    """Compile every kernel that some conditions need, once and here, unless they are kept."""
+    for text in config_jsons:
+        kind = _NUMBER.sub("0", text.decode())  # another number needs no other kernel
+        modules = set(component_modules(json.loads(text)))
+        if is_compiled(kind, modules):
+            continue
+        from evoexp.paths.motion import Motion  # and numba
+        from evoexp.planners.planner import judge_motion
+
+        # A planner that fails does so again in its replicate, and is noted there.
+        with contextlib.suppress(Exception):
+            condition = Condition.from_json(text)
+            planner, problem = condition.prepare()
+            # A reference takes long, and mostly needs the kernels of the planner beside it.
+            if condition.is_reference:
+                planner = planner.planner
+            for generation in itertools.islice(planner.evolve(problem, condition.rng(0)), 2):
+                planner.evaluate(problem, generation.best)
+                motion = planner.motion(problem, generation.best)
+                judge_motion(planner, problem, motion)
+                # A motion that touches nothing needs the kernels of the closest approach.
+                if motion is not None:
+                    judge_motion(planner, problem, Motion(motion.q[[0, 0]]))
+            note_compiled(kind, modules)

@@ -1,0 +1,156 @@
+"""The key of a module: a hash of all code that can change a kernel in it.
+
+That is its code and the code of every module that it imports, down to the last one, without
+comments, docstrings and annotations. So no stale kernel can be loaded, an edit recompiles only what
+depends on it, an edit of words recompiles nothing, and two checkouts share what is alike in them.
+"""
+
+import ast
+import contextlib
+import functools
+import hashlib
+import json
+import sys
+from collections.abc import Iterable, Iterator
+from importlib import metadata
+from pathlib import Path
+from typing import NamedTuple
+
+from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
+
+_PACKAGE = "evoexp"
+# Modules that keep kernels and change none; their own format is named by the folder `kernels`.
+_KEEPERS = {
+    f"evoexp.numeric.{name}" for name in ("code_keys", "kernel_cache", "kernel_files", "kept_files")
+}
+_ROOT = Path(__file__).parents[2]
+_files: dict[str, Path] = {}  # of modules that were found; others may be imported later
+_no_modules = set[str]()  # names of evoexp that are no modules: functions, classes
+
+
+class Source(NamedTuple):
+    """The code of one module, as far as it can change a compiled kernel.
+
+    Attributes:
+        digest: Of its syntax tree, without docstrings and annotations of functions.
+        imports: Dotted names that it imports; `package.name` may be a module or a name in one.
+    """
+
+    digest: str
+    imports: tuple[str, ...]
+
+
+@functools.cache
+def _compilers() -> tuple[str, ...]:
+    """Return the versions of what compiles kernels, without loading any of it."""
+    return metadata.version("numba"), metadata.version("llvmlite"), sys.version
+
+
+@functools.cache
+def module_key(module: str) -> str:
+    """Return the hash of a module's code and of all code that it imports from evoexp or its own.
+
+    Args:
+        module: Dotted name; one that cannot be found counts by its name alone.
+    """
+    digest = hashlib.sha256(" ".join(_compilers()).encode())
+    for name in sorted(_reached(module)):
+        source = _source_of(name)
+        digest.update(f"{name}\0{source.digest if source else ''}\0".encode())
+    return digest.hexdigest()
+
+
+def is_kernel_module(module: str) -> bool:
+    """Return whether a module is evoexp's, or imports something of it."""
+    if _file_of(module) is None:
+        return False
+    source = _source_of(module)
+    return source is not None and any(name.split(".")[0] == _PACKAGE for name in source.imports)
+
+
+def _reached(module: str) -> set[str]:
+    """Return a module and all modules that it imports, directly or not."""
+    found, waiting = {module}, [module]
+    while waiting:
+        source = _source_of(waiting.pop())
+        for name in source.imports if source else ():
+            inner = name if _file_of(name) is not None else name.rpartition(".")[0]
+            if inner not in found | _KEEPERS and _file_of(inner) is not None:
+                found.add(inner)
+                waiting.append(inner)
+    return found
+
+
+def _file_of(module: str) -> Path | None:
+    """Return the file of a module of evoexp or of a package that is imported; None for others."""
+    if module in _files or module in _no_modules:
+        return _files.get(module)
+    package, *parts = module.split(".")
+    if package == _PACKAGE:
+        root = _ROOT
+    else:
+        loaded = getattr(sys.modules.get(package), "__file__", None)
+        if loaded is None:
+            return None
+        root = Path(loaded).parents[1] if Path(loaded).stem == "__init__" else Path(loaded).parent
+    path = root.joinpath(package, *parts)
+    for candidate in (path.with_suffix(".py"), path / "__init__.py"):
+        if candidate.is_file():
+            _files[module] = candidate
+            return candidate
+    if package == _PACKAGE:
+        _no_modules.add(module)
+    return None
+
+
+def _source_of(module: str) -> Source | None:
+    """Return the code of a module; None for one of another package."""
+    path = _file_of(module)
+    return None if path is None else _read_source(module, path)
+
+
+@functools.cache
+def _read_source(module: str, path: Path) -> Source:
+    """Return the code of a module; parsed once per content and then kept beside the kernels."""
+    content = path.read_bytes()
+    package = module if path.name == "__init__.py" else module.rpartition(".")[0]
+    name = hashlib.sha256(f"{sys.version}\0{package}\0".encode() + content).hexdigest()[:32]
+    kept = cache_root() / "sources" / f"{name}.json"
+    with contextlib.suppress(FileNotFoundError, Damaged):
+        plain = json.loads(read_kept(kept))
+        return Source(plain["digest"], tuple(plain["imports"]))
+    source = parse(content, package)
+    with contextlib.suppress(OSError):
+        write_kept(kept, json.dumps(source._asdict()).encode())
+    return source
+
+
+def parse(content: bytes, package: str) -> Source:
+    """Return the code of a file, without comments, docstrings and annotations of functions.
+
+    Args:
+        content: Of the file.
+        package: Dotted name of the package that it is in, for relative imports.
+    """
+    tree, imports = ast.parse(content), set[str]()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            imports.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = package.rsplit(".", node.level - 1)[0] if node.level else ""
+            origin = ".".join(part for part in (base, node.module) if part)
+            imports.update(f"{origin}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            node.returns = None
+        elif isinstance(node, ast.arg):
+            node.annotation = None
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+            node.body = list(_without_docstring(node.body))
+    ours = sorted(name for name in imports if name.split(".")[0] in (_PACKAGE, *package.split(".")))
+    return Source(hashlib.sha256(ast.dump(tree).encode()).hexdigest(), tuple(ours))
+
+
+def _without_docstring(body: Iterable[ast.stmt]) -> Iterator[ast.stmt]:
+    for statement in body:
+        if not (isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)):
+            yield statement

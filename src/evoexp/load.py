@@ -12,8 +12,11 @@ import pandas as pd
 from evoexp.configuration import expansions
 from evoexp.configuration.search_path import is_file, options, searched_first
 from evoexp.errors import NothingStored, UnknownHash, UnknownOption
+from evoexp.store.run_context import ORIGIN, run_context
 from evoexp.store.run_directory import RunDirectory, outputs_root, resolve
 from evoexp.store.tables import read_generations, read_summaries
+
+SEED = "seed"
 
 
 class Frames(NamedTuple):
@@ -23,7 +26,8 @@ class Frames(NamedTuple):
         generations: One row per generation of every finished replicate, columns of
             `evoexp.records.GenerationRow`.
         summaries: One row per replicate, done or failed, columns of
-            `evoexp.records.ReplicateSummary`.
+            `evoexp.records.ReplicateSummary`, `seed`, and the settings in which the conditions
+            differ, by the names that they have in `summary.parquet`.
     """
 
     generations: pd.DataFrame
@@ -85,7 +89,24 @@ def load(
         run = _run(root, what, known)
         runs, labels = [run], [(run.hash12, run.condition_id)]
     summaries = read_summaries(runs, thorough=True)  # first: what is damaged is left out
+    summaries = summaries.assign(**_settings(runs, summaries))
     return Frames(_labelled(read_generations(runs), labels), _labelled(summaries, labels))
+
+
+def _settings(runs: Sequence[RunDirectory], summaries: pd.DataFrame) -> dict[str, pd.Series]:
+    """Return the columns that tell the conditions apart, and their seeds."""
+    contexts = {run.condition_id: run_context(run.path, summaries.columns) for run in runs}
+    names = dict.fromkeys(name for context in contexts.values() for name in context)
+    values = {name: [context.get(name) for context in contexts.values()] for name in names}
+    told = [
+        name
+        for name, own in values.items()
+        if name == SEED or (name not in ORIGIN and any(value != own[0] for value in own))
+    ]
+    return {
+        name: summaries["condition"].map(dict(zip(contexts, values[name], strict=True)))
+        for name in told
+    }
 
 
 def _run(outputs: Path, what: str, experiments: Sequence[str]) -> RunDirectory:

@@ -22,6 +22,7 @@ from evoexp.store.container import check
 from evoexp.store.damage import checked_summary, listed, reason, set_aside, warn
 from evoexp.store.files import write_file
 from evoexp.store.messages import field_types
+from evoexp.store.run_context import run_context, with_context
 from evoexp.store.run_directory import RunDirectory
 
 Runs = RunDirectory | Iterable[RunDirectory]
@@ -47,7 +48,7 @@ class _Summary(NamedTuple):
         return [name for name in self.files if not (name in self.damaged and _is_log(name))]
 
 
-_VERSION = 4  # of the table's columns and notes; another one is rebuilt
+_VERSION = 5  # of the table's columns and notes; another one is rebuilt
 _KEY = b"evoexp"
 # tables that this process wrote or read
 _KNOWN: dict[Path, tuple[tuple[int, int, int], _Summary]] = {}
@@ -92,7 +93,8 @@ def write_summary(
     }
     summary = _build(run, stored, stamps, rows, thorough)
     sink = pa.BufferOutputStream()
-    pq.write_table(summary.table, sink, compression="zstd", write_page_checksum=True)
+    table = with_context(summary.table, run_context(run.path, summary.table.column_names))
+    pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
     if run.summary_path.is_dir():
         set_aside(run.summary_path)
     write_file(run.summary_path, sink.getvalue().to_pybytes())
@@ -279,6 +281,7 @@ def _stored(run: RunDirectory) -> _Summary | None:
         with pq.ParquetFile(run.summary_path, page_checksum_verification=True) as file:
             table = file.read()
         notes = json.loads(table.schema.metadata[_KEY])
+        table = table.select(notes["columns"])
         valid = notes["version"] == _VERSION and notes["condition"] == run.condition_id
         valid = valid and all(table.schema.field(field.name).equals(field) for field in _BASE)
         summary = _Summary(table, notes["files"], notes["damaged"])
@@ -333,7 +336,7 @@ def _build(
     used = {name for row in rows_now for name, value in row.items() if value is not None} - base
     schema = pa.schema(_BASE + [pa.field(name, pa.float64()) for name in sorted(used)])
     notes = {"version": _VERSION, "condition": run.condition_id}
-    notes |= {"files": stamps, "damaged": damaged}
+    notes |= {"files": stamps, "damaged": damaged, "columns": schema.names}
     table = _table(rows_now, schema.with_metadata({_KEY: json.dumps(notes).encode()}))
     return _Summary(table, stamps, damaged)
 

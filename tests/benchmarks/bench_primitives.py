@@ -16,7 +16,7 @@ import pytest
 
 from evoexp.collision.models.primitives import PrimitiveCollision, shapes_of_geometry
 from evoexp.scenarios.obstacles import obstacle_table
-from references import arms_6r, primitives_numpy
+from references import arms_6r, arms_7r, primitives_numpy
 
 SIZE = 100
 IGNORED = [(1, arms_6r.FLOOR)]
@@ -85,6 +85,39 @@ def bench_collides(beside: Any, shapes: str, drawn: str) -> None:
         f"collisions of a 6R arm, {shapes}, {SIZE} {drawn} configurations",
         lambda: collision.collides(q),
         {name: (lambda one=one: one(q), SIZE, 1) for name, one in references.items()},
+        unit="configuration",
+        amount=SIZE,
+        repeat=10,
+    )
+
+
+@pytest.mark.parametrize("drawn", DRAWN)
+def bench_collides_7r(beside: Any, drawn: str) -> None:
+    """A 7R arm of 59 spheres among ten spheres: all answers, and whether any collides."""
+    model, table = arms_7r.model(), obstacle_table(arms_7r.OBSTACLES)
+    collision = PrimitiveCollision.build(model, arms_7r.shapes(), table, arms_7r.SELF_PAIRS)
+    q = getattr(arms_7r, drawn)(SIZE)
+    pool = pin.BroadPhaseManagerPool_DynamicAABBTreeCollisionManager(
+        model, arms_7r.geometry(model), 1
+    )
+    hits = pin.computeCollisionsInParallel(1, pool, q, True, False)
+    assert np.array_equal(collision.collides(q), hits)
+    edges = [np.ascontiguousarray(q[:, k : k + 20]) for k in range(0, SIZE, 20)]
+    beside(
+        f"collisions of a 7R arm, 59 spheres, {SIZE} {drawn} configurations",
+        lambda: collision.collides(q),
+        {
+            "coal, broad phase, 59 spheres": (
+                lambda: pin.computeCollisionsInParallel(1, pool, q, True, False),
+                SIZE,
+                1,
+            ),
+            "whether any of 20 collides": (
+                lambda: [collision.any_collides(edge) for edge in edges],
+                SIZE,
+                10,
+            ),
+        },
         unit="configuration",
         amount=SIZE,
         repeat=10,

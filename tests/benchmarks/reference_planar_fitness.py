@@ -16,7 +16,12 @@ import numpy as np
 
 from evoexp.condition import Condition
 from evoexp.configuration import compose
-from evoexp.records import FloatArray
+from evoexp.numeric.compilation import kernel
+from evoexp.numeric.named_tuples import named, plain
+from evoexp.objectives.string_fitness import StringTerms
+from evoexp.planners.via_point_ga.kernels import Judging, judge
+from evoexp.planners.via_point_ga.strings import Strings
+from evoexp.records import FloatArray, IntArray
 
 SOURCE = Path(__file__).with_suffix(".c")
 FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-shared", "-fPIC")
@@ -29,13 +34,15 @@ class Fitness(NamedTuple):
 
     Attributes:
         strings: (nq, POINTS + 1, individuals padded to whole vectors) [deg].
-        ours: Judges it by the planner; returns the costs.
+        ours: Judges it by the planner's kernel; returns the costs.
         theirs: Judges it by the C reference; returns the costs.
+        by_planner: Judges it as `Planner.cost` does, with the work of Python around the kernel.
     """
 
     strings: FloatArray
     ours: Callable[[], FloatArray]
     theirs: Callable[[], FloatArray]
+    by_planner: Callable[[], FloatArray]
 
 
 class _Arms(ctypes.Structure):
@@ -114,11 +121,31 @@ def prepared(when: str = "fresh", block: int = BLOCK) -> Fitness:
         function(ctypes.addressof(arms), strings.ctypes.data, BLOCK, cost.ctypes.data)
         return cost[:INDIVIDUALS]
 
+    judging = Strings(planner, problem).judging
+    lengths = np.empty((ARMS, BLOCK)), np.empty((ARMS, BLOCK))
+    terms = StringTerms(*lengths, np.empty(BLOCK), np.empty(BLOCK))
+    slices, settings, written = problem.arm_slices, plain(judging), plain(terms)
+
     def ours() -> FloatArray:
+        _judge(strings, slices, settings, written)
+        return terms.cost[:INDIVIDUALS]
+
+    def by_planner() -> FloatArray:
         found: FloatArray = planner.cost(problem, strings).cost
         return found[:INDIVIDUALS]
 
-    return Fitness(strings, ours, theirs)
+    return Fitness(strings, ours, theirs, by_planner)
+
+
+@kernel
+def _judge(
+    strings: FloatArray,
+    arm_slices: IntArray,
+    judging: tuple[Any, ...],
+    terms: tuple[Any, ...],
+) -> None:
+    """Judge a population as `advance` does, from tables that are quickly recognised."""
+    judge(strings, arm_slices, named(Judging, judging), named(StringTerms, terms))
 
 
 def _least(work: Callable[[], object], calls: int = 20) -> float:
@@ -133,6 +160,7 @@ def main() -> None:
     for when in ("fresh", "finished"):
         one = prepared(when)
         assert np.allclose(one.ours(), one.theirs(), rtol=0.0, atol=1e-9)
+        assert np.array_equal(one.ours(), one.by_planner())
         pairs = [(_least(one.ours), _least(one.theirs)) for _ in range(300)]
         ours, theirs = (1e6 * min(column) for column in zip(*pairs, strict=True))
         ratio = f"{theirs / ours:.2f}"

@@ -25,7 +25,7 @@ def touching(robot: Robot, spheres: int, radius: float = 0.5) -> SphereCollision
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
-@pytest.mark.parametrize("spheres", [1, 2, 5, 11])
+@pytest.mark.parametrize("spheres", [1, 2, 5, 11, 200])
 @pytest.mark.parametrize("count", [1, 9, 64, 8 * 64 + 5])
 def test_circles_at_equal_steps_collide_where_their_clearance_is_negative(
     robot: str, spheres: int, count: int

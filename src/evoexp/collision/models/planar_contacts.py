@@ -247,10 +247,11 @@ def _nearest_steps(
     # u the place on its line that is nearest, which is rounded to a step
     square, p = (dx * dx + dy * dy) * inverse, (ex * dx + ey * dy) * (2.0 * inverse)
     w, g, e2 = (fx * dx + fy * dy) * inverse, (ex * fx + ey * fy) * inverse, e2 * inverse
-    found, last = spread(np.inf), spread(m)
-    for step in range(int(n) + 1):
-        k = float(step)
-        u = w + g * k
-        nearest = lower(upper((u + _ROUND) - _ROUND, spread(0.0)), last)
-        found = lower(found, (square + (p + e2 * k) * k) + nearest * (nearest - (u + u)))
+    # from step to step u, the square and its increase grow by sums
+    u, increase, twice = w, p + e2, e2 + e2
+    found, nothing, last = spread(np.inf), spread(0.0), spread(m)
+    for _ in range(int(n) + 1):
+        nearest = lower(upper((u + _ROUND) - _ROUND, nothing), last)
+        found = lower(found, square + nearest * (nearest - (u + u)))
+        u, square, increase = u + g, square + increase, increase + twice
     return lower(least, found * f2)

@@ -51,3 +51,10 @@ def test_lanes_do_not_meet():
 def test_outputs_of_another_shape_are_refused():
     with pytest.raises(ValueError, match="shape"):
         path_lengths(np.zeros((6, 3, 8)), ARMS, np.zeros((3, 8)), np.zeros((2, 8)))
+
+
+@pytest.mark.parametrize("lanes", [4, 12])
+def test_lanes_that_fill_no_vectors_are_refused(lanes):
+    out = np.zeros((2, 3, lanes))
+    with pytest.raises(ValueError, match="multiple of 8"):
+        path_lengths(np.zeros((6, 3, lanes)), ARMS, out[0], out[1])

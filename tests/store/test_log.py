@@ -13,8 +13,10 @@ from mcap.reader import make_reader
 from store_samples import CONDITION, CONFIG, ENVIRONMENT, generations, summary, write
 
 from evoexp.records import FrontRow, GenerationRow
+from evoexp.store.digests import Chain, array_bytes
 from evoexp.store.log import Log
 from evoexp.store.log_reader import generation_columns, read_log, read_solution, read_summary
+from evoexp.store.messages import encode_generations
 
 FRONT = FrontRow(4, 1, np.array([[1.0, math.inf], [math.nan, -2.5], [-math.inf, 0.1]]))
 
@@ -201,3 +203,43 @@ def test_log_imports_no_tables() -> None:
     code += "assert not {'pandas', 'pyarrow', 'numba', 'scipy', 'pinocchio'} & set(sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_links_are_those_of_costs_one_by_one() -> None:
+    """Costs are searched for NaN many generations at a time.
+
+    A NaN counts as one whatever its bits; whole numbers may look like one.
+    """
+    other_nan = np.frombuffer(bytes.fromhex("010000000000f8ff"))
+    given, expected, rng = generations(150), [], np.random.default_rng(0)
+    for k in (3, 70, 149):
+        costs = given[k].costs.copy()
+        costs[2] = other_nan[0]
+        given[k] = given[k]._replace(costs=costs)
+    given[80] = given[80]._replace(costs=np.array([-1, 3]))
+    given[81] = given[81]._replace(costs=np.array([math.nan, 1.0], dtype=np.float32))
+    log, chain = Log(CONDITION, CONFIG, 7, rng), Chain(rng)
+    for generation in given:
+        log.write(generation)
+        costs, best = array_bytes(generation.costs), array_bytes(generation.best)
+        expected.append(chain.update(costs, best, chain.state()))
+        rng.random(3)
+    found = read_log(log.finish(summary()).content).generations
+    assert [row.chain for row in found] == expected
+
+
+@pytest.mark.parametrize("name", ["},{", "null", 'x":1},{"y', "{", "}"])
+def test_names_of_terms_may_look_like_json(name: str) -> None:
+    given = [
+        each._replace(terms={**each.terms, name: float(k)})
+        for k, each in enumerate(generations(70))
+    ]
+    rows = read_log(write(given).content).generations
+    assert [row.terms[name] for row in rows] == [float(k) for k in range(70)]
+
+
+def test_rows_together_are_the_rows_one_by_one() -> None:
+    rows = [{"index": k, "cost": k / 3.0, "solved": k > 2, "chain": f"{k:032x}"} for k in range(9)]
+    assert encode_generations(rows) == [orjson.dumps(row) for row in rows]
+    assert encode_generations(rows[:1]) == [orjson.dumps(rows[0])]
+    assert encode_generations([]) == []

@@ -20,6 +20,7 @@ from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
 from evoexp.registry import COMPONENTS, Registration, registrations
 
 _LIBRARIES = ("numpy", "numba", "scipy", "pin", "coal")
+_LOADED_HERE = set[str]()  # modules that were loaded only to find a fact
 
 
 def kept_fact(kind: str, about: bytes, modules: Iterable[str], find: Callable[[], Any]) -> Any:
@@ -28,10 +29,11 @@ def kept_fact(kind: str, about: bytes, modules: Iterable[str], find: Callable[[]
     Args:
         kind: Of the fact.
         about: Everything but the code that it follows from.
-        modules: Modules that are loaded to find it; where all of them are, it is found again.
+        modules: Modules that are loaded to find it; where all of them were before, it is found
+            again and not kept.
         find: Finds it, as plain data; what it raises is not kept.
     """
-    if set(modules) <= sys.modules.keys():
+    if set(modules) <= sys.modules.keys() - _LOADED_HERE:
         return find()
     digest = hashlib.sha256(installed_code())
     digest.update(json.dumps([kind, *_versions()]).encode())
@@ -39,7 +41,9 @@ def kept_fact(kind: str, about: bytes, modules: Iterable[str], find: Callable[[]
     path = cache_root() / "facts" / digest.hexdigest()[:32]
     with contextlib.suppress(FileNotFoundError, Damaged):
         return json.loads(read_kept(path))
+    before = set(sys.modules)
     found = find()
+    _LOADED_HERE.update(sys.modules.keys() - before)
     with contextlib.suppress(OSError):
         write_kept(path, json.dumps(found).encode())
     return found

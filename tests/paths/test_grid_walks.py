@@ -8,7 +8,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from evoexp.numeric.random_stream import Block, used_up
-from evoexp.paths.grid_walks import erase_loops, walk, walk_each
+from evoexp.paths.grid_walks import (
+    HEAVIEST,
+    erase_loops,
+    pack_weights,
+    walk,
+    walk_by_weights,
+    walk_each,
+)
+from evoexp.paths.grids import UNREACHED
 from paths.walked_worlds import POTENTIALS, SEEDS, SHAPES, World, as_path, nodes_of, without_loops
 
 
@@ -27,6 +35,50 @@ def test_a_single_walk_is_that_of_a_single_walker(
     trail = world.trail(iter(uniforms[7:].tolist()))
     assert taken[0] == 7 + len(trail) - 1
     assert nodes_of(path) == as_path(trail, erase, world.grid.num_nodes)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.tuples(*[st.integers(2, 7)] * 2),
+    st.floats(0.0, 0.5),
+    st.tuples(st.integers(1, 3), st.integers(1, 3)),
+    st.booleans(),
+    SEEDS,
+)
+def test_packed_weights_lead_to_the_same_nodes(
+    shape: tuple[int, ...], share: float, steps: tuple[int, int], erase: bool, seed: int
+) -> None:
+    world, rng = World(shape, share, seed, (steps[0], sum(steps))), np.random.default_rng(seed)
+    nodes, moves = world.grid.num_nodes, world.moves
+    weights = np.empty((1, nodes), dtype=np.uint64)
+    fronts = np.where(moves.steps == UNREACHED, 0, moves.steps)[None, :]
+    assert pack_weights(moves.neighbours, moves.potentials, fronts, weights)
+    moves = moves._replace(steps=fronts[0])
+    # numbers at the ends of the interval and at parts of a total, too
+    special = [0.0, 1.0 - 2.0**-53, *(k / total for total in range(2, 40) for k in range(total))]
+    uniforms = np.where(rng.random(5000) < 0.5, rng.choice(special, 5000), rng.random(5000))
+    found = []
+    for packed in (False, True):
+        path, place = np.zeros(nodes + 1, dtype=np.int32), np.zeros(nodes, dtype=np.int32)
+        draws = Block(uniforms, np.array([3]))
+        if packed:
+            own = weights[0]
+            walk_by_weights(draws, moves.neighbours, own, world.ends, erase, path, place)
+        else:
+            walk(draws, moves, world.ends, erase, path, place)
+        found.append((draws.taken[0], path[: path[0] + 1].tolist()))
+    assert found[0] == found[1]
+
+
+def test_weights_that_do_not_fit_are_not_packed() -> None:
+    for potentials, fits in (((1.0, 3.0), True), ((1.0, 3.5), False), ((1.0, 90.0), False)):
+        world = World((5, 5), 0.0, 0, potentials)
+        steps = world.moves.steps[None, :]
+        weights = np.empty(steps.shape, dtype=np.uint64)
+        own = world.moves.neighbours, world.moves.potentials
+        assert pack_weights(*own, steps, weights) == fits
+        if fits:
+            assert 1 < weights.view(np.uint8).max() <= HEAVIEST
 
 
 def test_numbers_that_do_not_suffice_are_said() -> None:

@@ -6,6 +6,7 @@ the path has that node at its place; so nothing needs to be cleared between path
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.random_stream import Block, used_up
@@ -45,6 +46,82 @@ def walk(
     place[node] = 1
     while node != target and at < num:
         node = _next_node(uniforms[at], moves.neighbours, moves.potentials, moves.steps, node)
+        at += 1
+        count += 1
+        trail[count] = node
+        place[node] = count
+    taken[0] = at if node == target else num + 1
+    _write(trail, count, erase, path, place)
+
+
+MOST_MOVES = 8  # of a node, for weights packed into one word
+HEAVIEST = 15  # weight: eight of them stay below 128
+_BYTES = np.uint64(0x0101010101010101)
+_HIGH_BITS = np.uint64(0x8080808080808080)
+
+
+@kernel
+def pack_weights(
+    neighbours: NodeArray, potentials: FloatArray, fronts: StepArray, out: NDArray[np.uint64]
+) -> bool:
+    """Write the weights of all moves toward all targets, see `walk`: one byte per move.
+
+    Args:
+        neighbours: (nodes, at most `MOST_MOVES`), see `grids.Grid`.
+        potentials: See `grids.Moves`.
+        fronts: (targets, nodes) steps to every node from each target.
+        out: (targets, nodes) written; the first move's weight is the lowest byte.
+
+    Returns:
+        False if a weight is no whole number up to `HEAVIEST`; then `out` is not complete.
+    """
+    neighbours, potentials, fronts, out = borrowed((neighbours, potentials, fronts, out))
+    for target in range(len(fronts)):
+        for node in range(len(neighbours)):
+            greatest, word = 0.0, np.uint64(0)
+            for move in range(neighbours.shape[1]):
+                if neighbours[node, move] >= 0:
+                    greatest = max(greatest, potentials[fronts[target, neighbours[node, move]]])
+            for move in range(neighbours.shape[1]):
+                if neighbours[node, move] >= 0:
+                    weight = greatest - potentials[fronts[target, neighbours[node, move]]] + 1.0
+                    if weight > HEAVIEST or weight != np.floor(weight):
+                        return False
+                    word |= np.uint64(int(weight)) << np.uint64(8 * move)
+            out[target, node] = word
+    return True
+
+
+@kernel
+def walk_by_weights(
+    draws: Block,
+    neighbours: NodeArray,
+    weights: NDArray[np.uint64],
+    ends: tuple[int, int],
+    erase: bool,
+    path: NodeArray,
+    place: NodeArray,
+) -> None:
+    """Write the same path as `walk`, by weights (nodes,) of `pack_weights` toward its target.
+
+    Whole weights and their differences are exact, so the part of a uniform number in front of the
+    point decides. The sums of bytes up to each move are those of one multiplication; the move is
+    the number of sums that do not pass that part.
+    """
+    uniforms, taken = draws.uniforms, draws.taken
+    node, target = np.uint64(ends[0]), np.uint64(ends[1])
+    at, num, count = taken[0], len(uniforms), 1
+    trail = np.empty(num - min(at, num) + 2, np.int32)
+    trail[1] = node
+    place[node] = 1
+    while node != target and at < num:
+        sums = weights[node] * _BYTES
+        total = sums >> np.uint64(56)
+        part = np.uint64(uniforms[at] * np.float64(total))
+        passed = ((part * _BYTES | _HIGH_BITS) - sums) & _HIGH_BITS
+        move = (passed >> np.uint64(7)) * _BYTES >> np.uint64(56)
+        # a node without a neighbour stays where it is
+        node = np.uint64(neighbours[node, move]) if total > np.uint64(0) else node
         at += 1
         count += 1
         trail[count] = node

@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from evoexp.collision.models.potential_fields import Fields, PotentialFields
 from evoexp.collision.scene import Scene, scene
@@ -22,7 +23,7 @@ from evoexp.errors import SettingError
 from evoexp.evolution.genetic_settings import ScaledGenetic
 from evoexp.numeric.random_stream import Draws
 from evoexp.objectives.path_cost import PathCost
-from evoexp.paths.grid_walks import walk_each
+from evoexp.paths.grid_walks import MOST_MOVES, pack_weights, walk_each
 from evoexp.paths.grids import UNREACHED, Moves, NodeArray, StepArray, spread_front
 from evoexp.paths.motion import Motion
 from evoexp.paths.walkers import LANES, WORDS, Choices, Walkers, choice_table
@@ -43,6 +44,7 @@ from evoexp.scenarios.grid_motion import GridMotion
 from evoexp.validation import Component, NonNegativeCount
 
 FEW_NODES = 2048  # the steps between all nodes of smaller grids are worked out once: at most 8 MB
+FEWER_NODES = 1200  # and the weights of all moves toward them: at most 12 MB
 FAULTS = "blocked_nodes", "forbidden_moves", "missed_ends"  # with one, a path costs inf
 STRETCH = 8  # generations that are computed in one call of a kernel, at most
 BLOCK = 16384  # uniform numbers drawn at once, at least
@@ -315,6 +317,7 @@ def _prepared(collision: PotentialFields, robot: FloorPlatform, scenario: GridMo
             "between"
         )
         raise SettingError("scenario.goal", must, list(scenario.goal))
+    fronts = _fronts(fields)
     world = World(
         own.neighbours,
         fields.num_moves,
@@ -322,7 +325,8 @@ def _prepared(collision: PotentialFields, robot: FloorPlatform, scenario: GridMo
         own.kinds,
         fields.unsafeness,
         fields.potentials,
-        _fronts(fields),
+        fronts,
+        _weights(fields, fronts),
     )
     moves = Moves(own.neighbours, fields.potentials, steps)
     bodies, margin = scene(robot.build(), scenario.bodies()), scenario.security_margin
@@ -344,3 +348,12 @@ def _fronts(fields: Fields) -> StepArray:
         source[0] = node
         spread_front(fields.grid.neighbours, fields.num_moves, source, steps, queue)
     return fronts
+
+
+def _weights(fields: Fields, fronts: StepArray) -> NDArray[np.uint64]:
+    """Return the weights of all moves toward all nodes; (0, nodes) where they do not fit."""
+    neighbours = fields.grid.neighbours
+    if neighbours.shape[1] > MOST_MOVES or len(fronts) > FEWER_NODES:
+        fronts = fronts[:0]
+    weights = np.empty(fronts.shape, dtype=np.uint64)
+    return weights if pack_weights(neighbours, fields.potentials, fronts, weights) else weights[:0]

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 
-from evoexp.attachments import attached, with_files
-from evoexp.errors import RevisionMismatch, SettingError, UnknownSetting
+from evoexp.attachments import SHA256, attached, keep, with_files
+from evoexp.errors import EvoexpError, RevisionMismatch, SettingError, UnknownSetting
 from evoexp.registry import component_class
 from evoexp.validation import LARGEST, TARGET, Component, build
 
@@ -20,6 +20,7 @@ from evoexp.validation import LARGEST, TARGET, Component, build
 _LARGEST = {"robot": 1e7, "scenario": 1e7, "planner": LARGEST}
 MAX_SEED = 2**128  # numpy's own seeds have as many bits
 PARTS = ("robot", "scenario", "planner")
+_pairs: dict[str, bytes] = {}  # a robot's settings → its derived pairs
 
 
 def read_files(config: Any, folders: Sequence[Path]) -> Any:
@@ -33,7 +34,27 @@ def read_files(config: Any, folders: Sequence[Path]) -> Any:
         config: Any nesting of mappings, lists and scalars.
         folders: Where paths are looked for that are not there from the current directory.
     """
-    return with_files(_component_files(config, ""), folders)
+    return _with_pairs(with_files(_component_files(config, ""), folders))
+
+
+def _with_pairs(config: Any) -> Any:
+    """Return plain data whose robot has the pairs of bodies derived that need no test."""
+    robot = config.get("robot") if isinstance(config, dict) else None
+    if not isinstance(robot, dict) or not isinstance(robot.get(TARGET), str):
+        return config
+    kind: Any = component_class(robot[TARGET], "robot")
+    if not hasattr(kind, "wants_pairs") or not kind.wants_pairs(robot):
+        return config
+    text = json.dumps(robot, sort_keys=True, default=str)
+    if text not in _pairs:
+        from evoexp.collision.derived_pairs import derive_pairs  # and coal, for URDFs only
+
+        try:
+            built = build(robot, component_class, "robot", _LARGEST["robot"]).build()
+        except EvoexpError:  # said where the robot is needed
+            return config
+        _pairs[text] = derive_pairs(built).to_json()
+    return {**config, "robot": {**robot, "pairs": {SHA256: keep(_pairs[text])}}}
 
 
 def _component_files(value: Any, field: str) -> Any:

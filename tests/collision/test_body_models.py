@@ -5,7 +5,6 @@ import pytest
 
 from evoexp.collision.models.body_models import BodyCapsules, BodyModel, SphereSets
 from evoexp.collision.scene import obstacle_shapes
-from evoexp.errors import SettingError
 from evoexp.robots.assembly import Assembly
 from evoexp.scenarios.obstacles import ObstacleTable, obstacle_table
 from matrix import first
@@ -73,13 +72,14 @@ def test_pairs_that_are_left_out_never_or_always_touch(name: str) -> None:
     assembly, _ = robot(name)
     model = MODELS["spheres"].bind(assembly)
     every = {(a, b) for a in range(len(model.names)) for b in range(a + 1, len(model.names))}
-    assert sorted(every) == sorted([*model.pairs, *model.adjacent, *model.always, *model.never])
+    found = model.sorted_pairs
+    assert sorted(every) == sorted([*model.pairs, *found.adjacent, *found.always, *found.never])
     items = assembly.geometry.geometryObjects
     data = assembly.model.createData()
     request, result = coal.CollisionRequest(), coal.CollisionResult()
     for one in random_q(assembly, 1500).T:
         pin.forwardKinematics(assembly.model, data, np.ascontiguousarray(one))
-        for pairs, expected in ((model.never, False), (model.always, True)):
+        for pairs, expected in ((found.never, False), (found.always, True)):
             for pair in pairs:
                 places = [data.oMi[items[k].parentJoint] * items[k].placement for k in pair]
                 frames = [coal.Transform3s(place.rotation, place.translation) for place in places]
@@ -93,18 +93,23 @@ def test_the_derived_pairs_are_those_one_would_name() -> None:
     assembly, _ = robot("manus")
     model = MODELS["spheres"].bind(assembly)
     named = lambda pairs: {frozenset((model.names[a], model.names[b])) for a, b in pairs}  # noqa: E731
-    assert frozenset(("wrist", "hand")) in named(model.always)
-    assert frozenset(("upper_arm", "wrist")) in named(model.never)
+    assert frozenset(("wrist", "hand")) in named(model.sorted_pairs.always)
+    assert frozenset(("upper_arm", "wrist")) in named(model.sorted_pairs.never)
     assert frozenset(("upper_arm", "hand")) in named(model.pairs)
-    assert frozenset(("hand", "finger_left")) in named(model.adjacent)
+    assert frozenset(("hand", "finger_left")) in named(model.sorted_pairs.adjacent)
 
 
-def test_covers_that_always_touch_are_refused() -> None:
+def test_covers_that_always_touch_are_left_to_the_certifier() -> None:
     assembly, _ = robot("puma560")
-    with pytest.raises(
-        SettingError, match="closer to the bodies: the covers of .* touch in every posture"
-    ):
-        SphereSets(inflation=0.3).bind(assembly)
+    close, wide = (SphereSets(inflation=each).bind(assembly) for each in (0.01, 0.3))
+    assert close.sorted_pairs.overlapping == ()
+    overlapping = wide.sorted_pairs.overlapping
+    assert overlapping
+    assert sorted([*wide.pairs, *overlapping]) == sorted(close.pairs)
+    assert sorted(wide.sorted_pairs.judged) == sorted(close.sorted_pairs.judged)
+    # of these pairs, the covers alone would have no posture free
+    q = random_q(assembly, 200)
+    assert not wide.collision(obstacle_table(())).collides(q).all()
 
 
 def test_what_may_touch_is_not_tested() -> None:

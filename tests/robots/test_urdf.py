@@ -84,7 +84,8 @@ def test_files_travel_with_the_log(tmp_path: Path) -> None:
     content = run_replicate(found, 0).content
     attachments = read_log(content).attachments
     contents = {data for name, data in attachments.items() if name.startswith(PREFIX)}
-    assert contents == {path.read_bytes() for path in DATA.iterdir()}
+    pairs = found.robot.pairs.content  # type: ignore[attr-defined]
+    assert contents == {pairs, *(path.read_bytes() for path in DATA.iterdir())}
     log = tmp_path / "0000.mcap"
     log.write_bytes(content)
     assert reproduce_log(log).matches
@@ -238,6 +239,6 @@ def test_frames_and_files_that_are_not_there(overrides: tuple[str, ...], message
 
 def test_a_configuration_holds_hashes_only() -> None:
     config = json.loads(condition().to_json())["robot"]
-    assert set(config) == {"_target_", "revision", "urdf", "meshes"}
+    assert set(config) == {"_target_", "revision", "urdf", "meshes", "pairs"}
     assert config["meshes"][0]["name"] == "package://ur5_like/hand.obj"
     assert Condition.from_json(condition().to_json()).id == condition().id

@@ -12,6 +12,7 @@ import pinocchio as pin
 
 from evoexp.collision.body_table import BodyTable, body_table
 from evoexp.collision.box_support import coal
+from evoexp.collision.derived_pairs import unjudged_pairs
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.kinematics import KinematicTable, kinematic_table
@@ -116,7 +117,7 @@ def scene(
         assembly: The robot; links without names of their own are named `arm_1_link_1` and so on.
         obstacles: Settings of obstacles, or their table; named `obstacle_1` and so on.
         self_pairs: Whether links of one arm are watched, too, unless one joint carries both or they
-            meet at a joint.
+            meet at a joint, or the robot's own data says that they need not be.
     """
     table = obstacles if isinstance(obstacles, ObstacleTable) else obstacle_table(obstacles)
     geometry = pin.GeometryModel()
@@ -135,13 +136,13 @@ def scene(
         geometry.addGeometryObject(pin.GeometryObject(f"obstacle_{k + 1}", 0, 0, placement, shape))
     parents = assembly.model.parents
     joints = [item.parentJoint for item in bodies]
+    unjudged = unjudged_pairs(assembly)
     for a, one in enumerate(joints):
         for b, two in enumerate(joints[a + 1 :], start=a + 1):
             neighbours = one in (two, parents[two]) or two == parents[one]
-            apart = frozenset((bodies[a].name, bodies[b].name)) in assembly.disabled
-            if (arms[a] != arms[b] and not apart) or (
-                arms[a] == arms[b] and self_pairs and not neighbours
-            ):
+            if frozenset((bodies[a].name, bodies[b].name)) in unjudged:
+                continue
+            if arms[a] != arms[b] or (self_pairs and not neighbours):
                 geometry.addCollisionPair(pin.CollisionPair(a, b))
         for k in range(len(table.kind)):
             geometry.addCollisionPair(pin.CollisionPair(a, len(bodies) + k))

@@ -4,7 +4,8 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from evoexp.robots.assembly import Arm, Chain, Robot
+from evoexp.attachments import File
+from evoexp.robots.assembly import Arm, Assembly, Chain, Robot
 from evoexp.validation import TARGET
 
 
@@ -13,11 +14,27 @@ class Arms(Robot):
 
     Attributes:
         arms: The arms, each with its own base.
+        pairs: Pairs of bodies that need no test, derived when the files of arms out of a URDF are
+            read; None: none are.
     """
 
     component: ClassVar[str] = "arms"
 
     arms: Annotated[tuple[Chain, ...], Field(min_length=1)]
+    pairs: File | None = None
+
+    @classmethod
+    def wants_pairs(cls, settings: dict[str, Any]) -> bool:
+        """Whether pairs are still to be derived: where an arm comes out of a URDF."""
+        arms = settings.get("arms")
+        found = isinstance(arms, list) and any(
+            isinstance(arm, dict) and arm.get(TARGET) == "urdf" for arm in arms
+        )
+        return found and settings.get("pairs") is None
+
+    def build(self) -> Assembly:
+        """Return the robot with its derived pairs."""
+        return super().build()._replace(pairs=self.pairs.content if self.pairs else None)
 
     @classmethod
     def read_files(cls, settings: dict[str, Any], field: str) -> dict[str, Any]:

@@ -48,6 +48,7 @@ class Assembly(NamedTuple):
         body_arms: Which arm each body belongs to.
         tools: The tool's frame of each arm.
         disabled: Pairs of bodies' names that are never judged (an SRDF's).
+        pairs: Data of `collision.derived_pairs`, attached to the condition; None: there is none.
     """
 
     model: Any  # pin.Model
@@ -58,6 +59,7 @@ class Assembly(NamedTuple):
     body_arms: tuple[int, ...]
     tools: tuple[Tool, ...] = ()
     disabled: frozenset[frozenset[str]] = frozenset()
+    pairs: bytes | None = None
 
     @property
     def num_arms(self) -> int:
@@ -102,6 +104,11 @@ class Robot(Component):
     def chains(self) -> tuple[Arm, ...]:
         """Return the arms, in the order of their slices of q."""
         raise NotImplementedError
+
+    @classmethod
+    def wants_pairs(cls, settings: dict[str, Any]) -> bool:
+        """Whether plain settings are to be given derived pairs of bodies, as data."""
+        return False
 
     def build(self) -> Assembly:
         """Append all arms to one model.

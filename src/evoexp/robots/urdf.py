@@ -15,7 +15,7 @@ from pydantic import BeforeValidator
 
 from evoexp.attachments import SHA256, File, keep
 from evoexp.errors import SettingError, nearest
-from evoexp.robots.assembly import Arm, Chain
+from evoexp.robots.assembly import Arm, Assembly, Chain
 from evoexp.robots.bodies import Point3, placed
 from evoexp.robots.joint_choice import joint_roles, standing_values
 from evoexp.robots.mesh_files import MESHES, mesh_content
@@ -68,6 +68,7 @@ class Urdf(Chain):
         slide_limit: How far a sliding joint moves to either side, then [m].
         base: Whether planar and floating joints stand still (fixed) or move (free); or the whole
             robot moves, as by a planar or floating joint below its root.
+        pairs: Pairs of bodies that need no test, derived when the files are read; None: none are.
     """
 
     component: ClassVar[str] = "urdf"
@@ -88,6 +89,16 @@ class Urdf(Chain):
     turn_limit: Positive = 180.0
     slide_limit: Positive = 1.0
     base: Literal["fixed", "free", "planar", "floating"] = "fixed"
+    pairs: File | None = None
+
+    @classmethod
+    def wants_pairs(cls, settings: dict[str, Any]) -> bool:
+        """Whether pairs are still to be derived."""
+        return settings.get("pairs") is None and "urdf" in settings
+
+    def build(self) -> Assembly:
+        """Return the robot with its derived pairs."""
+        return super().build()._replace(pairs=self.pairs.content if self.pairs else None)
 
     @classmethod
     def read_files(cls, settings: dict[str, Any], field: str) -> dict[str, Any]:

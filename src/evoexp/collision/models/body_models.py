@@ -8,26 +8,16 @@ on coal's geometry.
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
-from evoexp.collision.body_table import body_table
-from evoexp.collision.box_support import coal
+from evoexp.collision.derived_pairs import Pair
 from evoexp.collision.models.body_covers import Cover, capsule_cover, sphere_cover
+from evoexp.collision.models.body_pairs import BodyPairs, body_pairs
 from evoexp.collision.models.inner_balls import inner_balls
 from evoexp.collision.models.primitive_tables import Shapes
 from evoexp.collision.models.primitives import PrimitiveCollision
-from evoexp.collision.motion_bounds import pair_reaches, reaches
-from evoexp.errors import SettingError
-from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
-from evoexp.scenarios.obstacles import ObstacleTable, obstacle_table
+from evoexp.scenarios.obstacles import ObstacleTable
 from evoexp.validation import Component, NonNegative, Positive
-
-SAMPLES = 1000  # random postures by which pairs that always touch are found
-GRID, COARSE_GRID = 128, 48  # values per joint by which pairs that never touch are proven
-NO_OBSTACLES = obstacle_table(())
-
-Pair = tuple[int, int]
 
 
 class CollisionModel(Component):
@@ -44,13 +34,12 @@ class CollisionModel(Component):
 
         Raises:
             UnsupportedShape: If a body cannot be covered.
-            SettingError: If covers touch in every posture although their bodies do not.
         """
         covers = [self.cover(item) for item in assembly.geometry.geometryObjects]
         shapes = cover_shapes(
             covers, [item.parentJoint for item in assembly.geometry.geometryObjects]
         )
-        return BodyModel(assembly, tuple(covers), shapes, *_derived_pairs(assembly, shapes))
+        return BodyModel(assembly, tuple(covers), shapes, body_pairs(assembly, shapes))
 
 
 class SphereSets(CollisionModel):
@@ -95,19 +84,18 @@ class BodyModel(NamedTuple):
         assembly: The robot.
         covers: One per body.
         shapes: All of them; a shape's body is its index among the geometry objects.
-        pairs: Pairs of bodies that are tested.
-        adjacent: Pairs on one joint or on neighbouring ones, which are not.
-        always: Pairs that touch in every posture sampled.
-        never: Pairs that are proven never to touch.
+        sorted_pairs: Pairs of bodies, by who judges them.
     """
 
     assembly: Assembly
     covers: tuple[Cover, ...]
     shapes: Shapes
-    pairs: tuple[Pair, ...]
-    adjacent: tuple[Pair, ...]
-    always: tuple[Pair, ...]
-    never: tuple[Pair, ...]
+    sorted_pairs: BodyPairs
+
+    @property
+    def pairs(self) -> tuple[Pair, ...]:
+        """Pairs of bodies that a search tests."""
+        return self.sorted_pairs.tested
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -214,142 +202,3 @@ def cover_shapes(covers: list[Cover], joints: list[int], first: int = 0) -> Shap
         np.concatenate([cover.radius for cover in covers]),
         np.repeat(np.arange(first, first + len(covers)), sizes),
     )
-
-
-def _derived_pairs(assembly: Assembly, shapes: Shapes) -> tuple[tuple[Pair, ...], ...]:
-    """Return the pairs that are tested, that are adjacent, that always touch, that never touch."""
-    items, parents = list(assembly.geometry.geometryObjects), assembly.model.parents
-    adjacent: list[Pair] = []
-    apart: list[Pair] = []
-    for a, one in enumerate(items):
-        for b, two in enumerate(items[a + 1 :], start=a + 1):
-            i, j = one.parentJoint, two.parentJoint
-            near = i == j or (i > 0 and parents[i] == j) or (j > 0 and parents[j] == i)
-            named = frozenset((one.name, two.name)) in assembly.disabled
-            (adjacent if near or named else apart).append((a, b))
-    if not apart or not np.isfinite(_limits(assembly)).all():
-        return tuple(apart), tuple(adjacent), (), ()
-    low, high = _limits(assembly)
-    rng = np.random.Generator(np.random.PCG64(0))  # no search draws from it
-    q = low[:, None] + (high - low)[:, None] * rng.random((len(low), SAMPLES))
-    touching = _coal_touches(assembly, apart, q)
-    always = [pair for pair, hits in zip(apart, touching, strict=True) if hits.all()]
-    rest = [pair for pair in apart if pair not in always]
-    never = []
-    for pair in rest:
-        if not touching[apart.index(pair)].any() and _never_touch(assembly, shapes, pair):
-            never.append(pair)
-        elif _alone(assembly, shapes, pair).collides(q).all():
-            names = " and ".join(items[body].name for body in pair)
-            raise SettingError(
-                "collision",
-                f"closer to the bodies: the covers of {names} touch in every posture",
-                None,
-            )
-    return (
-        tuple(pair for pair in rest if pair not in never),
-        tuple(adjacent),
-        tuple(always),
-        tuple(never),
-    )
-
-
-def _limits(assembly: Assembly) -> FloatArray:
-    """Return least and greatest q, (2, nq); infinite where a joint has no limit."""
-    model = assembly.model
-    limits = np.array([model.lowerPositionLimit, model.upperPositionLimit])
-    return np.where(np.abs(limits) < 1e6, limits, np.inf)
-
-
-def _coal_touches(assembly: Assembly, pairs: list[Pair], q: FloatArray) -> np.ndarray:
-    """Return which pairs touch on coal's geometry, (pairs, configurations)."""
-    model, geometry = assembly.model, assembly.geometry
-    data, placements = model.createData(), geometry.createData()
-    shapes = [item.geometry for item in geometry.geometryObjects]
-    request, result = coal.CollisionRequest(), coal.CollisionResult()
-    out = np.zeros((len(pairs), q.shape[1]), dtype=np.bool_)
-    for n in range(q.shape[1]):
-        pin.updateGeometryPlacements(
-            model, data, geometry, placements, np.ascontiguousarray(q[:, n])
-        )
-        places = [coal.Transform3s(place.rotation, place.translation) for place in placements.oMg]
-        for k, (a, b) in enumerate(pairs):
-            result.clear()
-            out[k, n] = (
-                coal.collide(shapes[a], places[a], shapes[b], places[b], request, result) > 0
-            )
-    return out
-
-
-def _alone(assembly: Assembly, shapes: Shapes, pair: Pair) -> PrimitiveCollision:
-    """Return the model of two bodies alone."""
-    kept = np.isin(shapes.labels, pair)
-    own = Shapes(
-        shapes.joint[kept],
-        shapes.start[kept],
-        shapes.end[kept],
-        shapes.radius[kept],
-        shapes.labels[kept],
-    )
-    return PrimitiveCollision.build(assembly.model, own, NO_OBSTACLES, (pair,))
-
-
-def _never_touch(assembly: Assembly, shapes: Shapes, pair: Pair) -> bool:
-    """Return whether two bodies are proven to stay apart.
-
-    The proof takes a grid over the joints between them and a bound of their motion within a step.
-    The distances are those of the covers or, where these are too close, coal's on a coarser grid.
-    Pairs with more than two joints between them are never proven, and so always tested.
-    """
-    items, table = list(assembly.geometry.geometryObjects), assembly.table
-    bodies = body_table(table, [items[body] for body in pair])
-    strokes = np.abs(_limits(assembly)).max(axis=0)
-    reach = reaches(table.chain, bodies.joint, bodies.from_origin, bodies.from_axis, strokes)
-    way = pair_reaches(np.array([[0, 1]], dtype=np.int64), reach)[0]  # (joints,)
-    moving = np.flatnonzero(way > 0.0)
-    if len(moving) > 2:
-        return False
-    q, slack = _grid(assembly, moving, way, GRID)
-    if float(_alone(assembly, shapes, pair).clearance(q).least.min()) > slack:
-        return True
-    q, slack = _grid(assembly, moving, way, COARSE_GRID)
-    return bool(_coal_distances(assembly, pair, q).min() > slack)
-
-
-def _grid(
-    assembly: Assembly, moving: np.ndarray, way: FloatArray, size: int
-) -> tuple[FloatArray, float]:
-    """Return configurations on a grid, and a bound of a distance's change within half a step.
-
-    Args:
-        assembly: The robot.
-        moving: Indices of the joints that the grid spans.
-        way: (joints,) bound of |d distance / dq| by joint.
-        size: Values per joint.
-
-    Returns:
-        (nq, n) configurations, and the bound [length unit].
-    """
-    low, high = _limits(assembly)
-    columns = assembly.table.index_q[moving]
-    step = (high[columns] - low[columns]) / size
-    values = [low[c] + s * (np.arange(size) + 0.5) for c, s in zip(columns, step, strict=True)]
-    grid = np.meshgrid(*values, indexing="ij") if len(moving) else []
-    q = np.repeat(0.5 * (low + high)[:, None], grid[0].size if grid else 1, axis=1)
-    for column, value in zip(columns, grid, strict=True):
-        q[column] = value.ravel()
-    return q, float(np.sum(way[moving] * 0.5 * step))
-
-
-def _coal_distances(assembly: Assembly, pair: Pair, q: FloatArray) -> FloatArray:
-    """Return the distances of two bodies, (configurations,)."""
-    model, data = assembly.model, assembly.model.createData()
-    items = [assembly.geometry.geometryObjects[body] for body in pair]
-    request, result, out = coal.DistanceRequest(), coal.DistanceResult(), np.empty(q.shape[1])
-    for n in range(q.shape[1]):
-        pin.forwardKinematics(model, data, np.ascontiguousarray(q[:, n]))
-        places = [data.oMi[item.parentJoint] * item.placement for item in items]
-        one, two = (coal.Transform3s(place.rotation, place.translation) for place in places)
-        result.clear()
-        out[n] = coal.distance(items[0].geometry, one, items[1].geometry, two, request, result)
-    return out

@@ -238,11 +238,12 @@ def checks(results: Results) -> tuple[tuple[str, str], ...]:
     rows = []
     for c in measures.by_robot(results.main):
         bodies = measures.problem(c).bodies
+        pairs = bodies.sorted_pairs
         text = (
             f"{len(bodies.names)} bodies covered by {bodies.num_shapes} shapes, at most "
             f"{bodies.inflation:.3g} {c.condition.length_unit} beyond them; pairs of bodies: "
-            f"{len(bodies.pairs)} tested, {len(bodies.adjacent)} neighbours or disabled, "
-            f"{len(bodies.always)} always touch, {len(bodies.never)} never do"
+            f"{len(pairs.tested)} tested, {len(pairs.adjacent)} neighbours or disabled, "
+            f"{len(pairs.always)} always touch, {len(pairs.never)} never do"
         )
         rows.append((f"{c.label}: the model of collisions", text))
     return (*rows, *CHECKS)

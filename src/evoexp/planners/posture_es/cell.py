@@ -99,7 +99,7 @@ class Cell:
                 pin.GeometryObject(self.task.names[k], joint, 0, where, shape)
             )
         allowed = _allowed(phase)
-        pairs = list(self.bodies.pairs)
+        pairs = list(self.bodies.sorted_pairs.judged)
         touching: list[AllowedContact] = []
         for k in range(len(self.task.names)):
             if k == situation.held:

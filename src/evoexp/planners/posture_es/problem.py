@@ -101,11 +101,16 @@ def notes(problem: Problem) -> tuple[str, ...]:
         f"{len(names)} bodies covered by {bodies.num_shapes} spheres and capsules, "
         f"which reach at most {bodies.inflation:.3g} {unit} beyond them"
     ]
-    for what, pairs in (("always touch", bodies.always), ("never touch", bodies.never)):
+    found, only = bodies.sorted_pairs, "judged by the certifier only"
+    for what, pairs in (
+        ("neighbours or disabled, not tested", found.adjacent),
+        ("always touch, not tested", found.always),
+        ("never touch, not tested", found.never),
+        (f"touch in no posture sampled, {only}", found.unseen),
+        (f"covers touch in every posture sampled, {only}", found.overlapping),
+    ):
         if pairs:
-            lines.append(
-                f"{what}, not tested: " + ", ".join(f"{names[a]} with {names[b]}" for a, b in pairs)
-            )
+            lines.append(f"{what}: " + ", ".join(f"{names[a]} with {names[b]}" for a, b in pairs))
     return tuple(lines)
 
 

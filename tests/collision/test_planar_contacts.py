@@ -71,15 +71,19 @@ def test_large_angles_and_what_is_not_a_number_are_measured_exactly() -> None:
 
 
 def test_spheres_at_unequal_steps_are_measured_exactly() -> None:
-    collision = touching(TWO_PLANAR, 5)
+    collision, links = touching(TWO_PLANAR, 5), np.array([[0, 5]])
     joint, local, radius = collision.spheres
-    local[2, 1] += 0.7
-    lines = sphere_lines(
-        collision.assembly.table.chain, Spheres(joint, local, radius), np.array([[0, 5]])
-    )
-    assert lines.scale == np.inf
-    tables = (*collision.tables[:5], tuple(lines))
+    chain = collision.assembly.table.chain
+    assert sphere_lines(chain, collision.spheres, links).scale < np.inf
+    moved = local.copy()
+    moved[2, 1] += 0.7
+    assert sphere_lines(chain, Spheres(joint, moved, radius), links).scale == np.inf
+    space, numbers, indices = collision.tables
+    assert np.isfinite(numbers[-1])
+    unequal = (space, np.append(numbers[:-1], np.inf), indices)
     q = np.random.default_rng(0).uniform(-180.0, 180.0, size=(4, 300))
     out = np.empty(300)
-    contacts(tables, q, 0, out)
-    assert np.array_equal(out < 0.0, collision.clearance(q).least < 0.0)
+    contacts(unequal, q, 0, out)
+    exact = collision.clearance(q, 0.0).least
+    assert np.array_equal(out[exact < 0.0], exact[exact < 0.0]), "clearances, not their signs"
+    assert np.array_equal(out < 0.0, exact < 0.0)

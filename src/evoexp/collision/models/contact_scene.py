@@ -1,32 +1,25 @@
 """The blocks of `ContactTables` as named views, which kernels make of the two flat arrays."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from evoexp.collision.models.contact_tables import (
     BALLS,
-    CENTER,
+    CHAIN,
     ENTRIES,
     ENTRY_OBSTACLES,
-    INDEX_Q,
-    KIND,
+    OBSTACLES,
     PAIR_REACHES,
     PAIRS,
-    PARENT,
     PART_REACHES,
     PARTS,
-    PRISMATIC,
-    ROTATION,
     RUNS,
     SCALE,
-    SIZE,
     SPHERES,
-    TRANSLATION,
-    TURN,
-    TURNED,
     UNIT_COLUMNS,
     UNITS,
 )
-from evoexp.numeric.compilation import inlined, view_part, view_rows
+from evoexp.collision.models.flat_tables import chain_of, column_of, obstacles_of, table_of
+from evoexp.numeric.compilation import inlined
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.kinematics import KinematicChain
 from evoexp.scenarios.obstacles import ObstacleTable
@@ -68,44 +61,20 @@ class Scene(NamedTuple):
 
 
 @inlined
-def _table(array: Any, indices: IntArray, block: int, width: int) -> Any:
-    """Return a block of a flat array, row by row."""
-    return view_rows(array, indices[2 * block], indices[2 * block + 1], width)
-
-
-@inlined
-def _column(array: Any, indices: IntArray, block: int) -> Any:
-    """Return a block of a flat array whose rows are single numbers."""
-    return view_part(array, indices[2 * block], indices[2 * block + 1])
-
-
-@inlined
 def scene_of(n: FloatArray, i: IntArray) -> Scene:
     """Return the blocks of the flat arrays as views."""
     return Scene(
-        KinematicChain(
-            _column(i, i, PARENT),
-            _column(i, i, INDEX_Q),
-            _column(i, i, PRISMATIC),
-            _column(i, i, TURNED),
-            _table(n, i, ROTATION, 9),
-            _table(n, i, TRANSLATION, 3),
-        ),
-        _table(i, i, UNITS, UNIT_COLUMNS),
-        _table(n, i, BALLS, 4),
-        _table(i, i, RUNS, 2),
-        _table(n, i, SPHERES, 4),
-        ObstacleTable(
-            _column(i, i, KIND),
-            _table(n, i, CENTER, 3),
-            _table(n, i, TURN, 9),
-            _table(n, i, SIZE, 3),
-        ),
-        _table(n, i, ENTRIES, 4),
-        _column(i, i, ENTRY_OBSTACLES),
-        _table(i, i, PAIRS, 4),
-        _column(n, i, PAIR_REACHES),
-        _table(i, i, PARTS, 2),
-        _column(n, i, PART_REACHES),
+        chain_of(n, i, CHAIN),
+        table_of(i, i, UNITS, UNIT_COLUMNS),
+        table_of(n, i, BALLS, 4),
+        table_of(i, i, RUNS, 2),
+        table_of(n, i, SPHERES, 4),
+        obstacles_of(n, i, OBSTACLES),
+        table_of(n, i, ENTRIES, 4),
+        column_of(i, i, ENTRY_OBSTACLES),
+        table_of(i, i, PAIRS, 4),
+        column_of(n, i, PAIR_REACHES),
+        table_of(i, i, PARTS, 2),
+        column_of(n, i, PART_REACHES),
         n[i[2 * SCALE]],
     )

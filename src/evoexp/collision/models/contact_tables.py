@@ -1,11 +1,8 @@
-"""Robots made of spheres among obstacles, as two flat arrays for the kernel `find_contacts`.
-
-numba takes some 60 ns to recognise an array, and a robot has twenty of them: a call for a few
-configurations would take longer for the tables than for the answer.
-"""
+"""Robots made of spheres among obstacles, as two flat arrays for the kernel `find_contacts`."""
 
 import numpy as np
 
+from evoexp.collision.models.flat_tables import CHAIN_BLOCKS, OBSTACLE_BLOCKS, flattened
 from evoexp.collision.models.obstacle_kernels import MARGIN
 from evoexp.collision.models.packed_shapes import (
     FIRST_LISTED,
@@ -24,20 +21,10 @@ ROUNDING = 1e-12
 """Clearances below this times the scale are in doubt: rounding errors are a hundredth of it."""
 
 (
-    PARENT,
-    INDEX_Q,
-    PRISMATIC,
-    TURNED,
-    ROTATION,
-    TRANSLATION,
     UNITS,
     BALLS,
     RUNS,
     SPHERES,
-    KIND,
-    CENTER,
-    TURN,
-    SIZE,
     ENTRIES,
     ENTRY_OBSTACLES,
     PAIRS,
@@ -45,8 +32,9 @@ ROUNDING = 1e-12
     PARTS,
     PART_REACHES,
     SCALE,
-) = range(21)
-"""Blocks of the flat arrays."""
+) = range(CHAIN_BLOCKS + OBSTACLE_BLOCKS, CHAIN_BLOCKS + OBSTACLE_BLOCKS + 11)
+CHAIN, OBSTACLES = 0, CHAIN_BLOCKS
+"""Blocks of the flat arrays; a chain and obstacles take several."""
 
 UNIT_COLUMNS = 8
 FIRST_BALL, FIRST_HALF_SPACE, STOP_ENTRY, FIRST_PART, STOP_PART = range(3, 8)
@@ -86,17 +74,12 @@ def contact_tables(
     of_bodies = [(*bodies[k], k, end) for k, end in zip(starts, ends, strict=True)]
     reach = units.ball[:, REACH]
     blocks = [
-        *(np.asarray(column, dtype=np.int64) for column in chain[:4]),
-        chain.rotation,
-        chain.translation,
+        *chain,
+        *obstacles,
         rows,
         units.ball[:, : REACH + 1],
         shapes.runs,
         shapes.spheres,
-        obstacles.kind,
-        obstacles.center,
-        obstacles.rotation,
-        obstacles.size,
         entries,
         owners,
         np.array(of_bodies, dtype=np.int64).reshape(-1, 4),
@@ -105,7 +88,7 @@ def contact_tables(
         ((reach[pairs[:, 0]] + reach[pairs[:, 1]]) * MARGIN) ** 2,
         np.array([scale]),
     ]
-    return _flat(blocks)
+    return ContactTables(*flattened(blocks))
 
 
 def _unit_rows(
@@ -127,26 +110,6 @@ def _unit_rows(
             entries.append(_entry(obstacles, o, float(units.ball[b, REACH]), scale))
             owners.append(int(o))
     return rows, np.array(entries).reshape(-1, 4), np.array(owners, dtype=np.int64)
-
-
-def _flat(blocks: list[np.ndarray]) -> ContactTables:
-    """Return blocks one behind another; the integers begin with a table of their places."""
-    header: list[int] = []
-    numbers: list[np.ndarray] = []
-    indices: list[np.ndarray] = []
-    next_number, next_index = 0, 2 * len(blocks)
-    for block in blocks:
-        if block.dtype == np.float64:
-            header += [next_number, len(block)]
-            numbers.append(block.ravel())
-            next_number += block.size
-        else:
-            header += [next_index, len(block)]
-            indices.append(block.ravel())
-            next_index += block.size
-    return ContactTables(
-        np.concatenate(numbers), np.concatenate([np.array(header, dtype=np.int64), *indices])
-    )
 
 
 def _scale(chain: KinematicChain, units: Units, obstacles: ObstacleTable) -> float:

@@ -5,7 +5,7 @@ of different arms and all obstacles, as vectors (`numeric.vectors`) that stay in
 first-level cache. The arithmetic of the pairs limits the speed: six operations in the plane and
 nine in space; square roots are taken once per pair of arms, of the least squared distance. A caller
 that only asks for collisions (`limit` 0) is spared the pairs of links that are far apart in all
-eight configurations.
+eight configurations. In the plane, yes or no is answered faster by `planar_contacts`.
 """
 
 from typing import Any, Literal, NamedTuple
@@ -17,6 +17,15 @@ from evoexp.collision.models.center_kernels import (
     nearest,
     planar_point,
     spatial_point,
+)
+from evoexp.collision.models.flat_tables import (
+    CHAIN_BLOCKS,
+    OBSTACLE_BLOCKS,
+    chain_of,
+    column_of,
+    flattened,
+    obstacles_of,
+    table_of,
 )
 from evoexp.collision.models.obstacle_kernels import MARGIN, LinkBalls, meet, to_obstacles
 from evoexp.numeric.compilation import borrowed, inlined, kernel
@@ -105,12 +114,26 @@ class Memory(NamedTuple):
     out: FloatArray
 
 
+JOINT = CHAIN_BLOCKS + OBSTACLE_BLOCKS
+LOCAL, RADIUS, LINKS, LINES = JOINT + 1, JOINT + 2, JOINT + 3, JOINT + 8
+"""Blocks of the flat arrays behind a chain and obstacles."""
+
+
+def flat_spheres(tables: SphereTables) -> tuple[Any, ...]:
+    """Return the tables as kernels take them: whether in space, then two flat arrays."""
+    radius, scale = np.array([tables.spheres.radius]), np.array([tables.lines.scale])
+    fixed = [tables.spheres.joint, tables.spheres.local, radius]
+    lines = [tables.lines.line, tables.lines.turn, scale]
+    blocks = [*tables.chain, *tables.obstacles, *fixed, *tables.bounds, *lines]
+    return (tables.space, *flattened(blocks))
+
+
 @kernel
 def clearances(tables: tuple[Any, ...], limit: float, q: FloatArray, out: FloatArray) -> None:
     """Run the kernel of `SphereCollision.clearance`.
 
     Args:
-        tables: `SphereCollision.tables`: fields of `SphereTables` as plain tuples.
+        tables: `SphereCollision.tables`, of `flat_spheres`.
         limit: Above it no clearance is measured [length unit].
         q: (nq, configurations) [deg], contiguous.
         out: (2, configurations), contiguous, written: between arms, to obstacles.
@@ -137,16 +160,19 @@ def any_contact(tables: tuple[Any, ...], q: FloatArray) -> bool:
 
 @inlined
 def named_tables(tables: tuple[Any, ...]) -> SphereTables:
-    """Return plain tuples as the tables that they are."""
-    chain, space, spheres, bounds, obstacles, lines = tables
-    return SphereTables(
-        KinematicChain(*chain),
-        space,
-        Spheres(*spheres),
-        LinkBalls(*bounds),
-        ObstacleTable(*obstacles),
-        LinkLines(*lines),
+    """Return the tables in the arrays of `flat_spheres` as views."""
+    space, n, i = tables
+    spheres = Spheres(column_of(i, i, JOINT), table_of(n, i, LOCAL, 3), n[i[2 * RADIUS]])
+    links = LinkBalls(
+        column_of(i, i, LINKS),
+        table_of(n, i, LINKS + 1, 3),
+        column_of(n, i, LINKS + 2),
+        table_of(i, i, LINKS + 3, 2),
+        table_of(i, i, LINKS + 4, 2),
     )
+    lines = LinkLines(table_of(n, i, LINES, 10), column_of(n, i, LINES + 1), n[i[2 * LINES + 4]])
+    chain, obstacles = chain_of(n, i, 0), obstacles_of(n, i, CHAIN_BLOCKS)
+    return SphereTables(chain, space, spheres, links, obstacles, lines)
 
 
 @inlined

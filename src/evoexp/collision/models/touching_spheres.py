@@ -18,9 +18,9 @@ from evoexp.collision.models.sphere_kernels import (
     SphereTables,
     any_contact,
     clearances,
+    flat_spheres,
 )
 from evoexp.errors import SettingError
-from evoexp.numeric.compilation import plain
 from evoexp.numeric.elementary import atan2
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.assembly import Assembly, sphere_geometry
@@ -89,7 +89,7 @@ class TouchingSpheres(Component):
             fixed,
             _ranges(arms, assembly.num_arms),
             around,
-            plain(SphereTables(table.chain, space, fixed, balls, around, lines)),
+            flat_spheres(SphereTables(table.chain, space, fixed, balls, around, lines)),
             sphere_geometry(
                 assembly,
                 np.array([sphere.center for sphere in kept]),
@@ -191,7 +191,7 @@ class SphereCollision(NamedTuple):
         spheres: The spheres.
         arm_spheres: (arms, 2) first and one-past-last sphere of each arm.
         obstacles: The obstacle table.
-        tables: Fields of `SphereTables` as plain tuples, for the kernel `clearances`.
+        tables: `SphereTables` in two arrays, for kernels; see `flat_spheres`.
         geometry: The same spheres as a `pin.GeometryModel` of coal spheres.
     """
 

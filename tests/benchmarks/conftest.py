@@ -1,6 +1,7 @@
-"""Ours and a reference in turns.
+"""Ours and a reference in turns, in processor time.
 
-The clock speed of a shared machine changes during a run, their ratio hardly does.
+The clock speed of a shared machine changes during a run, their ratio hardly does; and how long a
+process waits for others is no property of either.
 """
 
 import statistics
@@ -62,6 +63,7 @@ def beside(benchmark: Any) -> Callable[..., None]:
                 "time": spread(taken),
                 "of_minima": min(taken) / min(each),
                 "median": statistics.median(ratios),
+                "noise": noise(ratios),
             }
             benchmark.extra_info["references"][name] = row
 
@@ -69,11 +71,17 @@ def beside(benchmark: Any) -> Callable[..., None]:
 
 
 def timed(work: Work, calls: int) -> float:
-    """Return the seconds that some calls take."""
-    begin = time.perf_counter()
+    """Return the processor time that some calls take [s]."""
+    begin = time.process_time()
     for _ in range(calls):
         work()
-    return time.perf_counter() - begin
+    return time.process_time() - begin
+
+
+def noise(ratios: list[float]) -> float:
+    """Return half of the interquartile range of ratios, relative to their median."""
+    low, middle, high = statistics.quantiles(ratios, n=4)
+    return (high - low) / (2.0 * middle)
 
 
 def spread(seconds: list[float]) -> dict[str, float]:

@@ -1,4 +1,8 @@
-"""The result of `scripts/benchmark` as one table: work | ours | reference | ratio."""
+"""The result of `scripts/benchmark` as one table: work | ours | reference | ratio.
+
+`ratios.json` keeps the ratios of an earlier run with the noise that they had. A ratio counts as
+worse when it and the kept one are apart by more than `MARGIN` times the noise of each.
+"""
 
 import json
 import platform
@@ -10,6 +14,8 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+KEPT = Path(__file__).parent / "ratios.json"
+MARGIN = 3.0  # [-] times the noise: half of the interquartile range of a run's rounds
 WIDTH = 150  # [characters] where the output is no terminal
 UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
 
@@ -39,7 +45,7 @@ def machine(info: dict[str, Any]) -> str:
 def ratio_table(benchmarks: list[dict[str, Any]]) -> Table:
     """Return a row per reference of every benchmark that has one, times per unit of work."""
     table = Table(
-        title="Times per unit of work: minimum · median. Ratios of interleaved rounds.",
+        title="Processor time per unit of work: minimum · median. Ratios of interleaved rounds.",
         title_justify="left",
     )
     table.add_column("work")
@@ -61,10 +67,58 @@ def ratio_table(benchmarks: list[dict[str, Any]]) -> Table:
     return table
 
 
-def main(path: Path) -> None:
-    """Print the table, the CPU seconds of a replicate.
+def found_ratios(benchmarks: list[dict[str, Any]]) -> dict[str, dict[str, float]]:
+    """Return work and reference → the median ratio of a run's rounds, and its noise."""
+    return {
+        f"{info['work']} | {name}": {"ratio": row["median"], "noise": row["noise"]}
+        for info in (b["extra_info"] for b in benchmarks if "work" in b["extra_info"])
+        for name, row in info["references"].items()
+    }
 
-    And the times of the benchmarks without a ratio.
+
+def worse(kept: dict[str, Any], found: dict[str, Any]) -> list[str]:
+    """Return a line per ratio that is worse than the kept one by more than both noises allow."""
+    lines = []
+    for name in sorted(kept.keys() & found.keys()):
+        then, now = kept[name], found[name]
+        least = then["ratio"] * (1.0 - MARGIN * then["noise"])
+        most = now["ratio"] * (1.0 + MARGIN * now["noise"])
+        if most < least:
+            lines.append(
+                f"slower: {name}: {now['ratio']:.3g} (noise {now['noise']:.1%}), was "
+                f"{then['ratio']:.3g} (noise {then['noise']:.1%})"
+            )
+    return lines
+
+
+def update(result: dict[str, Any]) -> None:
+    """Write the ratios of a run; those of benchmarks that were left out stay."""
+    kept = json.loads(KEPT.read_text())["ratios"] if KEPT.exists() else {}
+    ratios = dict(sorted((kept | found_ratios(result["benchmarks"])).items()))
+    table = {"machine": machine(result["machine_info"]), "ratios": ratios}
+    KEPT.write_text(json.dumps(table, indent=1, ensure_ascii=False) + "\n")
+
+
+def check(result: dict[str, Any]) -> int:
+    """Compare a run with the kept ratios; return 1 if one is worse, else 0."""
+    kept = json.loads(KEPT.read_text())
+    found = found_ratios(result["benchmarks"])
+    here = machine(result["machine_info"])
+    if kept["machine"] != here:
+        print(f"kept ratios are of another machine: {kept['machine']}")
+    lines = worse(kept["ratios"], found)
+    print(*lines, sep="\n")
+    new = len(found.keys() - kept["ratios"].keys())
+    print(f"{len(found) - new} ratios compared, {new} new ones, {len(lines)} worse")
+    return 1 if lines else 0
+
+
+def main(path: Path, mode: str) -> int:
+    """Print the table, the CPU seconds of a replicate, and the times of what has no ratio.
+
+    Args:
+        path: Result of pytest-benchmark.
+        mode: `--check`: compare with the kept ratios; `--update`: keep these; or empty.
     """
     result = json.loads(path.read_text())
     console = Console(width=None if sys.stdout.isatty() else WIDTH)
@@ -86,7 +140,10 @@ def main(path: Path) -> None:
             table.add_row(benchmark["name"], pair(benchmark["stats"]))
         console.print(table)
     console.print(f"[dim]{path}[/dim]")
+    if mode == "--update":
+        update(result)
+    return check(result) if mode == "--check" else 0
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    raise SystemExit(main(Path(sys.argv[1]), sys.argv[2] if len(sys.argv) > 2 else ""))

@@ -8,9 +8,10 @@ import pytest
 from evoexp.collision.body_table import HULL, BodyTable
 from evoexp.collision.certifier.convex_distance import _farthest_corner
 from evoexp.collision.certifier.verdict import certify
-from evoexp.collision.hull_graph import FEWEST, hull_graph, hull_of
+from evoexp.collision.hull_graph import FEWEST, hull_graph
 from evoexp.collision.scene import Scene, geometry_scene
 from evoexp.numeric.compilation import kernel
+from evoexp.numeric.convex_hull import hull_of
 from evoexp.paths.motion import Motion
 
 

@@ -5,10 +5,11 @@ that starts near by ends after a few steps, where a look at every corner takes h
 """
 
 from itertools import product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from evoexp.numeric.convex_hull import hull_of
 from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import FloatArray, IntArray
 
@@ -58,27 +59,6 @@ def hull_graph(points: FloatArray) -> HullGraph:
     for cell, direction in _cell_middles():
         starts[cell] = int(np.argmax(matrix_product(corners, direction)))
     return HullGraph(corners, neighbours, starts)
-
-
-def hull_of(points: FloatArray) -> tuple[FloatArray, IntArray] | None:
-    """Return the corners (corners, 3) of the convex hull of points, in their order, and triangles.
-
-    The triangles (triangles, 3) are turned outward. None if the points have no inside.
-    """
-    from scipy.spatial import ConvexHull, QhullError  # only meshes need it, and it loads for long
-
-    try:
-        hull: Any = ConvexHull(points)
-    except (ValueError, QhullError):
-        return None
-    kept = np.unique(hull.simplices)
-    number = np.full(len(points), -1, dtype=np.int64)
-    number[kept] = np.arange(len(kept))
-    triangles = number[hull.simplices]
-    a, b, c = (points[hull.simplices[:, k]] for k in range(3))
-    inward = (np.cross(b - a, c - a) * hull.equations[:, :3]).sum(axis=1) < 0.0
-    triangles[inward] = triangles[inward][:, ::-1]
-    return points[kept], triangles
 
 
 def _cell_middles() -> list[tuple[int, FloatArray]]:

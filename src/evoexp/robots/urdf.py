@@ -7,7 +7,7 @@ identity.
 
 import tempfile
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
 import numpy as np
 import pinocchio as pin
@@ -19,6 +19,13 @@ from evoexp.robots.assembly import Arm, Assembly, Chain
 from evoexp.robots.bodies import Point3, placed
 from evoexp.robots.joint_choice import joint_roles, standing_values
 from evoexp.robots.mesh_files import MESHES, mesh_content
+from evoexp.robots.mesh_pieces import (
+    Decomposition,
+    in_pieces,
+    mesh_key,
+    mesh_pieces,
+    read_pieces,
+)
 from evoexp.robots.srdf import Srdf
 from evoexp.robots.urdf_arms import UrdfArm, UrdfTree
 from evoexp.robots.urdf_rewriting import JointRules, plain_urdf
@@ -32,10 +39,12 @@ class Mesh(Settings):
     Attributes:
         name: As the URDF names it.
         file: Its content.
+        pieces: The convex pieces in its place, see `mesh_pieces`; None: it stays as it is.
     """
 
     name: str
     file: File
+    pieces: File | None = None
 
 
 def _pairs(value: Any) -> Any:
@@ -68,6 +77,8 @@ class Urdf(Chain):
         slide_limit: How far a sliding joint moves to either side, then [m].
         base: Whether planar and floating joints stand still (fixed) or move (free); or the whole
             robot moves, as by a planar or floating joint below its root.
+        decomposition: Whether meshes are replaced by convex pieces that contain them: by CoACD, or
+            by the convex hull of each; None: they stay as they are.
         pairs: Pairs of bodies that need no test, derived when the files are read; None: none are.
     """
 
@@ -89,6 +100,7 @@ class Urdf(Chain):
     turn_limit: Positive = 180.0
     slide_limit: Positive = 1.0
     base: Literal["fixed", "free", "planar", "floating"] = "fixed"
+    decomposition: Decomposition | None = None
     pairs: File | None = None
 
     @classmethod
@@ -122,6 +134,11 @@ class Urdf(Chain):
             settings["meshes"] = [
                 {"name": name, "file": {SHA256: keep(data)}} for name, data in found.items()
             ]
+            how: Any = settings.get("decomposition")
+            if how in get_args(Decomposition):
+                for mesh, (name, data) in zip(settings["meshes"], found.items(), strict=True):
+                    cut = mesh_pieces(data, Path(name).suffix, how, f"{field}.decomposition")
+                    mesh["pieces"] = {SHA256: keep(cut)}
         if srdf is not None:
             content = file_content(srdf, f"{field}.srdf")
             parsed_xml(content, f"{field}.srdf", "robot")
@@ -199,7 +216,8 @@ class Urdf(Chain):
                     "a URDF whose collision bodies can be read",
                     str(error).strip().splitlines()[0].replace(directory, ""),
                 ) from None
-
+            if self.decomposition is not None:
+                found = self._in_pieces(found, places)
         for item in found.geometryObjects:
             item.geometry.computeLocalAABB()
             far = np.abs(item.placement.translation).max() + item.geometry.aabb_radius
@@ -207,6 +225,24 @@ class Urdf(Chain):
                 must = f"a URDF whose bodies lie within {LARGEST:g} m"
                 raise SettingError("robot.path", must, f"'{item.name}' that reaches to {far:.3g}")
         return found
+
+    def _in_pieces(self, geometry: Any, places: dict[str, str]) -> Any:
+        """Return collision bodies with the pieces of meshes in their place.
+
+        Args:
+            geometry: The bodies, a `pin.GeometryModel`.
+            places: Name of each mesh → the path from which it was read.
+        """
+        files = {places[mesh.name]: mesh.pieces for mesh in self.meshes}
+        shapes = {}
+        for item in geometry.geometryObjects:
+            if item.meshPath not in files:
+                continue
+            pieces, scale = files[item.meshPath], np.array(item.meshScale).ravel()
+            if pieces is None:
+                raise SettingError("robot.meshes", "given with their pieces", None)
+            shapes[mesh_key(item)] = read_pieces(pieces.content, scale, "robot.meshes")
+        return in_pieces(geometry, shapes)
 
     def _base(self, model: Any) -> Any:
         """Return the `pin.SE3` of the root in the world."""

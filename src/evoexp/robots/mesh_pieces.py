@@ -1,0 +1,230 @@
+"""Meshes as convex pieces, found once, when a robot's files are read.
+
+The pieces of a mesh contain its whole surface: where CoACD's pieces leave a part of it out, they
+are grown until they hold it. They are kept as an OBJ file of one object per piece, which is
+attached to the condition; whoever has it needs neither the library nor the time.
+"""
+
+import contextlib
+import hashlib
+import tempfile
+from pathlib import Path
+from typing import Any, Literal
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from evoexp.errors import SettingError
+from evoexp.numeric.convex_hull import hull_of
+from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
+from evoexp.numeric.ordered_sums import matrix_product
+from evoexp.records import FloatArray, IntArray
+
+Decomposition = Literal["coacd", "hulls"]
+
+MOST_PIECES = 64  # of a mesh
+CONCAVITY = 0.05  # [-] of the mesh's size, assumed: CoACD's own default
+SEARCH = {"mcts_nodes": 10, "mcts_iterations": 60, "resolution": 1000}  # assumed: half its defaults
+CLOSE = 0.002  # [-] of the mesh's size: a triangle so close to a piece is taken into it whole
+SHORT = 0.02  # [-] of the mesh's size: triangles so small are not cut any more
+MOST_AT_ONCE = 2000  # triangles that are compared with a piece's faces
+
+
+def mesh_pieces(content: bytes, ending: str, how: Decomposition, field: str) -> bytes:
+    """Cut a mesh into convex pieces; return them as an OBJ file.
+
+    Args:
+        content: Of the mesh's file.
+        ending: Of its name, such as `.stl`.
+        how: "hulls": its convex hull is the only piece.
+        field: The setting, for errors.
+
+    Raises:
+        SettingError: If CoACD is not installed, or the mesh cannot be read or has no inside.
+    """
+    if how == "hulls":
+        corners, _ = loaded_mesh(content, ending, field)
+        return _written([corners], field)
+    coacd = _coacd(field)
+    key = hashlib.sha256(content)
+    key.update(repr((ending, CONCAVITY, SEARCH, CLOSE, SHORT, _version())).encode())
+    kept = cache_root() / "pieces" / f"{key.hexdigest()}.obj"
+    with contextlib.suppress(FileNotFoundError, Damaged):
+        return read_kept(kept)
+    corners, triangles = loaded_mesh(content, ending, field)
+    coacd.set_log_level("error")
+    found = coacd.run_coacd(
+        coacd.Mesh(corners, triangles), threshold=CONCAVITY, max_convex_hull=MOST_PIECES, **SEARCH
+    )
+    text = _written(_grown([points for points, _ in found], corners, triangles), field)
+    with contextlib.suppress(OSError):  # it takes longer the next time
+        write_kept(kept, text)
+    return text
+
+
+def loaded_mesh(content: bytes, ending: str, field: str) -> tuple[FloatArray, IntArray]:
+    """Return the corners (corners, 3) and triangles (triangles, 3) of a mesh's file.
+
+    Raises:
+        SettingError: If it cannot be read.
+    """
+    with tempfile.TemporaryDirectory() as directory:
+        place = Path(directory) / f"mesh{ending.lower()}"
+        place.write_bytes(content)
+        try:
+            mesh: Any = coal.MeshLoader().load(str(place), np.ones(3))
+        except (ValueError, RuntimeError) as error:
+            reason = str(error).strip().splitlines()[0].replace(directory, "")
+            raise SettingError(field, "a URDF whose meshes can be read", reason) from None
+    corners = np.array([mesh.vertex(k) for k in range(mesh.num_vertices)]).reshape(-1, 3)
+    faces = [mesh.tri_indices(k) for k in range(mesh.num_tris)]
+    triangles = np.array([[f[0], f[1], f[2]] for f in faces], dtype=np.int64).reshape(-1, 3)
+    return np.asarray(corners, dtype=np.float64), triangles
+
+
+def read_pieces(content: bytes, scale: FloatArray, field: str) -> list[Any]:
+    """Return the pieces of an OBJ file that `mesh_pieces` wrote, as coal shapes.
+
+    Args:
+        content: Of the file.
+        scale: (3,) by which the URDF scales the mesh.
+        field: The setting, for errors.
+
+    Raises:
+        SettingError: If it is none of these files.
+    """
+    pieces: list[tuple[list[list[float]], list[list[int]]]] = []
+    try:
+        for line in content.decode("ascii").splitlines():
+            kind, *words = line.split()
+            if kind == "o":
+                pieces.append(([], []))
+            elif kind == "v":
+                x, y, z = map(float, words)
+                pieces[-1][0].append([x, y, z])
+            elif kind == "f":
+                before = sum(len(corners) for corners, _ in pieces[:-1])
+                a, b, c = (int(word) - 1 - before for word in words)
+                pieces[-1][1].append([a, b, c])
+            else:
+                raise ValueError(kind)
+        if not 0 < len(pieces) <= MOST_PIECES:
+            raise ValueError(len(pieces))
+        return [_convex(np.array(corners) * scale, faces) for corners, faces in pieces]
+    except (ValueError, IndexError, UnicodeDecodeError):
+        raise SettingError(field, "pieces of a mesh", content[:40]) from None
+
+
+def in_pieces(geometry: Any, pieces: dict[str, list[Any]]) -> Any:
+    """Return a `pin.GeometryModel` with convex pieces in the place of its meshes.
+
+    Bodies of a link are numbered anew, as Pinocchio numbers them.
+
+    Args:
+        geometry: With meshes, as Pinocchio read it.
+        pieces: Path of a mesh and the scale → coal shapes; see `mesh_key`.
+    """
+    found, counts = pin.GeometryModel(), dict[str, int]()
+    for item in geometry.geometryObjects:
+        stem = item.name.rpartition("_")[0]
+        for shape in pieces.get(mesh_key(item), [item.geometry]):
+            number = counts.get(stem, 0)
+            counts[stem] = number + 1
+            found.addGeometryObject(
+                pin.GeometryObject(
+                    f"{stem}_{number}", item.parentJoint, item.parentFrame, item.placement, shape
+                )
+            )
+    return found
+
+
+def mesh_key(item: Any) -> str:
+    """Return the path and the scale of the mesh of a `pin.GeometryObject`, as one text."""
+    return f"{item.meshPath} {np.array(item.meshScale).ravel().tolist()}"
+
+
+def _convex(corners: FloatArray, faces: list[list[int]]) -> Any:
+    if len(corners) < 4 or not np.isfinite(corners).all() or len(faces) < 4:
+        raise ValueError
+    if min(map(min, faces)) < 0 or max(map(max, faces)) >= len(corners):
+        raise ValueError
+    points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    for corner in corners:
+        points.append(corner)
+    for face in faces:
+        triangles.append(coal.Triangle(*face))
+    return coal.Convex(points, triangles)
+
+
+def _coacd(field: str) -> Any:
+    try:
+        import coacd  # an extra: only those who cut meshes need it
+    except ImportError:
+        must = "hulls, or coacd with it installed (pip install 'evoexp[meshes]')"
+        raise SettingError(field, must, "coacd") from None
+    return coacd
+
+
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("coacd")
+    except PackageNotFoundError:
+        return ""
+
+
+def _written(pieces: list[FloatArray], field: str) -> bytes:
+    """Return the convex hulls of pieces as an OBJ file.
+
+    Raises:
+        SettingError: If none has an inside.
+    """
+    lines: list[str] = []
+    before = 0
+    for points in pieces:
+        hull = hull_of(points)
+        if hull is None:
+            continue
+        corners, triangles = hull
+        lines.append(f"o piece_{sum(line[0] == 'o' for line in lines)}")
+        lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in corners.tolist()]
+        lines += [f"f {a} {b} {c}" for a, b, c in (triangles + (1 + before)).tolist()]
+        before += len(corners)
+    if not lines:
+        raise SettingError(field, "left out for meshes without an inside", "coacd or hulls")
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _grown(pieces: list[FloatArray], corners: FloatArray, faces: IntArray) -> list[FloatArray]:
+    """Return pieces to whose hulls corners are added until they contain all triangles of a mesh.
+
+    A triangle belongs to the piece from which it stands out the least; one that stands out of all
+    by more than `CLOSE` is cut in two, as long as its longest edge is not `SHORT`.
+    """
+    from scipy.spatial import ConvexHull  # only meshes need it, and it loads for long
+
+    size = float((corners.max(axis=0) - corners.min(axis=0)).max())
+    planes = [ConvexHull(points).equations for points in pieces]
+    added: list[list[FloatArray]] = [[points] for points in pieces]
+    waiting = corners[faces]  # (triangles, 3, 3)
+    while len(waiting) > 0:
+        now, waiting = waiting[:MOST_AT_ONCE], waiting[MOST_AT_ONCE:]
+        out = np.array(
+            [(matrix_product(now, each[:, :3].T) + each[:, 3]).max(axis=(1, 2)) for each in planes]
+        )  # (pieces, triangles): by how much they stand out
+        best = out.argmin(axis=0)
+        least = out[best, np.arange(len(now))]
+        edges = ((now - np.roll(now, -1, axis=1)) ** 2).sum(axis=2)
+        longest = edges.argmax(axis=1)
+        whole = (least <= CLOSE * size) | (edges.max(axis=1) <= (SHORT * size) ** 2)
+        for piece in np.unique(best[whole]).tolist():
+            taken = whole & (best == piece) & (least > 0.0)
+            added[piece].append(now[taken].reshape(-1, 3))
+        cut, first = now[~whole], longest[~whole]
+        a, b, c = (cut[np.arange(len(cut)), (first + k) % 3] for k in range(3))
+        middle = 0.5 * (a + b)
+        halves = [np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)]
+        waiting = np.concatenate([*halves, waiting])
+    return [np.unique(np.vstack(points), axis=0) for points in added]

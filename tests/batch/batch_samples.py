@@ -1,6 +1,7 @@
 """Small batches."""
 
 from pathlib import Path
+from typing import Any
 
 from evoexp.batch.jobs import Outcome
 from evoexp.batch.runner import Batch
@@ -20,15 +21,20 @@ WORDS = (
 )
 
 
-def new_batch(outputs: Path, *wanted: tuple[Condition, int], num_workers: int = 1) -> Batch:
-    settings = RunnerSettings(num_workers=num_workers)
-    return Batch(
-        [(condition, count, {"label": "test"}) for condition, count in wanted], settings, outputs
-    )
+def new_batch(
+    outputs: Path,
+    *wanted: tuple[Condition, int],
+    retry_failed: bool = False,
+    **settings: Any,
+) -> Batch:
+    runner = RunnerSettings(**{"num_workers": 1} | settings)
+    notes = {"label": "test"}
+    conditions = [(condition, count, notes) for condition, count in wanted]
+    return Batch(conditions, runner, outputs, retry_failed=retry_failed)
 
 
-def run(outputs: Path, *wanted: tuple[Condition, int], num_workers: int = 1) -> list[Outcome]:
-    return list(new_batch(outputs, *wanted, num_workers=num_workers).run())
+def run(outputs: Path, *wanted: tuple[Condition, int], **settings: Any) -> list[Outcome]:
+    return list(new_batch(outputs, *wanted, **settings).run())
 
 
 def digests(outputs: Path, condition: Condition) -> dict[int, str]:

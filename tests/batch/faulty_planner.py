@@ -3,7 +3,8 @@
 Which misbehaves where the environment tells it to.
 
 `FAULTY` holds `<what>:<replicates>`, several with `;`: `raise:1,3`, `kill:2`, `kill_once:4`,
-`hang:5,6`, `tell:7` (whether a server forked the worker). It is no part of the condition, so that
+`hang:5,6`, `slow:1`, `slow_once:1`, `deaf:1` (slow, and no signal ends it), `eat:1` (80 GB),
+`tell:7` (whether a server forked the worker). It is no part of the condition, so that
 results can be compared with those of an undisturbed run.
 """
 
@@ -33,6 +34,15 @@ class Faulty(ViaPointGa):
         for generation in super().evolve(problem, rng):
             if "hang" in faults and generation.index == 1 and in_worker():
                 time.sleep(HANG_S)
+            if "slow" in faults and generation.index == 1:
+                time.sleep(HANG_S)
+            if "slow_once" in faults and generation.index == 1 and is_first(seed.spawn_key[0]):
+                time.sleep(HANG_S)
+            if "deaf" in faults and generation.index == 1 and in_worker():
+                signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGALRM])  # as compiled code
+                time.sleep(HANG_S)
+            if "eat" in faults and generation.index == 1:
+                assert np.ones(10**10).any()
             if "raise" in faults and generation.index == 1:
                 raise ArithmeticError(
                     f"replicate {seed.spawn_key[0]} is [bold]told[/] to fail\nand says why"
@@ -49,6 +59,14 @@ class Faulty(ViaPointGa):
 def faults_of(replicate: int) -> set[str]:
     parts = [part.partition(":") for part in os.environ.get("FAULTY", "").split(";") if part]
     return {what for what, _, replicates in parts if str(replicate) in replicates.split(",")}
+
+
+def is_first(replicate: int) -> bool:
+    """Return whether a replicate has not been here before; note that it has."""
+    flag = Path(os.environ["FAULTY_FLAGS"]) / f"slow {replicate}"
+    first = not flag.exists()
+    flag.touch()
+    return first
 
 
 def in_worker() -> bool:

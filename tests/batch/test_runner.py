@@ -194,9 +194,16 @@ def test_a_failed_replicate_is_a_row_and_a_file_and_the_others_go_on(
     assert rows["stop_reason"][2] == outcomes[2].reason
 
     monkeypatch.setenv("FAULTY", "raise:2")
-    assert [(o.replicate, o.failed) for o in run(tmp_path, (faulty, 4))] == [(0, False), (2, True)]
+    left = new_batch(tmp_path, (faulty, 4))
+    assert (left.jobs, left.num_left_failed) == ([], 2)
+    assert [(o.replicate, o.failed) for o in run(tmp_path, (faulty, 4), retry_failed=True)] == [
+        (0, False),
+        (2, True),
+    ]
     monkeypatch.delenv("FAULTY")
-    assert [(o.replicate, o.failed) for o in run(tmp_path, (faulty, 4))] == [(2, False)]
+    assert [(o.replicate, o.failed) for o in run(tmp_path, (faulty, 4), retry_failed=True)] == [
+        (2, False)
+    ]
     assert directory.failed() == set()
     assert not list(directory.replicates.glob("*.failed.json"))
     assert (read_summaries(directory)["status"] == "done").all()
@@ -227,6 +234,12 @@ def test_failures_on_the_command_line(
     )
     assert "2 of 3" in out[: out.index("\n1 failed ")]
     monkeypatch.setenv("COLUMNS", "80")
+    assert main(words) == 1
+    left = capsys.readouterr().out
+    assert "1 replicate failed before" in " ".join(left.split())
+    assert main(["list", "--failed"]) == 0
+    assert "ArithmeticError" in capsys.readouterr().out
+    words.append("--retry-failed")
     assert main(words) == 1
     narrow = capsys.readouterr().out
     assert max(map(len, narrow[narrow.index("\n1 failed ") :].splitlines())) <= 80

@@ -4,11 +4,14 @@ import contextlib
 import itertools
 import json
 import re
+import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from typing import Any, cast
 
-from evoexp.batch.jobs import Job, Outcome, run_jobs
+from evoexp.batch.jobs import NO_LIMITS, Job, Outcome, run_jobs
+from evoexp.batch.replicate_limits import ReplicateLimits
 from evoexp.condition import Condition
 from evoexp.numeric.compiled_kinds import is_compiled, note_compiled
 from evoexp.registry import component_modules
@@ -19,15 +22,24 @@ MAX_BUNDLE = 64  # replicates per task at most, so that results keep streaming
 _NUMBER = re.compile(r"-?\d+(\.\d+)?([eE][-+]?\d+)?")
 
 
-def fan_out(jobs: Sequence[Job], num_workers: int) -> Iterator[list[Outcome]]:
+def fan_out(
+    jobs: Sequence[Job], num_workers: int, limits: ReplicateLimits = NO_LIMITS
+) -> Iterator[list[Outcome]]:
     """Run jobs in worker processes; yield outcomes as they come.
 
     A worker that dies takes the pool with it, and everything in flight: each of those jobs then
     runs alone, so that only the one that kills its worker fails; the others go on in a new pool.
+    A job that took too long or too much memory runs once more at the end, alone.
+
+    Args:
+        jobs: The replicates.
+        num_workers: Worker processes; 1: they run in this process.
+        limits: Of each replicate.
     """
     if num_workers == 1:
         for job in jobs:
-            yield run_jobs([job])
+            outcomes = run_jobs([job], limits)
+            yield run_jobs([job], limits) if outcomes[0].may_pass else outcomes
         return
     import joblib  # which takes long to load
     from joblib.externals.loky.process_executor import TerminatedWorkerError
@@ -35,18 +47,22 @@ def fan_out(jobs: Sequence[Job], num_workers: int) -> Iterator[list[Outcome]]:
     from evoexp.batch.workers import in_workers
 
     waiting = deque(jobs)
+    by_key = {job.key: job for job in jobs}
+    again: list[Job] = []
+    run = joblib.delayed(partial(run_jobs, limits=limits, in_worker=True))
     while waiting:
         in_flight: dict[tuple[str, int], Job] = {}
         bundles = _Bundles(waiting, in_flight, num_workers)
         try:
-            for outcomes in in_workers(
-                num_workers, (joblib.delayed(run_jobs)(bundle) for bundle in bundles)
-            ):
+            for outcomes in in_workers(num_workers, (run(bundle) for bundle in bundles)):
                 bundles.took(outcomes)
-                yield outcomes
+                again += [by_key[each.key] for each in outcomes if each.may_pass]
+                yield [each for each in outcomes if not each.may_pass]
         except TerminatedWorkerError:
             for job in list(in_flight.values()):
-                yield [_run_alone(job)]
+                yield [_run_alone(job, limits)]
+    for job in again:
+        yield [_run_alone(job, limits)]
 
 
 def loading(
@@ -101,7 +117,7 @@ class _Bundles:
             self._in_flight.pop((outcome.condition_id, outcome.replicate), None)
 
 
-def _run_alone(job: Job) -> Outcome:
+def _run_alone(job: Job, limits: ReplicateLimits) -> Outcome:
     """Run one job in a process of its own, and once more if that dies.
 
     Which job had brought the pool down is not known.
@@ -111,14 +127,19 @@ def _run_alone(job: Job) -> Outcome:
 
     from evoexp.batch.workers import in_workers
 
-    trace = ""
+    run = joblib.delayed(partial(run_jobs, limits=limits, in_worker=True))
+    trace, begun = "", time.perf_counter()
     for _ in range(2):
+        begun = time.perf_counter()
         try:
-            ((outcome,),) = in_workers(2, [joblib.delayed(run_jobs)([job])])
+            ((outcome,),) = in_workers(2, [run([job])])
             return cast(Outcome, outcome)
         except TerminatedWorkerError as error:
             trace = str(error)
-    return Outcome(job.condition_id, job.replicate, "worker process died twice", trace, b"", 0.0)
+    reason = "worker process died twice"
+    if limits.timeout_s is not None and time.perf_counter() - begun >= limits.timeout_s:
+        reason = f"{limits.reason}, in compiled code: its process was ended"
+    return Outcome(job.condition_id, job.replicate, reason, trace, b"", 0.0)
 
 
 def compile_all(config_jsons: Iterable[bytes]) -> None:

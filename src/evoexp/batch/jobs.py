@@ -8,9 +8,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from evoexp.attachments import keep_all
+from evoexp.batch.replicate_limits import ReplicateLimits, TookTooLong, limited
 from evoexp.condition import Condition
 from evoexp.records import ReplicateSummary
 
+NO_LIMITS = ReplicateLimits()
 LONGEST_TASK_S = 2.0  # [s] a task that has taken so long begins no further replicate
 
 
@@ -46,6 +48,8 @@ class Outcome(NamedTuple):
         content: The finished log; dropped once it is written.
         wall_s: Duration [s].
         summary: The row that the log holds; None for a failed one.
+        may_pass: Whether a failed one may be done another time: it took too long, or too much
+            memory.
     """
 
     condition_id: str
@@ -55,6 +59,12 @@ class Outcome(NamedTuple):
     content: bytes
     wall_s: float
     summary: ReplicateSummary | None = None
+    may_pass: bool = False
+
+    @property
+    def key(self) -> tuple[str, int]:
+        """Names it among all jobs."""
+        return self.condition_id, self.replicate
 
     @property
     def failed(self) -> bool:
@@ -62,8 +72,15 @@ class Outcome(NamedTuple):
         return bool(self.reason)
 
 
-def run_jobs(jobs: Sequence[Job]) -> list[Outcome]:
+def run_jobs(
+    jobs: Sequence[Job], limits: ReplicateLimits = NO_LIMITS, *, in_worker: bool = False
+) -> list[Outcome]:
     """Run replicates in this process, one after the other; a failure is an outcome.
+
+    Args:
+        jobs: The replicates.
+        limits: Of each.
+        in_worker: Whether this process is a worker.
 
     Returns:
         Their outcomes, one at least; no further replicate begins after `LONGEST_TASK_S`.
@@ -79,14 +96,20 @@ def run_jobs(jobs: Sequence[Job]) -> list[Outcome]:
         try:
             keep_all(job.files)
             condition = _condition(job.condition_json)
-            content, summary = run_replicate(condition, job.replicate, job.condition_json)
-            reason = trace = ""
+            condition.prepare()
+            with limited(limits, in_worker=in_worker):
+                content, summary = run_replicate(condition, job.replicate, job.condition_json)
+            reason, trace, may_pass = "", "", False
         except Exception as error:
             content, summary, trace = b"", None, traceback.format_exc()
             reason = f"{type(error).__name__}: {error}".splitlines()[0]
+            reason = str(error) if isinstance(error, TookTooLong) else reason
+            may_pass = isinstance(error, TookTooLong | MemoryError)
         seconds = time.perf_counter() - start
         outcomes.append(
-            Outcome(job.condition_id, job.replicate, reason, trace, content, seconds, summary)
+            Outcome(
+                job.condition_id, job.replicate, reason, trace, content, seconds, summary, may_pass
+            )
         )
     return outcomes
 

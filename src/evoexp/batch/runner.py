@@ -11,7 +11,8 @@ from typing import Any
 
 from evoexp.batch.jobs import Job, Outcome, load
 from evoexp.batch.known_times import LongestTimes, are_short
-from evoexp.batch.memory_limit import allowed_memory, refuse_large
+from evoexp.batch.memory_limit import GIGABYTE, allowed_memory, refuse_large
+from evoexp.batch.replicate_limits import ReplicateLimits
 from evoexp.batch.runner_settings import RunnerSettings
 from evoexp.condition import Condition
 from evoexp.records import ReplicateSummary
@@ -21,6 +22,8 @@ from evoexp.store.manifest import manifest
 from evoexp.store.mending import lost_replicates, mend, needs_mending
 from evoexp.store.run_directory import RunDirectory, create_all, lock_all
 from evoexp.store.summaries import whole_logs, write_summary
+
+LEAST_MEMORY = 1.0 * GIGABYTE  # [B] that a replicate may take where nothing is set
 
 
 class Batch:
@@ -37,6 +40,8 @@ class Batch:
         conditions: Iterable[tuple[Condition, int, dict[str, Any]]],
         settings: RunnerSettings,
         outputs: Path,
+        *,
+        retry_failed: bool = False,
     ) -> None:
         """Plan; nothing is written yet but summary tables that were out of date.
 
@@ -45,8 +50,9 @@ class Batch:
                 may occur twice.
             settings: Number of workers, and where they run.
             outputs: Root of all outputs.
+            retry_failed: Whether replicates that failed before run again; else they stay failed.
         """
-        self._settings, self._outputs = settings, outputs
+        self._settings, self._outputs, self._retry_failed = settings, outputs, retry_failed
         self._wanted: dict[str, tuple[Condition, int, dict[str, Any]]] = {}
         for condition, count, notes in conditions:
             known = self._wanted.get(condition.id)
@@ -109,7 +115,7 @@ class Batch:
                 compile_all(config_jsons)
             times = LongestTimes()
             try:
-                for outcomes in fan_out(self.jobs, num_workers):
+                for outcomes in fan_out(self.jobs, num_workers, self._limits(num_workers)):
                     times.add(outcomes)
                     yield from self._store(outcomes)
                 times.keep({key: each[0].to_json() for key, each in self._wanted.items()})
@@ -131,6 +137,21 @@ class Batch:
 
         return max(1, min(asked or num_cores(), len(self.jobs)))
 
+    @property
+    def num_left_failed(self) -> int:
+        """Number of replicates that are asked for, failed before, and are not run again."""
+        if self._retry_failed:
+            return 0
+        return sum(
+            len(self.runs[key].failed() & set(range(count)))
+            for key, (_, count, _) in self._wanted.items()
+        )
+
+    def _limits(self, num_workers: int) -> ReplicateLimits:
+        allowed = allowed_memory(self._settings, num_workers)
+        least = 0.0 if self._settings.memory_gb is not None else LEAST_MEMORY
+        return ReplicateLimits(self._settings.timeout_s, int(max(allowed, least)))
+
     def _missing(self, lost: Mapping[str, set[int]]) -> list[Job]:
         """Return the jobs of missing replicates; references, which take longest, come first.
 
@@ -143,6 +164,7 @@ class Batch:
             config_json, run = condition.to_json(), self.runs[key]
             files = tuple(condition.files().values())
             missing = (set(range(count)) - whole_logs(run)) | lost[key]
+            missing -= set() if self._retry_failed else run.failed()
             jobs += [Job(key, config_json, index, files) for index in sorted(missing)]
         return jobs
 

@@ -15,8 +15,12 @@ class RunnerSettings(Settings):
     Attributes:
         num_workers: Worker processes; None: as many as there are cores.
         memory_gb: Memory that one replicate may take, by its planner's estimate; what would take
-            more is refused before it begins [GB]. None: the machine's, divided by the workers.
+            more is refused before it begins, and what does take more in a worker fails [GB]. None:
+            the machine's, divided by the workers.
+        timeout_s: Wall time that one replicate may take [s]; one that takes longer is run once
+            more, then it has failed. None: any time.
     """
 
     num_workers: Annotated[int, Field(ge=1, le=MOST_WORKERS)] | None
     memory_gb: Positive | None = None
+    timeout_s: Positive | None = None

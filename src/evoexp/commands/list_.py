@@ -25,6 +25,7 @@ from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import damaged_logs, summary_table
 
 EXPERIMENT_KEYS = ("name", "description", "origin", "path")
+FAILED_KEYS = ("hash", "label", "replicate", "reason", "path")
 RUN_KEYS = (
     "hash",
     "experiment",
@@ -43,15 +44,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     add_config_dir_argument(parser)
     parser.add_argument(
+        "--failed", action="store_true", help="list the failed replicates of stored runs instead"
+    )
+    parser.add_argument(
         "--json",
         action="store_true",
         help=f"print JSON: experiments ({', '.join(EXPERIMENT_KEYS)}) and runs "
-        f"({', '.join(RUN_KEYS)})",
+        f"({', '.join(RUN_KEYS)}); with --failed, failures ({', '.join(FAILED_KEYS)})",
     )
 
 
 def main(arguments: argparse.Namespace) -> int:
-    """Print both lists."""
+    """Print both lists, or that of failures."""
+    if arguments.failed:
+        return _print_failed(as_json=arguments.json)
     experiments = [_experiment(name) for name in options("experiment")]
     runs = [_run(name, run) for name, run in stored_runs(outputs_root())]
     if arguments.json:
@@ -63,6 +69,37 @@ def main(arguments: argparse.Namespace) -> int:
         console.print(_run_table(runs))
     else:
         console.print(f"no runs stored in {outputs_root()}", soft_wrap=True)
+    return 0
+
+
+def _print_failed(*, as_json: bool) -> int:
+    """List the failed replicates, run by run."""
+    rows = []
+    for name, run in stored_runs(outputs_root()):
+        if isinstance(run, EvoexpError) or not run.failed():
+            continue
+        label = _named(run)["label"] or ""
+        for replicate in sorted(run.failed()):
+            try:
+                reason = str(run.failure(replicate)["reason"])
+            except EvoexpError as error:
+                reason = str(error)
+            rows.append((name, label, replicate, reason, str(run.failure_path(replicate))))
+    if as_json:
+        print_json([dict(zip(FAILED_KEYS, row, strict=True)) for row in rows])
+        return 0
+    console = plain_console()
+    if not rows:
+        console.print(f"no failed replicates in {outputs_root()}", soft_wrap=True)
+        return 0
+    table = new_table()
+    add_hash_column(table)
+    add_columns(table, "condition")
+    add_columns(table, "#", right=True)
+    add_columns(table, "reason")
+    for name, label, replicate, reason, _ in rows:
+        table.add_row(name, coloured(label), str(replicate), coloured(reason))
+    console.print(table)
     return 0
 
 

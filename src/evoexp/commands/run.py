@@ -28,6 +28,9 @@ from evoexp.store.summaries import summary_table as stored_summaries
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     add_experiment_arguments(parser)
+    parser.add_argument(
+        "--retry-failed", action="store_true", help="run replicates again that failed before"
+    )
     parser.add_argument("--no-report", action="store_true", help="run only; draw nothing")
 
 
@@ -50,11 +53,19 @@ def main(arguments: argparse.Namespace) -> int:
         for experiment in experiments
         for labelled in experiment.conditions
     ]
-    batch = Batch(wanted, experiments[0].runner, outputs_root())
+    batch = Batch(
+        wanted, experiments[0].runner, outputs_root(), retry_failed=arguments.retry_failed
+    )
     if batch.num_workers > 1:
         _start_server(arguments)
     batch.prepare()
+    left = batch.num_left_failed
     failures = _run(batch, wanted, console)
+    if left:
+        which = f"{left} replicates failed before" if left > 1 else "1 replicate failed before"
+        console.print(
+            f"{which}: evoexp list --failed; run again with --retry-failed", soft_wrap=True
+        )
     try:
         for experiment in experiments:
             console.print(summary_table(experiment))
@@ -72,7 +83,7 @@ def main(arguments: argparse.Namespace) -> int:
     finally:
         if failures:
             console.print(_failure_table(batch, failures))
-    return 1 if failures else 0
+    return 1 if failures or left else 0
 
 
 def _start_server(arguments: argparse.Namespace) -> None:
@@ -97,7 +108,8 @@ def _run(
     if not batch.jobs:
         if batch.is_damaged:
             deque(batch.run(), maxlen=0)  # mends what is no replicate
-        console.print("nothing to run: every replicate is there")
+        if not batch.num_left_failed:
+            console.print("nothing to run: every replicate is there")
         return []
     planned = sorted({count for _, count, _ in wanted})
     console.print(

@@ -7,10 +7,22 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from evoexp.collision.body_table import body_table
+from evoexp.collision.motion_bounds import (
+    approach_bounds,
+    configuration,
+    joint_frames,
+    joint_twists,
+    pair_reaches,
+    reaches,
+)
 from evoexp.errors import EvoexpError
+from evoexp.numeric.compilation import kernel
 from evoexp.numeric.elementary import DEGREE
+from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.forward_kinematics import forward_kinematics
+from evoexp.robots.kinematics import KinematicChain
 from evoexp.robots.poses import frame_pose, local_pose
 from evoexp.robots.urdf import Urdf
 from evoexp.testing.small_conditions import conditions
@@ -107,6 +119,79 @@ def test_joints_that_are_named_move_and_the_others_stand_where_they_are_told() -
     turned = {"left_elbow": 30.0 * DEGREE, "left_shoulder": -100.0 * DEGREE}
     told = fixed | turned
     agrees(found.build(), STANDING | told)
+
+
+@pytest.mark.parametrize("group", ["", "left", "left_arm", "left_gripper"])
+def test_joints_that_follow_others_do_so_in_every_model(group: str) -> None:
+    """The thumb stands before the finger that it follows in Pinocchio's order."""
+    assembly = robot(group=group).build()
+    table = assembly.table
+    follow = {str(assembly.model.names[int(k) + 1]) for k in np.flatnonzero(~table.free)}
+    left = {"left_coupler", "a_left_thumb"}
+    expected = {"left_arm": {"left_coupler"}, "left_gripper": {"a_left_thumb"}}.get(group, left)
+    assert follow == expected and table.num_coordinates == assembly.model.nq
+    if group == "left_gripper":
+        assert table.slides.tolist() == [True]
+    agrees(assembly, STANDING)
+
+
+def test_the_certifier_bounds_hold_for_joints_that_follow() -> None:
+    """Frames, twists and greatest speeds against differences of Pinocchio's placements."""
+    assembly = robot(group="left").build()
+    model, chain, rng = assembly.model, assembly.table.chain, np.random.default_rng(3)
+    bodies = body_table(assembly.table, list(assembly.geometry.geometryObjects))
+    count, joints = len(bodies.joint), len(chain.parent)
+    pairs = np.array([(a, b) for b in range(count) for a in range(b)], dtype=np.int64)
+    for _ in range(10):
+        coefficients = np.zeros((4, model.nq))
+        coefficients[:2] = rng.uniform(-1.0, 1.0, (2, model.nq))
+        strokes = np.abs(coefficients).sum(axis=0)
+        reach = reaches(chain, bodies.joint, bodies.from_origin, bodies.from_axis, strokes)
+        bounds, above = np.empty((2, len(pairs))), np.empty(joints)
+        by_joint = pair_reaches(pairs, reach)
+        approach(tuple(chain), coefficients, by_joint, bounds, above)
+        frames, twists = np.empty((joints, 12)), np.empty((joints, 6))
+        frames_and_twists(tuple(chain), coefficients, 0.5, frames, twists)
+        before = placements(assembly, coefficients[0] + 0.5 * coefficients[1])
+        after = placements(assembly, coefficients[0] + (0.5 + 1e-6) * coefficients[1])
+        for k in range(joints):
+            turned = frames[k, :9].reshape(3, 3) @ assembly.table.alignment[k].T
+            assert np.abs(turned - before[0][k + 1].rotation).max() < 1e-12
+            assert np.abs(frames[k, 9:] - before[0][k + 1].translation).max() < 1e-12
+            speed = (after[0][k + 1].translation - before[0][k + 1].translation) * 1e6
+            expected = twists[k, 3:] + np.cross(twists[k, :3], frames[k, 9:])
+            assert speed == pytest.approx(expected, abs=1e-4)
+        for pair, (a, b) in enumerate(pairs.tolist()):
+            apart = [
+                np.linalg.norm(p[1][a].translation - p[1][b].translation) for p in (before, after)
+            ]
+            assert abs(apart[1] - apart[0]) * 1e6 <= bounds[0, pair] + 1e-4
+
+
+@kernel
+def approach(
+    fields: Any, coefficients: FloatArray, by_joint: FloatArray, out: FloatArray, above: FloatArray
+) -> None:
+    """Bound the approach of all pairs on the whole segment."""
+    approach_bounds(KinematicChain(*fields), coefficients, 0.0, 1.0, by_joint, out, above)
+
+
+@kernel
+def frames_and_twists(
+    fields: Any, coefficients: FloatArray, u: float, frames: FloatArray, twists: FloatArray
+) -> None:
+    """Write frames and twists of all joints."""
+    chain, q = KinematicChain(*fields), np.empty(coefficients.shape[1])
+    configuration(coefficients, u, q)
+    joint_frames(chain, q, frames)
+    joint_twists(chain, coefficients, u, frames, twists)
+
+
+def placements(assembly: Assembly, q: FloatArray) -> tuple[Any, Any]:
+    """Return Pinocchio's placements of joints and of bodies."""
+    data, placed = assembly.model.createData(), assembly.geometry.createData()
+    pin.updateGeometryPlacements(assembly.model, data, assembly.geometry, placed, q)
+    return data.oMi, placed.oMg
 
 
 def test_fields_at_their_defaults_are_no_part_of_the_identity() -> None:

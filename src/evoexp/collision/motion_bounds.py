@@ -33,7 +33,7 @@ def joint_frames(chain: KinematicChain, q: FloatArray, frames: FloatArray) -> No
     """Write the frames of all joints (joints, FRAME) at one configuration q (nq,)."""
     rotation, translation = chain.rotation, chain.translation
     for k in range(len(chain.parent)):
-        p, value = chain.parent[k], q[chain.index_q[k]]
+        p, value = chain.parent[k], chain.rule[k, 0] * q[chain.index_q[k]] + chain.rule[k, 1]
         s, c = (0.0, 1.0) if chain.prismatic[k] else sincos(value)
         slide = value if chain.prismatic[k] else 0.0
         dx, dy, dz = translation[k, 0], translation[k, 1], translation[k, 2]
@@ -80,6 +80,7 @@ def joint_twists(
     for k in range(len(chain.parent)):
         p, j = chain.parent[k], chain.index_q[k]
         rate = coefficients[1, j] + u * (2.0 * coefficients[2, j] + u * 3.0 * coefficients[3, j])
+        rate *= chain.rule[k, 0]
         zx, zy, zz = rate * frames[k, 2], rate * frames[k, 5], rate * frames[k, 8]
         x, y, z = frames[k, 9], frames[k, 10], frames[k, 11]
         for e in range(6):
@@ -148,7 +149,8 @@ def reaches(
         while k >= 0:
             out[body, k] = 1.0 if chain.prismatic[k] else turn
             x, y, z = chain.translation[k, 0], chain.translation[k, 1], chain.translation[k, 2]
-            slide = strokes[chain.index_q[k]] if chain.prismatic[k] else 0.0
+            stroke = abs(chain.rule[k, 0]) * strokes[chain.index_q[k]] + abs(chain.rule[k, 1])
+            slide = stroke if chain.prismatic[k] else 0.0
             beside = np.sqrt(x * x + y * y)
             # then the joint moves nothing away from its parent's axis
             parallel = abs(abs(chain.rotation[k, 8]) - 1.0) < PARALLEL
@@ -208,11 +210,12 @@ def approach_bounds(
         c1, c2, c3 = coefficients[1, j], 2.0 * coefficients[2, j], 3.0 * coefficients[3, j]
         first, last = abs(c1 + begin * (c2 + begin * c3)), abs(c1 + end * (c2 + end * c3))
         speed = max(first, max(last, abs(c1 + 0.5 * c2 * (begin + end) + c3 * begin * end)))
+        speed *= abs(chain.rule[k, 0])
         carried = above[p] if p >= 0 else 0.0
         turning = 0.0 if chain.prismatic[k] else speed
         above[k] = carried + turning
         # the greatest acceleration: linear in u, then centripetal and Coriolis
-        change = max(abs(c2 + 2.0 * c3 * begin), abs(c2 + 2.0 * c3 * end))
+        change = max(abs(c2 + 2.0 * c3 * begin), abs(c2 + 2.0 * c3 * end)) * abs(chain.rule[k, 0])
         change += speed * (turning + 2.0 * carried)
         if speed > 0.0 or change > 0.0:
             for pair in range(out.shape[1]):

@@ -187,8 +187,10 @@ def record(
 def _joints(assembly: Assembly) -> tuple[Joint, ...]:
     """Return the joints in the order of their coordinates."""
     table, names = assembly.table, assembly.model.names
+    own = np.flatnonzero(table.free)
     return tuple(
-        Joint(str(names[int(k) + 1]), bool(table.prismatic[k])) for k in np.argsort(table.index_q)
+        Joint(str(names[int(k) + 1]), bool(table.prismatic[k]))
+        for k in own[np.argsort(table.index_q[own])]
     )
 
 

@@ -54,10 +54,10 @@ def forward_kinematics(table: KinematicTable, q: FloatArray) -> tuple[FloatArray
     Raises:
         ValueError: If q has not as many rows as the model has coordinates.
     """
-    num_joints = len(table.parent)
+    num_joints, nq = len(table.parent), table.num_coordinates
     q = np.ascontiguousarray(q, dtype=np.float64)
-    if q.ndim != 2 or q.shape[0] != num_joints:
-        raise ValueError(f"q must have shape ({num_joints}, configurations), was {q.shape}")
+    if q.ndim != 2 or q.shape[0] != nq:
+        raise ValueError(f"q must have shape ({nq}, configurations), was {q.shape}")
     out = np.empty((num_joints, SPATIAL_ROWS, q.shape[1]))
     _forward_kinematics(tuple(table.chain), q, out)
     return out[:, :9].reshape(num_joints, 3, 3, -1), out[:, 9:]
@@ -143,6 +143,8 @@ def spatial_frames(chain: KinematicChain, eight: Eight, unit: float, frames: Flo
         before = U(chain.parent[k]) * SPATIAL_FRAME
         rotation, translation = chain.rotation[k], chain.translation[k]
         dx, dy, dz = translation[0], translation[1], translation[2]
+        if chain.rule[k, 0] != 1.0 or chain.rule[k, 1] != 0.0:  # it follows another joint
+            moved = moved * chain.rule[k, 0] + chain.rule[k, 1]
         s, c = sincos(moved)
         for e in range(3):
             row, at = U(3 * e) * VECTOR, U(9 + e) * VECTOR

@@ -40,6 +40,8 @@ class KinematicChain(NamedTuple):
         turned: (joints,) true where the placement's rotation is not the identity.
         rotation: (joints, 9) placement in the parent's frame, row by row.
         translation: (joints, 3) [length unit].
+        rule: (joints, 2) the joint's value is the first times its coordinate plus the second: 1 and
+            0, unless it follows another joint, whose coordinate it shares.
     """
 
     parent: IntArray
@@ -48,22 +50,25 @@ class KinematicChain(NamedTuple):
     turned: BoolArray
     rotation: FloatArray
     translation: FloatArray
+    rule: FloatArray
 
 
 class KinematicTable(NamedTuple):
     """Joints in the order of the model, without the universe; parents come before their children.
 
     Attributes:
-        parent: See `KinematicChain`, as for the next five.
+        parent: See `KinematicChain`, as for the next six.
         index_q: See there.
         prismatic: See there.
         turned: See there.
         rotation: See there.
         translation: See there.
+        rule: See there.
         alignment: (joints, 3, 3) from the table's frame of a joint to Pinocchio's: columns are the
             table's axes.
         planar: Whether every joint turns about the world's z, so that everything moves in parallel
-            planes.
+            planes; not if a joint follows another.
+        free: (joints,) whether a joint has a coordinate of its own, and follows no other.
     """
 
     parent: IntArray
@@ -72,13 +77,27 @@ class KinematicTable(NamedTuple):
     turned: BoolArray
     rotation: FloatArray
     translation: FloatArray
+    rule: FloatArray
     alignment: FloatArray
     planar: bool
+    free: BoolArray
 
     @property
     def chain(self) -> KinematicChain:
-        """The six arrays that kernels read."""
-        return KinematicChain(*self[:6])
+        """The seven arrays that kernels read."""
+        return KinematicChain(*self[:7])
+
+    @property
+    def num_coordinates(self) -> int:
+        """Number of values of a configuration."""
+        return int(self.free.sum())
+
+    @property
+    def slides(self) -> BoolArray:
+        """(nq,) whether a coordinate is a length, that of a joint that slides."""
+        found = np.zeros(self.num_coordinates, dtype=np.bool_)
+        found[self.index_q[self.free]] = self.prismatic[self.free]
+        return found
 
     def local(self, joint: int, point: FloatArray) -> FloatArray:
         """Express a point, given in Pinocchio's frame of a joint, in the table's frame of it.
@@ -115,14 +134,34 @@ def kinematic_table(model: Any) -> KinematicTable:
             matrix_product(before.T, placement.rotation), alignment[k]
         ).ravel()
         translation[k] = matrix_product(before.T, placement.translation)
+    joints = range(1, model.njoints)
+    rule = np.array([_rule(model, joint) for joint in joints]).reshape(-1, 2)
+    free = np.array([not _follows(model, joint) for joint in joints], dtype=np.bool_)
     turned = np.array(
         [not np.array_equal(matrix, np.eye(3).ravel()) for matrix in rotation], dtype=np.bool_
     )
     index_q = np.array([model.idx_qs[j] for j in range(1, model.njoints)], dtype=np.int64)
-    planar = not prismatic.any() and all(_keeps_plane(matrix) for matrix in rotation)
-    return KinematicTable(
-        parent, index_q, prismatic, turned, rotation, translation, alignment, planar
+    planar = (
+        bool(free.all())
+        and not prismatic.any()
+        and all(_keeps_plane(matrix) for matrix in rotation)
     )
+    return KinematicTable(
+        parent, index_q, prismatic, turned, rotation, translation, rule, alignment, planar, free
+    )
+
+
+def _follows(model: Any, joint: int) -> bool:
+    """Whether a joint follows another, and has no coordinate of its own."""
+    return bool(model.joints[joint].shortname() == "JointModelMimic")
+
+
+def _rule(model: Any, joint: int) -> tuple[float, float]:
+    """Return multiplier and offset of a joint's value, of its coordinate or that of its source."""
+    if not _follows(model, joint):
+        return 1.0, 0.0
+    mimic = model.joints[joint].extract()
+    return float(mimic.scaling), float(mimic.offset)
 
 
 def check_size(model: Any) -> None:
@@ -142,6 +181,12 @@ def _axis(model: Any, data: Any, neutral: FloatArray, joint: int) -> tuple[Float
         UnsupportedJoint: If it has not exactly one coordinate, or turns and slides at once.
     """
     name = model.names[joint]
+    if _follows(model, joint):
+        # Pinocchio's motion subspace of such a joint is its own times the multiplier
+        own = model.joints[joint].createData()
+        model.joints[joint].calc(own, neutral)
+        motion = np.reshape(own.S, 6) / _rule(model, joint)[0]
+        return (motion[:3], True) if motion[:3].any() else (motion[3:], False)
     if model.nqs[joint] != 1 or model.nvs[joint] != 1:
         kind = model.joints[joint].shortname()
         raise UnsupportedJoint(

@@ -188,7 +188,8 @@ class UrdfTree:
         """
         arms = []
         whole = [
-            own | {joint for joint, (source, *_) in self.rules.items() if source in own}
+            own
+            | {joint for joint, (source, rate, _) in self.rules.items() if source in own and rate}
             for own in self._arms
         ]
         everything = set[int]().union(*whole)
@@ -236,7 +237,7 @@ class UrdfTree:
                 found[joint] = min(max(0.0, low), high)
         for joint, (source, multiplier, offset) in self.rules.items():
             if joint not in moving:
-                found[joint] = multiplier * found[source] + offset
+                found[joint] = (multiplier * found[source] if multiplier else 0.0) + offset
         return found
 
 
@@ -276,6 +277,9 @@ class UrdfArm:
             index = own.idx_qs[joint]
             model.lowerPositionLimit[model.idx_qs[added]] = own.lowerPositionLimit[index]
             model.upperPositionLimit[model.idx_qs[added]] = own.upperPositionLimit[index]
+            # 0 where the URDF gives none: no limit
+            speed = own.velocityLimit[own.idx_vs[joint]]
+            model.velocityLimit[model.idx_vs[added]] = speed if speed > 0.0 else np.inf
             starts.append((before, place))
         links = []
         for before, place in starts:

@@ -77,7 +77,7 @@ def work_space(task: Task) -> Workspace:
     """Return the workspace of a task; bodies that stand still are in their places."""
     num_joints, bodies = len(task.chain.parent), task.bodies
     return Workspace(
-        q=np.zeros(num_joints),
+        q=np.zeros(task.coefficients.shape[2]),
         frames=np.zeros((num_joints, FRAME)),
         world=np.hstack([bodies.rotation, bodies.translation]),
         stamps=np.zeros(len(bodies.joint) + 2, dtype=np.int64),

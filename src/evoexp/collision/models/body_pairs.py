@@ -166,6 +166,11 @@ def _never_touch(assembly: Assembly, shapes: Shapes, pair: Pair) -> bool:
     strokes = np.abs(joint_limits(assembly)).max(axis=0)
     reach = reaches(table.chain, bodies.joint, bodies.from_origin, bodies.from_axis, strokes)
     way = pair_reaches(np.array([[0, 1]], dtype=np.int64), reach)[0]  # (joints,)
+    # joints that follow others share their coordinates
+    way = np.asarray(
+        np.bincount(table.index_q, way * np.abs(table.rule[:, 0]), table.num_coordinates),
+        dtype=np.float64,
+    )
     moving = np.flatnonzero(way > 0.0)
     if len(moving) > 2:
         return False
@@ -183,20 +188,19 @@ def _grid(
 
     Args:
         assembly: The robot.
-        moving: Indices of the joints that the grid spans.
-        way: (joints,) bound of |d distance / dq| by joint.
-        size: Values per joint.
+        moving: Indices of the coordinates that the grid spans.
+        way: (nq,) bound of |d distance / dq| by coordinate.
+        size: Values per coordinate.
 
     Returns:
         (nq, n) configurations, and the bound [length unit].
     """
     low, high = joint_limits(assembly)
-    columns = assembly.table.index_q[moving]
-    step = (high[columns] - low[columns]) / size
-    values = [low[c] + s * (np.arange(size) + 0.5) for c, s in zip(columns, step, strict=True)]
+    step = (high[moving] - low[moving]) / size
+    values = [low[c] + s * (np.arange(size) + 0.5) for c, s in zip(moving, step, strict=True)]
     grid = np.meshgrid(*values, indexing="ij") if len(moving) else []
     q = np.repeat(0.5 * (low + high)[:, None], grid[0].size if grid else 1, axis=1)
-    for column, value in zip(columns, grid, strict=True):
+    for column, value in zip(moving, grid, strict=True):
         q[column] = value.ravel()
     return q, float(np.sum(way[moving] * 0.5 * step))
 

@@ -164,6 +164,8 @@ def _limits(scene: Scene, eight: Eight) -> Limits:
     chain, scale, total = scene.chain, spread(scene.scale), spread(0.0)
     for k in range(len(chain.parent)):
         moved = magnitude(coordinate(eight, chain.index_q[k]))
+        if chain.rule[k, 0] != 1.0 or chain.rule[k, 1] != 0.0:
+            moved = moved * abs(chain.rule[k, 0]) + abs(chain.rule[k, 1])
         total = total + moved
         if chain.prismatic[k]:
             scale = scale + moved

@@ -13,7 +13,7 @@ from evoexp.records import FloatArray, IntArray
 from evoexp.robots.kinematics import KinematicChain
 from evoexp.scenarios.obstacles import ObstacleTable
 
-CHAIN_BLOCKS, OBSTACLE_BLOCKS = 6, 4
+CHAIN_BLOCKS, OBSTACLE_BLOCKS = 7, 4
 """How many blocks a chain and the obstacles take."""
 
 
@@ -58,6 +58,7 @@ def chain_of(n: FloatArray, i: IntArray, block: int) -> KinematicChain:
         column_of(i, i, block + 3),
         table_of(n, i, block + 4, 9),
         table_of(n, i, block + 5, 3),
+        table_of(n, i, block + 6, 2),
     )
 
 

@@ -250,10 +250,10 @@ class PrimitiveCollision(NamedTuple):
         return bool(self.collides(q).any())
 
     def _checked(self, q: FloatArray) -> FloatArray:
-        num_joints = len(self.table.parent)
+        nq = self.table.num_coordinates
         q = np.ascontiguousarray(q, dtype=np.float64)
-        if q.ndim != 2 or q.shape[0] != num_joints:
-            raise ValueError(f"q must have shape ({num_joints}, configurations), was {q.shape}")
+        if q.ndim != 2 or q.shape[0] != nq:
+            raise ValueError(f"q must have shape ({nq}, configurations), was {q.shape}")
         return q
 
 

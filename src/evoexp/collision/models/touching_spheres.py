@@ -242,10 +242,10 @@ class SphereCollision(NamedTuple):
         return any_contact(self.tables, self._checked(q))
 
     def _checked(self, q: FloatArray) -> FloatArray:
-        num_joints = len(self.assembly.table.parent)
+        nq = self.assembly.table.num_coordinates
         q = np.ascontiguousarray(q, dtype=np.float64)
-        if q.ndim != 2 or q.shape[0] != num_joints:
-            raise ValueError(f"q must have shape ({num_joints}, configurations), was {q.shape}")
+        if q.ndim != 2 or q.shape[0] != nq:
+            raise ValueError(f"q must have shape ({nq}, configurations), was {q.shape}")
         return q
 
     @property

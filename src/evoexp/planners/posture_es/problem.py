@@ -131,7 +131,7 @@ def _limits(assembly: Assembly) -> FloatArray:
 def _units(assembly: Assembly) -> FloatArray:
     """Return (nq,) model units per unit of the scenario: degrees, lengths of sliding joints."""
     units = np.full(assembly.model.nq, DEGREE)
-    units[assembly.table.index_q[assembly.table.prismatic]] = 1.0
+    units[assembly.table.slides] = 1.0
     return units
 
 
@@ -271,7 +271,9 @@ def reach(assembly: Assembly, limits: FloatArray) -> tuple[FloatArray, float]:
 def _stroke(assembly: Assembly, limits: FloatArray, joint: int) -> float:
     """Return the greatest slide of a joint of the table; 0 if it turns."""
     table = assembly.table
-    return float(np.abs(limits[table.index_q[joint]]).max()) if table.prismatic[joint] else 0.0
+    multiplier, offset = table.rule[joint]
+    stroke = abs(multiplier) * float(np.abs(limits[table.index_q[joint]]).max()) + abs(offset)
+    return float(stroke) if table.prismatic[joint] else 0.0
 
 
 def _check_reach(problem: Problem) -> None:

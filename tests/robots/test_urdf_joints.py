@@ -194,6 +194,98 @@ def placements(assembly: Assembly, q: FloatArray) -> tuple[Any, Any]:
     return data.oMi, placed.oMg
 
 
+def test_a_base_moves_by_one_coordinate_after_another() -> None:
+    """At x, y, z, yaw, pitch, roll the bodies stand as those of a base that is placed there."""
+    still = robot(
+        group="right_arm",
+        base_position=[0.3, -0.2, 0.1],
+        base_rotation=[10.0, 20.0, 30.0],
+    ).build()
+    moving = robot(group="right_arm", base="floating").build()
+    assert [str(name) for name in moving.model.names][1:4] == ["base_x", "base_y", "base_z"]
+    arm = np.array([0.4, -0.7])
+    pose = np.array([0.3, -0.2, 0.1, *(DEGREE * np.array([30.0, 20.0, 10.0]))])
+    for one, two in zip(
+        placements(still, arm)[1], placements(moving, np.concatenate([pose, arm]))[1], strict=True
+    ):
+        assert np.abs(one.homogeneous - two.homogeneous).max() < 1e-12
+    assert robot(group="right_arm", base="planar").build().model.nq == 5
+
+
+@pytest.mark.parametrize(("base", "nq"), [("fixed", 1), ("free", 4)])
+def test_planar_joints_of_a_file_stand_or_move(base: str, nq: int, tmp_path: Path) -> None:
+    text = (
+        '<robot name="x"><link name="a"/><joint name="floor" type="planar"><parent link="a"/>'
+        '<child link="b"/><origin xyz="0 0 1"/><axis xyz="0 1 0"/></joint><link name="b"/>'
+        '<joint name="turn" type="continuous"><parent link="b"/><child link="c"/>'
+        '<axis xyz="0 0 1"/>'
+        '</joint><link name="c"><collision><geometry><sphere radius="1"/></geometry></collision>'
+        "</link></robot>"
+    )
+    path = tmp_path / "x.urdf"
+    path.write_text(text)
+    assembly = robot(path, base=base).build()
+    assert assembly.model.nq == nq
+    placed = placements(assembly, np.full(nq, 0.5))[1][0]
+    if base == "fixed":
+        assert placed.translation == pytest.approx([0.0, 0.0, 1.0])
+    else:  # it stays in the plane across y, and turns about y, then z
+        assert placed.translation[1] == 0.0
+        assert np.hypot(placed.translation[0], placed.translation[2] - 1.0) == pytest.approx(
+            0.5**0.5
+        )
+        about = pin.utils.rotate("y", 0.5) @ pin.utils.rotate("z", 0.5)
+        assert placed.rotation == pytest.approx(about)
+
+
+def scenario_of(*overrides: str) -> Any:
+    words = ("robot=urdf", f"robot.path={URDF}", f"robot.srdf={SRDF}", *overrides)
+    (condition,) = conditions(*words).values()
+    return condition.scenario
+
+
+POSTURES = (
+    *("scenario=urdf_reach", "planner=posture_es", "ga=corsepius"),
+    *("objective=corsepius_reach", "collision=corsepius_spheres", "robot.group=left_arm"),
+)
+STRINGS = (
+    *("scenario=urdf_two_arms", "planner=rana_puma", "ga=rana_puma", "objective=rana_puma"),
+    *("collision=urdf_two_arms", "robot.groups=[left_arm,right_arm]"),
+)
+
+
+def test_states_are_start_and_goal_by_their_names() -> None:
+    task = scenario_of(*POSTURES, "scenario.q_start=bent")
+    assert task.q_start == pytest.approx([0.5 / DEGREE, -1.0 / DEGREE])
+    motion = scenario_of(*STRINGS, "scenario.q_start=bent", "scenario.q_goal=[bent,[1.0,2.0]]")
+    assert motion.q_start[1] == pytest.approx([0.25 / DEGREE, 1.0 / DEGREE])
+    assert motion.q_goal[0] == motion.q_start[0] and motion.q_goal[1] == (1.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (
+            (*POSTURES, "scenario.q_start=bend"),
+            "scenario.q_start: must be a state that the robot's",
+        ),
+        ((*POSTURES, "scenario.q_start=bend"), "was 'bend'; did you mean 'bent'?"),
+        (
+            (*POSTURES[:-1], "robot.group=left", "scenario.q_start=bent"),
+            "scenario.q_start: must be a state that tells left_finger, was 'bent'",
+        ),
+        (
+            (*STRINGS, "scenario.q_goal=[bent]"),
+            "must be one state or list per arm of the robot (2)",
+        ),
+    ],
+)
+def test_states_that_are_not_there(overrides: tuple[str, ...], message: str) -> None:
+    with pytest.raises(EvoexpError) as found:
+        scenario_of(*overrides)
+    assert message in str(found.value)
+
+
 def test_fields_at_their_defaults_are_no_part_of_the_identity() -> None:
     plain = robot().canonical()
     assert set(plain) == {"_target_", "revision", "urdf", "srdf"}

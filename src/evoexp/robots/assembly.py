@@ -6,6 +6,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from evoexp.errors import SettingError, nearest
 from evoexp.numeric.ordered_sums import length
 from evoexp.records import FloatArray
 from evoexp.robots.kinematics import KinematicTable, check_size, kinematic_table
@@ -76,6 +77,39 @@ class Follower(NamedTuple):
     offset: float  # [rad], a length for a prismatic joint
 
 
+class ArmStates(NamedTuple):
+    """The named states of an arm.
+
+    Attributes:
+        joints: Names of the joints that move, in the order of q.
+        units: Of each: degrees, or 1 for lengths [rad, m].
+        states: Values of joints by their names [rad, m], by the states' names.
+    """
+
+    joints: tuple[str, ...]
+    units: tuple[float, ...]
+    states: dict[str, dict[str, float]]
+
+    def values_of(self, name: str, field: str) -> list[float]:
+        """Return the configuration of a state [deg, m].
+
+        Args:
+            name: Of the state.
+            field: That names it, for errors.
+
+        Raises:
+            SettingError: If there is none, or it leaves out a joint.
+        """
+        if name not in self.states:
+            names = sorted(self.states)
+            must = f"a state that the robot's SRDF names ({', '.join(names) or 'none'}), or numbers"
+            raise SettingError(field, must, name, nearest(name, names))
+        state = self.states[name]
+        if missing := [joint for joint in self.joints if joint not in state]:
+            raise SettingError(field, f"a state that tells {', '.join(missing)}", name)
+        return [state[joint] / unit for joint, unit in zip(self.joints, self.units, strict=True)]
+
+
 class Arm(Protocol):
     """What a robot is built from: `Chain` says what each function does."""
 
@@ -97,6 +131,9 @@ class Arm(Protocol):
     def followers(self, first_joint: int) -> list[Follower]:
         """Return the joints that follow others."""
 
+    def states(self) -> tuple[ArmStates, ...]:
+        """Return the named states, of this arm alone."""
+
 
 class Robot(Component):
     """Base of every robot description: names its arms, which are built together."""
@@ -109,6 +146,10 @@ class Robot(Component):
     def wants_pairs(cls, settings: dict[str, Any]) -> bool:
         """Whether plain settings are to be given derived pairs of bodies, as data."""
         return False
+
+    def states(self) -> tuple[ArmStates, ...]:
+        """Return the named states of each arm."""
+        return tuple(own for chain in self.chains() for own in chain.states())
 
     def build(self) -> Assembly:
         """Append all arms to one model.
@@ -219,6 +260,10 @@ class Chain(Robot):
             first_joint: Index of the arm's first joint.
         """
         return []
+
+    def states(self) -> tuple[ArmStates, ...]:
+        """Return the named states: none, unless a file names some."""
+        return (ArmStates((), (), {}),)
 
 
 def link_capsule(link: Link, name: str) -> Any:

@@ -12,6 +12,8 @@ def mesh_content(name: str, urdf: Path, field: str) -> bytes:
     """Return the content of a mesh: beside the URDF, or in a package in a directory above it."""
     if name.startswith("package://"):
         rest = name.removeprefix("package://")
+        if Path(rest).suffix.lower() in MESHES:
+            rest = rest.lstrip("/")  # a common slip
         if rest.startswith("/") or ".." in Path(rest).parts:
             raise SettingError(field, "a URDF whose meshes lie in their packages", name)
         tried = [parent / rest for parent in urdf.resolve().parents]

@@ -15,7 +15,7 @@ from pydantic import BeforeValidator
 
 from evoexp.attachments import SHA256, File, keep
 from evoexp.errors import SettingError, nearest
-from evoexp.robots.assembly import Arm, Assembly, Chain
+from evoexp.robots.assembly import Arm, ArmStates, Assembly, Chain
 from evoexp.robots.bodies import Point3, placed
 from evoexp.robots.joint_choice import joint_roles, standing_values
 from evoexp.robots.mesh_files import MESHES, mesh_content
@@ -161,10 +161,14 @@ class Urdf(Chain):
             self._base(model),
             roles,
             values,
-            [] if srdf is None else srdf.disabled_links(),
             self._tips(roles.tips),
+            srdf,
         )
         return tuple(UrdfArm(tree, k) for k in range(len(roles.arms)))
+
+    def states(self) -> tuple[ArmStates, ...]:
+        """Return the named states of each arm."""
+        return tuple(own for chain in self.chains() for own in chain.states())
 
     def _tips(self, found: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
         """Return the frame of each arm's tool, empty if none is named, and the field that chose it.

@@ -9,8 +9,9 @@ from evoexp.errors import SettingError, nearest
 from evoexp.numeric.elementary import DEGREE, sincos
 from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import FloatArray
-from evoexp.robots.assembly import Follower, Link, Tool
+from evoexp.robots.assembly import ArmStates, Follower, Link, Tool
 from evoexp.robots.joint_choice import JointRoles
+from evoexp.robots.srdf import Srdf
 
 SLIDING = ("JointModelPX", "JointModelPY", "JointModelPZ", "JointModelPrismaticUnaligned")
 AXES = {"X": 0, "Y": 1, "Z": 2}
@@ -44,6 +45,7 @@ class UrdfTree:
         rules: Joints that follow: index of the source, multiplier, offset.
         disabled: Pairs of bodies' names that are never judged.
         tips: The link at the end of each arm, or the frame that is chosen.
+        states: That the SRDF names.
     """
 
     def __init__(
@@ -53,8 +55,8 @@ class UrdfTree:
         base: Any,
         roles: JointRoles,
         values: dict[str, float],
-        disabled: list[tuple[str, str]],
         tips: tuple[tuple[str, str], ...],
+        srdf: Srdf | None,
     ) -> None:
         """Find out which joints move.
 
@@ -64,10 +66,11 @@ class UrdfTree:
             base: `pin.SE3` of the root in the world.
             roles: Which joints move, which follow.
             values: Of joints that stand [deg, m].
-            disabled: Pairs of links that are never judged.
             tips: Frame of each arm's tool, empty where none is chosen, and the field that chose it.
+            srdf: Its states and pairs that are never judged; None: there are none.
         """
         self.model, self.base, self.tips = model, base, tips
+        self.states = [] if srdf is None else srdf.states()
         self.items = list(geometry.geometryObjects)
         stems = [item.name.rpartition("_")[0] for item in self.items]
         self.names = [
@@ -79,7 +82,7 @@ class UrdfTree:
             of_link.setdefault(stem, set()).add(name)
         self.disabled = {
             frozenset((a, b))
-            for one, two in disabled
+            for one, two in ([] if srdf is None else srdf.disabled_links())
             for a in of_link.get(one, ())
             for b in of_link.get(two, ())
         }
@@ -333,6 +336,16 @@ class UrdfArm:
             if joint in rules
             for source, multiplier, offset in [rules[joint]]
         ]
+
+    def states(self) -> tuple[ArmStates, ...]:
+        """Return the named states of the joints that move."""
+        tree, own = self._tree, [joint for joint in self._own if joint not in self._tree.rules]
+        found: dict[str, dict[str, float]] = {}
+        for state in tree.states:  # of several groups: one state of all their joints
+            found[state.name] = found.get(state.name, {}) | state.values
+        units = tuple(1.0 if _axis(tree.model, joint)[1] else DEGREE for joint in own)
+        joints = tuple(str(tree.model.names[joint]) for joint in own)
+        return (ArmStates(joints, units, found),)
 
     def _own_bodies(self) -> list[tuple[str, Any]]:
         """Return the bodies that this arm's joints carry, the first arm's with those that stand."""

@@ -17,6 +17,7 @@ FLOATING = (
     ("pitch", "revolute", "0 1 0"),
     ("roll", "revolute", "1 0 0"),
 )
+UNLIMITED = 1e6  # [rad, m] limits as large as this are none
 BASE = "base"  # what the coordinates of a base that moves are called: base_x, base_y, …
 
 
@@ -101,9 +102,15 @@ def _limit(joint: Any, most: float, *, always: bool = False) -> None:
     limit = joint.find("limit")
     if limit is None:
         limit = ET.SubElement(joint, "limit")
-    if always or (limit.get("lower") is None and limit.get("upper") is None):
-        limit.set("lower", repr(-most))
-        limit.set("upper", repr(most))
+    given = [float(limit.get(side, "0")) for side in ("lower", "upper")]
+    named = limit.get("lower") is not None or limit.get("upper") is not None
+    if always or not named:
+        given = [-most, most]
+    elif max(map(abs, given)) >= UNLIMITED:
+        given = [max(given[0], -most), min(given[1], most)]
+    for side, value in zip(("lower", "upper"), given, strict=True):
+        limit.set(side, repr(value))
+    # numbers without which Pinocchio does not read limits
     for name in ("effort", "velocity"):
         if limit.get(name) is None:
             limit.set(name, "0")

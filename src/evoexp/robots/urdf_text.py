@@ -3,6 +3,8 @@
 import xml.etree.ElementTree as ET
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from evoexp.errors import SettingError
 from evoexp.input_files import read_bounded
 
@@ -11,10 +13,8 @@ MOST_LINKS = 300  # and collision bodies: pairs of them are judged
 LARGEST = 1e7  # [m, rad] as of the numbers of other robots
 SHORTEST = 1e-6  # [-] of an axis
 # attributes of places, bodies, limits and joints that follow others
-NUMERIC = {
-    *("xyz", "rpy", "size", "scale", "radius", "length", "lower", "upper"),
-    *("multiplier", "offset"),
-}
+NUMERIC = {"xyz", "rpy", "size", "scale", "radius", "length", "multiplier", "offset"}
+LIMITS = {"lower", "upper"}  # those that are larger than a robot's are none
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 MESH = "link/collision/geometry/mesh"
 
@@ -121,6 +121,10 @@ def check_urdf(root: Any, field: str) -> None:
                 must = f"a URDF whose numbers are finite, at most {LARGEST:g}"
                 was = f'<{element.tag} {name}="{str(element.get(name))[:40]}"/>'
                 raise SettingError(field, must, was)
+        for name in LIMITS.intersection(element.keys()):
+            if not _is_number(str(element.get(name)), np.inf):
+                was = f'<{element.tag} {name}="{str(element.get(name))[:40]}"/>'
+                raise SettingError(field, "a URDF whose limits are numbers", was)
     for joint in root.iterfind("joint"):
         kind, name = joint.get("type"), joint.get("name")
         if kind not in KINDS:
@@ -174,9 +178,9 @@ def _check_rule(joint: JointText, joints: dict[str, JointText], field: str) -> N
         passed.append(joint.name)
 
 
-def _is_number(word: str) -> bool:
+def _is_number(word: str, largest: float = LARGEST) -> bool:
     """Whether a word is a number that joints and bodies can have."""
     try:
-        return abs(float(word)) <= LARGEST
+        return abs(float(word)) <= largest
     except ValueError:
         return False

@@ -11,11 +11,14 @@ import numpy as np
 
 from evoexp.collision.body_table import UnsupportedShape
 from evoexp.collision.box_support import coal
+from evoexp.collision.models.varied_spheres import Balls, Solid, varied_spheres
 from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import FloatArray
 
 # of one body that is neither ball nor capsule; where they do not suffice, the inflation grows
 MOST_SPHERES = 150
+MOST_VARIED = 300  # of one hull for which equal spheres do not suffice
+COARSER = 1.25  # [-] by which the inflation grows where these do not suffice either
 MOST_IN_A_ROW = 10_000  # spheres on the axis of one body
 WIDER = 1.0 + 1e-9  # covers are made larger by more than rounding
 
@@ -39,9 +42,11 @@ class Cover(NamedTuple):
 def sphere_cover(item: Any, inflation: float) -> Cover:
     """Return spheres that cover a geometry object.
 
-    Balls and capsules are covered by equal spheres on their axis; everything else by spheres around
-    the cells of a lattice, with as few cells as keep within the inflation; where that takes more
-    than `MOST_SPHERES`, by those that reach the least beyond it.
+    Balls and capsules are covered by equal spheres on their axis, convex pieces of meshes by
+    spheres of different radii (`varied_spheres`), everything else by spheres around the cells of a
+    lattice, with as few cells as keep within the inflation. Where that takes more than
+    `MOST_SPHERES`, a mesh is covered as pieces are, all else by those that reach the least beyond
+    it.
 
     Args:
         item: A `pin.GeometryObject` with a convex coal shape or a mesh; of a mesh the convex hull
@@ -62,17 +67,38 @@ def sphere_cover(item: Any, inflation: float) -> Cover:
         centers = np.column_stack([np.zeros((count, 2)), along])
         return _placed(item, centers, centers, np.full(count, radius), radius - shape.radius)
     solid = _solid(item)
+    if isinstance(shape, coal.ConvexBase) and (found := _varied(solid, inflation, np.inf)):
+        return _placed_balls(item, found)
     best = _column(item) if isinstance(shape, coal.Cylinder | coal.Cone) else None
     for counts in _lattices(solid.high - solid.low):
         centers, radius = _cells(solid, counts)
-        found = _Spheres(centers, radius, float((solid.far(centers) + radius).max()))
-        if best is None or found.reach < best.reach:
-            best = found
+        spheres = _Spheres(centers, radius, float((solid.far(centers) + radius).max()))
+        if best is None or spheres.reach < best.reach:
+            best = spheres
         if best.reach <= inflation:
             break
     assert best is not None
+    if best.reach > inflation and (found := _varied(solid, inflation, best.reach)):
+        return _placed_balls(item, found)
     radii = np.full(len(best.centers), best.radius * WIDER)
     return _placed(item, best.centers, best.centers, radii, best.reach)
+
+
+def _varied(solid: "_Solid", inflation: float, most: float) -> Balls | None:
+    """Return balls of different radii around a hull that reach as far as asked, or as little more.
+
+    None if that takes more than `MOST_VARIED` unless they reach as far as `most`, and for bodies
+    that are no hulls.
+    """
+    if solid.planes is None:
+        return None
+    hull = Solid(solid.low, solid.high, solid.planes, solid.far)
+    while inflation < most:
+        found = varied_spheres(hull, inflation, MOST_VARIED)
+        if found is not None:
+            return found
+        inflation *= COARSER
+    return None
 
 
 class _Spheres(NamedTuple):
@@ -145,12 +171,14 @@ class _Solid(NamedTuple):
         high: (3,) greatest corner.
         near: Function (points, 3) → (points,), at most the signed distance.
         far: The same, at least the signed distance.
+        planes: (planes, 4) of a hull: outward normals, and minus the planes' heights.
     """
 
     low: FloatArray
     high: FloatArray
     near: Any  # at most the distance
     far: Any  # at least the distance
+    planes: FloatArray | None = None
 
 
 def _solid(item: Any) -> _Solid:
@@ -205,7 +233,7 @@ def _solid(item: Any) -> _Solid:
         found[outside] = np.maximum(found[outside], _coal_distance(points[outside], shape))
         return found
 
-    return _Solid(corners.min(axis=0), corners.max(axis=0), near, far)
+    return _Solid(corners.min(axis=0), corners.max(axis=0), near, far, planes)
 
 
 def _exact(half: FloatArray, distance: Any) -> _Solid:
@@ -271,6 +299,10 @@ def _coal_distance(points: FloatArray, shape: Any) -> FloatArray:
             ball, coal.Transform3s(np.eye(3), point), shape, here, request, result
         )
     return found
+
+
+def _placed_balls(item: Any, balls: Balls) -> Cover:
+    return _placed(item, balls.centers, balls.centers, balls.radii * WIDER, balls.reach)
 
 
 def _placed(

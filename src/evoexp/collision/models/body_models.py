@@ -25,6 +25,11 @@ class CollisionModel(Component):
 
     component: ClassVar[str] = "collision_model"
 
+    @property
+    def asked(self) -> float:
+        """How far covers are asked to reach beyond bodies at most [length unit]; inf: no matter."""
+        return np.inf
+
     def cover(self, item: Any) -> Cover:
         """Return the cover that stands for a geometry object."""
         raise NotImplementedError
@@ -39,7 +44,7 @@ class CollisionModel(Component):
         shapes = cover_shapes(
             covers, [item.parentJoint for item in assembly.geometry.geometryObjects]
         )
-        return BodyModel(assembly, tuple(covers), shapes, body_pairs(assembly, shapes))
+        return BodyModel(assembly, tuple(covers), shapes, body_pairs(assembly, shapes), self.asked)
 
 
 class SphereSets(CollisionModel):
@@ -52,6 +57,11 @@ class SphereSets(CollisionModel):
     component: ClassVar[str] = "sphere_sets"
 
     inflation: Positive
+
+    @property
+    def asked(self) -> float:
+        """The inflation."""
+        return self.inflation
 
     def cover(self, item: Any) -> Cover:
         """Return spheres around a geometry object."""
@@ -85,12 +95,21 @@ class BodyModel(NamedTuple):
         covers: One per body.
         shapes: All of them; a shape's body is its index among the geometry objects.
         sorted_pairs: Pairs of bodies, by who judges them.
+        asked: How far covers are asked to reach beyond bodies at most [length unit].
     """
 
     assembly: Assembly
     covers: tuple[Cover, ...]
     shapes: Shapes
     sorted_pairs: BodyPairs
+    asked: float = np.inf
+
+    @property
+    def wider(self) -> tuple[tuple[str, float], ...]:
+        """Names of bodies whose covers reach farther than asked, and how far [length unit]."""
+        named = zip(self.names, self.covers, strict=True)
+        most = self.asked * (1.0 + 1e-6)
+        return tuple((name, cover.inflation) for name, cover in named if cover.inflation > most)
 
     @property
     def pairs(self) -> tuple[Pair, ...]:

@@ -1,0 +1,190 @@
+"""Spheres of different radii that cover a convex body, and reach beyond it no farther than asked.
+
+A ball around a point within a convex body that lies d deep may be d + i wide: no point of it is
+farther than i from the body. Deep points so cover much at once. The body is cut into small cells,
+and balls are chosen one after the other, each that which contains most of the cells left. A cell is
+done when one ball contains all that it has of the body, so the balls contain the body.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from evoexp.numeric.ordered_sums import matrix_product
+from evoexp.records import BoolArray, FloatArray
+
+FINE = 0.45  # [-] of the inflation: from the middle of a cell at the surface to its corners
+DEEP = 0.25  # [-] of a cell's depth: the same, of a cell within
+MOST_CELLS = 120_000
+CANDIDATES = 800  # middles of balls, within the body
+AT_ONCE = 16  # candidates whose cells are counted together
+POINTS_AT_ONCE = 4000  # whose heights above all planes are found together
+COAL_ERROR = 1e-5  # [-] of a body's size: more than that of its distances
+LESS = 1.0 - 1e-9  # of a ball's radius: more than rounding
+
+
+class Solid(NamedTuple):
+    """A convex body in its own frame.
+
+    Attributes:
+        low: (3,) least corner of the box around it.
+        high: (3,) greatest corner.
+        planes: (planes, 4) outward normals of unit length, and minus the planes' heights.
+        far: Function (points, 3) → (points,), at least the signed distance.
+    """
+
+    low: FloatArray
+    high: FloatArray
+    planes: FloatArray
+    far: Any
+
+    def heights(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the greatest height of points above a plane, and the normal of that plane."""
+        highest, normals = np.empty(len(points)), np.empty((len(points), 3))
+        for k in range(0, len(points), POINTS_AT_ONCE):
+            own = slice(k, k + POINTS_AT_ONCE)
+            heights = matrix_product(points[own], self.planes[:, :3].T) + self.planes[:, 3]
+            which = heights.argmax(axis=1)
+            highest[own] = heights[np.arange(len(which)), which]
+            normals[own] = self.planes[which, :3]
+        return highest, normals
+
+
+class Balls(NamedTuple):
+    """Balls around a body.
+
+    Attributes:
+        centers: (balls, 3).
+        radii: (balls,) [length unit].
+        reach: How far they reach beyond the body at most [length unit].
+    """
+
+    centers: FloatArray
+    radii: FloatArray
+    reach: float
+
+
+class _Cells(NamedTuple):
+    """Balls that hold a body together, each around the part of it in one cube.
+
+    Attributes:
+        middles: (cells, 3).
+        sizes: (cells,) radii.
+    """
+
+    middles: FloatArray
+    sizes: FloatArray
+
+
+def varied_spheres(solid: Solid, inflation: float, most: int) -> Balls | None:
+    """Cover a convex body.
+
+    Args:
+        solid: The body.
+        inflation: How far the balls may reach beyond it [length unit].
+        most: Number of balls that is not exceeded.
+
+    Returns:
+        The balls; None if so many do not suffice.
+    """
+    cells = _cells(solid, inflation)
+    if cells is None:
+        return None
+    kept: list[tuple[FloatArray, FloatArray]] = []
+    left = np.ones(len(cells.middles), dtype=np.bool_)
+    # deep balls first; whatever they leave is covered by balls around the cells themselves
+    for centers in (_within(solid, cells), cells.middles):
+        if not left.any():
+            break
+        if centers is cells.middles:
+            centers = centers[left]
+        radii = inflation - solid.far(centers)
+        wide = radii > 0.0
+        budget = most - sum(len(each) for each, _ in kept)
+        chosen = _chosen(centers[wide], radii[wide], cells, left, budget)
+        kept.append((centers[wide][chosen], radii[wide][chosen]))
+        if sum(len(each) for each, _ in kept) >= most and left.any():
+            return None
+    if left.any():
+        return None
+    return Balls(
+        np.vstack([centers for centers, _ in kept]),
+        np.concatenate([radii for _, radii in kept]),
+        inflation,
+    )
+
+
+def _cells(solid: Solid, inflation: float) -> _Cells | None:
+    """Cut a body into cubes, small ones at its surface; None if they are too many."""
+    edge = float((solid.high - solid.low).max())
+    slack = COAL_ERROR * edge
+    middles = 0.5 * (solid.low + solid.high)[None]
+    found: list[_Cells] = []
+    count = 0
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * 0.25
+    while len(middles) > 0:
+        half = 0.5 * edge * float(np.sqrt(3.0))
+        height, normals = solid.heights(middles)
+        # beyond a sharp edge a point is far from the body, however low above its planes
+        distance, above = height.copy(), np.flatnonzero((height > 0.0) & (height <= half))
+        distance[above] = np.maximum(height[above], solid.far(middles[above]) - slack)
+        met = distance <= half
+        middles, height, normals = middles[met], height[met], normals[met]
+        small = half <= np.maximum(FINE * inflation, -DEEP * height)
+        # of a cell whose middle is outside, what lies below the plane: a cap, less than half a ball
+        out = np.maximum(height[small], 0.0)
+        onto = middles[small] - out[:, None] * normals[small]
+        found.append(_Cells(onto, np.sqrt(np.maximum(half * half - out * out, 0.0)) / LESS))
+        count += int(small.sum())
+        middles = (middles[~small][:, None] + edge * corners).reshape(-1, 3)
+        edge *= 0.5
+        if count + len(middles) > 8 * MOST_CELLS or count > MOST_CELLS:
+            return None
+    return _Cells(
+        np.vstack([each.middles for each in found]),
+        np.concatenate([each.sizes for each in found]),
+    )
+
+
+def _within(solid: Solid, cells: _Cells) -> FloatArray:
+    """Return points on a lattice within a body, where deep balls have their middles."""
+    edges = solid.high - solid.low
+    step = float(np.prod(edges) / CANDIDATES) ** (1.0 / 3.0)
+    counts = np.maximum(np.ceil(edges / max(step, 1e-300)), 1.0).astype(int)
+    axes = [
+        low + edge * (np.arange(n) + 0.5) / n
+        for low, edge, n in zip(solid.low, edges, counts, strict=True)
+    ]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    return np.asarray(points[solid.heights(points)[0] < 0.0])
+
+
+def _chosen(
+    centers: FloatArray, radii: FloatArray, cells: _Cells, left: BoolArray, most: int
+) -> list[int]:
+    """Choose balls, at most so many, each that which contains most of the cells left.
+
+    Cells that a chosen ball contains are struck off `left`.
+    """
+    if len(centers) == 0:
+        return []
+    where = np.flatnonzero(left)
+    middles, margins = cells.middles[where], cells.sizes[where]
+    contains = np.empty((len(centers), len(where)), dtype=np.bool_)
+    for k in range(0, len(centers), AT_ONCE):
+        own = slice(k, k + AT_ONCE)
+        off = centers[own, None] - middles
+        reached = np.maximum(radii[own, None] * LESS - margins, 0.0)
+        inside = radii[own, None] * LESS > margins
+        contains[own] = inside & ((off * off).sum(axis=2) <= reached * reached)
+    counts = contains.sum(axis=1)
+    found: list[int] = []
+    waiting = np.ones(len(where), dtype=np.bool_)
+    while len(found) < most and counts.max() > 0:
+        best = int(counts.argmax())
+        found.append(best)
+        new = waiting & contains[best]
+        counts -= contains[:, new].sum(axis=1)
+        waiting &= ~new
+    left[where[~waiting]] = False
+    return found

@@ -4,9 +4,10 @@ import contextlib
 import functools
 import hashlib
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, get_type_hints
+from types import UnionType
+from typing import Any, NamedTuple, get_args, get_type_hints
 
 import numpy as np
 
@@ -23,7 +24,9 @@ PARTS = ("robot", "scenario", "planner")
 _pairs: dict[str, bytes] = {}  # a robot's settings → its derived pairs
 
 
-def read_files(config: Any, folders: Sequence[Path]) -> Any:
+def read_files(
+    config: Any, folders: Sequence[Path], adjust: Callable[[Any], Any] = lambda config: config
+) -> Any:
     """Return plain data with the contents' hashes in the place of paths; the contents are kept.
 
     Besides `{file: path}` (see `attachments.with_files`), components may have files of their own:
@@ -33,8 +36,10 @@ def read_files(config: Any, folders: Sequence[Path]) -> Any:
     Args:
         config: Any nesting of mappings, lists and scalars.
         folders: Where paths are looked for that are not there from the current directory.
+        adjust: Changes the data once files are read, before pairs of the robot's bodies are
+            derived: by what a file of the scenario says of the robot.
     """
-    return _with_pairs(with_files(_component_files(config, ""), folders))
+    return _with_pairs(adjust(with_files(_component_files(config, ""), folders)))
 
 
 def _with_pairs(config: Any) -> Any:
@@ -229,9 +234,14 @@ def _check_roles(robot: Component, scenario: Component, planner: Component) -> N
         hints = get_type_hints(inner.prepare)
         for part, value in (("robot", robot), ("scenario", scenario)):
             kind = hints.get(part, Any)
-            if isinstance(kind, type) and not isinstance(value, kind):
-                must = f"one that {inner.component} takes ({kind.__name__})"
+            if isinstance(kind, type | UnionType) and not isinstance(value, kind):
+                must = f"one that {inner.component} takes ({_names(kind)})"
                 raise SettingError(part, must, value.component)
+
+
+def _names(kind: Any) -> str:
+    """Return the name of a class, or of the classes of a union."""
+    return " or ".join(each.__name__ for each in get_args(kind) or (kind,))
 
 
 @functools.cache

@@ -46,6 +46,7 @@ from evoexp.configuration.overrides import (
     single_values,
     sweep,
 )
+from evoexp.configuration.problem_folders import FOLDER, problem_choices
 from evoexp.configuration.refusals import (
     uncomposed,
     unparsed,
@@ -278,18 +279,22 @@ def _labelled(
 ) -> tuple[dict[str, Any], dict[str, Choice]]:
     """Return the settings that all conditions share, and the overrides of each label."""
     swept = list(sweep(overrides))
-    base = _shared(compose(swept[0][1], file).config)
+    first = {key: each for key, each in swept[0][1].items() if key != FOLDER}
+    base = _shared(compose(first, file).config)
     labels: dict[str, Choice] = {}
     owner: dict[str, str] = {}  # the file's own label of a condition that is swept over
     for template, entry in _entries(base["conditions"]):
         for label, own in expand_entry(template, map(parse, entry)):
             for suffix, chosen_here in swept:
-                joined = JOIN.join(part for part in (label, suffix) if part) or name
-                if not joined.isprintable():
-                    raise SettingError("conditions", "labels of printable characters", joined)
-                if joined in labels:
-                    raise SettingError("conditions", "labels that differ", joined)
-                labels[joined], owner[joined] = own | chosen_here, label  # the command line wins
+                # the command line wins
+                for problem, choice in problem_choices(own | chosen_here):
+                    parts = (label, suffix, problem)
+                    joined = JOIN.join(part for part in parts if part) or name
+                    if not joined.isprintable():
+                        raise SettingError("conditions", "labels of printable characters", joined)
+                    if joined in labels:
+                        raise SettingError("conditions", "labels that differ", joined)
+                    labels[joined], owner[joined] = choice, label
     if unknown := [label for label in only if label not in {*labels, *owner.values()}]:
         raise UnknownOption("--only", unknown[0], labels)
     return base, {

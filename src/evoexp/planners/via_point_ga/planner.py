@@ -15,7 +15,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from evoexp.collision.models.touching_spheres import Clearance
+from evoexp.collision.models.covered_bodies import CoveredBodies, CoveredCollision
+from evoexp.collision.models.touching_spheres import Clearance, SphereCollision
 from evoexp.collision.scene import Part, scene
 from evoexp.errors import SettingError
 from evoexp.evolution.cost_statistics import cost_statistics
@@ -24,7 +25,10 @@ from evoexp.paths.motion import Motion
 from evoexp.paths.workspace import prepare_redistribution
 from evoexp.planners.answers import CoverShape
 from evoexp.planners.departures import joint_names, of_limits, of_place
+from evoexp.planners.moveit_tasks import arm_motion, with_allowed_pairs
 from evoexp.planners.planner import COPIES, Candidate, Keeper, PlannerDefaults, num_values
+from evoexp.planners.via_point_ga import tasks
+from evoexp.planners.via_point_ga.covered_strings import CoveredStrings
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
 from evoexp.planners.via_point_ga.strings import (
     JudgedGeneration,
@@ -35,6 +39,7 @@ from evoexp.planners.via_point_ga.strings import (
 from evoexp.records import FloatArray, Generation
 from evoexp.robots.assembly import Robot
 from evoexp.scenarios.arm_motion import ArmMotion
+from evoexp.scenarios.moveit import MoveitTask
 from evoexp.validation import Component
 
 UNLIMITED = 1e6  # [rad] a joint without limits has larger ones in the model
@@ -46,7 +51,7 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
 
     component: ClassVar[str] = "via_point_ga"
 
-    def prepare(self, robot: Robot, scenario: ArmMotion) -> Problem:
+    def prepare(self, robot: Robot, scenario: ArmMotion | MoveitTask) -> Problem:
         """Build the robot and check that start and goal fit it and are free of collision.
 
         Raises:
@@ -57,28 +62,35 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
             must = f"at most the offspring of a generation ({self.ga.num_offspring})"
             raise SettingError("planner.num_new_trajectories", must, self.num_new_trajectories)
         assembly = robot.build()
-        start, goal = scenario.ends(assembly.arm_slices)
-        collision = self.collision.bind(assembly, scenario.obstacles)
-        ends = ("q_start", start, scenario.q_start), ("q_goal", goal, scenario.q_goal)
-        for name, q, given in ends:
-            clearance = collision.clearance(q[:, None])
-            if clearance.least[0] < 0.0:
-                who = "two arms" if clearance.between_arms[0] < 0.0 else "an arm and an obstacle"
-                overlap = f"{-clearance.least[0]:.3g} {scenario.length_unit}"
-                must = f"free of collision ({who} overlap by {overlap})"
-                raise SettingError(f"scenario.{name}", must, [list(arm) for arm in given])
+        if isinstance(scenario, MoveitTask):
+            assembly = with_allowed_pairs(assembly, scenario)
+        task = arm_motion(assembly, scenario)
+        start, goal = tasks.ends_of(assembly, task)
+        collision: SphereCollision | CoveredCollision
+        if isinstance(self.collision, CoveredBodies):
+            bodies = tasks.covered_scene(assembly, task, scenario)
+            collision = tasks.covered_collision(
+                self.collision, bodies, assembly, task, scenario, (start, goal)
+            )
+        else:
+            collision = self.collision.bind(assembly, task.obstacles)
+            given = ("q_start", start, task.q_start), ("q_goal", goal, task.q_goal)
+            for name, q, typed in given:
+                clearance = collision.clearance(q[:, None])
+                tasks.check_spheres(clearance, f"scenario.{name}", typed, task.length_unit)
+            bodies = scene(assembly, collision.obstacles)
         joints = int(np.max(assembly.arm_slices[:, 1] - assembly.arm_slices[:, 0]))
         spline = prepare_redistribution(
             self.num_via_points, joints, self.spline_end, self.samples_per_segment
         )
-        bodies = scene(assembly, collision.obstacles)
-        own, margin = scenario.obstacle_margin, scenario.security_margin
+        own, margin = task.obstacle_margin, task.security_margin
         margins = margin, margin if own is None else own
-        return Problem(assembly, collision, start, goal, spline, bodies, *margins)
+        unit = task.length_unit
+        return Problem(assembly, collision, start, goal, spline, bodies, *margins, unit)
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield the initial population, then one generation after the other."""
-        size, strings, keeper = self.ga.population_size, Strings(self, problem), Keeper()
+        size, strings, keeper = self.ga.population_size, self._strings(problem), Keeper()
         population = strings.drawn(rng, size)
         judged = strings.judge(population, size)
         costs, hits = judged.cost.copy(), judged.terms.collisions[:size].copy()
@@ -105,11 +117,11 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
         """Return new trajectories as in the initial population, (nq, N + 1, count)."""
-        return Strings(self, problem).drawn(rng, count)[:, :, :count]
+        return self._strings(problem).drawn(rng, count)[:, :, :count]
 
     def cost(self, problem: Problem, population: FloatArray) -> Judgement:
         """Judge a population (nq, N + 1, individuals)."""
-        strings = Strings(self, problem)
+        strings = self._strings(problem)
         return strings.judge(strings.padded(population), population.shape[2])
 
     def improve(
@@ -119,7 +131,7 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
 
         Section 3.4 (c) as every offspring goes through it; nothing is drawn.
         """
-        strings, count = Strings(self, problem), population.shape[2]
+        strings, count = self._strings(problem), population.shape[2]
         improved = strings.padded(population)
         strings.smooth(improved, count)
         return improved[:, :, :count]
@@ -168,6 +180,10 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
 
     def covers(self, problem: Problem) -> tuple[CoverShape, ...]:
         """Return the circles or spheres on the links."""
+        if isinstance(problem.collision, CoveredCollision):
+            shapes = problem.collision.bodies.shapes
+            columns = shapes.joint.tolist(), shapes.start, shapes.end, shapes.radius.tolist()
+            return tuple(CoverShape(*shape) for shape in zip(*columns, strict=True))
         found = []
         for item in problem.collision.geometry.geometryObjects:
             center = np.array(item.placement.translation)
@@ -184,6 +200,16 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
     def shape(self, problem: Problem) -> tuple[tuple[int, int], ...]:
         """Return the documented shape of a solution: per arm, (N + 1, joints)."""
         return tuple((self.num_via_points + 1, int(b - a)) for a, b in problem.arm_slices)
+
+    def notes(self, problem: Problem) -> list[str]:
+        """Describe the covers of bodies, where bodies are covered."""
+        if not isinstance(problem.collision, CoveredCollision):
+            return []
+        return problem.collision.notes(problem.length_unit)
+
+    def _strings(self, problem: Problem) -> Strings:
+        is_covered = isinstance(problem.collision, CoveredCollision)
+        return (CoveredStrings if is_covered else Strings)(self, problem)
 
     def _strings_of(self, problem: Problem, solution: FloatArray) -> FloatArray:
         """Return a flat solution as strings (nq, N + 1)."""
@@ -215,9 +241,11 @@ def sampled(strings: FloatArray, samples: int) -> FloatArray:
 def _least_distances(problem: Problem, at: Clearance, between: Clearance) -> dict[str, float]:
     """Return least distances as in the paper's Fig. 7.
 
-    They are of circle centres, to those of another arm and to an obstacle's surface.
+    They are of circle centres, to those of another arm and to an obstacle's surface; of covered
+    bodies the clearances of covers.
     """
-    radius, distances = problem.collision.radius, {}
+    is_covered = isinstance(problem.collision, CoveredCollision)
+    radius, distances = 0.0 if is_covered else problem.sphere_radius, {}
     for name, via, dense, own in (
         ("arm", at.between_arms, between.between_arms, 2.0 * radius),
         ("obstacle", at.to_obstacles, between.to_obstacles, radius),

@@ -4,6 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from evoexp.collision.models.covered_bodies import CoveredBodies
 from evoexp.collision.models.touching_spheres import TouchingSpheres
 from evoexp.errors import SettingError
 from evoexp.evolution.genetic_settings import GeneticSettings
@@ -29,7 +30,7 @@ class ViaPointSettings(Settings):
         samples_per_segment: Samples of its arc length between two via-points.
         ga: Population, generations, elites, rates.
         objective: Weights of Eq. 7.
-        collision: The touching circles or spheres.
+        collision: The touching circles or spheres, or covers of the bodies.
         crossover_reading: How the double cross-over of section 3.4b is read: `tails` exchanges what
             follows the site in every arm's path; `segment` exchanges what lies between the two
             sites of the whole string: the end of the first path and the beginning of the second.
@@ -46,7 +47,7 @@ class ViaPointSettings(Settings):
     samples_per_segment: Count
     ga: GeneticSettings
     objective: StringFitness
-    collision: TouchingSpheres
+    collision: TouchingSpheres | CoveredBodies
     crossover_reading: Literal["tails", "segment"] = "tails"
 
     @model_validator(mode="after")

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from evoexp.collision.models.covered_bodies import CoveredCollision
 from evoexp.collision.models.touching_spheres import SphereCollision
 from evoexp.collision.scene import Scene, obstacle_pairs
 from evoexp.evolution import crossover
@@ -28,23 +29,25 @@ class Problem(NamedTuple):
 
     Attributes:
         assembly: The robot, built.
-        collision: The paper's collision model on it.
+        collision: The paper's collision model on it, or its covered bodies.
         start: (nq,) [deg].
         goal: (nq,) [deg].
         spline: Factor and memory of the redistribution; for one thread at a time.
         scene: The bodies themselves, for the exact verdict on a motion.
         security_margin: Clearance that the task requires between two arms [length unit].
         obstacle_margin: The same between a link and an obstacle.
+        length_unit: Name of the scene's unit of length.
     """
 
     assembly: Assembly
-    collision: SphereCollision
+    collision: SphereCollision | CoveredCollision
     start: FloatArray
     goal: FloatArray
     spline: Redistribution
     scene: Scene
     security_margin: float
     obstacle_margin: float
+    length_unit: str
 
     @property
     def arm_slices(self) -> IntArray:
@@ -60,7 +63,13 @@ class Problem(NamedTuple):
     @property
     def sphere_radius(self) -> float:
         """Radius of the circles or spheres that approximate the links [length unit]."""
-        return self.collision.radius
+        return self._spheres.radius
+
+    @property
+    def _spheres(self) -> SphereCollision:
+        """The paper's model: bodies that are covered have no spheres of one size."""
+        assert isinstance(self.collision, SphereCollision)
+        return self.collision
 
     def sphere_centres(self, q: FloatArray) -> list[FloatArray]:
         """Return the centres of the circles or spheres at one configuration.
@@ -71,11 +80,11 @@ class Problem(NamedTuple):
         Returns:
             One array (spheres, 3) [length unit] per arm.
         """
-        model, geometry = self.assembly.model, self.collision.geometry
+        model, geometry = self.assembly.model, self._spheres.geometry
         data, placements = model.createData(), geometry.createData()
         pin.updateGeometryPlacements(model, data, geometry, placements, DEGREE * q)
         centres = np.array([placement.translation for placement in placements.oMg])
-        return [centres[first:stop] for first, stop in self.collision.arm_spheres]
+        return [centres[first:stop] for first, stop in self._spheres.arm_spheres]
 
     def centre_distances(self, q: FloatArray) -> FloatArray:
         """Return the least distance between centres of two arms, as the paper's Figs. 7 and 13 do.
@@ -172,7 +181,7 @@ class Strings:
         self.judging = kernels.Judging(
             substeps=planner.collision.collision_substeps,
             weights=planner.objective.weights,
-            tables=problem.collision.tables,
+            tables=getattr(problem.collision, "tables", ()),
         )
 
     def padded(self, strings: FloatArray) -> FloatArray:
@@ -203,7 +212,7 @@ class Strings:
 
     def judge(self, strings: FloatArray, count: int) -> Judgement:
         """Judge the first `count` strings; the arrays of terms keep the padding."""
-        judged = self._unjudged(strings, count)
+        judged = self.unjudged(strings, count)
         kernels.judge(strings, self.problem.arm_slices, self.judging, judged.terms)
         return judged
 
@@ -220,7 +229,7 @@ class Strings:
         """
         ga, counts = self.planner.ga, self.counts
         offspring = self.empty(ga.num_offspring)
-        judged, elites = self._unjudged(offspring, ga.num_offspring), np.empty(ga.num_elites, int)
+        judged, elites = self.unjudged(offspring, ga.num_offspring), np.empty(ga.num_elites, int)
         memory = plain(kernels.Memory(population, costs, hits, offspring, judged.terms, elites))
         settings = plain(kernels.Settings(self.counts, self.breeding, self.smoothing, self.judging))
         num_drawn = sum(counts) + counts.new * (1 + self.num_uniforms)
@@ -231,7 +240,7 @@ class Strings:
             )
             yield JudgedGeneration(judged, CostStatistics(best, mean, std), num_feasible)
 
-    def _unjudged(self, strings: FloatArray, count: int) -> Judgement:
+    def unjudged(self, strings: FloatArray, count: int) -> Judgement:
         """Return memory for a judgement."""
         lengths, unevenness = np.empty((2, self.num_arms, strings.shape[2]))
         terms = StringTerms(lengths, unevenness, np.empty(strings.shape[2]), np.empty(count))

@@ -1,0 +1,116 @@
+"""Start and goal of strings of via-points: in the joints' units, within limits, free of contact."""
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from evoexp.collision.models.covered_bodies import CoveredBodies, CoveredCollision
+from evoexp.collision.models.touching_spheres import Clearance
+from evoexp.collision.scene import Scene, scene
+from evoexp.errors import SettingError
+from evoexp.numeric.elementary import DEGREE
+from evoexp.planners.moveit_tasks import moving_joints, without_pairs
+from evoexp.records import FloatArray
+from evoexp.robots.assembly import Assembly
+from evoexp.scenarios.arm_motion import ArmMotion
+from evoexp.scenarios.moveit import MoveitTask
+
+ROUNDING = 1e-9  # [rad, m] by which an end may lie beyond a limit
+FIELDS = "scenario.q_start", "scenario.q_goal"
+
+
+def ends_of(assembly: Assembly, task: ArmMotion) -> tuple[FloatArray, FloatArray]:
+    """Return start and goal as strings have them, each (nq,) [deg].
+
+    A metre of a sliding joint counts as a radian, 57.3 degrees.
+
+    Raises:
+        SettingError: If they do not fit the robot's arms and joints.
+    """
+    start, goal = task.ends(assembly.arm_slices)
+    slides = moving_joints(assembly).slides
+    units = np.where(slides, 1.0 / DEGREE, 1.0)
+    return start * units, goal * units
+
+
+def check_limits(assembly: Assembly, ends: tuple[FloatArray, FloatArray]) -> None:
+    """Refuse a start or goal beyond the limits of a joint.
+
+    Raises:
+        SettingError: Naming the joint.
+    """
+    model, joints = assembly.model, moving_joints(assembly)
+    for field, q in zip(FIELDS, ends, strict=True):
+        low, high = model.lowerPositionLimit, model.upperPositionLimit
+        beyond = (DEGREE * q < low - ROUNDING) | (DEGREE * q > high + ROUNDING)
+        if beyond.any():
+            k = int(np.argmax(beyond))
+            unit, name = (1.0 if joints.slides[k] else DEGREE), joints.names[k]
+            word = "m" if joints.slides[k] else "deg"
+            limits = f"{low[k] / unit:g} to {high[k] / unit:g} {word}"
+            must = f"within the limits of '{name}', {limits}"
+            raise SettingError(field, must, float(DEGREE * q[k] / unit))
+
+
+def covered_scene(assembly: Assembly, task: ArmMotion, given: ArmMotion | MoveitTask) -> Scene:
+    """Return the exact bodies of a robot among the obstacles of a task, pairs of one arm included.
+
+    Args:
+        assembly: The robot.
+        task: Its obstacles, by which contacts are named.
+        given: The task as the scenario has it; names the pairs that may touch.
+    """
+    found, num_bodies = scene(assembly, task.obstacles, self_pairs=True), assembly.geometry.ngeoms
+    if isinstance(given, MoveitTask):
+        found = without_pairs(found, given, num_bodies)
+    names = tuple(each.name or f"obstacle_{k + 1}" for k, each in enumerate(task.obstacles))
+    return found._replace(names=(*found.names[:num_bodies], *names))
+
+
+def covered_collision(
+    model: CoveredBodies,
+    bodies: Scene,
+    assembly: Assembly,
+    task: ArmMotion,
+    given: ArmMotion | MoveitTask,
+    ends: tuple[FloatArray, FloatArray],
+) -> CoveredCollision:
+    """Return the covered bodies of a robot, after a look at the exact ones at start and goal.
+
+    Raises:
+        SettingError: If bodies touch at the start or the goal, or these are beyond limits.
+    """
+    check_limits(assembly, ends)
+    for field, q in zip(FIELDS, ends, strict=True):
+        _check_bodies(bodies, DEGREE * q, field, task.length_unit)
+    names = bodies.names[: assembly.geometry.ngeoms]
+    ignored = given.touching(names) if isinstance(given, MoveitTask) else ()
+    return model.bind(assembly, task.obstacles, np.column_stack(ends), ignored)
+
+
+def check_spheres(clearance: Clearance, field: str, given: Any, unit: str) -> None:
+    """Refuse a configuration at which the paper's spheres overlap.
+
+    Raises:
+        SettingError: Naming what overlaps.
+    """
+    if clearance.least[0] < 0.0:
+        who = "two arms" if clearance.between_arms[0] < 0.0 else "an arm and an obstacle"
+        must = f"free of collision ({who} overlap by {-clearance.least[0]:.3g} {unit})"
+        raise SettingError(field, must, [list(arm) for arm in given])
+
+
+def _check_bodies(bodies: Scene, q: FloatArray, field: str, unit: str) -> None:
+    data, placements = bodies.model.createData(), bodies.geometry.createData()
+    pin.updateGeometryPlacements(bodies.model, data, bodies.geometry, placements, q)
+    worst, found = 0.0, ""
+    for k, (a, b) in enumerate(bodies.pairs):
+        pair = bodies.geometry.findCollisionPair(pin.CollisionPair(int(a), int(b)))
+        distance = pin.computeDistance(bodies.geometry, placements, pair).min_distance
+        if distance <= min(worst, float(bodies.tolerances[k])):
+            one, two = bodies.pair_names(k)
+            how = f"overlap by {-distance:.3g} {unit}" if distance < 0.0 else "touch"
+            worst, found = distance, f"{one} and {two} {how}"
+    if found:
+        raise SettingError(field, "free of contact between bodies", found)

@@ -5,6 +5,7 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field
 
 from evoexp.attachments import File
+from evoexp.errors import SettingError
 from evoexp.robots.assembly import Arm, Assembly, Chain, Robot
 from evoexp.validation import TARGET
 
@@ -33,7 +34,15 @@ class Arms(Robot):
         return found and settings.get("pairs") is None
 
     def build(self) -> Assembly:
-        """Return the robot with its derived pairs."""
+        """Return the robot with its derived pairs.
+
+        Raises:
+            SettingError: If an arm has spheres of its own.
+        """
+        for k, arm in enumerate(self.arms):
+            if getattr(arm, "spheres", None) is not None:
+                must = "left out for one of several arms"
+                raise SettingError(f"robot.arms[{k}].spheres", must, "a file")
         return super().build()._replace(pairs=self.pairs.content if self.pairs else None)
 
     @classmethod

@@ -1,5 +1,6 @@
 """The product of a robot description: one Pinocchio model, with the arms as slices of q."""
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol
 
 import coal
@@ -50,6 +51,8 @@ class Assembly(NamedTuple):
         tools: The tool's frame of each arm.
         disabled: Pairs of bodies' names that are never judged (an SRDF's).
         pairs: Data of `collision.derived_pairs`, attached to the condition; None: there is none.
+        spheres: Spheres that are given as the covers of bodies, by name: (spheres, 4) middles in
+            the body's frame and radii; None: none are.
     """
 
     model: Any  # pin.Model
@@ -61,6 +64,7 @@ class Assembly(NamedTuple):
     tools: tuple[Tool, ...] = ()
     disabled: frozenset[frozenset[str]] = frozenset()
     pairs: bytes | None = None
+    spheres: Mapping[str, FloatArray] | None = None
 
     @property
     def num_arms(self) -> int:

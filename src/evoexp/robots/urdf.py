@@ -15,8 +15,10 @@ from pydantic import BeforeValidator
 
 from evoexp.attachments import SHA256, File, keep
 from evoexp.errors import SettingError, nearest
+from evoexp.records import FloatArray
 from evoexp.robots.assembly import Arm, ArmStates, Assembly, Chain
 from evoexp.robots.bodies import Point3, placed
+from evoexp.robots.given_spheres import spheres_of_bodies, with_spheres
 from evoexp.robots.joint_choice import joint_roles, standing_values
 from evoexp.robots.mesh_files import MESHES, mesh_content
 from evoexp.robots.mesh_pieces import (
@@ -27,7 +29,7 @@ from evoexp.robots.mesh_pieces import (
     read_pieces,
 )
 from evoexp.robots.srdf import Srdf
-from evoexp.robots.urdf_arms import UrdfArm, UrdfTree
+from evoexp.robots.urdf_arms import UrdfArm, UrdfTree, body_names
 from evoexp.robots.urdf_rewriting import JointRules, plain_urdf
 from evoexp.robots.urdf_text import LARGEST, MESH, check_urdf, file_content, parsed_xml, read_joints
 from evoexp.validation import Positive, Settings
@@ -79,6 +81,8 @@ class Urdf(Chain):
             robot moves, as by a planar or floating joint below its root.
         decomposition: Whether meshes are replaced by convex pieces that contain them: by CoACD, or
             by the convex hull of each; None: they stay as they are.
+        spheres: A URDF of spheres, link by link, that cover the bodies in a search; they need not
+            contain them. None: covers are found.
         pairs: Pairs of bodies that need no test, derived when the files are read; None: none are.
     """
 
@@ -101,6 +105,7 @@ class Urdf(Chain):
     slide_limit: Positive = 1.0
     base: Literal["fixed", "free", "planar", "floating"] = "fixed"
     decomposition: Decomposition | None = None
+    spheres: File | None = None
     pairs: File | None = None
 
     @classmethod
@@ -109,8 +114,9 @@ class Urdf(Chain):
         return settings.get("pairs") is None and "urdf" in settings
 
     def build(self) -> Assembly:
-        """Return the robot with its derived pairs."""
-        return super().build()._replace(pairs=self.pairs.content if self.pairs else None)
+        """Return the robot with its derived pairs and given spheres."""
+        found = super().build()._replace(pairs=self.pairs.content if self.pairs else None)
+        return found if self.spheres is None else found._replace(spheres=self._given_spheres())
 
     @classmethod
     def read_files(cls, settings: dict[str, Any], field: str) -> dict[str, Any]:
@@ -139,6 +145,10 @@ class Urdf(Chain):
                 for mesh, (name, data) in zip(settings["meshes"], found.items(), strict=True):
                     cut = mesh_pieces(data, Path(name).suffix, how, f"{field}.decomposition")
                     mesh["pieces"] = {SHA256: keep(cut)}
+        if (spheres := settings.pop("spheres", None)) is not None:
+            content = file_content(spheres, f"{field}.spheres")
+            parsed_xml(content, f"{field}.spheres", "robot")
+            settings["spheres"] = {SHA256: keep(content)}
         if srdf is not None:
             content = file_content(srdf, f"{field}.srdf")
             parsed_xml(content, f"{field}.srdf", "robot")
@@ -229,6 +239,21 @@ class Urdf(Chain):
                 must = f"a URDF whose bodies lie within {LARGEST:g} m"
                 raise SettingError("robot.path", must, f"'{item.name}' that reaches to {far:.3g}")
         return found
+
+    def _given_spheres(self) -> dict[str, FloatArray]:
+        """Return the given spheres of each body by its name: middles in its frame, and radii."""
+        assert self.spheres is not None
+        model = self._model()
+        text = with_spheres(self.urdf.content, self.spheres.content)
+        plain = plain_urdf(text, {}, self._rules())
+        try:
+            spheres = pin.buildGeomFromUrdfString(model, plain, pin.GeometryType.COLLISION)
+        except (ValueError, RuntimeError) as error:
+            reason = str(error).strip().splitlines()[0]
+            raise SettingError("robot.spheres", "a URDF that Pinocchio reads", reason) from None
+        bodies = list(self._geometry(model).geometryObjects)
+        found = spheres_of_bodies(bodies, list(spheres.geometryObjects))
+        return dict(zip(body_names(bodies), found, strict=True))
 
     def _in_pieces(self, geometry: Any, places: dict[str, str]) -> Any:
         """Return collision bodies with the pieces of meshes in their place.

@@ -73,10 +73,7 @@ class UrdfTree:
         self.states = [] if srdf is None else srdf.states()
         self.items = list(geometry.geometryObjects)
         stems = [item.name.rpartition("_")[0] for item in self.items]
-        self.names = [
-            stem if stems.count(stem) == 1 else item.name
-            for item, stem in zip(self.items, stems, strict=True)
-        ]
+        self.names = body_names(self.items)
         of_link: dict[str, set[str]] = {}
         for name, stem in zip(self.names, stems, strict=True):
             of_link.setdefault(stem, set()).add(name)
@@ -242,6 +239,15 @@ class UrdfTree:
             if joint not in moving:
                 found[joint] = (multiplier * found[source] if multiplier else 0.0) + offset
         return found
+
+
+def body_names(items: list[Any]) -> list[str]:
+    """Return the names of bodies: those of their links, with a number where a link has several."""
+    stems = [item.name.rpartition("_")[0] for item in items]
+    return [
+        stem if stems.count(stem) == 1 else item.name
+        for item, stem in zip(items, stems, strict=True)
+    ]
 
 
 class UrdfArm:

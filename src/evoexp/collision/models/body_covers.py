@@ -18,6 +18,7 @@ from evoexp.records import FloatArray
 # of one body that is neither ball nor capsule; where they do not suffice, the inflation grows
 MOST_SPHERES = 150
 MOST_VARIED = 300  # of one hull for which equal spheres do not suffice
+MEASURED = 24  # points along each edge of a body's box, by which given covers are measured
 COARSER = 1.25  # [-] by which the inflation grows where these do not suffice either
 MOST_IN_A_ROW = 10_000  # spheres on the axis of one body
 WIDER = 1.0 + 1e-9  # covers are made larger by more than rounding
@@ -31,12 +32,15 @@ class Cover(NamedTuple):
         end: (shapes, 3) the same for spheres.
         radius: (shapes,).
         inflation: How far the cover reaches beyond the body at most [length unit].
+        uncovered: How far the body was seen to stand out of it; 0 of covers that are found here,
+            which contain their bodies [length unit].
     """
 
     start: FloatArray
     end: FloatArray
     radius: FloatArray
     inflation: float
+    uncovered: float = 0.0
 
 
 def sphere_cover(item: Any, inflation: float) -> Cover:
@@ -82,6 +86,41 @@ def sphere_cover(item: Any, inflation: float) -> Cover:
         return _placed_balls(item, found)
     radii = np.full(len(best.centers), best.radius * WIDER)
     return _placed(item, best.centers, best.centers, radii, best.reach)
+
+
+def given_cover(item: Any, spheres: FloatArray) -> Cover:
+    """Return somebody's spheres as the cover of a geometry object, and measure what they leave out.
+
+    Args:
+        item: A `pin.GeometryObject`.
+        spheres: (spheres, 4) middles in its frame and radii.
+
+    Raises:
+        UnsupportedShape: As `sphere_cover`.
+    """
+    shape, centers, radii = item.geometry, spheres[:, :3], spheres[:, 3]
+    margin = 0.0
+    if isinstance(shape, coal.Sphere | coal.Capsule):
+        half = shape.halfLength if isinstance(shape, coal.Capsule) else 0.0
+        points = np.array([[0.0, 0.0, z] for z in np.linspace(-half, half, MEASURED)])
+        onto = np.clip(centers[:, 2], -half, half)
+        square = centers[:, 0] ** 2 + centers[:, 1] ** 2 + (centers[:, 2] - onto) ** 2
+        reach, margin = float((np.sqrt(square) + radii).max()) - shape.radius, float(shape.radius)
+    else:
+        solid = _solid(item)
+        axes = [np.linspace(a, b, MEASURED) for a, b in zip(solid.low, solid.high, strict=True)]
+        points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        within = solid.far if solid.planes is None else solid.near
+        points = points[within(points) <= 0.0]
+        if isinstance(shape, coal.ConvexBase):
+            corners = [shape.point(k) for k in range(shape.num_points)]
+            points = np.vstack([points, np.array(corners)])
+        reach = float((solid.far(centers) + radii).max())
+    out = np.full(len(points), np.inf)
+    for center, radius in zip(centers, radii, strict=True):
+        out = np.minimum(out, np.sqrt(((points - center) ** 2).sum(axis=1)) - radius)
+    found = _placed(item, centers, centers, radii, max(reach, 0.0))
+    return found._replace(uncovered=max(float(out.max(initial=-margin)) + margin, 0.0))
 
 
 def _varied(solid: "_Solid", inflation: float, most: float) -> Balls | None:

@@ -10,11 +10,12 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from evoexp.collision.derived_pairs import Pair
-from evoexp.collision.models.body_covers import Cover, capsule_cover, sphere_cover
+from evoexp.collision.models.body_covers import Cover, capsule_cover, given_cover, sphere_cover
 from evoexp.collision.models.body_pairs import BodyPairs, body_pairs
 from evoexp.collision.models.inner_balls import inner_balls
 from evoexp.collision.models.primitive_tables import Shapes
 from evoexp.collision.models.primitives import PrimitiveCollision
+from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
 from evoexp.scenarios.obstacles import ObstacleTable
 from evoexp.validation import Component, NonNegative, Positive
@@ -34,13 +35,20 @@ class CollisionModel(Component):
         """Return the cover that stands for a geometry object."""
         raise NotImplementedError
 
+    def cover_of(self, item: Any, given: FloatArray | None) -> Cover:
+        """Return the cover of a robot's body, for which spheres may be given."""
+        return self.cover(item)
+
     def bind(self, assembly: Assembly) -> "BodyModel":
         """Return the model of a robot.
 
         Raises:
             UnsupportedShape: If a body cannot be covered.
         """
-        covers = [self.cover(item) for item in assembly.geometry.geometryObjects]
+        covers = [
+            self.cover_of(item, (assembly.spheres or {}).get(item.name))
+            for item in assembly.geometry.geometryObjects
+        ]
         shapes = cover_shapes(
             covers, [item.parentJoint for item in assembly.geometry.geometryObjects]
         )
@@ -66,6 +74,10 @@ class SphereSets(CollisionModel):
     def cover(self, item: Any) -> Cover:
         """Return spheres around a geometry object."""
         return sphere_cover(item, self.inflation)
+
+    def cover_of(self, item: Any, given: FloatArray | None) -> Cover:
+        """Return the given spheres; spheres around a body for which there are none."""
+        return self.cover(item) if given is None or len(given) == 0 else given_cover(item, given)
 
 
 class BodyCapsules(CollisionModel):
@@ -103,6 +115,12 @@ class BodyModel(NamedTuple):
     shapes: Shapes
     sorted_pairs: BodyPairs
     asked: float = np.inf
+
+    @property
+    def uncovered(self) -> tuple[tuple[str, float], ...]:
+        """Names of bodies that stand out of their covers, and how far [length unit]."""
+        named = zip(self.names, self.covers, strict=True)
+        return tuple((name, cover.uncovered) for name, cover in named if cover.uncovered > 0.0)
 
     @property
     def wider(self) -> tuple[tuple[str, float], ...]:

@@ -101,6 +101,9 @@ def notes(problem: Problem) -> tuple[str, ...]:
         f"{len(names)} bodies covered by {bodies.num_shapes} spheres and capsules, "
         f"which reach at most {bodies.inflation:.3g} {unit} beyond them"
     ]
+    if bodies.uncovered:
+        far = ", ".join(f"{name} {reach:.3g}" for name, reach in bodies.uncovered)
+        lines.append(f"given spheres do not contain all bodies; standing out [{unit}]: {far}")
     if bodies.wider:
         far = ", ".join(f"{name} {reach:.3g}" for name, reach in bodies.wider)
         lines.append(f"covers that reach farther than the {bodies.asked:g} {unit} asked for: {far}")

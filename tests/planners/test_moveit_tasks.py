@@ -155,3 +155,41 @@ def test_a_request_with_a_slide_counts_metres(tmp_path: Path) -> None:
         problem, planner.solution(problem, planner.sample(problem, found.rng(0), 1), 0)
     )
     assert np.allclose(motion.q[[0, -1], 3], [0.05, 0.08], atol=1e-15)
+
+
+REACHING = ["planner=posture_es", "ga=corsepius", "objective=corsepius_pose"]
+SPHERES = [*REACHING, "collision=corsepius_spheres", "budget=paper"]
+
+
+def test_posture_es_reaches_the_pose_of_a_goal_of_joints(tmp_path: Path) -> None:
+    found = condition(tmp_path, *SPHERES, world=scene())
+    planner, problem = found.prepare()
+    (phase,) = problem.task.phases
+    model, data = problem.assembly.model, problem.assembly.model.createData()
+    tool = problem.assembly.tools[0]
+    pin.forwardKinematics(model, data, np.array(GOAL))
+    pose = data.oMi[tool.joint] * pin.SE3(tool.rotation, tool.position)
+    assert np.allclose(phase.goal.point, pose.translation, atol=1e-12)
+    angles = DEGREE * np.array(phase.goal.rotation)
+    assert np.allclose(pin.rpy.rpyToMatrix(angles), pose.rotation, atol=1e-9)
+    *_, last = planner.evolve(problem, found.rng(0))
+    assert last.solved
+    assert judge_motion(planner, problem, planner.motion(problem, last.best)).certified
+
+
+def test_posture_es_takes_goals_of_links_and_via_points_say_that_they_do_not(
+    tmp_path: Path,
+) -> None:
+    region = {"primitives": [{"type": "sphere", "dimensions": [0.02]}]}
+    region["primitive_poses"] = [{"position": [0.3, 0.4, 0.6]}]  # type: ignore[dict-item]
+    goal = {"position_constraints": [{"link_name": "tip", "constraint_region": region}]}
+    asked = request(goal_constraints=[goal])
+    found = condition(tmp_path, *SPHERES, world=scene(), asked=asked)
+    assert found.robot.tool_frame == "tip"  # type: ignore[attr-defined]
+    planner, problem = found.prepare()
+    *_, last = planner.evolve(problem, found.rng(0))
+    assert last.solved
+    with pytest.raises(SettingError, match=r"robot\.tool_frame: must be 'tip'"):
+        condition(tmp_path, *SPHERES, "robot.tool_frame=lower", world=scene(), asked=asked)
+    with pytest.raises(SettingError, match="a goal of joints for this planner .*pose of 'tip'"):
+        condition(tmp_path, world=scene(), asked=asked).prepare()

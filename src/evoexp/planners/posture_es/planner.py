@@ -39,6 +39,7 @@ from evoexp.planners.posture_es.phases import Problem, Span
 from evoexp.planners.posture_es.settings import StrategySettings
 from evoexp.records import FloatArray, Generation
 from evoexp.robots.assembly import Robot
+from evoexp.scenarios.moveit import MoveitTask
 from evoexp.scenarios.posture_task import PostureTask
 from evoexp.validation import Component, NonNegativeCount, Positive
 
@@ -87,7 +88,7 @@ class PostureEs(PlannerDefaults, Component):
     objective: PostureCost
     collision: CollisionModel
 
-    def prepare(self, robot: Robot, scenario: PostureTask) -> Problem:
+    def prepare(self, robot: Robot, scenario: PostureTask | MoveitTask) -> Problem:
         """Build the robot and check the task against it.
 
         Raises:

@@ -13,10 +13,12 @@ from evoexp.collision.scene import obstacle_shapes
 from evoexp.errors import SettingError, nearest
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.posture_cost import ANGLE, AXIAL, HEADING, TERMS, UPRIGHT, PostureCost
+from evoexp.planners.moveit_tasks import posture_task, with_allowed_pairs
 from evoexp.planners.posture_es.phases import Problem
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly, Robot
 from evoexp.robots.poses import local_pose
+from evoexp.scenarios.moveit import MoveitTask
 from evoexp.scenarios.obstacles import CAPSULE, CYLINDER, ObstacleTable, obstacle_table
 from evoexp.scenarios.posture_task import (
     Phase,
@@ -31,7 +33,7 @@ from evoexp.scenarios.posture_task import (
 
 def prepare(
     robot: Robot,
-    task: PostureTask,
+    scenario: PostureTask | MoveitTask,
     scope: tuple[float, ...],
     objective: PostureCost,
     collision: CollisionModel,
@@ -44,12 +46,15 @@ def prepare(
             that rate it contradict each other.
     """
     assembly = _built(robot)
+    if isinstance(scenario, MoveitTask):
+        assembly = with_allowed_pairs(assembly, scenario)
     if assembly.num_arms != 1:
         raise SettingError("robot", "one arm", f"{assembly.num_arms} arms")
+    task = posture_task(assembly, scenario)
     limits = _limits(assembly)
     start = _start(task, assembly, limits)
     obstacles = obstacle_table(task.objects).without_ellipses()
-    bodies = _bodies(robot, collision)
+    bodies = _bodies(robot, collision, assembly.disabled)
     tool = assembly.tools[0]
     for k, name in enumerate(task.names):
         if name in bodies.names:
@@ -89,9 +94,11 @@ def _built(robot: Robot) -> Assembly:
 
 
 @functools.lru_cache(maxsize=16)
-def _bodies(robot: Robot, collision: CollisionModel) -> BodyModel:
+def _bodies(
+    robot: Robot, collision: CollisionModel, disabled: frozenset[frozenset[str]]
+) -> BodyModel:
     """Return a robot's bodies; kept, since finding pairs that never touch takes longest."""
-    return collision.bind(_built(robot))
+    return collision.bind(_built(robot)._replace(disabled=disabled))
 
 
 def notes(problem: Problem) -> tuple[str, ...]:

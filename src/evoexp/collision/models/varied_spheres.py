@@ -17,7 +17,7 @@ FINE = 0.45  # [-] of the inflation: from the middle of a cell at the surface to
 DEEP = 0.25  # [-] of a cell's depth: the same, of a cell within
 MOST_CELLS = 120_000
 CANDIDATES = 800  # middles of balls, within the body
-AT_ONCE = 16  # candidates whose cells are counted together
+AT_ONCE = 64  # cells that are compared with all candidates together
 POINTS_AT_ONCE = 4000  # whose heights above all planes are found together
 COAL_ERROR = 1e-5  # [-] of a body's size: more than that of its distances
 LESS = 1.0 - 1e-9  # of a ball's radius: more than rounding
@@ -169,22 +169,22 @@ def _chosen(
     if len(centers) == 0:
         return []
     where = np.flatnonzero(left)
-    middles, margins = cells.middles[where], cells.sizes[where]
-    contains = np.empty((len(centers), len(where)), dtype=np.bool_)
-    for k in range(0, len(centers), AT_ONCE):
+    middles, sizes = cells.middles[where], cells.sizes[where]
+    contains = np.empty((len(where), len(centers)), dtype=np.bool_)  # a row per cell
+    reached = radii * LESS
+    for k in range(0, len(where), AT_ONCE):
         own = slice(k, k + AT_ONCE)
-        off = centers[own, None] - middles
-        reached = np.maximum(radii[own, None] * LESS - margins, 0.0)
-        inside = radii[own, None] * LESS > margins
-        contains[own] = inside & ((off * off).sum(axis=2) <= reached * reached)
-    counts = contains.sum(axis=1)
+        x, y, z = (middles[own, None, e] - centers[:, e] for e in range(3))
+        room = np.maximum(reached - sizes[own, None], 0.0)
+        contains[own] = (x * x + y * y + z * z <= room * room) & (room > 0.0)
+    counts = contains.sum(axis=0)
     found: list[int] = []
     waiting = np.ones(len(where), dtype=np.bool_)
     while len(found) < most and counts.max() > 0:
         best = int(counts.argmax())
         found.append(best)
-        new = waiting & contains[best]
-        counts -= contains[:, new].sum(axis=1)
+        new = waiting & contains[:, best]
+        counts -= contains[new].sum(axis=0)
         waiting &= ~new
     left[where[~waiting]] = False
     return found

@@ -99,6 +99,18 @@ def pages(shown: Sequence[ShownMotion]) -> tuple[MotionPage, ...]:
     )
 
 
+def notes(shown: Sequence[ShownMotion]) -> tuple[tuple[str, str], ...]:
+    """Return (conditions, note): the planners' notes on the conditions whose motions are shown."""
+    labels: dict[str, list[str]] = {}
+    for each in shown:
+        planner, problem = each.condition.prepared
+        for note in planner.notes(problem):
+            own = labels.setdefault(note, [])
+            if each.condition.label not in own:
+                own.append(each.condition.label)
+    return tuple((", ".join(own), note) for note, own in labels.items())
+
+
 def _cover_drawing(shown: Sequence[ShownMotion]) -> tuple[Drawing, ...]:
     """Return the figure of bodies beside covers: one row per robot that has covers."""
     rows, conditions = [], []

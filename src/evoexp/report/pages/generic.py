@@ -40,6 +40,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
             *base.quantities,
             quantity(results, "CPU time of the search", "s", search_seconds),
         ),
+        checks=motion_pictures.notes(shown),
         tables=pairwise.share_tables(results, settings),
         comparisons=pairwise.comparisons(results, settings),
         drawings=(

@@ -96,8 +96,3 @@ def test_the_generic_page_holds_all_of_it(results: Results, settings: ReportSett
     ]
     assert page.tables[0].headers == ("condition", "solved", "certified", "required margin kept")
     assert {"best cost", "CPU time of the search"} <= {q.name for q in page.quantities}
-    # equal notes of several conditions stand in one row
-    planner, problem = results.conditions[0].prepared
-    notes = list(planner.notes(problem))
-    assert notes and [note for _, note in page.checks] == notes
-    assert all(set(labels.split(", ")) <= {"+0", "+1", "+2", "+3"} for labels, _ in page.checks)

@@ -1,0 +1,18 @@
+"""The planners' notes on a page."""
+
+from types import SimpleNamespace
+from typing import Any
+
+from evoexp.report import motion_pictures
+
+
+def shown(label: str, *notes: str) -> Any:
+    planner = SimpleNamespace(notes=lambda problem: [f"{problem}: {note}" for note in notes])
+    return SimpleNamespace(condition=SimpleNamespace(label=label, prepared=(planner, "robot")))
+
+
+def test_equal_notes_stand_in_one_row() -> None:
+    found = motion_pictures.notes(
+        [shown("I", "covers", "pairs"), shown("I", "covers"), shown("II", "covers"), shown("III")]
+    )
+    assert found == (("I, II", "robot: covers"), ("I", "robot: pairs"))

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from evoexp.batch import fan_out as fanning
 from evoexp.batch import jobs
-from evoexp.batch.fan_out import MAX_BUNDLE, TASK_S, _Bundles, compile_all, fan_out
+from evoexp.batch.fan_out import MAX_BUNDLE, TASK_S, Bundles, compile_all, fan_out
 from evoexp.batch.jobs import Job, Outcome, run_jobs
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.workers import in_workers, loading
@@ -361,7 +361,7 @@ def test_every_job_is_run_once_and_in_order(
 ) -> None:
     waiting = [Job("0" * 64, b"", k) for k in range(num_jobs)]
     in_flight: dict[tuple[str, int], Job] = {}
-    bundles = _Bundles(deque(waiting), in_flight, num_workers)
+    bundles = Bundles(deque(waiting), in_flight, num_workers)
     seen: list[Job] = []
     for count, bundle in enumerate(bundles):
         assert 1 <= len(bundle) <= MAX_BUNDLE
@@ -378,7 +378,7 @@ def test_every_job_is_run_once_and_in_order(
 
 def test_bundles_are_as_long_as_a_task() -> None:
     waiting = [Job("0" * 64, b"", k) for k in range(1000)]
-    bundles = _Bundles(deque(waiting), {}, 2)
+    bundles = Bundles(deque(waiting), {}, 2)
     iterator = iter(bundles)
     first = next(iterator)
     assert len(first) == MAX_BUNDLE, "nothing is known yet"

@@ -52,7 +52,7 @@ def fan_out(
     run = joblib.delayed(partial(run_jobs, limits=limits, in_worker=True))
     while waiting:
         in_flight: dict[tuple[str, int], Job] = {}
-        bundles = _Bundles(waiting, in_flight, num_workers)
+        bundles = Bundles(waiting, in_flight, num_workers)
         try:
             for outcomes in in_workers(num_workers, (run(bundle) for bundle in bundles)):
                 bundles.took(outcomes)
@@ -76,7 +76,7 @@ def loading(
     return workers.loading(num_workers, load, *arguments)
 
 
-class _Bundles:
+class Bundles:
     """Takes waiting jobs into tasks of about `TASK_S`, by the times seen of late.
 
     Before any is seen, tasks are long, and end when they take too long: replicates that need the
@@ -115,6 +115,12 @@ class _Bundles:
             self._seconds += outcome.wall_s
             self._count += 1
             self._in_flight.pop((outcome.condition_id, outcome.replicate), None)
+
+    def lost(self, bundle: Sequence[Job]) -> None:
+        """Forget a task whose jobs are run in another way."""
+        self._bundles.pop(bundle[0].key)
+        for job in bundle:
+            self._in_flight.pop(job.key, None)
 
 
 def _run_alone(job: Job, limits: ReplicateLimits) -> Outcome:

@@ -61,8 +61,16 @@ def limited(limits: ReplicateLimits, *, in_worker: bool) -> Iterator[None]:
 def _in_time(limits: ReplicateLimits, in_worker: bool) -> Iterator[None]:
     seconds = limits.timeout_s
     alone = threading.current_thread() is not threading.main_thread()
-    if seconds is None or alone or not hasattr(signal, "setitimer"):
+    if seconds is None or not hasattr(signal, "setitimer") or (alone and not in_worker):
         yield
+        return
+    if alone:  # no signal reaches a thread
+        with open(os.devnull, "w") as nowhere:
+            faulthandler.dump_traceback_later(seconds, exit=True, file=nowhere)
+            try:
+                yield
+            finally:
+                faulthandler.cancel_dump_traceback_later()
         return
 
     def tell(number: int, frame: Any) -> None:

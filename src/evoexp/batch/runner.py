@@ -5,7 +5,7 @@ mark of completion, so an interrupted batch is resumed by asking for it again.
 """
 
 import contextlib
-from collections.abc import Generator, Iterable, Mapping, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -93,7 +93,7 @@ class Batch:
         Raises:
             Busy: If another process writes one of the runs.
         """
-        from evoexp.batch.fan_out import compile_all, fan_out, loading
+        from evoexp.batch.fan_out import compile_all, loading
 
         with lock_all(self.runs.values()):
             lost = {key: lost_replicates(run) for key, run in self.runs.items()}
@@ -103,7 +103,8 @@ class Batch:
             num_workers = self.num_workers
             config_jsons = list(dict.fromkeys(job.condition_json for job in self.jobs))
             files = list(dict.fromkeys(content for job in self.jobs for content in job.files))
-            with loading(num_workers, load, config_jsons, files):
+            on_cluster = self._settings.backend == "dask"
+            with loading(1 if on_cluster else num_workers, load, config_jsons, files):
                 wanted = ((run, *self._wanted[key]) for key, run in self.runs.items())
                 create_all(
                     (run, text, _manifest(run, text) | notes, own.files())
@@ -112,10 +113,11 @@ class Batch:
                 )
                 for key in dict.fromkeys(job.condition_id for job in self.jobs):
                     self.runs[key].note_plan(self._wanted[key][1])
-                compile_all(config_jsons)
+                if self._settings.address is None:  # else the workers are elsewhere
+                    compile_all(config_jsons)
             times = LongestTimes()
             try:
-                for outcomes in fan_out(self.jobs, num_workers, self._limits(num_workers)):
+                for outcomes in self._spread(num_workers):
                     times.add(outcomes)
                     yield from self._store(outcomes)
                 times.keep({key: each[0].to_json() for key, each in self._wanted.items()})
@@ -127,11 +129,22 @@ class Batch:
                 raise
             self._summarise_all()
 
+    def _spread(self, num_workers: int) -> Iterator[list[Outcome]]:
+        """Run the jobs where the settings say."""
+        limits = self._limits(num_workers)
+        if self._settings.backend == "dask":
+            from evoexp.batch.cluster import cluster_fan_out
+
+            return cluster_fan_out(self.jobs, self._settings, limits)
+        from evoexp.batch.fan_out import fan_out
+
+        return fan_out(self.jobs, num_workers, limits)
+
     @property
     def num_workers(self) -> int:
         """Number of worker processes; 1: the replicates are run by this process."""
         asked = self._settings.num_workers
-        if asked is None and are_short(self.jobs):
+        if asked is None and self._settings.backend == "loky" and are_short(self.jobs):
             return 1
         from evoexp.batch.workers import num_cores  # and joblib
 

@@ -115,7 +115,7 @@ class ArmStates(NamedTuple):
 
 
 class Arm(Protocol):
-    """What a robot is built from: `Chain` says what each function does."""
+    """A part of a robot, as `Chain` describes it function by function."""
 
     def append_to(self, model: Any, arm: int) -> list[Link]:
         """Add the joints."""

@@ -9,7 +9,7 @@ from evoexp.robots.urdf_text import JointText, Mimic
 
 
 class JointRoles(NamedTuple):
-    """What the joints of a URDF do.
+    """The roles of the joints of a URDF.
 
     Attributes:
         arms: Names of the coordinates that move of their own, of each arm.

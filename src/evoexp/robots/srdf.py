@@ -23,7 +23,7 @@ class NamedState(NamedTuple):
 
 
 class Srdf:
-    """What an SRDF says of the robot of a URDF."""
+    """Groups, states and disabled pairs of the robot of a URDF."""
 
     def __init__(self, content: bytes, joints: dict[str, JointText]) -> None:
         """Read the text.

@@ -20,7 +20,7 @@ from evoexp.robots.assembly import Arm, ArmStates, Assembly, Chain
 from evoexp.robots.bodies import Point3, placed
 from evoexp.robots.given_spheres import spheres_of_bodies, with_spheres
 from evoexp.robots.joint_choice import joint_roles, standing_values
-from evoexp.robots.mesh_files import MESHES, mesh_content
+from evoexp.robots.mesh_files import MESHES, mesh_content, robot_file
 from evoexp.robots.mesh_pieces import (
     Decomposition,
     in_pieces,
@@ -129,7 +129,8 @@ class Urdf(Chain):
         settings = dict(settings)
         if "path" not in settings:
             return settings
-        path, srdf = settings.pop("path"), settings.pop("srdf", None)
+        path = robot_file(settings.pop("path"), f"{field}.path")
+        srdf = robot_file(settings.pop("srdf", None), f"{field}.srdf")
         content = file_content(path, f"{field}.path")
         root = parsed_xml(content, f"{field}.path", "robot")
         check_urdf(root, f"{field}.path")

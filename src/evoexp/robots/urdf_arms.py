@@ -18,7 +18,7 @@ AXES = {"X": 0, "Y": 1, "Z": 2}
 
 
 class Carrier(NamedTuple):
-    """What carries the frame of a joint of the URDF.
+    """The joint of the robot that carries the frame of a joint of the URDF.
 
     Attributes:
         joint: Index of the robot's joint, 0: the world.
@@ -99,7 +99,7 @@ class UrdfTree:
             self.disabled |= self._neighbours_between_arms()
 
     def carriers(self, first: int) -> list[Carrier]:
-        """Return what carries each joint's frame, the root's first.
+        """Return the carriers of all joints' frames, the root's first.
 
         Args:
             first: Index of the first joint of the robot that comes from this URDF.
@@ -251,7 +251,7 @@ def body_names(items: list[Any]) -> list[str]:
 
 
 class UrdfArm:
-    """One arm of a URDF; the first one brings the bodies that stand still."""
+    """One arm of a URDF; bodies that stand still belong to the first arm."""
 
     def __init__(self, tree: UrdfTree, index: int) -> None:
         """Take a part of a tree.

@@ -1,0 +1,277 @@
+"""Robots of the package example-robot-data, and a reach that each of them plans.
+
+Used by the test of all of them and by `scripts/update-gallery`, which writes their page.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from evoexp.batch.replicate import run_replicate
+from evoexp.condition import Condition
+from evoexp.errors import EvoexpError
+from evoexp.numeric.elementary import DEGREE
+from evoexp.records import FloatArray, ReplicateSummary
+from evoexp.robots.assembly import Assembly, Robot
+from evoexp.robots.mesh_files import ROBOT_DATA
+from evoexp.robots.poses import frame_pose, local_pose
+from evoexp.testing.small_conditions import conditions
+
+TRIES = 60  # random configurations, of which one must be free
+DRAWS = 10  # of a start and a goal
+REPLICATES = 5  # of which one must be certified
+BALL = 0.2  # [-] radius of the obstacle: share of its distance from the ends
+NO_OBSTACLE = "scenario.obstacles=[]"
+STRIDE = 0.25  # [-] of a joint's range: how far from the start the goal is drawn
+POSTURES = (
+    *("scenario=urdf_reach", "planner=posture_es", "ga=corsepius", "objective=corsepius_reach"),
+    *("collision=corsepius_spheres", "collision.inflation=0.05"),
+    *("scenario.check_reach=false", "planner.edge_check=4"),
+)
+STRINGS = (
+    *("scenario=urdf_two_arms", "planner=rana_puma", "ga=rana_puma", "objective=rana_puma"),
+    "collision=urdf_two_arms",
+)
+
+
+class GalleryRobot(NamedTuple):
+    """A robot, and the joints of one of its arms.
+
+    Attributes:
+        name: Of the robot.
+        path: Of its URDF in the package.
+        joints: That move; none: all.
+        tool: Frame of the tool, empty for the last one.
+    """
+
+    name: str
+    path: str
+    joints: tuple[str, ...] = ()
+    tool: str = ""
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """Words of the command line that choose it."""
+        found = ["robot=urdf", f"robot.path={ROBOT_DATA}:{self.path}"]
+        found += [f"robot.joints=[{','.join(self.joints)}]"] if self.joints else []
+        return (*found, *([f"robot.tool_frame={self.tool}"] if self.tool else ()))
+
+
+def _numbered(pattern: str, count: int) -> tuple[str, ...]:
+    return tuple(pattern.format(k) for k in range(1, count + 1))
+
+
+def _named(pattern: str, words: str) -> tuple[str, ...]:
+    return tuple(pattern.format(word) for word in words.split())
+
+
+_KINOVA = _numbered("j2s6s200_joint_{}", 6)
+_G1 = _named(
+    "left_{}_joint", "shoulder_pitch shoulder_roll shoulder_yaw elbow wrist_roll wrist_pitch"
+)
+_PR2 = _named(
+    "r_{}_joint",
+    "shoulder_pan shoulder_lift upper_arm_roll forearm_roll elbow_flex wrist_flex wrist_roll",
+)
+_ROMEO = _named("L{}", "ShoulderPitch ShoulderYaw ElbowRoll ElbowYaw WristRoll WristYaw WristPitch")
+_ICUB = _named(
+    "l_{}", "shoulder_pitch shoulder_roll shoulder_yaw elbow wrist_prosup wrist_pitch wrist_yaw"
+)
+_ALEX = _named("Left{}", "ShoulderPitch ShoulderRoll ShoulderYaw ElbowPitch WristYaw WristRoll")
+_TIAGO = _numbered("arm_{}_joint", 7)
+_TIAGO_URDF = "tiago_description/robots/tiago"
+ROBOTS = (
+    GalleryRobot("UR3", "ur_description/urdf/ur3_robot.urdf"),
+    GalleryRobot("UR5", "ur_description/urdf/ur5_robot.urdf"),
+    GalleryRobot("UR10", "ur_description/urdf/ur10_robot.urdf"),
+    GalleryRobot("UR5 with gripper", "ur_description/urdf/ur5_gripper.urdf"),
+    GalleryRobot(
+        "Panda", "panda_description/urdf/panda.urdf", _numbered("panda_joint{}", 7), "panda_hand"
+    ),
+    GalleryRobot("Kinova Jaco 2", "kinova_description/robots/kinova.urdf", _KINOVA),
+    GalleryRobot("xArm 7", "xarm_description/urdf/xarm7.urdf"),
+    GalleryRobot("Unitree Z1", "z1_description/urdf/z1.urdf", _numbered("joint{}", 6)),
+    GalleryRobot("SO-100", "so_arm_description/urdf/so100.urdf"),
+    GalleryRobot("Talos arm", "talos_data/robots/talos_left_arm.urdf"),
+    GalleryRobot(
+        "Talos", "talos_data/robots/talos_reduced.urdf", _numbered("arm_left_{}_joint", 7)
+    ),
+    GalleryRobot("Tiago", f"{_TIAGO_URDF}.urdf", _TIAGO),
+    GalleryRobot("Tiago without hand", f"{_TIAGO_URDF}_no_hand.urdf", _TIAGO),
+    GalleryRobot(
+        "Tiago with two arms", f"{_TIAGO_URDF}_dual.urdf", _numbered("arm_left_{}_joint", 7)
+    ),
+    GalleryRobot(
+        "Tiago Pro",
+        "tiago_pro_description/robots/tiago_pro.urdf",
+        _numbered("arm_left_{}_joint", 7),
+    ),
+    GalleryRobot(
+        "Baxter", "baxter_description/urdf/baxter.urdf", _named("left_{}", "s0 s1 e0 e1 w0 w1 w2")
+    ),
+    GalleryRobot("PR2", "pr2_description/urdf/pr2.urdf", _PR2),
+    GalleryRobot("Unitree G1", "g1_description/urdf/g1_29dof_rev_1_0.urdf", _G1),
+    GalleryRobot("Romeo", "romeo_description/urdf/romeo_small.urdf", _ROMEO),
+    GalleryRobot("iCub", "icub_description/robots/icub.urdf", _ICUB),
+    GalleryRobot("Alex", "alex_description/urdf/alex_nub_hands.urdf", _ALEX),
+    GalleryRobot(
+        "ANYmal with Kinova", "anymal_b_simple_description/robots/anymal-kinova.urdf", _KINOVA
+    ),
+    GalleryRobot("B1 with Z1", "b1_description/urdf/b1-z1.urdf", _numbered("joint{}", 6)),
+    GalleryRobot("Centauro", "centauro_description/urdf/centauro.urdf", _numbered("j_arm1_{}", 6)),
+)
+
+
+class Reach(NamedTuple):
+    """A reach of a robot, as a task of each planner.
+
+    Attributes:
+        postures: For `posture_es`: to the point where the tool is at the goal.
+        strings: For `via_point_ga`: to the goal's configuration.
+        q_start: (nq,) start [deg, m].
+        q_goal: (nq,) goal.
+    """
+
+    postures: Condition
+    strings: Condition
+    q_start: FloatArray
+    q_goal: FloatArray
+
+
+class PlannedReach(NamedTuple):
+    """A reach, and the summaries of certified motions by both planners.
+
+    Attributes:
+        reach: The reach.
+        postures: Of `posture_es`; None: no motion was certified.
+        strings: Of `via_point_ga`, likewise.
+        draws: How many starts and goals were drawn.
+    """
+
+    reach: Reach
+    postures: ReplicateSummary | None
+    strings: ReplicateSummary | None
+    draws: int
+
+
+def planned_reach(robot: GalleryRobot) -> PlannedReach:
+    """Draw starts and goals until both planners have certified motions, or `DRAWS` are drawn.
+
+    Raises:
+        EvoexpError: If no start and goal are free of collision.
+    """
+    for draw in range(DRAWS):
+        reach = find_reach(robot, draw)
+        found = PlannedReach(reach, plan(reach.postures), plan(reach.strings), draw + 1)
+        if found.postures is not None and found.strings is not None:
+            break
+    return found
+
+
+def find_reach(robot: GalleryRobot, draw: int = 0) -> Reach:
+    """Draw a start and a goal that are free of collision.
+
+    Args:
+        robot: The robot.
+        draw: Seed of the draw.
+
+    Raises:
+        EvoexpError: The last refusal, if none of the configurations drawn is free.
+    """
+    built = _condition((*robot.words, *POSTURES, NO_OBSTACLE)).robot
+    assert isinstance(built, Robot)
+    assembly = built.build()
+    units = np.where(assembly.table.slides, 1.0, DEGREE)
+    model, rng = assembly.model, np.random.default_rng(draw)
+    low, high = model.lowerPositionLimit / units, model.upperPositionLimit / units
+    reach = np.minimum(high - low, np.where(assembly.table.slides, np.inf, 360.0))
+    middle = np.clip(np.zeros(model.nq), low + 0.1 * reach, high - 0.1 * reach)
+    start = _free(robot, assembly, middle, 0.25 * reach, rng, low, high)
+    goal = _free(robot, assembly, start, STRIDE * reach, rng, low, high, at_least=0.3)
+    lists = tuple(f"scenario.{n}=[{_listed(q)}]" for n, q in (("q_start", start), ("q_goal", goal)))
+    ball = _ball(assembly, start, goal)
+    strings = _condition((*robot.words, *STRINGS, *lists, ball))
+    return Reach(_reaching(robot, assembly, start, goal, ball), strings, start, goal)
+
+
+def plan(condition: Condition) -> ReplicateSummary | None:
+    """Run replicates until one is solved and its motion certified; None: none of them is."""
+    for index in range(REPLICATES):
+        found = run_replicate(condition, index).summary
+        if found.solved and found.certified:
+            return found
+    return None
+
+
+def _ball(assembly: Assembly, start: FloatArray, goal: FloatArray) -> str:
+    """Put a small ball where the tool is half way between two configurations [deg, m]."""
+    middle = _tool_at(assembly, 0.5 * (start + goal))
+    ends = [_tool_at(assembly, q) for q in (start, goal)]
+    radius = BALL * min(float(np.sqrt(np.sum((middle - end) ** 2))) for end in ends)
+    ball = f"shape: sphere, name: ball, center: {_listed(middle)}, radius: {radius:.6f}"
+    return f"scenario.obstacles=[{{{ball}}}]"
+
+
+def _tool_at(assembly: Assembly, q: FloatArray) -> FloatArray:
+    """Return where the tool is at a configuration [deg, m], (3,)."""
+    tool, units = assembly.tools[0], np.where(assembly.table.slides, 1.0, DEGREE)
+    local = local_pose(assembly.table, tool.joint, tool.rotation, tool.position)
+    return frame_pose(assembly.table, tool.joint - 1, local, q * units)[9:]
+
+
+def _free(
+    robot: GalleryRobot,
+    assembly: Assembly,
+    around: FloatArray,
+    spread: FloatArray,
+    rng: np.random.Generator,
+    low: FloatArray,
+    high: FloatArray,
+    at_least: float = 0.0,
+) -> FloatArray:
+    """Draw configurations around one until the planner takes one as a start."""
+    refusal: EvoexpError | None = None
+    for attempt in range(TRIES):
+        drawn = rng.uniform(-1.0, 1.0, len(around)) * spread
+        drawn += np.sign(drawn) * at_least * spread
+        still = attempt == 0 and at_least == 0.0
+        inside = 0.02 * (high - low)
+        q = np.clip(around + (0.0 if still else 1.0) * drawn, low + inside, high - inside)
+        try:
+            _reaching(robot, assembly, q, q).prepare()
+            return np.asarray(q)
+        except EvoexpError as error:
+            refusal = error
+    assert refusal is not None
+    raise refusal
+
+
+def _reaching(
+    robot: GalleryRobot,
+    assembly: Assembly,
+    start: FloatArray,
+    goal: FloatArray,
+    obstacles: str = NO_OBSTACLE,
+) -> Condition:
+    """Return the task to reach the point where the tool is at a configuration [deg, m]."""
+    point = _tool_at(assembly, goal)
+    phase = f"{{name: reach, goal: {{kind: point, point: {_listed(point)}}}}}"
+    return _condition(
+        (
+            *robot.words,
+            *POSTURES,
+            obstacles,
+            f"scenario.q_start={_listed(start)}",
+            f"scenario.phases=[{phase}]",
+        )
+    )
+
+
+def _condition(words: Sequence[str]) -> Condition:
+    (found,) = conditions(*words, budget="paper").values()
+    return found
+
+
+def _listed(values: FloatArray) -> str:
+    return "[" + ",".join(f"{value:.6f}" for value in values) + "]"

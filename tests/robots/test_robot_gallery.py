@@ -1,0 +1,74 @@
+"""Every robot of the gallery loads, is covered, plans a reach with two planners, is certified."""
+
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
+
+import pytest
+
+from evoexp.attachments import PREFIX
+from evoexp.batch.replicate import run_replicate
+from evoexp.batch.reproduction import reproduce_log
+from evoexp.errors import EvoexpError
+from evoexp.robots.mesh_files import ROBOT_DATA
+from evoexp.robots.urdf import Urdf
+from evoexp.store.log_reader import read_log
+from evoexp.testing.robot_gallery import ROBOTS, GalleryRobot, find_reach, planned_reach
+
+
+def is_installed() -> bool:
+    try:
+        return bool(distribution(ROBOT_DATA))
+    except PackageNotFoundError:
+        return False
+
+
+needs_robots = pytest.mark.skipif(
+    not is_installed(), reason="needs the robots: pip install 'evoexp[robots]'"
+)
+
+
+@pytest.mark.matrix
+@needs_robots
+@pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
+def test_a_reach_is_planned_and_certified(robot: GalleryRobot) -> None:
+    found = planned_reach(robot)
+    _, problem = found.reach.postures.prepare()
+    assert problem.bodies.num_shapes > 0
+    assert found.postures is not None and found.strings is not None
+
+
+@pytest.mark.matrix
+@needs_robots
+def test_logs_reproduce_without_the_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    reach = find_reach(ROBOTS[0])
+    content = run_replicate(reach.postures, 0).content
+    assert any(name.startswith(PREFIX) for name in read_log(content).attachments)
+    log = tmp_path / "0000.mcap"
+    log.write_bytes(content)
+
+    def nothing(*_: object) -> None:
+        raise AssertionError("a log names no files")
+
+    monkeypatch.setattr("evoexp.attachments._contents", {})
+    monkeypatch.setattr("evoexp.robots.mesh_files.robot_file", nothing)
+    monkeypatch.setattr("evoexp.robots.urdf.file_content", nothing)
+    assert reproduce_log(log).matches
+
+
+def test_a_name_of_the_package_is_refused_without_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(name: str) -> None:
+        raise PackageNotFoundError(name)
+
+    monkeypatch.setattr("evoexp.robots.mesh_files.distribution", missing)
+    with pytest.raises(EvoexpError) as found:
+        Urdf.read_files({"path": f"{ROBOT_DATA}:ur5.urdf"}, "robot")
+    assert "pip install 'evoexp[robots]'" in str(found.value)
+
+
+@needs_robots
+def test_a_name_that_the_package_does_not_have_is_refused() -> None:
+    with pytest.raises(EvoexpError) as found:
+        Urdf.read_files({"path": f"{ROBOT_DATA}:z1_description/urdf/z2.urdf"}, "robot")
+    assert "did you mean 'z1_description/urdf/z1.urdf'?" in str(found.value)
+    with pytest.raises(EvoexpError):
+        Urdf.read_files({"path": f"{ROBOT_DATA}:../../../../x.urdf"}, "robot")

@@ -19,7 +19,7 @@ from evoexp.robots.poses import frame_pose, local_pose
 from evoexp.testing.small_conditions import conditions
 
 TRIES = 60  # random configurations, of which one must be free
-DRAWS = 10  # of a start and a goal
+DRAWS = 5  # of a start and a goal
 REPLICATES = 5  # of which one must be certified
 BALL = 0.2  # [-] radius of the obstacle: share of its distance from the ends
 NO_OBSTACLE = "scenario.obstacles=[]"
@@ -43,12 +43,14 @@ class GalleryRobot(NamedTuple):
         path: Of its URDF in the package.
         joints: That move; none: all.
         tool: Frame of the tool, empty for the last one.
+        thickness: Radius of the spheres by which `via_point_ga` tests its links [m].
     """
 
     name: str
     path: str
     joints: tuple[str, ...] = ()
     tool: str = ""
+    thickness: float = 0.06
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -92,7 +94,7 @@ ROBOTS = (
     GalleryRobot("Kinova Jaco 2", "kinova_description/robots/kinova.urdf", _KINOVA),
     GalleryRobot("xArm 7", "xarm_description/urdf/xarm7.urdf"),
     GalleryRobot("Unitree Z1", "z1_description/urdf/z1.urdf", _numbered("joint{}", 6)),
-    GalleryRobot("SO-100", "so_arm_description/urdf/so100.urdf"),
+    GalleryRobot("SO-100", "so_arm_description/urdf/so100.urdf", thickness=0.03),
     GalleryRobot("Talos arm", "talos_data/robots/talos_left_arm.urdf"),
     GalleryRobot(
         "Talos", "talos_data/robots/talos_reduced.urdf", _numbered("arm_left_{}_joint", 7)
@@ -161,11 +163,19 @@ def planned_reach(robot: GalleryRobot) -> PlannedReach:
     Raises:
         EvoexpError: If no start and goal are free of collision.
     """
+    found, refusal = None, None
     for draw in range(DRAWS):
-        reach = find_reach(robot, draw)
-        found = PlannedReach(reach, plan(reach.postures), plan(reach.strings), draw + 1)
+        try:
+            reach = find_reach(robot, draw)
+            found = PlannedReach(reach, plan(reach.postures), plan(reach.strings), draw + 1)
+        except EvoexpError as error:
+            refusal = error
+            continue
         if found.postures is not None and found.strings is not None:
             break
+    if found is None:
+        assert refusal is not None
+        raise refusal
     return found
 
 
@@ -191,7 +201,9 @@ def find_reach(robot: GalleryRobot, draw: int = 0) -> Reach:
     goal = _free(robot, assembly, start, STRIDE * reach, rng, low, high, at_least=0.3)
     lists = tuple(f"scenario.{n}=[{_listed(q)}]" for n, q in (("q_start", start), ("q_goal", goal)))
     ball = _ball(assembly, start, goal)
-    strings = _condition((*robot.words, *STRINGS, *lists, ball))
+    strings = _condition(
+        (*robot.words, *STRINGS, f"collision.sphere_radius={robot.thickness}", *lists, ball)
+    )
     return Reach(_reaching(robot, assembly, start, goal, ball), strings, start, goal)
 
 

@@ -51,7 +51,7 @@ class AllowedPairs(NamedTuple):
 
 
 class World(NamedTuple):
-    """What stands around the robot.
+    """The objects that stand around the robot.
 
     Attributes:
         obstacles: Its bodies, in the robot's root frame [m].

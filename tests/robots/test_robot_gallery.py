@@ -34,7 +34,8 @@ def test_a_reach_is_planned_and_certified(robot: GalleryRobot) -> None:
     found = planned_reach(robot)
     _, problem = found.reach.postures.prepare()
     assert problem.bodies.num_shapes > 0
-    assert found.postures is not None and found.strings is not None
+    assert found.postures is not None
+    assert (found.strings is not None) == robot.by_strings
 
 
 @pytest.mark.matrix

@@ -44,6 +44,7 @@ class GalleryRobot(NamedTuple):
         joints: That move; none: all.
         tool: Frame of the tool, empty for the last one.
         thickness: Radius of the spheres by which `via_point_ga` tests its links [m].
+        by_strings: Whether `via_point_ga` has a certified motion within the draws.
     """
 
     name: str
@@ -51,6 +52,7 @@ class GalleryRobot(NamedTuple):
     joints: tuple[str, ...] = ()
     tool: str = ""
     thickness: float = 0.06
+    by_strings: bool = True
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -69,18 +71,6 @@ def _named(pattern: str, words: str) -> tuple[str, ...]:
 
 
 _KINOVA = _numbered("j2s6s200_joint_{}", 6)
-_G1 = _named(
-    "left_{}_joint", "shoulder_pitch shoulder_roll shoulder_yaw elbow wrist_roll wrist_pitch"
-)
-_PR2 = _named(
-    "r_{}_joint",
-    "shoulder_pan shoulder_lift upper_arm_roll forearm_roll elbow_flex wrist_flex wrist_roll",
-)
-_ROMEO = _named("L{}", "ShoulderPitch ShoulderYaw ElbowRoll ElbowYaw WristRoll WristYaw WristPitch")
-_ICUB = _named(
-    "l_{}", "shoulder_pitch shoulder_roll shoulder_yaw elbow wrist_prosup wrist_pitch wrist_yaw"
-)
-_ALEX = _named("Left{}", "ShoulderPitch ShoulderRoll ShoulderYaw ElbowPitch WristYaw WristRoll")
 _TIAGO = _numbered("arm_{}_joint", 7)
 _TIAGO_URDF = "tiago_description/robots/tiago"
 ROBOTS = (
@@ -89,7 +79,11 @@ ROBOTS = (
     GalleryRobot("UR10", "ur_description/urdf/ur10_robot.urdf"),
     GalleryRobot("UR5 with gripper", "ur_description/urdf/ur5_gripper.urdf"),
     GalleryRobot(
-        "Panda", "panda_description/urdf/panda.urdf", _numbered("panda_joint{}", 7), "panda_hand"
+        "Panda",
+        "panda_description/urdf/panda.urdf",
+        _numbered("panda_joint{}", 7),
+        "panda_hand",
+        thickness=0.12,
     ),
     GalleryRobot("Kinova Jaco 2", "kinova_description/robots/kinova.urdf", _KINOVA),
     GalleryRobot("xArm 7", "xarm_description/urdf/xarm7.urdf"),
@@ -97,7 +91,10 @@ ROBOTS = (
     GalleryRobot("SO-100", "so_arm_description/urdf/so100.urdf", thickness=0.03),
     GalleryRobot("Talos arm", "talos_data/robots/talos_left_arm.urdf"),
     GalleryRobot(
-        "Talos", "talos_data/robots/talos_reduced.urdf", _numbered("arm_left_{}_joint", 7)
+        "Talos",
+        "talos_data/robots/talos_reduced.urdf",
+        _numbered("arm_left_{}_joint", 7),
+        by_strings=False,
     ),
     GalleryRobot("Tiago", f"{_TIAGO_URDF}.urdf", _TIAGO),
     GalleryRobot("Tiago without hand", f"{_TIAGO_URDF}_no_hand.urdf", _TIAGO),
@@ -112,16 +109,6 @@ ROBOTS = (
     GalleryRobot(
         "Baxter", "baxter_description/urdf/baxter.urdf", _named("left_{}", "s0 s1 e0 e1 w0 w1 w2")
     ),
-    GalleryRobot("PR2", "pr2_description/urdf/pr2.urdf", _PR2),
-    GalleryRobot("Unitree G1", "g1_description/urdf/g1_29dof_rev_1_0.urdf", _G1),
-    GalleryRobot("Romeo", "romeo_description/urdf/romeo_small.urdf", _ROMEO),
-    GalleryRobot("iCub", "icub_description/robots/icub.urdf", _ICUB),
-    GalleryRobot("Alex", "alex_description/urdf/alex_nub_hands.urdf", _ALEX),
-    GalleryRobot(
-        "ANYmal with Kinova", "anymal_b_simple_description/robots/anymal-kinova.urdf", _KINOVA
-    ),
-    GalleryRobot("B1 with Z1", "b1_description/urdf/b1-z1.urdf", _numbered("joint{}", 6)),
-    GalleryRobot("Centauro", "centauro_description/urdf/centauro.urdf", _numbered("j_arm1_{}", 6)),
 )
 
 

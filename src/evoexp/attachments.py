@@ -18,6 +18,7 @@ from evoexp.input_files import read_bounded
 from evoexp.validation import Settings
 
 FILE, SHA256 = "file", "sha256"
+SHIPPED = "evoexp:"  # of paths
 PREFIX = "files/"  # of the names of such attachments in a log
 
 _contents: dict[str, bytes] = {}
@@ -49,6 +50,13 @@ class File(Settings):
                 f"file of sha256 {self.sha256[:12]}…: its content is not there; give the file again"
             )
         return _contents[self.sha256]
+
+
+def located(path: str) -> str:
+    """Return the path of a file; `evoexp:` stands for the folder of files that evoexp ships."""
+    if not path.startswith(SHIPPED):
+        return path
+    return str(Path(__file__).parent / "assets" / path.removeprefix(SHIPPED))
 
 
 def keep(content: bytes) -> str:

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from evoexp.attachments import located
 from evoexp.configuration.overrides import Choice, Override, Value
 from evoexp.errors import SettingError
 
@@ -58,7 +59,7 @@ def problems(folder: str) -> list[ProblemFiles]:
     Raises:
         SettingError: If there are none or too many, or a scene has no request.
     """
-    root = Path(folder)
+    root = Path(located(folder))
     if "\0" in folder or not root.is_dir():
         raise SettingError(FOLDER, "a folder of problems", folder)
     found = []

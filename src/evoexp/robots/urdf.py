@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 from pydantic import BeforeValidator
 
-from evoexp.attachments import SHA256, File, keep
+from evoexp.attachments import SHA256, File, keep, located
 from evoexp.errors import SettingError, nearest
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Arm, ArmStates, Assembly, Chain
@@ -137,7 +137,9 @@ class Urdf(Chain):
         settings["urdf"] = {SHA256: keep(content)}
         names = dict.fromkeys(str(mesh.get("filename")) for mesh in root.iterfind(MESH))
         if names:
-            found = {name: mesh_content(name, Path(path), f"{field}.path") for name in names}
+            found = {
+                name: mesh_content(name, Path(located(path)), f"{field}.path") for name in names
+            }
             settings["meshes"] = [
                 {"name": name, "file": {SHA256: keep(data)}} for name, data in found.items()
             ]

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from evoexp.attachments import located
 from evoexp.errors import SettingError
 from evoexp.input_files import read_bounded
 
@@ -54,7 +55,7 @@ def file_content(path: Any, field: str) -> bytes:
     if path in (None, "???"):
         raise SettingError(field, "given: the path of a URDF", None)
     try:
-        return read_bounded(str(path))
+        return read_bounded(located(str(path)))
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise SettingError(field, f"a file that can be read ({reason})", str(path)) from None

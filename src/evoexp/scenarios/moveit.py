@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from evoexp.attachments import SHA256, File, keep
+from evoexp.attachments import SHA256, File, keep, located
 from evoexp.errors import SettingError
 from evoexp.input_files import read_bounded
 from evoexp.numeric.elementary import DEGREE
@@ -205,7 +205,7 @@ def _request(content: bytes, scene: bytes) -> Request:
 
 def _content(path: str, field: str) -> bytes:
     try:
-        return read_bounded(path, MAX_SCENE)
+        return read_bounded(located(path), MAX_SCENE)
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         raise SettingError(field, f"a file that can be read ({reason})", path) from None

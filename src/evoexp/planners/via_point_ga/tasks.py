@@ -83,7 +83,7 @@ def covered_collision(
     """
     check_limits(assembly, ends)
     for field, q in zip(FIELDS, ends, strict=True):
-        _check_bodies(bodies, DEGREE * q, field, task.length_unit)
+        check_bodies(bodies, DEGREE * q, field, task.length_unit)
     names = bodies.names[: assembly.geometry.ngeoms]
     ignored = given.touching(names) if isinstance(given, MoveitTask) else ()
     return model.bind(assembly, task.obstacles, np.column_stack(ends), ignored)
@@ -101,7 +101,12 @@ def check_spheres(clearance: Clearance, field: str, given: Any, unit: str) -> No
         raise SettingError(field, must, [list(arm) for arm in given])
 
 
-def _check_bodies(bodies: Scene, q: FloatArray, field: str, unit: str) -> None:
+def check_bodies(bodies: Scene, q: FloatArray, field: str, unit: str) -> None:
+    """Refuse a configuration q (nq,) [rad, m] at which exact bodies touch.
+
+    Raises:
+        SettingError: Naming the pair that overlaps most.
+    """
     data, placements = bodies.model.createData(), bodies.geometry.createData()
     pin.updateGeometryPlacements(bodies.model, data, bodies.geometry, placements, q)
     worst, found = 0.0, ""

@@ -25,6 +25,7 @@ from moveit_samples import (
     write_robot,
 )
 
+SMALL = ["ga.num_generations=40", "ga.population_size=40", "planner.num_new_trajectories=10"]
 POST = body("cylinder", [1.0, 0.03], [0.35, 0.35, 0.5], name="post")  # in the straight way
 
 
@@ -88,7 +89,7 @@ def test_pairs_that_may_touch_are_not_judged(tmp_path: Path) -> None:
 
 
 def test_covered_paths_agree_with_exact_bodies_and_keep_limits(tmp_path: Path) -> None:
-    found = condition(tmp_path, "budget=paper", "ga.num_generations=40", "ga.population_size=40")
+    found = condition(tmp_path, "budget=paper", *SMALL)
     planner, problem = found.prepare()
     strings = CoveredStrings(planner, problem)
     assert strings.low.max() < strings.high.min()

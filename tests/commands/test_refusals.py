@@ -206,7 +206,7 @@ def test_overrides(refused: Refused, override: str, message: str) -> None:
         ),
         (
             ("rum", "experiment=rana_planar"),
-            "no command 'rum'; did you mean 'run'? (commands: run, report, claims, reproduce,",
+            "no command 'rum'; did you mean 'run'? (commands: run, plan, report, claims,",
         ),
         (("--fast",), "no option '--fast'"),
         (("list", "runs"), "no option 'runs'"),

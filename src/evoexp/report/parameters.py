@@ -7,7 +7,7 @@ the shipped options of its group, and the table names the one that it is most li
 
 import functools
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,6 +20,7 @@ from evoexp.shipped import Option, config_directory
 from evoexp.validation import TARGET
 
 OVERRIDE = "override"
+OF_FILE = "content of a file"
 _CAPS = {"num_replicates": "max_replicates", "ga.num_generations": "max_generations"}
 _COMMENT = re.compile(r"#\s*(?:\[(?P<unit>[^\]]*)\])?\s*(?P<source>.*)")
 _REFERENCE = re.compile(r"\$\{(\w+)\}")
@@ -186,11 +187,19 @@ def _setting(
             if name not in (TARGET, "revision"):
                 yield from _setting(group, f"{key}.{name}", item, entries, otherwise, taken)
     else:
-        for path, leaf in _flat(value, key):
-            yield _parameter(f"{group}.{path}", leaf, entries.get(path), otherwise)
+        leaves = dict(_flat(value, key))
+        for path, leaf in leaves.items():
+            unknown = OF_FILE if path not in entries and _is_of_file(path, leaves) else otherwise
+            yield _parameter(f"{group}.{path}", leaf, entries.get(path), unknown)
         items = {path.split("]")[0] for path in entries if path.startswith(f"{key}[")}
         if isinstance(value, list) and len(items) > len(value):  # a list cut short
             yield Parameter(f"{group}.{key}", f"{len(value)} of {len(items)}", "", otherwise)
+
+
+def _is_of_file(path: str, leaves: Mapping[str, Any]) -> bool:
+    """Whether a setting is the hash of a file, or stands beside one in the item of a list."""
+    item = path.rpartition(".")[0]
+    return path.endswith(f".{SHA256}") or f"{item}.{FILE}.{SHA256}" in leaves
 
 
 def _most_like(group: str, config: dict[str, Any]) -> tuple[str, dict[str, Entry]]:

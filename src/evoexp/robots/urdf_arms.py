@@ -90,6 +90,10 @@ class UrdfTree:
             for name, rule in roles.rules.items()
             if name in index
         }
+        lost = [name for arm in roles.arms for name in arm if name not in index]
+        if lost:
+            must = "a URDF whose joints all hang on its root"
+            raise SettingError("robot.path", must, f"joint '{lost[0]}' that does not")
         self._arms = [{index[name] for name in arm} for arm in roles.arms]
         self.order = self._ordered()
         moving = [joint for arm in self.order for joint in arm]

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from evoexp.store.identity import CONFIG, MANIFEST
+from evoexp.errors import StoreError
+from evoexp.store.identity import CONFIG, MANIFEST, read_object
 
 ORIGIN = ("experiment", "label", "budget")  # of the manifest
 LONGEST = 200  # characters of a list
@@ -58,10 +59,9 @@ def with_context(table: pa.Table, context: Mapping[str, Any]) -> pa.Table:
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        found = json.loads(path.read_bytes())
-    except (OSError, ValueError, RecursionError):
+        return read_object(path)
+    except StoreError:
         return {}
-    return found if isinstance(found, dict) else {}
 
 
 def _settings(config: Any, name: str = "") -> Iterator[tuple[str, Any]]:

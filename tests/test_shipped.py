@@ -101,7 +101,7 @@ def test_a_paper_digest(row: Shipped) -> None:
 
 
 def test_a_raised_revision_is_another_hash(monkeypatch: pytest.MonkeyPatch) -> None:
-    condition = condition_of(TABLE[0])
+    condition = Condition.from_json(condition_of(TABLE[0]).to_json())  # not one that is kept
     before = condition.id
     monkeypatch.setattr(type(condition.scenario), "revision", 99)
     assert condition.id != before

@@ -9,6 +9,7 @@ import errno
 import importlib
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 
 from evoexp.commands.command_parser import COMMANDS, command_module, command_parser, whole_parser
@@ -27,6 +28,9 @@ WITH_WORKERS = ("reproduce",)  # `run` starts them by itself, if there is anythi
 KEPT = "finished replicates are kept, the same command runs the others"
 _DISK_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EIO}  # full, or defective
 
+# Whoever interrupts a batch gives up running tasks on purpose; joblib warns of them.
+GIVEN_UP = r"\d+ tasks (which were still being processed|have been successfully executed)"
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; return its exit code.
@@ -40,6 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # no threads that have nothing to do
         open_streams()
         interruption.hear()
+        warnings.filterwarnings("ignore", GIVEN_UP, UserWarning)
     words = list(sys.argv[1:] if arguments is None else arguments)
     try:
         try:

@@ -28,7 +28,7 @@ for k in range(40):
     turn = pin.Quaternion(*rng.normal(size=4)).normalized().toRotationMatrix()
     model.addJoint(k, joint, pin.SE3(turn, rng.normal(size=3)), f"joint_{k}")
 table = kinematic_table(model)
-sys.stdout.write(b"".join(array.tobytes() for array in table[:-1]).hex())
+sys.stdout.write(b"".join(a.tobytes() for a in table if isinstance(a, np.ndarray)).hex())
 """
 
 

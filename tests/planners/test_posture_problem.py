@@ -131,7 +131,8 @@ def phases(text: str) -> str:
         (["robot=two_planar_2r"], "robot: must be one arm, was '2 arms'"),
         (
             ["scenario=lavoie_7dof"],
-            "scenario: must be one that posture_es takes (PostureTask), was 'pick_and_place'",
+            "scenario: must be one that posture_es takes (PostureTask or MoveitTask), was "
+            "'pick_and_place'",
         ),
         (["collision=rana_planar"], "collision"),
     ],

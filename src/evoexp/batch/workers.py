@@ -6,7 +6,6 @@ import os
 import signal
 import threading
 import time
-import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -23,11 +22,6 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 from evoexp.numeric.kept_files import MESSAGES, cache_root
 
 WATCH_S = 1.0  # [s] between two looks whether the parent is alive
-
-# Whoever interrupts a batch gives up running tasks on purpose; joblib warns of them.
-_GIVEN_UP = r"\d+ tasks (which were still being processed|have been successfully executed)"
-warnings.filterwarnings("ignore", _GIVEN_UP, UserWarning)
-
 
 _OF_THE_PARENT = ("SIGINT", "SIGTERM", "SIGHUP")  # signals that end a batch in an orderly way
 _PRELOADED = ["evoexp.batch.preloaded"]

@@ -162,7 +162,7 @@ class Urdf(Chain):
         """Return the arms: one, or one per group."""
         root = parsed_xml(self.urdf.content, "robot.urdf", "robot")
         check_urdf(root, "robot.urdf")
-        joints = read_joints(root, "robot.urdf")
+        joints = read_joints(root, "robot.path")
         srdf = None if self.srdf is None else Srdf(self.srdf.content, joints)
         groups = self.groups or ((self.group,) if self.group else ())
         roles = joint_roles(joints, srdf, self.joints, groups, self.base, several=bool(self.groups))

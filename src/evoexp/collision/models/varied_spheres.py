@@ -117,6 +117,8 @@ def varied_spheres(solid: Solid, inflation: float, most: int) -> Balls | None:
 def _cells(solid: Solid, inflation: float) -> _Cells | None:
     """Cut a body into cubes, small ones at its surface; None if they are too many."""
     edge = float((solid.high - solid.low).max())
+    if edge > MOST_CELLS * 2.0 * FINE * inflation:  # in one row there would be more of them
+        return None
     slack = COAL_ERROR * edge
     middles = 0.5 * (solid.low + solid.high)[None]
     found: list[_Cells] = []

@@ -19,7 +19,6 @@ from evoexp.records import FloatArray
 MOST_SPHERES = 150
 MOST_VARIED = 300  # of one hull for which equal spheres do not suffice
 MEASURED = 24  # points along each edge of a body's box, by which given covers are measured
-COARSER = 1.25  # [-] by which the inflation grows where these do not suffice either
 MOST_IN_A_ROW = 10_000  # spheres on the axis of one body
 WIDER = 1.0 + 1e-9  # covers are made larger by more than rounding
 
@@ -124,20 +123,11 @@ def given_cover(item: Any, spheres: FloatArray) -> Cover:
 
 
 def _varied(solid: "_Solid", inflation: float, most: float) -> Balls | None:
-    """Return balls of different radii around a hull that reach as far as asked, or as little more.
-
-    None if that takes more than `MOST_VARIED` unless they reach as far as `most`, and for bodies
-    that are no hulls.
-    """
+    """Return balls of different radii around a hull, None for bodies that are no hulls."""
     if solid.planes is None:
         return None
-    hull = Solid(solid.low, solid.high, solid.planes, solid.far)
-    while inflation < most:
-        found = varied_spheres(hull, inflation, MOST_VARIED)
-        if found is not None:
-            return found
-        inflation *= COARSER
-    return None
+    hull = Solid(solid.low, solid.high, solid.planes, solid.far, solid.area)
+    return varied_spheres(hull, inflation, MOST_VARIED, most)
 
 
 class _Spheres(NamedTuple):
@@ -211,6 +201,7 @@ class _Solid(NamedTuple):
         near: Function (points, 3) → (points,), at most the signed distance.
         far: The same, at least the signed distance.
         planes: (planes, 4) of a hull: outward normals, and minus the planes' heights.
+        area: Of a hull's surface [length unit²].
     """
 
     low: FloatArray
@@ -218,6 +209,7 @@ class _Solid(NamedTuple):
     near: Any  # at most the distance
     far: Any  # at least the distance
     planes: FloatArray | None = None
+    area: float = 0.0
 
 
 def _solid(item: Any) -> _Solid:
@@ -258,10 +250,11 @@ def _solid(item: Any) -> _Solid:
     )  # only meshes need it, and it takes long to load
 
     try:
-        planes = ConvexHull(corners).equations  # outward normals, unit length
+        hull = ConvexHull(corners)
     except (ValueError, QhullError):
         must = f"robot: body '{item.name}' must be a solid"
         raise UnsupportedShape(f"{must}, was a mesh without an inside") from None
+    planes = hull.equations  # outward normals, unit length
 
     def near(points: FloatArray) -> FloatArray:
         return np.asarray((matrix_product(points, planes[:, :3].T) + planes[:, 3]).max(axis=1))
@@ -272,7 +265,7 @@ def _solid(item: Any) -> _Solid:
         found[outside] = np.maximum(found[outside], _coal_distance(points[outside], shape))
         return found
 
-    return _Solid(corners.min(axis=0), corners.max(axis=0), near, far, planes)
+    return _Solid(corners.min(axis=0), corners.max(axis=0), near, far, planes, hull.area)
 
 
 def _exact(half: FloatArray, distance: Any) -> _Solid:

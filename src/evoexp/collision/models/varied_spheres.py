@@ -16,6 +16,8 @@ from evoexp.records import BoolArray, FloatArray
 FINE = 0.45  # [-] of the inflation: from the middle of a cell at the surface to its corners
 DEEP = 0.25  # [-] of a cell's depth: the same, of a cell within
 MOST_CELLS = 120_000
+OF_A_CELL = 0.3  # [-] of its edge squared: at least the surface per cell (seen: .05 to .24)
+COARSER = 1.25  # [-] by which the inflation grows where balls do not suffice
 CANDIDATES = 800  # middles of balls, within the body
 AT_ONCE = 64  # cells that are compared with all candidates together
 POINTS_AT_ONCE = 4000  # whose heights above all planes are found together
@@ -31,12 +33,14 @@ class Solid(NamedTuple):
         high: (3,) greatest corner.
         planes: (planes, 4) outward normals of unit length, and minus the planes' heights.
         far: Function (points, 3) → (points,), at least the signed distance.
+        area: Of its surface [length unit²].
     """
 
     low: FloatArray
     high: FloatArray
     planes: FloatArray
     far: Any
+    area: float
 
     def heights(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the greatest height of points above a plane, and the normal of that plane."""
@@ -76,20 +80,31 @@ class _Cells(NamedTuple):
     sizes: FloatArray
 
 
-def varied_spheres(solid: Solid, inflation: float, most: int) -> Balls | None:
-    """Cover a convex body.
+def varied_spheres(solid: Solid, inflation: float, most: int, farthest: float) -> Balls | None:
+    """Cover a convex body with balls that reach as far as asked, or as little more as they can.
 
     Args:
         solid: The body.
         inflation: How far the balls may reach beyond it [length unit].
-        most: Number of balls that is not exceeded.
+        most: Number of balls that is not exceeded; where so many do not suffice, the inflation
+            grows.
+        farthest: What the inflation stays below [length unit].
 
     Returns:
         The balls; None if so many do not suffice.
     """
-    cells = _cells(solid, inflation)
-    if cells is None:
-        return None
+    edge, cells = np.inf, None  # of the smallest cells, on which all of them depend
+    while inflation < farthest:
+        if edge != (edge := _cell_edge(solid, inflation)):
+            cells = _cells(solid, edge)
+        if cells is not None and (found := _balls(solid, inflation, most, cells)) is not None:
+            return found
+        inflation *= COARSER
+    return None
+
+
+def _balls(solid: Solid, inflation: float, most: int, cells: _Cells) -> Balls | None:
+    """Choose balls that contain all cells together; None if so many do not suffice."""
     kept: list[tuple[FloatArray, FloatArray]] = []
     left = np.ones(len(cells.middles), dtype=np.bool_)
     # deep balls first; whatever they leave is covered by balls around the cells themselves
@@ -114,11 +129,19 @@ def varied_spheres(solid: Solid, inflation: float, most: int) -> Balls | None:
     )
 
 
-def _cells(solid: Solid, inflation: float) -> _Cells | None:
-    """Cut a body into cubes, small ones at its surface; None if they are too many."""
+def _cell_edge(solid: Solid, inflation: float) -> float:
+    """Return the edge of the cells at the surface, which halves the body's longest."""
     edge = float((solid.high - solid.low).max())
-    if edge > MOST_CELLS * 2.0 * FINE * inflation:  # in one row there would be more of them
+    while 0.5 * edge * float(np.sqrt(3.0)) > FINE * inflation:
+        edge *= 0.5
+    return edge
+
+
+def _cells(solid: Solid, least: float) -> _Cells | None:
+    """Cut a body into cubes, the smallest at its surface; None if they are too many."""
+    if solid.area > MOST_CELLS * OF_A_CELL * least * least:
         return None
+    edge = float((solid.high - solid.low).max())
     slack = COAL_ERROR * edge
     middles = 0.5 * (solid.low + solid.high)[None]
     found: list[_Cells] = []
@@ -132,7 +155,7 @@ def _cells(solid: Solid, inflation: float) -> _Cells | None:
         distance[above] = np.maximum(height[above], solid.far(middles[above]) - slack)
         met = distance <= half
         middles, height, normals = middles[met], height[met], normals[met]
-        small = half <= np.maximum(FINE * inflation, -DEEP * height)
+        small = (edge <= least) | (half <= -DEEP * height)
         # of a cell whose middle is outside, what lies below the plane: a cap, less than half a ball
         out = np.maximum(height[small], 0.0)
         onto = middles[small] - out[:, None] * normals[small]

@@ -55,8 +55,8 @@ class PlannedCondition(NamedTuple):
         condition_id: 64 hex digits.
         planned: Replicates that are asked for.
         cached: Those that are stored.
-        missing: Those that a run would start: `planned` without `cached`.
-        failed: Those of the missing ones that failed before.
+        missing: Those that a run would start: `planned` without `cached` and `failed`.
+        failed: Those that failed before, which start only if told so.
         damaged: Those of the missing ones whose log is damaged.
         other_revision: Hashes of stored runs of the same settings by components of another
             revision.
@@ -138,6 +138,7 @@ def _planned(
     asked = set(range(count))
     damaged = {int(Path(name).stem) for name in damaged_logs(run)} if run.completed() else set()
     cached = (run.completed() - damaged) & asked
+    failed = run.failed() & asked
     own = json.loads(condition.to_json())
     plain = without_revisions(own)
     others = tuple(
@@ -152,8 +153,8 @@ def _planned(
         condition.id,
         count,
         len(cached),
-        count - len(cached),
-        len(run.failed() & asked),
+        count - len(cached) - len(failed),
+        len(failed),
         len(damaged & asked),
         others,
         seconds,
@@ -232,17 +233,24 @@ def _table(rows: list[PlannedCondition]) -> Table:
 
 def _total(rows: list[PlannedCondition], workers: int) -> str:
     """Say how many replicates would run, and how long it would take."""
-    missing = sum(row.missing for row in rows)
+    missing, failed = (
+        sum(counts) for counts in zip(*((row.missing, row.failed) for row in rows), strict=True)
+    )
+    again = f"{failed} failed before, which start with --retry-failed" if failed else ""
     if not missing:
-        return "nothing to run: every replicate is there"
+        return f"nothing to run{f': {again}' if failed else ': every replicate is there'}"
     todo = [row for row in rows if row.missing]
     known = [(row.cpu_s_each, row.missing) for row in todo if row.cpu_s_each is not None]
     seconds = sum(each * count for each, count in known)
-    open_ones = sum(row.missing for row in todo if row.cpu_s_each is None)
-    rest = f", and {open_ones} replicates of unknown length" if open_ones else ""
+    unknown = sum(row.missing for row in todo if row.cpu_s_each is None)
     time = f"{seconds:.3g} s of CPU time, {seconds / workers:.3g} s on {workers} workers"
+    open_ones = f"{unknown} of them of unknown length" if known else "of unknown length"
     largest = max(row.memory_gb_each for row in todo)
-    return (
-        f"{missing} replicates to run: {time if known else 'no time known'}{rest}; at most "
-        f"{largest * min(workers, missing):.3g} GB at once"
+    parts = (
+        f"{missing} replicates to run" if missing > 1 else "1 replicate to run",
+        time if known else "",
+        open_ones if unknown else "",
+        f"at most {largest * min(workers, missing):.3g} GB at once",
+        again,
     )
+    return "; ".join(part for part in parts if part)

@@ -48,17 +48,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     try:
         try:
-            return _run(words, is_process)
+            code = _run(words, is_process)
         finally:
             sys.stdout.flush()  # here, where an error is explained
+        if is_process:
+            _end_workers()
+        return code
     except BaseException as error:
         interruption.end()
         try:
             return _explain(error, words, interruption)
         finally:
-            workers = sys.modules.get("evoexp.batch.workers")
-            if is_process and workers is not None:
-                workers.end_all()
+            if is_process:
+                _end_workers()
             interruption.leave()
     finally:
         interruption.end()
@@ -85,6 +87,13 @@ def _run(words: Sequence[str], is_process: bool) -> int:
             stack.enter_context(searched_first(folders))
         stack.enter_context(damage_in_lines())
         return int(command_module(chosen).main(given))
+
+
+def _end_workers() -> None:
+    """End the worker processes, if there are any, whatever they do."""
+    workers = sys.modules.get("evoexp.batch.workers")
+    if workers is not None:
+        workers.end_all()
 
 
 def _explain(error: BaseException, words: Sequence[str], interruption: Interruption) -> int:

@@ -54,9 +54,11 @@ def start_server() -> None:
 
 
 def end_all() -> None:
-    """End all workers and the server at once; for a process that gives up and leaves.
+    """End all workers and the server at once; for a process that leaves.
 
-    None of them has anything to save: only this process writes.
+    None of them has anything to save: only this process writes. Nor is any of them waited for: one
+    that died with the lock of the queue of tasks would keep all others from hearing that they may
+    go.
     """
     pool = reusable_executor._executor
     if pool is not None:

@@ -1,0 +1,107 @@
+"""CPU time, memory and files that replicates cost beside their planner, by how many there are.
+
+    python tests/benchmarks/measure_batches.py 100 1000 10000 [--dask]
+
+Each batch of the cheapest shipped condition (`rana_planar`, multi-start, smoke budget) runs in an
+empty store of its own, in processes whose CPU time is counted whoever started them; then comes the
+same command with nothing to run, and `list`. Kernels are compiled before.
+"""
+
+import argparse
+import ctypes
+import os
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+import pyarrow.parquet as pq
+
+CONDITION = ("experiment=rana_planar", "budget=smoke", "--only", "multi-start", "--no-report")
+TO_MEGABYTES = 1e-3  # of what wait4 counts in
+SUBREAPER = 36  # PR_SET_CHILD_SUBREAPER: orphans of a command are this process's to count
+
+
+class Spent(NamedTuple):
+    """Resources of a command.
+
+    Attributes:
+        wall_s: Time [s].
+        cpu_s: CPU time of all of its processes [s].
+        memory_mb: Peak memory of the command's own process [MB].
+    """
+
+    wall_s: float
+    cpu_s: float
+    memory_mb: float
+
+
+def spent(outputs: Path, *words: str) -> Spent:
+    """Run a command, wait for it and for whatever it started, and add up."""
+    started = time.monotonic()
+    command = os.posix_spawn(
+        sys.executable,
+        [sys.executable, "-m", "evoexp", *words],
+        {**os.environ, "EVOEXP_OUTPUTS": str(outputs)},
+        file_actions=[(os.POSIX_SPAWN_OPEN, 1, os.devnull, os.O_WRONLY, 0)],
+    )
+    wall = cpu = memory = 0.0
+    while True:
+        try:
+            process, status, used = os.wait4(-1, 0)
+        except ChildProcessError:
+            return Spent(wall, cpu, memory)
+        cpu += used.ru_utime + used.ru_stime
+        if process == command:
+            wall, memory = time.monotonic() - started, used.ru_maxrss * TO_MEGABYTES
+            if status != 0:
+                raise SystemExit(f"{' '.join(words)} ended with status {status}")
+
+
+def batch(count: int, runner: str) -> str:
+    """Run so many replicates; return a row of the table."""
+    with tempfile.TemporaryDirectory() as folder:
+        outputs = Path(folder)
+        asked = (*CONDITION, f"num_replicates={count}", f"budget.max_replicates={count}")
+        asked = (*asked, f"runner={runner}")
+        first = spent(outputs, "run", *asked)
+        (summary,) = outputs.glob("runs/*/summary.parquet")
+        planner = sum(pq.read_table(summary, columns=["cpu_s"])["cpu_s"].to_pylist())
+        size = sum(path.stat().st_blocks * 512 for path in outputs.rglob("*"))
+        again, listed = spent(outputs, "run", *asked), spent(outputs, "list")
+    each = (first.cpu_s - planner) / count
+    cells = (
+        f"{count:,}".replace(",", " "),
+        f"{first.wall_s:.1f} s",
+        f"{first.cpu_s:.1f} s",
+        f"{planner:.1f} s",
+        f"{1e3 * each:.2f} ms",
+        f"{first.memory_mb:.0f} MB",
+        f"{size / 1e6:.1f} MB",
+        f"{again.wall_s:.1f} s",
+        f"{listed.wall_s:.1f} s",
+    )
+    return f"| {' | '.join(cells)} |"
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description="Measure what replicates cost.")
+    parser.add_argument("counts", nargs="+", type=int)
+    parser.add_argument("--dask", action="store_true", help="a cluster on this machine, not loky")
+    arguments = parser.parse_args()
+    ctypes.CDLL(None).prctl(SUBREAPER, 1, 0, 0, 0)
+    runner = "dask" if arguments.dask else "loky"
+    with tempfile.TemporaryDirectory() as folder:  # compiles
+        spent(Path(folder), "run", *CONDITION, f"runner={runner}")
+    heads = "replicates, time, CPU time of all processes, of it planners, the rest per replicate"
+    heads += ", peak memory, on disk, again, list"
+    names = heads.split(", ")
+    print(f"| {' | '.join(names)} |\n|{' --- |' * len(names)}")
+    for count in arguments.counts:
+        print(batch(count, runner), flush=True)
+
+
+if __name__ == "__main__":
+    main()

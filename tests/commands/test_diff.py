@@ -27,6 +27,15 @@ def test_plain_data_differ_where_they_are_not_equal(one: object, two: object) ->
     assert bool(list(changed(stripped(one), stripped(two)))) == (stripped(one) != stripped(two))
 
 
+def test_a_planner_and_its_control_differ_by_their_types() -> None:
+    plain = {"planner": {"_target_": "via_point_ga", "num_via_points": 4}, "seed": 1}
+    control = {"planner": {"_target_": "random_search", "planner": plain["planner"]}, "seed": 2}
+    assert list(changed(plain, control)) == [
+        ("planner", "via_point_ga", "random_search around it"),
+        ("seed", 1, 2),
+    ]
+
+
 def test_a_run_does_not_differ_from_itself(evoexp: Evoexp, stored: Path) -> None:
     run = find_runs(stored)[0]
     said = evoexp("diff", run.hash12, run.condition_id)

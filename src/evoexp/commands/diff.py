@@ -81,8 +81,15 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def changed(one: Any, two: Any, name: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """Yield (dotted name, value, other value) where plain data differ; None: not there."""
-    if isinstance(one, Mapping) and isinstance(two, Mapping):
+    """Yield (dotted name, value, other value) where plain data differ; None: not there.
+
+    A component and one around it differ by their types alone: a planner, and its control.
+    """
+    if _is_around(one, two):
+        yield name, f"{one['_target_']} around it", two["_target_"]
+    elif _is_around(two, one):
+        yield name, one["_target_"], f"{two['_target_']} around it"
+    elif isinstance(one, Mapping) and isinstance(two, Mapping):
         for key in [*one, *(key for key in two if key not in one)]:
             yield from changed(one.get(key), two.get(key), f"{name}.{key}" if name else str(key))
     elif isinstance(one, list) and isinstance(two, list) and len(one) == len(two):
@@ -90,6 +97,11 @@ def changed(one: Any, two: Any, name: str = "") -> Iterator[tuple[str, Any, Any]
             yield from changed(a, b, f"{name}[{k}]")
     elif one != two:
         yield name, one, two
+
+
+def _is_around(outer: Any, inner: Any) -> bool:
+    components = [isinstance(each, Mapping) and "_target_" in each for each in (outer, inner)]
+    return all(components) and inner in outer.values()
 
 
 def _side(prefix: str) -> Side:

@@ -16,7 +16,7 @@ from store_samples import CONDITION, generations, write
 
 from evoexp.errors import DamagedStore
 from evoexp.records import ReplicateSummary
-from evoexp.store import damage, summaries, tables
+from evoexp.store import damage, summaries, summary_columns, tables
 from evoexp.store.log import Finished
 from evoexp.store.run_directory import RunDirectory
 from evoexp.store.summaries import write_summary
@@ -122,6 +122,26 @@ def test_what_was_just_written_is_not_read_again(
     assert rows(write_summary(run)) == rows(table)
 
 
+def test_a_table_made_piece_by_piece_is_the_same(
+    run: RunDirectory, add: Add, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for k in (0, 2, 3, 7, 8, 11):
+        add(k, terms={f"term{k % 3}": float(k)})
+    run.write_failure(5, "x", "")
+    whole = write_summary(run)
+    monkeypatch.setattr(summaries, "ROWS_AT_ONCE", 2)
+    run.summary_path.unlink()
+    pieces = write_summary(run)
+    assert rows(pieces) == rows(whole) and pieces.schema.equals(whole.schema)
+    add(4, terms={"other": 1.0})  # between rows that are there
+    run.write_failure(1, "y", "")
+    written = {6: add(6).summary, 12: add(12, terms={"term0": 2.0}).summary}
+    mixed = write_summary(run, written)
+    run.summary_path.unlink()
+    assert rows(write_summary(run)) == rows(mixed)
+    assert [row["replicate"] for row in mixed.to_pylist()] == [*range(9), 11, 12]
+
+
 @pytest.mark.parametrize(
     ("kind", "values"),
     [
@@ -134,7 +154,7 @@ def test_what_was_just_written_is_not_read_again(
 def test_columns_hold_what_they_are_given(kind: pa.DataType, values: list[Any]) -> None:
     for count in range(len(values) + 1):
         for given in (values[:count], [value for value in values[:count] if value is not None]):
-            column = summaries._column(given, kind)
+            column = summary_columns._column(given, kind)
             column.validate(full=True)
             assert column.type == kind
             assert repr(column.to_pylist()) == repr(given)

@@ -8,11 +8,11 @@ import errno
 import json
 import os
 import stat
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -21,9 +21,9 @@ from evoexp.records import ReplicateSummary, flatten
 from evoexp.store.container import check
 from evoexp.store.damage import checked_summary, listed, reason, set_aside, warn
 from evoexp.store.files import write_file
-from evoexp.store.messages import field_types
 from evoexp.store.run_context import run_context, with_context
 from evoexp.store.run_directory import RunDirectory
+from evoexp.store.summary_columns import BASE, schema_of, table_of
 
 Runs = RunDirectory | Iterable[RunDirectory]
 Stamps = dict[str, list[int]]  # file name → size [B], modification time [ns]
@@ -48,18 +48,11 @@ class _Summary(NamedTuple):
         return [name for name in self.files if not (name in self.damaged and _is_log(name))]
 
 
+ROWS_AT_ONCE = 5000  # that a table is built from
 _VERSION = 5  # of the table's columns and notes; another one is rebuilt
 _KEY = b"evoexp"
 # tables that this process wrote or read
 _KNOWN: dict[Path, tuple[tuple[int, int, int], _Summary]] = {}
-_PLAIN: dict[Any, pa.DataType] = {
-    str: pa.string(),
-    int: pa.int64(),
-    float: pa.float64(),
-    bool: pa.bool_(),
-}
-_ARROW = _PLAIN | {kind | None: arrow for kind, arrow in _PLAIN.items()}
-_BASE = [pa.field(name, _ARROW[kind]) for name, kind in field_types(ReplicateSummary).items()]
 
 
 def write_summary(
@@ -87,11 +80,8 @@ def write_summary(
     stored, stamps = _stored(run), _stamps(run)
     if stored is not None and _is_current(run, stored, stamps, thorough):
         return stored.table
-    rows = {
-        run.log_path(replicate).name: flatten(summary)
-        for replicate, summary in (written or {}).items()
-    }
-    summary = _build(run, stored, stamps, rows, thorough)
+    known = {run.log_path(replicate).name: each for replicate, each in (written or {}).items()}
+    summary = _build(run, stored, stamps, known, thorough)
     sink = pa.BufferOutputStream()
     table = with_context(summary.table, run_context(run.path, summary.table.column_names))
     pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
@@ -124,9 +114,9 @@ def summary_table(runs: Runs, *, thorough: bool = False) -> pa.Table:
                 f"run {run.hash12}: left out, damaged: {listed(summary.damaged)}; run again by: "
                 f"{run.command}"
             )
-    tables = [_table([], pa.schema(_BASE)), *(summary.table for summary in summaries)]
+    tables = [table_of([], pa.schema(BASE)), *(summary.table for summary in summaries)]
     table = pa.concat_tables(tables, promote_options="default")
-    names = [field.name for field in _BASE]
+    names = [field.name for field in BASE]
     return table.select(
         names + sorted(set(table.column_names) - set(names))
     ).replace_schema_metadata(None)
@@ -184,7 +174,7 @@ def altered_rows(run: RunDirectory, summaries: Mapping[str, ReplicateSummary]) -
     given = [flatten(summaries[name]) for name in known]
     columns = {*stored.table.column_names}
     wider = [name for name, row in zip(known, given, strict=True) if not row.keys() <= columns]
-    expected = _table(given, stored.table.schema).to_pylist()
+    expected = table_of(given, stored.table.schema).to_pylist()
     return wider + [
         name
         for name, row in zip(known, expected, strict=True)
@@ -283,7 +273,7 @@ def _stored(run: RunDirectory) -> _Summary | None:
         notes = json.loads(table.schema.metadata[_KEY])
         table = table.select(notes["columns"])
         valid = notes["version"] == _VERSION and notes["condition"] == run.condition_id
-        valid = valid and all(table.schema.field(field.name).equals(field) for field in _BASE)
+        valid = valid and all(table.schema.field(field.name).equals(field) for field in BASE)
         summary = _Summary(table, notes["files"], notes["damaged"])
         valid = valid and len(summary.row_names) == table.num_rows
     except (pa.ArrowException, OSError, ValueError, LookupError, TypeError, AttributeError):
@@ -310,61 +300,52 @@ def _build(
     run: RunDirectory,
     stored: _Summary | None,
     stamps: Stamps,
-    written: Mapping[str, dict[str, Any]] | None = None,
+    written: Mapping[str, ReplicateSummary] | None = None,
     thorough: bool = False,
 ) -> _Summary:
-    known: dict[str, dict[str, Any]] = {}
+    """Build the table of a run, some thousand rows at a time."""
+    written, kept = written or {}, dict[str, int]()  # file → its row of the stored table
     if stored is not None:
         old, intact = stored.files, _intact(run, stored) if thorough else {}
-        rows = zip(stored.row_names, stored.table.to_pylist(), strict=True)
-        known = {
-            name: row
-            for name, row in rows
+        kept = {
+            name: k
+            for k, name in enumerate(stored.row_names)
             if stamps.get(name) == old[name]
             and name not in stored.damaged
+            and name not in written
             and intact.get(name, True)
         }
-    known |= written or {}
-    rows_now: list[dict[str, Any]] = []
-    damaged: dict[str, str] = {}
-    for name in stamps:
-        row, why = (known[name], "") if name in known else _row(run, name)
-        rows_now += [row] if row else []
-        damaged |= {name: why} if why else {}
-    base = {field.name for field in _BASE}
+    tables = [_rows(stored.table, list(kept.values()))] if stored is not None else []
+    names, damaged = list(kept), dict[str, str]()
+    new = (name for name in stamps if name not in kept)
+    while some := list(islice(new, ROWS_AT_ONCE)):
+        rows = []
+        for name in some:
+            row, why = (flatten(written[name]), "") if name in written else _row(run, name)
+            if row:
+                rows.append(row)
+                names.append(name)
+            if why:
+                damaged[name] = why
+        tables.append(table_of(rows, schema_of({key for row in rows for key in row})))
+    table = pa.concat_tables([table_of([], schema_of(())), *tables], promote_options="default")
+    places = dict(zip(names, range(len(names)), strict=True))
+    order = [places[name] for name in stamps if name in places]
+    table = _rows(table, order)
     # A stored row has null for the terms that only its neighbours have.
-    used = {name for row in rows_now for name, value in row.items() if value is not None} - base
-    schema = pa.schema(_BASE + [pa.field(name, pa.float64()) for name in sorted(used)])
+    schema = schema_of({key for key in table.column_names if table[key].null_count < len(table)})
     notes = {"version": _VERSION, "condition": run.condition_id}
+    damaged = {name: damaged[name] for name in stamps if name in damaged}
     notes |= {"files": stamps, "damaged": damaged, "columns": schema.names}
-    table = _table(rows_now, schema.with_metadata({_KEY: json.dumps(notes).encode()}))
-    return _Summary(table, stamps, damaged)
+    table = table.select(schema.names).combine_chunks()
+    return _Summary(
+        table.replace_schema_metadata({_KEY: json.dumps(notes).encode()}), stamps, damaged
+    )
 
 
-def _table(rows: Sequence[Mapping[str, Any]], schema: pa.Schema) -> pa.Table:
-    columns = [_column([row.get(field.name) for row in rows], field.type) for field in schema]
-    return pa.Table.from_arrays(columns, schema=schema)
-
-
-def _column(values: list[Any], kind: pa.DataType) -> pa.Array:
-    """Return values, None where there is none, as a column.
-
-    `pa.array` would load pandas, which takes a third of a second.
-    """
-    given = np.array([value is not None for value in values], dtype=np.bool_)
-    buffers = [None if given.all() else pa.py_buffer(np.packbits(given, bitorder="little"))]
-    if kind == pa.string():
-        texts = [(value or "").encode() for value in values]
-        ends = np.cumsum([0, *map(len, texts)], dtype=np.int32)
-        buffers += [pa.py_buffer(ends), pa.py_buffer(b"".join(texts))]
-    else:
-        numbers = np.array(
-            [0 if value is None else value for value in values], dtype=kind.to_pandas_dtype()
-        )
-        buffers.append(
-            pa.py_buffer(np.packbits(numbers, bitorder="little") if kind == pa.bool_() else numbers)
-        )
-    return pa.Array.from_buffers(kind, len(values), buffers)
+def _rows(table: pa.Table, which: list[int]) -> pa.Table:
+    """Return rows of a table; all of them without looking, which would load more of pyarrow."""
+    return table if which == list(range(len(table))) else table.take(which)
 
 
 def _row(run: RunDirectory, name: str) -> tuple[dict[str, Any], str]:

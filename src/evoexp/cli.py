@@ -59,9 +59,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         try:
             return _explain(error, words, interruption)
         finally:
+            interruption.leave()
             if is_process:
                 _end_workers()
-            interruption.leave()
     finally:
         interruption.end()
         if is_process:

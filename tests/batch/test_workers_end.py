@@ -35,3 +35,29 @@ def test_workers_that_no_longer_answer_keep_nobody_waiting() -> None:
     )
     count, *stopped = done.stdout.split()
     assert (done.returncode, done.stderr, count, len(stopped)) == (0, "", "20", 2)
+
+
+LOCKED = """
+import os, signal, sys, threading
+from evoexp import cli
+from evoexp.batch import workers
+from evoexp.commands import interruption
+
+def command(words, is_process):
+    os.kill(os.getpid(), signal.SIGTERM)
+    threading.Event().wait(60)
+
+interruption.CLOSING_S = 0.5
+workers.end_all = threading.Event().wait  # a library that waits for somebody who is gone
+cli._run = command
+sys.exit(cli.main())
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timer here")
+def test_an_interrupted_command_leaves_whatever_libraries_wait_for() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", LOCKED], capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 128 + signal.SIGTERM
+    assert done.stderr.splitlines()[-1] == "evoexp: interrupted"

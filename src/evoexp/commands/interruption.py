@@ -66,9 +66,15 @@ class Interruption:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
 
     def leave(self) -> None:
-        """Ignore signals while the interpreter ends: one more would change the exit code."""
+        """Ignore signals while the interpreter ends: one more would change the exit code.
+
+        After a signal it may take `CLOSING_S` at most, whatever libraries wait for.
+        """
         for number in self._numbers:
             signal.signal(number, signal.SIG_IGN)
+        if self.number is not None and hasattr(signal, "setitimer"):
+            signal.signal(signal.SIGALRM, lambda number, frame: self._leave_at_once())
+            signal.setitimer(signal.ITIMER_REAL, CLOSING_S)
 
     def _heard(self, number: int, frame: FrameType | None) -> None:
         if self.number is None and not self._ended:

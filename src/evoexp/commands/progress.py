@@ -45,7 +45,11 @@ class BatchProgress:
 
     def __enter__(self) -> Self:
         """Show it."""
-        self._bar.start()
+        try:
+            self._bar.start()
+        except BaseException:  # interrupted: nobody else would give the terminal back
+            self._bar.stop()
+            raise
         return self
 
     def __exit__(

@@ -13,13 +13,15 @@ import os
 import sys
 import tempfile
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
 import pyarrow.parquet as pq
 
 CONDITION = ("experiment=rana_planar", "budget=smoke", "--only", "multi-start", "--no-report")
-TO_MEGABYTES = 1e-3  # of what wait4 counts in
+TO_MEGABYTES = 1e-3  # of what the system counts in
+LOOK_S = 0.02  # [s] between two looks at the process
 SUBREAPER = 36  # PR_SET_CHILD_SUBREAPER: orphans of a command are this process's to count
 
 
@@ -29,11 +31,13 @@ class Spent(NamedTuple):
     Attributes:
         wall_s: Time [s].
         cpu_s: CPU time of all of its processes [s].
+        main_s: CPU time of the command's own process, which writes what comes back [s].
         memory_mb: Peak memory of the command's own process [MB].
     """
 
     wall_s: float
     cpu_s: float
+    main_s: float
     memory_mb: float
 
 
@@ -46,17 +50,30 @@ def spent(outputs: Path, *words: str) -> Spent:
         {**os.environ, "EVOEXP_OUTPUTS": str(outputs)},
         file_actions=[(os.POSIX_SPAWN_OPEN, 1, os.devnull, os.O_WRONLY, 0)],
     )
-    wall = cpu = memory = 0.0
+    wall = cpu = main = memory = 0.0
     while True:
+        with suppress(OSError, IndexError):  # gone, or no longer anything in memory
+            main, memory = _own(command)
         try:
-            process, status, used = os.wait4(-1, 0)
+            process, status, used = os.wait4(-1, os.WNOHANG)
         except ChildProcessError:
-            return Spent(wall, cpu, memory)
-        cpu += used.ru_utime + used.ru_stime
+            return Spent(wall, cpu, main, memory)
+        if process == 0:
+            time.sleep(LOOK_S)
+            continue
+        cpu += used.ru_utime + used.ru_stime  # with those it waited for itself
         if process == command:
-            wall, memory = time.monotonic() - started, used.ru_maxrss * TO_MEGABYTES
+            wall = time.monotonic() - started
             if status != 0:
                 raise SystemExit(f"{' '.join(words)} ended with status {status}")
+
+
+def _own(process: int) -> tuple[float, float]:
+    """Return the CPU time [s] and the peak memory [MB] of a process by itself."""
+    _, _, fields = Path(f"/proc/{process}/stat").read_text().rpartition(") ")
+    ticks = sum(int(ticks) for ticks in fields.split()[11:13])
+    peak = Path(f"/proc/{process}/status").read_text().split("VmHWM:")[1].split()[0]
+    return ticks / os.sysconf("SC_CLK_TCK"), int(peak) * TO_MEGABYTES
 
 
 def batch(count: int, runner: str) -> str:
@@ -77,6 +94,7 @@ def batch(count: int, runner: str) -> str:
         f"{first.cpu_s:.1f} s",
         f"{planner:.1f} s",
         f"{1e3 * each:.2f} ms",
+        f"{first.main_s:.1f} s",
         f"{first.memory_mb:.0f} MB",
         f"{size / 1e6:.1f} MB",
         f"{again.wall_s:.1f} s",
@@ -96,7 +114,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:  # compiles
         spent(Path(folder), "run", *CONDITION, f"runner={runner}")
     heads = "replicates, time, CPU time of all processes, of it planners, the rest per replicate"
-    heads += ", peak memory, on disk, again, list"
+    heads += ", main process, its peak memory, on disk, again, list"
     names = heads.split(", ")
     print(f"| {' | '.join(names)} |\n|{' --- |' * len(names)}")
     for count in arguments.counts:

@@ -7,6 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from evoexp.collision.box_support import coal
+from evoexp.collision.certifier.near_triangles import NearPart, mesh_of, near_triangles
 from evoexp.collision.scene import Scene
 from evoexp.errors import EvoexpError
 from evoexp.paths.motion import Motion
@@ -17,9 +18,20 @@ were 1e-2 wrong)."""
 
 GJK_ITERATIONS = 1000
 
+ROUNDING = 1e-9  # [-] of the scene's size: by which more than the near triangles are kept
+
 TIME_RESOLUTION = 1e-12  # [segments] of the first contact
 
 TINY = 1e-300  # in place of a speed of 0
+
+WORTH = 4000  # queries times triangles, from which on near triangles are worth seeking
+
+CLOSE = 0.5  # [-] of a distance: changes by more leave too many triangles near
+
+WALK = 20.0  # queries of a walk, about half of them
+
+FINER = 8.0  # a part of a motion so many times shorter is worth fewer triangles
+FEW = 64  # triangles that are few enough
 
 
 class QueryLimit(EvoexpError):
@@ -43,19 +55,37 @@ class _Scratch(threading.local):
 _scratch = _Scratch()
 
 
+class _Body(NamedTuple):
+    """A body: coal's shape, and its place.
+
+    Attributes:
+        shape: Coal's.
+        joint: Index of its Pinocchio joint; 0: the world.
+        local: Its `pin.SE3` in the joint's frame.
+        num_triangles: Of a mesh; 0 for convex shapes.
+    """
+
+    shape: Any
+    joint: int
+    local: Any
+    num_triangles: int
+
+
 class CoalDistance:
-    """Distances of a scene's pairs along a motion, counted."""
+    """Distances of a scene's pairs along a motion, counted; none is computed twice."""
 
     def __init__(self, scene: Scene, motion: Motion, limit: int) -> None:
         self.scene, self.motion, self.limit, self.queries = scene, motion, limit, 0
         if _scratch.model is not scene.model:
             _scratch.model, _scratch.data = scene.model, scene.model.createData()
         self._model, self._data, self._token = scene.model, _scratch.data, object()
-        self._shapes = scene.shapes
+        self._pairs: dict[int, tuple[_Body, _Body]] = {}
         self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
         self._request.gjk_tolerance = GJK_TOLERANCE
         self._request.gjk_max_iterations = GJK_ITERATIONS
         self._t = np.nan
+        self._known: dict[tuple[int, float], float] = {}
+        self._near: list[NearPart] = []  # each within the one before it
 
     def __call__(self, pair: int, t: float) -> float:
         """Return the distance of a pair at t; negative where bodies overlap.
@@ -66,17 +96,78 @@ class CoalDistance:
         if self.queries >= self.limit:
             raise QueryLimit
         self.queries += 1
+        found = self._known.get((pair, t))
+        if found is None:
+            found = self._known[pair, t] = self._computed(pair, t)
+        return found
+
+    def narrow(
+        self, pair: int, interval: tuple[float, float], speed: float, most: float, queries: float
+    ) -> None:
+        """Prepare for queries in an interval in which a mesh does not touch a convex body.
+
+        Between two meshes it saves nothing: coal descends both trees fast.
+
+        Args:
+            pair: The pair.
+            interval: Begin and end.
+            speed: A bound of |d distance / dt| there.
+            most: An upper bound of the distance there [length unit].
+            queries: How many are expected.
+        """
+        (begin, end), near, (one, two) = interval, self._near, self._bodies(pair)
+        mesh, other = (one, two) if one.num_triangles > 0 else (two, one)
+        if mesh.num_triangles == 0 or other.num_triangles > 0:
+            return
+        while near and not near[-1].holds(pair, begin, end):
+            near.pop()
+        way, count = speed * (end - begin), len(near[-1].kept) if near else mesh.num_triangles
+        if near and (way * FINER > near[-1].way or count <= FEW):
+            return
+        if way > CLOSE * most or queries * count < WORTH:
+            return
+        self._place(0.5 * (begin + end))
+        into = self._at(other).inverse() * self._at(mesh)
+        reach = most + 0.5 * way + ROUNDING * self.scene.size
+        kept = near_triangles(mesh.shape, other.shape, into, reach, near[-1].kept if near else None)
+        if len(kept) > 0:
+            near.append(NearPart(pair, begin, end, way, mesh_of(mesh.shape, kept), kept))
+
+    def _computed(self, pair: int, t: float) -> float:
+        self._place(t)
+        one, two = self._bodies(pair)
+        first, second = one.shape, two.shape
+        for near in reversed(self._near):
+            if near.holds(pair, t, t):
+                first, second = (near.mesh, second) if one.num_triangles > 0 else (first, near.mesh)
+                break
+        places = _transform(self._at(one)), _transform(self._at(two))
+        self._result.clear()
+        return float(
+            coal.distance(first, places[0], second, places[1], self._request, self._result)
+        )
+
+    def _place(self, t: float) -> None:
         if t != self._t or _scratch.owner is not self._token:
             pin.forwardKinematics(self._model, self._data, self.motion.at(t))
             self._t, _scratch.owner = t, self._token
-        (one, first), (two, second) = (self._placed(int(body)) for body in self.scene.pairs[pair])
-        self._result.clear()
-        return float(coal.distance(one, first, two, second, self._request, self._result))
 
-    def _placed(self, body: int) -> tuple[Any, Any]:
-        shape, joint, local = self._shapes[body]
-        placement = self._data.oMi[joint] * local
-        return shape, coal.Transform3s(placement.rotation, placement.translation)
+    def _bodies(self, pair: int) -> tuple[_Body, _Body]:
+        if pair not in self._pairs:
+            one, two = (_body(*self.scene.shapes[int(k)]) for k in self.scene.pairs[pair])
+            self._pairs[pair] = one, two
+        return self._pairs[pair]
+
+    def _at(self, body: _Body) -> Any:
+        return body.local if body.joint == 0 else self._data.oMi[body.joint] * body.local
+
+
+def _body(shape: Any, joint: int, local: Any) -> _Body:
+    return _Body(shape, joint, local, getattr(shape, "num_tris", 0))
+
+
+def _transform(placement: Any) -> Any:
+    return coal.Transform3s(placement.rotation, placement.translation)
 
 
 def first_contact(distance: CoalDistance, pair: int, t: float, level: float) -> float | None:
@@ -116,11 +207,24 @@ def first_contact(distance: CoalDistance, pair: int, t: float, level: float) -> 
     return touching
 
 
-def walk_down(distance: CoalDistance, pair: int, t: float, step: float) -> tuple[float, float]:
-    """Return t and distance of a local minimum near t, by steps halved down to 1e-9 segments."""
+def walk_down(
+    distance: CoalDistance, pair: int, t: float, step: float, speed: float
+) -> tuple[float, float]:
+    """Return t and distance of a local minimum near t, by steps halved down to 1e-9 segments.
+
+    Args:
+        distance: Coal's.
+        pair: The pair.
+        t: Where the walk begins [instant].
+        step: The first one [segments].
+        speed: A bound of |d distance / dt| on the whole motion.
+    """
     last, best = float(distance.motion.num_segments), distance(pair, t)
     while step > 1e-9:
-        for tried in (max(t - step, 0.0), min(t + step, last)):
+        sides = max(t - step, 0.0), min(t + step, last)
+        if (way := speed * (sides[1] - sides[0])) < best:
+            distance.narrow(pair, sides, speed, best + way, WALK)
+        for tried in sides:
             found = distance(pair, tried)
             if found < best:
                 t, best = tried, found
@@ -184,6 +288,10 @@ def search_interval(
         else:
             middle = 0.5 * (a + b) + 0.5 * (d_a - d_b) / speed
             middle = min(max(middle, a + 0.1 * width), b - 0.1 * width)
+            nearest = min(d_a, d_b)
+            if nearest > way:
+                above = max(nearest - goals.target(min(least, goals.known)), goals.slack)
+                distance.narrow(pair, (a, b), speed, 0.5 * (d_a + d_b + way), way / above)
             d = distance(pair, middle)
             least, at = min((least, at), (d, middle))
             if d > goals.level:

@@ -295,8 +295,18 @@ class _Judgement:
         self._polish_from(pairs, self.sweep.pair_least_at[pairs])
         if self.best.pair >= 0 and not self.task.exact[self.best.pair]:
             distance, t = self.best.distance, self.best.t
-            t, distance = walk_down(self.coal, self.best.pair, t, 1e-3)
+            speed = self._greatest_speed(self.best.pair)
+            t, distance = walk_down(self.coal, self.best.pair, t, 1e-3, speed)
             self._note(_Candidate(distance, t, self.best.pair))
+
+    def _greatest_speed(self, pair: int) -> float:
+        """Return a bound of the change of a pair's distance, per segment, in the whole motion."""
+        weights = self.task.weights[pair : pair + 1]
+        speeds, scratch, found = np.empty((2, 1)), np.empty(len(self.task.chain.parent)), 0.0
+        for piece in self.task.coefficients:
+            approach_bounds(self.task.chain, piece, 0.0, 1.0, weights, speeds, scratch)
+            found = max(found, float(speeds[0, 0]))
+        return found
 
     def _polish_from(self, pairs: IntArray, begins: FloatArray) -> None:
         """Ask coal for the least of some pairs' local minima; for the first of equal ones."""

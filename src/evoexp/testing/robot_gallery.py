@@ -44,7 +44,7 @@ class GalleryRobot(NamedTuple):
         joints: That move; none: all.
         tool: Frame of the tool, empty for the last one.
         thickness: Radius of the spheres by which `via_point_ga` tests its links [m].
-        by_strings: Whether `via_point_ga` has a certified motion within the draws.
+        srdf: Its SRDF in the package; empty: pairs of bodies are derived from samples alone.
     """
 
     name: str
@@ -52,13 +52,14 @@ class GalleryRobot(NamedTuple):
     joints: tuple[str, ...] = ()
     tool: str = ""
     thickness: float = 0.06
-    by_strings: bool = True
+    srdf: str = ""
 
     @property
     def words(self) -> tuple[str, ...]:
         """Words of the command line that choose it."""
         found = ["robot=urdf", f"robot.path={ROBOT_DATA}:{self.path}"]
         found += [f"robot.joints=[{','.join(self.joints)}]"] if self.joints else []
+        found += [f"robot.srdf={ROBOT_DATA}:{self.srdf}"] if self.srdf else []
         return (*found, *([f"robot.tool_frame={self.tool}"] if self.tool else ()))
 
 
@@ -73,11 +74,24 @@ def _named(pattern: str, words: str) -> tuple[str, ...]:
 _KINOVA = _numbered("j2s6s200_joint_{}", 6)
 _TIAGO = _numbered("arm_{}_joint", 7)
 _TIAGO_URDF = "tiago_description/robots/tiago"
+_LEFT = _numbered("arm_left_{}_joint", 7)
+_TALOS_TOOL = "gripper_left_fingertip_1_link"
+_G1 = _named(
+    "left_{}_joint",
+    "shoulder_pitch shoulder_roll shoulder_yaw elbow wrist_roll wrist_pitch wrist_yaw",
+)
+_G1_URDF = "g1_description/urdf/g1_29dof"
+_PR2 = _named(
+    "l_{}_joint",
+    "shoulder_pan shoulder_lift upper_arm_roll elbow_flex forearm_roll wrist_flex wrist_roll",
+)
+_ROMEO = _named("L{}", "ShoulderPitch ShoulderYaw ElbowRoll ElbowYaw WristRoll WristYaw WristPitch")
 ROBOTS = (
     GalleryRobot("UR3", "ur_description/urdf/ur3_robot.urdf"),
+    GalleryRobot("UR3 with gripper", "ur_description/urdf/ur3_gripper.urdf"),
     GalleryRobot("UR5", "ur_description/urdf/ur5_robot.urdf"),
-    GalleryRobot("UR10", "ur_description/urdf/ur10_robot.urdf"),
     GalleryRobot("UR5 with gripper", "ur_description/urdf/ur5_gripper.urdf"),
+    GalleryRobot("UR10", "ur_description/urdf/ur10_robot.urdf"),
     GalleryRobot(
         "Panda",
         "panda_description/urdf/panda.urdf",
@@ -86,29 +100,50 @@ ROBOTS = (
         thickness=0.12,
     ),
     GalleryRobot("Kinova Jaco 2", "kinova_description/robots/kinova.urdf", _KINOVA),
+    GalleryRobot(
+        "ANYmal with Kinova", "anymal_b_simple_description/robots/anymal-kinova.urdf", _KINOVA
+    ),
     GalleryRobot("xArm 7", "xarm_description/urdf/xarm7.urdf"),
     GalleryRobot("Unitree Z1", "z1_description/urdf/z1.urdf", _numbered("joint{}", 6)),
+    GalleryRobot("Unitree B1 with Z1", "b1_description/urdf/b1-z1.urdf", _numbered("joint{}", 6)),
+    GalleryRobot("Unitree G1", f"{_G1_URDF}_rev_1_0.urdf", _G1, thickness=0.04),
+    GalleryRobot("Unitree G1 with hands", f"{_G1_URDF}_with_hand_rev_1_0.urdf", _G1, "", 0.04),
     GalleryRobot("SO-100", "so_arm_description/urdf/so100.urdf", thickness=0.03),
-    GalleryRobot("Talos arm", "talos_data/robots/talos_left_arm.urdf"),
+    GalleryRobot(
+        "SO-101",
+        "so_arm_description/urdf/so101.urdf",
+        _named("{}", "shoulder_pan shoulder_lift elbow_flex wrist_flex wrist_roll"),
+        thickness=0.03,
+    ),
+    GalleryRobot(
+        "Talos arm", "talos_data/robots/talos_left_arm.urdf", (), _TALOS_TOOL, thickness=0.08
+    ),
     GalleryRobot(
         "Talos",
         "talos_data/robots/talos_reduced.urdf",
-        _numbered("arm_left_{}_joint", 7),
-        by_strings=False,
+        _LEFT,
+        _TALOS_TOOL,
+        thickness=0.08,
+        srdf="talos_data/srdf/talos.srdf",
     ),
     GalleryRobot("Tiago", f"{_TIAGO_URDF}.urdf", _TIAGO),
     GalleryRobot("Tiago without hand", f"{_TIAGO_URDF}_no_hand.urdf", _TIAGO),
-    GalleryRobot(
-        "Tiago with two arms", f"{_TIAGO_URDF}_dual.urdf", _numbered("arm_left_{}_joint", 7)
-    ),
-    GalleryRobot(
-        "Tiago Pro",
-        "tiago_pro_description/robots/tiago_pro.urdf",
-        _numbered("arm_left_{}_joint", 7),
-    ),
+    GalleryRobot("Tiago with two arms", f"{_TIAGO_URDF}_dual.urdf", _LEFT),
+    GalleryRobot("Tiago Pro", "tiago_pro_description/robots/tiago_pro.urdf", _LEFT),
     GalleryRobot(
         "Baxter", "baxter_description/urdf/baxter.urdf", _named("left_{}", "s0 s1 e0 e1 w0 w1 w2")
     ),
+    GalleryRobot(
+        "PR2", "pr2_description/urdf/pr2.urdf", _PR2, srdf="pr2_description/srdf/pr2.srdf"
+    ),
+    GalleryRobot(
+        "Romeo",
+        "romeo_description/urdf/romeo.urdf",
+        _ROMEO,
+        thickness=0.04,
+        srdf="romeo_description/srdf/romeo.srdf",
+    ),
+    GalleryRobot("Centauro", "centauro_description/urdf/centauro.urdf", _numbered("j_arm1_{}", 6)),
 )
 
 

@@ -106,18 +106,36 @@ def test_the_matrix_says_which_pairs_may_touch() -> None:
     assert allowed.names == {"a", "b", "c", "d"}
 
 
-CONE = {"type": "cone", "dimensions": [1, 1]}
+PRISM = {"type": "prism", "dimensions": [1, 1]}
+
+
+def mesh(corners: Any, triangles: Any, **changes: Any) -> dict[str, Any]:
+    """Return a collision object of one mesh."""
+    data = {
+        "vertices": [dict(zip("xyz", map(float, corner), strict=True)) for corner in corners],
+        "triangles": [{"vertex_indices": [int(k) for k in face]} for face in triangles],
+    }
+    return {"id": "thing", "meshes": [data], "mesh_poses": [{}]} | changes
+
+
+FLAT = mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+LOST = mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 3]])
+HALF = mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], mesh_poses=[])
+FILE = {"id": "m", "meshes": [{"resource": "package://a/b.stl"}], "mesh_poses": [{}]}
 REFUSED = {
     "attached objects": {"robot_state": {"attached_collision_objects": [{"link_name": "x"}]}},
     "octomaps": {"world": {"octomap": {"octomap": {"data": [1]}}}},
     "link_padding": {"link_padding": [{"link_name": "x", "padding": 0.01}]},
     "link_scale": {"link_scale": [{"link_name": "x", "scale": 1.1}]},
-    "meshes": {"world": {"collision_objects": [{"id": "m", "meshes": [{"vertices": []}]}]}},
-    "a cone": scene({"id": "c", "primitives": [CONE], "primitive_poses": [{}]}),
+    "a part of 3 vertices in one plane": scene(FLAT),
+    "three of the 3 vertices of 'thing', counted from 0, was '0, 1, 3'": scene(LOST),
+    "a pose per mesh": scene(HALF),
+    "vertices and triangles of 'm', was 'the file package": scene(FILE),
+    "a prism": scene({"id": "c", "primitives": [PRISM], "primitive_poses": [{}]}),
     "frames that do not move": scene(body("sphere", [1], [0, 0, 0], header={"frame_id": "hand"})),
     "dimensions above 0": scene(body("box", [1, 0, 1], [0, 0, 0])),
     "2 numbers": scene(body("cylinder", [1], [0, 0, 0])),
-    "a pose per primitive": scene({"id": "x", "primitives": [CONE]}),
+    "a pose per primitive": scene({"id": "x", "primitives": [PRISM]}),
     "ids differ": scene(body("sphere", [1], [0, 0, 0]), body("sphere", [1], [0, 0, 0])),
     "at the origin": {
         "robot_state": {"multi_dof_joint_state": {"transforms": [{"translation": [1, 0, 0]}]}}

@@ -5,6 +5,8 @@ which the kernels of the certifier bound their distances. It is read-only: one s
 motions and threads.
 """
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,9 +15,12 @@ import pinocchio as pin
 from evoexp.collision.body_table import BodyTable, body_table
 from evoexp.collision.box_support import coal
 from evoexp.collision.derived_pairs import unjudged_pairs
+from evoexp.errors import SettingError
+from evoexp.numeric.convex_hull import hull_of
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.kinematics import KinematicTable, kinematic_table
+from evoexp.robots.mesh_pieces import convex_shape
 from evoexp.scenarios.obstacles import (
     BOX,
     CAPSULE,
@@ -23,8 +28,11 @@ from evoexp.scenarios.obstacles import (
     ELLIPSE,
     SPHERE,
     ObstacleTable,
+    obstacle_hulls,
     obstacle_table,
 )
+
+NO_HULLS: Mapping[int, FloatArray] = MappingProxyType({})
 
 
 class AllowedContact(NamedTuple):
@@ -119,7 +127,10 @@ def scene(
         self_pairs: Whether links of one arm are watched, too, unless one joint carries both or they
             meet at a joint, or the robot's own data says that they need not be.
     """
-    table = obstacles if isinstance(obstacles, ObstacleTable) else obstacle_table(obstacles)
+    if isinstance(obstacles, ObstacleTable):
+        table, hulls = obstacles, {}
+    else:
+        table, hulls = obstacle_table(obstacles), obstacle_hulls(obstacles)
     geometry = pin.GeometryModel()
     counts = [0] * assembly.num_arms
     bodies = list(assembly.geometry.geometryObjects)
@@ -132,7 +143,7 @@ def scene(
         geometry.addGeometryObject(
             pin.GeometryObject(name, item.parentJoint, 0, item.placement, item.geometry)
         )
-    for k, (shape, placement) in enumerate(obstacle_shapes(table)):
+    for k, (shape, placement) in enumerate(obstacle_shapes(table, hulls)):
         geometry.addGeometryObject(pin.GeometryObject(f"obstacle_{k + 1}", 0, 0, placement, shape))
     parents = assembly.model.parents
     joints = [item.parentJoint for item in bodies]
@@ -181,11 +192,27 @@ def geometry_scene(model: Any, geometry: Any, table: KinematicTable | None = Non
     )
 
 
-def obstacle_shapes(table: ObstacleTable) -> list[tuple[Any, Any]]:
-    """Return every obstacle as a coal shape and its placement, a `pin.SE3`."""
-    shapes = []
-    for kind, center, rotation, (a, b, c) in zip(*table, strict=True):
-        if kind == SPHERE:
+def obstacle_shapes(
+    table: ObstacleTable, hulls: Mapping[int, FloatArray] = NO_HULLS
+) -> list[tuple[Any, Any]]:
+    """Return every obstacle as a coal shape and its placement, a `pin.SE3`.
+
+    Args:
+        table: The obstacles.
+        hulls: Row → points (points, 3) in its frame, of those that are no box but a hull.
+
+    Raises:
+        SettingError: If the points of a hull lie in a plane.
+    """
+    shapes: list[tuple[Any, Any]] = []
+    for k, (kind, center, rotation, (a, b, c)) in enumerate(zip(*table, strict=True)):
+        if k in hulls:
+            found = hull_of(hulls[k])
+            if found is None:
+                must = "points that lie in no plane"
+                raise SettingError(f"scenario.obstacles[{k}].points", must, hulls[k].tolist()[:4])
+            shape = convex_shape(*found)
+        elif kind == SPHERE:
             shape = coal.Sphere(a)
         elif kind == BOX:
             shape = coal.Box(2.0 * a, 2.0 * b, 2.0 * c)

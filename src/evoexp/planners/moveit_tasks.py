@@ -1,5 +1,7 @@
 """A task that MoveIt wrote, in the words of planners: joints by name, pairs that may touch."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from evoexp.collision.scene import Scene
@@ -67,6 +69,14 @@ def without_pairs(found: Scene, task: MoveitTask, num_bodies: int) -> Scene:
     touching = {(body, num_bodies + k) for body, k in task.touching(found.names[:num_bodies])}
     kept = [(int(a), int(b)) not in touching for a, b in found.pairs]
     return found.of_pairs(np.array(kept, dtype=np.bool_)) if touching else found
+
+
+def hull_notes(names: Sequence[str]) -> tuple[str, ...]:
+    """Say that a search takes obstacles to be larger than they are, if there are such."""
+    if not names:
+        return ()
+    told = "meshes, cones and hulls: the search tests the boxes around them, the verdict is of the"
+    return (f"{told} convex hulls: {', '.join(names)}",)
 
 
 def _tool_pose(assembly: Assembly, q: FloatArray) -> Pose:

@@ -8,6 +8,7 @@ attached to the condition; whoever has it needs neither the library nor the time
 import contextlib
 import hashlib
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -111,7 +112,7 @@ def read_pieces(content: bytes, scale: FloatArray, field: str) -> list[Any]:
                 raise ValueError(kind)
         if not 0 < len(pieces) <= MOST_PIECES:
             raise ValueError(len(pieces))
-        return [_convex(np.array(corners) * scale, faces) for corners, faces in pieces]
+        return [convex_shape(np.array(corners) * scale, faces) for corners, faces in pieces]
     except (ValueError, IndexError, UnicodeDecodeError):
         raise SettingError(field, "pieces of a mesh", content[:40]) from None
 
@@ -144,7 +145,16 @@ def mesh_key(item: Any) -> str:
     return f"{item.meshPath} {np.array(item.meshScale).ravel().tolist()}"
 
 
-def _convex(corners: FloatArray, faces: list[list[int]]) -> Any:
+def convex_shape(corners: FloatArray, faces: Sequence[Sequence[int]] | IntArray) -> Any:
+    """Return a convex coal shape.
+
+    Args:
+        corners: (corners, 3).
+        faces: (triangles, 3) indices of corners, turned outward.
+
+    Raises:
+        ValueError: If they are no body.
+    """
     if len(corners) < 4 or not np.isfinite(corners).all() or len(faces) < 4:
         raise ValueError
     if min(map(min, faces)) < 0 or max(map(max, faces)) >= len(corners):
@@ -153,7 +163,7 @@ def _convex(corners: FloatArray, faces: list[list[int]]) -> Any:
     for corner in corners:
         points.append(corner)
     for face in faces:
-        triangles.append(coal.Triangle(*face))
+        triangles.append(coal.Triangle(*map(int, face)))
     return coal.Convex(points, triangles)
 
 

@@ -18,8 +18,7 @@ from evoexp.records import FloatArray
 MAX_SCENE = 4 * MEGABYTE  # the largest of the data set MotionBenchMaker has 12 kB
 MOST_NESTED, MOST_VALUES = 30, 200_000
 LARGEST = 1e7  # [m, rad] as of the numbers of robots and scenarios
-CONES, MESHES = "cone", "mesh"
-KINDS = ("", "box", "sphere", "cylinder", CONES, "prism")  # numbered as in SolidPrimitive.msg
+KINDS = ("", "box", "sphere", "cylinder", "cone", "prism")  # numbered as in SolidPrimitive.msg
 # what a scene or a request may hold that evoexp does not know, by where it stands
 UNKNOWN_OF_SCENE = {
     "robot_state.attached_collision_objects": "attached objects",
@@ -160,14 +159,15 @@ class Document:
         given = self.mapping(value, where)
         place = given.get("position", given.get("translation"))
         turn = given.get("orientation", given.get("rotation"))
-        position = np.zeros(3) if place is None else self._three(place, where)
+        position = np.zeros(3) if place is None else self.point(place, where)
         if turn is None:
             return Pose(np.eye(3), position)
         if isinstance(turn, dict):
             turn = [turn.get(key, 0) for key in "xyzw"]
         return Pose(self._rotation(self.numbers(turn, where, 4), where), position)
 
-    def _three(self, value: Any, where: str) -> FloatArray:
+    def point(self, value: Any, where: str) -> FloatArray:
+        """Return a point (3,)."""
         if isinstance(value, dict):
             value = [value.get(key, 0) for key in "xyz"]
         return self.numbers(value, where, 3)

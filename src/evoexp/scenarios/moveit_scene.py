@@ -12,6 +12,7 @@ from evoexp.scenarios.moveit_files import (
     Document,
     Pose,
 )
+from evoexp.scenarios.moveit_meshes import cone_hull, mesh_hulls
 from evoexp.scenarios.obstacles import (
     BoxObstacle,
     CylinderObstacle,
@@ -21,7 +22,13 @@ from evoexp.scenarios.obstacles import (
 )
 
 MOST_OBJECTS = 2000  # bodies: every one is tested against every body of the robot
-SIZES = {"box": 3, "sphere": 1, "cylinder": 2}  # numbers of a primitive that evoexp knows
+SINGULAR = {"primitives": "primitive", "planes": "plane", "meshes": "mesh"}
+SIZES = {
+    "box": 3,
+    "sphere": 1,
+    "cylinder": 2,
+    "cone": 2,
+}  # numbers of a primitive that evoexp knows
 KEPT_FRAMES = ("", "world", "/world")
 
 
@@ -151,12 +158,8 @@ def _bodies(
     """Return the bodies of a collision object."""
     own = frame_pose(scene, given.get("header"), frames)
     own = own.times(scene.pose(given.get("pose"), f"'{name}'"))
-    if scene.items(given.get("meshes"), f"'{name}'"):
-        must = f"free of meshes ({', '.join(SIZES)} and plane are known)"
-        raise SettingError(scene.field, must, f"'{name}'")
     found: list[Obstacle] = []
-    for kind in ("primitives", "planes"):
-        singular = kind[:-1]
+    for kind, singular in SINGULAR.items():
         bodies = scene.items(given.get(kind), f"'{name}'.{kind}")
         poses = scene.items(given.get(f"{singular}_poses"), f"'{name}'.{singular}_poses")
         if len(poses) != len(bodies):
@@ -166,15 +169,20 @@ def _bodies(
         for k, (body, pose) in enumerate(zip(bodies, poses, strict=True)):
             label = f"{name}_{len(found) + 1}" if several else name
             placed = own.times(scene.pose(pose, f"'{name}'.{singular}_poses[{k}]"))
-            make = _primitive if kind == "primitives" else _plane
-            found.append(make(scene, scene.mapping(body, f"'{name}'.{kind}[{k}]"), placed, label))
+            where = f"'{name}'.{kind}[{k}]"
+            data = scene.mapping(body, where)
+            if kind == "meshes":
+                found += mesh_hulls(scene, data, placed, where, label)
+            else:
+                make = _primitive if kind == "primitives" else _plane
+                found.append(make(scene, data, placed, label))
     if not found:
         raise SettingError(scene.field, "objects with a body each", f"'{name}' without one")
     return found
 
 
 def _primitive(scene: Document, given: dict[str, Any], pose: Pose, name: str) -> Obstacle:
-    """Return a box [x, y, z], a sphere [radius] or a cylinder [height, radius]."""
+    """Return a box [x, y, z], a sphere [radius], a cylinder or cone [height, radius]."""
     kind = given.get("type")
     if isinstance(kind, int) and 0 < kind < len(KINDS):
         kind = KINDS[kind]
@@ -192,6 +200,8 @@ def _primitive(scene: Document, given: dict[str, Any], pose: Pose, name: str) ->
         return BoxObstacle(shape="box", name=name, center=center, size=size, rotation=angles)
     if kind == "sphere":
         return SphereObstacle(shape="sphere", name=name, center=center, radius=float(sizes[0]))
+    if kind == "cone":
+        return cone_hull(float(sizes[0]), float(sizes[1]), pose, name)
     along = 0.5 * float(sizes[0]) * pose.rotation[:, 2]
     ends = _three(pose.position - along), _three(pose.position + along)
     radius = float(sizes[1])

@@ -7,6 +7,7 @@ from pydantic import Field
 
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import DEGREE, sincos
+from evoexp.numeric.ordered_sums import matrix_product
 from evoexp.records import FloatArray
 from evoexp.validation import Positive, Settings
 
@@ -97,13 +98,38 @@ class EllipseObstacle(NamedObstacle):
     angle: float = 0.0
 
 
+class HullObstacle(NamedObstacle):
+    """The convex hull of points, turned by roll, pitch and yaw [deg] as a box is.
+
+    Searches test the box around it, along the axes of its frame; verdicts are of the hull.
+
+    Attributes:
+        points: (points, 3) in its frame [length unit], not all in one plane.
+        center: Origin of its frame.
+        rotation: Of its frame.
+    """
+
+    shape: Literal["hull"]
+    points: Annotated[tuple[tuple[float, float, float], ...], Field(min_length=4)]
+    center: Point = (0.0, 0.0, 0.0)
+    rotation: Angles = (0.0, 0.0, 0.0)
+
+    @property
+    def box(self) -> tuple[FloatArray, FloatArray]:
+        """Middle and half the edges of the box around it, (3,) each, in its frame."""
+        points = np.array(self.points)
+        low, high = points.min(axis=0), points.max(axis=0)
+        return 0.5 * (low + high), 0.5 * (high - low)
+
+
 Obstacle = Annotated[
     SphereObstacle
     | BoxObstacle
     | CapsuleObstacle
     | CylinderObstacle
     | HalfSpaceObstacle
-    | EllipseObstacle,
+    | EllipseObstacle
+    | HullObstacle,
     Field(discriminator="shape"),
 ]
 
@@ -112,7 +138,7 @@ class ObstacleTable(NamedTuple):
     """Obstacles as arrays.
 
     Attributes:
-        kind: (obstacles,) SPHERE, BOX, CAPSULE, CYLINDER, HALF_SPACE or ELLIPSE.
+        kind: (obstacles,) SPHERE, BOX (of a hull, too), CAPSULE, CYLINDER, HALF_SPACE or ELLIPSE.
         center: (obstacles, 3); of a half-space a point of its boundary.
         rotation: (obstacles, 9) from the obstacle's frame to the world, row by row; capsules and
             cylinders lie along their z axis, a half-space is all points with z ≤ 0.
@@ -168,6 +194,13 @@ def obstacle_table(obstacles: tuple[Any, ...]) -> ObstacleTable:
             table.kind[k], table.center[k] = ELLIPSE, _point(obstacle.center)
             table.size[k] = *obstacle.semi_axes, obstacle.semi_axes[1]
             table.rotation[k] = rotation_matrix((0.0, 0.0, obstacle.angle)).ravel()
+        elif isinstance(obstacle, HullObstacle):
+            rotation, (middle, half) = rotation_matrix(obstacle.rotation), obstacle.box
+            if not half.min() > 0.0:
+                must = "points that lie in no plane"
+                raise SettingError(f"scenario.obstacles[{k}].points", must, list(2.0 * half))
+            table.kind[k], table.size[k], table.rotation[k] = BOX, half, rotation.ravel()
+            table.center[k] = _point(obstacle.center) + matrix_product(rotation, middle)
         elif isinstance(obstacle, HalfSpaceObstacle):
             axis, length = _direction(_point(obstacle.normal))
             if length == 0.0:
@@ -188,6 +221,18 @@ def obstacle_table(obstacles: tuple[Any, ...]) -> ObstacleTable:
             table.size[k, :2] = obstacle.radius, 0.5 * length
             table.rotation[k] = _z_along(axis).ravel()
     return table
+
+
+def obstacle_hulls(obstacles: tuple[Any, ...]) -> dict[int, FloatArray]:
+    """Return row → points (points, 3), of the obstacles whose box in the table is not all.
+
+    The points are in the frame of the box.
+    """
+    return {
+        k: np.array(obstacle.points) - obstacle.box[0]
+        for k, obstacle in enumerate(obstacles)
+        if isinstance(obstacle, HullObstacle)
+    }
 
 
 def rotation_matrix(angles: Angles) -> FloatArray:

@@ -177,7 +177,7 @@ class PostureTask(Component):
                 self.index_of(phase.goal.object, f"{field}.goal.object")
             if phase.then == "attach":
                 shape = self.objects[self.index_of(phase.object, f"{field}.object")].shape
-                if shape in ("half_space", "ellipse"):
+                if shape in ("half_space", "ellipse", "hull"):
                     raise SettingError(
                         f"{field}.object", "a sphere, box, capsule or cylinder", f"a {shape}"
                     )

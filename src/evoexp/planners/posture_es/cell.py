@@ -1,7 +1,7 @@
 """A robot cell: the arm, the objects around it, and the bodies that move or stand in a phase."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -14,7 +14,13 @@ from evoexp.objectives.posture_cost import EDGED, POINT, ROD, ROUND, Aim
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.poses import IDENTITY, compose, frame_pose, pose_of
-from evoexp.scenarios.obstacles import BOX, CYLINDER, ObstacleTable, rotation_matrix
+from evoexp.scenarios.obstacles import (
+    BOX,
+    CYLINDER,
+    ObstacleTable,
+    obstacle_hulls,
+    rotation_matrix,
+)
 from evoexp.scenarios.posture_task import (
     Phase,
     PlaceGoal,
@@ -74,6 +80,11 @@ class Cell:
         poses = situation.poses
         return self.obstacles._replace(rotation=poses[:, :9].copy(), center=poses[:, 9:].copy())
 
+    def shapes(self, situation: Situation) -> list[tuple[Any, Any]]:
+        """Return the exact shapes of the obstacles in a situation, and their placements."""
+        hulls = obstacle_hulls(self.task.objects)
+        return obstacle_shapes(self.placed_obstacles(situation), hulls)
+
     @property
     def allowed_penetration(self) -> float:
         """How deep pairs that may touch may overlap [length unit]."""
@@ -88,7 +99,7 @@ class Cell:
             geometry.addGeometryObject(
                 pin.GeometryObject(item.name, item.parentJoint, 0, item.placement, item.geometry)
             )
-        for k, (shape, placement) in enumerate(obstacle_shapes(self.placed_obstacles(situation))):
+        for k, (shape, placement) in enumerate(self.shapes(situation)):
             joint, where = 0, placement
             if k == situation.held:
                 joint = self.tool[0] + 1

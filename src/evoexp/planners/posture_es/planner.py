@@ -31,6 +31,7 @@ from evoexp.objectives.posture_cost import COLUMNS, PARALLEL, TERMS, UPRIGHT, Po
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import CoverShape, Listing
 from evoexp.planners.departures import joint_names, of_limits, of_place
+from evoexp.planners.moveit_tasks import hull_notes
 from evoexp.planners.planner import COPIES, Candidate, Keeper, PlannerDefaults
 from evoexp.planners.posture_es import problem as posture_problem
 from evoexp.planners.posture_es.cycles import Ancestry, Search
@@ -201,7 +202,13 @@ class PostureEs(PlannerDefaults, Component):
 
     def notes(self, problem: Problem) -> tuple[str, ...]:
         """Describe the collision model and list the body pairs that it skips."""
-        return posture_problem.notes(problem)
+        task = problem.task
+        hulls = [
+            name
+            for name, each in zip(task.names, task.objects, strict=True)
+            if isinstance(each, HullObstacle)
+        ]
+        return (*posture_problem.notes(problem), *hull_notes(hulls))
 
     def covers(self, problem: Problem) -> tuple[CoverShape, ...]:
         """Return the spheres or capsules around the robot's bodies."""

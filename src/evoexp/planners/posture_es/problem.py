@@ -224,10 +224,9 @@ def _check_terms(
     if isinstance(goal, SurfaceGoal):
         kind = obstacles.kind[task.names.index(goal.object)]
         shape = task.objects[task.names.index(goal.object)].shape
-        if shape == "half_space":
-            raise SettingError(
-                f"{where}.object", "a sphere, box, capsule or cylinder", "half_space"
-            )
+        if shape in ("half_space", "hull"):
+            must = "a sphere, box, capsule or cylinder"
+            raise SettingError(f"{where}.object", must, shape)
         if weights[AXIAL] > 0.0 and kind not in (CYLINDER, CAPSULE):
             raise SettingError(
                 f"{where}.object",

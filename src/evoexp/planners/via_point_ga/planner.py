@@ -25,7 +25,7 @@ from evoexp.paths.motion import Motion
 from evoexp.paths.workspace import prepare_redistribution
 from evoexp.planners.answers import CoverShape
 from evoexp.planners.departures import joint_names, of_limits, of_place
-from evoexp.planners.moveit_tasks import arm_motion, with_allowed_pairs
+from evoexp.planners.moveit_tasks import arm_motion, hull_notes, with_allowed_pairs
 from evoexp.planners.planner import COPIES, Candidate, Keeper, PlannerDefaults, num_values
 from evoexp.planners.via_point_ga import tasks
 from evoexp.planners.via_point_ga.covered_strings import CoveredStrings
@@ -205,7 +205,8 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
         """Describe the covers of bodies, where bodies are covered."""
         if not isinstance(problem.collision, CoveredCollision):
             return []
-        return problem.collision.notes(problem.length_unit)
+        hulls = tasks.hull_names(problem.scene, problem.assembly.geometry.ngeoms)
+        return [*problem.collision.notes(problem.length_unit), *hull_notes(hulls)]
 
     def _strings(self, problem: Problem) -> Strings:
         is_covered = isinstance(problem.collision, CoveredCollision)

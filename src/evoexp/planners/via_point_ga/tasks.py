@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from evoexp.collision.box_support import coal
 from evoexp.collision.models.covered_bodies import CoveredBodies, CoveredCollision
 from evoexp.collision.models.touching_spheres import Clearance
 from evoexp.collision.scene import Scene, scene
@@ -66,6 +67,12 @@ def covered_scene(assembly: Assembly, task: ArmMotion, given: ArmMotion | Moveit
         found = without_pairs(found, given, num_bodies)
     names = tuple(each.name or f"obstacle_{k + 1}" for k, each in enumerate(task.obstacles))
     return found._replace(names=(*found.names[:num_bodies], *names))
+
+
+def hull_names(bodies: Scene, first: int) -> list[str]:
+    """Return the names of obstacles, the bodies from `first` on, that are convex hulls."""
+    rest = zip(bodies.names[first:], bodies.shapes[first:], strict=True)
+    return [name for name, (shape, _, _) in rest if isinstance(shape, coal.ConvexBase)]
 
 
 def covered_collision(

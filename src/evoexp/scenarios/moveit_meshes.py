@@ -1,0 +1,97 @@
+"""Meshes and cones of a planning scene, as convex hulls that contain them."""
+
+from typing import Any
+
+import numpy as np
+
+from evoexp.errors import SettingError
+from evoexp.numeric.convex_hull import hull_of
+from evoexp.numeric.elementary import sincos
+from evoexp.records import FloatArray, IntArray
+from evoexp.scenarios.moveit_files import Document, Pose
+from evoexp.scenarios.obstacles import HullObstacle
+
+AROUND = 32  # corners of a cone's base; they stand out of it by half a hundredth of its radius
+
+
+def mesh_hulls(
+    scene: Document, given: dict[str, Any], pose: Pose, where: str, name: str
+) -> list[HullObstacle]:
+    """Return the convex hulls of the parts of a mesh (`shape_msgs/Mesh`) that hang together.
+
+    Args:
+        scene: The file.
+        given: The mesh.
+        pose: Where it stands.
+        where: Its place in the file, for errors.
+        name: Of the object; the hulls are numbered if they are several.
+
+    Raises:
+        SettingError: If it is no mesh, or a part of it has no inside.
+    """
+    if "resource" in given:
+        must = f"vertices and triangles of '{name}'"
+        raise SettingError(scene.field, must, f"the file {given['resource']}")
+    corners = np.array(
+        [scene.point(each, where) for each in scene.items(given.get("vertices"), where)]
+    )
+    faces = [
+        scene.numbers(scene.mapping(each, where).get("vertex_indices"), where, 3)
+        for each in scene.items(given.get("triangles"), where)
+    ]
+    triangles = np.array(faces).reshape(-1, 3)
+    whole = np.all(triangles == np.floor(triangles)) and np.all(triangles >= 0.0)
+    if not whole or not len(triangles) or triangles.max() >= len(corners):
+        must = f"triangles of three of the {len(corners)} vertices of '{name}', counted from 0"
+        count = len(corners)
+        wrong = [row for row in triangles if not 0.0 <= min(row) <= max(row) < count]
+        told = ", ".join(f"{value:g}" for value in wrong[0]) if wrong else "none"
+        raise SettingError(scene.field, must, told)
+    found = []
+    parts = _parts(corners, triangles.astype(np.int64))
+    for k, part in enumerate(parts):
+        hull = hull_of(part)
+        if hull is None:
+            must = f"meshes with an inside ('{name}')"
+            raise SettingError(scene.field, must, f"a part of {len(part)} vertices in one plane")
+        found.append(_hull(hull[0], pose, f"{name}_{k + 1}" if len(parts) > 1 else name))
+    return found
+
+
+def cone_hull(height: float, radius: float, pose: Pose, name: str) -> HullObstacle:
+    """Return a pyramid around a cone that stands as in `shape_msgs/SolidPrimitive`.
+
+    Its axis is z, its middle half way up.
+    """
+    turns = [sincos(2.0 * np.pi * k / AROUND) for k in range(AROUND)]
+    wide = radius / sincos(np.pi / AROUND)[1]
+    base = [[wide * cos, wide * sin, -0.5 * height] for sin, cos in turns]
+    return _hull(np.array([*base, [0.0, 0.0, 0.5 * height]]), pose, name)
+
+
+def _hull(points: FloatArray, pose: Pose, name: str) -> HullObstacle:
+    x, y, z = (float(value) + 0.0 for value in pose.position)
+    return HullObstacle(
+        shape="hull",
+        name=name,
+        points=tuple((float(a), float(b), float(c)) for a, b, c in points),
+        center=(x, y, z),
+        rotation=pose.angles,
+    )
+
+
+def _parts(corners: FloatArray, triangles: IntArray) -> list[FloatArray]:
+    """Return the corners of the parts of a mesh; corners at one place are one."""
+    places, same = np.unique(corners, axis=0, return_inverse=True)
+    root = np.arange(len(places))
+    linked = same.reshape(-1)[triangles]
+    while True:  # every corner takes the least number among its triangles'
+        least = root[linked].min(axis=1)
+        new = root.copy()
+        np.minimum.at(new, linked.ravel(), np.repeat(least, 3))
+        new = new[new]
+        if np.array_equal(new, root):
+            break
+        root = new
+    used = np.unique(linked)
+    return [places[used[root[used] == part]] for part in np.unique(root[used])]

@@ -1,12 +1,15 @@
 """The shipped problems of MotionBenchMaker: valid ends on exact bodies, of robots of known size."""
 
+import itertools
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 import pytest
+import yaml
 
 import evoexp
+from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
 from evoexp.planners.moveit_tasks import arm_motion, with_allowed_pairs
@@ -55,3 +58,82 @@ def test_starts_and_goals_are_free_on_exact_bodies(
         bodies.geometry.geometryObjects[last + 1].placement = placed.oMg[last]
         with pytest.raises(SettingError, match="free of contact between bodies"):
             tasks.check_bodies(bodies, np.deg2rad(ends[1]), "scenario.q_goal", "m")
+
+
+VIA_POINTS = (
+    "robot=panda",
+    "scenario=moveit",
+    "planner=via_points",
+    "ga=via_points",
+    "objective=via_points",
+    "collision=covered_bodies",
+)
+
+
+def test_a_box_as_a_mesh_is_the_same_to_the_last_bit(
+    shipped: dict[str, Condition], tmp_path: Path
+) -> None:
+    """Searches test the box around a mesh; the hull of a box is the box."""
+    problem = ASSETS / "problems" / "box_panda"
+    scene = yaml.safe_load((problem / "scene0001.yaml").read_text())
+    for each in scene["world"]["collision_objects"]:
+        if any(body["type"] != "box" for body in each["primitives"]):
+            continue
+        each["meshes"] = [_as_mesh(box["dimensions"]) for box in each.pop("primitives")]
+        each["mesh_poses"] = each.pop("primitive_poses")
+    changed = tmp_path / "scene.yaml"
+    changed.write_text(yaml.safe_dump(scene))
+    files = f"scenario.scene={changed}", f"scenario.request='{problem / 'request0001.yaml'}'"
+    (meshes,) = conditions(*VIA_POINTS, *files).values()
+    one, two = run_replicate(shipped["box_panda"], 0).summary, run_replicate(meshes, 0).summary
+    assert (one.digest, one.certified) == (two.digest, two.certified)
+    assert one.clearance == pytest.approx(two.clearance, abs=1e-6)
+    planner, found = meshes.prepare()
+    assert any(
+        "the verdict is of the convex hulls: " in line and "side_left" in line
+        for line in planner.notes(found)
+    )
+
+
+def _as_mesh(edges: list[float]) -> dict[str, object]:
+    corners = [
+        [0.5 * edge * sign for edge, sign in zip(edges, signs, strict=True)]
+        for signs in itertools.product((-1.0, 1.0), repeat=3)
+    ]
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    halves = [half for a, b, c, d in faces for half in ([a, b, c], [a, c, d])]
+    return {
+        "vertices": [dict(zip("xyz", corner, strict=True)) for corner in corners],
+        "triangles": [{"vertex_indices": half} for half in halves],
+    }
+
+
+POSTURES = (
+    "experiment=motionbenchmaker",
+    "planner=posture_es_fine",
+    "planner.scope=[0.03]",
+    "ga=corsepius",
+    "ga.patience=100",
+    "ga.num_generations=1000",
+    "objective=corsepius_pose",
+    "collision=corsepius_spheres",
+)
+
+
+def test_postures_reach_into_a_box_and_a_shelf() -> None:
+    found = conditions(*POSTURES, budget="paper")
+    for label in ("box_panda", "bookshelf_thin_panda"):
+        summary = run_replicate(found[label], 0).summary
+        assert summary.solved and summary.certified
+
+
+def test_covers_that_touch_at_the_start_are_left_to_the_certifier() -> None:
+    """Those of a UR5's base and upper arm do where its problems begin, the bodies do not."""
+    planner, problem = conditions(*POSTURES)["box_ur5"].prepare()
+    (note,) = (line for line in planner.notes(problem) if "left to the certifier" in line)
+    assert (
+        note.startswith("covers touch at the start or the goal")
+        and "base_link with upper_arm_link" in note
+    )
+    names = [problem.scene.pair_names(k) for k in range(len(problem.scene.pairs))]
+    assert ("base_link", "upper_arm_link") in names  # which judges the pair all the same

@@ -35,8 +35,8 @@ def phases(text: str) -> str:
             "scenario.q_start[1]: must be within the joint's limits, -200 to 20, was 90.0",
         ),
         (
-            ["scenario.obstacles.0.center=[0.322,0.105,0.896]"],
-            "scenario.q_start: must be free of collision (",
+            ["scenario.obstacles.0.center=[0.3,0.1,0.88]"],
+            "scenario.q_start: must be free of collision (finger_right and ball overlap by 0.0192 m)",
         ),
         (
             [phases("[{name: a, goal: {kind: point, point: [2, 0, 0.6]}}]")],

@@ -108,6 +108,7 @@ class BodyModel(NamedTuple):
         shapes: All of them; a shape's body is its index among the geometry objects.
         sorted_pairs: Pairs of bodies, by who judges them.
         asked: How far covers are asked to reach beyond bodies at most [length unit].
+        shrunk: Bodies whose covers were made smaller (`fitted_covers`), and by how much.
     """
 
     assembly: Assembly
@@ -115,6 +116,7 @@ class BodyModel(NamedTuple):
     shapes: Shapes
     sorted_pairs: BodyPairs
     asked: float = np.inf
+    shrunk: tuple[tuple[int, float], ...] = ()
 
     @property
     def uncovered(self) -> tuple[tuple[str, float], ...]:

@@ -41,6 +41,8 @@ class BodyPairs(NamedTuple):
         unseen: Pairs that touch in no posture sampled: only the certifier judges them.
         overlapping: Pairs whose covers touch in every posture sampled although the bodies do not:
             only the certifier judges them.
+        fitted: Pairs whose covers touch at the start or the goal although the bodies do not: only
+            the certifier judges them.
     """
 
     tested: tuple[Pair, ...]
@@ -49,11 +51,12 @@ class BodyPairs(NamedTuple):
     never: tuple[Pair, ...] = ()
     unseen: tuple[Pair, ...] = ()
     overlapping: tuple[Pair, ...] = ()
+    fitted: tuple[Pair, ...] = ()
 
     @property
     def judged(self) -> tuple[Pair, ...]:
         """Pairs that the certifier judges."""
-        return (*self.tested, *self.unseen, *self.overlapping)
+        return (*self.tested, *self.unseen, *self.overlapping, *self.fitted)
 
 
 def body_pairs(assembly: Assembly, shapes: Shapes) -> BodyPairs:

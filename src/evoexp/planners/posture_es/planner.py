@@ -203,11 +203,8 @@ class PostureEs(PlannerDefaults, Component):
     def notes(self, problem: Problem) -> tuple[str, ...]:
         """Describe the collision model and list the body pairs that it skips."""
         task = problem.task
-        hulls = [
-            name
-            for name, each in zip(task.names, task.objects, strict=True)
-            if isinstance(each, HullObstacle)
-        ]
+        named = zip(task.names, task.objects, strict=True)
+        hulls = [name for name, each in named if each.shape == "hull"]
         return (*posture_problem.notes(problem), *hull_notes(hulls))
 
     def covers(self, problem: Problem) -> tuple[CoverShape, ...]:

@@ -8,12 +8,13 @@ import pinocchio as pin
 
 from evoexp.collision.models.body_covers import Cover
 from evoexp.collision.models.body_models import BodyModel, CollisionModel
+from evoexp.collision.models.fitted_covers import fitted_covers, fitting_notes
 from evoexp.collision.models.inner_balls import inner_balls
 from evoexp.collision.scene import obstacle_shapes
 from evoexp.errors import SettingError, nearest
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.posture_cost import ANGLE, AXIAL, HEADING, TERMS, UPRIGHT, PostureCost
-from evoexp.planners.moveit_tasks import posture_task, with_allowed_pairs
+from evoexp.planners.moveit_tasks import moving_joints, posture_task, with_allowed_pairs
 from evoexp.planners.posture_es.phases import Problem
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly, Robot
@@ -83,9 +84,35 @@ def prepare(
         _check_reach(problem)
     stage = problem.begin(0, start, problem.first_situation)
     problem = replace(problem, scene=problem.scene_of(stage))
+    goal = None
+    if isinstance(scenario, MoveitTask):
+        goal = scenario.goal_configuration(moving_joints(assembly))
+    if goal is None and stage.judge(start[:, None]).feasible[0]:
+        return problem
+    problem = _fitted(problem, [start] if goal is None else [start, goal])
+    stage = problem.begin(0, start, problem.first_situation)
     if not stage.judge(start[:, None]).feasible[0]:
         raise _infeasible(problem, start)
     return problem
+
+
+def _fitted(problem: Problem, ends: list[FloatArray]) -> Problem:
+    """Return the problem with covers that do not touch at start and goal, where bodies do not."""
+    free = [q for q in ends if _distances(problem, q).min(initial=np.inf) > 0.0]
+    if not free:
+        return problem
+    table, ignored, _ = problem.surroundings(problem.phases[0], problem.first_situation)
+    bodies = fitted_covers(problem.bodies, table, ignored, np.column_stack(free))
+    return replace(problem, bodies=bodies, memory={})
+
+
+def _distances(problem: Problem, q: FloatArray) -> FloatArray:
+    """Return the distances of the exact bodies, pair by pair, at posture q (nq,)."""
+    scene = problem.scene
+    assert scene is not None
+    placements = scene.geometry.createData()
+    pin.computeDistances(scene.model, scene.model.createData(), scene.geometry, placements, q)
+    return np.array([result.min_distance for result in placements.distanceResults])
 
 
 @functools.lru_cache(maxsize=16)
@@ -124,7 +151,7 @@ def notes(problem: Problem) -> tuple[str, ...]:
     ):
         if pairs:
             lines.append(f"{what}: " + ", ".join(f"{names[a]} with {names[b]}" for a, b in pairs))
-    return tuple(lines)
+    return (*lines, *fitting_notes(bodies, "the start or the goal", unit))
 
 
 def _limits(assembly: Assembly) -> FloatArray:
@@ -323,20 +350,13 @@ def _infeasible(problem: Problem, start: FloatArray) -> SettingError:
     """Return the reason for which a start is refused."""
     scene, given = problem.scene, list(problem.task.q_start)
     assert scene is not None
-    data = scene.model.createData()
-    placements = scene.geometry.createData()
-    pin.computeDistances(scene.model, data, scene.geometry, placements, start)
-    distances = np.array([result.min_distance for result in placements.distanceResults])
+    distances = _distances(problem, start)
     stage = problem.begin(0, start, problem.first_situation)
     if stage.judge(start[:, None]).rows[TERMS.index("collision"), 0] == 0.0:
         return SettingError(
             "scenario.q_start", "within the hard limits of upright and keep_parallel", given
         )
     one, two = scene.pair_names(int(np.argmin(distances)))
-    least, unit = float(distances.min()), problem.task.length_unit
-    how = (
-        "touch each other"
-        if least <= 0.0
-        else f"are {least:.3g} {unit} apart, less than their covers need"
-    )
-    return SettingError("scenario.q_start", f"free of collision ({one} and {two} {how})", given)
+    depth = f"{max(-float(distances.min()), 0.0):.3g} {problem.task.length_unit}"
+    must = f"free of collision ({one} and {two} overlap by {depth})"
+    return SettingError("scenario.q_start", must, given)

@@ -36,7 +36,7 @@ def phases(text: str) -> str:
         ),
         (
             ["scenario.obstacles.0.center=[0.3,0.1,0.88]"],
-            "scenario.q_start: must be free of collision (finger_right and ball overlap by 0.0192 m)",
+            "scenario.q_start: must be free of collision (finger_right and ball overlap by 0.019",
         ),
         (
             [phases("[{name: a, goal: {kind: point, point: [2, 0, 0.6]}}]")],

@@ -137,3 +137,35 @@ def test_covers_that_touch_at_the_start_are_left_to_the_certifier() -> None:
     )
     names = [problem.scene.pair_names(k) for k in range(len(problem.scene.pairs))]
     assert ("base_link", "upper_arm_link") in names  # which judges the pair all the same
+
+
+def test_a_goal_in_contact_names_the_pair_and_how_deep(tmp_path: Path) -> None:
+    problem = ASSETS / "problems" / "box_panda"
+    request = yaml.safe_load((problem / "request0001.yaml").read_text())
+    joints = request["goal_constraints"][0]["joint_constraints"]
+    for k, joint in enumerate(joints):
+        joint["position"] = -0.1 if k == 3 else 0.0
+    changed = tmp_path / "request.yaml"
+    changed.write_text(yaml.safe_dump(request))
+    files = f"scenario.scene='{problem / 'scene0001.yaml'}'", f"scenario.request={changed}"
+    (folded,) = conditions(*VIA_POINTS, *files).values()
+    said = r"panda_link5 and panda_rightfinger overlap by at most 0\.02\d+ m"
+    with pytest.raises(SettingError, match=rf"scenario\.q_goal: .*{said}"):
+        folded.prepare()
+
+
+def test_a_pose_out_of_reach_is_one_of_the_request(tmp_path: Path) -> None:
+    problem = ASSETS / "problems" / "box_panda"
+    request = yaml.safe_load((problem / "request0001.yaml").read_text())
+    place = {"primitives": [{"type": "sphere", "dimensions": [0.01]}]}
+    place["primitive_poses"] = [{"position": [3, 0, 0]}]
+    goal = {"link_name": "panda_hand", "constraint_region": place}
+    request["goal_constraints"] = [{"position_constraints": [goal]}]
+    changed = tmp_path / "request.yaml"
+    changed.write_text(yaml.safe_dump(request))
+    words = [word for word in POSTURES if not word.startswith("experiment")]
+    files = f"scenario.scene='{problem / 'scene0001.yaml'}'", f"scenario.request={changed}"
+    (far,) = conditions("robot=panda", "scenario=moveit", *words, *files).values()
+    with pytest.raises(SettingError, match=r"^scenario.request: must be within reach, 0\.98") as it:
+        far.prepare()
+    assert "check_reach" not in str(it.value)

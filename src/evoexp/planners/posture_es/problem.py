@@ -81,7 +81,13 @@ def prepare(
     )
     _check_contacts(task, (*bodies.names, *task.all_names))
     if task.check_reach:
-        _check_reach(problem)
+        try:
+            _check_reach(problem)
+        except SettingError as error:
+            if isinstance(scenario, PostureTask):
+                raise
+            must = error.must.partition(" (check_reach")[0]  # which these tasks do not have
+            raise SettingError("scenario.request", must, f"a goal {error.was}") from None
     stage = problem.begin(0, start, problem.first_situation)
     problem = replace(problem, scene=problem.scene_of(stage))
     goal = None
@@ -340,9 +346,8 @@ def _check_reach(problem: Problem) -> None:
             if away - task.position_tolerance > far:
                 where = ", ".join(f"{value:g}" for value in center)
                 must = f"within reach, {far:.4g} {task.length_unit} from ({where})"
-                raise SettingError(
-                    field, f"{must} (check_reach=false searches it anyway)", f"{away:.4g} away"
-                )
+                must = f"{must} (check_reach=false searches it anyway)"
+                raise SettingError(field, must, f"{away:.4g} away")
         held = {"attach": True, "detach": False}.get(phase.then, held)
 
 

@@ -10,10 +10,12 @@ from evoexp.collision.models.covered_bodies import CoveredBodies, CoveredCollisi
 from evoexp.collision.models.touching_spheres import Clearance
 from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
+from evoexp.numeric.convex_hull import hull_of
 from evoexp.numeric.elementary import DEGREE
 from evoexp.planners.moveit_tasks import moving_joints, without_pairs
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Assembly
+from evoexp.robots.mesh_pieces import convex_shape
 from evoexp.scenarios.arm_motion import ArmMotion
 from evoexp.scenarios.moveit import MoveitTask
 
@@ -122,7 +124,22 @@ def check_bodies(bodies: Scene, q: FloatArray, field: str, unit: str) -> None:
         distance = pin.computeDistance(bodies.geometry, placements, pair).min_distance
         if distance <= min(worst, float(bodies.tolerances[k])):
             one, two = bodies.pair_names(k)
-            how = f"overlap by {-distance:.3g} {unit}" if distance < 0.0 else "touch"
+            how = f"overlap by {-distance:.3g} {unit}"
+            if distance >= 0.0:  # the surfaces of meshes, of which coal tells no depth
+                how = f"overlap by at most {_hull_depth(bodies, placements, a, b):.3g} {unit}"
             worst, found = distance, f"{one} and {two} {how}"
     if found:
         raise SettingError(field, "free of contact between bodies", found)
+
+
+def _hull_depth(bodies: Scene, placements: Any, one: int, two: int) -> float:
+    """Return how deep the convex hulls of two bodies overlap; 0 if they do not."""
+    given = []
+    for k in (int(one), int(two)):
+        shape, place = bodies.shapes[k][0], placements.oMg[k]
+        if isinstance(shape, coal.BVHModelBase):
+            hull = hull_of(np.array([shape.vertex(n) for n in range(shape.num_vertices)]))
+            assert hull is not None  # bodies without an inside are refused
+            shape = convex_shape(*hull)
+        given += [shape, coal.Transform3s(place.rotation, place.translation)]
+    return max(0.0, -float(coal.distance(*given, coal.DistanceRequest(), coal.DistanceResult())))

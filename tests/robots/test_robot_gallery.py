@@ -1,5 +1,9 @@
 """Every robot of the gallery loads, is covered, plans a reach with two planners, is certified."""
 
+import os
+import shutil
+import subprocess
+import sys
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
@@ -9,10 +13,16 @@ from evoexp.attachments import PREFIX
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.reproduction import reproduce_log
 from evoexp.errors import EvoexpError
-from evoexp.robots.mesh_files import ROBOT_DATA
+from evoexp.robots.mesh_files import ROBOT_DATA, robot_file
 from evoexp.robots.urdf import Urdf
 from evoexp.store.log_reader import read_log
-from evoexp.testing.robot_gallery import ROBOTS, GalleryRobot, find_reach, planned_reach
+from evoexp.testing.robot_gallery import (
+    POSTURES,
+    ROBOTS,
+    GalleryRobot,
+    find_reach,
+    planned_reach,
+)
 
 
 def is_installed() -> bool:
@@ -54,6 +64,31 @@ def test_logs_reproduce_without_the_files(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setattr("evoexp.robots.mesh_files.robot_file", nothing)
     monkeypatch.setattr("evoexp.robots.urdf.file_content", nothing)
     assert reproduce_log(log).matches
+
+
+@pytest.mark.matrix
+@needs_robots
+def test_a_run_is_reproduced_when_its_robot_is_gone(tmp_path: Path) -> None:
+    """By commands in processes of their own, which share nothing but what is stored."""
+    urdf = Path(robot_file(f"{ROBOT_DATA}:ur_description/urdf/ur5_robot.urdf", "robot.path"))
+    robots = tmp_path / ROBOT_DATA / "robots"  # as meshes are named in the file
+    shutil.copytree(urdf.parents[1], robots / "ur_description")
+    copy = robots / "ur_description" / "urdf" / urdf.name
+    words = (f"robot.path={copy}", "robot=urdf", "budget=smoke", "num_replicates=1")
+    _evoexp(tmp_path, "run", *words, *POSTURES, "runner=serial", "--no-report")
+    (run,) = (tmp_path / "outputs" / "runs").iterdir()
+    shutil.rmtree(robots)
+    assert "MATCH" in _evoexp(tmp_path, "reproduce", run.name).splitlines()[-1]
+
+
+def _evoexp(place: Path, *words: str) -> str:
+    """Run a command; return what it says."""
+    around = os.environ | {"EVOEXP_OUTPUTS": str(place / "outputs")}
+    done = subprocess.run(
+        [sys.executable, "-m", "evoexp", *words], env=around, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
 
 
 def test_a_name_of_the_package_is_refused_without_it(monkeypatch: pytest.MonkeyPatch) -> None:

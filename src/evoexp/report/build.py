@@ -31,6 +31,7 @@ class Request(NamedTuple):
         arguments: What was asked for, as words of the command line: "rana_planar budget=smoke";
             derived if empty.
         options: Label → the options that were taken; None: those that the runs' manifests name.
+        command: That draws it.
     """
 
     report_name: str
@@ -39,6 +40,7 @@ class Request(NamedTuple):
     conditions: Sequence[tuple[str, Condition]]
     arguments: str = ""
     options: Mapping[str, tuple[Option, ...]] | None = None
+    command: str = "report"
 
     @property
     def words(self) -> str:
@@ -93,7 +95,9 @@ def report(
         files |= drawn
     for motion in page.motions:
         files[f"{motion.stem}.html"] = motion.content()
-    files[INDEX] = render(page, found, settings, f"evoexp report {request.words}").encode()
+    files[INDEX] = render(
+        page, found, settings, f"evoexp {request.command} {request.words}"
+    ).encode()
     directory.mkdir(parents=True, exist_ok=True)
     write_files({directory / name: content for name, content in files.items()})
     for path in directory.iterdir():  # files of an earlier report that this report does not have

@@ -1,0 +1,118 @@
+"""`evoexp compare`: planners in one currency, by answers that the exact certifier proves."""
+
+import argparse
+import hashlib
+import re
+import shlex
+
+from evoexp.commands.arguments import add_experiment_arguments, folder_words, is_override
+from evoexp.commands.console import add_columns, new_table, plain_console, print_json
+from evoexp.commands.pack import unpacked
+from evoexp.condition import Condition
+from evoexp.configuration import expansions
+from evoexp.configuration.search_path import is_file, options
+from evoexp.errors import SettingError, UnknownOption
+from evoexp.report import build
+from evoexp.report.pages import comparison
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results import gather
+from evoexp.shipped import shipped
+from evoexp.store.run_directory import outputs_root, resolve
+
+PAGE = "comparison"
+MAX_NAMED = 4  # runs whose hashes the name of a report spells out
+_HASH = re.compile("[0-9a-fA-F]{4,64}")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments."""
+    words = add_experiment_arguments(parser)
+    words.metavar, words.nargs = "EXPERIMENT | HASH | RUNS.tar ... [KEY=VALUE ...]", "+"
+    words.help = "experiments and overrides as for run, or prefixes of the hashes of stored runs"
+    parser.add_argument("--json", action="store_true", help="print JSON: an object per condition")
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Draw the page, and print its table."""
+    arguments.overrides = unpacked(arguments.overrides)
+    request, settings, planned = _asked(arguments)
+    outputs = outputs_root()
+    path = build.report(request, settings, outputs, planned)
+    found = gather(
+        outputs,
+        request.conditions,
+        planned,
+        request.experiment,
+        request.budget,
+        request.hint,
+        request.options,
+    )
+    (table,) = comparison.page(found, settings).tables
+    if arguments.json:
+        print_json([dict(zip(table.headers, row, strict=True)) for row in table.rows])
+        return 0
+    console = plain_console()
+    shown = new_table(request.report_name)
+    add_columns(shown, *table.headers)
+    for row in table.rows:
+        shown.add_row(*map(str, row))
+    console.print(shown)
+    console.print(f"compare: {path}", highlight=False, soft_wrap=True)
+    return 0
+
+
+def _asked(arguments: argparse.Namespace) -> tuple[build.Request, ReportSettings, int | None]:
+    """Return what the page is drawn from, its settings, and the planned replicates.
+
+    Raises:
+        UnknownOption: If a word is neither an experiment nor a hash.
+        SettingError: If runs are given by their hashes, and overrides beside them.
+    """
+    multirun, only, known = arguments.multirun, arguments.only, options("experiment")
+    overrides = [word for word in arguments.overrides if is_override(word)]
+    names = [word for word in arguments.overrides if word not in overrides]
+    words = shlex.join([*arguments.overrides, *(["-m"] if multirun else [])])
+    words += f" --only {shlex.quote(','.join(only))}" if only else ""
+    words = " ".join([words, *folder_words(arguments.config_dir)])
+    if names and not any(name in known or is_file(name) for name in names):
+        for name in names:
+            if not _HASH.fullmatch(name):
+                raise UnknownOption("experiment", name, known)
+        if overrides or multirun or only:
+            must = "left out where runs are given by their hashes"
+            raise SettingError("overrides", must, " ".join([*overrides, *only]) or "-m")
+        runs = [resolve(outputs_root(), name) for name in names]
+        conditions = {run.hash12: Condition.from_json(run.config_json()) for run in runs}
+        plain = expansions.expand([f"experiment={shipped()[0].experiment}", "report=paper"])[0]
+        name = _name("+".join(conditions), len(conditions))
+        request = build.Request(name, "", "", tuple(conditions.items()), words, None, "compare")
+        return request, _with_page(plain.report), None
+    for name in names:
+        if name not in known and not is_file(name):
+            raise UnknownOption("experiment", name, known)
+    chosen = [f"experiment={','.join(names)}"] if names else []
+    experiments = expansions.expand(
+        [*chosen, *overrides], multirun=multirun or len(names) > 1, only=only
+    )
+    several = len(experiments) > 1
+    labelled = tuple(
+        (f"{experiment.name}: {label}" if several else label, condition)
+        for experiment in experiments
+        for label, condition in experiment.conditions
+    )
+    first = experiments[0]
+    name = _name("+".join(experiment.report_name for experiment in experiments), len(experiments))
+    title = " and ".join(dict.fromkeys(experiment.name for experiment in experiments))
+    request = build.Request(name, title, first.budget, labelled, words, None, "compare")
+    return request, _with_page(first.report), first.num_replicates
+
+
+def _name(parts: str, count: int) -> str:
+    """Return the name of the page's folder."""
+    if count > MAX_NAMED:
+        parts = f"{count}+{hashlib.sha256(parts.encode()).hexdigest()[:8]}"
+    return f"compare_{parts}"
+
+
+def _with_page(settings: ReportSettings) -> ReportSettings:
+    return settings.model_copy(update={"figures": PAGE})

@@ -1,0 +1,138 @@
+"""Every solution that a run logged on its way, judged by the exact certifier, and its length.
+
+A log holds each improvement of the best solution, and what it had cost in evaluations and collision
+queries. So planners of any kind are compared in one currency after the fact, and the logs need not
+know of it. Verdicts take long and follow from log and code alone: they are kept in the cache.
+"""
+
+import contextlib
+import hashlib
+import json
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
+from evoexp.paths.motion import Motion
+from evoexp.planners.planner import judge_motion
+from evoexp.records import FloatArray
+from evoexp.report.results import ConditionResults
+from evoexp.store.kept_facts import installed_code
+from evoexp.store.log_reader import LogContents, read_log
+
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(16)  # per cubic segment
+CLOSE = 1e-6  # [rad] by which goals may differ and be the same
+
+
+class Answer(NamedTuple):
+    """One improvement of a run's best solution.
+
+    Attributes:
+        replicate: Of the run.
+        generation: In which it was found.
+        evaluations: Since the start.
+        collision_queries: Configurations judged since the start.
+        length: Of the joints' path [rad, m].
+        straight: Distance of its ends, which no path is shorter than [rad, m].
+        solved: Whether the planner's own model accepts it.
+        certified: Whether the exact certifier proves it, and it is a solution of the task.
+    """
+
+    replicate: int
+    generation: int
+    evaluations: int
+    collision_queries: int
+    length: float
+    straight: float
+    solved: bool
+    certified: bool
+
+
+def answers(condition: ConditionResults) -> pd.DataFrame:
+    """Return the answers of all finished replicates, in order; columns of `Answer`.
+
+    Answers that are no motions, such as a posture that is held, have no row.
+    """
+    found = [row for k in condition.summaries.index for row in _of_replicate(condition, int(k))]
+    return pd.DataFrame(found, columns=list(Answer._fields))
+
+
+def motion_length(motion: Motion) -> float:
+    """Return the length of a path in joint space [rad, m], of cubics by quadrature."""
+    if motion.coefficients is None:
+        steps = np.diff(motion.q, axis=0)
+        return float(np.sqrt((steps * steps).sum(axis=1)).sum())
+    _, c1, c2, c3 = motion.coefficients.transpose(1, 0, 2)  # each (segments, nq)
+    total = 0.0
+    for node, weight in zip(0.5 * (NODES + 1.0), 0.5 * WEIGHTS, strict=True):
+        speed = c1 + node * (2.0 * c2 + node * 3.0 * c3)
+        total += float(weight * np.sqrt((speed * speed).sum(axis=1)).sum())
+    return total
+
+
+def first_reached(table: pd.DataFrame, replicates: Any, longest: float, spent: FloatArray) -> Any:
+    """Return what every run had spent when it first had a proven answer so short.
+
+    Args:
+        table: Of `answers`.
+        replicates: (runs,) in order.
+        longest: Length that an answer may have.
+        spent: (runs,) collision queries of the whole runs.
+
+    Returns:
+        (runs,) collision queries, those of the whole run without such an answer; (runs,) whether
+        there was one.
+    """
+    good = table[table["certified"] & (table["length"] <= longest)]
+    first = good.groupby("replicate")["collision_queries"].min().reindex(replicates)
+    reached = first.notna().to_numpy()
+    return np.where(reached, first.to_numpy(np.float64, na_value=0.0), spent), reached
+
+
+def best_lengths(table: pd.DataFrame, replicates: Any) -> FloatArray:
+    """Return the least length of a proven answer of every run, (runs,); inf: none is proven."""
+    good = table[table["certified"]].groupby("replicate")["length"].min().reindex(replicates)
+    return np.asarray(good.to_numpy(np.float64, na_value=np.inf))
+
+
+def straight_line(table: pd.DataFrame) -> float:
+    """Return the distance from start to goal; NaN where goals are not all the same."""
+    far = table["straight"].to_numpy(np.float64)
+    return float(far[0]) if len(far) and np.ptp(far) < CLOSE else np.nan
+
+
+def _of_replicate(condition: ConditionResults, replicate: int) -> Iterator[Answer]:
+    log = read_log(condition.run.log_path(replicate))
+    for answer in _kept(condition, log):
+        yield Answer(replicate, *answer)
+
+
+def _kept(condition: ConditionResults, log: LogContents) -> list[list[Any]]:
+    """Return the answers of a log, from the cache if they were judged before by the same code."""
+    key = hashlib.sha256(installed_code())
+    key.update(f"{condition.condition.id} {log.content_digest}".encode())
+    path = cache_root() / "answers" / key.hexdigest()[:32]
+    with contextlib.suppress(FileNotFoundError, Damaged):
+        kept: list[list[Any]] = json.loads(read_kept(path))
+        return kept
+    found = list(_judged(condition, log))
+    with contextlib.suppress(OSError):
+        write_kept(path, json.dumps(found).encode())
+    return found
+
+
+def _judged(condition: ConditionResults, log: LogContents) -> Iterator[list[Any]]:
+    planner, problem = condition.prepared
+    for row in log.solutions:
+        motion = planner.motion(problem, row.values)
+        if motion is None or not (length := motion_length(motion)):
+            continue
+        at = log.generations[row.generation]
+        certified = judge_motion(planner, problem, motion).certified is True
+        proven = certified and not planner.departures(problem, row.values)
+        ends = motion.q[-1] - motion.q[0]
+        straight = float(np.sqrt((ends * ends).sum()))
+        counts = row.generation, at.evaluations, at.collision_queries
+        yield [*counts, length, straight, bool(at.solved), proven]

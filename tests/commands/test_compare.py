@@ -1,0 +1,40 @@
+"""`evoexp compare`: a page and a table of proven answers."""
+
+import json
+from pathlib import Path
+
+from command_samples import SERIAL, Evoexp
+
+from evoexp.store.run_directory import find_runs
+
+HEADS = "condition", "runs", "with a proven answer", "queries per proven answer"
+
+
+def test_an_experiment_is_compared(evoexp: Evoexp, stored: Path) -> None:
+    said = evoexp("compare", "rana_planar", *SERIAL, "--json")
+    assert (said.code, said.err) == (0, "")
+    rows = json.loads(said.out)
+    assert [row["condition"] for row in rows] == ["via-point GA", "random search", "multi-start"]
+    assert all(row["runs"] == 2 and set(HEADS) <= row.keys() for row in rows)
+    (page,) = (stored / "reports").glob("compare_rana_planar@smoke*/index.md")
+    text = page.read_text()
+    assert "Made by `evoexp compare rana_planar budget=smoke " in text
+    assert {"targets_reached.svg", "proven_lengths.csv"} <= {p.name for p in page.parent.iterdir()}
+
+
+def test_runs_are_compared_by_their_hashes(evoexp: Evoexp, stored: Path) -> None:
+    one, two, *_ = sorted(run.hash12 for run in find_runs(stored))
+    said = evoexp("compare", one, two)
+    assert said.code == 0 and "refuted" in said.out
+    page = stored / "reports" / f"compare_{one}+{two}" / "index.md"
+    assert str(page) in said.out and page.exists()
+
+
+def test_what_is_neither_is_refused(evoexp: Evoexp, stored: Path) -> None:
+    said = evoexp("compare", "rana_planet")
+    assert said.code == 2 and "did you mean 'rana_planar'?" in said.err
+    (run, *_) = find_runs(stored)
+    said = evoexp("compare", run.hash12, "ga.num_elites=1")
+    assert said.code == 2 and "left out where runs are given by their hashes" in said.err
+    said = evoexp("compare", "lavoie_7dof")
+    assert said.code == 2 and "nothing stored" in said.err

@@ -62,7 +62,7 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _asked(arguments: argparse.Namespace) -> tuple[build.Request, ReportSettings, int | None]:
-    """Return what the page is drawn from, its settings, and the planned replicates.
+    """Return the request of the page, its settings, and the planned replicates.
 
     Raises:
         UnknownOption: If a word is neither an experiment nor a hash.

@@ -73,7 +73,7 @@ def motion_length(motion: Motion) -> float:
 
 
 def first_reached(table: pd.DataFrame, replicates: Any, longest: float, spent: FloatArray) -> Any:
-    """Return what every run had spent when it first had a proven answer so short.
+    """Return the effort of every run up to its first proven answer that is so short.
 
     Args:
         table: Of `answers`.

@@ -37,7 +37,7 @@ def fitted_covers(
 
 
 def fitting_notes(bodies: BodyModel, where: str, unit: str) -> list[str]:
-    """Say what was fitted, in a line each."""
+    """Return a line on the covers made smaller, and one on the pairs left to the certifier."""
     lines, names = [], bodies.names
     if bodies.shrunk:
         told = ", ".join(f"{names[body]} by {size:.3g} {unit}" for body, size in bodies.shrunk)

@@ -81,24 +81,17 @@ def prepare(
     )
     _check_contacts(task, (*bodies.names, *task.all_names))
     if task.check_reach:
-        try:
-            _check_reach(problem)
-        except SettingError as error:
-            if isinstance(scenario, PostureTask):
-                raise
-            must = error.must.partition(" (check_reach")[0]  # which these tasks do not have
-            raise SettingError("scenario.request", must, f"a goal {error.was}") from None
+        _check_goals(problem, scenario)
     stage = problem.begin(0, start, problem.first_situation)
     problem = replace(problem, scene=problem.scene_of(stage))
     goal = None
     if isinstance(scenario, MoveitTask):
         goal = scenario.goal_configuration(moving_joints(assembly))
-    if goal is None and stage.judge(start[:, None]).feasible[0]:
-        return problem
-    problem = _fitted(problem, [start] if goal is None else [start, goal])
-    stage = problem.begin(0, start, problem.first_situation)
-    if not stage.judge(start[:, None]).feasible[0]:
-        raise _infeasible(problem, start)
+    if goal is not None or not stage.judge(start[:, None]).feasible[0]:
+        problem = _fitted(problem, [start] if goal is None else [start, goal])
+        stage = problem.begin(0, start, problem.first_situation)
+        if not stage.judge(start[:, None]).feasible[0]:
+            raise _infeasible(problem, start)
     return problem
 
 
@@ -319,6 +312,17 @@ def _stroke(assembly: Assembly, limits: FloatArray, joint: int) -> float:
     multiplier, offset = table.rule[joint]
     stroke = abs(multiplier) * float(np.abs(limits[table.index_q[joint]]).max()) + abs(offset)
     return float(stroke) if table.prismatic[joint] else 0.0
+
+
+def _check_goals(problem: Problem, given: PostureTask | MoveitTask) -> None:
+    """Refuse goals out of reach, in the words of the task as it was given."""
+    try:
+        _check_reach(problem)
+    except SettingError as error:
+        if isinstance(given, PostureTask):
+            raise
+        must = error.must.partition(" (check_reach")[0]  # which these tasks do not have
+        raise SettingError("scenario.request", must, f"a goal {error.was}") from None
 
 
 def _check_reach(problem: Problem) -> None:

@@ -87,12 +87,27 @@ def prepare(
     goal = None
     if isinstance(scenario, MoveitTask):
         goal = scenario.goal_configuration(moving_joints(assembly))
-    if goal is not None or not stage.judge(start[:, None]).feasible[0]:
-        problem = _fitted(problem, [start] if goal is None else [start, goal])
-        stage = problem.begin(0, start, problem.first_situation)
-        if not stage.judge(start[:, None]).feasible[0]:
-            raise _infeasible(problem, start)
-    return problem
+    return _started(problem, goal)
+
+
+def _started(problem: Problem, goal: FloatArray | None) -> Problem:
+    """Return the problem with covers that its start, and a goal of joints, do not bring in contact.
+
+    Raises:
+        SettingError: If the start is infeasible all the same.
+    """
+    start = problem.start
+    if goal is None and _is_feasible(problem):
+        return problem
+    fitted = _fitted(problem, [start] if goal is None else [start, goal])
+    if not _is_feasible(fitted):
+        raise _infeasible(fitted, start)
+    return fitted
+
+
+def _is_feasible(problem: Problem) -> bool:
+    stage = problem.begin(0, problem.start, problem.first_situation)
+    return bool(stage.judge(problem.start[:, None]).feasible[0])
 
 
 def _fitted(problem: Problem, ends: list[FloatArray]) -> Problem:

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from evoexp.collision.box_support import coal
 from evoexp.collision.derived_pairs import Pair
 from evoexp.collision.models.body_covers import Cover, capsule_cover, given_cover, sphere_cover
 from evoexp.collision.models.body_pairs import BodyPairs, body_pairs
@@ -143,8 +144,18 @@ class BodyModel(NamedTuple):
 
     @property
     def inflation(self) -> float:
-        """How far a cover reaches beyond its body at most [length unit]."""
+        """How far a cover reaches beyond its body, or a mesh's convex hull, at most."""
         return max(cover.inflation for cover in self.covers)
+
+    def described(self, unit: str) -> str:
+        """Return a line on the covers: how many, and how far they reach [length unit]."""
+        items = self.assembly.geometry.geometryObjects
+        meshes = any(isinstance(item.geometry, coal.BVHModelBase) for item in items)
+        beyond = "them, or the convex hulls of meshes" if meshes else "them"
+        return (
+            f"{len(self.names)} bodies covered by {self.num_shapes} spheres and capsules, which "
+            f"reach at most {self.inflation:.3g} {unit} beyond {beyond}"
+        )
 
     @property
     def num_shapes(self) -> int:

@@ -86,10 +86,6 @@ class CoveredCollision(NamedTuple):
 
     def notes(self, unit: str) -> list[str]:
         """Describe the covers, and what is left to the certifier."""
-        names = self.bodies.names
-        lines = [
-            f"{len(names)} bodies covered by {self.bodies.num_shapes} spheres and capsules, "
-            f"which reach at most {self.bodies.inflation:.3g} {unit} beyond them"
-        ]
+        lines = [self.bodies.described(unit)]
         lines += fitting_notes(self.bodies, "the start or the goal", unit)
         return lines

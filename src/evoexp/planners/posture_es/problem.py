@@ -145,10 +145,7 @@ def _bodies(
 def notes(problem: Problem) -> tuple[str, ...]:
     """Describe the collision model and list the body pairs that it skips."""
     bodies, names, unit = problem.bodies, problem.bodies.names, problem.task.length_unit
-    lines = [
-        f"{len(names)} bodies covered by {bodies.num_shapes} spheres and capsules, "
-        f"which reach at most {bodies.inflation:.3g} {unit} beyond them"
-    ]
+    lines = [bodies.described(unit)]
     if bodies.uncovered:
         far = ", ".join(f"{name} {reach:.3g}" for name, reach in bodies.uncovered)
         lines.append(f"given spheres do not contain all bodies; standing out [{unit}]: {far}")

@@ -94,7 +94,8 @@ class Terminal:
 
 # The terminal becomes the process's own; signals are handled when Python has started.
 _IN_TERMINAL = """
-import fcntl, sys, termios
+import fcntl, signal, sys, termios
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # whatever started the tests may ignore it
 fcntl.ioctl(0, termios.TIOCSCTTY, 0)
 from evoexp.cli import main
 print("begun", flush=True)

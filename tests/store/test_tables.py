@@ -142,6 +142,19 @@ def test_a_table_made_piece_by_piece_is_the_same(
     assert [row["replicate"] for row in mixed.to_pylist()] == [*range(9), 11, 12]
 
 
+def test_a_table_whose_files_are_all_others_now_is_built_anew(run: RunDirectory, add: Add) -> None:
+    for k in range(3):
+        add(k)
+    write_summary(run)
+    for k in range(3):
+        add(k, best_cost=float(k))
+    assert write_summary(run)["best_cost"].to_pylist() == [0.0, 1.0, 2.0]
+    for k in range(3):
+        run.log_path(k).unlink()
+    run.write_failure(0, "x", "")
+    assert write_summary(run)["status"].to_pylist() == ["failed"]
+
+
 @pytest.mark.parametrize(
     ("kind", "values"),
     [

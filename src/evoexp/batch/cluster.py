@@ -74,6 +74,10 @@ class _Spread:
         self._sent: dict[str, list[Job]] = {}  # by the key of the task
         self._alone: deque[Job] = deque()  # those that run once more, one per task
         self._tried: set[tuple[str, int]] = set()
+        # A scheduler blames whatever waits on a worker that dies: whoever is blamed when it ran in
+        # a task of its own runs a last time, beside nothing.
+        self._blamed: deque[Job] = deque()
+        self._judged: set[tuple[str, int]] = set()
         self._running: Any = distributed.as_completed(loop=client.loop)
 
     def outcomes(self) -> Iterator[list[Outcome]]:
@@ -105,6 +109,9 @@ class _Spread:
             bundle = next(iter(self._bundles), None)
             if bundle is None and self._alone:
                 bundle = [self._alone.popleft()]
+            if bundle is None and self._blamed and not self._sent:
+                bundle = [self._blamed.popleft()]
+                self._judged.add(bundle[0].key)
             if bundle is None:
                 break
             future = self._client.submit(
@@ -130,7 +137,9 @@ class _Spread:
         if bundle[0].key not in self._tried:
             self._bundles.lost(bundle)
         for job in bundle:
-            if job.key in self._tried:
+            if job.key in self._tried and job.key not in self._judged:
+                self._blamed.append(job)
+            elif job.key in self._judged:
                 text = "worker process died twice"
                 yield Outcome(job.condition_id, job.replicate, text, reason, b"", 0.0)
             else:

@@ -345,7 +345,9 @@ def _build(
 
 def _rows(table: pa.Table, which: list[int]) -> pa.Table:
     """Return rows of a table; all of them without looking, which would load more of pyarrow."""
-    return table if which == list(range(len(table))) else table.take(which)
+    if which == list(range(len(table))):
+        return table
+    return table.take(pa.array(which, pa.int64()))
 
 
 def _row(run: RunDirectory, name: str) -> tuple[dict[str, Any], str]:

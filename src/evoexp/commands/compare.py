@@ -4,6 +4,7 @@ import argparse
 import hashlib
 import re
 import shlex
+from typing import Any
 
 from evoexp.commands.arguments import add_experiment_arguments, folder_words, is_override
 from evoexp.commands.console import add_columns, new_table, plain_console, print_json
@@ -12,7 +13,7 @@ from evoexp.condition import Condition
 from evoexp.configuration import expansions
 from evoexp.configuration.search_path import is_file, options
 from evoexp.errors import SettingError, UnknownOption
-from evoexp.report import build
+from evoexp.report import build, markdown
 from evoexp.report.pages import comparison
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import gather
@@ -47,18 +48,29 @@ def main(arguments: argparse.Namespace) -> int:
         request.hint,
         request.options,
     )
-    (table,) = comparison.page(found, settings).tables
+    rows = comparison.rated(found, settings)
     if arguments.json:
-        print_json([dict(zip(table.headers, row, strict=True)) for row in table.rows])
+        print_json([row._asdict() | _parts(row) for row in rows])
         return 0
     console = plain_console()
-    shown = new_table(request.report_name)
-    add_columns(shown, *table.headers)
-    for row in table.rows:
-        shown.add_row(*map(str, row))
-    console.print(shown)
+    table = new_table(request.report_name)
+    add_columns(table, "condition")
+    add_columns(table, "proven", "queries\neach", "best\nlength", "refuted", right=True)
+    for row in rows:
+        table.add_row(
+            row.condition,
+            f"{row.proven} of {row.runs}",
+            markdown.number(row.queries),
+            markdown.number(row.lengths.median),
+            f"{row.refuted} of {row.judged}",
+        )
+    console.print(table)
     console.print(f"compare: {path}", highlight=False, soft_wrap=True)
     return 0
+
+
+def _parts(row: comparison.Rated) -> dict[str, Any]:
+    return {"interval": row.interval._asdict(), "lengths": row.lengths._asdict()}
 
 
 def _asked(arguments: argparse.Namespace) -> tuple[build.Request, ReportSettings, int | None]:

@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Mapping, Sequence
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -16,7 +17,14 @@ from evoexp.report.proportions import Proportion
 from evoexp.report.proven_answers import answers, best_lengths, first_reached, straight_line
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
-from evoexp.report.statistics import expected_effort, expected_interval, quantile, spread
+from evoexp.report.statistics import (
+    Interval,
+    Spread,
+    expected_effort,
+    expected_interval,
+    quantile,
+    spread,
+)
 from evoexp.report.verdicts import Comparison
 
 INTRODUCTION = (
@@ -33,6 +41,40 @@ EFFORT = (
     "planner's own model accepts and the certifier refutes."
 )
 Planners = dict[str, list[ConditionResults]]
+
+
+class Rated(NamedTuple):
+    """A condition, rated by the proven answers of its runs.
+
+    Attributes:
+        condition: Its label.
+        runs: That are finished.
+        proven: Runs with a proven answer.
+        first_own: Median of the queries to the first answer that the planner's own model accepts.
+        queries: Expected running time to a proven answer [collision queries].
+        interval: Of it, by bootstrap.
+        lengths: Best proven length of a run: median and quartiles [rad, m].
+        straight: Distance from start to goal; NaN where goals differ.
+        refuted: Last solutions that the planner's own model accepts and the certifier refutes.
+        judged: Last solutions that were judged.
+    """
+
+    condition: str
+    runs: int
+    proven: int
+    first_own: float
+    queries: float
+    interval: Interval
+    lengths: Spread
+    straight: float
+    refuted: int
+    judged: int
+
+    @property
+    def in_lines(self) -> Spread:
+        """The lengths in units of the straight line from start to goal."""
+        median, lower, upper, count = self.lengths
+        return Spread(median / self.straight, lower / self.straight, upper / self.straight, count)
 
 
 def page(results: Results, settings: ReportSettings) -> Page:
@@ -73,7 +115,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
     return Page(
         title=f"{results.experiment or 'stored runs'}: proven answers",
         introduction=INTRODUCTION,
-        tables=(_table(conditions, found, settings),),
+        tables=(_table(rated(results, settings), settings),),
         comparisons=_comparisons(conditions, found, settings),
         drawings=tuple(drawn),
     )
@@ -96,32 +138,31 @@ def _num_problems(conditions: Sequence[ConditionResults]) -> int:
     return len({(c.condition.robot, c.condition.scenario) for c in conditions})
 
 
-def _table(
-    conditions: Sequence[ConditionResults],
-    found: Mapping[str, pd.DataFrame],
-    settings: ReportSettings,
-) -> Table:
-    rows = []
-    for c in conditions:
-        table, runs = found[c.label], c.summaries.index
-        effort, reached = first_reached(table, runs, np.inf, c.column("collision_queries"))
-        ert = expected_effort(effort, reached)
-        interval = expected_interval(effort, reached, settings.confidence, settings.num_resamples)
-        first = table[table["solved"]].groupby("replicate")["collision_queries"].min()
-        own = quantile(first.reindex(runs).fillna(np.inf).to_numpy(np.float64), 0.5)
-        lengths, line = best_lengths(table, runs), straight_line(table)
-        rows.append(
-            (
-                c.label,
-                c.done,
-                Proportion(int(reached.sum()), c.done).with_interval(settings.confidence, 0),
-                markdown.number(own),
-                f"{markdown.number(ert)} ({_between(interval)})",
-                markdown.spread(spread(lengths)),
-                markdown.spread(spread(lengths / line)) if line > 0.0 else "–",
-                f"{c.verdicts.solved_refuted} of {c.verdicts.judged}",
-            )
-        )
+def rated(results: Results, settings: ReportSettings) -> list[Rated]:
+    """Return the conditions that have motions, rated by their proven answers."""
+    found = {c.label: answers(c) for c in results.evolved}
+    return [_rated(c, found[c.label], settings) for c in results.evolved if len(found[c.label])]
+
+
+def _rated(c: ConditionResults, table: pd.DataFrame, settings: ReportSettings) -> Rated:
+    runs, verdicts = c.summaries.index, c.verdicts
+    effort, reached = first_reached(table, runs, np.inf, c.column("collision_queries"))
+    first = table[table["solved"]].groupby("replicate")["collision_queries"].min()
+    return Rated(
+        c.label,
+        c.done,
+        int(reached.sum()),
+        quantile(first.reindex(runs).fillna(np.inf).to_numpy(np.float64), 0.5),
+        expected_effort(effort, reached),
+        expected_interval(effort, reached, settings.confidence, settings.num_resamples),
+        spread(best_lengths(table, runs)),
+        straight_line(table),
+        verdicts.solved_refuted,
+        verdicts.judged,
+    )
+
+
+def _table(rows: Sequence[Rated], settings: ReportSettings) -> Table:
     headers = (
         "condition",
         "runs",
@@ -132,7 +173,20 @@ def _table(
         "the same in straight lines",
         "refuted",
     )
-    return Table("Answers", headers, tuple(rows), EFFORT)
+    cells = tuple(
+        (
+            row.condition,
+            row.runs,
+            Proportion(row.proven, row.runs).with_interval(settings.confidence, 0),
+            markdown.number(row.first_own),
+            f"{markdown.number(row.queries)} ({_between(row.interval)})",
+            markdown.spread(row.lengths),
+            markdown.spread(row.in_lines) if row.straight > 0.0 else "–",
+            f"{row.refuted} of {row.judged}",
+        )
+        for row in rows
+    )
+    return Table("Answers", headers, cells, EFFORT)
 
 
 def _between(interval: tuple[float, float]) -> str:

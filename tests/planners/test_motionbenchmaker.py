@@ -169,3 +169,23 @@ def test_a_pose_out_of_reach_is_one_of_the_request(tmp_path: Path) -> None:
     with pytest.raises(SettingError, match=r"^scenario.request: must be within reach, 0\.98") as it:
         far.prepare()
     assert "check_reach" not in str(it.value)
+
+
+def test_a_goal_for_a_joint_that_is_none_is_refused(tmp_path: Path) -> None:
+    problem = ASSETS / "problems" / "box_panda"
+    text = (problem / "request0001.yaml").read_text()
+    request = yaml.safe_load(text)
+    request["goal_constraints"][0]["joint_constraints"][0]["joint_name"] = "panda_joint9"
+    changed = tmp_path / "request.yaml"
+    changed.write_text(yaml.safe_dump(request))
+    files = f"scenario.scene='{problem / 'scene0001.yaml'}'", f"scenario.request={changed}"
+    (misspelt,) = conditions(*VIA_POINTS, *files).values()
+    with pytest.raises(SettingError, match=r"joints that move .*'panda_joint9'.*did you mean"):
+        misspelt.prepare()
+
+
+def test_pairs_that_the_certifier_alone_judges_are_named(shipped: dict[str, Condition]) -> None:
+    planner, problem = shipped["box_ur5"].prepare()
+    (line,) = (line for line in planner.notes(problem) if "in every posture sampled" in line)
+    assert "judged by the certifier only" in line
+    assert "forearm_link with wrist_2_link" in line

@@ -121,6 +121,10 @@ def mesh(corners: Any, triangles: Any, **changes: Any) -> dict[str, Any]:
 FLAT = mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
 LOST = mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 3]])
 HALF = mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], mesh_poses=[])
+FRACTION = {
+    "vertices": [{"x": 0, "y": 0, "z": k} for k in range(3)],
+    "triangles": [{"vertex_indices": [0, 1, 1.5]}],
+}
 FILE = {"id": "m", "meshes": [{"resource": "package://a/b.stl"}], "mesh_poses": [{}]}
 REFUSED = {
     "attached objects": {"robot_state": {"attached_collision_objects": [{"link_name": "x"}]}},
@@ -129,6 +133,13 @@ REFUSED = {
     "link_scale": {"link_scale": [{"link_name": "x", "scale": 1.1}]},
     "a part of 3 vertices in one plane": scene(FLAT),
     "three of the 3 vertices of 'thing', counted from 0, was '0, 1, 3'": scene(LOST),
+    "counted from 0, was '0, 1, 1.5'": scene(
+        mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]) | {"meshes": [FRACTION]}
+    ),
+    "objects to be added": scene(body("sphere", [1], [0, 0, 0], operation=1)),
+    r"a normal other than 0 of 'floor', was \[0.0, 0.0, 0.0\]": scene(
+        {"id": "floor", "planes": [{"coef": [0, 0, 0, -1]}], "plane_poses": [{}]}
+    ),
     "a pose per mesh": scene(HALF),
     "vertices and triangles of 'm', was 'the file package": scene(FILE),
     "a prism": scene({"id": "c", "primitives": [PRISM], "primitive_poses": [{}]}),

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from evoexp.attachments import SHA256, File, keep, located
-from evoexp.errors import SettingError
+from evoexp.errors import SettingError, nearest
 from evoexp.input_files import read_bounded
 from evoexp.numeric.elementary import DEGREE
 from evoexp.records import BoolArray, FloatArray, IntArray
@@ -134,15 +134,12 @@ class MoveitTask(Component):
         Raises:
             SettingError: If the goal is a pose, or is silent about a joint.
         """
-        goal = self.plan_request.joint_goal
-        if not goal:
+        q_goal = self.goal_configuration(joints)
+        if q_goal is None:
             must = "a goal of joints for this planner (posture_es plans to poses)"
             link = self.plan_request.link_goal
             raise SettingError("scenario.request", must, f"a pose of '{link and link.link}'")
-        ends = [
-            joints.typed(q)
-            for q in (state_of(joints.names, self.state), state_of(joints.names, goal, self.state))
-        ]
+        ends = [joints.typed(q) for q in (state_of(joints.names, self.state), q_goal)]
         start, end = (
             tuple(tuple(float(value) for value in q[a:b]) for a, b in joints.slices) for q in ends
         )
@@ -155,8 +152,18 @@ class MoveitTask(Component):
         )
 
     def goal_configuration(self, joints: Joints) -> FloatArray | None:
-        """Return the goal (nq,) [rad, m]; None: it is a pose."""
+        """Return the goal (nq,) [rad, m]; None: it is a pose.
+
+        Raises:
+            SettingError: If it names a joint that does not move, or is silent about one that does
+                and has no start.
+        """
         goal = self.plan_request.joint_goal
+        for name in goal:
+            if name not in joints.names:
+                must = f"a goal for joints that move ({', '.join(joints.names)})"
+                hint = nearest(name, joints.names)
+                raise SettingError("scenario.request", must, name, hint)
         return state_of(joints.names, goal, self.state) if goal else None
 
     def posture_task(self, joints: Joints, tool_at_goal: Pose | None) -> PostureTask:

@@ -44,7 +44,11 @@ def mesh_hulls(
     if not whole or not len(triangles) or triangles.max() >= len(corners):
         must = f"triangles of three of the {len(corners)} vertices of '{name}', counted from 0"
         count = len(corners)
-        wrong = [row for row in triangles if not 0.0 <= min(row) <= max(row) < count]
+        wrong = [
+            row
+            for row in triangles
+            if not 0.0 <= min(row) <= max(row) < count or any(row != np.floor(row))
+        ]
         told = ", ".join(f"{value:g}" for value in wrong[0]) if wrong else "none"
         raise SettingError(scene.field, must, told)
     found = []

@@ -29,6 +29,7 @@ SIZES = {
     "cylinder": 2,
     "cone": 2,
 }  # numbers of a primitive that evoexp knows
+ADDED = (0, None, "add", "ADD", b"\0", "\0")  # CollisionObject.operation
 KEPT_FRAMES = ("", "world", "/world")
 
 
@@ -156,6 +157,9 @@ def _bodies(
     scene: Document, given: dict[str, Any], name: str, frames: dict[str, Pose]
 ) -> list[Obstacle]:
     """Return the bodies of a collision object."""
+    if given.get("operation", 0) not in ADDED:
+        must = f"objects to be added ('{name}'.operation: 0)"
+        raise SettingError(scene.field, must, str(given["operation"]))
     own = frame_pose(scene, given.get("header"), frames)
     own = own.times(scene.pose(given.get("pose"), f"'{name}'"))
     found: list[Obstacle] = []
@@ -217,7 +221,9 @@ def _plane(scene: Document, given: dict[str, Any], pose: Pose, name: str) -> Obs
     normal = np.array([a, b, c])
     size = float(a * a + b * b + c * c)
     if size == 0.0:
-        raise SettingError(scene.field, f"a normal other than 0 of '{name}'", [a, b, c, d])
+        raise SettingError(
+            scene.field, f"a normal other than 0 of '{name}'", [float(a), float(b), float(c)]
+        )
     point = pose.of_point(-d / size * normal)
     direction = Pose(pose.rotation, np.zeros(3)).of_point(normal)
     return HalfSpaceObstacle(

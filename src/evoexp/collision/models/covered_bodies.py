@@ -87,5 +87,13 @@ class CoveredCollision(NamedTuple):
     def notes(self, unit: str) -> list[str]:
         """Describe the covers, and what is left to the certifier."""
         lines = [self.bodies.described(unit)]
+        names, pairs = self.bodies.names, self.bodies.sorted_pairs
+        for what, left in (
+            ("touch in no posture sampled", pairs.unseen),
+            ("covers touch in every posture sampled", pairs.overlapping),
+        ):
+            if left:
+                told = ", ".join(f"{names[a]} with {names[b]}" for a, b in left)
+                lines.append(f"{what}, judged by the certifier only: {told}")
         lines += fitting_notes(self.bodies, "the start or the goal", unit)
         return lines

@@ -96,7 +96,7 @@ def test_numbers_up_to_a_limit_are_counted() -> None:
         count_seven(array, places, 10, limits, out)
         for lane, begin in enumerate(places.astype(int) + 10):
             for num, found in ((7, out[lane]), (8, out[LANES + lane])):
-                assert found == np.count_nonzero(array[begin : begin + num] <= limits[lane])
+                assert found == np.count_nonzero(array[begin + 8 - num : begin + 8] <= limits[lane])
 
 
 def test_whole_numbers_become_places() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from plain_redistribution import run_plainly
 from reference_paths import redistributed
 
 from evoexp.paths.redistribution import redistribute
@@ -84,6 +85,22 @@ def test_points_are_those_of_scipys_spline_at_equal_arc_length(num, joints, samp
     mean, largest = BOUNDS[joints, samples]
     assert np.sqrt(np.mean(found**2)) < mean
     assert found.max() < largest
+
+
+@pytest.mark.examples(12)
+@pytest.mark.parametrize("end", ENDS)
+@pytest.mark.parametrize("samples", [8, 16, 64])
+@pytest.mark.parametrize("joints", [1, 2, 3, 4])
+@pytest.mark.parametrize("num", [2, 3, 7, 20])
+def test_bits_are_those_of_the_same_operations_number_by_number(num, joints, samples, end):
+    given = strings(num, joints + 2, num, 16)
+    given[:, :, 8:] = np.cumsum(given[:, :, 8:] - 40.0, axis=1)  # paths that hardly turn
+    given[:, 1:-1, 3] = given[:, :1, 3]  # and some with points that are repeated
+    given[:, :, 4] = 7.0
+    given[:, :, 5] = np.round(given[:, :, 5] / 50.0) * 50.0
+    slices = arms([0, joints], [joints, joints + 2])
+    expected = run_plainly(given, slices, end, samples)
+    assert np.array_equal(run(given, slices, 16, end, samples), expected)
 
 
 @pytest.mark.parametrize("end", ENDS)

@@ -117,7 +117,9 @@ def _count(
 ) -> Any:
     if not isinstance(num, types.IntegerLiteral):
         raise TypingError("num must be a constant")
-    first = (1 << num.literal_value) - 1  # the bits of the numbers that count
+    # the bits of the numbers that count, of every lane
+    last = (0xFF << (LANES - num.literal_value)) & 0xFF
+    counted = int.from_bytes(bytes([last] * LANES), "little")
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         limits, masks = arguments[4], []
@@ -130,13 +132,17 @@ def _count(
             both = list(range(2 * masks[0].type.count))
             pairs = zip(masks[::2], masks[1::2], strict=True)
             masks = [_shuffle(builder, a, b, both) for a, b in pairs]
-        words = ir.VectorType(ir.IntType(8), LANES)
-        counted = builder.and_(
-            builder.bitcast(masks[0], words), ir.Constant(words, [first] * LANES)
-        )
+        # through a scalar register: LLVM would pass the masks through memory, and wait for them
+        bits = ir.IntType(LANES * LANES)
+        both = ir.VectorType(bits, 2)
+        word = builder.and_(builder.bitcast(masks[0], bits), ir.Constant(bits, counted))
+        pair = builder.insert_element(ir.Constant(both, None), word, ir.Constant(_INDEX, 0))
+        bytes_ = builder.bitcast(pair, ir.VectorType(ir.IntType(8), 2 * LANES))
+        narrow = _shuffle(builder, bytes_, bytes_, list(range(LANES)))
+        words = ir.VectorType(ir.IntType(64), LANES)
         kind = ir.FunctionType(words, [words])
-        ones = cgutils.get_or_insert_function(builder.module, kind, f"llvm.ctpop.v{LANES}i8")
-        wide = builder.zext(builder.call(ones, [counted]), ir.VectorType(ir.IntType(64), LANES))
+        ones = cgutils.get_or_insert_function(builder.module, kind, f"llvm.ctpop.v{LANES}i64")
+        wide = builder.call(ones, [builder.zext(narrow, words)])
         return builder.sitofp(wide, _DOUBLES)
 
     return vector_type(array, places, types.uint64, types.uint64, vector_type, num), generate
@@ -195,7 +201,7 @@ load_quads: Callable[
 num_up_to: Callable[[FloatArray, Places, np.uint64, np.uint64, Vector, int], Vector] = _for_kernels(
     _count
 )
-"""Return how many numbers from an offset of each lane's place on are not above its limit.
+"""Return how many of eight numbers at an offset from each lane's place are not above its limit.
 
 Args:
     array: See `load_pairs`.
@@ -203,7 +209,7 @@ Args:
     at: See `load_pairs`.
     offset: See `load_pairs`.
     limits: One per lane.
-    num: How many numbers are looked at, a constant up to eight; eight are read.
+    num: How many of the eight are looked at, the last ones; a constant.
 """
 
 store_places: Callable[[Places, np.uint64, Vector], None] = _for_kernels(_store_places)

@@ -5,25 +5,26 @@ The length between the samples j and j + 1 is that of the cubic through four spe
     h/24 (13 (v[j] + v[j+1]) − v[j−1] − v[j+2]).
 
 The kernels leave h/24 out and keep every length at or above a twelfth of the trapezoid's, so that L
-never falls where a path turns on the spot. The origin of L is arbitrary (not zero). A length is
-known one sample later than its speed.
+never falls where a path turns on the spot. The origin of L is arbitrary (not zero).
 """
 
 import numpy as np
 
 from evoexp.numeric.compilation import inlined
 from evoexp.numeric.vector_rows import Eight
-from evoexp.numeric.vectors import Vector, select, spread, store
+from evoexp.numeric.vectors import Vector, load, select, spread, store
 from evoexp.paths.spline import (
     PAIR,
+    load_eight,
     slope,
     speed_at_goal,
     speed_of_all,
     speed_of_two,
     square_speed,
+    store_eight,
     store_rows,
 )
-from evoexp.paths.workspace import U0, U1, U2, VECTOR, Layout
+from evoexp.paths.workspace import EIGHT, U0, U1, U2, U6, U7, VECTOR, Layout
 from evoexp.records import FloatArray
 
 
@@ -71,48 +72,77 @@ def speeds_of_all(
 
 
 @inlined
+def write_speeds(
+    w: FloatArray,
+    joints: np.uint64,
+    N: np.uint64,
+    at: Layout,
+    ahead: np.uint64,
+    segment: np.uint64,
+    u: float,
+    h: float,
+) -> None:
+    """Write the speeds at eight samples of a segment, from u on, or behind the goal."""
+    if segment == N:
+        # beyond the goal the speed is that of the parabola through the last three samples
+        behind, v = at.ahead + at.ahead + EIGHT - ahead, speed_at_goal(w, N, joints, at)
+        p1, p2 = load(w, behind + U7 * VECTOR), load(w, behind + U6 * VECTOR)
+        store(w, ahead, v)
+        store(w, ahead + VECTOR, 3.0 * (v - p1) + p2)
+    elif joints == U2:
+        store_eight(w, ahead, speeds_of_two(w, segment * PAIR, at, u, h))
+    else:
+        store_eight(w, ahead, speeds_of_all(w, segment * PAIR, joints, at, u, h))
+
+
+@inlined
 def integrate_speed(
     w: FloatArray, joints: np.uint64, N: np.uint64, S: np.uint64, at: Layout
 ) -> tuple[Vector, Vector]:
     """Write the speeds and lengths of all samples of eight paths; see `workspace`.
 
+    The speeds of a block of eight samples are on their way, in the processor's one unit for roots,
+    while the lengths of the block before are summed.
+
     Returns:
         Lengths up to the first sample and to the last one.
     """
-    h = 1.0 / np.float64(S)
-    nothing = spread(0.0)
-    p3, p2, p1, length, origin = nothing, nothing, nothing, nothing, nothing
-    for k in range(N):
-        for block in range(k * S, (k + U1) * S, VECTOR):
-            knot, u = k * PAIR, np.float64(block - k * S) * h
-            if joints == U2:
-                v = speeds_of_two(w, knot, at, u, h)
-            else:
-                v = speeds_of_all(w, knot, joints, at, u, h)
-            l0 = length + between(p3, p2, p1, v[0])
-            l1 = l0 + between(p2, p1, v[0], v[1])
-            l2 = l1 + between(p1, v[0], v[1], v[2])
-            l3 = l2 + between(v[0], v[1], v[2], v[3])
-            l4 = l3 + between(v[1], v[2], v[3], v[4])
-            l5 = l4 + between(v[2], v[3], v[4], v[5])
-            l6 = l5 + between(v[3], v[4], v[5], v[6])
-            l7 = l6 + between(v[4], v[5], v[6], v[7])
-            if block == U0:
-                # before the start the speed is that of the parabola through the first three samples
-                beyond = 3.0 * (v[0] - v[1]) + v[2]
-                origin = l2 - between(beyond, v[0], v[1], v[2])
-                l1 = origin
-            if block == k * S:
-                store(w, at.begins + k * VECTOR, l1)
-            store_rows(w, at.speeds + block, at.sample, v)
-            store_rows(w, at.lengths + block, at.sample, (l0, l1, l2, l3, l4, l5, l6, l7))
-            p3, p2, p1, length = v[5], v[6], v[7], l7
-    # the sample at the goal; beyond it the speed is again that of a parabola
-    v0 = speed_at_goal(w, N, joints, at)
-    before = length + between(p3, p2, p1, v0)
-    beyond = 3.0 * (v0 - p1) + p2
-    last = before + between(p2, p1, v0, beyond)
+    nothing, h = spread(0.0), 1.0 / np.float64(S)
+    here, ahead = at.ahead, at.ahead + EIGHT  # of the block, and of the one behind it
+    write_speeds(w, joints, N, at, here, U0, 0.0, h)
+    before, first, second = nothing, load(w, here), load(w, here + VECTOR)
+    length = between(nothing, nothing, nothing, first) + between(nothing, nothing, first, second)
+    origin, segment, begin, stop = nothing, U0, True, S
+    for place in range(U0, N * S, VECTOR):
+        v = load_eight(w, here)
+        if begin:
+            kept = segment * VECTOR
+        if place + VECTOR == stop:
+            segment, stop = segment + U1, stop + S
+        u = np.float64(place + VECTOR + S - stop) * h
+        write_speeds(w, joints, N, at, ahead, segment, u, h)
+        after = load(w, ahead), load(w, ahead + VECTOR)
+        l1 = length + between(before, v[0], v[1], v[2])
+        if place == U0:
+            # before the start, too, the speed is that of a parabola
+            beyond = 3.0 * (v[0] - v[1]) + v[2]
+            length = origin = l1 - between(beyond, v[0], v[1], v[2])
+        l2 = l1 + between(v[0], v[1], v[2], v[3])
+        l3 = l2 + between(v[1], v[2], v[3], v[4])
+        l4 = l3 + between(v[2], v[3], v[4], v[5])
+        l5 = l4 + between(v[3], v[4], v[5], v[6])
+        l6 = l5 + between(v[4], v[5], v[6], v[7])
+        l7 = l6 + between(v[5], v[6], v[7], after[0])
+        if begin:
+            store(w, at.begins + kept, length)
+        begin = place + VECTOR + S == stop
+        store_rows(w, at.speeds + place, at.sample, v)
+        store_rows(w, at.lengths + place, at.sample, (length, l1, l2, l3, l4, l5, l6, l7))
+        before, length = v[7], l7 + between(v[6], v[7], after[0], after[1])
+        here, ahead = ahead, here
+    # the sample at the goal
+    v0 = load(w, here)
     store_rows(w, at.speeds + N * S, at.sample, (v0, v0, v0, v0, v0, v0, v0, v0))
-    ends = (before, last, last, last, last, last, last, last)
+    ends = (length, length, length, length, length, length, length, length)
     store_rows(w, at.lengths + N * S, at.sample, ends)
-    return origin, last
+    return origin, length

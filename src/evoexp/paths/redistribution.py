@@ -106,7 +106,7 @@ def find_samples(
         store_places(places, at.samples + own, begin)
         # bisection down to eight samples, among which lengths are counted
         sample = spread(0.0) if S == VECTOR else halve(w, S, at, target, own, places)
-        sample = sample + num_up_to(w, places, at.samples + own, at.lengths + U2, target, 7)
+        sample = sample + num_up_to(w, places, at.samples + own, at.lengths, target, 7)
         store(w, at.found + own, sample)
         store_places(places, at.samples + own, begin + sample)
 
@@ -120,7 +120,7 @@ def halve(
         limit, begin, step = w[at.targets + own + lane], places[at.samples + own + lane], S >> U1
         place = begin
         while step > U4:
-            if w[at.lengths + U1 + place + step] <= limit:
+            if w[at.lengths + place + step] <= limit:
                 place += step
             step >>= U1
         places[at.samples + own + lane] = place
@@ -171,21 +171,35 @@ def move_points(
     h = 1.0 / np.float64(S)
     moves = select(total > 0.0, select(total < _LONGEST, spread(1.0), spread(0.0)), spread(0.0))
     any_stays = any_lane(moves < 1.0)
+    # between two samples the speed is linear
     for i in range(U1, N):
         own = i * VECTOR
-        # between two samples the speed is linear
         speeds = load_pairs(w, places, at.samples + own, at.speeds)
-        lengths = load_pairs(w, places, at.samples + own, at.lengths + U1)
+        lengths = load_pairs(w, places, at.samples + own, at.lengths)
         target, sample = load(w, at.targets + own), load(w, at.found + own)
-        u = parameter(target, sample, speeds, lengths) * h
-        # the splines there
-        for joint in range(joints):
-            a0, m0, a1, m1 = load_quads(w, places, at.knots + own, at.rows + joint * at.joint)
-            x = a0 + u * ((a1 - a0 - 2.0 * m0 - m1) + u * (3.0 * m0 + u * (m1 - m0)))
-            place = first + (joint * (N + U1) + i) * pitch
+        store(w, at.found + own, parameter(target, sample, speeds, lengths) * h)
+    # the splines there, of two joints at a time; a last one goes with itself
+    for joint in range(U0, joints, U2):
+        other = joint + (U1 if joint + U1 < joints else U0)
+        rows, rows2 = at.rows + joint * at.joint, at.rows + other * at.joint
+        start, start2 = first + joint * (N + U1) * pitch, first + other * (N + U1) * pitch
+        for i in range(U1, N):
+            own, place, place2 = i * VECTOR, start + i * pitch, start2 + i * pitch
+            u = load(w, at.found + own)
+            x = spline_point(load_quads(w, places, at.knots + own, rows), u)
+            x2 = spline_point(load_quads(w, places, at.knots + own, rows2), u)
             if any_stays:
                 x = select(moves < 1.0, load(via_points, place), x)
+                x2 = select(moves < 1.0, load(via_points, place2), x2)
             store(via_points, place, x)
+            store(via_points, place2, x2)
+
+
+@inlined
+def spline_point(knots: tuple[Vector, Vector, Vector, Vector], u: Vector) -> Vector:
+    """Return the point of a segment's spline at u in [0, 1], from a and m at both ends."""
+    a0, m0, a1, m1 = knots
+    return a0 + u * ((a1 - a0 - 2.0 * m0 - m1) + u * (3.0 * m0 + u * (m1 - m0)))
 
 
 @kernel

@@ -41,26 +41,41 @@ def fit_splines(
         at: Places in it.
     """
     to_joint = (N + U1) * pitch
-    for joint in range(joints):
-        source, knot = first + joint * to_joint, joint * at.joint * VECTOR
-        before = load(via_points, source)
-        here = load(via_points, source + pitch)
-        m = (here - before) * pivots[0]
-        store(w, knot, before)
-        store(w, knot + VECTOR, m)
+    # two joints at a time: neither waits for results of the other; a last one goes with itself
+    for joint in range(U0, joints, U2):
+        other = joint + (U1 if joint + U1 < joints else U0)
+        source, source2 = first + joint * to_joint, first + other * to_joint
+        knot, knot2 = joint * at.joint * VECTOR, other * at.joint * VECTOR
+        before, before2 = load(via_points, source), load(via_points, source2)
+        here, here2 = load(via_points, source + pitch), load(via_points, source2 + pitch)
+        m, m2 = (here - before) * pivots[0], (here2 - before2) * pivots[0]
+        store_knot(w, knot, before, m)
+        store_knot(w, knot2, before2, m2)
         for i in range(U1, N):
             after = load(via_points, source + (i + U1) * pitch)
+            after2 = load(via_points, source2 + (i + U1) * pitch)
             m = ((before - here) + (after - here) - m) * pivots[i]
-            store(w, knot + i * PAIR, here)
-            store(w, knot + i * PAIR + VECTOR, m)
-            before, here = here, after
-        m = ((before - here) - m) * pivots[N]
-        store(w, knot + N * PAIR, here)
-        store(w, knot + N * PAIR + VECTOR, m)
+            m2 = ((before2 - here2) + (after2 - here2) - m2) * pivots[i]
+            store_knot(w, knot + i * PAIR, here, m)
+            store_knot(w, knot2 + i * PAIR, here2, m2)
+            before, here, before2, here2 = here, after, here2, after2
+        m, m2 = ((before - here) - m) * pivots[N], ((before2 - here2) - m2) * pivots[N]
+        store_knot(w, knot + N * PAIR, here, m)
+        store_knot(w, knot2 + N * PAIR, here2, m2)
         for back in range(N):
             k = N - U1 - back
-            m = load(w, knot + k * PAIR + VECTOR) - m * pivots[k]
-            store(w, knot + k * PAIR + VECTOR, m)
+            own, own2 = knot + k * PAIR + VECTOR, knot2 + k * PAIR + VECTOR
+            old, old2 = load(w, own), load(w, own2)
+            m, m2 = old - m * pivots[k], old2 - m2 * pivots[k]
+            store(w, own, m)
+            store(w, own2, m2)
+
+
+@inlined
+def store_knot(w: FloatArray, knot: np.uint64, a: Vector, m: Vector) -> None:
+    """Write a knot: coordinate, and a sixth of the second derivative."""
+    store(w, knot, a)
+    store(w, knot + VECTOR, m)
 
 
 @inlined
@@ -69,21 +84,8 @@ def write_rows(joints: np.uint64, w: FloatArray, at: Layout) -> None:
     for joint in range(joints):
         for place in range(U0, at.joint, VECTOR):
             block = (joint * at.joint + place) * VECTOR
-            store_rows(
-                w,
-                at.rows + joint * at.joint + place,
-                at.row,
-                (
-                    load(w, block),
-                    load(w, block + VECTOR),
-                    load(w, block + U2 * VECTOR),
-                    load(w, block + U3 * VECTOR),
-                    load(w, block + U4 * VECTOR),
-                    load(w, block + U5 * VECTOR),
-                    load(w, block + U6 * VECTOR),
-                    load(w, block + U7 * VECTOR),
-                ),
-            )
+            rows = at.rows + joint * at.joint + place
+            store_rows(w, rows, at.row, load_eight(w, block))
 
 
 @inlined
@@ -98,6 +100,34 @@ def store_rows(w: FloatArray, place: np.uint64, pitch: np.uint64, vectors: Eight
     store(w, place + U5 * pitch, rows[5])
     store(w, place + U6 * pitch, rows[6])
     store(w, place + U7 * pitch, rows[7])
+
+
+@inlined
+def load_eight(w: FloatArray, place: np.uint64) -> Eight:
+    """Return eight vectors that stand one behind the other."""
+    return (
+        load(w, place),
+        load(w, place + VECTOR),
+        load(w, place + U2 * VECTOR),
+        load(w, place + U3 * VECTOR),
+        load(w, place + U4 * VECTOR),
+        load(w, place + U5 * VECTOR),
+        load(w, place + U6 * VECTOR),
+        load(w, place + U7 * VECTOR),
+    )
+
+
+@inlined
+def store_eight(w: FloatArray, place: np.uint64, vectors: Eight) -> None:
+    """Write eight vectors one behind the other."""
+    store(w, place, vectors[0])
+    store(w, place + VECTOR, vectors[1])
+    store(w, place + U2 * VECTOR, vectors[2])
+    store(w, place + U3 * VECTOR, vectors[3])
+    store(w, place + U4 * VECTOR, vectors[4])
+    store(w, place + U5 * VECTOR, vectors[5])
+    store(w, place + U6 * VECTOR, vectors[6])
+    store(w, place + U7 * VECTOR, vectors[7])
 
 
 @inlined

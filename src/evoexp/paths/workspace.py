@@ -12,7 +12,8 @@ per segment:
   first to follow, and of its sample;
 - `rows`: per lane a and m again, joint by joint and knot by knot;
 - `speeds`: per lane the speed at every sample;
-- `lengths`: per lane the arc length up to every sample, one place later than its speed.
+- `lengths`: per lane the arc length up to every sample;
+- `ahead`: vectors of the speeds at twice eight samples.
 
 Another array holds places: eight for a moment, then per target those of its segment in `rows`
 (`knots`) and of its sample in `speeds` (`samples`).
@@ -29,6 +30,7 @@ from evoexp.records import FloatArray
 
 VECTOR = np.uint64(LANES)  # places of a vector
 U0, U1, U2, U3, U4, U5, U6, U7 = (np.uint64(u) for u in range(8))
+EIGHT = VECTOR * VECTOR  # places of eight vectors
 MAX_SAMPLES = 1024
 
 Offsets = NDArray[np.uint64]
@@ -71,6 +73,7 @@ class Layout(NamedTuple):
         rows: Of lane 0.
         speeds: Of lane 0.
         lengths: Of lane 0.
+        ahead: In all.
         size: Of all.
         knots: In the other array.
         samples: In the other array.
@@ -87,6 +90,7 @@ class Layout(NamedTuple):
     rows: np.uint64
     speeds: np.uint64
     lengths: np.uint64
+    ahead: np.uint64
     size: np.uint64
     knots: np.uint64
     samples: np.uint64
@@ -104,6 +108,7 @@ def layout(joints: np.uint64, N: np.uint64, S: np.uint64) -> Layout:
     entered, found, rows = targets + points, targets + U2 * points, targets + U3 * points
     speeds = rows + row * VECTOR
     lengths = speeds + sample * VECTOR
+    ahead = lengths + sample * VECTOR
     return Layout(
         joint,
         row,
@@ -115,7 +120,8 @@ def layout(joints: np.uint64, N: np.uint64, S: np.uint64) -> Layout:
         rows,
         speeds,
         lengths,
-        lengths + sample * VECTOR,
+        ahead,
+        ahead + U2 * EIGHT,
         VECTOR,
         VECTOR + points,
         VECTOR + U2 * points,

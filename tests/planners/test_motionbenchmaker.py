@@ -12,8 +12,8 @@ import evoexp
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
+from evoexp.planners import arm_tasks as tasks
 from evoexp.planners.moveit_tasks import arm_motion, with_allowed_pairs
-from evoexp.planners.via_point_ga import tasks
 from evoexp.testing.small_conditions import conditions
 
 ASSETS = Path(evoexp.__file__).parent / "assets" / "motionbenchmaker"

@@ -15,19 +15,18 @@ from typing import ClassVar
 
 import numpy as np
 
-from evoexp.collision.models.covered_bodies import CoveredBodies, CoveredCollision
-from evoexp.collision.models.touching_spheres import Clearance, SphereCollision
-from evoexp.collision.scene import Part, scene
+from evoexp.collision.models.covered_bodies import CoveredCollision
+from evoexp.collision.models.touching_spheres import Clearance
+from evoexp.collision.scene import Part
 from evoexp.errors import SettingError
 from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion
 from evoexp.paths.workspace import prepare_redistribution
 from evoexp.planners.answers import CoverShape
+from evoexp.planners.arm_tasks import UNLIMITED, arm_problem, cover_notes, cover_shapes
 from evoexp.planners.departures import joint_names, of_limits, of_place
-from evoexp.planners.moveit_tasks import arm_motion, hull_notes, with_allowed_pairs
 from evoexp.planners.planner import COPIES, Candidate, Keeper, PlannerDefaults, num_values
-from evoexp.planners.via_point_ga import tasks
 from evoexp.planners.via_point_ga.covered_strings import CoveredStrings
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
 from evoexp.planners.via_point_ga.strings import (
@@ -42,7 +41,6 @@ from evoexp.scenarios.arm_motion import ArmMotion
 from evoexp.scenarios.moveit import MoveitTask
 from evoexp.validation import Component
 
-UNLIMITED = 1e6  # [rad] a joint without limits has larger ones in the model
 SAMPLES_BETWEEN = 100  # configurations per segment where a clearance between via-points is sampled
 
 
@@ -61,32 +59,15 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
         if self.num_new_trajectories > self.ga.num_offspring:
             must = f"at most the offspring of a generation ({self.ga.num_offspring})"
             raise SettingError("planner.num_new_trajectories", must, self.num_new_trajectories)
-        assembly = robot.build()
-        if isinstance(scenario, MoveitTask):
-            assembly = with_allowed_pairs(assembly, scenario)
-        task = arm_motion(assembly, scenario)
-        start, goal = tasks.ends_of(assembly, task)
-        collision: SphereCollision | CoveredCollision
-        if isinstance(self.collision, CoveredBodies):
-            bodies = tasks.covered_scene(assembly, task, scenario)
-            collision = tasks.covered_collision(
-                self.collision, bodies, assembly, task, scenario, (start, goal)
-            )
-        else:
-            collision = self.collision.bind(assembly, task.obstacles)
-            given = ("q_start", start, task.q_start), ("q_goal", goal, task.q_goal)
-            for name, q, typed in given:
-                clearance = collision.clearance(q[:, None])
-                tasks.check_spheres(clearance, f"scenario.{name}", typed, task.length_unit)
-            bodies = scene(assembly, collision.obstacles)
-        joints = int(np.max(assembly.arm_slices[:, 1] - assembly.arm_slices[:, 0]))
+        found = arm_problem(robot, scenario, self.collision)
+        slices = found.arm_slices
+        joints = int(np.max(slices[:, 1] - slices[:, 0]))
         spline = prepare_redistribution(
             self.num_via_points, joints, self.spline_end, self.samples_per_segment
         )
-        own, margin = task.obstacle_margin, task.security_margin
-        margins = margin, margin if own is None else own
-        unit = task.length_unit
-        return Problem(assembly, collision, start, goal, spline, bodies, *margins, unit)
+        ends, margins = (found.start, found.goal), (found.security_margin, found.obstacle_margin)
+        bodies = found.assembly, found.collision
+        return Problem(*bodies, *ends, spline, found.scene, *margins, found.length_unit)
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield the initial population, then one generation after the other."""
@@ -180,16 +161,7 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
 
     def covers(self, problem: Problem) -> tuple[CoverShape, ...]:
         """Return the circles or spheres on the links."""
-        if isinstance(problem.collision, CoveredCollision):
-            shapes = problem.collision.bodies.shapes
-            columns = shapes.joint.tolist(), shapes.start, shapes.end, shapes.radius.tolist()
-            return tuple(CoverShape(*shape) for shape in zip(*columns, strict=True))
-        found = []
-        for item in problem.collision.geometry.geometryObjects:
-            center = np.array(item.placement.translation)
-            radius = float(item.geometry.radius)
-            found.append(CoverShape(item.parentJoint, center, center, radius))
-        return tuple(found)
+        return cover_shapes(problem.collision)
 
     def memory(self, problem: Problem) -> int:
         """Return the memory of populations, and of the configurations tested between via-points."""
@@ -203,10 +175,7 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
 
     def notes(self, problem: Problem) -> list[str]:
         """Describe the covers of bodies, where bodies are covered."""
-        if not isinstance(problem.collision, CoveredCollision):
-            return []
-        hulls = tasks.hull_names(problem.scene, problem.assembly.geometry.ngeoms)
-        return [*problem.collision.notes(problem.length_unit), *hull_notes(hulls)]
+        return cover_notes(problem.collision, problem.scene, problem.length_unit)
 
     def _strings(self, problem: Problem) -> Strings:
         is_covered = isinstance(problem.collision, CoveredCollision)

@@ -8,7 +8,7 @@ import pinocchio as pin
 
 from evoexp.collision.models.covered_bodies import CoveredCollision
 from evoexp.collision.models.touching_spheres import SphereCollision
-from evoexp.collision.scene import Scene, obstacle_pairs
+from evoexp.collision.scene import Scene
 from evoexp.evolution import crossover
 from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.numeric.elementary import DEGREE
@@ -16,6 +16,7 @@ from evoexp.numeric.named_tuples import plain
 from evoexp.objectives.string_fitness import StringTerms
 from evoexp.paths.walk import num_uniforms, walk
 from evoexp.paths.workspace import Redistribution
+from evoexp.planners.arm_tasks import margins
 from evoexp.planners.via_point_ga import kernels
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
 from evoexp.records import BoolArray, FloatArray, IntArray
@@ -57,8 +58,7 @@ class Problem(NamedTuple):
     @property
     def margins(self) -> FloatArray:
         """(pairs of the scene,) clearance that the task requires of each [length unit]."""
-        among_obstacles = obstacle_pairs(self.assembly, self.scene)
-        return np.where(among_obstacles, self.obstacle_margin, self.security_margin)
+        return margins(self.assembly, self.scene, self.security_margin, self.obstacle_margin)
 
     @property
     def sphere_radius(self) -> float:

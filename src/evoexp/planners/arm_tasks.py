@@ -1,26 +1,144 @@
-"""Start and goal of strings of via-points: in the joints' units, within limits, free of contact."""
+"""Motions of arms between two configurations: start and goal in degrees, bodies, and their covers.
 
-from typing import Any
+Planners that take a robot from one configuration to another share this problem: start and goal
+within limits and free of contact, the collision model that a search tests, the exact bodies.
+"""
+
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from evoexp.collision.box_support import coal
 from evoexp.collision.models.covered_bodies import CoveredBodies, CoveredCollision
-from evoexp.collision.models.touching_spheres import Clearance
-from evoexp.collision.scene import Scene, scene
+from evoexp.collision.models.touching_spheres import Clearance, SphereCollision, TouchingSpheres
+from evoexp.collision.scene import Scene, obstacle_pairs, scene
 from evoexp.errors import SettingError
 from evoexp.numeric.convex_hull import hull_of
 from evoexp.numeric.elementary import DEGREE
-from evoexp.planners.moveit_tasks import moving_joints, without_pairs
-from evoexp.records import FloatArray
-from evoexp.robots.assembly import Assembly
+from evoexp.planners.answers import CoverShape
+from evoexp.planners.moveit_tasks import (
+    arm_motion,
+    hull_notes,
+    moving_joints,
+    with_allowed_pairs,
+    without_pairs,
+)
+from evoexp.records import FloatArray, IntArray
+from evoexp.robots.assembly import Assembly, Robot
 from evoexp.robots.mesh_pieces import convex_shape
 from evoexp.scenarios.arm_motion import ArmMotion
 from evoexp.scenarios.moveit import MoveitTask
 
 ROUNDING = 1e-9  # [rad, m] by which an end may lie beyond a limit
+UNLIMITED = 1e6  # [rad] a joint without limits has larger ones in the model
 FIELDS = "scenario.q_start", "scenario.q_goal"
+
+
+class ArmProblem(NamedTuple):
+    """A robot and its scenario, prepared.
+
+    Attributes:
+        assembly: The robot, built.
+        collision: The touching circles or spheres on it, or its covered bodies.
+        start: (nq,) [deg].
+        goal: (nq,) [deg].
+        scene: The bodies themselves, for the exact verdict on a motion.
+        security_margin: Clearance that the task requires between two arms [length unit].
+        obstacle_margin: The same between a link and an obstacle.
+        length_unit: Name of the scene's unit of length.
+    """
+
+    assembly: Assembly
+    collision: SphereCollision | CoveredCollision
+    start: FloatArray
+    goal: FloatArray
+    scene: Scene
+    security_margin: float
+    obstacle_margin: float
+    length_unit: str
+
+    @property
+    def arm_slices(self) -> IntArray:
+        """(arms, 2) rows of each arm."""
+        return self.assembly.arm_slices
+
+    @property
+    def margins(self) -> FloatArray:
+        """(pairs of the scene,) clearance that the task requires of each [length unit]."""
+        return margins(self.assembly, self.scene, self.security_margin, self.obstacle_margin)
+
+    @property
+    def limits(self) -> FloatArray:
+        """(nq, 2) least and greatest value of each joint [deg]; large where it has no limits."""
+        model = self.assembly.model
+        limits = np.column_stack([model.lowerPositionLimit, model.upperPositionLimit])
+        return np.asarray(np.clip(limits, -UNLIMITED, UNLIMITED) / DEGREE)
+
+
+def arm_problem(
+    robot: Robot, scenario: ArmMotion | MoveitTask, model: TouchingSpheres | CoveredBodies
+) -> ArmProblem:
+    """Build the robot, and check that start and goal fit it and are free of collision.
+
+    Raises:
+        SettingError: If they do not, or are not.
+    """
+    assembly = robot.build()
+    if isinstance(scenario, MoveitTask):
+        assembly = with_allowed_pairs(assembly, scenario)
+    task = arm_motion(assembly, scenario)
+    start, goal = ends_of(assembly, task)
+    collision: SphereCollision | CoveredCollision
+    if isinstance(model, CoveredBodies):
+        bodies = covered_scene(assembly, task, scenario)
+        collision = covered_collision(model, bodies, assembly, task, scenario, (start, goal))
+    else:
+        collision = model.bind(assembly, task.obstacles)
+        given = ("q_start", start, task.q_start), ("q_goal", goal, task.q_goal)
+        for name, q, typed in given:
+            clearance = collision.clearance(q[:, None])
+            check_spheres(clearance, f"scenario.{name}", typed, task.length_unit)
+        bodies = scene(assembly, collision.obstacles)
+    own, margin = task.obstacle_margin, task.security_margin
+    both = margin, margin if own is None else own
+    return ArmProblem(assembly, collision, start, goal, bodies, *both, task.length_unit)
+
+
+def margins(
+    assembly: Assembly, bodies: Scene, security_margin: float, obstacle_margin: float
+) -> FloatArray:
+    """Return the clearance that a task requires of each pair of a scene, (pairs,)."""
+    return np.where(obstacle_pairs(assembly, bodies), obstacle_margin, security_margin)
+
+
+def cover_shapes(collision: SphereCollision | CoveredCollision) -> tuple[CoverShape, ...]:
+    """Return the circles, spheres and capsules that a collision model tests."""
+    if isinstance(collision, CoveredCollision):
+        shapes = collision.bodies.shapes
+        columns = shapes.joint.tolist(), shapes.start, shapes.end, shapes.radius.tolist()
+        return tuple(CoverShape(*shape) for shape in zip(*columns, strict=True))
+    found = []
+    for item in collision.geometry.geometryObjects:
+        center = np.array(item.placement.translation)
+        found.append(CoverShape(item.parentJoint, center, center, float(item.geometry.radius)))
+    return tuple(found)
+
+
+def cover_notes(
+    collision: SphereCollision | CoveredCollision, bodies: Scene, unit: str
+) -> list[str]:
+    """Describe the covers of bodies, where bodies are covered.
+
+    Args:
+        collision: The collision model.
+        bodies: The exact bodies: the robot's first, then the obstacles.
+        unit: Name of the scene's unit of length.
+    """
+    if not isinstance(collision, CoveredCollision):
+        return []
+    hulls = hull_names(bodies, collision.assembly.geometry.ngeoms)
+    return [*collision.notes(unit), *hull_notes(hulls)]
 
 
 def ends_of(assembly: Assembly, task: ArmMotion) -> tuple[FloatArray, FloatArray]:

@@ -17,7 +17,7 @@ from evoexp.configuration.experiment import Experiment
 from evoexp.configuration.search_path import options
 from matrix import examples
 
-KINDS = range(115)  # numbers of all kinds of conditions; `test_shipped` checks how many there are
+KINDS = range(118)  # numbers of all kinds of conditions; `test_shipped` checks how many there are
 EXAMPLES = (  # (experiment, number of its condition): every planner, and its rarer parts
     ("rana_obstacles", 0),
     ("rana_planar", 1),  # random search
@@ -27,6 +27,7 @@ EXAMPLES = (  # (experiment, number of its condition): every planner, and its ra
     ("lavoie_coding", 1),  # binary
     ("corsepius_ball", 0),
     ("corsepius_pick_and_place", 0),
+    ("rrt_connect", 0),
     ("chen_mission", 0),  # two stages: both planners of Chen & Zalzala
     ("chen_path", 4),  # elitism
     ("chen_placement", 3),  # a reference

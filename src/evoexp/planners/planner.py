@@ -102,7 +102,8 @@ class Planner(Protocol):
     def num_evaluations(self, index: int) -> int:
         """Return how many individuals of a population generation `index` evaluates, 0 the initial.
 
-        A planner that starts anew after a failed attempt says so of each attempt.
+        A planner that starts anew after a failed attempt says so of each attempt. The last
+        generation of a planner that ends by itself (`stop_reason`) may evaluate fewer.
         """
 
     def sample(self, problem: Any, rng: np.random.Generator, count: int) -> FloatArray:

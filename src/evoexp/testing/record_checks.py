@@ -29,7 +29,10 @@ def generations_are_numbered(condition: Condition) -> None:
 
 
 def evaluations_add_up(condition: Condition) -> None:
-    """Evaluations grow by what `num_evaluations` announces for each generation."""
+    """Evaluations grow by what `num_evaluations` announces for each generation.
+
+    The last generation may have fewer where the planner ends by itself.
+    """
     found = evolution(condition)
     counts = [generation.evaluations for generation in found.generations]
     must = "evaluations must grow with every generation"
@@ -42,7 +45,8 @@ def evaluations_add_up(condition: Condition) -> None:
     announced = itertools.accumulate(rows * each(index) for index in range(len(counts)))
     for index, (wanted, was) in enumerate(zip(announced, counts, strict=True)):
         must = f"evaluations up to generation {index} must be the sum of num_evaluations, {wanted}"
-        demand(was == wanted, condition, must, was)
+        ends = bool(found.generations[index].stop_reason)
+        demand(was == wanted or (ends and was < wanted), condition, must, was)
 
 
 def collision_queries_never_decrease(condition: Condition) -> None:

@@ -14,7 +14,10 @@ from evoexp.testing.evolution_record import demand, evolution
 from evoexp.testing.protocol_checks import has_one_population
 
 TOLERANCE = 1e-9  # [-] of numbers that pass through another unit on their way
-OF_THE_SEARCH = {"attempts", "sub_path", "phase", "cycles", "idle_cycles"}
+OF_THE_SEARCH = {
+    *("attempts", "sub_path", "phase", "cycles", "idle_cycles"),
+    *("iterations", "nodes", "first_solution_queries", "first_solution_length_deg"),
+}
 """Terms that describe how the search went, which no solution alone can know."""
 NUM_SAMPLES = 6  # [-] individuals that are drawn and judged
 

@@ -1,0 +1,282 @@
+"""RRT-Connect: two trees that grow toward each other (Kuffner & LaValle 2000), then shortcuts.
+
+A baseline from outside the evolutionary planners: it is done with the first path that is free, and
+makes that one shorter by random shortcuts (Geraerts & Overmars 2007), as many as are asked for.
+All arms together are one configuration (nq,) [deg]; angles are not wrapped. Random configurations
+are uniform within the joints' limits; the goal is never drawn on purpose.
+
+A generation is a batch of iterations: random configurations that the trees grow toward, then
+attempts to shorten the path. Its costs are the lengths of the path in hand after each iteration,
+inf before there is one; its population is all nodes of both trees. A solution is flat: node by
+node, joint by joint (nodes × nq) [deg], start and goal included; the start alone: no path was
+found, and there is no motion.
+"""
+
+from collections.abc import Iterator
+from typing import Any, ClassVar
+
+import numpy as np
+
+from evoexp.collision.scene import Part
+from evoexp.errors import SettingError
+from evoexp.evolution.cost_statistics import cost_statistics
+from evoexp.numeric.elementary import DEGREE
+from evoexp.paths.motion import Motion
+from evoexp.planners.answers import CoverShape
+from evoexp.planners.arm_tasks import (
+    UNLIMITED,
+    ArmProblem,
+    arm_problem,
+    cover_notes,
+    cover_shapes,
+)
+from evoexp.planners.departures import joint_names, of_limits, of_place
+from evoexp.planners.planner import Candidate, JudgementArrays, Keeper, PlannerDefaults
+from evoexp.planners.rrt_connect.kernels import distance, lengths_along
+from evoexp.planners.rrt_connect.settings import RrtSettings
+from evoexp.planners.rrt_connect.shortcuts import ShortenedPath
+from evoexp.planners.rrt_connect.trees import EdgeTest, TreePair
+from evoexp.records import FloatArray, Generation
+from evoexp.robots.assembly import Robot
+from evoexp.scenarios.arm_motion import ArmMotion
+from evoexp.scenarios.moveit import MoveitTask
+from evoexp.validation import Component
+
+MOST_STEPS = 10_000  # of a line through the whole space of configurations
+MOST_TESTED = 1_000_000  # configurations on such a line
+NODES_PER_ITERATION = 4  # of both trees, for the estimate of memory: most have fewer
+
+
+class RrtConnect(PlannerDefaults, RrtSettings, Component):
+    """RRT-Connect and shortcuts."""
+
+    component: ClassVar[str] = "rrt_connect"
+
+    def prepare(self, robot: Robot, scenario: ArmMotion | MoveitTask) -> ArmProblem:
+        """Build the robot, and check that start and goal fit it and are free of collision.
+
+        Raises:
+            SettingError: If they do not, or are not, or if steps are too short for the joints'
+                ranges.
+        """
+        problem = arm_problem(robot, scenario, self.collision)
+        low, high = self.box(problem)
+        through, substeps = distance(low, high), self.collision.collision_substeps
+        most = min(MOST_STEPS, MOST_TESTED // substeps)
+        if through > most * self.range:
+            must = f"at least {through / most:.3g} deg: a line through the ranges of all joints "
+            must += f"({through:.4g} deg) has at most {MOST_STEPS:,} steps and {MOST_TESTED:,} "
+            must += f"configurations tested, {substeps} per step"
+            raise SettingError("planner.range", must, self.range)
+        return problem
+
+    def box(self, problem: ArmProblem) -> tuple[FloatArray, FloatArray]:
+        """Return the least and the greatest value of each joint that is drawn, each (nq,) [deg]."""
+        low, high = problem.limits.T
+        # ends that lie on a limit lie within it, whatever the last bit of the conversion is
+        first = np.minimum(problem.start, problem.goal)
+        last = np.maximum(problem.start, problem.goal)
+        free_low, free_high = self._free_joints(problem)
+        return (
+            np.where(free_low, first - self.free_turn, np.minimum(low, first)),
+            np.where(free_high, last + self.free_turn, np.maximum(high, last)),
+        )
+
+    def evolve(self, problem: ArmProblem, rng: np.random.Generator) -> Iterator[Generation]:
+        """Yield a record per batch of iterations, until the path is shortened or given up."""
+        search, keeper = _Search(self, problem), Keeper()
+        for index in range(self.num_generations + 1):
+            costs, asked = np.full(self.num_evaluations(index), np.inf), search.edges.queries
+            count = 0
+            while count < len(costs) and not search.stop_reason:
+                search.iterate(rng)
+                costs[count] = search.cost
+                count += 1
+            costs = costs[:count]
+            keeper.keep(search.cost, search.candidate())
+            yield keeper.record(
+                cost_statistics(costs),
+                costs,
+                np.concatenate([tree.nodes for tree in search.pair.trees]),
+                lowest=float(costs.min()),
+                num_feasible=int(np.count_nonzero(np.isfinite(costs))),
+                evaluations=count,
+                collision_queries=search.edges.queries - asked,
+                stop_reason=search.stop_reason,
+            )
+            if search.stop_reason:
+                return
+
+    @property
+    def num_generations(self) -> int:
+        """Batches after the first, at most."""
+        batches = -(-self._most_iterations // self.ga.iterations_per_generation)
+        return min(self.ga.num_generations, batches - 1)
+
+    def num_evaluations(self, index: int) -> int:
+        """Return the iterations of a generation, an upper bound for the one in which the run ends."""
+        size = self.ga.iterations_per_generation
+        return max(0, min(size, self._most_iterations - index * size))
+
+    def sample(self, problem: ArmProblem, rng: np.random.Generator, count: int) -> FloatArray:
+        """Refuse: trees are grown, paths are not drawn one by one.
+
+        Raises:
+            SettingError: Always.
+        """
+        raise SettingError("planner", "one that draws paths one by one", self.component)
+
+    def cost(self, problem: ArmProblem, population: FloatArray) -> JudgementArrays:
+        """Judge paths (nq, nodes, individuals): their length, inf where a tested edge collides."""
+        edges = EdgeTest(problem.collision, self.resolution)
+        paths = [np.ascontiguousarray(path) for path in population.transpose(2, 1, 0)]
+        lengths = np.array([_length(path) for path in paths])
+        collisions = np.array([edges.num_contacts(path) for path in paths])
+        feasible = (collisions == 0) & np.isfinite(lengths)
+        segments = np.full(len(paths), population.shape[1] - 1)
+        terms = {"length_deg": lengths, "segments": segments, "collisions": collisions}
+        return JudgementArrays(np.where(feasible, lengths, np.inf), feasible, edges.queries, terms)
+
+    def solution(self, problem: ArmProblem, population: FloatArray, individual: int) -> FloatArray:
+        """Return one path of a population (nq, nodes, individuals) as a flat solution."""
+        return np.asarray(population[:, :, individual].T.ravel())
+
+    def motion(self, problem: ArmProblem, solution: FloatArray) -> Motion | None:
+        """Return the joint-space motion: straight, nodes in equal times; None without a path."""
+        path = self._path(problem, solution)
+        return Motion(np.ascontiguousarray(DEGREE * path)) if len(path) > 1 else None
+
+    def parts(self, problem: ArmProblem, motion: Motion) -> tuple[Part, ...]:
+        """Return the whole motion; arms and obstacles have margins of their own."""
+        return (Part(problem.scene, 0, motion.num_segments, problem.margins),)
+
+    def evaluate(self, problem: ArmProblem, solution: FloatArray) -> dict[str, float]:
+        """Return length, segments and contacts of a path; its length beside the straight line's.
+
+        Raises:
+            ValueError: If the solution is no list of configurations.
+        """
+        path = self._path(problem, solution)
+        terms = self.cost(problem, path.T[:, :, None]).named_terms(0)
+        straight = distance(problem.start, problem.goal)
+        ratio = {"length_ratio": terms["length_deg"] / straight} if straight > 0.0 else {}
+        return terms | ratio
+
+    def departures(self, problem: ArmProblem, solution: FloatArray) -> list[str]:
+        """Compare start and goal of every arm with the task's, and angles with their limits."""
+        path, found = self._path(problem, solution), []
+        if len(path) == 1:
+            found.append("there is no path, one configuration only")
+        for arm, (a, b) in enumerate(problem.arm_slices):
+            for end, row, wanted in (("start", 0, problem.start), ("goal", -1, problem.goal)):
+                name = f"the {end} of arm {arm + 1}"
+                found += of_place(name, path[row, a:b], wanted[a:b], "deg")
+        return found + of_limits(joint_names(path.shape[1]), path.T, problem.limits, "deg")
+
+    def shape(self, problem: ArmProblem) -> tuple[Any, ...]:
+        """Return the documented shape of a solution: any number of nodes × nq."""
+        return ..., (len(problem.start),)
+
+    def memory(self, problem: ArmProblem) -> int:
+        """Return the memory of both trees, of their copy as they grow, and of a record's copy."""
+        most = (self.num_generations + 1) * self.ga.iterations_per_generation
+        nodes = NODES_PER_ITERATION * min(self.max_iterations, most)
+        low, high = self.box(problem)
+        tested = distance(low, high) / self.resolution
+        return int(8 * (len(problem.start) + 1) * (4 * nodes + 2 * tested))
+
+    def notes(self, problem: ArmProblem) -> list[str]:
+        """Describe how densely edges are tested, the ranges of free joints, and the covers."""
+        lines = [f"edges are tested every {self.resolution:.4g} deg or more densely"]
+        free_low, free_high = self._free_joints(problem)
+        if count := int(np.count_nonzero(free_low | free_high)):
+            joints = f"{count} joints have" if count > 1 else "1 joint has"
+            lines.append(
+                f"{joints} no limits: drawn up to {self.free_turn:g} deg beyond start and goal"
+            )
+        return lines + cover_notes(problem.collision, problem.scene, problem.length_unit)
+
+    def covers(self, problem: ArmProblem) -> tuple[CoverShape, ...]:
+        """Return the circles, spheres and capsules that edges are tested with."""
+        return cover_shapes(problem.collision)
+
+    @property
+    def _most_iterations(self) -> int:
+        """Iterations of a run that finds its path last of all, shortcuts included."""
+        return self.max_iterations + self.num_shortcuts
+
+    def _free_joints(self, problem: ArmProblem) -> tuple[np.ndarray, np.ndarray]:
+        """Return which joints have no lower and which have no upper limit, each (nq,)."""
+        low, high = problem.limits.T
+        most = UNLIMITED / DEGREE
+        return low <= -most, high >= most
+
+    def _path(self, problem: ArmProblem, solution: FloatArray) -> FloatArray:
+        """Return a flat solution as a path (nodes, nq)."""
+        nq = len(problem.start)
+        if solution.ndim != 1 or len(solution) == 0 or len(solution) % nq:
+            raise ValueError(f"a solution has a multiple of {nq} values, was {solution.shape}")
+        return np.ascontiguousarray(solution.reshape(-1, nq))
+
+
+class _Search:
+    """The state of one run: the trees until they meet, then the path.
+
+    Attributes:
+        pair: The trees.
+        edges: Tests edges and counts.
+    """
+
+    def __init__(self, planner: RrtConnect, problem: ArmProblem) -> None:
+        self._planner, self._start = planner, problem.start
+        self._low, self._high = planner.box(problem)
+        self.edges = EdgeTest(problem.collision, planner.resolution)
+        self.pair = TreePair(problem.start, problem.goal, self.edges, planner.range)
+        self._path: ShortenedPath | None = None
+        self._first = {"first_solution_queries": np.inf, "first_solution_length_deg": np.inf}
+        self._solution, self._shown = problem.start.copy(), problem.start
+
+    @property
+    def cost(self) -> float:
+        """Length of the path in hand [deg], inf without one."""
+        return np.inf if self._path is None else self._path.length
+
+    @property
+    def stop_reason(self) -> str:
+        """Why the run ends now; empty while it goes on."""
+        if self._path is not None:
+            done = self._path.num_attempts >= self._planner.num_shortcuts
+            return "solution" if done else ""
+        given_up = self.pair.num_iterations >= self._planner.max_iterations
+        return "no solution" if given_up else ""
+
+    def iterate(self, rng: np.random.Generator) -> None:
+        """Grow the trees toward a random configuration, or try a shortcut of the path."""
+        if self._path is not None:
+            self._path.attempt(rng.random(2))
+            return
+        drawn = self._low + rng.random(len(self._low)) * (self._high - self._low)
+        nodes = self.pair.iterate(drawn)
+        if nodes is not None:
+            self._path = ShortenedPath(nodes, self.edges)
+            self._first = {
+                "first_solution_queries": float(self.edges.queries),
+                "first_solution_length_deg": self._path.length,
+            }
+
+    def candidate(self) -> Candidate:
+        """Return the path in hand as it is recorded; the same array as long as it is the same."""
+        if self._path is not None and self._path.nodes is not self._shown:
+            self._shown = self._path.nodes
+            self._solution = self._shown.flatten()
+        terms = {
+            "length_deg": self.cost,
+            "iterations": float(self.pair.num_iterations),
+            "nodes": float(sum(tree.count for tree in self.pair.trees)),
+        }
+        return Candidate(self._solution, terms | self._first, self._path is not None)
+
+
+def _length(path: FloatArray) -> float:
+    """Return the length of a path (nodes, nq) [deg]; inf of a single configuration."""
+    return float(lengths_along(path)[-1]) if len(path) > 1 else np.inf

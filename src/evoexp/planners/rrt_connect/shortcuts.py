@@ -1,0 +1,60 @@
+"""Shortcuts of paths between random places (Geraerts & Overmars 2007, section 4)."""
+
+import itertools
+
+import numpy as np
+
+from evoexp.planners.rrt_connect.kernels import lengths_along, place_on_path
+from evoexp.planners.rrt_connect.trees import EdgeTest
+from evoexp.records import FloatArray
+
+
+class ShortenedPath:
+    """A path that becomes shorter, attempt by attempt.
+
+    All its edges were tested as edges of their own: what is left of a segment that a shortcut cuts
+    in two is tested anew, because other configurations of it are looked at.
+
+    Attributes:
+        nodes: (nodes, nq) [deg]; never changed in place.
+        lengths: (nodes,) from the start to each [deg].
+        num_attempts: Attempts so far.
+    """
+
+    def __init__(self, nodes: FloatArray, edges: EdgeTest) -> None:
+        """Begin with a path (nodes, nq) that is free."""
+        self.nodes, self.lengths = nodes, lengths_along(nodes)
+        self._edges, self.num_attempts = edges, 0
+
+    @property
+    def length(self) -> float:
+        """Length of the path [deg]."""
+        return float(self.lengths[-1])
+
+    def attempt(self, uniforms: FloatArray) -> None:
+        """Try the straight line between two places of the path.
+
+        Args:
+            uniforms: (2,) the places, as shares of the length.
+        """
+        self.num_attempts += 1
+        places = sorted(float(share) * self.length for share in uniforms)
+        (first, one), (last, two) = (place_on_path(self.nodes, self.lengths, at) for at in places)
+        if first == last:  # the line between them is already part of the path
+            return
+        kept = [*self.nodes[: first + 1], one, two, *self.nodes[last + 1 :]]
+        # a place that is a node of the path stays once
+        rows = [kept[0], *(b for a, b in itertools.pairwise(kept) if (a != b).any())]
+        found = np.array(rows)
+        lengths = lengths_along(found)
+        if lengths[-1] < self.length and self._is_free(first, last, one, two):
+            self.nodes, self.lengths = found, lengths
+
+    def _is_free(self, first: int, last: int, one: FloatArray, two: FloatArray) -> bool:
+        """Whether the new edge is free, and what is left of the segments at both of its ends."""
+        before, behind = self.nodes[first], self.nodes[last + 1]
+        return all(
+            self._edges.is_free(a, b)
+            for a, b in ((one, two), (before, one), (two, behind))
+            if (a != b).any()
+        )

@@ -1,0 +1,185 @@
+"""RRT-Connect: kernels and whole runs against a slow version, edges tested densely, hostile input."""
+
+import itertools
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from evoexp.condition import Condition
+from evoexp.configuration.compose import expand
+from evoexp.errors import SettingError
+from evoexp.planners.planner import judge_motion
+from evoexp.planners.rrt_connect.kernels import (
+    distance,
+    lengths_along,
+    nearest_node,
+    place_on_path,
+    step_toward,
+)
+from evoexp.planners.rrt_connect.kernels import (
+    tested_configurations as configurations_on,
+)
+from moveit_samples import COVERED, body, scene, write_problem, write_robot
+from references import rrt_connect_python
+
+PLANAR = "rana_planar"
+POST = body("cylinder", [1.0, 0.03], [0.35, 0.35, 0.5], name="post")  # in the straight way
+
+
+def condition(label: str, *changes: str) -> Condition:
+    (experiment,) = expand(["experiment=rrt_connect", *changes])
+    return next(each.condition for each in experiment.conditions if each.label == label)
+
+
+def ran(chosen: Condition, seed: int) -> tuple[Any, Any, list[Any]]:
+    planner, problem = chosen.prepare()
+    return planner, problem, list(planner.evolve(problem, np.random.default_rng(seed)))
+
+
+@given(st.integers(1, 300), st.integers(1, 8), st.integers(0, 99))
+def test_the_nearest_node_is_the_first_of_the_least_distance(
+    count: int, joints: int, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    nodes = np.round(rng.normal(size=(joints, count + 5)) * 2.0)  # coarse, so that many are equal
+    q = np.round(rng.normal(size=joints))
+    squares = ((nodes[:, :count] - q[:, None]) ** 2).sum(axis=0)
+    assert nearest_node(nodes, count, q) == int(np.argmin(squares))
+
+
+@given(st.floats(0.5, 200.0), st.floats(0.1, 50.0), st.integers(0, 99))
+def test_an_edge_is_tested_at_equal_distances_with_its_end_and_either_way_alike(
+    far: float, resolution: float, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    one, direction = rng.normal(size=5) * 100.0, rng.normal(size=5)
+    two = one + far * direction / np.linalg.norm(direction)
+    found = configurations_on(one, two, resolution)
+    assert np.array_equal(found[:, 0], two)
+    order = np.argsort(np.linalg.norm(found - one[:, None], axis=0))
+    along = np.linspace(one, two, found.shape[1] + 1)[1:]
+    assert np.allclose(found[:, order].T, along, atol=1e-9)
+    assert far / found.shape[1] <= resolution * (1.0 + 1e-5)
+    assert far / max(1, found.shape[1] - 1) >= resolution or found.shape[1] == 1
+    back = configurations_on(two, one, resolution)
+    inside, inside_back = ({tuple(q) for q in each.T[1:]} for each in (found, back))
+    assert inside == inside_back
+
+
+def test_steps_are_as_long_as_asked_and_end_at_the_target() -> None:
+    q, target = np.array([1.0, 2.0, 3.0]), np.array([1.0, 14.0, 8.0])
+    new = step_toward(q, target, 6.5)
+    assert new == pytest.approx([1.0, 8.0, 5.5])
+    assert distance(q, new) == pytest.approx(6.5)
+    assert np.array_equal(step_toward(q, target, 13.0), target)
+
+
+@given(st.integers(2, 9), st.floats(0.0, 1.0), st.integers(0, 99))
+def test_places_on_a_path_are_those_of_interpolation(nodes: int, share: float, seed: int) -> None:
+    path = np.random.default_rng(seed).normal(size=(nodes, 3))
+    lengths = lengths_along(path)
+    pieces = [math.dist(a, b) for a, b in itertools.pairwise(path)]
+    assert lengths == pytest.approx([0.0, *np.cumsum(pieces)])
+    at = share * lengths[-1]
+    segment, q = place_on_path(path, lengths, at)
+    assert lengths[segment] <= at <= lengths[segment + 1] + 1e-12
+    assert q == pytest.approx([np.interp(at, lengths, joint) for joint in path.T], abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("shortcuts", [0, 60])
+def test_runs_are_those_of_the_slow_version(seed: int, shortcuts: int) -> None:
+    chosen = condition(PLANAR, f"planner.num_shortcuts={shortcuts}", "ga.num_generations=400")
+    planner, problem, records = ran(chosen, seed)
+    slow = rrt_connect_python.run(
+        planner, problem, lambda q: bool(problem.collision.collides(q[:, None])[0]), seed
+    )
+    last = records[-1]
+    assert last.stop_reason == "solution"
+    path = last.best.reshape(-1, len(problem.start))
+    assert path.shape == (len(slow.path), len(problem.start))
+    assert np.allclose(path, slow.path, rtol=0.0, atol=1e-9)
+    assert last.collision_queries == slow.asked
+    assert last.best_cost == pytest.approx(rrt_connect_python.length(slow.path))
+    assert last.terms["iterations"] == slow.iterations
+    assert last.terms["nodes"] == slow.nodes
+    assert last.terms["first_solution_length_deg"] == pytest.approx(slow.first_length)
+
+
+def test_paths_are_free_where_they_were_tested_and_become_shorter() -> None:
+    planner, problem, records = ran(condition(PLANAR, "ga.iterations_per_generation=5"), 1)
+    costs = [record.best_cost for record in records]
+    assert all(later <= earlier for earlier, later in itertools.pairwise(costs))
+    found = [record for record in records if math.isfinite(record.best_cost)]
+    assert found[0].best_cost > found[-1].best_cost
+    for record in (found[0], found[-1]):
+        path = record.best.reshape(-1, len(problem.start))
+        assert np.array_equal(path[[0, -1]], [problem.start, problem.goal])
+        for one, two in itertools.pairwise(path):
+            tested = configurations_on(one, two, planner.resolution)
+            assert not problem.collision.collides(tested).any()
+        terms = planner.evaluate(problem, record.best)
+        assert terms["collisions"] == 0.0
+        assert terms["length_deg"] == pytest.approx(record.best_cost)
+        assert not planner.departures(problem, record.best)
+    motion = planner.motion(problem, found[-1].best)
+    assert judge_motion(planner, problem, motion).certified
+
+
+def test_the_last_record_has_the_iterations_that_were_made() -> None:
+    chosen = condition(PLANAR, "planner.num_shortcuts=7", "ga.iterations_per_generation=10")
+    _, _, records = ran(chosen, 2)
+    last = records[-1]
+    assert last.evaluations == last.terms["iterations"] + 7
+    counts = [record.evaluations for record in records]
+    assert all(b - a == 10 for a, b in itertools.pairwise([0, *counts[:-1]]))
+
+
+def test_a_search_that_is_given_up_has_no_path_and_no_motion(tmp_path: Path) -> None:
+    chosen = condition(PLANAR, "planner.max_iterations=3")
+    planner, problem, records = ran(chosen, 0)
+    (only,) = records
+    assert only.stop_reason == "no solution"
+    assert (only.evaluations, only.best_cost, only.solved) == (3, math.inf, False)
+    assert planner.motion(problem, only.best) is None
+    (departure,) = [d for d in planner.departures(problem, only.best) if "path" in d]
+    assert departure == "there is no path, one configuration only"
+
+
+def test_tasks_of_moveit_are_planned_around_obstacles(tmp_path: Path) -> None:
+    words = [*write_robot(tmp_path), *write_problem(tmp_path, scene(POST))]
+    words += [word for word in COVERED if not word.startswith(("planner", "ga", "objective"))]
+    words += ["planner=rrt_connect", "ga=rrt_connect", "objective=null"]
+    (experiment,) = expand(words)
+    planner, problem, records = ran(experiment.conditions[0].condition, 0)
+    assert records[-1].solved
+    motion = planner.motion(problem, records[-1].best)
+    assert judge_motion(planner, problem, motion).certified
+    assert any("tested every 2.5 deg" in note for note in planner.notes(problem))
+
+
+@pytest.mark.parametrize(
+    ("change", "line"),
+    [
+        ("planner.range=0.001", r"planner\.range: must be at least .* deg: a line through"),
+        ("planner.range=-1", r"planner\.range: must be"),
+        ("planner.num_shortcuts=-1", r"planner\.num_shortcuts: must be"),
+        ("planner.max_iterations=0", r"planner\.max_iterations: must be"),
+        ("planner.free_turn=0", r"planner\.free_turn: must be"),
+        ("control=random_search", r"planner: must be one that draws paths one by one"),
+    ],
+)
+def test_settings_that_cannot_be_are_one_line(change: str, line: str) -> None:
+    with pytest.raises(SettingError, match=line):
+        ran(condition(PLANAR, change), 0)
+
+
+def test_solutions_of_another_size_are_refused() -> None:
+    planner, problem = condition(PLANAR).prepare()
+    with pytest.raises(ValueError, match="a multiple of 4 values"):
+        planner.evaluate(problem, np.zeros(7))

@@ -1,0 +1,134 @@
+"""RRT-Connect and shortcuts, slow and obvious: lists of nodes, one configuration after the other.
+
+A configuration is asked for by a function of one configuration, so that this knows nothing of
+collision models. Random numbers are drawn as the planner draws them.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+
+class Outcome(NamedTuple):
+    """What a search came to.
+
+    Attributes:
+        path: Configurations from start to goal; none if there is no path.
+        first_length: Length of the path before any shortcut [deg].
+        asked: Configurations that were asked for.
+        iterations: Random configurations.
+        nodes: Of both trees.
+    """
+
+    path: list[Any]
+    first_length: float
+    asked: int
+    iterations: int
+    nodes: int
+
+
+class Planner:
+    """Grows two trees and shortens what they find."""
+
+    def __init__(self, collides: Callable[[Any], bool], step: float, substeps: int) -> None:
+        """Begin with an obstacle test of one configuration, and the length of a step [deg]."""
+        self.collides, self.step, self.resolution = collides, step, step / substeps
+        self.asked = 0
+
+    def free(self, one: Any, two: Any) -> bool:
+        """Whether the configurations on an edge are free, its first end left out."""
+        parts = max(1, math.ceil(math.dist(one, two) / self.resolution - 1e-6))
+        self.asked += parts
+        places = [((parts - k) * one + k * two) / parts for k in range(1, parts)] + [two]
+        return not any(self.collides(q) for q in places)
+
+    def grow(self, tree: list[Any], q: Any, target: Any, near: int) -> tuple[Any, str]:
+        """EXTEND: one step from a node."""
+        far = math.dist(q, target)
+        new = target if far <= self.step else q + self.step / far * (target - q)
+        if np.array_equal(new, q):
+            return near, "reached"
+        if not self.free(q, new):
+            return near, "trapped"
+        tree.append((new, near))
+        return len(tree) - 1, "reached" if new is target else "advanced"
+
+    def search(self, start: Any, goal: Any, draw: Callable[[], Any], most: int) -> Any:
+        """Return a path and how many iterations and nodes it took."""
+        trees = [[(start, -1)], [(goal, -1)]]
+        for turn in range(most):
+            own, other = trees[turn % 2], trees[1 - turn % 2]
+            target = draw()
+            near = nearest(own, target)
+            node, how = self.grow(own, own[near][0], target, near)
+            if how == "trapped":
+                continue
+            new = own[node][0]
+            met = nearest(other, new)
+            met, how = self.grow(other, other[met][0], new, met)
+            while how == "advanced":
+                met, how = self.grow(other, other[met][0], new, met)
+            if how == "reached":
+                halves = [branch(own, node), branch(other, met)]
+                first, last = halves if turn % 2 == 0 else halves[::-1]
+                return first + last[-2::-1], turn + 1, len(own) + len(other)
+        return [], most, sum(map(len, trees))
+
+    def shorten(self, path: list[Any], uniforms: Any) -> list[Any]:
+        """Return the path with the line between two random places, if that is free and shorter."""
+        edges = list(zip(path[:-1], path[1:], strict=True))
+        total = length(path)
+        places = []
+        for at in sorted(float(share) * total for share in uniforms):
+            k = before = 0
+            while k < len(edges) - 1 and before + math.dist(*edges[k]) <= at:
+                before += math.dist(*edges[k])
+                k += 1
+            share = (at - before) / math.dist(*edges[k])
+            places.append((k, edges[k][0] + share * (edges[k][1] - edges[k][0])))
+        (first, one), (last, two) = places
+        if first == last:
+            return path
+        new = [*path[: first + 1], one, two, *path[last + 1 :]]
+        if length(new) >= total:
+            return path
+        pieces = [(one, two), (path[first], one), (two, path[last + 1])]
+        return new if all(self.free(a, b) for a, b in pieces) else path
+
+
+def nearest(tree: list[Any], q: Any) -> int:
+    """Return the nearest node, the oldest among equals."""
+    squares = [sum((a - b) ** 2 for a, b in zip(node, q, strict=True)) for node, _ in tree]
+    return squares.index(min(squares))
+
+
+def branch(tree: list[Any], node: int) -> list[Any]:
+    """Return the nodes from the root to a node."""
+    found = []
+    while node >= 0:
+        found.append(tree[node][0])
+        node = tree[node][1]
+    return found[::-1]
+
+
+def length(path: list[Any]) -> float:
+    """Return the length of a path."""
+    return sum(math.dist(a, b) for a, b in zip(path[:-1], path[1:], strict=True))
+
+
+def run(planner: Any, problem: Any, collides: Callable[[Any], bool], seed: int) -> Outcome:
+    """Run a search as `RrtConnect` with the same settings and seed does."""
+    own = Planner(collides, planner.range, planner.collision.collision_substeps)
+    rng = np.random.default_rng(seed)
+    low, high = planner.box(problem)
+
+    def draw() -> Any:
+        return low + rng.random(len(low)) * (high - low)
+
+    path, iterations, nodes = own.search(problem.start, problem.goal, draw, planner.max_iterations)
+    first = length(path) if path else math.inf
+    for _ in range(planner.num_shortcuts if path else 0):
+        path = own.shorten(path, rng.random(2))
+    return Outcome(path, first, own.asked, iterations, nodes)

@@ -1,4 +1,4 @@
-"""RRT-Connect: kernels and whole runs against a slow version, edges tested densely, hostile input."""
+"""RRT-Connect: kernels and whole runs against a slow version, dense tests of edges, hostile input."""
 
 import itertools
 import math

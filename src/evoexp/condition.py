@@ -14,13 +14,15 @@ import numpy as np
 from evoexp.attachments import SHA256, attached, keep, with_files
 from evoexp.errors import EvoexpError, RevisionMismatch, SettingError, UnknownSetting
 from evoexp.registry import component_class
-from evoexp.validation import LARGEST, TARGET, Component, build
+from evoexp.validation import LARGEST, MOST_QUERIES, TARGET, Component, build
 
 # Of robots and scenarios: coal's distances between bodies ten times as far apart or as large as
 # that end in memory that is not theirs.
 _LARGEST = {"robot": 1e7, "scenario": 1e7, "planner": LARGEST}
 MAX_SEED = 2**128  # numpy's own seeds have as many bits
 PARTS = ("robot", "scenario", "planner")
+KEYS = (*PARTS, "seed", MOST_QUERIES)
+LARGEST_CAP = 10**15  # collision queries: as many as a float tells apart
 _pairs: dict[str, bytes] = {}  # a robot's settings → its derived pairs
 
 
@@ -95,8 +97,8 @@ def stored_config(text: bytes) -> dict[str, Any]:
         if not isinstance(named, dict) or not isinstance(named.get(TARGET), str):
             must = f"a component, given by its {TARGET}"
             raise SettingError(f"config.json: {part}", must, named)
-    if unknown := set(config) - {*PARTS, "seed"}:
-        raise UnknownSetting(min(unknown), (*PARTS, "seed"))
+    if unknown := set(config) - {*KEYS}:
+        raise UnknownSetting(min(unknown), KEYS)
     return config
 
 
@@ -108,28 +110,36 @@ class Prepared(NamedTuple):
 
 
 class Condition(NamedTuple):
-    """Robot, scenario, planner with its parts, and the seed; nothing else can change a result."""
+    """What can change a result: robot, scenario, planner with its parts, seed, and a cap.
+
+    Attributes:
+        robot: A component.
+        scenario: A component.
+        planner: A component that is a `planners.planner.Planner`.
+        seed: At least 0.
+        max_collision_queries: A run ends before the generation that takes it beyond; None: no cap.
+    """
 
     robot: Component
     scenario: Component
-    planner: Any  # a component that is a `planners.planner.Planner`
+    planner: Any
     seed: int
+    max_collision_queries: int | None = None
 
     @classmethod
     def from_config(cls, config: Any) -> "Condition":
         """Build a condition from plain data.
 
         Args:
-            config: Mapping with `robot`, `scenario`, `planner` (each with its `_target_`) and
-                `seed`.
+            config: Mapping with `robot`, `scenario`, `planner` (each with its `_target_`), `seed`
+                and, if need be, `max_collision_queries`.
 
         Raises:
             SettingError: For any value that cannot be.
             UnknownSetting: For any key that does not exist.
         """
-        unknown = set(config) - {*PARTS, "seed"}
-        if unknown:
-            raise UnknownSetting(min(unknown), (*PARTS, "seed"))
+        if unknown := set(config) - {*KEYS}:
+            raise UnknownSetting(min(unknown), KEYS)
         parts = [build(config.get(part), component_class, part, _LARGEST[part]) for part in PARTS]
         for part, value in zip(PARTS, parts, strict=True):
             if not isinstance(value, Component):
@@ -139,9 +149,12 @@ class Condition(NamedTuple):
             raise SettingError("seed", "a whole number, at least 0", seed)
         if seed >= MAX_SEED:
             raise SettingError("seed", "less than 2^128", seed)
+        most = config.get(MOST_QUERIES)
+        if most is not None and (type(most) is not int or not 0 < most <= LARGEST_CAP):
+            raise SettingError(MOST_QUERIES, f"a whole number, 1 to {LARGEST_CAP:,}", most)
         robot, scenario, planner = parts
         _check_roles(robot, scenario, planner)
-        return cls(robot, scenario, planner, seed)
+        return cls(robot, scenario, planner, seed, most)
 
     @classmethod
     def from_json(cls, text: bytes) -> "Condition":
@@ -164,6 +177,8 @@ class Condition(NamedTuple):
     def to_json(self) -> bytes:
         """Return the canonical form, whose SHA-256 is the identity: keys sorted, floats short."""
         config = {part: getattr(self, part).canonical() for part in PARTS} | {"seed": self.seed}
+        if self.max_collision_queries is not None:
+            config[MOST_QUERIES] = self.max_collision_queries
         return json.dumps(config, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
 
     def files(self) -> dict[str, bytes]:

@@ -29,6 +29,7 @@ NonNegative = Annotated[float, Field(ge=0.0)]
 Vector = tuple[float, ...]
 
 TARGET = "_target_"
+MOST_QUERIES = "max_collision_queries"  # of a condition; left out where nothing is capped
 
 
 class Settings(BaseModel):

@@ -1,4 +1,4 @@
-"""RRT-Connect: kernels and whole runs against a slow version, dense tests of edges, hostile input."""
+"""RRT-Connect: kernels and whole runs against a slow version, edges, hostile input."""
 
 import itertools
 import math

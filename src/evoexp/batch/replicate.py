@@ -6,12 +6,14 @@ from evoexp.attachments import SHA256
 from evoexp.batch.compile_clock import now
 from evoexp.collision.box_support import EXACT
 from evoexp.condition import Condition
+from evoexp.errors import SettingError
 from evoexp.planners.planner import judge_motion
 from evoexp.records import Generation, ReplicateSummary
 from evoexp.registry import guests
 from evoexp.store.log import Finished, Log
 from evoexp.store.manifest import environment
 
+BUDGET_SPENT = "collision queries"  # why a run ended whose next generation exceeds the budget
 EXACT_BOXES = "exact_boxes"  # the entry of a log's environment; logs without it are older
 HASHED = f'"{SHA256}"'.encode()  # stands in configurations that refer to files, and only there
 
@@ -35,11 +37,18 @@ def run_replicate(condition: Condition, index: int, config_json: bytes | None = 
     log = Log(condition_id, config_json, index, rng, files, around)
     first_feasible: int | None = None
     last: Generation | None = None
-    for last in planner.evolve(problem, rng):
+    most, ended = condition.max_collision_queries, "generations"
+    for generation in planner.evolve(problem, rng):
+        if most is not None and generation.collision_queries > most:
+            ended = BUDGET_SPENT
+            break
+        last = generation
         log.write(last)  # the planner knows nothing of files
         if first_feasible is None and last.num_feasible > 0:
             first_feasible = last.index
-    assert last is not None, "a planner yields its initial population at least"
+    if last is None:
+        must = f"at least what the initial population asks for ({generation.collision_queries:,})"
+        raise SettingError("budget.collision_queries", must, most)
     evolved = now()
     verdict = judge_motion(planner, problem, planner.motion(problem, last.best))
     certified = now()
@@ -47,7 +56,7 @@ def run_replicate(condition: Condition, index: int, config_json: bytes | None = 
         condition=condition_id,
         replicate=index,
         status="done",
-        stop_reason=last.stop_reason or "generations",
+        stop_reason=last.stop_reason or ended,
         num_generations=last.index,
         best_cost=last.best_cost,
         first_feasible_generation=first_feasible,

@@ -4,7 +4,7 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from evoexp.validation import TARGET
+from evoexp.validation import MOST_QUERIES, TARGET
 
 INDENT = 13  # columns of the names on the left
 SHOWN = ("python", "evoexp", "numpy", "numba", "pin", "coal")  # versions on the screen
@@ -184,6 +184,8 @@ def typed_parts(settings: Mapping[str, Any]) -> dict[str, Any]:
             inner = {key: value for key, value in component.items() if _is_component(value)}
             own = {key: value for key, value in component.items() if key not in inner}
             parts |= {"planner": own} | inner
+        elif name == MOST_QUERIES:
+            parts["budget"] = {"collision_queries": component}
         else:
             parts[name] = component
     return parts

@@ -315,12 +315,13 @@ def _entries(conditions: Any) -> Iterator[tuple[str, list[str]]]:
 
 
 def _condition(config: dict[str, Any], budget: Budget) -> Condition:
-    """Build one composed configuration, its generations capped by the budget."""
+    """Build one composed configuration, its generations and queries capped by the budget."""
     plain, cap = _resolved(config), budget.max_generations
     asked = (plain.get("ga") or {}).get("num_generations")
     if cap is not None and isinstance(asked, int) and asked > cap:  # before a planner takes it in
         plain = _resolved(config | {"ga": config["ga"] | {"num_generations": cap}})
-    return build_condition(plain, str(config["planner"]))
+    built = build_condition(plain, str(config["planner"]))
+    return built._replace(max_collision_queries=budget.collision_queries)
 
 
 def _shared(config: dict[str, Any]) -> dict[str, Any]:

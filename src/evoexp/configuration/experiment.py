@@ -2,13 +2,23 @@
 
 import hashlib
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Annotated, Any, NamedTuple
+
+from pydantic import BeforeValidator, Field
 
 from evoexp.batch.runner_settings import RunnerSettings
-from evoexp.condition import Condition
+from evoexp.condition import LARGEST_CAP, Condition
 from evoexp.report.report_settings import ReportSettings
 from evoexp.shipped import Option
 from evoexp.validation import Count, Settings
+
+
+def _whole(value: Any) -> Any:
+    """Return 1e6 as a whole number, as one types it."""
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+Queries = Annotated[int, BeforeValidator(_whole), Field(ge=1, le=LARGEST_CAP)]
 
 
 class Budget(Settings):
@@ -18,11 +28,14 @@ class Budget(Settings):
         name: `paper` caps nothing.
         max_replicates: Cap on the number of replicates.
         max_generations: Cap on the number of generations; changes the condition.
+        collision_queries: Cap on the configurations asked for: a run ends before the generation
+            that takes it beyond; changes the condition.
     """
 
     name: str
     max_replicates: Count | None
     max_generations: Count | None
+    collision_queries: Queries | None = None
 
 
 class Labelled(NamedTuple):

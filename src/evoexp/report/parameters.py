@@ -65,6 +65,8 @@ def parameters(results: Results, condition: ConditionResults) -> list[Parameter]
         found += _component(part, value, taken)
     root = option(config_directory() / "config.yaml")
     found.append(_parameter("seed", condition.condition.seed, root.get("seed"), OVERRIDE))
+    if (most := condition.condition.max_collision_queries) is not None:
+        found.append(_parameter("budget.collision_queries", most, None, OVERRIDE))
     if not condition.is_reference:  # which has one replicate, however many are planned
         planned = Entry(planned_replicates(results), *root["num_replicates"][1:])
         found.append(_parameter("num_replicates", condition.planned, planned, OVERRIDE))

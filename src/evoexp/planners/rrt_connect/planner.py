@@ -114,7 +114,7 @@ class RrtConnect(PlannerDefaults, RrtSettings, Component):
         return min(self.ga.num_generations, batches - 1)
 
     def num_evaluations(self, index: int) -> int:
-        """Return the iterations of a generation, an upper bound for the one in which the run ends."""
+        """Return the iterations of a generation, at most; a run may end within one."""
         size = self.ga.iterations_per_generation
         return max(0, min(size, self._most_iterations - index * size))
 

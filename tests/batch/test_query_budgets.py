@@ -1,0 +1,82 @@
+"""Budgets in collision queries: a part of the identity, and a prefix of the run without a cap."""
+
+import math
+from typing import Any
+
+import pytest
+
+from evoexp.batch.replicate import BUDGET_SPENT, run_replicate
+from evoexp.condition import Condition
+from evoexp.configuration import compose
+from evoexp.errors import SettingError
+from evoexp.store.log_reader import read_log
+
+FEW = ("ga.num_generations=30", "num_replicates=1")
+
+
+def condition(*words: str, label: str = "via-point GA") -> Condition:
+    (experiment,) = compose.expand(["experiment=rana_planar", *FEW, *words])
+    return next(each.condition for each in experiment.conditions if each.label == label)
+
+
+def log(chosen: Condition, tmp_path: Any) -> Any:
+    path = tmp_path / f"{chosen.id[:12]}.mcap"
+    path.write_bytes(run_replicate(chosen, 0).content)
+    return read_log(path)
+
+
+@pytest.mark.parametrize("label", ["via-point GA", "random search", "multi-start"])
+@pytest.mark.parametrize("most", [1000, 9000, 9001, 20_000])
+def test_a_capped_run_is_the_beginning_of_the_uncapped_one(
+    label: str, most: int, tmp_path: Any
+) -> None:
+    whole = log(condition(label=label), tmp_path)
+    capped = log(condition(f"budget.collision_queries={most}", label=label), tmp_path)
+    kept = [row for row in whole.generations if row.collision_queries <= most]
+    assert 0 < len(kept) < len(whole.generations)
+    assert [row.chain for row in capped.generations] == [row.chain for row in kept]
+    assert capped.summary.stop_reason == BUDGET_SPENT
+    assert capped.summary.collision_queries == kept[-1].collision_queries
+    assert capped.summary.digest != whole.summary.digest
+    assert whole.summary.stop_reason == "generations"
+
+
+def test_a_cap_that_is_never_reached_changes_the_hash_alone(tmp_path: Any) -> None:
+    free, capped = condition(), condition("budget.collision_queries=1e9")
+    assert capped.id != free.id
+    assert b"max_collision_queries" not in free.to_json()
+    whole, same = log(free, tmp_path), log(capped, tmp_path)
+    assert [row.chain for row in same.generations] == [row.chain for row in whole.generations]
+    assert same.summary.stop_reason == "generations"
+
+
+def test_caps_are_whole_numbers_as_one_types_them() -> None:
+    chosen = condition("budget.collision_queries=2e4")
+    assert chosen.max_collision_queries == 20_000
+    assert Condition.from_json(chosen.to_json()) == chosen
+    assert condition("budget.collision_queries=20000").id == chosen.id
+    assert condition("budget.collision_queries=null").id == condition().id
+
+
+@pytest.mark.parametrize("text", ["0", "-5", "1.5", "x", "true", "1e300"])
+def test_other_caps_are_refused(text: str) -> None:
+    with pytest.raises(SettingError, match=r"budget\.collision_queries: must be"):
+        condition(f"budget.collision_queries={text}")
+
+
+def test_a_stored_cap_is_checked() -> None:
+    text = condition("budget.collision_queries=7").to_json()
+    for wrong in (b"0", b"true", b'"7"', b"7.0"):
+        broken = text.replace(b'"max_collision_queries":7', b'"max_collision_queries":' + wrong)
+        assert broken != text
+        with pytest.raises(SettingError, match="max_collision_queries: must be a whole number"):
+            Condition.from_json(broken)
+
+
+def test_a_cap_below_the_initial_population_is_one_line() -> None:
+    must = r"budget\.collision_queries: must be at least what the initial population asks for"
+    with pytest.raises(SettingError, match=must + r" \(1,000\), was 999"):
+        run_replicate(condition("budget.collision_queries=999"), 0)
+    assert math.isfinite(
+        run_replicate(condition("budget.collision_queries=1000"), 0).summary.best_cost
+    )

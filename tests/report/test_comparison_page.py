@@ -10,8 +10,9 @@ from scipy.interpolate import CubicSpline
 from evoexp.errors import NothingStored
 from evoexp.paths.motion import Motion, spline_motion
 from evoexp.planners.planner import judge_motion
-from evoexp.report.figures.effort_curves import TARGETS, draw_shares, length_table, share_table
+from evoexp.report.figures.effort_curves import draw_shares, length_table, share_table
 from evoexp.report.pages import comparison
+from evoexp.report.planner_runs import MULTIPLES, of_results
 from evoexp.report.proven_answers import (
     answers,
     best_lengths,
@@ -75,18 +76,18 @@ def test_an_answer_that_is_not_proven_counts_for_nothing() -> None:
 
 def test_shares_are_counts_of_targets(results: Results) -> None:
     found = {c.label: answers(c) for c in results.evolved}
-    table = share_table({c.label: [c] for c in results.evolved}, found)
+    table = share_table(of_results(results.evolved))
     for condition in results.evolved:
         own, line = found[condition.label], straight_line(found[condition.label])
         curve = table[table["planner"] == condition.label]
-        assert curve["targets"].unique().tolist() == [len(TARGETS) * condition.done]
+        assert curve["targets"].unique().tolist() == [len(MULTIPLES) * condition.done]
         assert curve["share"].is_monotonic_increasing
         for x, share in zip(curve["collision_queries"], curve["share"], strict=True):
             good = own[own["certified"] & (own["collision_queries"] <= x)]
             count = sum(
                 bool((good[good["replicate"] == k]["length"] <= target * line).any())
                 for k in condition.summaries.index
-                for target in TARGETS
+                for target in MULTIPLES
             )
             assert share == pytest.approx(count / curve["targets"].iloc[0])
     (axes,) = draw_shares(table).axes
@@ -96,7 +97,7 @@ def test_shares_are_counts_of_targets(results: Results) -> None:
 
 def test_the_last_median_is_that_of_the_best_lengths(results: Results) -> None:
     found = {c.label: answers(c) for c in results.evolved}
-    table = length_table({c.label: [c] for c in results.evolved}, found)
+    table = length_table(of_results(results.evolved))
     for condition in results.evolved:
         best = best_lengths(found[condition.label], condition.summaries.index)
         last = table[table["planner"] == condition.label].iloc[-1]
@@ -120,7 +121,7 @@ def test_planners_of_several_problems_are_named_by_their_components(
     conditions = [(f"{e.name}: {label}", c) for e in both for label, c in e.conditions]
     results = gather(stored, conditions, None, "", "", "")
     page = comparison.page(results, settings)
-    assert [drawing.stem for drawing in page.drawings] == ["targets_reached"]
+    assert [drawing.stem for drawing in page.drawings] == ["targets_reached", "targets_by_problem"]
     names = set(page.drawings[0].table()["planner"])
     assert all(name.startswith(("via_point_ga", "random_search", "multi_start")) for name in names)
 

@@ -15,6 +15,7 @@ from evoexp.configuration.search_path import is_file, options
 from evoexp.errors import SettingError, UnknownOption
 from evoexp.report import build, markdown
 from evoexp.report.pages import comparison
+from evoexp.report.planner_runs import of_results
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import gather
 from evoexp.shipped import shipped
@@ -37,10 +38,8 @@ def main(arguments: argparse.Namespace) -> int:
     """Draw the page, and print its table."""
     arguments.overrides = unpacked(arguments.overrides)
     request, settings, planned = _asked(arguments)
-    outputs = outputs_root()
-    path = build.report(request, settings, outputs, planned)
     found = gather(
-        outputs,
+        outputs_root(),
         request.conditions,
         planned,
         request.experiment,
@@ -48,7 +47,10 @@ def main(arguments: argparse.Namespace) -> int:
         request.hint,
         request.options,
     )
-    rows = comparison.rated(found, settings)
+    runs = of_results(found.evolved)
+    page = comparison.page_of_runs(runs, found, settings)
+    path = build.write_page(request, page, found, settings)
+    rows = comparison.rated(runs, settings)
     if arguments.json:
         print_json([row._asdict() | _parts(row) for row in rows])
         return 0

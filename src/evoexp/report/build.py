@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 from evoexp.condition import Condition
 from evoexp.report.drawing_processes import on_all_cores
 from evoexp.report.index import render
-from evoexp.report.page_parts import Drawing
+from evoexp.report.page_parts import Drawing, Page
 from evoexp.report.pages import page_of
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import gather
+from evoexp.report.results import Results, gather
 from evoexp.shipped import Option
 from evoexp.store.files import write_files
 from evoexp.version import __version__
@@ -88,8 +88,19 @@ def report(
         request.hint,
         request.options,
     )
-    page = page_of(found, settings)
-    directory = outputs / "reports" / request.report_name
+    return write_page(request, page_of(found, settings), found, settings)
+
+
+def write_page(request: Request, page: Page, found: Results, settings: ReportSettings) -> Path:
+    """Draw a page's figures, write all its files, and return the path of its `index.md`.
+
+    Args:
+        request: Names the folder, and the command.
+        page: The parts.
+        found: The results that it was made from.
+        settings: Formats and levels.
+    """
+    directory = found.outputs / "reports" / request.report_name
     files: dict[str, bytes] = {}
     for drawn in on_all_cores(lambda drawing: _drawn(drawing, settings), page.drawings):
         files |= drawn

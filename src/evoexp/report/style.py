@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import EngFormatter, MaxNLocator
+from matplotlib.ticker import EngFormatter, LogLocator, MaxNLocator, NullFormatter
 
 ARM_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")  # Okabe & Ito 2008
 CONDITION_COLOURS = (
@@ -24,11 +24,14 @@ CONDITION_COLOURS = (
     "#44AA99",
     "#999933",
 )  # Tol
+NUM_CURVE_COLOURS = 6  # that curves which cross are still told apart by
+CURVE_STYLES: tuple[Any, ...] = ("-", (0, (4, 1.5)), (0, (1, 1)), (0, (5, 1, 1, 1)))
 NEUTRAL, FAINT, FORBIDDEN = "#333333", "#9a9a9a", "#882255"
 ARM_SYMBOLS = ("θ", "α", "β", "γ", "δ", "ε")  # θ and α are the paper's
 SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 DOTS: dict[str, Any] = {"mec": "white", "ms": 5, "clip_on": False}  # configurations of a path
 THOUSANDS = 10_000  # from here on numbers along an axis are written with k and M
+FEW_DECADES = 30.0  # [-] last over first number of an axis, below which powers of ten are few
 WIDTH = 7.2  # [inch] of a figure over the whole page
 
 _RC: dict[str, Any] = {
@@ -144,6 +147,26 @@ def condition_colour(position: int) -> str:
     return CONDITION_COLOURS[position % len(CONDITION_COLOURS)]
 
 
+def curve_look(position: int) -> dict[str, Any]:
+    """Return the look of one of many curves: six colours, then the next line style.
+
+    A later curve is thinner, so that one below it is seen where both are equal.
+    """
+    line, colour = divmod(position, NUM_CURVE_COLOURS)
+    return {
+        "color": CONDITION_COLOURS[colour],
+        "linestyle": CURVE_STYLES[line % len(CURVE_STYLES)],
+        "linewidth": 2.2 - 0.2 * colour,
+    }
+
+
+def shortened(text: str, most: int) -> str:
+    """Return a text of so many signs at most; of a longer one the middle is left out."""
+    if len(text) <= most:
+        return text
+    return f"{text[: (most - 1) // 2]}…{text[len(text) - most // 2 :]}"
+
+
 def row_colour(position: int, count: int) -> str:
     """Return the colour of a condition that has a row with its name to itself.
 
@@ -170,6 +193,15 @@ def shorten_thousands(axis: Axis) -> None:
     """Write the numbers along an axis with k and M where they are large: 200 k."""
     if axis.get_view_interval()[1] >= THOUSANDS:
         axis.set_major_formatter(EngFormatter())
+
+
+def log_axis(axes: Axes, first: float, last: float) -> None:
+    """Make the horizontal axis logarithmic; a short one has numbers between powers of ten, too."""
+    axes.set(xscale="log", xlim=(first, last))
+    if last < FEW_DECADES * first:
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.xaxis.set_major_formatter(EngFormatter())
+    axes.xaxis.set_minor_formatter(NullFormatter())
 
 
 def operational_axes(axes: Axes, unit: str) -> None:

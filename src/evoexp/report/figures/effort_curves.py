@@ -1,46 +1,43 @@
 """Proven answers over collision queries: shares of targets reached, and the best lengths."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from evoexp.records import FloatArray
 from evoexp.report import style
-from evoexp.report.proven_answers import first_reached, straight_line
-from evoexp.report.results import ConditionResults
+from evoexp.report.planner_runs import PlannerRuns
 from evoexp.report.statistics import quantile
 
-TARGETS = (np.inf, 4.0, 3.0, 2.0, 1.5, 1.2, 1.1, 1.05)  # [-] of the straight line
 POINTS = 200  # along the axis of effort
+MAX_PANELS = 24  # problems that have a panel of their own
+BEFORE = 0.8  # times the effort of the first proven answer is where curves begin
+PER_LINE = 3  # panels side by side
+
+NOTE: dict[str, Any] = {"ha": "center", "va": "center", "color": style.NEUTRAL, "fontsize": 7.5}
 
 
-def share_table(
-    planners: Mapping[str, Sequence[ConditionResults]], found: Mapping[str, pd.DataFrame]
-) -> pd.DataFrame:
+def share_table(runs: Sequence[PlannerRuns], axis: FloatArray | None = None) -> pd.DataFrame:
     """Return the share of (problem, target, run) that each planner has reached, over effort.
 
     Args:
-        planners: Name → its conditions, one per problem.
-        found: Label of a condition → its answers.
+        runs: Of each planner on each problem.
+        axis: Efforts (points,); None: from before the first answer of these runs to their end.
 
     Returns:
         Columns planner, collision_queries, share, targets.
     """
     reached: dict[str, list[float]] = {}
-    for planner, own in planners.items():
-        reached[planner] = []
-        for condition in own:
-            table, runs = found[condition.label], condition.summaries.index
-            spent, line = condition.column("collision_queries"), straight_line(table)
-            for target in TARGETS if line > 0.0 else TARGETS[:1]:
-                longest = np.inf if np.isinf(target) else target * line
-                effort, done = first_reached(table, runs, longest, spent)
-                reached[planner] += np.where(done, effort, np.inf).tolist()
-    finite = [value for own in reached.values() for value in own if 0.0 < value < np.inf]
-    most = max(c.column("collision_queries").max() for own in planners.values() for c in own)
-    axis = np.geomspace(min(finite, default=1.0), max(most, 1.0), POINTS)
+    for own in runs:
+        for longest in own.problem.targets:
+            effort, done = own.first_reached(longest)
+            values = np.where(done, effort, np.inf).tolist()
+            reached.setdefault(own.planner, []).extend(values)
+    axis = _axis(runs) if axis is None else axis
     return pd.DataFrame(
         {
             "planner": planner,
@@ -52,53 +49,106 @@ def share_table(
     ).explode(["collision_queries", "share"], ignore_index=True)
 
 
-def length_table(
-    planners: Mapping[str, Sequence[ConditionResults]], found: Mapping[str, pd.DataFrame]
-) -> pd.DataFrame:
+def _axis(runs: Sequence[PlannerRuns]) -> FloatArray:
+    """Return efforts from a little before the first proven answer of all to the longest run."""
+    firsts = [own.first_reached() for own in runs]
+    first = [np.where(done, effort, np.inf).min() for effort, done in firsts]
+    most = max(1.0, *(float(own.spent.max()) for own in runs))
+    least = min([value for value in first if 0.0 < value < np.inf], default=most / 10.0)
+    return np.geomspace(BEFORE * least, most, POINTS)
+
+
+def problem_share_table(runs: Sequence[PlannerRuns]) -> pd.DataFrame:
+    """Return the share of (target, run) that each planner has reached, problem by problem.
+
+    Returns:
+        Columns problem, planner, collision_queries, share, targets.
+    """
+    parts, axis = [], _axis(runs)
+    for name in problem_order(runs):
+        table = share_table([own for own in runs if own.problem.name == name], axis)
+        table.insert(0, "problem", name)
+        parts.append(table)
+    return pd.concat(parts, ignore_index=True)
+
+
+def length_table(runs: Sequence[PlannerRuns]) -> pd.DataFrame:
     """Return median and quartiles over runs of the best proven length so far, of one problem.
 
     Returns:
         Columns planner, collision_queries, median, lower, upper.
     """
     parts = []
-    for planner, (condition,) in planners.items():
-        table, runs = found[condition.label], condition.summaries.index
-        most = float(condition.column("collision_queries").max())
+    for own in runs:
+        table = own.table
         least = float(table["collision_queries"].min()) if len(table) else 1.0
-        axis = np.geomspace(max(least, 1.0), max(most, 2.0), POINTS // 2)
-        good = table[table["certified"]]
-        best = np.array(
-            [
-                good[good["collision_queries"] <= x]
-                .groupby("replicate")["length"]
-                .min()
-                .reindex(runs)
-                .fillna(np.inf)
-                .to_numpy()
-                for x in axis
-            ]
-        )
+        axis = np.geomspace(max(least, 1.0), max(float(own.spent.max()), 2.0), POINTS // 2)
+        best = np.array([_best_until(own, x) for x in axis])  # (points, runs)
         spread = {
             name: [quantile(row, share) for row in best]
             for name, share in (("median", 0.5), ("lower", 0.25), ("upper", 0.75))
         }
-        columns: dict[str, Any] = {"planner": planner}
+        columns: dict[str, Any] = {"planner": own.planner}
         parts.append(pd.DataFrame(columns | {"collision_queries": axis} | spread))
     return pd.concat(parts, ignore_index=True)
+
+
+def _best_until(own: PlannerRuns, effort: float) -> FloatArray:
+    """Return the least proven length of each run up to some effort, (runs,); inf: none."""
+    early = own.table["certified"] & (own.table["collision_queries"] <= effort)
+    best = own.table[early].groupby("replicate")["length"].min().reindex(list(own.replicates))
+    return np.asarray(best.to_numpy(np.float64, na_value=np.inf))
+
+
+def problem_order(runs: Iterable[PlannerRuns]) -> list[str]:
+    """Return the names of the problems, each once, in order."""
+    return list(dict.fromkeys(own.problem.name for own in runs))
 
 
 def draw_shares(table: pd.DataFrame) -> Figure:
     """Draw the shares of targets reached."""
     figure, (axes,) = style.row_of_panels(3.6, 1)
-    for k, planner in enumerate(table["planner"].unique()):
-        curve = table[table["planner"] == planner]
-        x, y = (curve[name].astype(float) for name in ("collision_queries", "share"))
-        label = f"{planner} ({int(curve['targets'].iloc[0])} targets)"
-        axes.step(x, y, where="post", color=style.condition_colour(k), label=label)
-    axes.set(xscale="log", xlim=_ends(table), ylim=(0.0, 1.02), xlabel="collision queries")
-    axes.set_ylabel("share of targets reached")
+    _draw_share_curves(axes, table, list(table["planner"].unique()), counted=True)
+    axes.set(xlabel="collision queries", ylabel="share of targets reached")
     style.legend_below(figure, axes, 2)
     return figure
+
+
+def draw_shares_by_problem(table: pd.DataFrame) -> Figure:
+    """Draw the shares of targets reached in one panel per problem."""
+    planners, problems = (list(table[name].unique()) for name in ("planner", "problem"))
+    shown = problems[:MAX_PANELS]
+    figure, panels = style.lines_of_panels(1.75, len(shown), PER_LINE, 0.5)
+    columns = min(len(shown), PER_LINE)
+    for k, (axes, problem) in enumerate(zip(panels, shown, strict=True)):
+        own = table[table["problem"] == problem]
+        _draw_share_curves(axes, own, planners)
+        axes.set_title(style.shortened(problem, 34), fontweight="normal")
+        if not (own["share"].astype(float) > 0.0).any():
+            axes.text(0.5, 0.5, "no proven answer", transform=axes.transAxes, **NOTE)
+        if k % columns == 0:
+            axes.set_ylabel("share reached")
+        else:
+            axes.tick_params(labelleft=False)
+        if k + columns >= len(shown):
+            axes.set_xlabel("collision queries")
+    style.legend_of_all(figure, panels, 4)
+    return figure
+
+
+def _draw_share_curves(
+    axes: Axes, table: pd.DataFrame, planners: Sequence[str], *, counted: bool = False
+) -> None:
+    """Draw a curve for each planner that a table has, in the look of its place among all."""
+    for k, planner in enumerate(planners):
+        curve = table[table["planner"] == planner]
+        if not len(curve):
+            continue
+        x, y = (curve[name].astype(float) for name in ("collision_queries", "share"))
+        count = f" ({int(curve['targets'].iloc[0])} targets)" if counted else ""
+        axes.step(x, y, where="post", label=f"{planner}{count}", **style.curve_look(k))
+    axes.set(ylim=(0.0, 1.02))
+    style.log_axis(axes, *_ends(table))
 
 
 def draw_lengths(table: pd.DataFrame) -> Figure:
@@ -106,13 +156,14 @@ def draw_lengths(table: pd.DataFrame) -> Figure:
     figure, (axes,) = style.row_of_panels(3.6, 1)
     for k, planner in enumerate(table["planner"].unique()):
         curve = table[table["planner"] == planner]
-        shown = curve.replace([np.inf], np.nan)
-        x, colour = shown["collision_queries"], style.condition_colour(k)
+        shown, look = curve.replace([np.inf], np.nan), style.curve_look(k)
+        x, colour = shown["collision_queries"], look["color"]
         axes.fill_between(
             x, shown["lower"], shown["upper"], step="post", color=colour, alpha=0.18, linewidth=0
         )
-        axes.step(x, shown["median"], where="post", color=colour, label=planner)
-    axes.set(xscale="log", xlim=_ends(table), xlabel="collision queries")
+        axes.step(x, shown["median"], where="post", label=planner, **look)
+    axes.set_xlabel("collision queries")
+    style.log_axis(axes, *_ends(table))
     axes.set_ylabel("best proven length so far [rad, m]")
     style.legend_below(figure, axes, 2)
     return figure
@@ -120,4 +171,5 @@ def draw_lengths(table: pd.DataFrame) -> Figure:
 
 def _ends(table: pd.DataFrame) -> tuple[float, float]:
     """Return the ends of the axis of effort, also where no run has a proven answer."""
-    return float(table["collision_queries"].min()), float(table["collision_queries"].max())
+    first, last = float(table["collision_queries"].min()), float(table["collision_queries"].max())
+    return first, max(last, 1.01 * first)

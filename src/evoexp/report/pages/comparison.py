@@ -1,20 +1,21 @@
 """The page of `evoexp compare`: planners in one currency, by their proven answers alone."""
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 
 from evoexp.errors import NothingStored
+from evoexp.records import FloatArray
 from evoexp.report import markdown
 from evoexp.report.comparisons import compared
 from evoexp.report.figures import effort_curves
+from evoexp.report.figures.effort_curves import MAX_PANELS, problem_order
 from evoexp.report.page_parts import Drawing, Page, Table
+from evoexp.report.planner_runs import PlannerRuns, of_results
 from evoexp.report.proportions import Proportion
-from evoexp.report.proven_answers import answers, best_lengths, first_reached, straight_line
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
 from evoexp.report.statistics import (
@@ -34,13 +35,15 @@ INTRODUCTION = (
     "shortest of all. Effort is counted in configurations that a planner asked to be judged for "
     "collision."
 )
+TARGETS = (
+    "any at all, or one at most 4, 3, 2, 1.5, 1.2, 1.1, 1.05 times as long as the straight line."
+)
 EFFORT = (
     "Effort: expected running time (Hansen et al. 2009), the collision queries of all runs, failed "
     "ones included, per run with a proven answer; in brackets the bootstrap interval. Lengths: "
     "median and quartiles over runs, ∞: no proven answer. Refuted: last solutions that the "
     "planner's own model accepts and the certifier refutes."
 )
-Planners = dict[str, list[ConditionResults]]
 
 
 class Rated(NamedTuple):
@@ -48,6 +51,8 @@ class Rated(NamedTuple):
 
     Attributes:
         condition: Its label.
+        planner: Its name in figures.
+        problem: Name of the problem.
         runs: That are finished.
         proven: Runs with a proven answer.
         first_own: Median of the queries to the first answer that the planner's own model accepts.
@@ -60,6 +65,8 @@ class Rated(NamedTuple):
     """
 
     condition: str
+    planner: str
+    problem: str
     runs: int
     proven: int
     first_own: float
@@ -83,80 +90,82 @@ def page(results: Results, settings: ReportSettings) -> Page:
     Raises:
         NothingStored: If no run has a motion.
     """
-    found = {c.label: answers(c) for c in results.evolved}
-    conditions = [c for c in results.evolved if len(found[c.label])]
-    if not conditions:
+    return page_of_runs(of_results(results.evolved), results, settings)
+
+
+def page_of_runs(runs: Sequence[PlannerRuns], results: Results, settings: ReportSettings) -> Page:
+    """Build the page from runs that are judged already.
+
+    Raises:
+        NothingStored: If there are none.
+    """
+    if not runs:
         raise NothingStored(f"{results.experiment or 'compare'}: no stored solution is a motion")
-    planners = _planners(conditions)
-    drawn = [
-        Drawing(
-            stem="targets_reached",
-            title="Targets reached",
-            caption="Share of (problem, target, run) with a proven answer: any at all, or one at "
-            "most 4, 3, 2, 1.5, 1.2, 1.1, 1.05 times as long as the straight line. Left and high "
-            "is good.",
-            table=partial(effort_curves.share_table, planners, found),
-            draw=effort_curves.draw_shares,
-            conditions=tuple(conditions),
-        )
-    ]
-    if _num_problems(conditions) == 1:
-        drawn.append(
-            Drawing(
-                stem="proven_lengths",
-                title="Best proven length so far",
-                caption="Median and quartiles over runs; a curve begins where half of the runs "
-                "have a proven answer, its band where three quarters have one.",
-                table=partial(effort_curves.length_table, planners, found),
-                draw=effort_curves.draw_lengths,
-                conditions=tuple(conditions),
-            )
-        )
     return Page(
         title=f"{results.experiment or 'stored runs'}: proven answers",
         introduction=INTRODUCTION,
-        tables=(_table(rated(results, settings), settings),),
-        comparisons=_comparisons(conditions, found, settings),
-        drawings=tuple(drawn),
+        tables=(_table(rated(runs, settings), settings),),
+        comparisons=_comparisons(runs, settings),
+        drawings=tuple(_drawings(runs)),
     )
 
 
-def _planners(conditions: Sequence[ConditionResults]) -> Planners:
-    """Return the conditions by planner; of one problem each condition is a planner."""
-    if _num_problems(conditions) == 1:
-        return {c.label: [c] for c in conditions}
-    found: Planners = {}
-    kinds = list(dict.fromkeys(c.condition.planner for c in conditions))
-    for c in conditions:
-        same = [kind for kind in kinds if kind.component == c.condition.planner.component]
-        number = f" {same.index(c.condition.planner) + 1}" if len(same) > 1 else ""
-        found.setdefault(f"{c.condition.planner.component}{number}", []).append(c)
-    return found
+def _drawings(runs: Sequence[PlannerRuns]) -> Iterator[Drawing]:
+    """Yield the figures: curves of all problems and of each, or of one with its lengths."""
+    conditions, problems = tuple(own.condition for own in runs), problem_order(runs)
+    yield Drawing(
+        stem="targets_reached",
+        title="Targets reached",
+        caption=f"Share of (problem, target, run) with a proven answer: {TARGETS} Left and high is "
+        "good.",
+        table=partial(effort_curves.share_table, runs),
+        draw=effort_curves.draw_shares,
+        conditions=conditions,
+    )
+    if len(problems) == 1:
+        yield Drawing(
+            stem="proven_lengths",
+            title="Best proven length so far",
+            caption="Median and quartiles over runs; a curve begins where half of the runs "
+            "have a proven answer, its band where three quarters have one.",
+            table=partial(effort_curves.length_table, runs),
+            draw=effort_curves.draw_lengths,
+            conditions=conditions,
+        )
+        return
+    first = f" The first {MAX_PANELS} of {len(problems)}; the CSV has all."
+    yield Drawing(
+        stem="targets_by_problem",
+        title="Targets reached, problem by problem",
+        caption="The same of each problem by itself: share of (target, run). A planner that was "
+        f"not run on a problem has no curve there.{first * (len(problems) > MAX_PANELS)}",
+        table=partial(effort_curves.problem_share_table, runs),
+        draw=effort_curves.draw_shares_by_problem,
+        conditions=conditions,
+    )
 
 
-def _num_problems(conditions: Sequence[ConditionResults]) -> int:
-    return len({(c.condition.robot, c.condition.scenario) for c in conditions})
-
-
-def rated(results: Results, settings: ReportSettings) -> list[Rated]:
+def rated(runs: Sequence[PlannerRuns], settings: ReportSettings) -> list[Rated]:
     """Return the conditions that have motions, rated by their proven answers."""
-    found = {c.label: answers(c) for c in results.evolved}
-    return [_rated(c, found[c.label], settings) for c in results.evolved if len(found[c.label])]
+    return [_rated(own, settings) for own in runs]
 
 
-def _rated(c: ConditionResults, table: pd.DataFrame, settings: ReportSettings) -> Rated:
-    runs, verdicts = c.summaries.index, c.verdicts
-    effort, reached = first_reached(table, runs, np.inf, c.column("collision_queries"))
-    first = table[table["solved"]].groupby("replicate")["collision_queries"].min()
+def _rated(own: PlannerRuns, settings: ReportSettings) -> Rated:
+    verdicts, table = own.condition.verdicts, own.table
+    effort, reached = own.first_reached()
+    first = table[table["solved"].astype(bool)].groupby("replicate")["collision_queries"].min()
+    first_own = first.reindex(list(own.replicates)).fillna(np.inf).to_numpy(np.float64)
     return Rated(
-        c.label,
-        c.done,
+        own.label,
+        own.planner,
+        own.problem.name,
+        len(own.replicates),
         int(reached.sum()),
-        quantile(first.reindex(runs).fillna(np.inf).to_numpy(np.float64), 0.5),
+        quantile(first_own, 0.5),
         expected_effort(effort, reached),
         expected_interval(effort, reached, settings.confidence, settings.num_resamples),
-        spread(best_lengths(table, runs)),
-        straight_line(table),
+        spread(own.best_lengths),
+        own.problem.straight,
         verdicts.solved_refuted,
         verdicts.judged,
     )
@@ -194,19 +203,18 @@ def _between(interval: tuple[float, float]) -> str:
 
 
 def _comparisons(
-    conditions: Sequence[ConditionResults],
-    found: Mapping[str, pd.DataFrame],
-    settings: ReportSettings,
+    runs: Sequence[PlannerRuns], settings: ReportSettings
 ) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
     """Compare the planners of each problem on common seeds."""
+    by_label = {own.label: own for own in runs}
     pairs = [
-        (a, b)
-        for a, b in itertools.combinations(conditions, 2)
-        if (a.condition.robot, a.condition.scenario) == (b.condition.robot, b.condition.scenario)
+        (a.condition, b.condition)
+        for a, b in itertools.combinations(runs, 2)
+        if a.problem == b.problem
     ]
 
-    def lengths(condition: ConditionResults) -> np.ndarray:
-        return best_lengths(found[condition.label], condition.summaries.index)
+    def lengths(condition: ConditionResults) -> FloatArray:
+        return by_label[condition.label].best_lengths
 
     rows = compared(pairs, lengths, settings, named=lambda a, b: f"{a.label} – {b.label}")
     return (("best proven length", rows),) if rows else ()

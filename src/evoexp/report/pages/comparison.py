@@ -14,7 +14,9 @@ from evoexp.report.comparisons import compared
 from evoexp.report.figures import effort_curves
 from evoexp.report.figures.effort_curves import MAX_PANELS, problem_order
 from evoexp.report.page_parts import Drawing, Page, Table
+from evoexp.report.pages import ranking
 from evoexp.report.planner_runs import PlannerRuns, of_results
+from evoexp.report.problem_ranks import standing
 from evoexp.report.proportions import Proportion
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
@@ -101,12 +103,13 @@ def page_of_runs(runs: Sequence[PlannerRuns], results: Results, settings: Report
     """
     if not runs:
         raise NothingStored(f"{results.experiment or 'compare'}: no stored solution is a motion")
+    found = standing(runs)
     return Page(
         title=f"{results.experiment or 'stored runs'}: proven answers",
         introduction=INTRODUCTION,
-        tables=(_table(rated(runs, settings), settings),),
+        tables=(_table(rated(runs, settings), settings), *ranking.tables(found, settings)),
         comparisons=_comparisons(runs, settings),
-        drawings=tuple(_drawings(runs)),
+        drawings=(*_drawings(runs), *ranking.drawings(found, runs, settings)),
     )
 
 

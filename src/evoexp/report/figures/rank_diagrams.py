@@ -1,0 +1,69 @@
+"""Planners over many problems: performance profiles, and mean ranks with a critical difference."""
+
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from evoexp.report import style
+from evoexp.report.problem_ranks import alike
+
+LINE = 0.24  # [inch] between names of planners
+BAR = 0.09  # [inch] between bars that join planners
+ABOVE = 0.62  # [inch] of the bar of the critical difference and the axis' numbers
+
+
+def draw_profiles(table: pd.DataFrame) -> Figure:
+    """Draw performance profiles."""
+    figure, (axes,) = style.row_of_panels(3.4, 1)
+    for k, planner in enumerate(table["planner"].unique()):
+        curve = table[table["planner"] == planner]
+        axes.step(
+            curve["ratio"], curve["share"], where="post", label=planner, **style.curve_look(k)
+        )
+    count = int(table["problems"].iloc[0])
+    style.log_axis(axes, 1.0, float(table["ratio"].max()))
+    axes.set(ylim=(0.0, 1.02), ylabel=f"share of {count} problems")
+    axes.set_xlabel("expected running time to a proven answer, times that of the best planner [–]")
+    style.legend_below(figure, axes, 3)
+    return figure
+
+
+def draw_critical_difference(table: pd.DataFrame) -> Figure:
+    """Draw mean ranks on a line; a bar joins planners that do not differ significantly."""
+    ranks, difference = table["mean_rank"].tolist(), float(table["critical_difference"].iloc[0])
+    groups, count = alike(ranks, difference), len(ranks)
+    left = (count + 1) // 2  # planners named on the left
+    foot = BAR * (len(groups) + 1) + LINE * left  # [inch] below the axis
+    figure = style.figure(ABOVE + foot)
+    axes = figure.add_subplot()
+    axes.set(xlim=(1.0 - 0.45 * (count - 1), count + 0.45 * (count - 1)), ylim=(-foot, ABOVE))
+    axes.axis("off")
+    _scale(axes, count, difference)
+    for k, (first, last) in enumerate(groups):
+        ends = ranks[first] - 0.02 * count, ranks[last] + 0.02 * count
+        y = -BAR * (k + 1)
+        axes.plot(ends, [y, y], color=style.NEUTRAL, linewidth=3.5, solid_capstyle="butt")
+    for k, row in enumerate(table.itertuples()):
+        on_left = k < left
+        y = -BAR * (len(groups) + 1) - LINE * ((k if on_left else count - 1 - k) + 0.5)
+        end = 1.0 - 0.06 * (count - 1) if on_left else count + 0.06 * (count - 1)
+        rank = float(ranks[k])
+        axes.plot([rank, rank, end], [0.0, y, y], color=style.NEUTRAL, linewidth=0.8)
+        name = style.shortened(str(row.planner), 26)
+        text = f"{name}  {rank:.2f} " if on_left else f" {rank:.2f}  {name}"
+        axes.text(end, y, text, ha="right" if on_left else "left", va="center")
+    return figure
+
+
+def _scale(axes: Axes, count: int, difference: float) -> None:
+    """Draw the axis of mean ranks, and the critical difference above it."""
+    axes.plot([1.0, count], [0.0, 0.0], color=style.NEUTRAL, linewidth=1.0)
+    for rank in range(1, count + 1):
+        axes.plot([rank, rank], [0.0, 0.06], color=style.NEUTRAL, linewidth=1.0)
+        axes.text(rank, 0.09, str(rank), ha="center", va="bottom", fontsize=7.5)
+    axes.text(count + 0.06 * (count - 1), 0.0, "mean rank\n(1 is best)", va="center", fontsize=7.5)
+    axes.plot([1.0, 1.0 + difference], [0.4, 0.4], color=style.NEUTRAL, linewidth=1.0)
+    for end in (1.0, 1.0 + difference):
+        axes.plot([end, end], [0.36, 0.44], color=style.NEUTRAL, linewidth=1.0)
+    text = f"critical difference {difference:.2f}"
+    axes.text(1.0 + 0.5 * difference, 0.45, text, ha="center", va="bottom", fontsize=7.5)

@@ -1,0 +1,118 @@
+"""The part of `evoexp compare`'s page that ranks planners over problems."""
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+
+import numpy as np
+
+from evoexp.report import markdown
+from evoexp.report.figures import rank_diagrams
+from evoexp.report.page_parts import Drawing, Table
+from evoexp.report.planner_runs import PlannerRuns
+from evoexp.report.problem_ranks import (
+    MIN_PLANNERS,
+    MIN_PROBLEMS,
+    Standing,
+    critical_difference,
+    friedman,
+    profile_table,
+    rank_table,
+)
+from evoexp.report.report_settings import ReportSettings
+
+RULE = (
+    "The problem is the unit of a ranking, seeds are its repetitions: each problem counts once, by "
+    "the median over its runs of the best proven length (without a proven answer: ∞, the worst; "
+    "equal medians share the mean of their ranks)."
+)
+
+
+def tables(found: Standing, settings: ReportSettings) -> tuple[Table, ...]:
+    """Return the table of mean ranks; none where there is but one planner, or one problem."""
+    if not found.can_be_profiled:
+        return ()
+    lengths = found.lengths
+    best = (lengths == lengths.min(axis=1, keepdims=True)) & np.isfinite(lengths)
+    rows = [
+        (
+            planner,
+            f"{found.mean_ranks[k]:.2f}",
+            markdown.share(int(best[:, k].sum()), len(lengths)),
+            markdown.share(int(np.isfinite(lengths[:, k]).sum()), len(lengths)),
+            markdown.share(int(np.isfinite(found.efforts[:, k]).sum()), len(lengths)),
+        )
+        for k, planner in sorted(
+            enumerate(found.planners), key=lambda each: found.mean_ranks[each[0]]
+        )
+    ]
+    headers = (
+        "planner",
+        "mean rank",
+        "shortest on",
+        "median run proven on",
+        "any run proven on",
+    )
+    note = " ".join([RULE, _left_out(found), _tested(found, settings)]).replace("  ", " ")
+    return (Table("Ranks over problems", headers, tuple(rows), note),)
+
+
+def _left_out(found: Standing) -> str:
+    """Name the problems that do not count; empty if all do."""
+    names = ", ".join(found.left_out)
+    return f"Left out, as some planner was not run on them: {names}." if names else ""
+
+
+def _tested(found: Standing, settings: ReportSettings) -> str:
+    """Tell the outcome of the tests, or why there are none."""
+    planners, problems = len(found.planners), len(found.problems)
+    if not found.can_be_tested:
+        return (
+            f"Too few for a test of ranks and its diagram: that takes {MIN_PLANNERS} planners and "
+            f"{MIN_PROBLEMS} problems that all of them were run on; here are {planners} planners "
+            f"and {problems} such problems."
+        )
+    test = friedman(found.lengths)
+    difference = critical_difference(planners, problems, settings.significance)
+    says = (
+        "the planners rank differently"
+        if test.p_value < settings.significance
+        else "no planner is shown to rank differently from another, whatever their differences"
+    )
+    return (
+        f"Friedman's test over {problems} problems: χ² = {test.statistic:.3g}, p = "
+        f"{markdown.p_value(test.p_value)}: {says}. Nemenyi's critical difference of mean ranks at "
+        f"{settings.significance:g}: {difference:.2f}."
+    )
+
+
+def drawings(
+    found: Standing, runs: Sequence[PlannerRuns], settings: ReportSettings
+) -> Iterator[Drawing]:
+    """Yield performance profiles, and the critical-difference diagram."""
+    counted = set(found.problems)
+    conditions = tuple(own.condition for own in runs if own.problem.name in counted)
+    if found.can_be_profiled:
+        unsolved = int(np.isinf(found.efforts).all(axis=1).sum())
+        never = f" No planner has a proven answer on {unsolved} of them." if unsolved else ""
+        yield Drawing(
+            stem="performance_profiles",
+            title="Performance profiles",
+            caption="Share of problems on which a planner's expected running time to a proven "
+            "answer is at most so many times that of the best planner on the problem (Dolan and "
+            "Moré 2002). At 1: problems on which it is the best; at the right end: problems that "
+            f"it solves at all. {len(found.problems)} problems.{never}",
+            table=partial(profile_table, found),
+            draw=rank_diagrams.draw_profiles,
+            conditions=conditions,
+        )
+    if found.can_be_tested:
+        yield Drawing(
+            stem="critical_difference",
+            title="Mean ranks and their critical difference",
+            caption="Mean rank over problems of the median proven length. A bar joins planners "
+            "whose mean ranks differ by less than Nemenyi's critical difference (Demšar 2006): "
+            f"these data do not tell them apart. {_tested(found, settings)}",
+            table=partial(rank_table, found, settings.significance),
+            draw=rank_diagrams.draw_critical_difference,
+            conditions=conditions,
+        )

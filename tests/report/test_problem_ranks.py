@@ -1,0 +1,159 @@
+"""Ranks over problems: against printed numbers of Demšar (2006), and against plain counts."""
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from evoexp.report.figures.rank_diagrams import draw_critical_difference, draw_profiles
+from evoexp.report.planner_runs import PlannerRuns, Problem
+from evoexp.report.problem_ranks import (
+    Standing,
+    alike,
+    critical_difference,
+    effort_ratios,
+    friedman,
+    profile_table,
+    rank_table,
+    standing,
+)
+
+# Demšar 2006, Tab. 6: areas under the curve of four classifiers on fourteen data sets
+AREAS = np.array(
+    [
+        [0.763, 0.768, 0.771, 0.798],
+        [0.599, 0.591, 0.590, 0.569],
+        [0.954, 0.971, 0.968, 0.967],
+        [0.628, 0.661, 0.654, 0.657],
+        [0.882, 0.888, 0.886, 0.898],
+        [0.936, 0.931, 0.916, 0.931],
+        [0.661, 0.668, 0.609, 0.685],
+        [0.583, 0.583, 0.563, 0.625],
+        [0.775, 0.838, 0.866, 0.875],
+        [1.000, 1.000, 1.000, 1.000],
+        [0.940, 0.962, 0.965, 0.962],
+        [0.619, 0.666, 0.614, 0.669],
+        [0.972, 0.981, 0.97501, 0.975],  # printed 0.975 twice, and ranked second and third
+        [0.957, 0.978, 0.946, 0.970],
+    ]
+)
+COSTS = st.sampled_from([1.0, 2.0, 3.0, 4.0, np.inf])
+
+
+def stands(lengths: np.ndarray, efforts: np.ndarray | None = None) -> Standing:
+    problems, planners = lengths.shape
+    return Standing(
+        tuple(f"planner {k}" for k in range(planners)),
+        tuple(f"problem {k}" for k in range(problems)),
+        (),
+        lengths if efforts is None else efforts,
+        lengths,
+    )
+
+
+def test_mean_ranks_and_critical_differences_are_demsars() -> None:
+    found = stands(1.0 - AREAS)
+    assert found.mean_ranks.round(3).tolist() == [3.143, 2.0, 2.893, 1.964]
+    assert critical_difference(4, 14, 0.05) == pytest.approx(1.25, abs=0.005)
+    assert critical_difference(4, 14, 0.10) == pytest.approx(1.12, abs=0.005)
+    # Tab. 5 (a): critical values of the two-tailed Nemenyi test at 0.05
+    printed = (1.960, 2.343, 2.569, 2.728, 2.850, 2.949, 3.031, 3.102, 3.164)
+    for planners, value in enumerate(printed, 2):
+        scale = np.sqrt(planners * (planners + 1) / (6.0 * 14))
+        assert critical_difference(planners, 14, 0.05) / scale == pytest.approx(value, abs=1.5e-3)
+
+
+def test_friedmans_statistic_is_that_of_the_formula() -> None:
+    found = stands(1.0 - AREAS)
+    plain = 12 * 14 / (4 * 5) * ((found.mean_ranks**2).sum() - 4 * 5**2 / 4)
+    assert plain == pytest.approx(9.28, abs=0.01)  # as printed, without correction for ties
+    ties = sum(n**3 - n for row in AREAS for n in np.unique(row, return_counts=True)[1])
+    corrected = plain / (1.0 - ties / (14 * 4 * (4**2 - 1)))
+    assert friedman(1.0 - AREAS).statistic == pytest.approx(corrected)
+    assert friedman(np.full((6, 3), np.inf)) == (0.0, 1.0)
+    assert friedman(np.tile([1.0, 2.0, np.inf], (6, 1))).p_value < 0.01
+
+
+@given(arrays(np.float64, st.tuples(st.integers(1, 6), st.integers(2, 5)), elements=COSTS))
+def test_ranks_count_who_is_better(lengths: np.ndarray) -> None:
+    ranks = stands(lengths).ranks
+    for (i, j), rank in np.ndenumerate(ranks):
+        better = sum(other < lengths[i, j] for other in lengths[i])
+        equal = sum(other == lengths[i, j] for other in lengths[i])
+        assert rank == better + (equal + 1) / 2
+
+
+@given(arrays(np.float64, st.tuples(st.integers(1, 6), st.integers(2, 5)), elements=COSTS))
+def test_profiles_count_problems(efforts: np.ndarray) -> None:
+    ratios = effort_ratios(efforts)
+    for row, got in zip(efforts, ratios, strict=True):
+        for effort, ratio in zip(row, got, strict=True):
+            assert ratio == (np.inf if np.isinf(effort) else effort / min(row))
+    table = profile_table(stands(efforts))
+    for row in table.itertuples():
+        own = ratios[:, int(str(row.planner).removeprefix("planner "))]
+        assert row.share == sum(ratio <= row.ratio for ratio in own) / len(own)
+    last = table.groupby("planner")["share"].last()
+    assert last.tolist() == [np.isfinite(own).mean() for own in efforts.T]
+
+
+@given(st.lists(st.floats(1.0, 6.0), min_size=2, max_size=7), st.floats(0.1, 3.0))
+def test_groups_join_all_pairs_that_do_not_differ(ranks: list[float], difference: float) -> None:
+    ranks = sorted(ranks)
+    groups = alike(ranks, difference)
+    for i, j in itertools.combinations(range(len(ranks)), 2):
+        joined = any(first <= i and j <= last for first, last in groups)
+        assert joined == (ranks[j] - ranks[i] < difference)
+    for one, two in itertools.permutations(groups, 2):
+        assert not (one[0] >= two[0] and one[1] <= two[1])  # none inside of another
+
+
+def runs_of(planner: str, problem: str, lengths: list[float], spent: float = 100.0) -> PlannerRuns:
+    """Return runs whose one answer, where there is one, comes at a tenth of the effort."""
+    rows = [(k, 0.1 * spent, x, True) for k, x in enumerate(lengths) if np.isfinite(x)]
+    table = pd.DataFrame(rows, columns=["replicate", "collision_queries", "length", "certified"])
+    nobody: Any = None
+    return PlannerRuns(
+        planner,
+        Problem(problem, "", np.nan),
+        f"{problem}, {planner}",
+        table,
+        tuple(range(len(lengths))),
+        np.full(len(lengths), spent),
+        nobody,
+    )
+
+
+def test_a_problem_counts_once_however_many_seeds_it_has() -> None:
+    runs = [
+        runs_of("A", "p", [1.0, 2.0, 9.0]),
+        runs_of("B", "p", [3.0] * 50),
+        runs_of("A", "q", [np.inf, np.inf, 1.0]),
+        runs_of("B", "q", [4.0, 4.0]),
+        runs_of("A", "only A", [1.0]),
+    ]
+    found = standing(runs)
+    assert (found.planners, found.problems) == (("A", "B"), ("p", "q"))
+    assert found.left_out == ("only A",)
+    assert found.lengths.tolist() == [[2.0, 3.0], [np.inf, 4.0]]
+    assert found.efforts.tolist() == [[10.0, 10.0], [210.0, 10.0]]
+    assert found.mean_ranks.tolist() == [1.5, 1.5]
+    assert found.can_be_profiled and not found.can_be_tested
+
+
+def test_figures_name_every_planner() -> None:
+    rng = np.random.default_rng(3)
+    found = stands(rng.random((8, 7)), rng.random((8, 7)))
+    assert found.can_be_tested
+    table = rank_table(found, 0.05)
+    assert table["mean_rank"].is_monotonic_increasing
+    (axes,) = draw_critical_difference(table).axes
+    texts = " ".join(text.get_text() for text in axes.texts)
+    assert all(name in texts for name in found.planners)
+    (axes,) = draw_profiles(profile_table(found)).axes
+    assert [line.get_label() for line in axes.get_lines()] == list(found.planners)

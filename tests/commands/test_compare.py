@@ -38,3 +38,20 @@ def test_what_is_neither_is_refused(evoexp: Evoexp, stored: Path) -> None:
     assert said.code == 2 and "left out where runs are given by their hashes" in said.err
     said = evoexp("compare", "lavoie_7dof")
     assert said.code == 2 and "nothing stored" in said.err
+
+
+def test_given_runs_stand_beside_ours(evoexp: Evoexp, stored: Path, tmp_path: Path) -> None:
+    data = tmp_path / "given.csv"
+    data.write_text("planner,problem,seed,queries,cost\nRRT*,rana_planar,0,70,5.5\n")
+    said = evoexp("compare", "rana_planar", *SERIAL, "--data", str(data), "--json")
+    assert (said.code, said.err) == (0, "")
+    *_, last = json.loads(said.out)
+    assert (last["condition"], last["proven"], last["queries"]) == ("RRT* (given)", 1, 70.0)
+    assert last["problem"] == "rana_planar" and last["first_own"] is None
+    (page,) = (stored / "reports").glob("compare_rana_planar@smoke*+given_*/index.md")
+    assert f"--data {data}`" in page.read_text()
+    data.write_text("planner,problem,seed,queries,cost\nRRT*,rana_plan,0,70,x\n")
+    said = evoexp("compare", "rana_planar", *SERIAL, "--data", str(data))
+    assert said.code == 2 and "given.csv, line 2, cost: must be a length" in said.err
+    said = evoexp("compare", "rana_planar", *SERIAL, "--data", str(tmp_path / "none.csv"))
+    assert said.code == 2 and "No such file" in said.err and said.err.count("\n") == 1

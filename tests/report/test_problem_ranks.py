@@ -1,7 +1,6 @@
 """Ranks over problems: against printed numbers of Demšar (2006), and against plain counts."""
 
 import itertools
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -50,6 +49,7 @@ def stands(lengths: np.ndarray, efforts: np.ndarray | None = None) -> Standing:
     return Standing(
         tuple(f"planner {k}" for k in range(planners)),
         tuple(f"problem {k}" for k in range(problems)),
+        (),
         (),
         lengths if efforts is None else efforts,
         lengths,
@@ -117,7 +117,6 @@ def runs_of(planner: str, problem: str, lengths: list[float], spent: float = 100
     """Return runs whose one answer, where there is one, comes at a tenth of the effort."""
     rows = [(k, 0.1 * spent, x, True) for k, x in enumerate(lengths) if np.isfinite(x)]
     table = pd.DataFrame(rows, columns=["replicate", "collision_queries", "length", "certified"])
-    nobody: Any = None
     return PlannerRuns(
         planner,
         Problem(problem, "", np.nan),
@@ -125,7 +124,7 @@ def runs_of(planner: str, problem: str, lengths: list[float], spent: float = 100
         table,
         tuple(range(len(lengths))),
         np.full(len(lengths), spent),
-        nobody,
+        None,
     )
 
 
@@ -144,6 +143,17 @@ def test_a_problem_counts_once_however_many_seeds_it_has() -> None:
     assert found.efforts.tolist() == [[10.0, 10.0], [210.0, 10.0]]
     assert found.mean_ranks.tolist() == [1.5, 1.5]
     assert found.can_be_profiled and not found.can_be_tested
+
+
+def test_a_planner_of_few_problems_is_not_ranked_and_costs_no_problem() -> None:
+    runs = [runs_of(name, problem, [1.0]) for problem in "pqrs" for name in "AB"]
+    few = [runs_of("few", "p", [1.0]), *(runs_of("few", f"own {k}", [1.0]) for k in range(9))]
+    found = standing([*runs, *few])
+    assert (found.planners, found.outsiders) == (("A", "B"), ("few",))
+    assert (found.problems, len(found.left_out)) == (tuple("pqrs"), 9)
+    half = standing([*runs, runs_of("half", "p", [1.0]), runs_of("half", "q", [1.0])])
+    assert (half.planners, half.problems) == (("A", "B", "half"), ("p", "q"))
+    assert half.left_out == ("r", "s") and not half.outsiders
 
 
 def test_figures_name_every_planner() -> None:

@@ -14,6 +14,7 @@ from evoexp.configuration import expansions
 from evoexp.configuration.search_path import is_file, options
 from evoexp.errors import SettingError, UnknownOption
 from evoexp.report import build, markdown
+from evoexp.report.given_data import GivenData, of_given, read_given, strange_problems
 from evoexp.report.pages import comparison
 from evoexp.report.planner_runs import of_results
 from evoexp.report.report_settings import ReportSettings
@@ -31,13 +32,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     words = add_experiment_arguments(parser)
     words.metavar, words.nargs = "EXPERIMENT | HASH | RUNS.tar ... [KEY=VALUE ...]", "+"
     words.help = "experiments and overrides as for run, or prefixes of the hashes of stored runs"
+    parser.add_argument(
+        "--data",
+        metavar="FILE.csv",
+        help="runs of other planners: columns planner, problem, seed, queries, cost; a row per "
+        "improvement, cost: the path's length, empty: the run has no answer",
+    )
     parser.add_argument("--json", action="store_true", help="print JSON: an object per condition")
 
 
 def main(arguments: argparse.Namespace) -> int:
     """Draw the page, and print its table."""
     arguments.overrides = unpacked(arguments.overrides)
+    given = read_given(arguments.data) if arguments.data else None
     request, settings, planned = _asked(arguments)
+    if given:
+        request = _with_data(request, arguments.data, given)
     found = gather(
         outputs_root(),
         request.conditions,
@@ -47,8 +57,11 @@ def main(arguments: argparse.Namespace) -> int:
         request.hint,
         request.options,
     )
-    runs = of_results(found.evolved)
-    page = comparison.page_of_runs(runs, found, settings)
+    runs, strange = of_results(found.evolved), list[str]()
+    if given:
+        strange = list(strange_problems(given, runs))
+        runs += of_given(given, runs)
+    page = comparison.page_of_runs(runs, found, settings, given)
     path = build.write_page(request, page, found, settings)
     rows = comparison.rated(runs, settings)
     if arguments.json:
@@ -64,9 +77,11 @@ def main(arguments: argparse.Namespace) -> int:
             f"{row.proven} of {row.runs}",
             markdown.number(row.queries),
             markdown.number(row.lengths.median),
-            f"{row.refuted} of {row.judged}",
+            f"{row.refuted} of {row.judged}" if row.judged else "–",
         )
     console.print(table)
+    for line in strange:
+        console.print(line, highlight=False, soft_wrap=True)
     console.print(f"compare: {path}", highlight=False, soft_wrap=True)
     return 0
 
@@ -119,6 +134,13 @@ def _asked(arguments: argparse.Namespace) -> tuple[build.Request, ReportSettings
     title = " and ".join(dict.fromkeys(experiment.name for experiment in experiments))
     request = build.Request(name, title, first.budget, labelled, words, None, "compare")
     return request, _with_page(first.report), first.num_replicates
+
+
+def _with_data(request: build.Request, path: str, given: GivenData) -> build.Request:
+    """Return the request of a page that shows given runs, too: a folder of its own."""
+    name = f"{request.report_name}+given_{given.sha256[:8]}"
+    words = f"{request.arguments} --data {shlex.quote(path)}".strip()
+    return request._replace(report_name=name, arguments=words)
 
 
 def _name(parts: str, count: int) -> str:

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import re
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -54,7 +54,7 @@ class PlannerRuns(NamedTuple):
         table: Its answers in order; columns replicate, collision_queries, length and certified.
         replicates: (runs,) in order.
         spent: (runs,) collision queries of the whole runs.
-        condition: That was run.
+        condition: That was run; None: the runs were given, nobody here judged them.
     """
 
     planner: str
@@ -63,7 +63,7 @@ class PlannerRuns(NamedTuple):
     table: pd.DataFrame
     replicates: tuple[int, ...]
     spent: FloatArray
-    condition: ConditionResults
+    condition: ConditionResults | None
 
     def first_reached(self, longest: float = np.inf) -> tuple[FloatArray, np.ndarray]:
         """Return each run's effort up to an answer that is so short, and whether it has one.
@@ -78,6 +78,16 @@ class PlannerRuns(NamedTuple):
     def best_lengths(self) -> FloatArray:
         """Least length of a proven answer of each run, (runs,) [rad, m]; inf: none is proven."""
         return best_lengths(self.table, self.replicates)
+
+
+def several_problems(problems: Iterable[Problem]) -> bool:
+    """Return whether there is more than one problem, so that labels have to name it."""
+    return len({problem.name for problem in problems}) > 1
+
+
+def stored_conditions(runs: Iterable[PlannerRuns]) -> tuple[ConditionResults, ...]:
+    """Return the conditions of those runs that were not given."""
+    return tuple(own.condition for own in runs if own.condition is not None)
 
 
 def problem_key(condition: Condition) -> str:

@@ -39,7 +39,8 @@ class Standing(NamedTuple):
     Attributes:
         planners: Their names.
         problems: Names of the problems.
-        left_out: Problems that some planner was not run on.
+        left_out: Problems that some of these planners was not run on.
+        outsiders: Planners run on less than half of the problems that two planners were run on.
         efforts: Expected running time to a proven answer, (problems, planners) [collision queries].
         lengths: Median of the best proven lengths, (problems, planners); inf: half have none.
     """
@@ -47,6 +48,7 @@ class Standing(NamedTuple):
     planners: tuple[str, ...]
     problems: tuple[str, ...]
     left_out: tuple[str, ...]
+    outsiders: tuple[str, ...]
     efforts: FloatArray
     lengths: FloatArray
 
@@ -73,11 +75,17 @@ class Standing(NamedTuple):
 
 def standing(runs: Sequence[PlannerRuns]) -> Standing:
     """Return how planners stand, each problem counted once."""
-    planners = tuple(dict.fromkeys(own.planner for own in runs))
+    every = tuple(dict.fromkeys(own.planner for own in runs))
     problems = tuple(dict.fromkeys(own.problem.name for own in runs))
     cells: dict[tuple[str, str], list[PlannerRuns]] = {}
     for own in runs:
         cells.setdefault((own.problem.name, own.planner), []).append(own)
+    contested = [name for name in problems if sum((name, each) in cells for each in every) > 1]
+    planners = tuple(
+        each
+        for each in every
+        if 2 * sum((name, each) in cells for name in contested) >= len(contested)
+    )
     common = tuple(name for name in problems if all((name, each) in cells for each in planners))
 
     def matrix(value: Callable[[Sequence[PlannerRuns]], float]) -> FloatArray:
@@ -85,7 +93,8 @@ def standing(runs: Sequence[PlannerRuns]) -> Standing:
         return np.array(rows, dtype=np.float64).reshape(len(common), len(planners))
 
     left_out = tuple(name for name in problems if name not in common)
-    return Standing(planners, common, left_out, matrix(_effort), matrix(_length))
+    outsiders = tuple(each for each in every if each not in planners)
+    return Standing(planners, common, left_out, outsiders, matrix(_effort), matrix(_length))
 
 
 def _effort(runs: Sequence[PlannerRuns]) -> float:

@@ -13,9 +13,10 @@ from evoexp.report import markdown
 from evoexp.report.comparisons import compared
 from evoexp.report.figures import effort_curves
 from evoexp.report.figures.effort_curves import MAX_PANELS, problem_order
+from evoexp.report.given_data import MARK, GivenData
 from evoexp.report.page_parts import Drawing, Page, Table
 from evoexp.report.pages import ranking
-from evoexp.report.planner_runs import PlannerRuns, of_results
+from evoexp.report.planner_runs import PlannerRuns, of_results, stored_conditions
 from evoexp.report.problem_ranks import standing
 from evoexp.report.proportions import Proportion
 from evoexp.report.report_settings import ReportSettings
@@ -95,8 +96,19 @@ def page(results: Results, settings: ReportSettings) -> Page:
     return page_of_runs(of_results(results.evolved), results, settings)
 
 
-def page_of_runs(runs: Sequence[PlannerRuns], results: Results, settings: ReportSettings) -> Page:
+def page_of_runs(
+    runs: Sequence[PlannerRuns],
+    results: Results,
+    settings: ReportSettings,
+    given: GivenData | None = None,
+) -> Page:
     """Build the page from runs that are judged already.
+
+    Args:
+        runs: Stored ones, and given ones.
+        results: The stored ones come from.
+        settings: Levels.
+        given: The file that the given ones come from.
 
     Raises:
         NothingStored: If there are none.
@@ -106,21 +118,30 @@ def page_of_runs(runs: Sequence[PlannerRuns], results: Results, settings: Report
     found = standing(runs)
     return Page(
         title=f"{results.experiment or 'stored runs'}: proven answers",
-        introduction=INTRODUCTION,
+        introduction=INTRODUCTION + (_of_file(given) if given else ""),
         tables=(_table(rated(runs, settings), settings), *ranking.tables(found, settings)),
         comparisons=_comparisons(runs, settings),
         drawings=(*_drawings(runs), *ranking.drawings(found, runs, settings)),
     )
 
 
+def _of_file(given: GivenData) -> str:
+    """Say whose word the given answers are."""
+    return (
+        f" Planners marked{MARK} were not run here: their answers count as {given.name} "
+        f"(SHA-256 {given.sha256[:12]}…) tells them, the certifier has not seen them, and as seeds "
+        "are not common they are not compared pair by pair."
+    )
+
+
 def _drawings(runs: Sequence[PlannerRuns]) -> Iterator[Drawing]:
     """Yield the figures: curves of all problems and of each, or of one with its lengths."""
-    conditions, problems = tuple(own.condition for own in runs), problem_order(runs)
+    conditions, problems = stored_conditions(runs), problem_order(runs)
     yield Drawing(
         stem="targets_reached",
         title="Targets reached",
         caption=f"Share of (problem, target, run) with a proven answer: {TARGETS} Left and high is "
-        "good.",
+        f"good.{_unequal(runs)}",
         table=partial(effort_curves.share_table, runs),
         draw=effort_curves.draw_shares,
         conditions=conditions,
@@ -148,30 +169,50 @@ def _drawings(runs: Sequence[PlannerRuns]) -> Iterator[Drawing]:
     )
 
 
+def _unequal(runs: Sequence[PlannerRuns]) -> str:
+    """Warn where planners were run on different problems; empty if all were run on the same."""
+    problems: dict[str, set[str]] = {}
+    for own in runs:
+        problems.setdefault(own.planner, set()).add(own.problem.name)
+    if len({frozenset(names) for names in problems.values()}) == 1:
+        return ""
+    return (
+        " Each planner's curve is over the problems that it was run on, which are not the same for "
+        "all: compare them problem by problem."
+    )
+
+
 def rated(runs: Sequence[PlannerRuns], settings: ReportSettings) -> list[Rated]:
     """Return the conditions that have motions, rated by their proven answers."""
     return [_rated(own, settings) for own in runs]
 
 
 def _rated(own: PlannerRuns, settings: ReportSettings) -> Rated:
-    verdicts, table = own.condition.verdicts, own.table
     effort, reached = own.first_reached()
-    first = table[table["solved"].astype(bool)].groupby("replicate")["collision_queries"].min()
-    first_own = first.reindex(list(own.replicates)).fillna(np.inf).to_numpy(np.float64)
+    verdicts = own.condition.verdicts if own.condition else None
     return Rated(
         own.label,
         own.planner,
         own.problem.name,
         len(own.replicates),
         int(reached.sum()),
-        quantile(first_own, 0.5),
+        _first_own(own),
         expected_effort(effort, reached),
         expected_interval(effort, reached, settings.confidence, settings.num_resamples),
         spread(own.best_lengths),
         own.problem.straight,
-        verdicts.solved_refuted,
-        verdicts.judged,
+        verdicts.solved_refuted if verdicts else 0,
+        verdicts.judged if verdicts else 0,
     )
+
+
+def _first_own(own: PlannerRuns) -> float:
+    """Return the median effort to an answer that the planner's own model accepts; NaN: unknown."""
+    if own.condition is None:
+        return np.nan
+    good = own.table[own.table["solved"].astype(bool)]
+    first = good.groupby("replicate")["collision_queries"].min().reindex(list(own.replicates))
+    return quantile(first.to_numpy(np.float64, na_value=np.inf), 0.5)
 
 
 def _table(rows: Sequence[Rated], settings: ReportSettings) -> Table:
@@ -194,7 +235,7 @@ def _table(rows: Sequence[Rated], settings: ReportSettings) -> Table:
             f"{markdown.number(row.queries)} ({_between(row.interval)})",
             markdown.spread(row.lengths),
             markdown.spread(row.in_lines) if row.straight > 0.0 else "–",
-            f"{row.refuted} of {row.judged}",
+            f"{row.refuted} of {row.judged}" if row.judged else "–",
         )
         for row in rows
     )
@@ -209,10 +250,11 @@ def _comparisons(
     runs: Sequence[PlannerRuns], settings: ReportSettings
 ) -> tuple[tuple[str, tuple[Comparison, ...]], ...]:
     """Compare the planners of each problem on common seeds."""
-    by_label = {own.label: own for own in runs}
+    stored = [(own, own.condition) for own in runs if own.condition is not None]
+    by_label = {own.label: own for own, _ in stored}
     pairs = [
-        (a.condition, b.condition)
-        for a, b in itertools.combinations(runs, 2)
+        (first, second)
+        for (a, first), (b, second) in itertools.combinations(stored, 2)
         if a.problem == b.problem
     ]
 

@@ -8,7 +8,7 @@ import numpy as np
 from evoexp.report import markdown
 from evoexp.report.figures import rank_diagrams
 from evoexp.report.page_parts import Drawing, Table
-from evoexp.report.planner_runs import PlannerRuns
+from evoexp.report.planner_runs import PlannerRuns, stored_conditions
 from evoexp.report.problem_ranks import (
     MIN_PLANNERS,
     MIN_PROBLEMS,
@@ -57,9 +57,13 @@ def tables(found: Standing, settings: ReportSettings) -> tuple[Table, ...]:
 
 
 def _left_out(found: Standing) -> str:
-    """Name the problems that do not count; empty if all do."""
+    """Name the problems and planners that do not count; empty if all do."""
     names = ", ".join(found.left_out)
-    return f"Left out, as some planner was not run on them: {names}." if names else ""
+    problems = f"Left out, as some planner was not run on them: {names}." if names else ""
+    if not found.outsiders:
+        return problems
+    planners = ", ".join(found.outsiders)
+    return f"{problems} Not ranked, as run on less than half of the problems: {planners}."
 
 
 def _tested(found: Standing, settings: ReportSettings) -> str:
@@ -90,7 +94,7 @@ def drawings(
 ) -> Iterator[Drawing]:
     """Yield performance profiles, and the critical-difference diagram."""
     counted = set(found.problems)
-    conditions = tuple(own.condition for own in runs if own.problem.name in counted)
+    conditions = stored_conditions(own for own in runs if own.problem.name in counted)
     if found.can_be_profiled:
         unsolved = int(np.isinf(found.efforts).all(axis=1).sum())
         never = f" No planner has a proven answer on {unsolved} of them." if unsolved else ""

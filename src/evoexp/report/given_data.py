@@ -1,0 +1,224 @@
+"""Runs of other people's planners, read from a CSV file: one row per improvement of a run.
+
+Nobody here judges them: their answers count as given, and are marked so wherever they stand.
+"""
+
+import csv
+import hashlib
+import io
+import math
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from evoexp.errors import SettingError, nearest, printable
+from evoexp.input_files import read_bounded
+from evoexp.report.planner_runs import PlannerRuns, Problem, several_problems
+
+COLUMNS = ("planner", "problem", "seed", "queries", "cost")
+MARK = " (given)"  # behind the names of planners that were not run here
+_WHOLE = re.compile("[0-9]{1,18}")
+_NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]{1,3})?")
+
+
+class GivenAnswer(NamedTuple):
+    """A row of the file.
+
+    Attributes:
+        line: Number of the line in the file, from 1.
+        planner: Its name.
+        problem: Name of the problem.
+        seed: Of the run.
+        queries: Configurations that the run had judged for collision so far.
+        cost: Length of the path [rad, m]; NaN: no answer, the whole run has spent that much.
+    """
+
+    line: int
+    planner: str
+    problem: str
+    seed: int
+    queries: int
+    cost: float
+
+
+class GivenData(NamedTuple):
+    """A file's content.
+
+    Attributes:
+        name: Of the file.
+        sha256: Of its bytes, 64 hex digits.
+        answers: Its rows, in order.
+    """
+
+    name: str
+    sha256: str
+    answers: tuple[GivenAnswer, ...]
+
+
+def read_given(path: str) -> GivenData:
+    """Read a file with the columns planner, problem, seed, queries and cost.
+
+    Raises:
+        SettingError: If something in it cannot be; names line and column.
+        OSError: If it cannot be read.
+    """
+    content = read_bounded(path)
+    name = printable(Path(path).name)
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content[: error.start].count(b"\n") + 1
+        raise SettingError(
+            f"{name}, line {line}", "text in UTF-8", error.object[error.start]
+        ) from None
+    answers = tuple(_rows(name, text))
+    if not answers:
+        raise SettingError(name, "a file with a row per improvement of a run", "no row")
+    _check_runs(name, answers)
+    return GivenData(name, hashlib.sha256(content).hexdigest(), answers)
+
+
+def _rows(name: str, text: str) -> Iterator[GivenAnswer]:
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    order: list[str] = []
+    try:
+        for cells in reader:
+            where = f"{name}, line {reader.line_num}"
+            if not cells or not any(cell.strip() for cell in cells):
+                continue
+            if not order:
+                order = _header(where, [cell.strip() for cell in cells])
+                continue
+            if len(cells) != len(COLUMNS):
+                raise SettingError(where, f"{len(COLUMNS)} cells, as in the first line", len(cells))
+            yield _row(where, reader.line_num, dict(zip(order, cells, strict=True)))
+    except csv.Error as error:
+        where = f"{name}, line {reader.line_num}"
+        raise SettingError(where, "a line of CSV", str(error)) from None
+
+
+def _header(where: str, names: list[str]) -> list[str]:
+    """Return the names of the columns in the file's order."""
+    for column in names:
+        if column not in COLUMNS:
+            must = f"the columns {', '.join(COLUMNS)}"
+            raise SettingError(where, must, column, nearest(column, COLUMNS))
+    for column in COLUMNS:
+        if names.count(column) != 1:
+            raise SettingError(f"{where}, {column}", "there once", f"{names.count(column)} times")
+    return names
+
+
+def _row(where: str, line: int, cells: dict[str, str]) -> GivenAnswer:
+    given = {name: cell.strip() for name, cell in cells.items()}
+    for name in ("planner", "problem"):
+        if not given[name] or not given[name].isprintable():
+            raise SettingError(f"{where}, {name}", "a name", given[name])
+    for name in ("seed", "queries"):
+        if not _WHOLE.fullmatch(given[name]):
+            must = "a whole number, at least 0, of 18 digits at most"
+            raise SettingError(f"{where}, {name}", must, given[name])
+    cost = math.nan
+    if given["cost"]:
+        cost = float(given["cost"]) if _NUMBER.fullmatch(given["cost"]) else math.nan
+        if not 0.0 < cost < math.inf:
+            must = "a length above 0, or empty where the run has no answer"
+            raise SettingError(f"{where}, cost", must, given["cost"])
+    seed, queries = int(given["seed"]), int(given["queries"])
+    return GivenAnswer(line, given["planner"], given["problem"], seed, queries, cost)
+
+
+def _by_run(answers: Sequence[GivenAnswer]) -> dict[tuple[str, str, int], list[GivenAnswer]]:
+    found: dict[tuple[str, str, int], list[GivenAnswer]] = {}
+    for row in answers:
+        found.setdefault((row.planner, row.problem, row.seed), []).append(row)
+    return found
+
+
+def _check_runs(name: str, answers: Sequence[GivenAnswer]) -> None:
+    """Refuse rows of one run that contradict each other."""
+    for run in _by_run(answers).values():
+        at: dict[int, int] = {}  # queries → line
+        ends = [row for row in run if math.isnan(row.cost)]
+        for row in run:
+            where = f"{name}, line {row.line}"
+            if math.isnan(row.cost):
+                if row is not ends[0]:
+                    must = f"a length: line {ends[0].line} is this run's row without one"
+                    raise SettingError(f"{where}, cost", must, "")
+                continue
+            if row.queries in at:
+                must = f"another number than in line {at[row.queries]}, of the same run"
+                raise SettingError(f"{where}, queries", must, row.queries)
+            at[row.queries] = row.line
+        if ends and at and ends[0].queries < max(at):
+            must = f"at least {max(at)}, as the same run spent in line {at[max(at)]}"
+            raise SettingError(f"{name}, line {ends[0].line}, queries", must, ends[0].queries)
+
+
+def of_given(data: GivenData, ours: Sequence[PlannerRuns]) -> list[PlannerRuns]:
+    """Return the runs of a file, beside ours.
+
+    A problem is one of ours if the file calls it as the page does, or by a label of one of its
+    conditions, or by its key; else it is a problem of its own, where any answer is the only target.
+
+    Args:
+        data: The file.
+        ours: Runs of stored conditions.
+    """
+    known = _known(ours)
+    cells: dict[tuple[str, Problem], dict[int, list[GivenAnswer]]] = {}
+    for (planner, name, seed), rows in _by_run(data.answers).items():
+        problem = known.get(name, Problem(name, "", math.nan))
+        cells.setdefault((planner, problem), {}).setdefault(seed, []).extend(rows)
+    every = [*(own.problem for own in ours), *(problem for _, problem in cells)]
+    named = several_problems(every)
+    return [
+        _runs(f"{planner}{MARK}", problem, runs, named)
+        for (planner, problem), runs in cells.items()
+    ]
+
+
+def strange_problems(data: GivenData, ours: Sequence[PlannerRuns]) -> Iterator[str]:
+    """Yield a line for each problem of a file that is none of ours, with the name perhaps meant."""
+    known = _known(ours)
+    for name in dict.fromkeys(row.problem for row in data.answers):
+        if name not in known:
+            hint = nearest(name, known)
+            yield f"{data.name}: '{name}' is a problem of its own, none of those compared{hint}"
+
+
+def _known(ours: Sequence[PlannerRuns]) -> dict[str, Problem]:
+    """Return our problems by each name that a file may call them."""
+    known: dict[str, Problem] = {own.problem.name: own.problem for own in ours}
+    for own in ours:
+        known.setdefault(own.label, own.problem)
+        known.setdefault(own.problem.key, own.problem)
+    return known
+
+
+def _runs(
+    planner: str, problem: Problem, runs: dict[int, list[GivenAnswer]], named: bool
+) -> PlannerRuns:
+    """Return the runs of a planner on a problem, in the order of their seeds."""
+    rows = [
+        (seed, row.queries, row.cost, True)
+        for seed in sorted(runs)
+        for row in sorted(runs[seed], key=lambda each: each.queries)
+        if not math.isnan(row.cost)
+    ]
+    table = pd.DataFrame(rows, columns=["replicate", "collision_queries", "length", "certified"])
+    spent = [max(row.queries for row in runs[seed]) for seed in sorted(runs)]
+    return PlannerRuns(
+        planner,
+        problem,
+        f"{problem.name}: {planner}" if named else planner,
+        table.astype({"certified": bool}),
+        tuple(sorted(runs)),
+        np.array(spent, dtype=np.float64),
+        None,
+    )

@@ -1,0 +1,125 @@
+"""Runs from a CSV file: what is read, what is refused, and where it stands."""
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from evoexp.errors import SettingError
+from evoexp.report.figures.effort_curves import share_table
+from evoexp.report.given_data import COLUMNS, of_given, read_given, strange_problems
+from evoexp.report.pages import comparison
+from evoexp.report.planner_runs import MULTIPLES, of_results
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results import Results
+
+HEAD = ",".join(COLUMNS)
+
+
+@pytest.fixture
+def given(tmp_path: Path) -> Path:
+    """Return a file of two planners: one on our problem, with a run that failed."""
+    path = tmp_path / "given.csv"
+    rows = [
+        ("RRT*", "link_motion", 7, 50, 9.0),
+        ("RRT*", "link_motion", 7, 400, 5.0),
+        ("RRT*", "link_motion", 3, 900, ""),
+        ("my, own", "elsewhere", 0, 10, 1.5),
+        ("my, own", "elsewhere", 0, 99, ""),
+    ]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file).writerows([COLUMNS, *rows])
+    return path
+
+
+def test_given_runs_are_those_of_the_file(given: Path, results: Results) -> None:
+    ours = of_results(results.evolved)
+    name = ours[0].problem.name
+    text = given.read_text().replace("link_motion", name)
+    given.write_text(text)
+    found = of_given(read_given(str(given)), ours)
+    assert [(own.planner, own.problem.name) for own in found] == [
+        ("RRT* (given)", name),
+        ("my, own (given)", "elsewhere"),
+    ]
+    tree, other = found
+    assert tree.problem == ours[0].problem and tree.replicates == (3, 7)
+    assert tree.best_lengths.tolist() == [math.inf, 5.0]
+    assert [part.tolist() for part in tree.first_reached()] == [[900.0, 50.0], [False, True]]
+    assert [part.tolist() for part in tree.first_reached(6.0)] == [[900.0, 400.0], [False, True]]
+    assert (other.problem.key, other.problem.targets) == ("", MULTIPLES[:1])
+    assert other.spent.tolist() == [99.0] and other.best_lengths.tolist() == [1.5]
+    counts = share_table([*ours, *found]).groupby("planner")["targets"].first()
+    assert counts["RRT* (given)"] == 2 * len(MULTIPLES) and counts["my, own (given)"] == 1
+
+
+def test_a_problem_is_called_by_its_name_a_label_or_its_key(given: Path, results: Results) -> None:
+    ours = of_results(results.evolved)
+    problem = ours[0].problem
+    text = given.read_text()
+    for called in (problem.name, ours[1].label, problem.key):
+        given.write_text(text.replace("link_motion", called))
+        data = read_given(str(given))
+        assert of_given(data, ours)[0].problem == problem
+        assert [line.split("'")[1] for line in strange_problems(data, ours)] == ["elsewhere"]
+    given.write_text(text.replace("link_motion", ours[1].label.upper()[:-1].lower()))
+    lines = list(strange_problems(read_given(str(given)), ours))
+    assert f"did you mean '{ours[1].label}'?" in lines[0]
+
+
+def test_the_page_marks_given_planners(
+    given: Path, results: Results, settings: ReportSettings
+) -> None:
+    ours = of_results(results.evolved)
+    data = read_given(str(given))
+    page = comparison.page_of_runs([*ours, *of_given(data, ours)], results, settings, data)
+    assert data.sha256[:12] in page.introduction and "(given)" in page.introduction
+    last = page.tables[0].rows[-1]
+    assert last[0] == "elsewhere: my, own (given)" and last[-1] == "–"
+    assert not any("given" in row.quantity for _, rows in page.comparisons for row in rows)
+    assert not np.isnan(float(str(last[4]).split(" ")[0]))
+
+
+REFUSED = {
+    "planner,problem,seed,queries": "line 1, cost: must be there once, was '0 times'",
+    "planner,problem,seed,querys,cost": "line 1: must be the columns .*did you mean 'queries'",
+    "planner,problem,seed,queries,cost,cost": "line 1, cost: must be there once, was '2 times'",
+    "planner;problem;seed;queries;cost": "line 1: must be the columns",
+    HEAD: "must be a file with a row per improvement of a run",
+    f"{HEAD}\nA,p,1,10": "line 2: must be 5 cells, as in the first line, was 4",
+    f"{HEAD}\n,p,1,10,2.0": "line 2, planner: must be a name, was ''",
+    f"{HEAD}\nA,\x1bp,1,10,2.0": "line 2, problem: must be a name",
+    f"{HEAD}\nA,p,one,10,2.0": "line 2, seed: must be a whole number",
+    f"{HEAD}\nA,p,1,10,2.0\n\nA,p,1,-3,1.0": "line 4, queries: must be a whole number",
+    f"{HEAD}\nA,p,1,1e3,2.0": "line 2, queries: must be a whole number",
+    f"{HEAD}\nA,p,1,10,0": "line 2, cost: must be a length above 0, or empty .*, was '0'",
+    f"{HEAD}\nA,p,1,10,inf": "line 2, cost: must be a length above 0",
+    f"{HEAD}\nA,p,1,10,nan": "line 2, cost: must be a length above 0",
+    f"{HEAD}\nA,p,1,10,1_0": "line 2, cost: must be a length above 0",
+    f"{HEAD}\nA,p,1,10,1e999": "line 2, cost: must be a length above 0",
+    f"{HEAD}\nA,p,1,10,2.0\nA,p,1,10,1.5": "line 3, queries: must be another number than in line 2",
+    f"{HEAD}\nA,p,1,10,\nA,p,1,20,": "line 3, cost: must be a length: line 2 is this run's row",
+    f"{HEAD}\nA,p,1,10,\nA,p,1,20,3.0": "line 2, queries: must be at least 20, .* line 3, was 10",
+    f'{HEAD}\nA,"p,1,10,2.0': "line 2: must be a line of CSV",
+}
+
+
+@pytest.mark.parametrize(("text", "said"), REFUSED.items())
+def test_a_bad_row_is_named_by_line_and_column(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "bad.csv"
+    path.write_text(text, newline="")
+    with pytest.raises(SettingError, match=f"^bad.csv.*{said}") as caught:
+        read_given(str(path))
+    assert "\n" not in str(caught.value)
+
+
+def test_other_bytes_than_text_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "bad.csv"
+    path.write_bytes(f"{HEAD}\nA,p,1,10,2.0\n".encode() + b"B\xff,p,1,10,2.0\n")
+    with pytest.raises(SettingError, match="line 3: must be text in UTF-8"):
+        read_given(str(path))
+    path.write_bytes(b"\xef\xbb\xbf" + f"{HEAD}\r\nA,p,1,10,2.0\r\n".encode())
+    (row,) = read_given(str(path)).answers  # as spreadsheets write it
+    assert row == (2, "A", "p", 1, 10, 2.0)

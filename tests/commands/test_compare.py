@@ -55,3 +55,17 @@ def test_given_runs_stand_beside_ours(evoexp: Evoexp, stored: Path, tmp_path: Pa
     assert said.code == 2 and "given.csv, line 2, cost: must be a length" in said.err
     said = evoexp("compare", "rana_planar", *SERIAL, "--data", str(tmp_path / "none.csv"))
     assert said.code == 2 and "No such file" in said.err and said.err.count("\n") == 1
+
+
+def test_the_table_is_written_as_csv_and_latex(
+    evoexp: Evoexp, stored: Path, tmp_path: Path
+) -> None:
+    table, latex = tmp_path / "table.csv", tmp_path / "table.tex"
+    files = ("--csv", str(table), "--latex", str(latex))
+    said = evoexp("compare", "rana_planar", *SERIAL, *files)
+    assert said.code == 0 and f"csv: {table}" in said.out and f"latex: {latex}" in said.out
+    names = [line.split(",")[0] for line in table.read_text().splitlines()]
+    assert names == ["planner", "via-point GA", "random search", "multi-start"]
+    assert all(f"{name} & rana\\_planar & 2 & " in latex.read_text() for name in names[1:])
+    said = evoexp("compare", "rana_planar", *SERIAL, "--csv", str(tmp_path / "none" / "t.csv"))
+    assert said.code == 2 and "No such file" in said.err and said.err.count("\n") == 1

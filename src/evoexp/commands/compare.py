@@ -4,6 +4,7 @@ import argparse
 import hashlib
 import re
 import shlex
+from pathlib import Path
 from typing import Any
 
 from evoexp.commands.arguments import add_experiment_arguments, folder_words, is_override
@@ -14,12 +15,14 @@ from evoexp.configuration import expansions
 from evoexp.configuration.search_path import is_file, options
 from evoexp.errors import SettingError, UnknownOption
 from evoexp.report import build, markdown
+from evoexp.report.comparison_files import as_csv, as_latex
 from evoexp.report.given_data import GivenData, of_given, read_given, strange_problems
 from evoexp.report.pages import comparison
 from evoexp.report.planner_runs import of_results
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import gather
 from evoexp.shipped import shipped
+from evoexp.store.files import write_file
 from evoexp.store.run_directory import outputs_root, resolve
 
 PAGE = "comparison"
@@ -38,6 +41,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="runs of other planners: columns planner, problem, seed, queries, cost; a row per "
         "improvement, cost: the path's length, empty: the run has no answer",
     )
+    parser.add_argument("--csv", metavar="FILE", help="write the table as CSV, with all digits")
+    parser.add_argument("--latex", metavar="FILE", help="write the table as LaTeX (booktabs)")
     parser.add_argument("--json", action="store_true", help="print JSON: an object per condition")
 
 
@@ -64,6 +69,11 @@ def main(arguments: argparse.Namespace) -> int:
     page = comparison.page_of_runs(runs, found, settings, given)
     path = build.write_page(request, page, found, settings)
     rows = comparison.rated(runs, settings)
+    if arguments.csv:
+        write_file(Path(arguments.csv), as_csv(rows))
+    if arguments.latex:
+        command = f"evoexp compare {request.words}"
+        write_file(Path(arguments.latex), as_latex(rows, command, settings.confidence))
     if arguments.json:
         print_json([row._asdict() | _parts(row) for row in rows])
         return 0
@@ -82,6 +92,9 @@ def main(arguments: argparse.Namespace) -> int:
     console.print(table)
     for line in strange:
         console.print(line, highlight=False, soft_wrap=True)
+    for kind in ("csv", "latex"):
+        if written := getattr(arguments, kind):
+            console.print(f"{kind}: {written}", highlight=False, soft_wrap=True)
     console.print(f"compare: {path}", highlight=False, soft_wrap=True)
     return 0
 

@@ -1,0 +1,105 @@
+"""The table of a comparison as CSV for spreadsheets, and as LaTeX for papers."""
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+
+from evoexp.report import markdown
+from evoexp.report.pages.comparison import Rated
+
+COLUMNS = (
+    "planner",
+    "problem",
+    "n",
+    "proven",
+    "effort",
+    "effort_low",
+    "effort_high",
+    "length",
+    "length_lower",
+    "length_upper",
+)
+_SIGNS = {
+    "\\": r"\textbackslash{}",
+    "{": r"\{",
+    "}": r"\}",
+    "$": r"\$",
+    "&": r"\&",
+    "#": r"\#",
+    "_": r"\_",
+    "%": r"\%",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+    "|": r"\textbar{}",
+    "[": "{[}",  # behind the end of a line it would begin an option
+    "*": "{*}",
+}
+
+
+def as_csv(rows: Sequence[Rated]) -> bytes:
+    """Return the table as CSV, numbers with all digits, `inf` where there is no proven answer.
+
+    Columns: planner, problem, n (runs), proven (runs with a proven answer), effort (expected
+    running time [collision queries]) with its interval, length (median [rad, m]) with quartiles.
+    """
+    file = io.StringIO(newline="")
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for row in rows:
+        numbers = (row.queries, *row.interval, *row.lengths[:3])
+        cells = ("" if math.isnan(value) else repr(float(value)) for value in numbers)
+        writer.writerow((row.planner, row.problem, row.runs, row.proven, *cells))
+    return file.getvalue().encode()
+
+
+def as_latex(rows: Sequence[Rated], command: str, confidence: float) -> bytes:
+    r"""Return the table as LaTeX; it needs `\usepackage{booktabs}`.
+
+    Args:
+        rows: Of the table.
+        command: That makes it, for a comment above it.
+        confidence: Level of the interval.
+    """
+    level = f"{100.0 * confidence:g}"
+    head = (
+        "planner",
+        "problem",
+        "$n$",
+        "proven",
+        rf"queries per proven answer ({level}\,\%)",
+        "length [quartiles]",
+    )
+    lines = [
+        f"% made by {command.replace(chr(10), ' ')}",
+        "% queries: expected running time, failed runs included; length: best proven one [rad, m]",
+        r"\begin{tabular}{llrrrr}",
+        r"\toprule",
+        " & ".join(head) + r" \\",
+        r"\midrule",
+        *(" & ".join(_cells(row)) + r" \\" for row in rows),
+        r"\bottomrule",
+        r"\end{tabular}",
+        "",
+    ]
+    return "\n".join(lines).encode()
+
+
+def _cells(row: Rated) -> tuple[str, ...]:
+    low, high = (_number(value) for value in row.interval)
+    median, lower, upper = (_number(value) for value in row.lengths[:3])
+    length = median if row.lengths.num_values == 1 else f"{median} [{lower}, {upper}]"
+    effort = f"{_number(row.queries)} ({low}--{high})"
+    names = escaped(row.planner), escaped(row.problem)
+    return (*names, str(row.runs), str(row.proven), effort, length)
+
+
+def escaped(text: str) -> str:
+    """Return a text that LaTeX prints as it is."""
+    return "".join(_SIGNS.get(sign, sign) for sign in " ".join(text.split()))
+
+
+def _number(value: float) -> str:
+    return markdown.number(value).replace("∞", r"$\infty$").replace("–", "--")

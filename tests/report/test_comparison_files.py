@@ -70,11 +70,9 @@ def test_latex_has_a_row_per_planner_and_problem() -> None:
 @given(st.text(alphabet=st.sampled_from(r"""ab \{}$&#_%~^<>|"[]*'(λ""")))
 def test_escaped_names_hold_no_commands_but_ours(text: str) -> None:
     found = escaped(text)
-    words = (
-        r"textbackslash|textasciitilde|textasciicircum|textless|textgreater|textbar|textquotedbl"
-    )
-    bare = re.sub(rf"\\({words}){{}}|\\[{{}}$&#_%]|{{[\[*]}}".replace("{}", r"\{\}", 1), "", found)
-    assert not set(bare) & set('\\{}$&#_%~^<>|"[*'), (text, found)
+    words = "textbackslash|textasciitilde|textasciicircum|textless|textgreater|textbar"
+    bare = re.sub(rf"\\(?:{words})\{{\}}|\\[{{}}$&#_%]|\{{[\[*]\}}", "", found)
+    assert not set(bare) & set("\\{}$&#_%~^<>|[*"), (text, found)
     assert bare.count("a") == text.count("a") and bare.count("λ") == text.count("λ")
 
 

@@ -110,7 +110,7 @@ class Prepared(NamedTuple):
 
 
 class Condition(NamedTuple):
-    """What can change a result: robot, scenario, planner with its parts, seed, and a cap.
+    """All that can change a result: robot, scenario, planner with its parts, seed, and a cap.
 
     Attributes:
         robot: A component.

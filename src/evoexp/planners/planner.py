@@ -214,6 +214,9 @@ class PlannerDefaults:
 
     reproducibility: ClassVar[Reproducibility] = "bits"
     is_reference: ClassVar[bool] = False
+    is_real_coded: ClassVar[bool] = False
+    """Whether any real numbers in the place of those in which individuals of `sample` differ are an
+    individual that `cost` judges: what optimisers of real vectors need."""
 
     @property
     def num_generations(self: _Budgeted) -> int:

@@ -48,6 +48,7 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
     """The evolutionary algorithm of Rana & Zalzala, sections 3 and 4."""
 
     component: ClassVar[str] = "via_point_ga"
+    is_real_coded: ClassVar[bool] = True
 
     def prepare(self, robot: Robot, scenario: ArmMotion | MoveitTask) -> Problem:
         """Build the robot and check that start and goal fit it and are free of collision.

@@ -1,0 +1,100 @@
+"""Stochastic trajectory optimisation on a planner's own coding and cost, in the manner of STOMP."""
+
+import math
+from collections.abc import Iterator
+from typing import Any, ClassVar
+
+import numpy as np
+
+from evoexp.numeric.elementary import exp, standard_normal
+from evoexp.numeric.ordered_sums import matrix_product
+from evoexp.planners.baselines.real_vectors import (
+    check_real_coded,
+    correlated,
+    real_vectors,
+    transposed_root,
+)
+from evoexp.planners.planner import COPIES, Keeper, num_values
+from evoexp.planners.wrapped_planner import WrappedPlanner
+from evoexp.records import FloatArray, Generation
+from evoexp.validation import Count, Positive, Rate
+
+
+class Stomp(WrappedPlanner):
+    """Moves one trajectory by the weighted mean of noisy ones (Kalakrishnan et al. 2011).
+
+    Noise is as smooth as the individuals that the planner draws at first are: it has their
+    covariance. Unlike in STOMP a cost is that of a whole trajectory, the planner's own, so that all
+    its via-points share one weight: exp(−h (S − min S) / (max S − min S)) (their Eq. 11). The
+    trajectory that results is judged too, as the first of the next generation. Noise shrinks by a
+    factor per generation; after `patience` generations without a better trajectory the search
+    starts anew from an individual that the planner draws, with the first noise.
+
+    Attributes:
+        sigma: Standard deviation of the first noise, in those of the drawn individuals [-].
+        shrinkage: Share of the noise that is left after a generation [-].
+        sensitivity: h, the weight's decay from the least cost to the largest [-].
+        patience: Generations without a better trajectory until it starts anew.
+        num_drawn: Individuals drawn for the noise's covariance; they are not judged.
+        planner: The planner whose coding, cost and budget are used.
+    """
+
+    component: ClassVar[str] = "stomp"
+
+    sigma: Positive
+    shrinkage: Rate
+    sensitivity: Positive
+    patience: Count
+    num_drawn: Count
+
+    def prepare(self, robot: Any, scenario: Any) -> Any:
+        """Prepare the wrapped planner's problem.
+
+        Raises:
+            SettingError: If the planner's individuals are no real vectors.
+        """
+        check_real_coded(self.planner, self.component)
+        return super().prepare(robot, scenario)
+
+    def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Generation]:
+        """Yield one generation of noisy trajectories after the other, the middle one first."""
+        planner, keeper = self.planner, Keeper()
+        vectors = real_vectors(planner, problem, planner.sample(problem, rng, self.num_drawn))
+        root, scale = transposed_root(vectors.covariance), vectors.deviation
+        middle, sigma, least, idle = vectors.mean, self.sigma, np.inf, 0
+        for index in range(planner.num_generations + 1):
+            if idle > self.patience:
+                middle = planner.sample(problem, rng, 1)[vectors.changes][:, 0]
+                sigma, least, idle = self.sigma, np.inf, 0
+            normals = standard_normal(rng, (self.num_evaluations(index), len(middle)))
+            normals[0] = 0.0
+            noise = correlated(root, normals, sigma * scale)
+            population = vectors.population(middle + noise)
+            judged = planner.cost(problem, population)
+            yield keeper.record_judged(planner, problem, population, judged)
+            idle = 0 if judged.cost.min() < least else idle + 1
+            least = min(least, float(judged.cost.min()))
+            middle = middle + matrix_product(self.weights(judged.cost), noise)
+            sigma *= self.shrinkage
+
+    def weights(self, costs: FloatArray) -> FloatArray:
+        """Return the weights of trajectories (individuals,) by their costs, of sum 1.
+
+        Infeasible ones weigh nothing.
+        """
+        finite = np.isfinite(costs)
+        if not finite.any():
+            return np.full(len(costs), 1.0 / len(costs))
+        low, high = costs[finite].min(), costs[finite].max()
+        decay = self.sensitivity / (high - low) if high > low else 0.0
+        found = [exp(-decay * (c - low)) if math.isfinite(c) else 0.0 for c in costs.tolist()]
+        return np.array(found) / sum(found)
+
+    def num_evaluations(self, index: int) -> int:
+        """Return the planner's evaluations of a later generation, at least two."""
+        return max(2, self.planner.num_evaluations(max(1, index)))
+
+    def memory(self, problem: Any) -> int:
+        """Return the planner's estimate, and that of the drawn individuals and their covariance."""
+        values = num_values(self.shape(problem))
+        return self.planner.memory(problem) + 8 * values * (COPIES * self.num_drawn + 4 * values)

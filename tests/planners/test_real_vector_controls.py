@@ -1,0 +1,137 @@
+"""CMA-ES and noisy trajectories on a planner's coding: each beside an obvious version of itself."""
+
+from typing import Any
+
+import cmaes
+import numpy as np
+import pytest
+
+from evoexp.condition import Condition
+from evoexp.configuration import compose
+from evoexp.errors import SettingError
+from evoexp.numeric.elementary import standard_normal
+from evoexp.planners.baselines.real_vectors import correlated, real_vectors, transposed_root
+
+CONTROLS = ("cma_es", "stomp")
+
+
+def control(name: str, *words: str, experiment: str = "rana_planar") -> Condition:
+    given = [f"experiment={experiment}", f"control={name}", *words]
+    return compose.expand(given)[0].conditions[0].condition
+
+
+def evolved(chosen: Condition, seed: int) -> list[Any]:
+    planner, problem = chosen.prepare()
+    found = planner.evolve(problem, np.random.default_rng(seed))
+    return [each._replace(costs=each.costs.copy()) for each in found]
+
+
+def test_vectors_are_the_numbers_that_differ_with_the_samples_mean_and_covariance() -> None:
+    planner, problem = control("cma_es").prepare()
+    drawn = planner.sample(problem, np.random.default_rng(0), 400)
+    found = real_vectors(planner, problem, drawn)
+    assert found.changes.shape == (4, 21)
+    assert np.array_equal(found.changes, np.pad(np.ones((4, 19), bool), ((0, 0), (1, 1))))
+    inner = drawn[:, 1:-1].reshape(76, 400)
+    assert found.mean == pytest.approx(inner.mean(axis=1))
+    covariance = np.cov(inner, bias=True)
+    scale = np.trace(covariance) / 76
+    assert found.deviation == pytest.approx(np.sqrt(scale))
+    assert np.diag(found.covariance) == pytest.approx(np.diag(covariance) / scale)
+    apart = ~np.eye(76, dtype=bool)
+    assert found.covariance[apart] == pytest.approx(0.9 * covariance[apart] / scale)
+    again = found.population(inner.T)
+    assert np.array_equal(again, drawn)
+
+
+@pytest.mark.parametrize("improves", [True, False])
+def test_cma_es_is_the_package_told_the_planners_costs(improves: bool) -> None:
+    chosen = control("cma_es", "ga.num_generations=12", f"control.improves={improves}")
+    planner, problem = chosen.prepare()
+    rng = np.random.default_rng(5)
+    start = real_vectors(planner, problem, planner.sample(problem, rng, 1000))
+    plain = cmaes.CMA(
+        start.mean,
+        start.deviation,
+        cov=start.covariance,
+        seed=int(rng.integers(2**32)),
+        population_size=48,
+    )
+    for record in evolved(chosen, 5):
+        asked = [plain.ask() for _ in range(48)]
+        strings = np.zeros((4, 21, 48))
+        strings[:, 0], strings[:, -1] = problem.start[:, None], problem.goal[:, None]
+        for k, vector in enumerate(asked):
+            strings[:, 1:-1, k] = vector.reshape(4, 19)
+        if improves:
+            strings = planner.planner.improve(problem, strings, rng)
+        costs = planner.planner.cost(problem, strings).cost
+        assert record.costs == pytest.approx(costs)
+        plain.tell(list(zip(asked, costs.tolist(), strict=True)))
+    assert record.evaluations == 13 * 48
+
+
+def test_noisy_trajectories_move_by_their_weighted_mean() -> None:
+    chosen = control("stomp", "ga.num_generations=15", "control.sensitivity=7")
+    planner, problem = chosen.prepare()
+    rng = np.random.default_rng(2)
+    start = real_vectors(planner, problem, planner.sample(problem, rng, 1000))
+    root = np.linalg.cholesky(start.covariance) * start.deviation
+    middle, sigma = start.mean, 0.5
+    for record in evolved(chosen, 2):
+        normals = standard_normal(rng, (48, 76))
+        noise = [np.zeros(76), *(sigma * (root @ each) for each in normals[1:])]
+        strings = start.population(np.array([middle + each for each in noise]))
+        costs = planner.cost(problem, strings).cost
+        assert record.costs == pytest.approx(costs)
+        scaled = (costs - costs.min()) / (costs.max() - costs.min())
+        weights = np.exp(-7.0 * scaled)
+        middle = middle + sum(w * e for w, e in zip(weights, noise, strict=True)) / weights.sum()
+        sigma *= 0.99
+    assert record.index == 15
+
+
+def test_roots_and_correlated_noise_are_those_of_linear_algebra() -> None:
+    rng = np.random.default_rng(4)
+    tall = rng.normal(size=(60, 30))
+    matrix = tall.T @ tall
+    root = transposed_root(matrix)
+    assert np.allclose(root.T, np.linalg.cholesky(matrix), rtol=0.0, atol=1e-9)
+    normals = rng.normal(size=(7, 30))
+    assert correlated(root, normals, 0.3) == pytest.approx(0.3 * normals @ root)
+
+
+def test_weights_of_infeasible_and_of_equal_costs() -> None:
+    planner = control("stomp").planner
+    assert planner.weights(np.array([3.0, np.inf, 3.0])) == pytest.approx([0.5, 0.0, 0.5])
+    assert planner.weights(np.full(4, np.inf)) == pytest.approx([0.25] * 4)
+    found = planner.weights(np.array([1.0, 2.0]))
+    assert found[1] / found[0] == pytest.approx(np.exp(-10.0))
+
+
+def test_without_a_better_trajectory_the_search_starts_anew() -> None:
+    patient = evolved(control("stomp", "ga.num_generations=60", "control.patience=1000"), 3)
+    hasty = evolved(control("stomp", "ga.num_generations=60", "control.patience=1"), 3)
+    lowest = [each.best_cost for each in patient]
+    anew = next(k for k in range(2, 60) if lowest[k] == lowest[k - 1] == lowest[k - 2]) + 1
+    same = [np.array_equal(a.costs, b.costs) for a, b in zip(patient, hasty, strict=True)]
+    assert same.index(False) == anew
+    assert hasty[anew].costs.min() > lowest[anew]
+
+
+@pytest.mark.parametrize("name", CONTROLS)
+def test_runs_depend_on_their_seed_alone_and_costs_fall(name: str) -> None:
+    chosen = control(name, "ga.num_generations=60")
+    one, two, other = evolved(chosen, 0), evolved(chosen, 0), evolved(chosen, 1)
+    assert [each.best_cost for each in one] == [each.best_cost for each in two]
+    assert one[-1].best_cost != other[-1].best_cost
+    assert one[-1].best_cost < 0.7 * one[0].best_cost
+    assert chosen.reproducibility == {"cma_es": "environment", "stomp": "bits"}[name]
+
+
+@pytest.mark.parametrize("name", CONTROLS)
+@pytest.mark.parametrize("experiment", ["curkovic_motion", "lavoie_7dof", "corsepius_ball"])
+def test_planners_of_other_codings_are_refused(name: str, experiment: str) -> None:
+    must = "control: must be left out: individuals of .* are no vectors of real numbers"
+    with pytest.raises(SettingError, match=must):
+        control(name, experiment=experiment).prepare()

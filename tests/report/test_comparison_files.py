@@ -25,6 +25,8 @@ ROWS = [
         Interval(900.25, 2000.125),
         Spread(4.0 / 3.0, 1.0, 2.0, 4),
         1.0,
+        np.nan,
+        1.0,
         0,
         4,
     ),
@@ -38,6 +40,8 @@ ROWS = [
         np.inf,
         Interval(1e6, np.inf),
         Spread(np.inf, np.inf, np.inf, 2),
+        np.nan,
+        np.nan,
         np.nan,
         0,
         0,
@@ -60,7 +64,7 @@ def test_latex_has_a_row_per_planner_and_problem() -> None:
     assert [line for line in lines if "rule" in line] == [r"\toprule", r"\midrule", r"\bottomrule"]
     rows = lines[lines.index(r"\midrule") + 1 : lines.index(r"\bottomrule")]
     assert rows == [
-        r"{[}A] \& B\_1 50\% & p\_1 & 4 & 3 & 1234 (900.2--2000) & 1.333 [1, 2] \\",
+        r"{[}A] \& B\_1 50\% & p\_1 & 4 & 3 & 1234 (900--2000) & 1.333 [1, 2] \\",
         r"C (given) & q, \{a\} & 2 & 0 & $\infty$ (1000000--$\infty$) "
         r"& $\infty$ [$\infty$, $\infty$] \\",
     ]

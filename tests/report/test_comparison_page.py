@@ -108,7 +108,7 @@ def test_the_page_tells_every_condition_and_every_pair(
     results: Results, settings: ReportSettings
 ) -> None:
     page = comparison.page(results, settings)
-    assert [row[0] for row in page.tables[0].rows] == [c.label for c in results.evolved]
+    assert [row[0] for row in page.tables[1].rows] == [c.label for c in results.evolved]
     count = len(results.evolved)
     assert len(page.comparisons[0][1]) == count * (count - 1) // 2
     assert [drawing.stem for drawing in page.drawings] == ["targets_reached", "proven_lengths"]
@@ -125,7 +125,10 @@ def test_planners_of_several_problems_are_named_by_their_components(
         "targets_reached",
         "targets_by_problem",
     ]
-    assert [table.heading for table in page.tables] == ["Answers"]  # no problem has all planners
+    assert [table.heading for table in page.tables] == [
+        "Problems",
+        "Answers",
+    ]  # no problem has all planners
     names = set(page.drawings[0].table()["planner"])
     assert all(name.startswith(("via_point_ga", "random_search", "multi_start")) for name in names)
 

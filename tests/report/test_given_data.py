@@ -76,7 +76,7 @@ def test_the_page_marks_given_planners(
     data = read_given(str(given))
     page = comparison.page_of_runs([*ours, *of_given(data, ours)], results, settings, data)
     assert data.sha256[:12] in page.introduction and "(given)" in page.introduction
-    last = page.tables[0].rows[-1]
+    last = page.tables[1].rows[-1]
     assert last[0] == "elsewhere: my, own (given)" and last[-1] == "–"
     assert not any("given" in row.quantity for _, rows in page.comparisons for row in rows)
     assert not np.isnan(float(str(last[4]).split(" ")[0]))

@@ -119,7 +119,7 @@ def runs_of(planner: str, problem: str, lengths: list[float], spent: float = 100
     table = pd.DataFrame(rows, columns=["replicate", "collision_queries", "length", "certified"])
     return PlannerRuns(
         planner,
-        Problem(problem, "", np.nan),
+        Problem(problem),
         f"{problem}, {planner}",
         table,
         tuple(range(len(lengths))),

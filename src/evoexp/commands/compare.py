@@ -15,6 +15,7 @@ from evoexp.configuration import expansions
 from evoexp.configuration.search_path import is_file, options
 from evoexp.errors import SettingError, UnknownOption
 from evoexp.report import build, markdown
+from evoexp.report.best_known import read_best_known, shipped_best_known
 from evoexp.report.comparison_files import as_csv, as_latex
 from evoexp.report.given_data import GivenData, of_given, read_given, strange_problems
 from evoexp.report.pages import comparison
@@ -41,6 +42,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="runs of other planners: columns planner, problem, seed, queries, cost; a row per "
         "improvement, cost: the path's length, empty: the run has no answer",
     )
+    parser.add_argument(
+        "--best-known",
+        metavar="FILE.yaml",
+        help="best known lengths of problems, besides those that come with evoexp: targets are "
+        "multiples of them",
+    )
     parser.add_argument("--csv", metavar="FILE", help="write the table as CSV, with all digits")
     parser.add_argument("--latex", metavar="FILE", help="write the table as LaTeX (booktabs)")
     parser.add_argument("--json", action="store_true", help="print JSON: an object per condition")
@@ -50,6 +57,7 @@ def main(arguments: argparse.Namespace) -> int:
     """Draw the page, and print its table."""
     arguments.overrides = unpacked(arguments.overrides)
     given = read_given(arguments.data) if arguments.data else None
+    known = _best_known(arguments.best_known)
     request, settings, planned = _asked(arguments)
     if given:
         request = _with_data(request, arguments.data, given)
@@ -62,7 +70,7 @@ def main(arguments: argparse.Namespace) -> int:
         request.hint,
         request.options,
     )
-    runs, strange = of_results(found.evolved), list[str]()
+    runs, strange = of_results(found.evolved, known), list[str]()
     if given:
         strange = list(strange_problems(given, runs))
         runs += of_given(given, runs)
@@ -147,6 +155,12 @@ def _asked(arguments: argparse.Namespace) -> tuple[build.Request, ReportSettings
     title = " and ".join(dict.fromkeys(experiment.name for experiment in experiments))
     request = build.Request(name, title, first.budget, labelled, words, None, "compare")
     return request, _with_page(first.report), first.num_replicates
+
+
+def _best_known(path: str | None) -> dict[str, float]:
+    """Return the best known lengths by the keys of problems; those of the user's file win."""
+    known = shipped_best_known() | (read_best_known(path) if path else {})
+    return {key: each.length for key, each in known.items()}
 
 
 def _with_data(request: build.Request, path: str, given: GivenData) -> build.Request:

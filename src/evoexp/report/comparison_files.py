@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from evoexp.report import markdown
-from evoexp.report.pages.comparison import Rated
+from evoexp.report.pages.comparison import Rated, effort_text
 
 COLUMNS = (
     "planner",
@@ -88,10 +88,10 @@ def as_latex(rows: Sequence[Rated], command: str, confidence: float) -> bytes:
 
 
 def _cells(row: Rated) -> tuple[str, ...]:
-    low, high = (_number(value) for value in row.interval)
-    median, lower, upper = (_number(value) for value in row.lengths[:3])
+    effort, low, high = (_latex(effort_text(each)) for each in (row.queries, *row.interval))
+    median, lower, upper = (_latex(markdown.number(value)) for value in row.lengths[:3])
     length = median if row.lengths.num_values == 1 else f"{median} [{lower}, {upper}]"
-    effort = f"{_number(row.queries)} ({low}--{high})"
+    effort = f"{effort} ({low}--{high})"
     names = escaped(row.planner), escaped(row.problem)
     return (*names, str(row.runs), str(row.proven), effort, length)
 
@@ -101,5 +101,5 @@ def escaped(text: str) -> str:
     return "".join(_SIGNS.get(sign, sign) for sign in " ".join(text.split()))
 
 
-def _number(value: float) -> str:
-    return markdown.number(value).replace("∞", r"$\infty$").replace("–", "--")
+def _latex(number: str) -> str:
+    return number.replace("∞", r"$\infty$").replace("–", "--")

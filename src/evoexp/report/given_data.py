@@ -17,7 +17,7 @@ import pandas as pd
 
 from evoexp.errors import SettingError, nearest, printable
 from evoexp.input_files import read_bounded
-from evoexp.report.planner_runs import PlannerRuns, Problem, several_problems
+from evoexp.report.planner_runs import PlannerRuns, Problem
 
 COLUMNS = ("planner", "problem", "seed", "queries", "cost")
 MARK = " (given)"  # behind the names of planners that were not run here
@@ -171,15 +171,15 @@ def of_given(data: GivenData, ours: Sequence[PlannerRuns]) -> list[PlannerRuns]:
         ours: Runs of stored conditions.
     """
     known = _known(ours)
-    cells: dict[tuple[str, Problem], dict[int, list[GivenAnswer]]] = {}
-    for (planner, name, seed), rows in _by_run(data.answers).items():
-        problem = known.get(name, Problem(name, "", math.nan))
-        cells.setdefault((planner, problem), {}).setdefault(seed, []).extend(rows)
-    every = [*(own.problem for own in ours), *(problem for _, problem in cells)]
-    named = several_problems(every)
+    cells: dict[tuple[str, str], dict[int, list[GivenAnswer]]] = {}
+    for (planner, called, seed), rows in _by_run(data.answers).items():
+        problem = known.get(called, Problem(called))
+        known.setdefault(problem.name, problem)
+        cells.setdefault((planner, problem.name), {}).setdefault(seed, []).extend(rows)
+    named = len({*(own.problem.name for own in ours), *(name for _, name in cells)}) > 1
     return [
-        _runs(f"{planner}{MARK}", problem, runs, named)
-        for (planner, problem), runs in cells.items()
+        _runs(f"{planner}{MARK}", known[name], runs, named)
+        for (planner, name), runs in cells.items()
     ]
 
 

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import re
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,16 +25,28 @@ class Problem(NamedTuple):
         name: That pages show.
         key: Of robot and scenario, 12 hex digits, see `problem_key`; empty where nobody knows them.
         straight: Distance from start to goal [rad, m]; NaN where goals differ.
+        best_known: Length of the shortest proven answer known before these runs were compared
+            [rad, m], see `best_known`; NaN: none is stored.
     """
 
     name: str
-    key: str
-    straight: float
+    key: str = ""
+    straight: float = np.nan
+    best_known: float = np.nan
 
     @property
     def unit(self) -> float:
         """Length whose multiples are targets [rad, m]; NaN: any proven answer is the only one."""
+        if not np.isnan(self.best_known):
+            return self.best_known
         return self.straight if self.straight > 0.0 else np.nan
+
+    @property
+    def unit_name(self) -> str:
+        """The length whose multiples are targets, in words."""
+        if np.isnan(self.unit):
+            return "none: any proven answer is the only target"
+        return "straight line" if np.isnan(self.best_known) else "best known"
 
     @property
     def targets(self) -> tuple[float, ...]:
@@ -80,11 +92,6 @@ class PlannerRuns(NamedTuple):
         return best_lengths(self.table, self.replicates)
 
 
-def several_problems(problems: Iterable[Problem]) -> bool:
-    """Return whether there is more than one problem, so that labels have to name it."""
-    return len({problem.name for problem in problems}) > 1
-
-
 def stored_conditions(runs: Iterable[PlannerRuns]) -> tuple[ConditionResults, ...]:
     """Return the conditions of those runs that were not given."""
     return tuple(own.condition for own in runs if own.condition is not None)
@@ -97,11 +104,17 @@ def problem_key(condition: Condition) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
-def of_results(conditions: Sequence[ConditionResults]) -> list[PlannerRuns]:
+def of_results(
+    conditions: Sequence[ConditionResults], known: Mapping[str, float] | None = None
+) -> list[PlannerRuns]:
     """Return the runs of conditions, in order, with their answers judged.
 
     Conditions of a problem that nobody has a motion for are left out: their answers are of another
     kind. A planner without a motion where others have one has failed, and stays.
+
+    Args:
+        conditions: That are compared.
+        known: Key of a problem → best known length [rad, m].
     """
     found = {c.label: answers(c) for c in conditions}
     moving = {_task(c) for c in conditions if len(found[c.label])}
@@ -109,14 +122,12 @@ def of_results(conditions: Sequence[ConditionResults]) -> list[PlannerRuns]:
     if not kept:
         return []
     names = problem_names(kept)
-    problems = {
-        task: Problem(
-            names[task],
-            problem_key(own[0].condition),
-            straight_line(pd.concat([found[c.label] for c in own if len(found[c.label])])),
-        )
-        for task, own in _by_task(kept).items()
-    }
+    problems = {}
+    for task, own in _by_task(kept).items():
+        key = problem_key(own[0].condition)
+        tables = [found[c.label] for c in own if len(found[c.label])]
+        straight = straight_line(pd.concat(tables))
+        problems[task] = Problem(names[task], key, straight, (known or {}).get(key, np.nan))
     planners = planner_names(kept, names)
     return [
         PlannerRuns(

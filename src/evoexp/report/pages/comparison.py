@@ -10,13 +10,14 @@ import numpy as np
 from evoexp.errors import NothingStored
 from evoexp.records import FloatArray
 from evoexp.report import markdown
+from evoexp.report.best_known import shipped_best_known
 from evoexp.report.comparisons import compared
 from evoexp.report.figures import effort_curves
 from evoexp.report.figures.effort_curves import MAX_PANELS, problem_order
 from evoexp.report.given_data import MARK, GivenData
 from evoexp.report.page_parts import Drawing, Page, Table
 from evoexp.report.pages import ranking
-from evoexp.report.planner_runs import PlannerRuns, of_results, stored_conditions
+from evoexp.report.planner_runs import PlannerRuns, Problem, of_results, stored_conditions
 from evoexp.report.problem_ranks import standing
 from evoexp.report.proportions import Proportion
 from evoexp.report.report_settings import ReportSettings
@@ -39,7 +40,13 @@ INTRODUCTION = (
     "collision."
 )
 TARGETS = (
-    "any at all, or one at most 4, 3, 2, 1.5, 1.2, 1.1, 1.05 times as long as the straight line."
+    "any at all, or one at most 4, 3, 2, 1.5, 1.2, 1.1, 1.05 times as long as the unit of the "
+    "problem (table of problems)."
+)
+UNITS = (
+    "Targets are multiples of a length that these runs do not change: of the shortest proven "
+    "answer known before, stored with evoexp or in the file of `--best-known`; where none is "
+    "stored, of the straight line from start to goal. The key is that of robot and scenario."
 )
 EFFORT = (
     "Effort: expected running time (Hansen et al. 2009), the collision queries of all runs, failed "
@@ -63,6 +70,8 @@ class Rated(NamedTuple):
         interval: Of it, by bootstrap.
         lengths: Best proven length of a run: median and quartiles [rad, m].
         straight: Distance from start to goal; NaN where goals differ.
+        best_known: Length of the shortest proven answer known of the problem; NaN: none is stored.
+        unit: The one of both that targets are multiples of; NaN: any answer is the only target.
         refuted: Last solutions that the planner's own model accepts and the certifier refutes.
         judged: Last solutions that were judged.
     """
@@ -77,14 +86,16 @@ class Rated(NamedTuple):
     interval: Interval
     lengths: Spread
     straight: float
+    best_known: float
+    unit: float
     refuted: int
     judged: int
 
     @property
-    def in_lines(self) -> Spread:
-        """The lengths in units of the straight line from start to goal."""
+    def in_units(self) -> Spread:
+        """The lengths in units of the targets."""
         median, lower, upper, count = self.lengths
-        return Spread(median / self.straight, lower / self.straight, upper / self.straight, count)
+        return Spread(median / self.unit, lower / self.unit, upper / self.unit, count)
 
 
 def page(results: Results, settings: ReportSettings) -> Page:
@@ -93,7 +104,8 @@ def page(results: Results, settings: ReportSettings) -> Page:
     Raises:
         NothingStored: If no run has a motion.
     """
-    return page_of_runs(of_results(results.evolved), results, settings)
+    known = {key: each.length for key, each in shipped_best_known().items()}
+    return page_of_runs(of_results(results.evolved, known), results, settings)
 
 
 def page_of_runs(
@@ -119,7 +131,11 @@ def page_of_runs(
     return Page(
         title=f"{results.experiment or 'stored runs'}: proven answers",
         introduction=INTRODUCTION + (_of_file(given) if given else ""),
-        tables=(_table(rated(runs, settings), settings), *ranking.tables(found, settings)),
+        tables=(
+            _problem_table(runs),
+            _table(rated(runs, settings), settings),
+            *ranking.tables(found, settings),
+        ),
         comparisons=_comparisons(runs, settings),
         drawings=(*_drawings(runs), *ranking.drawings(found, runs, settings)),
     )
@@ -201,6 +217,8 @@ def _rated(own: PlannerRuns, settings: ReportSettings) -> Rated:
         expected_interval(effort, reached, settings.confidence, settings.num_resamples),
         spread(own.best_lengths),
         own.problem.straight,
+        own.problem.best_known,
+        own.problem.unit,
         verdicts.solved_refuted if verdicts else 0,
         verdicts.judged if verdicts else 0,
     )
@@ -215,6 +233,34 @@ def _first_own(own: PlannerRuns) -> float:
     return quantile(first.to_numpy(np.float64, na_value=np.inf), 0.5)
 
 
+def _problem_table(runs: Sequence[PlannerRuns]) -> Table:
+    """Tell of each problem the lengths that answers are measured by."""
+    found: dict[str, tuple[Problem, list[float]]] = {}
+    for own in runs:
+        best = found.setdefault(own.problem.name, (own.problem, []))[1]
+        best.append(float(own.best_lengths.min()))
+    rows = tuple(
+        (
+            name,
+            f"`{problem.key}`" if problem.key else "–",
+            markdown.number(problem.straight),
+            markdown.number(problem.best_known),
+            markdown.number(min(best)),
+            problem.unit_name,
+        )
+        for name, (problem, best) in found.items()
+    )
+    headers = (
+        "problem",
+        "key",
+        "straight line [rad, m]",
+        "best known",
+        "shortest here",
+        "unit of the targets",
+    )
+    return Table("Problems", headers, rows, UNITS)
+
+
 def _table(rows: Sequence[Rated], settings: ReportSettings) -> Table:
     headers = (
         "condition",
@@ -223,7 +269,7 @@ def _table(rows: Sequence[Rated], settings: ReportSettings) -> Table:
         "queries to the first answer of its own model, median",
         "queries per proven answer",
         "best proven length [rad, m]",
-        "the same in straight lines",
+        "the same in units of the targets",
         "refuted",
     )
     cells = tuple(
@@ -232,9 +278,9 @@ def _table(rows: Sequence[Rated], settings: ReportSettings) -> Table:
             row.runs,
             Proportion(row.proven, row.runs).with_interval(settings.confidence, 0),
             markdown.number(row.first_own),
-            f"{markdown.number(row.queries)} ({_between(row.interval)})",
+            f"{effort_text(row.queries)} ({_between(row.interval)})",
             markdown.spread(row.lengths),
-            markdown.spread(row.in_lines) if row.straight > 0.0 else "–",
+            markdown.spread(row.in_units) if row.unit > 0.0 else "–",
             f"{row.refuted} of {row.judged}" if row.judged else "–",
         )
         for row in rows
@@ -243,7 +289,12 @@ def _table(rows: Sequence[Rated], settings: ReportSettings) -> Table:
 
 
 def _between(interval: tuple[float, float]) -> str:
-    return " to ".join(markdown.number(value) for value in interval)
+    return " to ".join(effort_text(value) for value in interval)
+
+
+def effort_text(queries: float) -> str:
+    """Return a number of collision queries as a whole number; inf and NaN as `markdown.number`."""
+    return markdown.number(round(queries) if np.isfinite(queries) else queries)
 
 
 def _comparisons(

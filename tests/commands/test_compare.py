@@ -69,3 +69,16 @@ def test_the_table_is_written_as_csv_and_latex(
     assert all(f"{name} & rana\\_planar & 2 & " in latex.read_text() for name in names[1:])
     said = evoexp("compare", "rana_planar", *SERIAL, "--csv", str(tmp_path / "none" / "t.csv"))
     assert said.code == 2 and "No such file" in said.err and said.err.count("\n") == 1
+
+
+def test_runs_are_written_for_iohprofiler_into_an_empty_folder(
+    evoexp: Evoexp, stored: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "ioh" / "data"
+    words = ("compare", "rana_planar", *SERIAL, "--ioh", str(folder))
+    assert evoexp(*words).code == 0
+    names = sorted(path.name for path in folder.iterdir())
+    assert names == ["multi-start", "random_search", "via-point_GA"]
+    assert all((folder / name / "IOHprofiler_f1_rana_planar.json").is_file() for name in names)
+    said = evoexp(*words)
+    assert said.code == 2 and "--ioh: must be a folder that is empty or not there yet" in said.err

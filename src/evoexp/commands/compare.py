@@ -4,8 +4,11 @@ import argparse
 import hashlib
 import re
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
+
+from rich.table import Table
 
 from evoexp.commands.arguments import add_experiment_arguments, folder_words, is_override
 from evoexp.commands.console import add_columns, new_table, plain_console, print_json
@@ -18,12 +21,13 @@ from evoexp.report import build, markdown
 from evoexp.report.best_known import read_best_known, shipped_best_known
 from evoexp.report.comparison_files import as_csv, as_latex
 from evoexp.report.given_data import GivenData, of_given, read_given, strange_problems
+from evoexp.report.ioh_format import ioh_files
 from evoexp.report.pages import comparison
-from evoexp.report.planner_runs import of_results
+from evoexp.report.planner_runs import PlannerRuns, of_results
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import gather
 from evoexp.shipped import shipped
-from evoexp.store.files import write_file
+from evoexp.store.files import write_file, write_files
 from evoexp.store.run_directory import outputs_root, resolve
 
 PAGE = "comparison"
@@ -50,6 +54,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--csv", metavar="FILE", help="write the table as CSV, with all digits")
     parser.add_argument("--latex", metavar="FILE", help="write the table as LaTeX (booktabs)")
+    parser.add_argument(
+        "--ioh", metavar="FOLDER", help="write the runs for IOHanalyzer and iohinspector"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON: an object per condition")
 
 
@@ -58,6 +65,8 @@ def main(arguments: argparse.Namespace) -> int:
     arguments.overrides = unpacked(arguments.overrides)
     given = read_given(arguments.data) if arguments.data else None
     known = _best_known(arguments.best_known)
+    if arguments.ioh:
+        _check_empty(arguments.ioh)
     request, settings, planned = _asked(arguments)
     if given:
         request = _with_data(request, arguments.data, given)
@@ -77,16 +86,23 @@ def main(arguments: argparse.Namespace) -> int:
     page = comparison.page_of_runs(runs, found, settings, given)
     path = build.write_page(request, page, found, settings)
     rows = comparison.rated(runs, settings)
-    if arguments.csv:
-        write_file(Path(arguments.csv), as_csv(rows))
-    if arguments.latex:
-        command = f"evoexp compare {request.words}"
-        write_file(Path(arguments.latex), as_latex(rows, command, settings.confidence))
+    _write_files(arguments, runs, rows, f"evoexp compare {request.words}", settings)
     if arguments.json:
         print_json([row._asdict() | _parts(row) for row in rows])
         return 0
     console = plain_console()
-    table = new_table(request.report_name)
+    console.print(_table(rows, request.report_name))
+    for line in strange:
+        console.print(line, highlight=False, soft_wrap=True)
+    for kind in ("csv", "latex", "ioh"):
+        if written := getattr(arguments, kind):
+            console.print(f"{kind}: {written}", highlight=False, soft_wrap=True)
+    console.print(f"compare: {path}", highlight=False, soft_wrap=True)
+    return 0
+
+
+def _table(rows: Sequence[comparison.Rated], title: str) -> Table:
+    table = new_table(title)
     add_columns(table, "condition")
     add_columns(table, "proven", "queries\neach", "best\nlength", "refuted", right=True)
     for row in rows:
@@ -97,14 +113,27 @@ def main(arguments: argparse.Namespace) -> int:
             markdown.number(row.lengths.median),
             f"{row.refuted} of {row.judged}" if row.judged else "–",
         )
-    console.print(table)
-    for line in strange:
-        console.print(line, highlight=False, soft_wrap=True)
-    for kind in ("csv", "latex"):
-        if written := getattr(arguments, kind):
-            console.print(f"{kind}: {written}", highlight=False, soft_wrap=True)
-    console.print(f"compare: {path}", highlight=False, soft_wrap=True)
-    return 0
+    return table
+
+
+def _write_files(
+    arguments: argparse.Namespace,
+    runs: Sequence[PlannerRuns],
+    rows: Sequence[comparison.Rated],
+    command: str,
+    settings: ReportSettings,
+) -> None:
+    """Write the files that `--csv`, `--latex` and `--ioh` ask for."""
+    if arguments.csv:
+        write_file(Path(arguments.csv), as_csv(rows))
+    if arguments.latex:
+        write_file(Path(arguments.latex), as_latex(rows, command, settings.confidence))
+    if arguments.ioh:
+        folder = Path(arguments.ioh)
+        files = {folder / name: content for name, content in ioh_files(runs).items()}
+        for parent in {path.parent for path in files}:
+            parent.mkdir(parents=True, exist_ok=True)
+        write_files(files)
 
 
 def _parts(row: comparison.Rated) -> dict[str, Any]:
@@ -155,6 +184,13 @@ def _asked(arguments: argparse.Namespace) -> tuple[build.Request, ReportSettings
     title = " and ".join(dict.fromkeys(experiment.name for experiment in experiments))
     request = build.Request(name, title, first.budget, labelled, words, None, "compare")
     return request, _with_page(first.report), first.num_replicates
+
+
+def _check_empty(path: str) -> None:
+    """Refuse a folder that holds anything: readers would take older files in it for runs, too."""
+    folder = Path(path)
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise SettingError("--ioh", "a folder that is empty or not there yet", path)
 
 
 def _best_known(path: str | None) -> dict[str, float]:

@@ -37,6 +37,24 @@ def test_labels_that_tell_problem_and_planner_name_both(both: Results) -> None:
     assert names(of_results(both.evolved)) == want
 
 
+def test_a_problem_whose_labels_share_nothing_is_named_by_its_scenario(both: Results) -> None:
+    labels = iter(("plain", "with draws", "three arms: three arms"))
+    other = [replace(c, label=next(labels)) for c in both.evolved]
+    scenario = both.evolved[0].condition.scenario.component
+    assert names(of_results(other)) == [
+        ("via_point_ga", scenario),
+        ("random_search", scenario),
+        ("via_point_ga", "three arms"),
+    ]
+    alike = [replace(c, label=label) for c, label in zip(other, "aba", strict=True)]
+    robots = {c.condition.robot.component for c in alike}
+    assert {name for _, name in names(of_results(alike))} == (
+        {f"{scenario}, {robot}" for robot in robots}
+        if len(robots) > 1
+        else {f"{scenario}, {min(robots)} 1", f"{scenario}, {min(robots)} 2"}
+    )
+
+
 def test_a_name_that_stands_for_two_components_names_no_planner(both: Results) -> None:
     other = [
         replace(c, label=c.label.replace("draws", "B").replace("arms · GA", "arms · B"))

@@ -146,26 +146,27 @@ def of_results(
 def problem_names(conditions: Sequence[ConditionResults]) -> dict[Hashable, str]:
     """Return a name for each problem: what the labels of its conditions, and no others, share.
 
-    Where labels tell no problems apart: the names of the options that were taken, or of the
-    scenario's component.
+    Where its labels share nothing: the name of the scenario's option that was taken, or of its
+    component; and with it the robot's, where two problems have one name.
     """
     groups = _by_task(conditions)
     parts = {task: [_parts(c) for c in own] for task, own in groups.items()}
-    by_label = {}
+    names: dict[Hashable, str] = {}
     for task, own in parts.items():
         others = {
             part for other in groups if other != task for each in parts[other] for part in each
         }
         shared = [part for part in own[0] if all(part in each for each in own)]
-        by_label[task] = ", ".join(part for part in shared if part not in others)
-    is_planner = len(conditions) == 1  # the label of one condition names either
-    if all(by_label.values()) and len(set(by_label.values())) == len(groups) and not is_planner:
-        return by_label
-    options = {task: _option(own[0], "scenario") for task, own in groups.items()}
-    if len(set(options.values())) < len(groups):
-        robots = {task: _option(own[0], "robot") for task, own in groups.items()}
-        options = {task: f"{name}, {robots[task]}" for task, name in options.items()}
-    return _numbered(options)
+        names[task] = ", ".join(dict.fromkeys(part for part in shared if part not in others))
+        is_planner = len(conditions) == 1  # the label of one condition names either
+        if not names[task] or is_planner:
+            names[task] = _option(groups[task][0], "scenario")
+    every = list(names.values())
+    robots = {
+        task: f"{name}, {_option(groups[task][0], 'robot')}" if every.count(name) > 1 else name
+        for task, name in names.items()
+    }
+    return _numbered(robots)
 
 
 def planner_names(

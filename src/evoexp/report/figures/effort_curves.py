@@ -110,7 +110,7 @@ def draw_shares(table: pd.DataFrame) -> Figure:
     figure, (axes,) = style.row_of_panels(3.6, 1)
     _draw_share_curves(axes, table, list(table["planner"].unique()), counted=True)
     axes.set(xlabel="collision queries", ylabel="share of targets reached")
-    style.legend_below(figure, axes, 2)
+    style.legend_below(figure, axes, 4)
     return figure
 
 
@@ -165,7 +165,7 @@ def draw_lengths(table: pd.DataFrame) -> Figure:
     axes.set_xlabel("collision queries")
     style.log_axis(axes, *_ends(table))
     axes.set_ylabel("best proven length so far [rad, m]")
-    style.legend_below(figure, axes, 2)
+    style.legend_below(figure, axes, 4)
     return figure
 
 

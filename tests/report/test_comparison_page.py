@@ -10,11 +10,13 @@ from scipy.interpolate import CubicSpline
 from evoexp.errors import NothingStored
 from evoexp.paths.motion import Motion, spline_motion
 from evoexp.planners.planner import judge_motion
+from evoexp.report import proven_answers
 from evoexp.report.figures.effort_curves import draw_shares, length_table, share_table
 from evoexp.report.pages import comparison
 from evoexp.report.planner_runs import MULTIPLES, of_results
 from evoexp.report.proven_answers import (
     answers,
+    answers_of,
     best_lengths,
     first_reached,
     motion_length,
@@ -22,6 +24,7 @@ from evoexp.report.proven_answers import (
 )
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results, gather
+from evoexp.store.log_reader import read_log
 from report_samples import expand, store
 
 
@@ -50,6 +53,24 @@ def test_answers_are_the_logged_improvements_judged(results: Results) -> None:
             assert motion is not None
             assert last["length"] == motion_length(motion) >= last["straight"] - 1e-9
             assert bool(judge_motion(planner, problem, motion).certified) == last["certified"]
+
+
+def test_answers_of_many_runs_are_those_of_each(
+    results: Results, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(proven_answers, "cache_root", lambda: tmp_path)  # judged anew, on all cores
+    together = answers_of(results.evolved)
+    assert list(together) == [c.label for c in results.evolved]
+    kept = {path.name for path in (tmp_path / "answers").iterdir()}
+    assert len(kept) == sum(c.done for c in results.evolved)
+    for c in results.evolved:
+        rows = [
+            (k, *row)
+            for k in c.summaries.index
+            for row in proven_answers._judged(c, read_log(c.run.log_path(int(k))))
+        ]
+        assert together[c.label].to_numpy().tolist() == [list(row) for row in rows]
+        assert together[c.label].equals(answers(c))
 
 
 TABLE = pd.DataFrame(

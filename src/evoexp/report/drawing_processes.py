@@ -1,7 +1,7 @@
-"""Draws the figures of a page on all cores, in copies of this process.
+"""Draws the figures of a page, and judges answers, on all cores, in copies of this process.
 
-Figures are drawn from closures over results that this process has read. A copy made by fork has
-them already; a worker process would have to be sent them, and to load matplotlib first.
+Both work on results that this process has read. A copy made by fork has them already; a worker
+process would have to be sent them, and to load matplotlib first.
 """
 
 import contextlib

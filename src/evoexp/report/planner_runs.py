@@ -11,7 +11,7 @@ import pandas as pd
 
 from evoexp.condition import Condition
 from evoexp.records import FloatArray
-from evoexp.report.proven_answers import answers, best_lengths, first_reached, straight_line
+from evoexp.report.proven_answers import answers_of, best_lengths, first_reached, straight_line
 from evoexp.report.results import ConditionResults
 
 MULTIPLES = (np.inf, 4.0, 3.0, 2.0, 1.5, 1.2, 1.1, 1.05)  # [-] of a problem's unit of length
@@ -116,7 +116,7 @@ def of_results(
         conditions: That are compared.
         known: Key of a problem → best known length [rad, m].
     """
-    found = {c.label: answers(c) for c in conditions}
+    found = answers_of(conditions)
     moving = {_task(c) for c in conditions if len(found[c.label])}
     kept = [c for c in conditions if _task(c) in moving]
     if not kept:

@@ -8,7 +8,7 @@ know of it. Verdicts take long and follow from log and code alone: they are kept
 import contextlib
 import hashlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +18,7 @@ from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
 from evoexp.paths.motion import Motion
 from evoexp.planners.planner import judge_motion
 from evoexp.records import FloatArray
+from evoexp.report.drawing_processes import on_all_cores
 from evoexp.report.results import ConditionResults
 from evoexp.store.kept_facts import installed_code
 from evoexp.store.log_reader import LogContents, read_log
@@ -55,8 +56,18 @@ def answers(condition: ConditionResults) -> pd.DataFrame:
 
     Answers that are no motions, such as a posture that is held, have no row.
     """
-    found = [row for k in condition.summaries.index for row in _of_replicate(condition, int(k))]
-    return pd.DataFrame(found, columns=list(Answer._fields))
+    return answers_of([condition])[condition.label]
+
+
+def answers_of(conditions: Sequence[ConditionResults]) -> dict[str, pd.DataFrame]:
+    """Return the answers of conditions by their labels, see `answers`; judged on all cores."""
+    code = installed_code()
+    runs = [(c, int(k)) for c in conditions for k in c.summaries.index]
+    judged = on_all_cores(lambda run: _of_replicate(*run, code), runs)
+    found: dict[str, list[Answer]] = {c.label: [] for c in conditions}
+    for (condition, _), own in zip(runs, judged, strict=True):
+        found[condition.label] += own
+    return {label: pd.DataFrame(own, columns=list(Answer._fields)) for label, own in found.items()}
 
 
 def motion_length(motion: Motion) -> float:
@@ -103,15 +114,14 @@ def straight_line(table: pd.DataFrame) -> float:
     return float(far[0]) if len(far) and np.ptp(far) < CLOSE else np.nan
 
 
-def _of_replicate(condition: ConditionResults, replicate: int) -> Iterator[Answer]:
+def _of_replicate(condition: ConditionResults, replicate: int, code: bytes) -> list[Answer]:
     log = read_log(condition.run.log_path(replicate))
-    for answer in _kept(condition, log):
-        yield Answer(replicate, *answer)
+    return [Answer(replicate, *answer) for answer in _kept(condition, log, code)]
 
 
-def _kept(condition: ConditionResults, log: LogContents) -> list[list[Any]]:
+def _kept(condition: ConditionResults, log: LogContents, code: bytes) -> list[list[Any]]:
     """Return the answers of a log, from the cache if they were judged before by the same code."""
-    key = hashlib.sha256(installed_code())
+    key = hashlib.sha256(code)
     key.update(f"{condition.condition.id} {log.content_digest}".encode())
     path = cache_root() / "answers" / key.hexdigest()[:32]
     with contextlib.suppress(FileNotFoundError, Damaged):

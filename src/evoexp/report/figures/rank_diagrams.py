@@ -40,7 +40,7 @@ def draw_critical_difference(table: pd.DataFrame) -> Figure:
     axes.axis("off")
     _scale(axes, count, difference)
     for k, (first, last) in enumerate(groups):
-        ends = ranks[first] - 0.02 * count, ranks[last] + 0.02 * count
+        ends = ranks[first] - 0.008 * count, ranks[last] + 0.008 * count
         y = -BAR * (k + 1)
         axes.plot(ends, [y, y], color=style.NEUTRAL, linewidth=3.5, solid_capstyle="butt")
     for k, row in enumerate(table.itertuples()):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from evoexp.errors import SettingError
-from evoexp.report.figures.effort_curves import share_table
+from evoexp.report.figures.effort_curves import length_table, share_table
 from evoexp.report.given_data import COLUMNS, of_given, read_given, strange_problems
 from evoexp.report.pages import comparison
 from evoexp.report.planner_runs import MULTIPLES, of_results
@@ -80,6 +80,18 @@ def test_the_page_marks_given_planners(
     assert last[0] == "elsewhere: my, own (given)" and last[-1] == "–"
     assert not any("given" in row.quantity for _, rows in page.comparisons for row in rows)
     assert not np.isnan(float(str(last[4]).split(" ")[0]))
+
+
+def test_a_planner_without_any_answer_does_not_widen_the_axis(
+    tmp_path: Path, results: Results
+) -> None:
+    ours = of_results(results.evolved)
+    path = tmp_path / "given.csv"
+    path.write_text(f"{HEAD}\nnever,{ours[0].problem.name},0,90000,\n")
+    table = length_table([*ours, *of_given(read_given(str(path)), ours)])
+    first = min(float(own.table["collision_queries"].min()) for own in ours if len(own.table))
+    assert table["collision_queries"].min() == pytest.approx(first)
+    assert np.isinf(table[table["planner"] == "never (given)"]["median"]).all()
 
 
 REFUSED = {

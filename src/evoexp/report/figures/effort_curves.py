@@ -80,9 +80,9 @@ def length_table(runs: Sequence[PlannerRuns]) -> pd.DataFrame:
     """
     parts = []
     for own in runs:
-        table = own.table
-        least = float(table["collision_queries"].min()) if len(table) else 1.0
-        axis = np.geomspace(max(least, 1.0), max(float(own.spent.max()), 2.0), POINTS // 2)
+        table, most = own.table, max(float(own.spent.max()), 2.0)
+        least = float(table["collision_queries"].min()) if len(table) else 0.5 * most
+        axis = np.geomspace(max(least, 1.0), most, POINTS // 2)
         best = np.array([_best_until(own, x) for x in axis])  # (points, runs)
         spread = {
             name: [quantile(row, share) for row in best]

@@ -130,6 +130,7 @@ def test_the_page_tells_every_condition_and_every_pair(
 ) -> None:
     page = comparison.page(results, settings)
     assert [row[0] for row in page.tables[1].rows] == [c.label for c in results.evolved]
+    assert "Planners are not ranked" in page.tables[0].note  # one problem
     count = len(results.evolved)
     assert len(page.comparisons[0][1]) == count * (count - 1) // 2
     assert [drawing.stem for drawing in page.drawings] == ["targets_reached", "proven_lengths"]

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from evoexp.report.figures.rank_diagrams import draw_critical_difference, draw_profiles
+from evoexp.report.pages import ranking
 from evoexp.report.planner_runs import PlannerRuns, Problem
 from evoexp.report.problem_ranks import (
     Standing,
@@ -21,6 +22,7 @@ from evoexp.report.problem_ranks import (
     rank_table,
     standing,
 )
+from evoexp.report.report_settings import ReportSettings
 
 # Demšar 2006, Tab. 6: areas under the curve of four classifiers on fourteen data sets
 AREAS = np.array(
@@ -154,6 +156,24 @@ def test_a_planner_of_few_problems_is_not_ranked_and_costs_no_problem() -> None:
     half = standing([*runs, runs_of("half", "p", [1.0]), runs_of("half", "q", [1.0])])
     assert (half.planners, half.problems) == (("A", "B", "half"), ("p", "q"))
     assert half.left_out == ("r", "s") and not half.outsiders
+
+
+def test_the_page_says_why_there_is_no_test_or_no_ranking(settings: ReportSettings) -> None:
+    def page_parts(problems: str, planners: str) -> tuple[str, str, list[str]]:
+        runs = [runs_of(a, p, [float(k + 1)]) for p in problems for k, a in enumerate(planners)]
+        found = standing(runs)
+        notes = " ".join(table.note for table in ranking.tables(found, settings))
+        stems = [drawing.stem for drawing in ranking.drawings(found, runs, settings)]
+        return ranking.too_few(found), notes, stems
+
+    remark, notes, stems = page_parts("p", "ABC")
+    assert "not ranked" in remark and (notes, stems) == ("", [])
+    remark, notes, stems = page_parts("pqrs", "ABC")
+    assert not remark and stems == ["performance_profiles"]
+    assert "5 problems that all of them were run on; here are 3 planners and 4" in notes
+    remark, notes, stems = page_parts("pqrst", "ABC")
+    assert not remark and stems == ["performance_profiles", "critical_difference"]
+    assert "the planners rank differently" in notes and "unit of a ranking" in notes
 
 
 def test_figures_name_every_planner() -> None:

@@ -132,7 +132,7 @@ def page_of_runs(
         title=f"{results.experiment or 'stored runs'}: proven answers",
         introduction=INTRODUCTION + (_of_file(given) if given else ""),
         tables=(
-            _problem_table(runs),
+            _problem_table(runs, ranking.too_few(found)),
             _table(rated(runs, settings), settings),
             *ranking.tables(found, settings),
         ),
@@ -233,7 +233,7 @@ def _first_own(own: PlannerRuns) -> float:
     return quantile(first.to_numpy(np.float64, na_value=np.inf), 0.5)
 
 
-def _problem_table(runs: Sequence[PlannerRuns]) -> Table:
+def _problem_table(runs: Sequence[PlannerRuns], remark: str) -> Table:
     """Tell of each problem the lengths that answers are measured by."""
     found: dict[str, tuple[Problem, list[float]]] = {}
     for own in runs:
@@ -258,7 +258,7 @@ def _problem_table(runs: Sequence[PlannerRuns]) -> Table:
         "shortest here",
         "unit of the targets",
     )
-    return Table("Problems", headers, rows, UNITS)
+    return Table("Problems", headers, rows, f"{UNITS} {remark}".strip())
 
 
 def _table(rows: Sequence[Rated], settings: ReportSettings) -> Table:

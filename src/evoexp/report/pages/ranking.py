@@ -56,6 +56,16 @@ def tables(found: Standing, settings: ReportSettings) -> tuple[Table, ...]:
     return (Table("Ranks over problems", headers, tuple(rows), note),)
 
 
+def too_few(found: Standing) -> str:
+    """Say why planners are not ranked; empty if they are."""
+    if found.can_be_profiled:
+        return ""
+    return (
+        "Planners are not ranked: a problem counts once, however many seeds it has, and it takes "
+        "two planners, and two problems at least that both were run on."
+    )
+
+
 def _left_out(found: Standing) -> str:
     """Name the problems and planners that do not count; empty if all do."""
     names = ", ".join(found.left_out)

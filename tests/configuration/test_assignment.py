@@ -93,7 +93,7 @@ def test_a_setting_that_the_option_does_not_mention_needs_no_plus() -> None:
         ((PHASES, "~scenario.phases.0.name=x"), "scenario.phases.0.name: must be "),
         ((PHASES, "+scenario.phases.0.name=x"), "scenario.phases.0.name: must be given without +"),
         ((ARMS, "scenario.obstacles=[]", "scenario.obstacles.0=1"), "the list is empty"),
-        ((ARMS, "control.x=1"), "control: must be chosen: multi_start, "),
+        ((ARMS, "control.x=1"), "control: must be chosen: cma_es, multi_start, "),
         ((ARMS, "q_start=[]"), "q_start: unknown setting; did you mean 'scenario.q_start'?"),
         ((ARMS, "experiment.x=3"), "experiment.x: must be left out"),
     ],

@@ -487,7 +487,7 @@ def test_a_group_that_the_planner_does_not_take_is_refused(
         (["planner.ga=3"], SettingError, "planner.ga: must be left as it is; set ga"),
         (["ga=null"], SettingError, "ga: must be chosen: "),
         (["~objective"], SettingError, "objective: must be chosen: "),
-        (["+control.x=1"], SettingError, "control: must be chosen: multi_start, "),
+        (["+control.x=1"], SettingError, "control: must be chosen: cma_es, multi_start, "),
         (
             ["control=random_search", "+control.planner=1"],
             SettingError,

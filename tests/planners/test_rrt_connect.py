@@ -14,14 +14,14 @@ from evoexp.condition import Condition
 from evoexp.configuration.compose import expand
 from evoexp.errors import SettingError
 from evoexp.planners.planner import judge_motion
-from evoexp.planners.rrt_connect.kernels import (
+from evoexp.planners.sampling_based.kernels import (
     distance,
     lengths_along,
     nearest_node,
     place_on_path,
     step_toward,
 )
-from evoexp.planners.rrt_connect.kernels import (
+from evoexp.planners.sampling_based.kernels import (
     tested_configurations as configurations_on,
 )
 from moveit_samples import COVERED, body, scene, write_problem, write_robot

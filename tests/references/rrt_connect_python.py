@@ -38,10 +38,13 @@ class Planner:
         self.asked = 0
 
     def free(self, one: Any, two: Any) -> bool:
-        """Whether the configurations on an edge are free, its first end left out."""
+        """Whether an edge is free: its last end first, its first left out."""
         parts = max(1, math.ceil(math.dist(one, two) / self.resolution - 1e-6))
-        self.asked += parts
-        places = [((parts - k) * one + k * two) / parts for k in range(1, parts)] + [two]
+        self.asked += 1
+        if self.collides(two):
+            return False
+        self.asked += parts - 1
+        places = [((parts - k) * one + k * two) / parts for k in range(1, parts)]
         return not any(self.collides(q) for q in places)
 
     def grow(self, tree: list[Any], q: Any, target: Any, near: int) -> tuple[Any, str]:

@@ -18,8 +18,9 @@ from evoexp.commands.arguments import add_experiment_arguments, folder_words
 from evoexp.commands.console import add_columns, add_hash_column, new_table, plain_console
 from evoexp.condition import Condition
 from evoexp.configuration import expansions
-from evoexp.configuration.experiment import Experiment
-from evoexp.errors import printable
+from evoexp.configuration.experiment import Experiment, Labelled
+from evoexp.errors import SettingError, printable
+from evoexp.extras import lacking
 from evoexp.report.pages import page_registration
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_table as stored_summaries
@@ -51,7 +52,7 @@ def main(arguments: argparse.Namespace) -> int:
             _notes(experiment, labelled.label, command),
         )
         for experiment in experiments
-        for labelled in experiment.conditions
+        for labelled in _that_can_run(experiment, console)
     ]
     batch = Batch(
         wanted, experiments[0].runner, outputs_root(), retry_failed=arguments.retry_failed
@@ -84,6 +85,21 @@ def main(arguments: argparse.Namespace) -> int:
         if failures:
             console.print(_failure_table(batch, failures))
     return 1 if failures or left else 0
+
+
+def _that_can_run(experiment: Experiment, console: Console) -> list[Labelled]:
+    """Return the conditions of an experiment, without those that need an extra that is not there.
+
+    Raises:
+        SettingError: If all of them do.
+    """
+    lacks = {c.label: lacking(c.condition.to_json()) for c in experiment.conditions}
+    for label, what in lacks.items():
+        if what:
+            console.print(f"skipped: {label}: {what}", soft_wrap=True, markup=False)
+    if all(lacks.values()):
+        raise SettingError("planner", f"one that is installed: {next(iter(lacks.values()))}", "it")
+    return [each for each in experiment.conditions if not lacks[each.label]]
 
 
 def _start_server(arguments: argparse.Namespace) -> None:

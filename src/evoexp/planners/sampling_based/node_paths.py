@@ -1,25 +1,16 @@
-"""RRT-Connect: two trees that grow toward each other (Kuffner & LaValle 2000), then shortcuts.
+"""Answers of planners whose solution is a path of straight edges between configurations.
 
-A baseline from outside the evolutionary planners: it is done with the first path that is free, and
-makes that one shorter by random shortcuts (Geraerts & Overmars 2007), as many as are asked for.
 All arms together are one configuration (nq,) [deg]; angles are not wrapped. Random configurations
-are uniform within the joints' limits; the goal is never drawn on purpose.
-
-A generation is a batch of iterations: random configurations that the trees grow toward, then
-attempts to shorten the path. Its costs are the lengths of the path in hand after each iteration,
-inf before there is one; its population is all nodes of both trees. A solution is flat: node by
-node, joint by joint (nodes × nq) [deg], start and goal included; the start alone: no path was
-found, and there is no motion.
+are uniform within the joints' limits. A solution is flat: node by node, joint by joint (nodes × nq)
+[deg], start and goal included; the start alone: no path was found, and there is no motion.
 """
 
-from collections.abc import Iterator
 from typing import Any, ClassVar
 
 import numpy as np
 
 from evoexp.collision.scene import Part
 from evoexp.errors import SettingError
-from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import CoverShape
@@ -31,26 +22,23 @@ from evoexp.planners.arm_tasks import (
     cover_shapes,
 )
 from evoexp.planners.departures import joint_names, of_limits, of_place
-from evoexp.planners.planner import Candidate, JudgementArrays, Keeper, PlannerDefaults
-from evoexp.planners.rrt_connect.kernels import distance, lengths_along
-from evoexp.planners.rrt_connect.settings import RrtSettings
-from evoexp.planners.rrt_connect.shortcuts import ShortenedPath
-from evoexp.planners.rrt_connect.trees import EdgeTest, TreePair
-from evoexp.records import FloatArray, Generation
+from evoexp.planners.planner import JudgementArrays, PlannerDefaults
+from evoexp.planners.sampling_based.kernels import distance, lengths_along
+from evoexp.planners.sampling_based.settings import EdgeSettings
+from evoexp.planners.sampling_based.trees import EdgeTest
+from evoexp.records import FloatArray
 from evoexp.robots.assembly import Robot
 from evoexp.scenarios.arm_motion import ArmMotion
 from evoexp.scenarios.moveit import MoveitTask
-from evoexp.validation import Component
 
 MOST_STEPS = 10_000  # of a line through the whole space of configurations
 MOST_TESTED = 1_000_000  # configurations on such a line
-NODES_PER_ITERATION = 4  # of both trees, for the estimate of memory: most have fewer
 
 
-class RrtConnect(PlannerDefaults, RrtSettings, Component):
-    """RRT-Connect and shortcuts."""
+class NodePaths(PlannerDefaults, EdgeSettings):
+    """The usual answers of a planner of such paths, to be inherited before `Component`."""
 
-    component: ClassVar[str] = "rrt_connect"
+    component: ClassVar[str]
 
     def prepare(self, robot: Robot, scenario: ArmMotion | MoveitTask) -> ArmProblem:
         """Build the robot, and check that start and goal fit it and are free of collision.
@@ -82,42 +70,6 @@ class RrtConnect(PlannerDefaults, RrtSettings, Component):
             np.where(free_high, last + self.free_turn, np.maximum(high, last)),
         )
 
-    def evolve(self, problem: ArmProblem, rng: np.random.Generator) -> Iterator[Generation]:
-        """Yield a record per batch of iterations, until the path is shortened or given up."""
-        search, keeper = _Search(self, problem), Keeper()
-        for index in range(self.num_generations + 1):
-            costs, asked = np.full(self.num_evaluations(index), np.inf), search.edges.queries
-            count = 0
-            while count < len(costs) and not search.stop_reason:
-                search.iterate(rng)
-                costs[count] = search.cost
-                count += 1
-            costs = costs[:count]
-            keeper.keep(search.cost, search.candidate())
-            yield keeper.record(
-                cost_statistics(costs),
-                costs,
-                np.concatenate([tree.nodes for tree in search.pair.trees]),
-                lowest=float(costs.min()),
-                num_feasible=int(np.count_nonzero(np.isfinite(costs))),
-                evaluations=count,
-                collision_queries=search.edges.queries - asked,
-                stop_reason=search.stop_reason,
-            )
-            if search.stop_reason:
-                return
-
-    @property
-    def num_generations(self) -> int:
-        """Batches after the first, at most."""
-        batches = -(-self._most_iterations // self.ga.iterations_per_generation)
-        return min(self.ga.num_generations, batches - 1)
-
-    def num_evaluations(self, index: int) -> int:
-        """Return the iterations of a generation, at most; a run may end within one."""
-        size = self.ga.iterations_per_generation
-        return max(0, min(size, self._most_iterations - index * size))
-
     def sample(self, problem: ArmProblem, rng: np.random.Generator, count: int) -> FloatArray:
         """Refuse: trees are grown, paths are not drawn one by one.
 
@@ -130,7 +82,7 @@ class RrtConnect(PlannerDefaults, RrtSettings, Component):
         """Judge paths (nq, nodes, individuals): their length, inf where a tested edge collides."""
         edges = EdgeTest(problem.collision, self.resolution)
         paths = [np.ascontiguousarray(path) for path in population.transpose(2, 1, 0)]
-        lengths = np.array([_length(path) for path in paths])
+        lengths = np.array([path_length(path) for path in paths])
         collisions = np.array([edges.num_contacts(path) for path in paths])
         feasible = (collisions == 0) & np.isfinite(lengths)
         segments = np.full(len(paths), population.shape[1] - 1)
@@ -177,14 +129,6 @@ class RrtConnect(PlannerDefaults, RrtSettings, Component):
         """Return the documented shape of a solution: any number of nodes × nq."""
         return ..., (len(problem.start),)
 
-    def memory(self, problem: ArmProblem) -> int:
-        """Return the memory of both trees, of their copy as they grow, and of a record's copy."""
-        most = (self.num_generations + 1) * self.ga.iterations_per_generation
-        nodes = NODES_PER_ITERATION * min(self.max_iterations, most)
-        low, high = self.box(problem)
-        tested = distance(low, high) / self.resolution
-        return int(8 * (len(problem.start) + 1) * (4 * nodes + 2 * tested))
-
     def notes(self, problem: ArmProblem) -> list[str]:
         """Describe how densely edges are tested, the ranges of free joints, and the covers."""
         lines = [f"edges are tested every {self.resolution:.4g} deg or more densely"]
@@ -200,11 +144,6 @@ class RrtConnect(PlannerDefaults, RrtSettings, Component):
         """Return the circles, spheres and capsules that edges are tested with."""
         return cover_shapes(problem.collision)
 
-    @property
-    def _most_iterations(self) -> int:
-        """Iterations of a run that finds its path last of all, shortcuts included."""
-        return self.max_iterations + self.num_shortcuts
-
     def _free_joints(self, problem: ArmProblem) -> tuple[np.ndarray, np.ndarray]:
         """Return which joints have no lower and which have no upper limit, each (nq,)."""
         low, high = problem.limits.T
@@ -219,64 +158,6 @@ class RrtConnect(PlannerDefaults, RrtSettings, Component):
         return np.ascontiguousarray(solution.reshape(-1, nq))
 
 
-class _Search:
-    """The state of one run: the trees until they meet, then the path.
-
-    Attributes:
-        pair: The trees.
-        edges: Tests edges and counts.
-    """
-
-    def __init__(self, planner: RrtConnect, problem: ArmProblem) -> None:
-        self._planner, self._start = planner, problem.start
-        self._low, self._high = planner.box(problem)
-        self.edges = EdgeTest(problem.collision, planner.resolution)
-        self.pair = TreePair(problem.start, problem.goal, self.edges, planner.range)
-        self._path: ShortenedPath | None = None
-        self._first = {"first_solution_queries": np.inf, "first_solution_length_deg": np.inf}
-        self._solution, self._shown = problem.start.copy(), problem.start
-
-    @property
-    def cost(self) -> float:
-        """Length of the path in hand [deg], inf without one."""
-        return np.inf if self._path is None else self._path.length
-
-    @property
-    def stop_reason(self) -> str:
-        """Why the run ends now; empty while it goes on."""
-        if self._path is not None:
-            done = self._path.num_attempts >= self._planner.num_shortcuts
-            return "solution" if done else ""
-        given_up = self.pair.num_iterations >= self._planner.max_iterations
-        return "no solution" if given_up else ""
-
-    def iterate(self, rng: np.random.Generator) -> None:
-        """Grow the trees toward a random configuration, or try a shortcut of the path."""
-        if self._path is not None:
-            self._path.attempt(rng.random(2))
-            return
-        drawn = self._low + rng.random(len(self._low)) * (self._high - self._low)
-        nodes = self.pair.iterate(drawn)
-        if nodes is not None:
-            self._path = ShortenedPath(nodes, self.edges)
-            self._first = {
-                "first_solution_queries": float(self.edges.queries),
-                "first_solution_length_deg": self._path.length,
-            }
-
-    def candidate(self) -> Candidate:
-        """Return the path in hand as it is recorded; the same array as long as it is the same."""
-        if self._path is not None and self._path.nodes is not self._shown:
-            self._shown = self._path.nodes
-            self._solution = self._shown.flatten()
-        terms = {
-            "length_deg": self.cost,
-            "iterations": float(self.pair.num_iterations),
-            "nodes": float(sum(tree.count for tree in self.pair.trees)),
-        }
-        return Candidate(self._solution, terms | self._first, self._path is not None)
-
-
-def _length(path: FloatArray) -> float:
+def path_length(path: FloatArray) -> float:
     """Return the length of a path (nodes, nq) [deg]; inf of a single configuration."""
     return float(lengths_along(path)[-1]) if len(path) > 1 else np.inf

@@ -4,8 +4,8 @@ import itertools
 
 import numpy as np
 
-from evoexp.planners.rrt_connect.kernels import lengths_along, place_on_path
-from evoexp.planners.rrt_connect.trees import EdgeTest
+from evoexp.planners.sampling_based.kernels import lengths_along, place_on_path
+from evoexp.planners.sampling_based.trees import EdgeTest
 from evoexp.records import FloatArray
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from evoexp.collision.models.covered_bodies import CoveredCollision
 from evoexp.collision.models.touching_spheres import SphereCollision
-from evoexp.planners.rrt_connect.kernels import nearest_node, step_toward, tested_configurations
+from evoexp.planners.sampling_based.kernels import nearest_node, step_toward, tested_configurations
 from evoexp.records import FloatArray, IntArray
 
 ROOM = 256  # nodes that a tree has room for at first
@@ -30,10 +30,20 @@ class EdgeTest:
         self._collision, self._resolution, self.queries = collision, resolution, 0
 
     def is_free(self, one: FloatArray, two: FloatArray) -> bool:
-        """Whether an edge is free at the configurations tested; its first end is known to be."""
-        q = tested_configurations(one, two, self._resolution)
-        self.queries += q.shape[1]
-        return not self._collision.any_collides(q)
+        """Whether an edge is free at the configurations tested; its first end is known to be.
+
+        Its second end is asked for first, and the others only if that one is free.
+        """
+        if not self.is_free_at(two):
+            return False
+        inside = tested_configurations(one, two, self._resolution)[:, 1:]
+        self.queries += inside.shape[1]
+        return not inside.size or not self._collision.any_collides(np.ascontiguousarray(inside))
+
+    def is_free_at(self, q: FloatArray) -> bool:
+        """Whether one configuration (nq,) [deg] is free."""
+        self.queries += 1
+        return not self._collision.any_collides(np.ascontiguousarray(q[:, None]))
 
     def num_contacts(self, path: FloatArray) -> int:
         """Return how many of the configurations tested on a path (nodes, nq) collide."""

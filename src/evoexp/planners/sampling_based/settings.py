@@ -1,6 +1,6 @@
-"""Settings of the planner of two trees."""
+"""Settings of planners of straight edges between random configurations."""
 
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from evoexp.collision.models.covered_bodies import CoveredBodies
 from evoexp.collision.models.touching_spheres import TouchingSpheres
@@ -29,30 +29,65 @@ class TreeGrowth(Component):
     num_generations: NonNegativeCount
 
 
-class RrtSettings(Settings):
-    """Hyperparameters of RRT-Connect and of the shortcuts behind it.
+class EdgeSettings(Settings):
+    """Settings of every planner of straight edges.
 
     Distances are Euclidean over all joints of all arms, in degrees; a metre of a sliding joint
     counts as a radian, 57.3 degrees.
 
     Attributes:
         range: Length of a step, the longest edge of a tree [deg].
-        max_iterations: Random configurations after which the search for a path is given up.
         num_shortcuts: Attempts to shorten the path that was found; 0: none.
         free_turn: How far joints without limits may go beyond start and goal [deg].
-        ga: Iterations per record, and records.
         collision: The touching circles or spheres, or covers of the bodies. An edge as long as
             `range` is tested at `collision_substeps` configurations, other edges as densely.
     """
 
     range: Positive
-    max_iterations: Count
     num_shortcuts: NonNegativeCount
     free_turn: Positive
-    ga: TreeGrowth
     collision: TouchingSpheres | CoveredBodies
 
     @property
     def resolution(self) -> float:
         """Greatest distance between configurations that are tested on an edge [deg]."""
         return self.range / self.collision.collision_substeps
+
+
+class RrtSettings(EdgeSettings):
+    """Hyperparameters of RRT-Connect and of the shortcuts behind it.
+
+    Attributes:
+        max_iterations: Random configurations after which the search for a path is given up.
+        ga: Iterations per record, and records.
+    """
+
+    max_iterations: Count
+    ga: TreeGrowth
+
+
+class QueryChunks(Component):
+    """How long a planner of a library searches per record, and in all.
+
+    Attributes:
+        queries_per_generation: Configurations that are asked for between two records; an edge that
+            is being tested is tested to its end.
+        num_generations: Records after the first, at most.
+    """
+
+    component: ClassVar[str] = "query_chunks"
+
+    queries_per_generation: Count
+    num_generations: NonNegativeCount
+
+
+class OmplSettings(EdgeSettings):
+    """Hyperparameters of a planner of OMPL.
+
+    Attributes:
+        algorithm: Its name in OMPL; all of its settings but `range` are OMPL's own.
+        ga: Configurations asked for per record, and records.
+    """
+
+    algorithm: Literal["RRTConnect", "RRTstar", "InformedRRTstar", "BITstar"]
+    ga: QueryChunks

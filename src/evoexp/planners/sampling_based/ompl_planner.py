@@ -1,0 +1,195 @@
+"""Planners of the Open Motion Planning Library (Sucan et al. 2012), on the same edges.
+
+OMPL asks whether configurations and straight edges are free; both are tested by the planner's
+collision model, as densely as RRT-Connect's here, and counted. All numbers are drawn by OMPL, from
+a seed of the replicate; its code makes the last bits those of an environment.
+
+A generation is a chunk of a search that goes on: its cost and its population are the path in hand.
+A planner that ends with its first path (RRTConnect) is done then, and the path is made shorter by
+random shortcuts (Geraerts & Overmars 2007).
+"""
+
+import importlib.util
+from collections.abc import Iterator
+from typing import Any, ClassVar
+
+import numpy as np
+
+from evoexp.errors import SettingError
+from evoexp.evolution.cost_statistics import cost_statistics
+from evoexp.planners.arm_tasks import ArmProblem
+from evoexp.planners.planner import Candidate, Keeper, Reproducibility
+from evoexp.planners.sampling_based.kernels import distance
+from evoexp.planners.sampling_based.node_paths import NodePaths, path_length
+from evoexp.planners.sampling_based.settings import OmplSettings
+from evoexp.planners.sampling_based.shortcuts import ShortenedPath
+from evoexp.planners.sampling_based.trees import EdgeTest
+from evoexp.records import FloatArray, Generation
+from evoexp.robots.assembly import Robot
+from evoexp.scenarios.arm_motion import ArmMotion
+from evoexp.scenarios.moveit import MoveitTask
+from evoexp.validation import Component
+
+SEEDS = 2**31
+BYTES_PER_QUERY = 500  # of a graph in OMPL, for the estimate of memory
+DONE_WITH_A_PATH = ("RRTConnect",)
+
+
+class OmplPlanner(NodePaths, OmplSettings, Component):
+    """A planner of OMPL, by its name."""
+
+    component: ClassVar[str] = "ompl"
+    reproducibility: ClassVar[Reproducibility] = "environment"
+
+    def prepare(self, robot: Robot, scenario: ArmMotion | MoveitTask) -> ArmProblem:
+        """Build the robot, and check start, goal and settings.
+
+        Raises:
+            SettingError: If they do not fit, or OMPL is not installed.
+        """
+        if importlib.util.find_spec("ompl") is None:
+            must = "another planner: ompl needs pip install 'evoexp[baselines]'"
+            raise SettingError("planner", must, self.component)
+        if self.num_shortcuts and self.algorithm not in DONE_WITH_A_PATH:
+            must = f"0: {self.algorithm} goes on to shorten its path by itself"
+            raise SettingError("planner.num_shortcuts", must, self.num_shortcuts)
+        return super().prepare(robot, scenario)
+
+    def evolve(self, problem: ArmProblem, rng: np.random.Generator) -> Iterator[Generation]:
+        """Yield a record per chunk of the search, then of the shortcuts, until it is done."""
+        search, keeper = _Search(self, problem, int(rng.integers(1, SEEDS))), Keeper()
+        for index in range(self.num_generations + 1):
+            asked = search.edges.queries
+            search.go_on(rng, (index + 1) * self.ga.queries_per_generation)
+            cost = np.array([search.cost])
+            keeper.keep(search.cost, search.candidate())
+            yield keeper.record(
+                cost_statistics(cost),
+                cost,
+                search.nodes,
+                lowest=search.cost,
+                num_feasible=int(np.isfinite(search.cost)),
+                evaluations=1,
+                collision_queries=search.edges.queries - asked,
+                stop_reason=search.stop_reason,
+            )
+            if search.stop_reason:
+                return
+
+    def num_evaluations(self, index: int) -> int:
+        """Return 1: a record judges the path in hand."""
+        return 1
+
+    def memory(self, problem: ArmProblem) -> int:
+        """Return an estimate by the number of configurations that are asked for."""
+        low, high = self.box(problem)
+        tested = distance(low, high) / self.resolution
+        queries = (self.num_generations + 1) * self.ga.queries_per_generation
+        return int(BYTES_PER_QUERY * queries + 16 * len(problem.start) * tested)
+
+
+class _Search:
+    """A planner of OMPL at work on one problem, then shortcuts of its path.
+
+    Attributes:
+        edges: Tests edges and counts.
+        nodes: (nodes, nq) the path in hand [deg]; the start alone before there is one.
+        stop_reason: Why the run ends now; empty while it goes on.
+    """
+
+    def __init__(self, planner: OmplPlanner, problem: ArmProblem, seed: int) -> None:
+        self._settings, self.stop_reason = planner, ""
+        self.edges = EdgeTest(problem.collision, planner.resolution)
+        self._library = _Library(planner, problem, self.edges, seed)
+        self.nodes, self._shown = problem.start[None], problem.start.copy()
+        self._path: ShortenedPath | None = None
+
+    @property
+    def cost(self) -> float:
+        """Length of the path in hand [deg], inf without one."""
+        return path_length(self.nodes)
+
+    def go_on(self, rng: np.random.Generator, most: int) -> None:
+        """Search until so many configurations were asked for since the start, or to the end."""
+        if self._path is None:
+            found = self._library.solve(most)
+            if found is not None and path_length(found) < self.cost:
+                self.nodes, self._shown = found, found.flatten()
+            if self._settings.algorithm not in DONE_WITH_A_PATH or len(self.nodes) == 1:
+                return
+            self._path = ShortenedPath(self.nodes, self.edges)
+        while self._path.num_attempts < self._settings.num_shortcuts:
+            if self.edges.queries >= most:
+                break
+            self._path.attempt(rng.random(2))
+        else:
+            self.stop_reason = "solution"
+        if self._path.nodes is not self.nodes:
+            self.nodes, self._shown = self._path.nodes, self._path.nodes.flatten()
+
+    def candidate(self) -> Candidate:
+        """Return the path in hand as it is recorded; the same array as long as it is the same."""
+        return Candidate(self._shown, {"length_deg": self.cost}, len(self.nodes) > 1)
+
+
+class _Library:
+    """OMPL's objects for one run: space, motion tests, problem, and planner."""
+
+    def __init__(
+        self, planner: OmplPlanner, problem: ArmProblem, edges: EdgeTest, seed: int
+    ) -> None:
+        from ompl import base, geometric, util
+
+        util.setLogLevel(util.LogLevel.LOG_NONE)
+        util.RNG.setSeed(seed)
+        self._edges, self._base, nq = edges, base, len(problem.start)
+        low, high = planner.box(problem)
+        space, bounds = base.RealVectorStateSpace(nq), base.RealVectorBounds(nq)
+        for joint in range(nq):
+            bounds.setLow(joint, float(low[joint]))
+            bounds.setHigh(joint, float(high[joint]))
+        space.setBounds(bounds)
+        self._info = base.SpaceInformation(space)
+        self._info.setStateValidityChecker(lambda state: edges.is_free_at(_array(state, nq)))
+
+        class Edges(base.MotionValidator):  # type: ignore[misc]
+            """Tests whole edges."""
+
+            def checkMotion(self, one: Any, two: Any, last: Any = None) -> bool:  # noqa: N802
+                """Whether the edge between two states is free."""
+                return edges.is_free(_array(one, nq), _array(two, nq))
+
+        self._motions = Edges(self._info)  # kept: OMPL holds no reference
+        self._info.setMotionValidator(self._motions)
+        self._info.setup()
+        self._ends = [space.allocState() for _ in range(2)]
+        for state, q in zip(self._ends, (problem.start, problem.goal), strict=True):
+            for joint in range(nq):
+                state[joint] = float(q[joint])
+        self._problem = base.ProblemDefinition(self._info)
+        self._problem.setStartAndGoalStates(*self._ends)
+        self._problem.setOptimizationObjective(base.PathLengthOptimizationObjective(self._info))
+        self._planner = getattr(geometric, planner.algorithm)(self._info)
+        if hasattr(self._planner, "setRange"):
+            self._planner.setRange(planner.range)
+        self._planner.setProblemDefinition(self._problem)
+        self._planner.setup()
+        self._nq, self._start, self._goal = nq, problem.start, problem.goal
+
+    def solve(self, most: int) -> FloatArray | None:
+        """Search until so many configurations were asked for.
+
+        Returns:
+            (nodes, nq) the best path so far [deg]; None: no path from start to goal yet.
+        """
+        enough = self._base.PlannerTerminationCondition(lambda: self._edges.queries >= most)
+        self._planner.solve(enough)
+        if not self._problem.hasExactSolution():
+            return None
+        states = self._problem.getSolutionPath().getStates()
+        return np.array([_array(state, self._nq) for state in states])
+
+
+def _array(state: Any, nq: int) -> FloatArray:
+    """Return a state of OMPL as an array (nq,)."""
+    return np.array([state[joint] for joint in range(nq)])

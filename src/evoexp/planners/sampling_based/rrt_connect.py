@@ -1,0 +1,141 @@
+"""RRT-Connect: two trees that grow toward each other (Kuffner & LaValle 2000), then shortcuts.
+
+A baseline from outside the evolutionary planners: it is done with the first path that is free, and
+makes that one shorter by random shortcuts (Geraerts & Overmars 2007), as many as are asked for.
+The goal is never drawn on purpose.
+
+A generation is a batch of iterations: random configurations that the trees grow toward, then
+attempts to shorten the path. Its costs are the lengths of the path in hand after each iteration,
+inf before there is one; its population is all nodes of both trees.
+"""
+
+from collections.abc import Iterator
+from typing import ClassVar
+
+import numpy as np
+
+from evoexp.evolution.cost_statistics import cost_statistics
+from evoexp.planners.arm_tasks import ArmProblem
+from evoexp.planners.planner import Candidate, Keeper
+from evoexp.planners.sampling_based.kernels import distance
+from evoexp.planners.sampling_based.node_paths import NodePaths
+from evoexp.planners.sampling_based.settings import RrtSettings
+from evoexp.planners.sampling_based.shortcuts import ShortenedPath
+from evoexp.planners.sampling_based.trees import EdgeTest, TreePair
+from evoexp.records import Generation
+from evoexp.validation import Component
+
+NODES_PER_ITERATION = 4  # of both trees, for the estimate of memory: most have fewer
+
+
+class RrtConnect(NodePaths, RrtSettings, Component):
+    """RRT-Connect and shortcuts."""
+
+    component: ClassVar[str] = "rrt_connect"
+
+    def evolve(self, problem: ArmProblem, rng: np.random.Generator) -> Iterator[Generation]:
+        """Yield a record per batch of iterations, until the path is shortened or given up."""
+        search, keeper = _Search(self, problem), Keeper()
+        for index in range(self.num_generations + 1):
+            costs, asked = np.full(self.num_evaluations(index), np.inf), search.edges.queries
+            count = 0
+            while count < len(costs) and not search.stop_reason:
+                search.iterate(rng)
+                costs[count] = search.cost
+                count += 1
+            costs = costs[:count]
+            keeper.keep(search.cost, search.candidate())
+            yield keeper.record(
+                cost_statistics(costs),
+                costs,
+                np.concatenate([tree.nodes for tree in search.pair.trees]),
+                lowest=float(costs.min()),
+                num_feasible=int(np.count_nonzero(np.isfinite(costs))),
+                evaluations=count,
+                collision_queries=search.edges.queries - asked,
+                stop_reason=search.stop_reason,
+            )
+            if search.stop_reason:
+                return
+
+    @property
+    def num_generations(self) -> int:
+        """Batches after the first, at most."""
+        batches = -(-self._most_iterations // self.ga.iterations_per_generation)
+        return min(self.ga.num_generations, batches - 1)
+
+    def num_evaluations(self, index: int) -> int:
+        """Return the iterations of a generation, at most; a run may end within one."""
+        size = self.ga.iterations_per_generation
+        return max(0, min(size, self._most_iterations - index * size))
+
+    def memory(self, problem: ArmProblem) -> int:
+        """Return the memory of both trees, of their copy as they grow, and of a record's copy."""
+        most = (self.num_generations + 1) * self.ga.iterations_per_generation
+        nodes = NODES_PER_ITERATION * min(self.max_iterations, most)
+        low, high = self.box(problem)
+        tested = distance(low, high) / self.resolution
+        return int(8 * (len(problem.start) + 1) * (4 * nodes + 2 * tested))
+
+    @property
+    def _most_iterations(self) -> int:
+        """Iterations of a run that finds its path last of all, shortcuts included."""
+        return self.max_iterations + self.num_shortcuts
+
+
+class _Search:
+    """The state of one run: the trees until they meet, then the path.
+
+    Attributes:
+        pair: The trees.
+        edges: Tests edges and counts.
+    """
+
+    def __init__(self, planner: RrtConnect, problem: ArmProblem) -> None:
+        self._planner, self._start = planner, problem.start
+        self._low, self._high = planner.box(problem)
+        self.edges = EdgeTest(problem.collision, planner.resolution)
+        self.pair = TreePair(problem.start, problem.goal, self.edges, planner.range)
+        self._path: ShortenedPath | None = None
+        self._first = {"first_solution_queries": np.inf, "first_solution_length_deg": np.inf}
+        self._solution, self._shown = problem.start.copy(), problem.start
+
+    @property
+    def cost(self) -> float:
+        """Length of the path in hand [deg], inf without one."""
+        return np.inf if self._path is None else self._path.length
+
+    @property
+    def stop_reason(self) -> str:
+        """Why the run ends now; empty while it goes on."""
+        if self._path is not None:
+            done = self._path.num_attempts >= self._planner.num_shortcuts
+            return "solution" if done else ""
+        given_up = self.pair.num_iterations >= self._planner.max_iterations
+        return "no solution" if given_up else ""
+
+    def iterate(self, rng: np.random.Generator) -> None:
+        """Grow the trees toward a random configuration, or try a shortcut of the path."""
+        if self._path is not None:
+            self._path.attempt(rng.random(2))
+            return
+        drawn = self._low + rng.random(len(self._low)) * (self._high - self._low)
+        nodes = self.pair.iterate(drawn)
+        if nodes is not None:
+            self._path = ShortenedPath(nodes, self.edges)
+            self._first = {
+                "first_solution_queries": float(self.edges.queries),
+                "first_solution_length_deg": self._path.length,
+            }
+
+    def candidate(self) -> Candidate:
+        """Return the path in hand as it is recorded; the same array as long as it is the same."""
+        if self._path is not None and self._path.nodes is not self._shown:
+            self._shown = self._path.nodes
+            self._solution = self._shown.flatten()
+        terms = {
+            "length_deg": self.cost,
+            "iterations": float(self.pair.num_iterations),
+            "nodes": float(sum(tree.count for tree in self.pair.trees)),
+        }
+        return Candidate(self._solution, terms | self._first, self._path is not None)

@@ -1,0 +1,114 @@
+"""Planners of OMPL on our edges: free paths, seeds, distribution beside our own RRT-Connect."""
+
+import importlib.util
+import itertools
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import mannwhitneyu
+
+from evoexp.cli import main
+from evoexp.condition import Condition
+from evoexp.configuration.compose import expand
+from evoexp.errors import SettingError
+from evoexp.planners.planner import judge_motion
+
+pytest.importorskip("ompl", reason="an extra")
+OMPL = ("planner=ompl", "ga=ompl", "ga.num_generations=20")
+ANYTIME = ("RRTstar", "InformedRRTstar", "BITstar")
+
+
+def condition(*words: str, label: str = "rana_planar") -> Condition:
+    (experiment,) = expand(["experiment=rrt_connect", *words])
+    return next(each.condition for each in experiment.conditions if each.label == label)
+
+
+def ran(chosen: Condition, seed: int) -> tuple[Any, Any, list[Any]]:
+    planner, problem = chosen.prepare()
+    return planner, problem, list(planner.evolve(problem, np.random.default_rng(seed)))
+
+
+def of(algorithm: str, *words: str, shortcuts: int = 200) -> Condition:
+    num = shortcuts if algorithm == "RRTConnect" else 0
+    chosen = f"planner.algorithm={algorithm}", f"planner.num_shortcuts={num}"
+    return condition(*OMPL, *chosen, *words)
+
+
+@pytest.mark.parametrize("algorithm", ["RRTConnect", *ANYTIME])
+def test_paths_are_free_between_start_and_goal_and_become_shorter(algorithm: str) -> None:
+    planner, problem, records = ran(of(algorithm), 3)
+    costs = [record.best_cost for record in records]
+    assert all(later <= earlier for earlier, later in itertools.pairwise(costs))
+    queries = [record.collision_queries for record in records]
+    assert all(later > earlier for earlier, later in itertools.pairwise(queries))
+    last = records[-1]
+    if not last.solved:
+        assert algorithm in ("RRTstar", "InformedRRTstar")
+        assert planner.motion(problem, last.best) is None
+        return
+    path = last.best.reshape(-1, 4)
+    assert np.array_equal(path[[0, -1]], [problem.start, problem.goal])
+    steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    assert last.best_cost == pytest.approx(steps.sum())
+    assert planner.evaluate(problem, last.best)["collisions"] == 0.0
+    assert judge_motion(planner, problem, planner.motion(problem, last.best)).certified is not None
+
+
+@pytest.mark.parametrize("algorithm", ["RRTConnect", "BITstar"])
+def test_a_seed_is_the_same_run_whatever_ran_before(algorithm: str) -> None:
+    chosen = of(algorithm)
+    assert chosen.reproducibility == "environment"
+    one, other, again = (ran(chosen, seed)[2] for seed in (1, 2, 1))
+    assert [r.best_cost for r in one] == [r.best_cost for r in again]
+    assert [r.collision_queries for r in one] == [r.collision_queries for r in again]
+    assert [r.best_cost for r in one] != [r.best_cost for r in other]
+
+
+def test_our_rrt_connect_is_no_other_than_ompls_in_distribution() -> None:
+    """First path and its price of 60 runs each: OMPL steps alike, and joins trees alike.
+
+    It asks for the ends of edges of the goal's tree twice.
+    """
+    plain = "planner.num_shortcuts=0"
+    ours = [ran(condition(plain, "ga.iterations_per_generation=1"), s)[2][-1] for s in range(60)]
+    theirs = [
+        ran(of("RRTConnect", "ga.queries_per_generation=500", shortcuts=0), s) for s in range(60)
+    ]
+    lasts = [records[-1] for _, _, records in theirs]
+    assert all(record.stop_reason == "solution" for record in [*ours, *lasts])
+    for name in ("best_cost", "collision_queries"):
+        one, two = ([getattr(r, name) for r in runs] for runs in (ours, lasts))
+        assert 0.35 < mannwhitneyu(one, two).statistic / 3600 < 0.65, name
+
+
+def test_algorithms_that_shorten_by_themselves_take_no_shortcuts() -> None:
+    with pytest.raises(SettingError, match=r"planner\.num_shortcuts: must be 0: BITstar goes on"):
+        condition(*OMPL, "planner.algorithm=BITstar").prepare()
+
+
+def test_an_unknown_algorithm_is_one_line() -> None:
+    with pytest.raises(SettingError, match=r"planner\.algorithm: must be"):
+        condition(*OMPL, "planner.algorithm=BitStar")
+
+
+def test_without_the_package_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(SettingError, match=r"needs pip install 'evoexp\[baselines\]'"):
+        of("RRTConnect", "seed=77").prepare()
+
+
+def test_rows_that_need_the_package_are_skipped_with_a_note(
+    monkeypatch: pytest.MonkeyPatch, capsys: Any, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("EVOEXP_OUTPUTS", str(tmp_path))
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    given = ["experiment=arena_ompl", "budget=smoke", "num_replicates=1", "--no-report"]
+    only = ["--only", "rana_planar · RRT-Connect,rana_planar · BIT* (OMPL)"]
+    assert main(["run", *given, *only]) == 0
+    said = capsys.readouterr().out
+    assert "skipped: rana_planar · BIT* (OMPL): ompl needs pip install 'evoexp[baselines]'" in said
+    assert len(list((tmp_path / "runs").iterdir())) == 1
+    assert main(["run", *given, "--only", "rana_planar · BIT* (OMPL)"]) == 2
+    assert "evoexp: planner: must be one that is installed: ompl needs" in capsys.readouterr().err

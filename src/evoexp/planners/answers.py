@@ -1,8 +1,12 @@
-"""Answers of a planner beside motions and costs: a table, and the shapes that its search tests."""
+"""Answers of a planner beside motions and costs: tables, shapes of solutions, tested covers."""
 
+import math
 from typing import Any, NamedTuple
 
 from evoexp.records import FloatArray
+
+Shape = tuple[Any, ...]  # of a solution: one tuple per part; a leading ... stands for any number
+LONGEST = 1000  # parts of a solution of any number, as its memory is estimated
 
 
 class CoverShape(NamedTuple):
@@ -31,3 +35,14 @@ class Listing(NamedTuple):
 
     names: list[str]
     rows: list[list[Any]]
+
+
+def num_values(shape: Shape) -> int:
+    """Return how many numbers a solution of a documented shape has; of any number of parts, many.
+
+    Args:
+        shape: As `Planner.shape` returns it.
+    """
+    if len(shape) and shape[0] is ...:
+        return LONGEST * num_values(shape[1:])
+    return sum(math.prod(part) for part in shape)

@@ -5,8 +5,7 @@ clock or a file; its randomness is an argument. `PlannerDefaults` answers what m
 alike; everything else a planner writes itself. `evoexp.testing` checks every obligation.
 """
 
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, ClassVar, Literal, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
@@ -17,13 +16,13 @@ from evoexp.collision.scene import Part, Scene
 from evoexp.evolution.cost_statistics import CostStatistics, cost_statistics
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import CoverShape, Listing
+from evoexp.planners.answers import Shape as Shape
+from evoexp.planners.answers import num_values as num_values
 from evoexp.records import BoolArray, FloatArray, Generation
 
 Reproducibility = Literal["bits", "environment"]
 # Copies of a population that a run of most planners holds: parents, offspring, paths between them.
 COPIES = 5
-LONGEST = 1000  # parts of a solution of any number, as its memory is estimated
-Shape = tuple[Any, ...]  # of a solution: one tuple per part; a leading ... stands for any number
 
 
 class Judgement(Protocol):
@@ -180,17 +179,6 @@ class Planner(Protocol):
         """
 
 
-def num_values(shape: Shape) -> int:
-    """Return how many numbers a solution of a documented shape has; of any number of parts, many.
-
-    Args:
-        shape: As `Planner.shape` returns it.
-    """
-    if len(shape) and shape[0] is ...:
-        return LONGEST * num_values(shape[1:])
-    return sum(math.prod(part) for part in shape)
-
-
 class _Budgeted(Protocol):
     """A planner with a field `ga`, as most have."""
 
@@ -215,8 +203,7 @@ class PlannerDefaults:
     reproducibility: ClassVar[Reproducibility] = "bits"
     is_reference: ClassVar[bool] = False
     is_real_coded: ClassVar[bool] = False
-    """Whether any real numbers in the place of those in which individuals of `sample` differ are an
-    individual that `cost` judges: what optimisers of real vectors need."""
+    """Whether `cost` takes any real numbers where individuals of `sample` differ."""
 
     @property
     def num_generations(self: _Budgeted) -> int:
@@ -296,10 +283,10 @@ class Keeper:
         collision_queries: Configurations asked for so far.
     """
 
-    __slots__ = ("best", "collision_queries", "cost", "evaluations", "index")
+    __slots__ = ("_tried", "best", "collision_queries", "cost", "evaluations", "index")
 
     def __init__(self) -> None:
-        self.index, self.cost = -1, np.inf
+        self.index, self.cost, self._tried = -1, np.inf, np.inf
         self.best = Candidate(np.empty(0), {}, False)
         self.evaluations = self.collision_queries = 0
 
@@ -310,6 +297,23 @@ class Keeper:
     def keep(self, cost: float, best: Candidate) -> None:
         """Keep a solution and its cost as the best so far."""
         self.cost, self.best = cost, best
+
+    def keep_proven(
+        self, costs: FloatArray, proven: BoolArray, candidate: Callable[[int, bool], Candidate]
+    ) -> None:
+        """Keep the cheapest proven individual; before there is one, the cheapest, at cost inf.
+
+        Args:
+            costs: (individuals,).
+            proven: (individuals,) whether each is; what costs more than a proven one may be open.
+            candidate: Makes a candidate of an individual, solved or not.
+        """
+        k, cheapest = int(np.argmin(np.where(proven, costs, np.inf))), int(np.argmin(costs))
+        if proven[k] and costs[k] < self.cost:
+            self.keep(float(costs[k]), candidate(k, True))
+        elif not self.best.solved and (costs[cheapest] < self._tried or self.index < 0):
+            self._tried = float(costs[cheapest])
+            self.keep(np.inf, candidate(cheapest, False))
 
     def record_judged(
         self, planner: Planner, problem: Any, population: FloatArray, judgement: Judgement
@@ -325,9 +329,15 @@ class Keeper:
         statistics, feasible = cost_statistics(judgement.cost), judgement.feasible
         k = statistics.best
         lowest = float(judgement.cost[k])
-        if self.improves(lowest):
+
+        def candidate(k: int, solved: bool) -> Candidate:
             solution = planner.solution(problem, population, k)
-            self.keep(lowest, Candidate(solution, judgement.named_terms(k), bool(feasible[k])))
+            return Candidate(solution, judgement.named_terms(k), solved)
+
+        if getattr(planner, "answers_are_proven", False):
+            self.keep_proven(judgement.cost, feasible, candidate)
+        elif self.improves(lowest):
+            self.keep(lowest, candidate(k, bool(feasible[k])))
         return self.record(
             statistics,
             judgement.cost,

@@ -28,6 +28,7 @@ from evoexp.planners.arm_tasks import UNLIMITED, arm_problem, cover_notes, cover
 from evoexp.planners.departures import joint_names, of_limits, of_place
 from evoexp.planners.planner import COPIES, Candidate, Keeper, PlannerDefaults, num_values
 from evoexp.planners.via_point_ga.covered_strings import CoveredStrings
+from evoexp.planners.via_point_ga.proofs import Prover
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
 from evoexp.planners.via_point_ga.strings import (
     JudgedGeneration,
@@ -79,32 +80,77 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
         num_feasible = int(np.count_nonzero(judged.feasible))
         first = JudgedGeneration(judged, cost_statistics(costs), num_feasible)
         later = strings.generations(rng, population, costs, hits)
+        prover = Prover(self, problem) if self.answers_are_proven else None
         for judged, statistics, num_feasible in chain(
             [first], islice(later, self.ga.num_generations)
         ):
-            k = statistics.best
-            lowest = float(costs[k])
-            if keeper.improves(lowest):
-                solution, terms = self.solution(problem, population, k), judged.named_terms(k)
-                keeper.keep(lowest, Candidate(solution, terms, terms["collisions"] == 0.0))
+            if prover is None:
+                k = statistics.best
+                lowest = float(costs[k])
+                if keeper.improves(lowest):
+                    solution, terms = self.solution(problem, population, k), judged.named_terms(k)
+                    keeper.keep(lowest, Candidate(solution, terms, terms["collisions"] == 0.0))
+            else:
+                self._keep_proven(problem, prover, keeper, (population, costs, hits), judged)
+                statistics = cost_statistics(costs)
+                num_feasible = int(np.count_nonzero(hits == 0.0))
             yield keeper.record(
                 statistics,
                 costs,
                 population,
-                lowest=lowest,
+                lowest=float(costs[statistics.best]),
                 num_feasible=num_feasible,
                 evaluations=len(judged.cost),
                 collision_queries=judged.collision_queries,
             )
+
+    def _keep_proven(
+        self,
+        problem: Problem,
+        prover: Prover,
+        keeper: Keeper,
+        individuals: tuple[FloatArray, FloatArray, FloatArray],
+        judged: Judgement,
+    ) -> None:
+        """Keep a proven string that costs less than the one kept, where a generation has one.
+
+        Args:
+            problem: The problem.
+            prover: Of the run.
+            keeper: Of the run.
+            individuals: Strings (nq, N + 1, individuals), costs and colliding instants of the
+                population, its new ones first; the prover changes what it refutes.
+            judged: Of the new ones.
+        """
+        strings, costs, _ = individuals
+        k, proven = prover.settle(*individuals, keeper.cost), np.zeros(len(costs), bool)
+        if k is not None:
+            proven[k] = True
+
+        def candidate(k: int, solved: bool) -> Candidate:
+            terms = judged.named_terms(k) | {"certificates": float(prover.num_certificates)}
+            return Candidate(self.solution(problem, strings, k), terms, solved)
+
+        keeper.keep_proven(costs, proven, candidate)
+
+    @property
+    def answers_are_proven(self) -> bool:
+        """Whether what the search accepts is proven by the exact certifier."""
+        return self.acceptance != "model"
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
         """Return new trajectories as in the initial population, (nq, N + 1, count)."""
         return self._strings(problem).drawn(rng, count)[:, :, :count]
 
     def cost(self, problem: Problem, population: FloatArray) -> Judgement:
-        """Judge a population (nq, N + 1, individuals)."""
+        """Judge a population (nq, N + 1, individuals); if so asked, its cheapest ones by proof."""
         strings = self._strings(problem)
-        return strings.judge(strings.padded(population), population.shape[2])
+        padded = strings.padded(population)
+        judged = strings.judge(padded, population.shape[2])
+        if self.answers_are_proven:
+            hits = judged.terms.collisions[: population.shape[2]]
+            Prover(self, problem).settle(padded, judged.cost, hits)
+        return judged
 
     def improve(
         self, problem: Problem, population: FloatArray, rng: np.random.Generator

@@ -34,6 +34,10 @@ class ViaPointSettings(Settings):
         crossover_reading: How the double cross-over of section 3.4b is read: `tails` exchanges what
             follows the site in every arm's path; `segment` exchanges what lies between the two
             sites of the whole string: the end of the first path and the beginning of the second.
+        acceptance: Which motions are an answer: those that the collision model accepts at the
+            instants it tests (`model`), those of them that the exact certifier proves free of
+            contact between all instants (`certified`), or also free by the task's margins
+            (`margin`). A string that is refuted counts as colliding at one instant more.
     """
 
     num_via_points: LayoutCount
@@ -49,6 +53,7 @@ class ViaPointSettings(Settings):
     objective: StringFitness
     collision: TouchingSpheres | CoveredBodies
     crossover_reading: Literal["tails", "segment"] = "tails"
+    acceptance: Literal["model", "certified", "margin"] = "model"
 
     @model_validator(mode="after")
     def _samples_halve(self) -> Self:

@@ -131,6 +131,35 @@ def test_paths_are_free_where_they_were_tested_and_become_shorter() -> None:
     assert judge_motion(planner, problem, motion).certified
 
 
+def test_restarts_keep_the_shortest_path_of_all() -> None:
+    words = "planner.num_shortcuts=5", "planner.max_iterations=400"
+    _, _, once = ran(condition(PLANAR, *words), 4)
+    _, _, thrice = ran(condition(PLANAR, *words, "planner.num_restarts=2"), 4)
+    costs = [record.best_cost for record in thrice]
+    assert all(later <= earlier for earlier, later in itertools.pairwise(costs))
+    assert costs[-1] == min(each for record in thrice for each in record.costs)
+    assert (
+        np.isinf([c for record in thrice for c in record.costs]).sum()
+        > np.isinf([c for record in once for c in record.costs]).sum()
+    )
+    assert thrice[-1].stop_reason == once[-1].stop_reason == "solution"
+    assert thrice[-1].terms["first_solution_queries"] == once[-1].terms["first_solution_queries"]
+
+
+def test_each_start_is_that_of_the_slow_version() -> None:
+    words = "planner.num_shortcuts=5", "planner.num_restarts=1", "ga.iterations_per_generation=1"
+    planner, problem, records = ran(condition(PLANAR, *words), 6)
+
+    def collides(q: Any) -> bool:
+        return bool(problem.collision.collides(q[:, None])[0])
+
+    rng = np.random.default_rng(6)
+    slow = [rrt_connect_python.run(planner, problem, collides, rng) for _ in range(2)]
+    lengths = [rrt_connect_python.length(each.path) for each in slow]
+    assert records[-1].best_cost == pytest.approx(min(lengths))
+    assert records[-1].collision_queries == sum(each.asked for each in slow)
+
+
 def test_the_last_record_has_the_iterations_that_were_made() -> None:
     chosen = condition(PLANAR, "planner.num_shortcuts=7", "ga.iterations_per_generation=10")
     _, _, records = ran(chosen, 2)

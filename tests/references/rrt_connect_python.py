@@ -121,10 +121,10 @@ def length(path: list[Any]) -> float:
     return sum(math.dist(a, b) for a, b in zip(path[:-1], path[1:], strict=True))
 
 
-def run(planner: Any, problem: Any, collides: Callable[[Any], bool], seed: int) -> Outcome:
+def run(planner: Any, problem: Any, collides: Callable[[Any], bool], seed: Any) -> Outcome:
     """Run a search as `RrtConnect` with the same settings and seed does."""
     own = Planner(collides, planner.range, planner.collision.collision_substeps)
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)  # a generator stays as it is
     low, high = planner.box(problem)
 
     def draw() -> Any:

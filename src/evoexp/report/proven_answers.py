@@ -54,7 +54,8 @@ class Answer(NamedTuple):
 def answers(condition: ConditionResults) -> pd.DataFrame:
     """Return the answers of all finished replicates, in order; columns of `Answer`.
 
-    Answers that are no motions, such as a posture that is held, have no row.
+    Solutions of infinite cost, and those that are no motions, such as a posture that is held, have
+    no row.
     """
     return answers_of([condition])[condition.label]
 
@@ -136,6 +137,8 @@ def _kept(condition: ConditionResults, log: LogContents, code: bytes) -> list[li
 def _judged(condition: ConditionResults, log: LogContents) -> Iterator[list[Any]]:
     planner, problem = condition.prepared
     for row in log.solutions:
+        if not np.isfinite(row.cost):  # infeasible, as the planner says itself
+            continue
         motion = planner.motion(problem, row.values)
         if motion is None or not (length := motion_length(motion)):
             continue

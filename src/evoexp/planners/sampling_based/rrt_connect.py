@@ -34,7 +34,7 @@ class RrtConnect(NodePaths, RrtSettings, Component):
     component: ClassVar[str] = "rrt_connect"
 
     def evolve(self, problem: ArmProblem, rng: np.random.Generator) -> Iterator[Generation]:
-        """Yield a record per batch of iterations, until the path is shortened or given up."""
+        """Yield a record per batch of iterations, until the last path is shortened or given up."""
         search, keeper = _Search(self, problem), Keeper()
         for index in range(self.num_generations + 1):
             costs, asked = np.full(self.num_evaluations(index), np.inf), search.edges.queries
@@ -44,7 +44,7 @@ class RrtConnect(NodePaths, RrtSettings, Component):
                 costs[count] = search.cost
                 count += 1
             costs = costs[:count]
-            keeper.keep(search.cost, search.candidate())
+            keeper.keep(search.best_cost, search.candidate())
             yield keeper.record(
                 cost_statistics(costs),
                 costs,
@@ -72,32 +72,34 @@ class RrtConnect(NodePaths, RrtSettings, Component):
     def memory(self, problem: ArmProblem) -> int:
         """Return the memory of both trees, of their copy as they grow, and of a record's copy."""
         most = (self.num_generations + 1) * self.ga.iterations_per_generation
-        nodes = NODES_PER_ITERATION * min(self.max_iterations, most)
+        nodes = NODES_PER_ITERATION * min(self.max_iterations, most)  # trees of one start
         low, high = self.box(problem)
         tested = distance(low, high) / self.resolution
         return int(8 * (len(problem.start) + 1) * (4 * nodes + 2 * tested))
 
     @property
     def _most_iterations(self) -> int:
-        """Iterations of a run that finds its path last of all, shortcuts included."""
-        return self.max_iterations + self.num_shortcuts
+        """Iterations of a run that finds its paths last of all, shortcuts included."""
+        return (1 + self.num_restarts) * (self.max_iterations + self.num_shortcuts)
 
 
 class _Search:
-    """The state of one run: the trees until they meet, then the path.
+    """The state of one run: the trees until they meet, then the path, and so at each start.
 
     Attributes:
         pair: The trees.
         edges: Tests edges and counts.
+        best_cost: Length of the shortest path so far [deg], inf without one.
     """
 
     def __init__(self, planner: RrtConnect, problem: ArmProblem) -> None:
-        self._planner, self._start = planner, problem.start
+        self._planner, self._ends = planner, (problem.start, problem.goal)
         self._low, self._high = planner.box(problem)
         self.edges = EdgeTest(problem.collision, planner.resolution)
-        self.pair = TreePair(problem.start, problem.goal, self.edges, planner.range)
+        self.pair = TreePair(*self._ends, self.edges, planner.range)
         self._path: ShortenedPath | None = None
         self._first = {"first_solution_queries": np.inf, "first_solution_length_deg": np.inf}
+        self._starts, self._iterations, self.best_cost = 1, 0, np.inf
         self._solution, self._shown = problem.start.copy(), problem.start
 
     @property
@@ -108,34 +110,48 @@ class _Search:
     @property
     def stop_reason(self) -> str:
         """Why the run ends now; empty while it goes on."""
-        if self._path is not None:
-            done = self._path.num_attempts >= self._planner.num_shortcuts
-            return "solution" if done else ""
-        given_up = self.pair.num_iterations >= self._planner.max_iterations
-        return "no solution" if given_up else ""
+        if not self._is_done() or self._starts <= self._planner.num_restarts:
+            return ""
+        return "solution" if np.isfinite(self.best_cost) else "no solution"
 
     def iterate(self, rng: np.random.Generator) -> None:
         """Grow the trees toward a random configuration, or try a shortcut of the path."""
+        if self._is_done():
+            self.pair = TreePair(*self._ends, self.edges, self._planner.range)
+            self._path, self._starts = None, self._starts + 1
         if self._path is not None:
             self._path.attempt(rng.random(2))
-            return
+        else:
+            self._grow(rng)
+        if self._path is not None and self._path.length < self.best_cost:
+            self.best_cost, self._shown = self._path.length, self._path.nodes
+            self._solution = self._shown.flatten()
+
+    def candidate(self) -> Candidate:
+        """Return the shortest path as it is recorded, the same array as long as it is the same."""
+        terms = {
+            "length_deg": self.best_cost,
+            "iterations": float(self._iterations),
+            "nodes": float(sum(tree.count for tree in self.pair.trees)),
+        }
+        return Candidate(self._solution, terms | self._first, bool(np.isfinite(self.best_cost)))
+
+    def _is_done(self) -> bool:
+        """Whether the present start has come to its end."""
+        if self._path is not None:
+            return self._path.num_attempts >= self._planner.num_shortcuts
+        return self.pair.num_iterations >= self._planner.max_iterations
+
+    def _grow(self, rng: np.random.Generator) -> None:
+        """Grow the trees; where they meet there is a path."""
         drawn = self._low + rng.random(len(self._low)) * (self._high - self._low)
+        self._iterations += 1
         nodes = self.pair.iterate(drawn)
-        if nodes is not None:
-            self._path = ShortenedPath(nodes, self.edges)
+        if nodes is None:
+            return
+        self._path = ShortenedPath(nodes, self.edges)
+        if not np.isfinite(self._first["first_solution_queries"]):
             self._first = {
                 "first_solution_queries": float(self.edges.queries),
                 "first_solution_length_deg": self._path.length,
             }
-
-    def candidate(self) -> Candidate:
-        """Return the path in hand as it is recorded; the same array as long as it is the same."""
-        if self._path is not None and self._path.nodes is not self._shown:
-            self._shown = self._path.nodes
-            self._solution = self._shown.flatten()
-        terms = {
-            "length_deg": self.cost,
-            "iterations": float(self.pair.num_iterations),
-            "nodes": float(sum(tree.count for tree in self.pair.trees)),
-        }
-        return Candidate(self._solution, terms | self._first, self._path is not None)

@@ -60,10 +60,13 @@ class RrtSettings(EdgeSettings):
     Attributes:
         max_iterations: Random configurations after which the search for a path is given up.
         ga: Iterations per record, and records.
+        num_restarts: How often both trees are grown anew once a path is shortened or given up; the
+            shortest path of all is the answer.
     """
 
     max_iterations: Count
     ga: TreeGrowth
+    num_restarts: NonNegativeCount = 0
 
 
 class QueryChunks(Component):

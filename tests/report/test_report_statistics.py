@@ -11,6 +11,8 @@ from evoexp.report.statistics import (
     EXACT_PAIRS,
     EXACT_VALUES,
     Interval,
+    _percentiles,
+    _weights,
     effect,
     effort_ratio,
     expected_effort,
@@ -141,6 +143,23 @@ def test_effect_has_the_bootstrap_interval_of_its_pairs() -> None:
     assert first.interval == pytest.approx(
         expected, abs=0.03
     )  # two bootstraps of 400 and 2000 resamples
+
+
+VALUES = st.sampled_from([-np.inf, -1.5, 0.0, 0.5, 0.5, 2.0, 7.0, np.inf, np.nan])
+
+
+@given(st.lists(st.tuples(VALUES, VALUES), min_size=1, max_size=30), st.integers(1, 12))
+def test_the_effect_is_that_of_all_pairs_counted_one_by_one(
+    pairs: list[tuple[float, float]], num_resamples: int
+) -> None:
+    x, y = np.array(pairs).T
+    wins = (x[:, None] > y) + 0.5 * (x[:, None] == y)
+    weights = _weights(len(x), num_resamples)
+    resampled = ((weights @ wins) * weights).sum(axis=1) / len(x) ** 2
+    found = effect(x, y, 0.9, num_resamples)
+    assert found.a12 == wins.sum() / wins.size
+    assert found.interval == _percentiles(resampled, 0.9)
+    assert vargha_delaney(x, y[: len(y) // 2 + 1]) == wins[:, : len(y) // 2 + 1].mean()
 
 
 def test_effect_of_separated_and_of_no_values() -> None:

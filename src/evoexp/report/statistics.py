@@ -170,8 +170,23 @@ def vargha_delaney(x: FloatArray, y: FloatArray) -> float:
     """Return A12 = P(x > y) + P(x = y) / 2 of values (n,) and (m,); NaN if either is empty."""
     if not len(x) or not len(y):
         return math.nan
-    greater, equal = x[:, None] > y, x[:, None] == y
-    return float((np.count_nonzero(greater) + 0.5 * np.count_nonzero(equal)) / greater.size)
+    below, up_to = _ranks(x, y)
+    return float(0.5 * (int(below.sum()) + int(up_to.sum())) / (len(x) * len(y)))
+
+
+def _ranks(x: FloatArray, y: FloatArray) -> tuple[np.ndarray, np.ndarray]:
+    """Return how many of y lie below each of x, and how many up to it; none of a NaN.
+
+    Args:
+        x: (n,).
+        y: (m,).
+
+    Returns:
+        (n,) and (n,).
+    """
+    ordered, known = np.sort(y), ~np.isnan(x)
+    below, up_to = (np.searchsorted(ordered, x, side) for side in ("left", "right"))
+    return np.where(known, below, 0), np.where(known, up_to, 0)
 
 
 def effect(x: FloatArray, y: FloatArray, confidence: float, num_resamples: int) -> Effect:
@@ -185,11 +200,15 @@ def effect(x: FloatArray, y: FloatArray, confidence: float, num_resamples: int) 
     """
     if not len(x):
         return Effect(math.nan, Interval(math.nan, math.nan))
-    wins = (x[:, None] > y) + 0.5 * (x[:, None] == y)  # (pairs, pairs)
+    (below, up_to), order = _ranks(x, y), np.argsort(y, kind="stable")
     weights = _weights(len(x), num_resamples)
-    # multiples of 1/2 are exact in any order
-    resampled = ((weights @ wins) * weights).sum(axis=1) / len(x) ** 2
-    return Effect(vargha_delaney(x, y), _percentiles(resampled, confidence))
+    resampled = np.empty(num_resamples)
+    passed = np.zeros(len(x) + 1)  # pairs of a resample whose y is among the k lowest
+    for k, own in enumerate(weights):
+        np.cumsum(own[order], out=passed[1:])
+        # multiples of 1/2 are exact in any order
+        resampled[k] = 0.5 * np.sum(own * (passed[below] + passed[up_to]))
+    return Effect(vargha_delaney(x, y), _percentiles(resampled / len(x) ** 2, confidence))
 
 
 def expected_effort(effort: FloatArray, solved: np.ndarray) -> float:

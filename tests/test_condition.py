@@ -55,6 +55,8 @@ WORDS = (  # that one setting takes
     ("revolute", "prismatic"),
     ("rad", "deg"),
     ("sine", "step"),
+    ("model", "certified", "margin"),
+    ("RRTConnect", "RRTstar", "InformedRRTstar", "BITstar"),
 )
 
 
@@ -226,6 +228,22 @@ def test_components_in_the_wrong_place_are_refused(config: dict[str, Any]) -> No
     assert refusal(config | {"planner": planner | {"ga": robot}}).startswith(
         "planner.ga: must be a GeneticSettings"
     )
+
+
+@pytest.mark.parametrize("value", [{}, [], None, 3])
+def test_a_component_without_a_name_is_refused(config: dict[str, Any], value: Any) -> None:
+    named = "must be a component, given by its _target_, was"
+    arms = [*config["robot"]["arms"][:-1], value]
+    changed = config | {"robot": config["robot"] | {"arms": arms}}
+    assert refusal(changed).startswith(f"robot.arms[{len(arms) - 1}]: {named}")
+    changed = config | {"planner": config["planner"] | {"ga": value}}
+    assert refusal(changed).startswith("planner.ga: ")
+
+
+def test_a_refusal_is_a_line_that_can_be_read(config: dict[str, Any]) -> None:
+    arms = [{"_target_": "planar_chain", "revision": 9}] * 5000
+    assert len(refusal(config | {"robot": config["robot"] | {"arms": arms}})) < 1100
+    assert len(refusal(config | {"robot": {"_target_": "x" * 5000}})) < 1500
 
 
 @pytest.mark.parametrize(

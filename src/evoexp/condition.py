@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, get_args, get_type_hints
 import numpy as np
 
 from evoexp.attachments import SHA256, attached, keep, with_files
-from evoexp.errors import EvoexpError, RevisionMismatch, SettingError, UnknownSetting
+from evoexp.errors import EvoexpError, RevisionMismatch, SettingError, UnknownSetting, brief
 from evoexp.registry import component_class
 from evoexp.validation import LARGEST, MOST_QUERIES, TARGET, Component, build
 
@@ -171,7 +171,7 @@ class Condition(NamedTuple):
             if stored != installed
         ]
         if stale:
-            raise RevisionMismatch("; ".join(stale))
+            raise RevisionMismatch(brief("; ".join(stale)))
         return cls.from_config(config)
 
     def to_json(self) -> bytes:

@@ -8,6 +8,7 @@ import difflib
 from collections.abc import Iterable
 
 _SHOWN = 200  # [-] characters of a value in a message
+_LONGEST = 1000  # [-] characters of any other text in it, such as a list of names
 
 
 class EvoexpError(Exception):
@@ -27,10 +28,15 @@ def printable(text: str) -> str:
     )
 
 
+def brief(text: str, most: int = _LONGEST) -> str:
+    """Return a text of at most so many characters, one of them an ellipsis where it was longer."""
+    return text if len(text) <= most else f"{text[: most - 1]}…"
+
+
 def nearest(name: str, known: Iterable[str]) -> str:
     """Return `; did you mean 'x'?` for the closest known name, an empty string if none is close."""
     matches = difflib.get_close_matches(name, list(known), n=1, cutoff=0.6)
-    return f"; did you mean '{matches[0]}'?" if matches else ""
+    return f"; did you mean '{brief(matches[0], _SHOWN)}'?" if matches else ""
 
 
 class SettingError(EvoexpError):
@@ -44,9 +50,7 @@ class SettingError(EvoexpError):
     """
 
     def __init__(self, field: str, must: str, was: object, hint: str = "") -> None:
-        shown = repr(was)
-        shown = shown if len(shown) <= _SHOWN else f"{shown[:_SHOWN]}…"
-        super().__init__(f"{field}: must be {must}, was {shown}{hint}")
+        super().__init__(f"{field}: must be {brief(must)}, was {brief(repr(was), _SHOWN)}{hint}")
         self.field = field
         self.must = must
         self.was = was

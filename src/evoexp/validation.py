@@ -9,7 +9,8 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Annotated, Any, ClassVar, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic_core import PydanticCustomError
 
 from evoexp.errors import SettingError, UnknownSetting, nearest
 
@@ -63,6 +64,15 @@ class Component(Settings):
 
     component: ClassVar[str]
     revision: ClassVar[int] = 1
+
+    @model_validator(mode="before")
+    @classmethod
+    def _names_its_component(cls, settings: Any) -> Any:
+        """Refuse settings without a name where only the base of several components is known."""
+        if not hasattr(cls, "component") and not isinstance(settings, cls):
+            must = "a component, given by its {target}"
+            raise PydanticCustomError("unnamed", must, {"target": TARGET})
+        return settings
 
     def canonical(self) -> dict[str, Any]:
         """Return the settings with the component's name and revision."""

@@ -47,7 +47,6 @@ class Reference(WrappedPlanner):
         planner: The planner whose problem, cost and solutions it shares.
     """
 
-    component: ClassVar[str] = "reference"
     reproducibility: ClassVar[Reproducibility] = "environment"
     is_reference: ClassVar[bool] = True
 

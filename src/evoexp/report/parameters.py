@@ -66,7 +66,8 @@ def parameters(results: Results, condition: ConditionResults) -> list[Parameter]
     root = option(config_directory() / "config.yaml")
     found.append(_parameter("seed", condition.condition.seed, root.get("seed"), OVERRIDE))
     if (most := condition.condition.max_collision_queries) is not None:
-        found.append(_parameter("budget.collision_queries", most, None, OVERRIDE))
+        own = _of_experiment(results).get(name := "budget.collision_queries")
+        found.append(_parameter(name, most, own, OVERRIDE))
     if not condition.is_reference:  # which has one replicate, however many are planned
         planned = Entry(planned_replicates(results), *root["num_replicates"][1:])
         found.append(_parameter("num_replicates", condition.planned, planned, OVERRIDE))
@@ -77,11 +78,16 @@ def parameters(results: Results, condition: ConditionResults) -> list[Parameter]
 
 def planned_replicates(results: Results) -> int:
     """Return the number of replicates that an experiment has without any cap or override."""
+    name = "num_replicates"
+    default = option(config_directory() / "config.yaml")[name]
+    return int(_of_experiment(results).get(name, default).value)
+
+
+def _of_experiment(results: Results) -> dict[str, Entry]:
+    """Return what the file of the experiment itself sets, by dotted key."""
     taken = {each.group: each for c in results.conditions for each in c.options}
     path = _file("experiment", results.experiment, taken)
-    own = yaml.safe_load(path.read_text()).get("num_replicates") if path else None
-    default = option(config_directory() / "config.yaml")["num_replicates"].value
-    return int(default if own is None else own)
+    return option(path) if path else {}
 
 
 def _file(group: str, name: str, taken: dict[str, Option]) -> Path | None:

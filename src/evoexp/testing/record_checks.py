@@ -57,9 +57,16 @@ def collision_queries_never_decrease(condition: Condition) -> None:
 
 
 def the_best_so_far_never_gets_worse(condition: Condition) -> None:
-    """The best cost is the least of all generations so far."""
-    generations = evolution(condition).generations
-    lowest = np.inf
+    """The best cost is the least of all generations so far, or the least that was proven."""
+    found = evolution(condition)
+    generations, lowest = found.generations, np.inf
+    if getattr(found.planner, "answers_are_proven", False):  # and cheaper ones may be refuted
+        costs = [generation.best_cost for generation in generations]
+        must = "best_cost must never get worse, and be no less than the least cost so far"
+        least = np.minimum.accumulate([each.best_cost_in_generation for each in generations])
+        never_worse = all(a >= b for a, b in itertools.pairwise(costs))
+        demand(never_worse and bool(np.all(costs >= least)), condition, must, costs)
+        return
     for generation in generations:
         lowest = min(lowest, generation.best_cost_in_generation)
         must = f"best_cost must be the least cost so far ({lowest!r} in generation "

@@ -25,8 +25,6 @@ from evoexp.validation import Component, NonNegative, Positive
 class CollisionModel(Component):
     """Base of the collision models that cover bodies: sphere sets and capsules."""
 
-    component: ClassVar[str] = "collision_model"
-
     @property
     def asked(self) -> float:
         """How far covers are asked to reach beyond bodies at most [length unit]; inf: no matter."""

@@ -18,8 +18,6 @@ class SelectiveSettings(GeneticSettings):
         rank_pressure: Offspring expected of the best one, in linear ranking [-].
     """
 
-    component: ClassVar[str] = "selective"
-
     selection: Literal["tournament", "roulette", "rank"]
     tournament_size: Count
     rank_pressure: Annotated[float, Field(ge=1.0, le=2.0)]

@@ -237,7 +237,7 @@ def test_a_component_without_a_name_is_refused(config: dict[str, Any], value: An
     changed = config | {"robot": config["robot"] | {"arms": arms}}
     assert refusal(changed).startswith(f"robot.arms[{len(arms) - 1}]: {named}")
     changed = config | {"planner": config["planner"] | {"ga": value}}
-    assert refusal(changed).startswith("planner.ga: ")
+    assert refusal(changed).startswith("planner.ga")  # or the first setting that is missing
 
 
 def test_a_refusal_is_a_line_that_can_be_read(config: dict[str, Any]) -> None:

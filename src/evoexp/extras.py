@@ -2,7 +2,7 @@
 
 import importlib.util
 
-EXTRAS = {"ompl": ("ompl", "baselines")}
+EXTRAS = {"nsga2": ("pymoo", "baselines"), "ompl": ("ompl", "baselines")}
 """Component → the package that it needs, and the extra of evoexp that brings it."""
 
 

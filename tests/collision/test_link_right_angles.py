@@ -12,7 +12,7 @@ import pytest
 from evoexp.collision.models.link_crossings import Arm, count_crossings
 from evoexp.configuration import compose
 from evoexp.numeric.elementary import DEGREE
-from evoexp.planners.planner import judge_motion
+from evoexp.planners.proofs import judge_motion
 from references.link_crossings_numpy import segments_touch
 
 QUARTERS = (0, 1, 2, 3)

@@ -12,7 +12,7 @@ import pytest
 from confinement import confined, no_longer
 from evoexp.commands.given_motion import flatten, read_motion
 from evoexp.errors import EvoexpError
-from evoexp.planners.planner import judge_motion
+from evoexp.planners.proofs import judge_motion
 from matrix import counts, matrices_are_asked_for
 from shipped_conditions import Kind, of_kind
 

@@ -11,7 +11,7 @@ from evoexp.papers.lavoie import assumptions_page, measures
 from evoexp.papers.lavoie.figures import attempts, error_distribution, reaching_motions
 from evoexp.papers.lavoie.figures.reaching_motions import ShownMotion
 from evoexp.paths.motion import Motion
-from evoexp.planners.planner import judge_motion
+from evoexp.planners.proofs import judge_motion
 from evoexp.report import body_contacts, motion_geometry, run_measures, style
 from evoexp.report.figures import shares
 from evoexp.report.pages import page_of

@@ -88,7 +88,7 @@ def test_arms_are_those_of_the_collision_model(one: Prepared) -> None:
 
 
 def test_a_contact_lies_on_both_bodies() -> None:
-    from evoexp.planners.planner import judge_motion
+    from evoexp.planners.proofs import judge_motion
 
     one = prepared("linear")
     line = link_motions.straight(one)

@@ -11,7 +11,7 @@ from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import SettingError
-from evoexp.planners.planner import judge_motion
+from evoexp.planners.proofs import judge_motion
 from evoexp.planners.via_point_ga.proofs import Prover
 from evoexp.store.log_reader import read_log
 

@@ -9,8 +9,9 @@ import pytest
 from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.papers.curkovic.measures import lower_bound
-from evoexp.planners.coevolution.planner import Coevolution, Evaluated, Problem
-from evoexp.planners.planner import judge_motion
+from evoexp.planners.coevolution.planner import Coevolution, Evaluated
+from evoexp.planners.coevolution.problem import Problem
+from evoexp.planners.proofs import judge_motion
 
 SMALL = ("ga.population_size=12", "ga.num_generations=15", "ga.hall_depth=0.25")
 NO_HALL = ("ga=curkovic_1", "ga.population_size=12", "ga.num_generations=15")

@@ -14,7 +14,7 @@ from evoexp.objectives.path_cost import PathCost
 from evoexp.planners.baselines.random_search import RandomSearch
 from evoexp.planners.grid_path_ga import path_operators
 from evoexp.planners.grid_path_ga import planner as grid_planner
-from evoexp.planners.planner import judge_motion
+from evoexp.planners.proofs import judge_motion
 from planners.grid_samples import FIELDS, faults, planner, robot, scenario, solvable
 
 SEEDS = st.integers(0, 2**32)

@@ -13,7 +13,7 @@ from evoexp.cli import main
 from evoexp.condition import Condition
 from evoexp.configuration.compose import expand
 from evoexp.errors import SettingError
-from evoexp.planners.planner import judge_motion
+from evoexp.planners.proofs import judge_motion
 
 pytest.importorskip("ompl", reason="an extra")
 OMPL = ("planner=ompl", "ga=ompl", "ga.num_generations=20")

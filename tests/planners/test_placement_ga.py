@@ -8,7 +8,7 @@ from evoexp.configuration import compose
 from evoexp.errors import EvoexpError
 from evoexp.planners.placement_ga import planner as placement_planner
 from evoexp.planners.placement_ga.planner import Problem
-from evoexp.planners.planner import judge_motion
+from evoexp.planners.proofs import judge_motion
 
 BASE = ("experiment=chen_placement",)
 

@@ -13,8 +13,8 @@ from evoexp.collision.certifier.certificate import combined, judged_part
 from evoexp.commands import evaluate
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.posture_cost import UPRIGHT
-from evoexp.planners.planner import judge_motion
 from evoexp.planners.posture_es.planner import dense
+from evoexp.planners.proofs import judge_motion
 from references import posture_es_python
 
 FREE = ("corsepius_ball", "collision=corsepius_capsules")

@@ -1,5 +1,6 @@
 """CMA-ES and noisy trajectories on a planner's coding: each beside an obvious version of itself."""
 
+import importlib.util
 from typing import Any
 
 import cmaes
@@ -12,7 +13,12 @@ from evoexp.errors import SettingError
 from evoexp.numeric.elementary import standard_normal
 from evoexp.planners.baselines.real_vectors import correlated, real_vectors, transposed_root
 
-CONTROLS = ("cma_es", "stomp")
+HAS_PYMOO = importlib.util.find_spec("pymoo") is not None
+CONTROLS = (
+    "cma_es",
+    "stomp",
+    pytest.param("nsga2", marks=pytest.mark.skipif(not HAS_PYMOO, reason="an extra")),
+)
 
 
 def control(name: str, *words: str, experiment: str = "rana_planar") -> Condition:
@@ -91,6 +97,50 @@ def test_noisy_trajectories_move_by_their_weighted_mean() -> None:
     assert record.index == 15
 
 
+@pytest.mark.skipif(not HAS_PYMOO, reason="an extra")
+def test_nsga2_is_the_package_told_the_terms_of_the_planner() -> None:
+    from pymoo.algorithms.moo.nsga2 import NSGA2
+    from pymoo.core.problem import Problem
+
+    chosen = control("nsga2", "ga.num_generations=8", "control.num_drawn=300")
+    planner, problem = chosen.prepare()
+    rng = np.random.default_rng(6)
+    drawn = planner.sample(problem, rng, 300)
+    inner = drawn[:, 1:-1].reshape(76, 300)
+    box = Problem(n_var=76, n_obj=3, xl=inner.min(axis=1), xu=inner.max(axis=1))
+    plain = NSGA2(pop_size=48, sampling=inner.T[:48], eliminate_duplicates=False)
+    plain.setup(box, termination=("n_gen", 99), seed=int(rng.integers(2**32)), verbose=False)
+    cheapest = np.inf
+    for record in evolved(chosen, 6):
+        asked = plain.ask()
+        strings = drawn[:, :, :48].copy()
+        strings[:, 1:-1] = asked.get("X").T.reshape(4, 19, 48)
+        judged = planner.cost(problem, strings)
+        terms = [judged.named_terms(k) for k in range(48)]
+        values = [
+            [
+                t["length_arm_1_deg"] + t["length_arm_2_deg"],
+                t["unevenness_arm_1_deg"] + t["unevenness_arm_2_deg"],
+                t["collisions"],
+            ]
+            for t in terms
+        ]
+        asked.set("F", np.array(values))
+        plain.tell(infills=asked)
+        assert record.costs == pytest.approx(judged.cost)
+        cheapest = min(cheapest, judged.cost.min())
+        assert record.best_cost == cheapest
+    assert record.index == 8
+
+
+def test_objectives_are_names_of_terms() -> None:
+    must = r"control\.objectives\[1\]: must be the begin of a term .*collisions.*, was 'colisions'"
+    with pytest.raises(SettingError, match=must):
+        control("nsga2", "control.objectives=[length, colisions]").prepare()
+    with pytest.raises(SettingError, match=r"control\.objectives: must be a list of at least 2"):
+        control("nsga2", "control.objectives=[length]").prepare()
+
+
 def test_roots_and_correlated_noise_are_those_of_linear_algebra() -> None:
     rng = np.random.default_rng(4)
     tall = rng.normal(size=(60, 30))
@@ -125,8 +175,8 @@ def test_runs_depend_on_their_seed_alone_and_costs_fall(name: str) -> None:
     one, two, other = evolved(chosen, 0), evolved(chosen, 0), evolved(chosen, 1)
     assert [each.best_cost for each in one] == [each.best_cost for each in two]
     assert one[-1].best_cost != other[-1].best_cost
-    assert one[-1].best_cost < 0.7 * one[0].best_cost
-    assert chosen.reproducibility == {"cma_es": "environment", "stomp": "bits"}[name]
+    assert one[-1].best_cost < 0.8 * one[0].best_cost
+    assert chosen.reproducibility == ("bits" if name == "stomp" else "environment")
 
 
 @pytest.mark.parametrize("name", CONTROLS)

@@ -10,7 +10,7 @@ import pytest
 
 from evoexp.configuration import compose
 from evoexp.errors import SettingError
-from evoexp.planners.planner import judge_motion
+from evoexp.planners.proofs import judge_motion
 from evoexp.planners.redundant_ga.planner import Problem, RedundantGa
 from evoexp.records import FloatArray
 

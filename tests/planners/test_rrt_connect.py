@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from evoexp.condition import Condition
 from evoexp.configuration.compose import expand
 from evoexp.errors import SettingError
-from evoexp.planners.planner import judge_motion
+from evoexp.planners.proofs import judge_motion
 from evoexp.planners.sampling_based.kernels import (
     distance,
     lengths_along,

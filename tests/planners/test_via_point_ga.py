@@ -9,7 +9,7 @@ import pytest
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import SettingError
-from evoexp.planners.planner import judge_motion
+from evoexp.planners.proofs import judge_motion
 from evoexp.planners.via_point_ga.planner import Problem, ViaPointGa
 from evoexp.robots.arms import Arms
 from evoexp.robots.serial_chain import SerialChain, SerialJoint

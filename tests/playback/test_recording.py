@@ -5,7 +5,7 @@ import pytest
 
 from evoexp.collision.scene import Part, geometry_scene
 from evoexp.paths.motion import Motion, clamped_cubic
-from evoexp.planners.planner import judge_motion
+from evoexp.planners.proofs import judge_motion
 from evoexp.playback.body_poses import MAX_TICKS, ticks
 from evoexp.playback.contacts import at_instant, clearance, remainder
 from evoexp.playback.recording import Recording

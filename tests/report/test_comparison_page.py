@@ -9,7 +9,7 @@ from scipy.interpolate import CubicSpline
 
 from evoexp.errors import NothingStored
 from evoexp.paths.motion import Motion, spline_motion
-from evoexp.planners.planner import judge_motion
+from evoexp.planners.proofs import judge_motion
 from evoexp.report import proven_answers
 from evoexp.report.figures.effort_curves import draw_shares, length_table, share_table
 from evoexp.report.pages import comparison

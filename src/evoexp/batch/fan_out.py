@@ -156,7 +156,7 @@ def compile_all(config_jsons: Iterable[bytes]) -> None:
         if is_compiled(kind, modules):
             continue
         from evoexp.paths.motion import Motion  # and numba
-        from evoexp.planners.planner import judge_motion
+        from evoexp.planners.proofs import judge_motion
 
         # A planner that fails does so again in its replicate, and is noted there.
         with contextlib.suppress(Exception):

@@ -7,7 +7,7 @@ from evoexp.batch.compile_clock import now
 from evoexp.collision.box_support import EXACT
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
-from evoexp.planners.planner import judge_motion
+from evoexp.planners.proofs import judge_motion
 from evoexp.records import Generation, ReplicateSummary
 from evoexp.registry import guests
 from evoexp.store.log import Finished, Log

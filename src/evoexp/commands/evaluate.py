@@ -10,7 +10,7 @@ from evoexp.commands.arguments import add_experiment_arguments
 from evoexp.commands.console import add_columns, new_table, plain_console, print_json
 from evoexp.commands.given_motion import fitting_motions
 from evoexp.planners.answers import Listing
-from evoexp.planners.planner import judge_motion
+from evoexp.planners.proofs import judge_motion
 
 DEPARTURES = "departures"  # of a row: the ways in which the motion is none of the task
 HEAD = ("label", "condition", "length_unit")  # of a row; its other entries are terms and verdict

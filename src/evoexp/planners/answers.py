@@ -37,6 +37,15 @@ class Listing(NamedTuple):
     rows: list[list[Any]]
 
 
+def num_body_tests(problem: Any) -> float:
+    """Return how many pairs of shapes one collision query of a planner stands for; NaN: not known.
+
+    Args:
+        problem: A prepared one; its collision model counts them.
+    """
+    return float(getattr(getattr(problem, "collision", None), "num_tests", math.nan))
+
+
 def num_values(shape: Shape) -> int:
     """Return how many numbers a solution of a documented shape has; of any number of parts, many.
 

@@ -11,6 +11,7 @@ import pinocchio as pin
 
 from evoexp.collision.box_support import coal
 from evoexp.collision.models.covered_bodies import CoveredBodies, CoveredCollision
+from evoexp.collision.models.link_collision import two_link_arms
 from evoexp.collision.models.touching_spheres import Clearance, SphereCollision, TouchingSpheres
 from evoexp.collision.scene import Scene, obstacle_pairs, scene
 from evoexp.errors import SettingError
@@ -28,11 +29,14 @@ from evoexp.records import FloatArray, IntArray
 from evoexp.robots.assembly import Assembly, Robot
 from evoexp.robots.mesh_pieces import convex_shape
 from evoexp.scenarios.arm_motion import ArmMotion
+from evoexp.scenarios.link_motion import LinkMotion
 from evoexp.scenarios.moveit import MoveitTask
 
 ROUNDING = 1e-9  # [rad, m] by which an end may lie beyond a limit
 UNLIMITED = 1e6  # [rad] a joint without limits has larger ones in the model
 FIELDS = "scenario.q_start", "scenario.q_goal"
+ArmTask = ArmMotion | LinkMotion | MoveitTask
+"""Scenarios in which robots go from one configuration to another."""
 
 
 class ArmProblem(NamedTuple):
@@ -77,7 +81,7 @@ class ArmProblem(NamedTuple):
 
 
 def arm_problem(
-    robot: Robot, scenario: ArmMotion | MoveitTask, model: TouchingSpheres | CoveredBodies
+    robot: Robot, scenario: ArmTask, model: TouchingSpheres | CoveredBodies
 ) -> ArmProblem:
     """Build the robot, and check that start and goal fit it and are free of collision.
 
@@ -87,7 +91,7 @@ def arm_problem(
     assembly = robot.build()
     if isinstance(scenario, MoveitTask):
         assembly = with_allowed_pairs(assembly, scenario)
-    task = arm_motion(assembly, scenario)
+    task = _arm_motion(assembly, scenario)
     start, goal = ends_of(assembly, task)
     collision: SphereCollision | CoveredCollision
     if isinstance(model, CoveredBodies):
@@ -103,6 +107,29 @@ def arm_problem(
     own, margin = task.obstacle_margin, task.security_margin
     both = margin, margin if own is None else own
     return ArmProblem(assembly, collision, start, goal, bodies, *both, task.length_unit)
+
+
+def _arm_motion(assembly: Assembly, task: ArmTask) -> ArmMotion:
+    """Return a task as a motion between configurations, all joints relative to the link before.
+
+    Raises:
+        SettingError: If its goal is a pose, it is silent about a joint, or robots stand still.
+    """
+    if not isinstance(task, LinkMotion):
+        return arm_motion(assembly, task)
+    if task.stationary:
+        must = "empty: this planner moves all robots"
+        raise SettingError("scenario.stationary", must, list(task.stationary))
+    arms = two_link_arms(assembly)
+    ends = task.ends(np.array([arm.base for arm in arms]), np.array([arm.lengths for arm in arms]))
+    start, goal = (tuple((one, two - one) for one, two in end.tolist()) for end in ends)
+    return ArmMotion(
+        q_start=start,
+        q_goal=goal,
+        security_margin=task.security_margin,
+        length_unit=task.length_unit,
+        obstacles=task.obstacles,
+    )
 
 
 def margins(
@@ -174,7 +201,7 @@ def check_limits(assembly: Assembly, ends: tuple[FloatArray, FloatArray]) -> Non
             raise SettingError(field, must, float(DEGREE * q[k] / unit))
 
 
-def covered_scene(assembly: Assembly, task: ArmMotion, given: ArmMotion | MoveitTask) -> Scene:
+def covered_scene(assembly: Assembly, task: ArmMotion, given: ArmTask) -> Scene:
     """Return the exact bodies of a robot among the obstacles of a task, pairs of one arm included.
 
     Args:
@@ -200,7 +227,7 @@ def covered_collision(
     bodies: Scene,
     assembly: Assembly,
     task: ArmMotion,
-    given: ArmMotion | MoveitTask,
+    given: ArmTask,
     ends: tuple[FloatArray, FloatArray],
 ) -> CoveredCollision:
     """Return the covered bodies of a robot, after a look at the exact ones at start and goal.

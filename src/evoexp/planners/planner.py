@@ -11,7 +11,6 @@ from typing import Any, ClassVar, Literal, NamedTuple, Protocol, runtime_checkab
 import numpy as np
 from numpy.typing import NDArray
 
-from evoexp.collision.certifier.certificate import Certificate, certificate
 from evoexp.collision.scene import Part, Scene
 from evoexp.evolution.cost_statistics import CostStatistics, cost_statistics
 from evoexp.paths.motion import Motion
@@ -204,6 +203,13 @@ class PlannerDefaults:
     is_reference: ClassVar[bool] = False
     is_real_coded: ClassVar[bool] = False
     """Whether `cost` takes any real numbers where individuals of `sample` differ."""
+    goal_is_region: ClassVar[bool] = False
+    """Whether a solution that is not `solved` may miss the goal, which `departures` do not tell."""
+
+    @property
+    def answers_are_proven(self) -> bool:
+        """Whether what the search accepts is proven: by its field `acceptance`, if it has one."""
+        return getattr(self, "acceptance", "model") != "model"
 
     @property
     def num_generations(self: _Budgeted) -> int:
@@ -249,13 +255,6 @@ class PlannerDefaults:
     def covers(self, problem: Any) -> Sequence[CoverShape]:
         """Return none: the search tests no spheres and capsules."""
         return ()
-
-
-def judge_motion(planner: Planner, problem: Any, motion: Motion | None) -> Certificate:
-    """Judge a planner's motion by the exact bodies; without a motion the certificate is empty."""
-    if motion is None:
-        return Certificate()
-    return certificate(planner.parts(problem, motion), motion, planner.security_margin(problem))
 
 
 class Candidate(NamedTuple):

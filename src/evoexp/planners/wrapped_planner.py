@@ -35,6 +35,16 @@ class WrappedPlanner(PlannerDefaults, Component):
         raise NotImplementedError
 
     @property
+    def answers_are_proven(self) -> bool:
+        """Whether the wrapped planner's answers are proven."""
+        return getattr(self.planner, "answers_are_proven", False)
+
+    @property
+    def goal_is_region(self) -> bool:  # type: ignore[override]  # not of the class: of the planner
+        """Whether the wrapped planner's goal is a region."""
+        return getattr(self.planner, "goal_is_region", False)
+
+    @property
     def num_generations(self) -> int:
         """Generations of the wrapped planner."""
         return self.planner.num_generations

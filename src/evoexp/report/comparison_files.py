@@ -19,6 +19,9 @@ COLUMNS = (
     "length",
     "length_lower",
     "length_upper",
+    "body_queries",
+    "evaluations",
+    "cpu_s",
 )
 _SIGNS = {
     "\\": r"\textbackslash{}",
@@ -43,13 +46,16 @@ def as_csv(rows: Sequence[Rated]) -> bytes:
     """Return the table as CSV, numbers with all digits, `inf` where there is no proven answer.
 
     Columns: planner, problem, n (runs), proven (runs with a proven answer), effort (expected
-    running time [collision queries]) with its interval, length (median [rad, m]) with quartiles.
+    running time [collision queries]) with its interval, length (median [rad, m]) with quartiles;
+    body_queries (the effort in pairs of shapes), evaluations and cpu_s (of all runs, per run with a
+    proven answer), empty where they are not known.
     """
     file = io.StringIO(newline="")
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(COLUMNS)
     for row in rows:
-        numbers = (row.queries, *row.interval, *row.lengths[:3])
+        others = row.queries * row.body_tests, row.evaluations, row.cpu_s
+        numbers = (row.queries, *row.interval, *row.lengths[:3], *others)
         cells = ("" if math.isnan(value) else repr(float(value)) for value in numbers)
         writer.writerow((row.planner, row.problem, row.runs, row.proven, *cells))
     return file.getvalue().encode()

@@ -16,7 +16,7 @@ import pandas as pd
 
 from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
 from evoexp.paths.motion import Motion
-from evoexp.planners.planner import judge_motion
+from evoexp.planners.proofs import judge_motion
 from evoexp.records import FloatArray
 from evoexp.report.drawing_processes import on_all_cores
 from evoexp.report.results import ConditionResults
@@ -143,8 +143,12 @@ def _judged(condition: ConditionResults, log: LogContents) -> Iterator[list[Any]
         if motion is None or not (length := motion_length(motion)):
             continue
         at = log.generations[row.generation]
-        certified = judge_motion(planner, problem, motion).certified is True
-        proven = certified and not planner.departures(problem, row.values)
+        reached = at.solved or not getattr(planner, "goal_is_region", False)
+        proven = (
+            bool(reached)
+            and judge_motion(planner, problem, motion).certified is True
+            and not planner.departures(problem, row.values)
+        )
         ends = motion.q[-1] - motion.q[0]
         straight = float(np.sqrt((ends * ends).sum()))
         counts = row.generation, at.evaluations, at.collision_queries

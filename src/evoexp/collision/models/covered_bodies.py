@@ -75,6 +75,13 @@ class CoveredCollision(NamedTuple):
     collision: PrimitiveCollision
     obstacles: ObstacleTable
 
+    @property
+    def num_tests(self) -> int:
+        """Pairs of shapes that one configuration has: of two bodies, and with obstacles."""
+        own = dict(zip(*np.unique(self.bodies.shapes.labels, return_counts=True), strict=True))
+        between = sum(own[a] * own[b] for a, b in self.bodies.pairs)
+        return int(between + sum(own.values()) * len(self.obstacles.kind))
+
     def clearance(self, q: FloatArray) -> Clearance:
         """Return the clearances of a batch of configurations (nq, configurations) [deg]."""
         found = self.collision.clearance(DEGREE * q)

@@ -51,7 +51,7 @@ class LinkCrossings(Component):
             SettingError: If a robot is no planar arm of two links, or an obstacle no figure of the
                 plane.
         """
-        arms = tuple(_arm(assembly, first) for first, _ in _pairs_of_joints(assembly))
+        arms = two_link_arms(assembly)
         try:
             flat = planar_obstacles(obstacle_table(obstacles))
         except ValueError as error:
@@ -77,6 +77,11 @@ class LinkCollision(NamedTuple):
     substeps: int
     half_width: float
     tcp_radius: float
+
+    @property
+    def num_tests(self) -> int:
+        """Pairs of shapes that one query has, a configuration of two robots: links, and tools."""
+        return (2 + (self.tcp_radius > 0.0)) ** 2
 
     @property
     def enveloped(self) -> bool:
@@ -133,6 +138,15 @@ class LinkCollision(NamedTuple):
 
     def _enveloped(self, robot: int) -> EnvelopedArm:
         return EnvelopedArm(self.arms[robot], self.half_width, self.tcp_radius)
+
+
+def two_link_arms(assembly: Assembly) -> tuple[Arm, ...]:
+    """Return base and link lengths of every robot.
+
+    Raises:
+        SettingError: If a robot is no planar arm of two links.
+    """
+    return tuple(_arm(assembly, first) for first, _ in _pairs_of_joints(assembly))
 
 
 def _pairs_of_joints(assembly: Assembly) -> list[tuple[int, int]]:

@@ -92,6 +92,11 @@ class EllipseCollision(NamedTuple):
     obstacles: ObstacleTable
 
     @property
+    def num_tests(self) -> int:
+        """Pairs of shapes that one configuration has: links and ellipses."""
+        return len(self.arm.lengths) * len(self.ellipses.maps)
+
+    @property
     def path(self) -> TestedPath:
         """The positions tested: the end, halves, quarters, …; all again if chords are swept."""
         first = _spread(self.num_positions)

@@ -4,6 +4,7 @@ Any number of arms, in the plane or in space, among static obstacles; the kernel
 `sphere_kernels`.
 """
 
+import itertools
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -201,6 +202,13 @@ class SphereCollision(NamedTuple):
     obstacles: ObstacleTable
     tables: tuple[Any, ...]
     geometry: Any
+
+    @property
+    def num_tests(self) -> int:
+        """Pairs of shapes that one configuration has: spheres of two arms, and with obstacles."""
+        own = [int(stop - first) for first, stop in self.arm_spheres]
+        between = sum(a * b for a, b in itertools.combinations(own, 2))
+        return between + sum(own) * len(self.obstacles.kind)
 
     def clearance(self, q: FloatArray, limit: float = np.inf) -> Clearance:
         """Return the clearances of a batch of configurations.

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from evoexp.paths.motion import Motion
-from evoexp.planners.planner import judge_motion
+from evoexp.planners.proofs import judge_motion
 from evoexp.planners.redundant_ga.planner import RedundantGa
 from evoexp.records import FloatArray
 from evoexp.report.kit import (

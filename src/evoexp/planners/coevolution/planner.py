@@ -10,15 +10,15 @@ configuration 2, …. A solution is flat: robot by robot, configuration by confi
 (robots × (K + 2) × 2) [deg], start and goal included.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import combinations
-from typing import ClassVar, Literal, NamedTuple, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
 
-from evoexp.collision.models.link_collision import LinkCollision, LinkCrossings
-from evoexp.collision.scene import Scene, scene
+from evoexp.collision.models.link_collision import LinkCrossings
+from evoexp.collision.scene import scene
 from evoexp.errors import SettingError
 from evoexp.evolution.best_team import BestTeam, best_team
 from evoexp.evolution.cost_statistics import cost_statistics
@@ -30,41 +30,20 @@ from evoexp.objectives.motion_criteria import MotionCriteria
 from evoexp.paths.motion import Motion, clamped_cubic, joint_ranges, top_speeds
 from evoexp.planners.coevolution.chromosome_length import SpeedLimit, length_notes
 from evoexp.planners.coevolution.kernels import Breeding, breed, measure, renew
+from evoexp.planners.coevolution.problem import Problem, check_ends
+from evoexp.planners.coevolution.proven_teams import ProvenTeams
 from evoexp.planners.coevolution.settings import CoevolutionSettings
 from evoexp.planners.coevolution.teams import Evaluated, Judgement
 from evoexp.planners.departures import of_limits, of_place
 from evoexp.planners.planner import COPIES, Candidate, Keeper, PlannerDefaults, num_values
-from evoexp.records import BoolArray, FloatArray, Generation
-from evoexp.robots.assembly import Assembly, Robot
+from evoexp.planners.proofs import Acceptance
+from evoexp.records import FloatArray, Generation
+from evoexp.robots.assembly import Robot
 from evoexp.scenarios.link_motion import LinkMotion
 from evoexp.validation import Component, LayoutCount
 
 PAIR_BYTES = 5  # of a pair of individuals: their collisions, and whether they are a team
 HALF_TURN = DEGREE * 180.0  # genes live in [0, π)
-
-
-class Problem(NamedTuple):
-    """Robots and their scenario, prepared.
-
-    Attributes:
-        assembly: The robots, built.
-        collision: The paper's collision model on them.
-        arms: (robots, 4) base x, base y, lengths of both links [length unit].
-        start: (robots, 2) absolute link angles [rad].
-        goal: (robots, 2) [rad].
-        moving: (robots,) false for robots that stand still.
-        scene: The bodies themselves, for the exact verdict on a motion.
-        security_margin: Clearance that the task requires [length unit].
-    """
-
-    assembly: Assembly
-    collision: LinkCollision
-    arms: FloatArray
-    start: FloatArray
-    goal: FloatArray
-    moving: BoolArray
-    scene: Scene
-    security_margin: float
 
 
 class Coevolution(PlannerDefaults, Component):
@@ -82,6 +61,9 @@ class Coevolution(PlannerDefaults, Component):
         ga: Populations, generations, rates, hall of fame.
         objective: Weights of C1 … C4.
         collision: Links as lines, or their envelopes.
+        acceptance: Which teams are an answer: those that the model accepts at the configurations
+            it tests, or those of them whose motion the exact certifier proves; robots of one that
+            is refuted count as colliding once more.
     """
 
     component: ClassVar[str] = "coevolution"
@@ -93,6 +75,7 @@ class Coevolution(PlannerDefaults, Component):
     ga: CoevolutionSettings
     objective: MotionCriteria
     collision: LinkCrossings
+    acceptance: Acceptance = "model"
 
     @model_validator(mode="after")
     def _genes_come_in_pairs(self) -> Self:
@@ -126,15 +109,7 @@ class Coevolution(PlannerDefaults, Component):
         moving = np.array([r not in scenario.stationary for r in range(len(arms))])
         bodies, margin = scene(assembly, scenario.obstacles), scenario.security_margin
         problem = Problem(assembly, collision, arms, start, goal, moving, bodies, margin)
-        for name, posture in (("q_start", start), ("q_goal", goal)):
-            if contact := collision.contact(posture):
-                relative = np.stack([posture[:, 0], posture[:, 1] - posture[:, 0]], axis=1).ravel()
-                closest = " and ".join(bodies.nearest_pair(relative))
-                raise SettingError(
-                    f"scenario.{name}",
-                    f"free of collision ({contact}: {closest})",
-                    (posture / DEGREE).round(9).tolist(),
-                )
+        check_ends(problem)
         return problem
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
@@ -142,8 +117,9 @@ class Coevolution(PlannerDefaults, Component):
         ga, keeper = self.ga, Keeper()
         populations = self.sample(problem, rng, ga.population_size)
         hall, waiting = Hall.empty(len(problem.start)), 0
+        best_of = self._choice(problem)
         found = self.evaluated(problem, populations)
-        best = best_team(found.collisions, found.teamable)
+        best = best_of(populations, found)
         yield self._recorded(keeper, problem, populations, found, best)
         for index in range(1, ga.num_generations + 1):
             hall = self._renewed(problem, populations, found, best, hall)
@@ -157,8 +133,14 @@ class Coevolution(PlannerDefaults, Component):
                 populations = self._bred(rng, problem, populations, found, hall, index)
                 hall = hall.moved(ga.population_size - hall.num_teams)
             found = self.evaluated(problem, populations)
-            best = best_team(found.collisions, found.teamable)
+            best = best_of(populations, found)
             yield self._recorded(keeper, problem, populations, found, best)
+
+    def _choice(self, problem: Problem) -> Callable[[FloatArray, Evaluated], BestTeam]:
+        """Return what chooses the best team of populations; a run keeps its verdicts."""
+        if self.answers_are_proven:
+            return ProvenTeams(self, problem).settle
+        return lambda _, found: best_team(found.collisions, found.teamable)
 
     def _recorded(
         self,
@@ -294,6 +276,8 @@ class Coevolution(PlannerDefaults, Component):
         """Judge the individuals of the first robot, each by its cheapest collision-free team."""
         found, count = self.evaluated(problem, population), population.shape[2]
         costs = np.array([found.cost_of(found.team_of(i)) for i in range(count)])
+        if self.answers_are_proven:
+            ProvenTeams(self, problem).settle_each(population, found, costs)
         return Judgement(costs, found, self.queries(problem, count))
 
     def queries(self, problem: Problem, count: int) -> int:
@@ -304,9 +288,11 @@ class Coevolution(PlannerDefaults, Component):
 
     def solution(self, problem: Problem, population: FloatArray, individual: int) -> FloatArray:
         """Return the team of an individual of the first robot as a flat solution."""
-        return self.team_solution(
-            problem, population, self.evaluated(problem, population).team_of(individual)
-        )
+        found = self.evaluated(problem, population)
+        team = found.team_of(individual)
+        if self.answers_are_proven:
+            team = ProvenTeams(self, problem).team_of(population, found, individual)
+        return self.team_solution(problem, population, team)
 
     def team_solution(
         self, problem: Problem, population: FloatArray, team: np.ndarray

@@ -1,5 +1,6 @@
 """The evolution strategy on postures, cycle by cycle (Corsépius 2001, section 4.2)."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -73,8 +74,20 @@ class Search:
         edge_check: int,
         ancestry: Ancestry,
         node: int,
+        accepts: Callable[[FloatArray, FloatArray], bool] | None = None,
     ) -> None:
-        """Begin a phase at a node of the ancestry; `edge_check` as in `kernels.Strategy`."""
+        """Begin a phase.
+
+        Args:
+            ga: Settings.
+            problem: The prepared task.
+            stage: The phase.
+            edge_check: As in `kernels.Strategy`.
+            ancestry: Of all phases.
+            node: Where the phase begins.
+            accepts: Whether a parent (nq,) may have a child (nq,); None: any.
+        """
+        self._accepts = accepts
         self.ga, self.judging, self.ancestry = ga, stage.judging, ancestry
         self._nq, room = len(problem.scope), ga.num_parents
         self._strategy = Strategy(
@@ -116,9 +129,28 @@ class Search:
         chosen, winner = kernels.advance(
             uniforms, normals, bred, self._strategy, self.judging, self._members, self.memory
         )
+        if self._accepts is not None:
+            chosen, winner = self._accepted(chosen, int(winner), self._accepts)
         self.cycles += 1
         origins = self._nodes[self.memory.origin]
         self._take_best(int(winner), self._take_parents(chosen, count, origins), origins)
+
+    def _accepted(
+        self, chosen: IntArray, winner: int, accepts: Callable[[FloatArray, FloatArray], bool]
+    ) -> tuple[IntArray, int]:
+        """Select again until everybody selected is accepted; who is refused is not feasible."""
+        offspring, origin = self.memory.offspring, self.memory.origin
+        known: set[int] = set()
+        while True:
+            count = offspring.shape[1]
+            asked = {n for n in (*chosen.tolist(), winner) if 0 <= n < count} - known
+            known |= asked
+            parents = self._members.postures
+            refused = [n for n in asked if not accepts(parents[:, origin[n]], offspring[:, n])]
+            if not refused:
+                return chosen, winner
+            self.memory.feasible[refused] = False
+            chosen, winner = kernels.select(self._strategy, self._members, self.memory)
 
     def _take_parents(self, chosen: IntArray, count: int, origins: IntArray) -> dict[int, int]:
         """Take over the selected parents of a cycle of `count` offspring.

@@ -333,13 +333,21 @@ def advance(
         parents stay); index of the winner, which meets the goal at the least cost, −1 if nobody
         does.
     """
-    rows, feasible, met = memory.rows, memory.feasible, memory.met
-    count, num_parents = memory.offspring.shape[1], members.size
-    # offspring, judged
     breed(uniforms, normals, num_bred, strategy, members, memory)
-    judge(memory.offspring, judging, rows, feasible, met)
+    judge(memory.offspring, judging, memory.rows, memory.feasible, memory.met)
     if strategy.edge_check > 0:
         judge_edges(members.postures, strategy.edge_check, judging, memory)
+    return select(strategy, members, memory)
+
+
+@kernel
+def select(strategy: Strategy, members: Members, memory: Memory) -> tuple[IntArray, int]:
+    """Select the next parents and the winner among judged offspring; see `advance`.
+
+    Nobody meets the goal who is not feasible.
+    """
+    rows, feasible, met = memory.rows, memory.feasible, memory.met
+    count, num_parents = memory.offspring.shape[1], members.size
     # who may be selected, at which cost; the winner
     keys = np.full(count + num_parents, np.inf)
     winner, usable = -1, 0

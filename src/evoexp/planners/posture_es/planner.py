@@ -17,12 +17,13 @@ is the term `cost`. Individuals that collide or pass a hard limit are rated, but
 means and deviations leave them out.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import BeforeValidator, Field
 
+from evoexp.collision.certifier.certificate import certificate
 from evoexp.collision.models.body_models import CollisionModel
 from evoexp.collision.scene import Part
 from evoexp.evolution.cost_statistics import cost_statistics
@@ -36,8 +37,9 @@ from evoexp.planners.planner import COPIES, Candidate, Keeper, PlannerDefaults
 from evoexp.planners.posture_es import problem as posture_problem
 from evoexp.planners.posture_es.cycles import Ancestry, Search
 from evoexp.planners.posture_es.kernels import COST
-from evoexp.planners.posture_es.phases import Problem, Span
+from evoexp.planners.posture_es.phases import Problem, Span, Stage
 from evoexp.planners.posture_es.settings import StrategySettings
+from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.records import FloatArray, Generation
 from evoexp.robots.assembly import Robot
 from evoexp.scenarios.moveit import MoveitTask
@@ -79,15 +81,19 @@ class PostureEs(PlannerDefaults, Component):
         ga: Parents, offspring, selection, mutation, when to stop.
         objective: Terms of the cost.
         collision: Covers of the bodies.
+        acceptance: Who may be a parent or the winner: everybody whom the model accepts, or those of
+            them to whom the exact certifier proves the way from their parent.
     """
 
     component: ClassVar[str] = "posture_es"
+    goal_is_region: ClassVar[bool] = True
 
     scope: Annotated[tuple[Positive, ...], Field(min_length=1), BeforeValidator(_one_or_several)]
     edge_check: NonNegativeCount
     ga: StrategySettings
     objective: PostureCost
     collision: CollisionModel
+    acceptance: Acceptance = "model"
 
     def prepare(self, robot: Robot, scenario: PostureTask | MoveitTask) -> Problem:
         """Build the robot and check the task against it.
@@ -105,7 +111,8 @@ class PostureEs(PlannerDefaults, Component):
         situation = problem.first_situation
         for index in range(len(problem.phases)):
             stage = problem.begin(index, ancestry.postures[node], situation)
-            search = Search(self.ga, problem, stage, self.edge_check, ancestry, node)
+            accepts = self._proves(problem, stage) if self.answers_are_proven else None
+            search = Search(self.ga, problem, stage, self.edge_check, ancestry, node, accepts)
             last = index == len(problem.phases) - 1
             while True:
                 reason = search.stop_reason
@@ -127,7 +134,24 @@ class PostureEs(PlannerDefaults, Component):
     def cost(self, problem: Problem, population: FloatArray) -> Judgement:
         """Judge postures (nq, individuals) by the first phase."""
         stage = problem.begin(0, problem.start, problem.first_situation)
-        return Judgement(*stage.judge(population), self.chosen)
+        judged = stage.judge(population)
+        if self.answers_are_proven:
+            met = np.where(judged.met, judged.cost, np.inf)
+            Proofs(self, problem).settle(met, lambda k: self.solution(problem, population, k))
+            refuted = judged.met & ~np.isfinite(met)
+            judged.feasible[refuted] = judged.met[refuted] = False
+        return Judgement(*judged, self.chosen)
+
+    def _proves(self, problem: Problem, stage: Stage) -> Callable[[FloatArray, FloatArray], bool]:
+        """Return what proves the way from a parent (nq,) to its child in a phase."""
+        part, margin = Part(problem.scene_of(stage), 0, 1), self.security_margin(problem)
+
+        def is_proven(parent: FloatArray, child: FloatArray) -> bool:
+            found = certificate((part,), Motion(np.array([parent, child])), margin)
+            asked = found.certified_margin if self.acceptance == "margin" else found.certified
+            return asked is True
+
+        return is_proven
 
     @property
     def chosen(self) -> tuple[int, ...]:

@@ -28,6 +28,7 @@ from evoexp.objectives.reaching import Reaching
 from evoexp.paths.motion import Motion
 from evoexp.planners.departures import joint_names, of_limits, of_place
 from evoexp.planners.planner import COPIES, Candidate, Keeper, PlannerDefaults, num_values
+from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.planners.redundant_ga import kernels
 from evoexp.planners.redundant_ga.kernels import RESULTS, Judging
 from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic, SelectiveSettings
@@ -110,9 +111,12 @@ class RedundantGa(PlannerDefaults, Component):
         ga: Population, generations, operators.
         objective: Weights of Eq. 4.
         collision: Positions and chords that are tested.
+        acceptance: Which ends of sub-paths may be the best one: those that the model accepts, or
+            those of them whose sub-path the exact certifier proves; one that is refuted costs inf.
     """
 
     component: ClassVar[str] = "redundant_ga"
+    goal_is_region: ClassVar[bool] = True
 
     num_attempts: Count
     stop_cost_sp1: Positive
@@ -121,6 +125,7 @@ class RedundantGa(PlannerDefaults, Component):
     ga: SelectiveSettings
     objective: Reaching
     collision: LinkEllipses
+    acceptance: Acceptance = "model"
 
     def prepare(self, robot: Robot, scenario: PickAndPlace) -> Problem:
         """Build the robot and check that the start fits it and is free of collision.
@@ -167,20 +172,36 @@ class RedundantGa(PlannerDefaults, Component):
             rng: Source of all random numbers.
             kind: What searches a sub-path: the genetic algorithm, or a control in its place.
         """
-        plans = _Plans(self, problem)
+        plans, proofs = _Plans(self, problem), None
+        if self.answers_are_proven:
+            proofs = Proofs(self, problem)
         for _ in range(self.num_attempts):
             plans.attempts += 1
-            search = self._new(kind, problem, 0, problem.start)
+            search = self._new(kind, problem, (), proofs)
             via = yield from self._search(search, rng, plans, 0)
             if self.successful(0, via.cost):
                 plans.via = via
-                search = self._new(kind, problem, 1, via.posture)
+                search = self._new(kind, problem, (via.posture,), proofs)
                 goal = yield from self._search(search, rng, plans, 1)
                 if self.successful(1, goal.cost):
                     return
 
-    def _new(self, kind: type[Search], problem: Problem, path: int, start: FloatArray) -> Search:
-        return kind(self.ga, problem.joint_limits, self._judging(problem, path), start)
+    def _new(
+        self,
+        kind: type[Search],
+        problem: Problem,
+        via: tuple[FloatArray, ...],
+        proofs: Proofs | None,
+    ) -> Search:
+        """Return the search of SP1, or of SP2 behind a posture A."""
+        start = (problem.start, *via)
+
+        def is_proven(end: FloatArray) -> bool:
+            assert proofs is not None
+            return proofs.is_proven(np.concatenate([*start, *[end] * (3 - len(start))]))
+
+        judging, accepts = self._judging(problem, len(via)), is_proven if proofs else None
+        return kind(self.ga, problem.joint_limits, judging, start[-1], accepts)
 
     def _search(
         self, search: Search, rng: np.random.Generator, plans: "_Plans", path: int
@@ -222,6 +243,8 @@ class RedundantGa(PlannerDefaults, Component):
             [self._judge(problem, 0, starts, population[0]), self._judge(problem, 1, *population)]
         )
         cost = np.where(self.successful(0, terms[0, 0]), terms[1, 0], np.inf)
+        if self.answers_are_proven:
+            Proofs(self, problem).settle(cost, lambda k: self.solution(problem, population, k))
         queries = 2 * problem.collision.queries * population.shape[2]
         return Judgement(cost, np.asarray(self.successful(1, cost)), terms, queries)
 

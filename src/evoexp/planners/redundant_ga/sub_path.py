@@ -1,5 +1,6 @@
 """One genetic search for the end posture of a sub-path (Lavoie & Boudreau 2001)."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -62,7 +63,12 @@ class Search:
     num_finite: int
 
     def __init__(
-        self, ga: SelectiveSettings, limits: FloatArray, judging: Judging, start: FloatArray
+        self,
+        ga: SelectiveSettings,
+        limits: FloatArray,
+        judging: Judging,
+        start: FloatArray,
+        accepts: Callable[[FloatArray], bool] | None = None,
     ) -> None:
         """Take the settings, and memory for a population.
 
@@ -71,7 +77,9 @@ class Search:
             limits: (joints, 2) of the joint angles [rad].
             judging: Collision model and objective.
             start: (joints,) where the sub-path starts [rad].
+            accepts: Whether an end (joints,) [rad] may be the best one; None: any of finite cost.
         """
+        self._accepts = accepts
         joints, size, count = len(start), ga.population_size, ga.num_offspring
         self._ga, self._judging, self._breeding = ga, judging, _breeding(ga, limits)
         first = self._breeding.num_genes if self._breeding.binary else 0
@@ -104,7 +112,8 @@ class Search:
 
     def begin(self, rng: np.random.Generator) -> None:
         """Draw the initial population, uniform within the limits, and judge it."""
-        self._take(self._draw(rng, len(self._starts[0])))
+        size = len(self._starts[0])
+        self._take(self._draw(rng, size), size)
 
     def _draw(self, rng: np.random.Generator, count: int) -> tuple[int, float, float, int]:
         """Draw the first `count` individuals anew and judge them; return their summary."""
@@ -134,12 +143,17 @@ class Search:
                 ga.mutation_std,
             )
         draws = Draws(uniforms[:chosen], uniforms[chosen:crossed], uniforms[crossed:], normals)
-        self._take(
-            kernels.advance(draws, spread, breeding, self._judging, self._starts, self._memory)
-        )
+        found = kernels.advance(draws, spread, breeding, self._judging, self._starts, self._memory)
+        self._take(found, len(self._starts[0]))
 
-    def _take(self, summary: tuple[int, float, float, int]) -> None:
-        """Take over the summary of a generation."""
+    def _take(self, summary: tuple[int, float, float, int], count: int) -> None:
+        """Take over the summary of the first `count` individuals; refused ends cost inf."""
+        costs = self._results[0, :count]
+        while self._accepts is not None and np.isfinite(costs[summary[0]]):
+            if self._accepts(self._angles[:, summary[0]]):
+                break
+            costs[summary[0]] = np.inf
+            summary = kernels.summary(costs)
         self.statistics, self.num_finite = CostStatistics(*summary[:3]), summary[3]
         terms = self._results[:, summary[0]].copy()
         self.best = BestEnd(float(terms[0]), self._angles[:, summary[0]].copy(), terms)
@@ -157,7 +171,7 @@ class DrawnSearch(Search):
         before, count = self.best, self._ga.num_offspring
         if count == 0:  # all are elites: nothing is bred, and nothing drawn
             return
-        self._take(self._draw(rng, count))
+        self._take(self._draw(rng, count), count)
         self.genomes, self.costs = self.genomes[:, :count], self._results[0, :count]
         self.best = self.best if self.best.cost < before.cost else before
 

@@ -17,6 +17,7 @@ from evoexp.planners.answers import CoverShape
 from evoexp.planners.arm_tasks import (
     UNLIMITED,
     ArmProblem,
+    ArmTask,
     arm_problem,
     cover_notes,
     cover_shapes,
@@ -28,8 +29,6 @@ from evoexp.planners.sampling_based.settings import EdgeSettings
 from evoexp.planners.sampling_based.trees import EdgeTest
 from evoexp.records import FloatArray
 from evoexp.robots.assembly import Robot
-from evoexp.scenarios.arm_motion import ArmMotion
-from evoexp.scenarios.moveit import MoveitTask
 
 MOST_STEPS = 10_000  # of a line through the whole space of configurations
 MOST_TESTED = 1_000_000  # configurations on such a line
@@ -40,7 +39,7 @@ class NodePaths(PlannerDefaults, EdgeSettings):
 
     component: ClassVar[str]
 
-    def prepare(self, robot: Robot, scenario: ArmMotion | MoveitTask) -> ArmProblem:
+    def prepare(self, robot: Robot, scenario: ArmTask) -> ArmProblem:
         """Build the robot, and check that start and goal fit it and are free of collision.
 
         Raises:

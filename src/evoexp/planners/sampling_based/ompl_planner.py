@@ -17,7 +17,7 @@ import numpy as np
 
 from evoexp.errors import SettingError
 from evoexp.evolution.cost_statistics import cost_statistics
-from evoexp.planners.arm_tasks import ArmProblem
+from evoexp.planners.arm_tasks import ArmProblem, ArmTask
 from evoexp.planners.planner import Candidate, Keeper, Reproducibility
 from evoexp.planners.sampling_based.kernels import distance
 from evoexp.planners.sampling_based.node_paths import NodePaths, path_length
@@ -26,8 +26,6 @@ from evoexp.planners.sampling_based.shortcuts import ShortenedPath
 from evoexp.planners.sampling_based.trees import EdgeTest
 from evoexp.records import FloatArray, Generation
 from evoexp.robots.assembly import Robot
-from evoexp.scenarios.arm_motion import ArmMotion
-from evoexp.scenarios.moveit import MoveitTask
 from evoexp.validation import Component
 
 SEEDS = 2**31
@@ -41,7 +39,7 @@ class OmplPlanner(NodePaths, OmplSettings, Component):
     component: ClassVar[str] = "ompl"
     reproducibility: ClassVar[Reproducibility] = "environment"
 
-    def prepare(self, robot: Robot, scenario: ArmMotion | MoveitTask) -> ArmProblem:
+    def prepare(self, robot: Robot, scenario: ArmTask) -> ArmProblem:
         """Build the robot, and check start, goal and settings.
 
         Raises:

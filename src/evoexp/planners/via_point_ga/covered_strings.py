@@ -16,6 +16,7 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.string_fitness import count_collisions, weigh
 from evoexp.paths.interpolation import interpolate_linear
 from evoexp.paths.lengths import measure_paths
+from evoexp.planners.arm_tasks import UNLIMITED
 from evoexp.planners.via_point_ga import kernels
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
 from evoexp.planners.via_point_ga.strings import JudgedGeneration, Judgement, Problem, Strings
@@ -30,7 +31,8 @@ class CoveredStrings(Strings):
         assert isinstance(problem.collision, CoveredCollision)
         self.collision = problem.collision
         model = problem.assembly.model
-        low, high = model.lowerPositionLimit / DEGREE, model.upperPositionLimit / DEGREE
+        limits = np.array([model.lowerPositionLimit, model.upperPositionLimit])
+        low, high = np.clip(limits, -UNLIMITED, UNLIMITED) / DEGREE
         # ends that lie on a limit lie within it, whatever the last bit of the conversion is
         self.low = np.minimum(low, np.minimum(problem.start, problem.goal))[:, None, None]
         self.high = np.maximum(high, np.maximum(problem.start, problem.goal))[:, None, None]

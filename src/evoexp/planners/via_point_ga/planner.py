@@ -24,7 +24,13 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion
 from evoexp.paths.workspace import prepare_redistribution
 from evoexp.planners.answers import CoverShape
-from evoexp.planners.arm_tasks import UNLIMITED, arm_problem, cover_notes, cover_shapes
+from evoexp.planners.arm_tasks import (
+    UNLIMITED,
+    ArmTask,
+    arm_problem,
+    cover_notes,
+    cover_shapes,
+)
 from evoexp.planners.departures import joint_names, of_limits, of_place
 from evoexp.planners.planner import COPIES, Candidate, Keeper, PlannerDefaults, num_values
 from evoexp.planners.via_point_ga.covered_strings import CoveredStrings
@@ -38,8 +44,6 @@ from evoexp.planners.via_point_ga.strings import (
 )
 from evoexp.records import FloatArray, Generation
 from evoexp.robots.assembly import Robot
-from evoexp.scenarios.arm_motion import ArmMotion
-from evoexp.scenarios.moveit import MoveitTask
 from evoexp.validation import Component
 
 SAMPLES_BETWEEN = 100  # configurations per segment where a clearance between via-points is sampled
@@ -51,7 +55,7 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
     component: ClassVar[str] = "via_point_ga"
     is_real_coded: ClassVar[bool] = True
 
-    def prepare(self, robot: Robot, scenario: ArmMotion | MoveitTask) -> Problem:
+    def prepare(self, robot: Robot, scenario: ArmTask) -> Problem:
         """Build the robot and check that start and goal fit it and are free of collision.
 
         Raises:
@@ -132,11 +136,6 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
             return Candidate(self.solution(problem, strings, k), terms, solved)
 
         keeper.keep_proven(costs, proven, candidate)
-
-    @property
-    def answers_are_proven(self) -> bool:
-        """Whether what the search accepts is proven by the exact certifier."""
-        return self.acceptance != "model"
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
         """Return new trajectories as in the initial population, (nq, N + 1, count)."""

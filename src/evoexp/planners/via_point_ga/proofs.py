@@ -4,20 +4,12 @@ from typing import Any
 
 import numpy as np
 
-from evoexp.planners.planner import judge_motion
+from evoexp.planners.proofs import Proofs
 from evoexp.records import FloatArray
-
-KEPT = 10_000  # verdicts that are remembered: elites, and strings that crossover leaves as they are
 
 
 class Prover:
-    """Judges the whole motions of strings, and tells a search which ones are refuted.
-
-    A verdict is yes or no, the same on every processor; undecided ones count as no.
-
-    Attributes:
-        num_certificates: Motions judged so far.
-    """
+    """Judges the whole motions of strings, and tells a search which ones are refuted."""
 
     def __init__(self, planner: Any, problem: Any) -> None:
         """Begin with no verdict.
@@ -28,8 +20,12 @@ class Prover:
         """
         self._planner, self._problem = planner, problem
         self._weight = planner.objective.collision_weight
-        self._known: dict[bytes, bool] = {}
-        self.num_certificates = 0
+        self._proofs = Proofs(planner, problem)
+
+    @property
+    def num_certificates(self) -> int:
+        """Motions judged so far."""
+        return self._proofs.num_certificates
 
     def settle(
         self, strings: FloatArray, costs: FloatArray, hits: FloatArray, below: float = np.inf
@@ -59,14 +55,5 @@ class Prover:
 
     def is_proven(self, string: FloatArray) -> bool:
         """Whether the certifier proves the whole motion of a string (nq, N + 1)."""
-        key = string.tobytes()
-        if key not in self._known:
-            if len(self._known) >= KEPT:
-                self._known.clear()
-            self.num_certificates += 1
-            planner, problem = self._planner, self._problem
-            solution = planner.solution(problem, string[:, :, None], 0)
-            found = judge_motion(planner, problem, planner.motion(problem, solution))
-            asked = found.certified_margin if planner.acceptance == "margin" else found.certified
-            self._known[key] = asked is True
-        return self._known[key]
+        solution = self._planner.solution(self._problem, string[:, :, None], 0)
+        return self._proofs.is_proven(solution)

@@ -9,6 +9,7 @@ from evoexp.collision.models.touching_spheres import TouchingSpheres
 from evoexp.errors import SettingError
 from evoexp.evolution.genetic_settings import GeneticSettings
 from evoexp.objectives.string_fitness import StringFitness
+from evoexp.planners.proofs import Acceptance
 from evoexp.validation import Count, LayoutCount, NonNegativeCount, Positive, Rate, Settings
 
 SAMPLES = tuple(2**k for k in range(3, 11))  # per segment, that the redistribution can take
@@ -53,7 +54,7 @@ class ViaPointSettings(Settings):
     objective: StringFitness
     collision: TouchingSpheres | CoveredBodies
     crossover_reading: Literal["tails", "segment"] = "tails"
-    acceptance: Literal["model", "certified", "margin"] = "model"
+    acceptance: Acceptance = "model"
 
     @model_validator(mode="after")
     def _samples_halve(self) -> Self:

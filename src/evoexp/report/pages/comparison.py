@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from evoexp.errors import NothingStored
+from evoexp.planners.answers import num_body_tests
 from evoexp.records import FloatArray
 from evoexp.report import markdown
 from evoexp.report.best_known import shipped_best_known
@@ -56,6 +57,14 @@ EFFORT = (
 )
 
 
+COINS = (
+    "Pairs of shapes: what a planner's own collision model compares in one configuration, if it "
+    "skips nothing. Whole runs: to their end, and the verdict's CPU time is part of theirs. Own "
+    "cost: of the last solutions, median and quartiles over runs, ∞: infeasible; planners with "
+    "different costs cannot be compared by it."
+)
+
+
 class Rated(NamedTuple):
     """A condition, rated by the proven answers of its runs.
 
@@ -74,6 +83,10 @@ class Rated(NamedTuple):
         unit: The one of both that targets are multiples of; NaN: any answer is the only target.
         refuted: Last solutions that the planner's own model accepts and the certifier refutes.
         judged: Last solutions that were judged.
+        body_tests: Pairs of shapes that one collision query stands for; NaN: not known.
+        evaluations: Evaluations of all runs per run with a proven answer.
+        cpu_s: CPU time of all runs per run with a proven answer [s].
+        own_cost: The planner's own cost of its last solution: median and quartiles over runs.
     """
 
     condition: str
@@ -90,6 +103,10 @@ class Rated(NamedTuple):
     unit: float
     refuted: int
     judged: int
+    body_tests: float = np.nan
+    evaluations: float = np.nan
+    cpu_s: float = np.nan
+    own_cost: Spread = Spread(np.nan, np.nan, np.nan, 0)
 
     @property
     def in_units(self) -> Spread:
@@ -127,13 +144,14 @@ def page_of_runs(
     """
     if not runs:
         raise NothingStored(f"{results.experiment or 'compare'}: no stored solution is a motion")
-    found = standing(runs)
+    found, rows = standing(runs), rated(runs, settings)
     return Page(
         title=f"{results.experiment or 'stored runs'}: proven answers",
         introduction=INTRODUCTION + (_of_file(given) if given else ""),
         tables=(
             _problem_table(runs, ranking.too_few(found)),
-            _table(rated(runs, settings), settings),
+            _table(rows, settings),
+            _coin_table(rows),
             *ranking.tables(found, settings),
         ),
         comparisons=_comparisons(runs, settings),
@@ -206,7 +224,7 @@ def rated(runs: Sequence[PlannerRuns], settings: ReportSettings) -> list[Rated]:
 def _rated(own: PlannerRuns, settings: ReportSettings) -> Rated:
     effort, reached = own.first_reached()
     verdicts = own.condition.verdicts if own.condition else None
-    return Rated(
+    found = Rated(
         own.label,
         own.planner,
         own.problem.name,
@@ -221,6 +239,23 @@ def _rated(own: PlannerRuns, settings: ReportSettings) -> Rated:
         own.problem.unit,
         verdicts.solved_refuted if verdicts else 0,
         verdicts.judged if verdicts else 0,
+    )
+    return found if own.condition is None else _in_other_coins(found, own.condition)
+
+
+def _in_other_coins(row: Rated, condition: ConditionResults) -> Rated:
+    """Add what runs took in tests of bodies, evaluations and CPU time, and their own cost."""
+
+    def per_answer(name: str) -> float:
+        total = float(condition.column(name).sum())
+        return total / row.proven if row.proven else np.inf
+
+    _, problem = condition.prepared
+    return row._replace(
+        body_tests=num_body_tests(problem),
+        evaluations=per_answer("evaluations"),
+        cpu_s=per_answer("cpu_s"),
+        own_cost=spread(condition.column("best_cost")),
     )
 
 
@@ -286,6 +321,30 @@ def _table(rows: Sequence[Rated], settings: ReportSettings) -> Table:
         for row in rows
     )
     return Table("Answers", headers, cells, EFFORT)
+
+
+def _coin_table(rows: Sequence[Rated]) -> Table:
+    headers = (
+        "condition",
+        "pairs of shapes per query",
+        "body queries per proven answer",
+        "evaluations of whole runs per proven answer",
+        "CPU time of whole runs per proven answer [s]",
+        "the planner's own cost",
+    )
+    cells = tuple(
+        (
+            row.condition,
+            markdown.number(row.body_tests),
+            effort_text(row.queries * row.body_tests),
+            effort_text(row.evaluations),
+            markdown.number(row.cpu_s),
+            markdown.spread(row.own_cost),
+        )
+        for row in rows
+        if row.own_cost.num_values
+    )
+    return Table("The same in other coins", headers, cells, COINS)
 
 
 def _between(interval: tuple[float, float]) -> str:

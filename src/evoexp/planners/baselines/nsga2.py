@@ -1,0 +1,102 @@
+"""NSGA-II (Deb et al. 2002) on a planner's own coding and the terms of its cost, by pymoo."""
+
+from collections.abc import Iterator
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from evoexp.errors import SettingError, nearest
+from evoexp.planners.baselines.real_vectors import check_real_coded, real_vectors
+from evoexp.planners.planner import COPIES, Judgement, Keeper, Reproducibility, num_values
+from evoexp.planners.wrapped_planner import WrappedPlanner
+from evoexp.records import FloatArray, Generation
+from evoexp.validation import Component, Count
+
+SEEDS = 2**32  # of numpy's older generators
+ENDLESS = 10**9  # generations: this planner counts them itself
+
+
+class Nsga2(WrappedPlanner, Component):
+    """Evolves a front: individuals that no other surpasses in all objectives at once.
+
+    Objectives are terms of the planner's own judgement; the answer is the individual of the least
+    cost of the planner. Operators are pymoo's defaults (simulated binary crossover, polynomial
+    mutation, binary tournament by rank and crowding), within the box that holds all individuals
+    drawn at first. A generation has as many individuals as a later one of the planner.
+
+    Linear algebra of libraries makes the last bits those of an environment.
+
+    Attributes:
+        objectives: Names of terms, to be minimised; a name stands for the sum of all terms that
+            begin with it, as `length` does for the lengths of all arms.
+        num_drawn: Individuals drawn for the box and the first population; those that are not in
+            that population are not judged.
+        planner: The planner whose coding, terms, cost and budget are used.
+    """
+
+    component: ClassVar[str] = "nsga2"
+    reproducibility: ClassVar[Reproducibility] = "environment"
+
+    objectives: Annotated[tuple[str, ...], Field(min_length=2)]
+    num_drawn: Count
+
+    def prepare(self, robot: Any, scenario: Any) -> Any:
+        """Prepare the wrapped planner's problem.
+
+        Raises:
+            SettingError: If the planner's individuals are no real vectors, or it has no such terms.
+        """
+        check_real_coded(self.planner, self.component)
+        problem = super().prepare(robot, scenario)
+        one = self.planner.sample(problem, np.random.default_rng(0), 1)
+        names = tuple(self.planner.cost(problem, one).named_terms(0))
+        for k, name in enumerate(self.objectives):
+            if not any(term.startswith(name) for term in names):
+                must = f"the begin of a term ({', '.join(names)})"
+                raise SettingError(f"control.objectives[{k}]", must, name, nearest(name, names))
+        return problem
+
+    def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Generation]:
+        """Yield one generation after the other."""
+        from pymoo.algorithms.moo.nsga2 import NSGA2
+        from pymoo.core.problem import Problem
+
+        planner, keeper, size = self.planner, Keeper(), self.num_evaluations(1)
+        drawn = planner.sample(problem, rng, max(self.num_drawn, size))
+        coding = real_vectors(planner, problem, drawn)
+        vectors = drawn[coding.changes].T
+        box = Problem(
+            n_var=vectors.shape[1],
+            n_obj=len(self.objectives),
+            xl=vectors.min(axis=0),
+            xu=vectors.max(axis=0),
+        )
+        search = NSGA2(pop_size=size, sampling=vectors[:size], eliminate_duplicates=False)
+        forever = ("n_gen", ENDLESS)
+        search.setup(box, termination=forever, seed=int(rng.integers(SEEDS)), verbose=False)
+        for _ in range(planner.num_generations + 1):
+            asked = search.ask()
+            population = coding.population(np.asarray(asked.get("X"), dtype=np.float64))
+            judged = planner.cost(problem, population)
+            asked.set("F", self._values(judged))
+            search.tell(infills=asked)
+            yield keeper.record_judged(planner, problem, population, judged)
+
+    def num_evaluations(self, index: int) -> int:
+        """Return the planner's evaluations of a later generation, at least four."""
+        return max(4, self.planner.num_evaluations(max(1, index)))
+
+    def memory(self, problem: Any) -> int:
+        """Return the planner's estimate, and that of the drawn individuals and their covariance."""
+        values = num_values(self.shape(problem))
+        return self.planner.memory(problem) + 8 * values * (COPIES * self.num_drawn + values)
+
+    def _values(self, judged: Judgement) -> FloatArray:
+        """Return the objectives of judged individuals, (individuals, objectives)."""
+        rows = []
+        for k, cost in enumerate(judged.cost):
+            terms = judged.named_terms(k)
+            own = [sum(v for n, v in terms.items() if n.startswith(o)) for o in self.objectives]
+            rows.append(own if np.isfinite(cost) else [np.finfo(float).max] * len(own))
+        return np.array(rows, dtype=np.float64)

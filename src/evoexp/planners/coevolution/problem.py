@@ -1,0 +1,53 @@
+"""Robots of two links and their scenario, prepared for co-evolution."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from evoexp.collision.models.link_collision import LinkCollision
+from evoexp.collision.scene import Scene
+from evoexp.errors import SettingError
+from evoexp.numeric.elementary import DEGREE
+from evoexp.records import BoolArray, FloatArray
+from evoexp.robots.assembly import Assembly
+
+
+class Problem(NamedTuple):
+    """Robots and their scenario, prepared.
+
+    Attributes:
+        assembly: The robots, built.
+        collision: The paper's collision model on them.
+        arms: (robots, 4) base x, base y, lengths of both links [length unit].
+        start: (robots, 2) absolute link angles [rad].
+        goal: (robots, 2) [rad].
+        moving: (robots,) false for robots that stand still.
+        scene: The bodies themselves, for the exact verdict on a motion.
+        security_margin: Clearance that the task requires [length unit].
+    """
+
+    assembly: Assembly
+    collision: LinkCollision
+    arms: FloatArray
+    start: FloatArray
+    goal: FloatArray
+    moving: BoolArray
+    scene: Scene
+    security_margin: float
+
+
+def check_ends(problem: Problem) -> None:
+    """Refuse a start or goal at which robots touch.
+
+    Raises:
+        SettingError: Naming the bodies.
+    """
+    for name, posture in (("q_start", problem.start), ("q_goal", problem.goal)):
+        if contact := problem.collision.contact(posture):
+            relative = np.stack([posture[:, 0], posture[:, 1] - posture[:, 0]], axis=1).ravel()
+            closest = " and ".join(problem.scene.nearest_pair(relative))
+            raise SettingError(
+                f"scenario.{name}",
+                f"free of collision ({contact}: {closest})",
+                (posture / DEGREE).round(9).tolist(),
+            )

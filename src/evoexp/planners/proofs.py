@@ -1,0 +1,86 @@
+"""The exact verdict on a planner's motion, and searches that accept only what it proves."""
+
+from collections.abc import Callable
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from evoexp.collision.certifier.certificate import Certificate, certificate
+from evoexp.paths.motion import Motion
+from evoexp.planners.planner import Planner
+from evoexp.records import FloatArray
+
+Acceptance = Literal["model", "certified", "margin"]
+"""Which motions a search accepts: those that its collision model accepts at the instants it tests,
+those of them that the exact certifier proves free of contact between all instants, or also free by
+the task's margins."""
+
+KEPT = 10_000  # verdicts that are remembered: elites, and what operators leave as it is
+
+
+def judge_motion(planner: Planner, problem: Any, motion: Motion | None) -> Certificate:
+    """Judge a planner's motion by the exact bodies; without a motion the certificate is empty."""
+    if motion is None:
+        return Certificate()
+    return certificate(planner.parts(problem, motion), motion, planner.security_margin(problem))
+
+
+class Verdict(NamedTuple):
+    """What a search learns about a motion: the same on every processor.
+
+    Attributes:
+        proven: Whether the certifier proves it; one that it cannot decide is not proven.
+        pair: Names of the bodies that touch, " – " between them; empty if none do.
+    """
+
+    proven: bool
+    pair: str
+
+
+class Proofs:
+    """Judges whole motions for a search that accepts proven ones only, each solution once.
+
+    Attributes:
+        num_certificates: Motions judged so far.
+    """
+
+    def __init__(self, planner: Any, problem: Any) -> None:
+        """Begin with no verdict.
+
+        Args:
+            planner: A planner whose field `acceptance` is not `model`.
+            problem: Its problem.
+        """
+        self._planner, self._problem = planner, problem
+        self._known: dict[bytes, Verdict] = {}
+        self.num_certificates = 0
+
+    def verdict(self, solution: FloatArray) -> Verdict:
+        """Return the verdict on a flat solution."""
+        key = solution.tobytes()
+        if key not in self._known:
+            if len(self._known) >= KEPT:
+                self._known.clear()
+            self.num_certificates += 1
+            motion = self._planner.motion(self._problem, solution)
+            found = judge_motion(self._planner, self._problem, motion)
+            asked = self._planner.acceptance == "margin"
+            proven = found.certified_margin if asked else found.certified
+            self._known[key] = Verdict(proven is True, found.refuted_pair)
+        return self._known[key]
+
+    def settle(self, costs: FloatArray, solution: Callable[[int], FloatArray]) -> None:
+        """Judge individuals, the cheapest first, until one is proven; refuted ones cost inf.
+
+        Args:
+            costs: (individuals,), changed; what costs inf is not judged.
+            solution: Makes a flat solution of an individual.
+        """
+        while np.isfinite(costs[k := int(np.argmin(costs))]):
+            if self.is_proven(solution(k)):
+                return
+            costs[k] = np.inf
+
+    def is_proven(self, solution: FloatArray) -> bool:
+        """Whether the certifier proves the motion of a flat solution."""
+        return self.verdict(solution).proven

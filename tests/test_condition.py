@@ -213,8 +213,8 @@ def test_components_in_the_wrong_place_are_refused(config: dict[str, Any]) -> No
         == "robot: must be one that via_point_ga takes (Robot), was 'arm_motion'"
     )
     assert (
-        refusal(config | {"scenario": robot})
-        == "scenario: must be one that via_point_ga takes (ArmMotion or MoveitTask), was 'arms'"
+        refusal(config | {"scenario": robot}) == "scenario: must be one that via_point_ga takes "
+        "(ArmMotion or LinkMotion or MoveitTask), was 'arms'"
     )
     assert refusal(config | {"planner": robot}) == "planner: must be a planner, was 'arms'"
     search = {"_target_": "random_search", "revision": 1}
@@ -242,7 +242,7 @@ def test_a_component_without_a_name_is_refused(config: dict[str, Any], value: An
 
 def test_a_refusal_is_a_line_that_can_be_read(config: dict[str, Any]) -> None:
     arms = [{"_target_": "planar_chain", "revision": 9}] * 5000
-    assert len(refusal(config | {"robot": config["robot"] | {"arms": arms}})) < 1100
+    assert len(refusal(config | {"robot": config["robot"] | {"arms": arms}})) < 1300
     assert len(refusal(config | {"robot": {"_target_": "x" * 5000}})) < 1500
 
 

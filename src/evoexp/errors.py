@@ -8,7 +8,7 @@ import difflib
 from collections.abc import Iterable
 
 _SHOWN = 200  # [-] characters of a value in a message
-_LONGEST = 1000  # [-] characters of any other text in it, such as a list of names
+_LONGEST = 1200  # [-] characters of any other text in it, such as a list of names
 
 
 class EvoexpError(Exception):

@@ -12,7 +12,7 @@ from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.planners.proofs import judge_motion
-from evoexp.planners.via_point_ga.proofs import Prover
+from evoexp.planners.via_point_ga.string_proofs import Prover
 from evoexp.store.log_reader import read_log
 
 

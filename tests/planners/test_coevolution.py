@@ -9,8 +9,8 @@ import pytest
 from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.papers.curkovic.measures import lower_bound
+from evoexp.planners.coevolution.link_problem import Problem
 from evoexp.planners.coevolution.planner import Coevolution, Evaluated
-from evoexp.planners.coevolution.problem import Problem
 from evoexp.planners.proofs import judge_motion
 
 SMALL = ("ga.population_size=12", "ga.num_generations=15", "ga.hall_depth=0.25")

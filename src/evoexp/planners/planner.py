@@ -202,7 +202,7 @@ class PlannerDefaults:
     reproducibility: ClassVar[Reproducibility] = "bits"
     is_reference: ClassVar[bool] = False
     is_real_coded: ClassVar[bool] = False
-    """Whether `cost` takes any real numbers where individuals of `sample` differ."""
+    """Whether `cost` takes any real numbers within its `bounds` where those of `sample` differ."""
     goal_is_region: ClassVar[bool] = False
     """Whether a solution that is not `solved` may miss the goal, which `departures` do not tell."""
 

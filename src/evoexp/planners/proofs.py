@@ -11,9 +11,12 @@ from evoexp.planners.planner import Planner
 from evoexp.records import FloatArray
 
 Acceptance = Literal["model", "certified", "margin"]
-"""Which motions a search accepts: those that its collision model accepts at the instants it tests,
-those of them that the exact certifier proves free of contact between all instants, or also free by
-the task's margins."""
+"""Motions that a search accepts.
+
+`model`: those that its collision model accepts at the instants it tests; `certified`: those of them
+that the exact certifier proves free of contact between all instants; `margin`: or by the task's
+margins.
+"""
 
 KEPT = 10_000  # verdicts that are remembered: elites, and what operators leave as it is
 
@@ -26,7 +29,7 @@ def judge_motion(planner: Planner, problem: Any, motion: Motion | None) -> Certi
 
 
 class Verdict(NamedTuple):
-    """What a search learns about a motion: the same on every processor.
+    """The verdict on a motion as a search learns it: the same on every processor.
 
     Attributes:
         proven: Whether the certifier proves it; one that it cannot decide is not proven.

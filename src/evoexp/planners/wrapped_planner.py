@@ -61,6 +61,11 @@ class WrappedPlanner(PlannerDefaults, Component):
         """Judge as the wrapped planner does."""
         return self.planner.cost(problem, population)
 
+    def bounds(self, problem: Any) -> tuple[FloatArray, FloatArray]:
+        """Return the bounds of the wrapped planner, a real-coded one."""
+        found: tuple[FloatArray, FloatArray] = self.planner.bounds(problem)  # type: ignore[attr-defined]
+        return found
+
     def solution(self, problem: Any, population: FloatArray, individual: int) -> FloatArray:
         """Return an individual as the wrapped planner does."""
         return self.planner.solution(problem, population, individual)

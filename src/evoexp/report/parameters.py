@@ -84,7 +84,7 @@ def planned_replicates(results: Results) -> int:
 
 
 def _of_experiment(results: Results) -> dict[str, Entry]:
-    """Return what the file of the experiment itself sets, by dotted key."""
+    """Return the settings in the file of the experiment itself, by dotted key."""
     taken = {each.group: each for c in results.conditions for each in c.options}
     path = _file("experiment", results.experiment, taken)
     return option(path) if path else {}

@@ -9,6 +9,7 @@ import contextlib
 import hashlib
 import json
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,6 +25,8 @@ from evoexp.store.kept_facts import installed_code
 from evoexp.store.log_reader import LogContents, read_log
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(16)  # per cubic segment
+NO_PART = ("batch", "commands", "papers", "playback", "report", "testing")
+"""Folders of code that planners and the certifier do not know: no verdict depends on them."""
 CLOSE = 1e-6  # [rad] by which goals may differ and be the same
 
 
@@ -62,7 +65,7 @@ def answers(condition: ConditionResults) -> pd.DataFrame:
 
 def answers_of(conditions: Sequence[ConditionResults]) -> dict[str, pd.DataFrame]:
     """Return the answers of conditions by their labels, see `answers`; judged on all cores."""
-    code = installed_code()
+    code = installed_code(NO_PART) + Path(__file__).read_bytes()
     runs = [(c, int(k)) for c in conditions for k in c.summaries.index]
     judged = on_all_cores(lambda run: _of_replicate(*run, code), runs)
     found: dict[str, list[Answer]] = {c.label: [] for c in conditions}

@@ -12,7 +12,7 @@ import importlib.util
 import json
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -54,15 +54,22 @@ def _versions() -> list[str]:
     return [importlib.metadata.version(name) for name in _LIBRARIES]
 
 
-def installed_code() -> bytes:
-    """Return the hash of the code of evoexp and of all guests, as it is now."""
+def installed_code(without: Collection[str] = ()) -> bytes:
+    """Return the hash of the code of evoexp and of all guests, as it is now.
+
+    Args:
+        without: Folders of evoexp that do not count.
+    """
     components = registrations(COMPONENTS)
-    code = [Path(__file__).parents[1], *(root for each in components for root in _sources(each))]
-    stamps = sorted(stamp for root in dict.fromkeys(code) for stamp in _stamps(str(root)))
+    own = Path(__file__).parents[1]
+    code = [own, *(root for each in components for root in _sources(each))]
+    left_out = tuple(f"{own / folder}{os.sep}" for folder in without)
+    found = {stamp for root in dict.fromkeys(code) for stamp in _stamps(str(root))}
+    stamps = sorted(stamp for stamp in found if not stamp[0].startswith(left_out))
     return _hash_of_code(json.dumps(components), tuple(stamps))
 
 
-@functools.lru_cache(maxsize=1)
+@functools.lru_cache(maxsize=2)
 def _hash_of_code(components: str, stamps: tuple[tuple[str, int, int], ...]) -> bytes:
     """Read all code, once per process as long as no file is written again."""
     digest = hashlib.sha256(components.encode())

@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 
 from evoexp.papers.curkovic import link_motions
-from evoexp.planners.coevolution.problem import Problem
+from evoexp.planners.coevolution.link_problem import Problem
 from evoexp.records import FloatArray
 from evoexp.report.kit import (
     ConditionResults,

@@ -13,7 +13,7 @@ from evoexp.papers.curkovic.figures import (
     robot_motions,
 )
 from evoexp.papers.curkovic.rules import RULES
-from evoexp.planners.coevolution.problem import Problem
+from evoexp.planners.coevolution.link_problem import Problem
 from evoexp.records import FloatArray
 from evoexp.report.kit import (
     Claim,

@@ -49,7 +49,7 @@ class Nsga2(WrappedPlanner, Component):
         """
         check_real_coded(self.planner, self.component)
         problem = super().prepare(robot, scenario)
-        one = self.planner.sample(problem, np.random.default_rng(0), 1)
+        one = self.planner.sample(problem, np.random.Generator(np.random.PCG64(0)), 1)
         names = tuple(self.planner.cost(problem, one).named_terms(0))
         for k, name in enumerate(self.objectives):
             if not any(term.startswith(name) for term in names):

@@ -22,6 +22,7 @@ class RealVectors(NamedTuple):
         mean: (variables,) of the drawn individuals.
         covariance: (variables, variables) of them, of mean variance 1.
         deviation: Root of the mean variance of the drawn individuals.
+        bounds: Least and greatest values of an individual's numbers, each of the template's shape.
     """
 
     template: FloatArray
@@ -29,12 +30,17 @@ class RealVectors(NamedTuple):
     mean: FloatArray
     covariance: FloatArray
     deviation: float
+    bounds: tuple[FloatArray, FloatArray]
 
     def population(self, vectors: FloatArray) -> FloatArray:
-        """Return vectors (individuals, variables) as the planner's `cost` takes individuals."""
+        """Return vectors (individuals, variables) as the planner's `cost` takes individuals.
+
+        Numbers beyond the bounds are put there.
+        """
         found = np.repeat(self.template[..., None], len(vectors), axis=-1)
         found[self.changes] = vectors.T
-        return found
+        low, high = (bound[..., None] for bound in self.bounds)
+        return np.asarray(np.minimum(np.maximum(found, low), high))
 
 
 def check_real_coded(planner: Planner, name: str) -> None:
@@ -56,7 +62,7 @@ def real_vectors(planner: Planner, problem: Any, drawn: FloatArray) -> RealVecto
     """Return where a search among individuals begins: as the planner's own first ones are spread.
 
     Args:
-        planner: A real-coded planner.
+        planner: A real-coded planner, which has `bounds(problem)`.
         problem: Its problem.
         drawn: Individuals of its `sample`, individuals last.
 
@@ -72,7 +78,8 @@ def real_vectors(planner: Planner, problem: Any, drawn: FloatArray) -> RealVecto
     mean, covariance = moments(vectors)
     variance = float(trace(covariance)) / len(covariance)
     shrink(covariance, variance)
-    return RealVectors(template, changes, mean, covariance, float(np.sqrt(variance)))
+    bounds = planner.bounds(problem)  # type: ignore[attr-defined]  # real-coded ones have them
+    return RealVectors(template, changes, mean, covariance, float(np.sqrt(variance)), bounds)
 
 
 @kernel

@@ -30,7 +30,7 @@ from evoexp.objectives.motion_criteria import MotionCriteria
 from evoexp.paths.motion import Motion, clamped_cubic, joint_ranges, top_speeds
 from evoexp.planners.coevolution.chromosome_length import SpeedLimit, length_notes
 from evoexp.planners.coevolution.kernels import Breeding, breed, measure, renew
-from evoexp.planners.coevolution.problem import Problem, check_ends
+from evoexp.planners.coevolution.link_problem import Problem, check_ends
 from evoexp.planners.coevolution.proven_teams import ProvenTeams
 from evoexp.planners.coevolution.settings import CoevolutionSettings
 from evoexp.planners.coevolution.teams import Evaluated, Judgement
@@ -137,7 +137,7 @@ class Coevolution(PlannerDefaults, Component):
             yield self._recorded(keeper, problem, populations, found, best)
 
     def _choice(self, problem: Problem) -> Callable[[FloatArray, Evaluated], BestTeam]:
-        """Return what chooses the best team of populations; a run keeps its verdicts."""
+        """Return the choice of the best team of populations; it keeps the verdicts of a run."""
         if self.answers_are_proven:
             return ProvenTeams(self, problem).settle
         return lambda _, found: best_team(found.collisions, found.teamable)

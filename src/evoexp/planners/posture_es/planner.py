@@ -143,7 +143,7 @@ class PostureEs(PlannerDefaults, Component):
         return Judgement(*judged, self.chosen)
 
     def _proves(self, problem: Problem, stage: Stage) -> Callable[[FloatArray, FloatArray], bool]:
-        """Return what proves the way from a parent (nq,) to its child in a phase."""
+        """Return the proof of the way from a parent (nq,) to its child in a phase."""
         part, margin = Part(problem.scene_of(stage), 0, 1), self.security_margin(problem)
 
         def is_proven(parent: FloatArray, child: FloatArray) -> bool:

@@ -37,6 +37,11 @@ class CoveredStrings(Strings):
         self.low = np.minimum(low, np.minimum(problem.start, problem.goal))[:, None, None]
         self.high = np.maximum(high, np.maximum(problem.start, problem.goal))[:, None, None]
 
+    @property
+    def limits(self) -> tuple[FloatArray, FloatArray]:
+        """Least and greatest angle of each joint, each (nq, 1, 1) [deg]."""
+        return self.low, self.high
+
     def smooth(self, strings: FloatArray, count: int) -> None:
         """Redistribute and relax the first `count` strings; what leaves the limits is put there."""
         super().smooth(strings, count)

@@ -34,8 +34,8 @@ from evoexp.planners.arm_tasks import (
 from evoexp.planners.departures import joint_names, of_limits, of_place
 from evoexp.planners.planner import COPIES, Candidate, Keeper, PlannerDefaults, num_values
 from evoexp.planners.via_point_ga.covered_strings import CoveredStrings
-from evoexp.planners.via_point_ga.proofs import Prover
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
+from evoexp.planners.via_point_ga.string_proofs import Prover
 from evoexp.planners.via_point_ga.strings import (
     JudgedGeneration,
     Judgement,
@@ -150,6 +150,12 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
             hits = judged.terms.collisions[: population.shape[2]]
             Prover(self, problem).settle(padded, judged.cost, hits)
         return judged
+
+    def bounds(self, problem: Problem) -> tuple[FloatArray, FloatArray]:
+        """Return the least and the greatest value of an individual's numbers, each (nq, N + 1)."""
+        strings, shape = self._strings(problem), (len(problem.start), self.num_via_points + 1)
+        low, high = (np.broadcast_to(limit[..., 0], shape) for limit in strings.limits)
+        return low, high
 
     def improve(
         self, problem: Problem, population: FloatArray, rng: np.random.Generator

@@ -184,6 +184,12 @@ class Strings:
             tables=getattr(problem.collision, "tables", ()),
         )
 
+    @property
+    def limits(self) -> tuple[FloatArray, FloatArray]:
+        """Least and greatest angle of each joint, each (nq, 1, 1) [deg]; here there are none."""
+        most = np.full((len(self.problem.start), 1, 1), np.inf)
+        return -most, most
+
     def padded(self, strings: FloatArray) -> FloatArray:
         """Return a copy of strings (nq, N + 1, count), padded to whole vectors by zeros."""
         count = strings.shape[2]

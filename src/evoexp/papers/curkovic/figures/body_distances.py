@@ -7,7 +7,7 @@ from matplotlib.ticker import MaxNLocator
 
 from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.curkovic import link_motions
-from evoexp.planners.coevolution.problem import Problem
+from evoexp.planners.coevolution.link_problem import Problem
 from evoexp.report.kit import (
     ConditionResults,
     body_contacts,

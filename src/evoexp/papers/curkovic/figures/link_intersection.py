@@ -10,7 +10,7 @@ from matplotlib.patches import Arc
 from evoexp.collision.models.link_crossings import closed_form
 from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.curkovic import link_motions
-from evoexp.planners.coevolution.problem import Problem
+from evoexp.planners.coevolution.link_problem import Problem
 from evoexp.report.kit import ConditionResults, records, rounded, style
 
 SAMPLES = 200  # configurations per segment of the straight line among which one is chosen

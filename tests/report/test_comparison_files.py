@@ -29,6 +29,9 @@ ROWS = [
         1.0,
         0,
         4,
+        20.0,
+        51.5,
+        0.25,
     ),
     Rated(
         "q: C",
@@ -51,10 +54,12 @@ ROWS = [
 
 def test_csv_has_all_digits() -> None:
     head, first, second = csv.reader(io.StringIO(as_csv(ROWS).decode()))
-    assert head[:4] == ["planner", "problem", "n", "proven"] and len(set(head)) == 10
+    assert head[:4] == ["planner", "problem", "n", "proven"] and len(set(head)) == 13
     assert first[:4] == ["[A] & B_1 50%", "p_1", "4", "3"]
-    assert [float(cell) for cell in first[4:]] == [1234.5, 900.25, 2000.125, 4 / 3, 1.0, 2.0]
-    assert second == ["C (given)", "q, {a}", "2", "0", "inf", "1000000.0", *["inf"] * 4]
+    numbers = [1234.5, 900.25, 2000.125, 4 / 3, 1.0, 2.0, 24690.0, 51.5, 0.25]
+    assert [float(cell) for cell in first[4:]] == numbers
+    unknown = ["", "", ""]  # of runs that were given
+    assert second == ["C (given)", "q, {a}", "2", "0", "inf", "1000000.0", *["inf"] * 4, *unknown]
 
 
 def test_latex_has_a_row_per_planner_and_problem() -> None:

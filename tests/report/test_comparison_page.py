@@ -150,6 +150,7 @@ def test_planners_of_several_problems_are_named_by_their_components(
     assert [table.heading for table in page.tables] == [
         "Problems",
         "Answers",
+        "The same in other coins",
     ]  # no problem has all planners
     names = set(page.drawings[0].table()["planner"])
     assert all(name.startswith(("via_point_ga", "random_search", "multi_start")) for name in names)
@@ -163,3 +164,16 @@ def test_answers_that_are_no_motions_are_not_compared(
     results = gather(tmp_path, experiment.conditions, None, experiment.name, "smoke", "")
     with pytest.raises(NothingStored, match="no stored solution is a motion"):
         comparison.page(results, settings)
+
+
+def test_effort_in_other_coins(stored: Path, settings: ReportSettings) -> None:
+    conditions = list(expand("rana_planar").conditions)
+    results = gather(stored, conditions, None, "", "", "")
+    rows = comparison.rated(of_results(results.evolved, {}), settings)
+    assert len(rows) == len(results.evolved)
+    for row, condition in zip(rows, results.evolved, strict=True):
+        assert row.body_tests == 9 * 9  # circles on two arms
+        if row.proven:
+            assert row.evaluations == condition.column("evaluations").sum() / row.proven
+            assert row.cpu_s == condition.column("cpu_s").sum() / row.proven
+        assert row.own_cost.median == np.median(condition.column("best_cost"))

@@ -71,7 +71,12 @@ def answers_of(conditions: Sequence[ConditionResults]) -> dict[str, pd.DataFrame
     found: dict[str, list[Answer]] = {c.label: [] for c in conditions}
     for (condition, _), own in zip(runs, judged, strict=True):
         found[condition.label] += own
-    return {label: pd.DataFrame(own, columns=list(Answer._fields)) for label, own in found.items()}
+    return {label: answer_table(own) for label, own in found.items()}
+
+
+def answer_table(found: Sequence[Answer]) -> pd.DataFrame:
+    """Return answers as a table, its columns of the same types where there are none."""
+    return pd.DataFrame(found, columns=list(Answer._fields)).astype(Answer.__annotations__)
 
 
 def motion_length(motion: Motion) -> float:

@@ -17,7 +17,7 @@ from evoexp.configuration.experiment import Experiment
 from evoexp.configuration.search_path import options
 from matrix import examples
 
-KINDS = range(255)  # numbers of all kinds of conditions; `test_shipped` checks how many there are
+KINDS = range(194)  # numbers of all kinds of conditions; `test_shipped` checks how many there are
 EXAMPLES = (  # (experiment, number of its condition): every planner, and its rarer parts
     ("rana_obstacles", 0),
     ("rana_planar", 1),  # random search
@@ -78,11 +78,11 @@ def different_conditions(budget: str) -> dict[str, Condition]:
 
 @functools.cache
 def kinds_of_conditions(budget: str) -> list[Condition]:
-    """Return `different_conditions`, of those that differ in numbers only the last.
+    """Return `different_conditions`, of those that differ in numbers and files only the last.
 
-    Sweeps are long and alike.
+    Sweeps are long and alike, and so are problems of a data set.
     """
-    numbers = re.compile(r"-?\d+(\.\d+)?([eE][-+]?\d+)?")
+    numbers = re.compile(r'"[0-9a-f]{64}"|-?\d+(\.\d+)?([eE][-+]?\d+)?')
     found = {
         numbers.sub("0", c.to_json().decode()): c for c in different_conditions(budget).values()
     }

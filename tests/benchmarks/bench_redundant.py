@@ -12,7 +12,7 @@ import numpy as np
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.configuration import compose
-from evoexp.planners.redundant_ga.planner import Problem
+from evoexp.planners.reaching_tasks import Problem
 from evoexp.records import FloatArray
 
 NUM_PATHS = 800

@@ -225,7 +225,10 @@ def test_overrides(refused: Refused, override: str, message: str) -> None:
             "motion file: one is needed (.json or .npy), got 2: a",
         ),
         (("reproduce", "no/such.mcap"), "no/such.mcap: cannot be read: No such file or directory"),
-        (("reproduce", "abc"), "NOTHING TO COMPARE: hash: no run 'abc' among the 0 in"),
+        (
+            ("reproduce", "abcabcabcabc"),
+            "NOTHING TO COMPARE: hash: no run 'abcabcabcabc' among the 0 in",
+        ),
         (
             ("reproduce", "xyz"),
             "NOTHING TO COMPARE: hash: must be 1 to 64 hexadecimal digits, was 'xyz'",

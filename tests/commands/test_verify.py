@@ -182,7 +182,7 @@ def test_an_empty_store_and_unknown_hashes(
 ) -> None:
     assert evoexp("verify").out == "0 runs, 0 logs: all is well\n"
     assert not outputs.exists()
-    assert "no run 'abc' among the 0" in refused("verify", "abc")
+    assert "no run 'abcabcabcabc' among the 0" in refused("verify", "abcabcabcabc")
 
 
 def test_a_directory_that_may_not_be_read_hides_no_other(

@@ -11,7 +11,8 @@ import pytest
 from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.planners.proofs import judge_motion
-from evoexp.planners.redundant_ga.planner import Problem, RedundantGa
+from evoexp.planners.reaching_tasks import Problem
+from evoexp.planners.redundant_ga.planner import RedundantGa
 from evoexp.records import FloatArray
 
 SMALL = ("ga.population_size=60", "ga.num_generations=8", "planner.num_attempts=3")

@@ -9,7 +9,7 @@ from evoexp.papers.lavoie.figures import attempts, error_distribution, reaching_
 from evoexp.papers.lavoie.figures.reaching_motions import ShownMotion
 from evoexp.papers.lavoie.measures import RefutedMotions
 from evoexp.papers.lavoie.rules import RULES
-from evoexp.planners.redundant_ga.planner import Problem
+from evoexp.planners.reaching_tasks import Problem
 from evoexp.report.kit import (
     Claim,
     ConditionResults,

@@ -20,8 +20,7 @@ from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.link_ellipses import EllipseCollision, LinkEllipses
-from evoexp.collision.scene import Scene, scene
+from evoexp.collision.models.link_ellipses import LinkEllipses
 from evoexp.errors import SettingError
 from evoexp.numeric.vectors import LANES
 from evoexp.objectives.reaching import Reaching
@@ -29,12 +28,13 @@ from evoexp.paths.motion import Motion
 from evoexp.planners.departures import joint_names, of_limits, of_place
 from evoexp.planners.planner import COPIES, Candidate, Keeper, PlannerDefaults, num_values
 from evoexp.planners.proofs import Acceptance, Proofs
+from evoexp.planners.reaching_tasks import Problem, reaching_problem
 from evoexp.planners.redundant_ga import kernels
 from evoexp.planners.redundant_ga.kernels import RESULTS, Judging
 from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic, SelectiveSettings
 from evoexp.planners.redundant_ga.sub_path import BestEnd, Search
 from evoexp.records import BoolArray, FloatArray, Generation
-from evoexp.robots.assembly import Assembly, Robot
+from evoexp.robots.assembly import Robot
 from evoexp.scenarios.pick_and_place import PickAndPlace
 from evoexp.validation import Component, Count, Positive
 
@@ -44,31 +44,6 @@ TERMS = (
     ("joint_displacement", "_rad"),
 )  # of each sub-path, with unit
 CONTACT = ("position", "obstacle", "link", "swept")  # the fields of `link_ellipses.Contact`
-ANYWHERE = np.array([-np.inf, np.inf, -np.inf, np.inf])  # the box of SP1
-
-
-class Problem(NamedTuple):
-    """Robot and scenario, prepared for the search.
-
-    Attributes:
-        assembly: The robot, built.
-        collision: The paper's collision model on it.
-        start: (joints,) [rad].
-        joint_limits: (joints, 2) [rad].
-        targets: (2, 2) via point and goal point.
-        boxes: (2, 4) where the tip must end: least and greatest x, y.
-        scene: The bodies themselves, for the exact verdict on a motion.
-        security_margin: Clearance that the task requires [length unit].
-    """
-
-    assembly: Assembly
-    collision: EllipseCollision
-    start: FloatArray
-    joint_limits: FloatArray
-    targets: FloatArray
-    boxes: FloatArray
-    scene: Scene
-    security_margin: float
 
 
 class Judgement(NamedTuple):
@@ -135,28 +110,7 @@ class RedundantGa(PlannerDefaults, Component):
         """
         if not isinstance(self.ga, RealGenetic | BinaryGenetic):
             raise SettingError("ga", "a real_genetic or a binary_genetic", self.ga.component)
-        assembly = robot.build()
-        table = scenario.obstacle_table()
-        collision = self.collision.bind(assembly, table)
-        model, start = assembly.model, np.array(scenario.q_start)
-        limits = np.column_stack([model.lowerPositionLimit, model.upperPositionLimit])
-        if not (np.abs(limits) < 1e6).all():
-            raise SettingError("robot.joint_limits", "given: postures are drawn between them", None)
-        if len(start) != model.nq:
-            raise SettingError("scenario.q_start", f"one angle per joint ({model.nq})", len(start))
-        for k, (angle, (least, greatest)) in enumerate(zip(start, limits, strict=True)):
-            if not least <= angle <= greatest:
-                must = f"within the joint's limits, {least:g} to {greatest:g} rad"
-                raise SettingError(f"scenario.q_start[{k}]", must, float(angle))
-        if contact := collision.contact(start, start):
-            must = f"free of collision (link {contact.link} touches obstacle {contact.obstacle})"
-            raise SettingError("scenario.q_start", must, list(scenario.q_start))
-        targets = np.array([scenario.via_point, scenario.goal_point])
-        boxes = np.array([ANYWHERE, scenario.box])
-        bodies = scene(assembly, table)
-        return Problem(
-            assembly, collision, start, limits, targets, boxes, bodies, scenario.security_margin
-        )
+        return reaching_problem(robot, scenario, self.collision)
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield the generations of all searches; their indices go on counting."""

@@ -7,7 +7,8 @@ import numpy as np
 from pydantic import field_validator
 
 from evoexp.errors import SettingError
-from evoexp.planners.redundant_ga.planner import Problem, RedundantGa
+from evoexp.planners.reaching_tasks import Problem
+from evoexp.planners.redundant_ga.planner import RedundantGa
 from evoexp.planners.redundant_ga.sub_path import DrawnSearch
 from evoexp.planners.wrapped_planner import WrappedPlanner
 from evoexp.records import Generation

@@ -3,7 +3,9 @@
 from typing import ClassVar, Literal
 
 from evoexp.collision.models.covered_bodies import CoveredBodies
+from evoexp.collision.models.link_ellipses import LinkEllipses
 from evoexp.collision.models.touching_spheres import TouchingSpheres
+from evoexp.planners.proofs import Acceptance
 from evoexp.validation import (
     Component,
     Count,
@@ -67,6 +69,36 @@ class RrtSettings(EdgeSettings):
     max_iterations: Count
     ga: TreeGrowth
     num_restarts: NonNegativeCount = 0
+
+
+class ReachingSettings(Settings):
+    """Hyperparameters of trees toward postures whose tip is at a given place.
+
+    Distances are Euclidean over all joints, in degrees.
+
+    Attributes:
+        range: Length of a step, the longest edge of a tree [deg].
+        resolution: Greatest distance between configurations that are tested on an edge [deg].
+        num_postures: Free postures drawn for a place of the tip, of which the nearest one is taken.
+        max_iterations: Draws after which the search for postures, or for a path to the one taken,
+            is given up.
+        num_shortcuts: Attempts to shorten the path to a posture; 0: none.
+        num_restarts: How often all is begun anew; the shortest path of all is the answer.
+        ga: Iterations per record, and records.
+        collision: Links as lines among ellipses, tested at single configurations.
+        acceptance: Which plans are an answer: those whose tested configurations are free, or those
+            of them that the exact certifier proves.
+    """
+
+    range: Positive
+    resolution: Positive
+    num_postures: Count
+    max_iterations: Count
+    num_shortcuts: NonNegativeCount
+    num_restarts: NonNegativeCount
+    ga: TreeGrowth
+    collision: LinkEllipses
+    acceptance: Acceptance = "model"
 
 
 class QueryChunks(Component):

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from evoexp.collision.models.covered_bodies import CoveredCollision
+from evoexp.collision.models.ellipse_configurations import EllipseConfigurations
 from evoexp.collision.models.touching_spheres import SphereCollision
 from evoexp.planners.sampling_based.kernels import nearest_node, step_toward, tested_configurations
 from evoexp.records import FloatArray, IntArray
@@ -20,7 +21,11 @@ class EdgeTest:
         queries: Configurations asked for so far, also those behind the first contact of an edge.
     """
 
-    def __init__(self, collision: SphereCollision | CoveredCollision, resolution: float) -> None:
+    def __init__(
+        self,
+        collision: SphereCollision | CoveredCollision | EllipseConfigurations,
+        resolution: float,
+    ) -> None:
         """Begin with no query.
 
         Args:

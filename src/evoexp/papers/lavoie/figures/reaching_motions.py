@@ -11,7 +11,7 @@ from matplotlib.patches import Ellipse, Patch, Rectangle
 from matplotlib.patheffects import withStroke
 
 from evoexp.numeric.elementary import DEGREE
-from evoexp.planners.redundant_ga.planner import Problem
+from evoexp.planners.reaching_tasks import Problem
 from evoexp.records import FloatArray
 from evoexp.report.kit import (
     ConditionResults,

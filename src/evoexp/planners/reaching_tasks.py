@@ -1,0 +1,66 @@
+"""Tasks of one planar arm among ellipses: its tip passes a via point and ends at a goal point."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from evoexp.collision.models.link_ellipses import EllipseCollision, LinkEllipses
+from evoexp.collision.scene import Scene, scene
+from evoexp.errors import SettingError
+from evoexp.records import FloatArray
+from evoexp.robots.assembly import Assembly, Robot
+from evoexp.scenarios.pick_and_place import PickAndPlace
+
+ANYWHERE = np.array([-np.inf, np.inf, -np.inf, np.inf])  # the box of the first sub-path
+
+
+class Problem(NamedTuple):
+    """Robot and scenario, prepared for the search.
+
+    Attributes:
+        assembly: The robot, built.
+        collision: The paper's collision model on it.
+        start: (joints,) [rad].
+        joint_limits: (joints, 2) [rad].
+        targets: (2, 2) via point and goal point.
+        boxes: (2, 4) where the tip must end: least and greatest x, y.
+        scene: The bodies themselves, for the exact verdict on a motion.
+        security_margin: Clearance that the task requires [length unit].
+    """
+
+    assembly: Assembly
+    collision: EllipseCollision
+    start: FloatArray
+    joint_limits: FloatArray
+    targets: FloatArray
+    boxes: FloatArray
+    scene: Scene
+    security_margin: float
+
+
+def reaching_problem(robot: Robot, scenario: PickAndPlace, model: LinkEllipses) -> Problem:
+    """Build the robot and check that the start fits it and is free of collision.
+
+    Raises:
+        SettingError: If it is not, or the robot has no joint limits to draw postures from.
+    """
+    assembly = robot.build()
+    table = scenario.obstacle_table()
+    collision = model.bind(assembly, table)
+    arm, start = assembly.model, np.array(scenario.q_start)
+    limits = np.column_stack([arm.lowerPositionLimit, arm.upperPositionLimit])
+    if not (np.abs(limits) < 1e6).all():
+        raise SettingError("robot.joint_limits", "given: postures are drawn between them", None)
+    if len(start) != arm.nq:
+        raise SettingError("scenario.q_start", f"one angle per joint ({arm.nq})", len(start))
+    for k, (angle, (least, greatest)) in enumerate(zip(start, limits, strict=True)):
+        if not least <= angle <= greatest:
+            must = f"within the joint's limits, {least:g} to {greatest:g} rad"
+            raise SettingError(f"scenario.q_start[{k}]", must, float(angle))
+    if contact := collision.contact(start, start):
+        must = f"free of collision (link {contact.link} touches obstacle {contact.obstacle})"
+        raise SettingError("scenario.q_start", must, list(scenario.q_start))
+    targets = np.array([scenario.via_point, scenario.goal_point])
+    boxes = np.array([ANYWHERE, scenario.box])
+    bodies, margin = scene(assembly, table), scenario.security_margin
+    return Problem(assembly, collision, start, limits, targets, boxes, bodies, margin)

@@ -1,0 +1,284 @@
+"""RRT-Connect to places of a planar arm's tip: a posture is sought at each, then a path to it.
+
+A baseline beside the search of Lavoie & Boudreau 2001. For the via point and then for the goal
+point, postures whose tip is there are found from random ones by damped least squares; the nearest
+of the free ones is the goal of two trees, and the path between them is made shorter by shortcuts.
+
+A solution is flat: posture by posture, joint by joint (postures × joints) [rad], the start
+included; the start alone: no path was found, and there is no motion. A generation is a batch of
+iterations: postures drawn, configurations that trees grow toward, shortcuts tried. Its costs are
+the lengths of the plans that its iterations complete, inf elsewhere; its population is the shortest
+plan so far.
+"""
+
+from collections.abc import Generator, Iterator
+from typing import Any, ClassVar
+
+import numpy as np
+
+from evoexp.collision.models.ellipse_configurations import EllipseConfigurations
+from evoexp.errors import SettingError
+from evoexp.evolution.cost_statistics import cost_statistics
+from evoexp.numeric.elementary import DEGREE
+from evoexp.paths.motion import Motion
+from evoexp.planners.departures import joint_names, of_limits, of_place
+from evoexp.planners.planner import Candidate, JudgementArrays, Keeper, PlannerDefaults
+from evoexp.planners.proofs import Proofs
+from evoexp.planners.reaching_tasks import Problem, reaching_problem
+from evoexp.planners.sampling_based.kernels import distance
+from evoexp.planners.sampling_based.node_paths import path_length
+from evoexp.planners.sampling_based.settings import ReachingSettings
+from evoexp.planners.sampling_based.shortcuts import ShortenedPath
+from evoexp.planners.sampling_based.trees import EdgeTest, TreePair
+from evoexp.records import FloatArray, Generation
+from evoexp.robots.assembly import Robot
+from evoexp.robots.planar_postures import bring_tip_to, tip
+from evoexp.scenarios.pick_and_place import PickAndPlace
+from evoexp.validation import Component
+
+CLOSE = 1e-6  # [-] of the arm's length, by which the tip may miss a place
+NODES_PER_ITERATION = 4  # of both trees, for the estimate of memory: most have fewer
+PLACES = "via point", "goal point"
+
+
+class RrtReaching(PlannerDefaults, ReachingSettings, Component):
+    """RRT-Connect to postures that reach the via point, and then to some that reach the goal."""
+
+    component: ClassVar[str] = "rrt_reaching"
+
+    def prepare(self, robot: Robot, scenario: PickAndPlace) -> Problem:
+        """Build the robot and check that the start fits it and is free of collision.
+
+        Raises:
+            SettingError: If it is not, the robot has no joint limits, or the goal is not in the
+                box.
+        """
+        problem = reaching_problem(robot, scenario, self.collision)
+        (x, y), (left, right, bottom, top) = problem.targets[1], problem.boxes[1]
+        if not (left <= x <= right and bottom <= y <= top):
+            must = f"in the box, x from {left:g} to {right:g} and y from {bottom:g} to {top:g}"
+            raise SettingError("scenario.goal_point", must, [float(x), float(y)])
+        return problem
+
+    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
+        """Yield a record per batch of iterations, until the last plan is complete or given up."""
+        search, keeper = _Search(self, problem), Keeper()
+        steps = search.steps(rng)
+        for index in range(self.num_generations + 1):
+            costs, asked = np.full(self.num_evaluations(index), np.inf), search.edges.queries
+            count, stop_reason = 0, ""
+            while count < len(costs) and not stop_reason:
+                costs[count] = next(steps, np.nan)
+                stop_reason = search.end if np.isnan(costs[count]) else ""
+                count += not stop_reason
+            costs = costs[: max(1, count)]
+            costs[np.isnan(costs)] = np.inf
+            keeper.keep(search.best_cost, search.candidate())
+            yield keeper.record(
+                cost_statistics(costs),
+                costs,
+                search.best,
+                lowest=float(costs.min()),
+                num_feasible=int(np.count_nonzero(np.isfinite(costs))),
+                evaluations=len(costs),
+                collision_queries=search.edges.queries - asked,
+                stop_reason=stop_reason,
+            )
+            if stop_reason:
+                return
+
+    @property
+    def num_generations(self) -> int:
+        """Batches after the first, at most."""
+        batches = -(-self._most_iterations // self.ga.iterations_per_generation)
+        return min(self.ga.num_generations, batches - 1)
+
+    def num_evaluations(self, index: int) -> int:
+        """Return the iterations of a generation, at most; a run may end within one."""
+        size = self.ga.iterations_per_generation
+        return max(0, min(size, self._most_iterations - index * size))
+
+    @property
+    def _most_iterations(self) -> int:
+        """Iterations of a run that finds all as late as it may, and one to find that it is done."""
+        return (1 + self.num_restarts) * 2 * (2 * self.max_iterations + self.num_shortcuts) + 1
+
+    def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
+        """Refuse: trees are grown, paths are not drawn one by one.
+
+        Raises:
+            SettingError: Always.
+        """
+        raise SettingError("planner", "one that draws paths one by one", self.component)
+
+    def cost(self, problem: Problem, population: FloatArray) -> JudgementArrays:
+        """Judge paths (joints, postures, individuals) [rad]: their length in degrees.
+
+        It is inf where a tested edge collides.
+        """
+        edges = EdgeTest(EllipseConfigurations(problem.collision), self.resolution)
+        paths = [np.ascontiguousarray(path) / DEGREE for path in population.transpose(2, 1, 0)]
+        lengths = np.array([path_length(path) for path in paths])
+        collisions = np.array([edges.num_contacts(path) for path in paths])
+        feasible = (collisions == 0) & np.isfinite(lengths)
+        terms = {"length_deg": lengths, "collisions": collisions}
+        return JudgementArrays(np.where(feasible, lengths, np.inf), feasible, edges.queries, terms)
+
+    def solution(self, problem: Problem, population: FloatArray, individual: int) -> FloatArray:
+        """Return one path of a population (joints, postures, individuals) as a flat solution."""
+        return np.asarray(population[:, :, individual].T.ravel())
+
+    def motion(self, problem: Problem, solution: FloatArray) -> Motion | None:
+        """Return the joint-space motion: straight, postures in equal times; None without a path."""
+        path = self._path(problem, solution)
+        return Motion(path) if len(path) > 1 else None
+
+    def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
+        """Return length and contacts of a path, and how near its postures come to both places.
+
+        Raises:
+            ValueError: If the solution is no list of postures.
+        """
+        path = self._path(problem, solution)
+        terms = self.cost(problem, path.T[:, :, None]).named_terms(0)
+        via, goal = self._errors(problem, path)
+        return terms | {"via_error": via, "goal_error": goal}
+
+    def departures(self, problem: Problem, solution: FloatArray) -> list[str]:
+        """Compare start, joint limits and the two places of the tip with the task's."""
+        path = self._path(problem, solution)
+        names, close = joint_names(len(problem.start)), CLOSE * problem.collision.arm.lengths.sum()
+        found = [
+            *of_place("the start", path[0], problem.start, "rad"),
+            *of_limits(names, path.T, problem.joint_limits, "rad"),
+        ]
+        for place, error in zip(PLACES, self._errors(problem, path), strict=True):
+            if error > close:
+                found.append(f"the tip misses the {place} by {error:.3g}")
+        return found
+
+    def shape(self, problem: Problem) -> tuple[Any, ...]:
+        """Return the documented shape of a solution: any number of postures × joints."""
+        return ..., (len(problem.start),)
+
+    def memory(self, problem: Problem) -> int:
+        """Return the memory of both trees, of their copy as they grow, and of an edge's tests."""
+        low, high = problem.joint_limits.T / DEGREE
+        tested = distance(low, high) / self.resolution
+        nodes = NODES_PER_ITERATION * self.max_iterations
+        return int(8 * (len(problem.start) + 1) * (4 * nodes + 2 * tested))
+
+    def _errors(self, problem: Problem, path: FloatArray) -> tuple[float, float]:
+        """Return the least distance of the tip from the via point, and its last from the goal."""
+        tips = np.array([tip(q, problem.collision.arm) for q in path])
+        via, goal = (np.sqrt(((tips - target) ** 2).sum(axis=1)) for target in problem.targets)
+        return float(via.min()), float(goal[-1])
+
+    def _path(self, problem: Problem, solution: FloatArray) -> FloatArray:
+        """Return a flat solution as a path (postures, joints) [rad]."""
+        num = len(problem.start)
+        if solution.ndim != 1 or len(solution) == 0 or len(solution) % num:
+            raise ValueError(f"a solution has a multiple of {num} values, was {solution.shape}")
+        return np.ascontiguousarray(solution.reshape(-1, num))
+
+
+class _Search:
+    """The state of one run.
+
+    Attributes:
+        edges: Tests edges and counts.
+        best_cost: Length of the shortest plan so far [deg], inf without one.
+        best: (postures, joints) the shortest plan [rad]; the start alone without one.
+    """
+
+    def __init__(self, planner: RrtReaching, problem: Problem) -> None:
+        self._planner, self._problem = planner, problem
+        self.edges = EdgeTest(EllipseConfigurations(problem.collision), planner.resolution)
+        self.best_cost, self.best = np.inf, problem.start[None]
+        self._plans = self._iterations = 0
+        self._proofs = Proofs(planner, problem) if planner.answers_are_proven else None
+
+    @property
+    def end(self) -> str:
+        """The reason why a run ends that has done all it may."""
+        return "solution" if np.isfinite(self.best_cost) else "no solution"
+
+    def candidate(self) -> Candidate:
+        """Return the shortest plan as it is recorded."""
+        terms = {
+            "length_deg": self.best_cost,
+            "iterations": float(self._iterations),
+            "plans": float(self._plans),
+        }
+        return Candidate(self.best.ravel(), terms, bool(np.isfinite(self.best_cost)))
+
+    def steps(self, rng: np.random.Generator) -> Iterator[float]:
+        """Yield after every iteration: the length of the plan that it completes [deg], or inf."""
+        for _ in range(1 + self._planner.num_restarts):
+            nodes = yield from self._plan(rng)
+            if nodes is None:
+                continue
+            length, plan = path_length(nodes), np.ascontiguousarray(DEGREE * nodes)
+            self._plans += 1
+            shorter = length < self.best_cost
+            if shorter and (self._proofs is None or self._proofs.is_proven(plan.ravel())):
+                self.best_cost, self.best = length, plan
+            yield length
+
+    def _plan(self, rng: np.random.Generator) -> Generator[float, None, FloatArray | None]:
+        """Search a path (postures, joints) [deg] to the via point and on to the goal point."""
+        nodes = self._problem.start[None] / DEGREE
+        for target in self._problem.targets:
+            found = yield from self._extended(rng, nodes, target)
+            if found is None:
+                return None
+            nodes = found
+        return nodes
+
+    def _extended(
+        self, rng: np.random.Generator, nodes: FloatArray, target: FloatArray
+    ) -> Generator[float, None, FloatArray | None]:
+        """Search a way from the end of a path (postures, joints) to a place of the tip."""
+        planner = self._planner
+        goal = yield from self._posture(rng, nodes[-1], target)
+        if goal is None:
+            return None
+        low, high = self._problem.joint_limits.T / DEGREE
+        trees = TreePair(nodes[-1], goal, self.edges, planner.range)
+        for _ in range(planner.max_iterations):
+            self._iterations += 1
+            found = trees.iterate(low + rng.random(len(low)) * (high - low))
+            yield np.inf
+            if found is not None:
+                break
+        else:
+            return None
+        path = ShortenedPath(found, self.edges)
+        for _ in range(planner.num_shortcuts):
+            path.attempt(rng.random(2))
+            yield np.inf
+        return np.concatenate([nodes, path.nodes[1:]])
+
+    def _posture(
+        self, rng: np.random.Generator, begin: FloatArray, target: FloatArray
+    ) -> Generator[float, None, FloatArray | None]:
+        """Search free postures whose tip is at a place; return the nearest to one (joints,) [deg].
+
+        None: too many draws led to none.
+        """
+        problem, planner = self._problem, self._planner
+        low, high = problem.joint_limits.T
+        nearest, least, count = None, np.inf, 0
+        for _ in range(planner.max_iterations):
+            q = low + (high - low) * rng.random(len(low))
+            reached = bring_tip_to(q, target, problem.joint_limits, problem.collision.arm)
+            posture = q / DEGREE
+            self._iterations += 1
+            if reached and self.edges.is_free_at(posture):
+                count += 1
+                far = distance(begin, posture)
+                nearest, least = (posture, far) if far < least else (nearest, least)
+            yield np.inf
+            if count == planner.num_postures:
+                break
+        return nearest

@@ -17,7 +17,7 @@ TOLERANCE = 1e-9  # [-] of numbers that pass through another unit on their way
 OF_THE_SEARCH = {
     *("attempts", "sub_path", "phase", "cycles", "idle_cycles"),
     "certificates",
-    *("iterations", "nodes", "first_solution_queries", "first_solution_length_deg"),
+    *("iterations", "nodes", "plans", "first_solution_queries", "first_solution_length_deg"),
 }
 """Terms that describe how the search went, which no solution alone can know."""
 NUM_SAMPLES = 6  # [-] individuals that are drawn and judged

@@ -10,7 +10,8 @@ from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import SettingError
-from evoexp.planners.planner import Keeper, judge_motion
+from evoexp.planners.planner import Keeper
+from evoexp.planners.proofs import judge_motion
 from evoexp.robots.floor_manipulator import FloorManipulator
 from evoexp.store.log_reader import read_log
 

@@ -1,7 +1,7 @@
 """Logs and tables without the times that no two runs share, and with every other byte.
 
-A log is compared as bytes: its times are set to zero where they stand, and what depends on the
-length or value of their text (offsets behind them, checksums over them) is set right or to zero.
+A log is compared as bytes: its times are set to zero where they stand, chunks are compared as what
+they hold, and what depends on length or value of them (offsets, checksums) is set to zero.
 """
 
 from pathlib import Path
@@ -10,31 +10,20 @@ from typing import Any
 import pyarrow.parquet as pq
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
-from mcap.records import AttachmentIndex, ChunkIndex, DataEnd, Footer, Metadata, MetadataIndex
+from mcap.records import AttachmentIndex, ChunkIndex, Metadata, MetadataIndex
 
-from evoexp.store.container import check, parse
+from evoexp.store.container import check, chunk_messages, parse
 from evoexp.store.log import SUMMARY
 
 TIMES = ("certificate_s", "cpu_s", "wall_s")  # [s] all that two runs of a replicate may differ in
-_MAGIC = 8  # [B]
 _HEAD = 9  # [B] opcode and length of a record
 
 
 def masked_log(content: bytes) -> bytes:
     """Return the bytes of a log with its times, and what follows from them, set to zero."""
     container = check(content, "log")
-    records, place, start, longer = [], _MAGIC, 0, 0
-    for opcode, body in container.data_section():
-        if opcode == Opcode.METADATA and parse(Metadata, body).name == SUMMARY:
-            masked = _without_times(body)
-            start, longer = place, len(body) - len(masked)
-        records.append((opcode, body))
-        place += _HEAD + len(body)
-    assert start, "a log has a summary"
-    records += container.summary_section()
-    found = [_masked(opcode, body, start, longer) for opcode, body in records]
-    footer = Footer(container.summary_start - longer, 0, 0)
-    return content[:_MAGIC] + b"".join([*found, _bytes(footer)]) + content[-_MAGIC:]
+    records = [*container.data_section(), *container.summary_section()]
+    return b"".join(_masked(opcode, body) for opcode, body in records)
 
 
 def masked_rows(summary: Path) -> list[dict[str, Any]]:
@@ -80,30 +69,25 @@ def _without_times(body: bytes) -> bytes:
     return _bytes(metadata)[_HEAD:]
 
 
-def _masked(opcode: int, body: bytes, start: int, longer: int) -> bytes:
-    """Return a record as it were if the summary, which begins at `start`, were `longer` less."""
-
-    def moved(offset: int) -> int:
-        return offset - longer if offset > start else offset
-
+def _masked(opcode: int, body: bytes) -> bytes:
+    """Return a record without times, places and checksums."""
     if opcode == Opcode.METADATA and parse(Metadata, body).name == SUMMARY:
         body = _without_times(body)
+    elif opcode == Opcode.CHUNK:
+        messages = [message._replace(publish_time=0) for message in chunk_messages(body)]
+        body = repr(messages).encode()
     elif opcode == Opcode.DATA_END:
-        body = _bytes(DataEnd(0))[_HEAD:]
+        body = b""
     elif opcode == Opcode.METADATA_INDEX:
-        entry = parse(MetadataIndex, body)
-        length = entry.length - longer if entry.offset == start else entry.length
-        body = _bytes(MetadataIndex(moved(entry.offset), length, entry.name))[_HEAD:]
+        body = parse(MetadataIndex, body).name.encode()
     elif opcode == Opcode.ATTACHMENT_INDEX:
         attachment = parse(AttachmentIndex, body)
-        attachment.offset = moved(attachment.offset)
+        attachment.offset = 0
         body = _bytes(attachment)[_HEAD:]
     elif opcode == Opcode.CHUNK_INDEX:
         chunk = parse(ChunkIndex, body)
-        chunk.chunk_start_offset = moved(chunk.chunk_start_offset)
-        places = chunk.message_index_offsets
-        chunk.message_index_offsets = {k: moved(offset) for k, offset in places.items()}
-        body = _bytes(chunk)[_HEAD:]
+        body = repr((chunk.message_start_time, chunk.message_end_time)).encode()
+        body += repr((sorted(chunk.message_index_offsets), chunk.uncompressed_size)).encode()
     return bytes([opcode]) + len(body).to_bytes(8, "little") + body
 
 

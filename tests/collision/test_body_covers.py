@@ -5,6 +5,7 @@ import pytest
 
 from evoexp.collision.body_table import UnsupportedShape
 from evoexp.collision.models.body_covers import MOST_SPHERES, Cover, capsule_cover, sphere_cover
+from evoexp.collision.models.body_models import BodyCapsules
 
 PLACE = pin.SE3(
     pin.Quaternion(0.5, 0.1, -0.7, 0.3).normalized().toRotationMatrix(), np.array([0.3, -0.2, 0.1])
@@ -94,6 +95,22 @@ def test_one_capsule_covers_a_body(name: str) -> None:
     assert distance_to(cover, points).max() <= 1e-12
     if name in ("sphere", "capsule"):
         assert cover.inflation == 0.0
+
+
+def test_a_capsule_around_a_cylinder_is_as_thick_as_it() -> None:
+    for shape in (coal.Cylinder(0.5, 0.2), coal.Cylinder(0.1, 2.0)):
+        item = pin.GeometryObject("cylinder", 0, 0, PLACE, shape)
+        cover = BodyCapsules(padding=0.0, around_cylinders=True).cover(item)
+        points = points_of(shape) @ PLACE.rotation.T + PLACE.translation
+        assert distance_to(cover, points).max() <= 1e-12
+        assert cover.radius == pytest.approx([shape.radius])
+        assert cover.inflation == pytest.approx(shape.radius)  # beyond the faces
+        assert np.linalg.norm(cover.end - cover.start) == pytest.approx(2.0 * shape.halfLength)
+    item = pin.GeometryObject("box", 0, 0, PLACE, SHAPES["box"])
+    one, other = (
+        BodyCapsules(padding=0.1, around_cylinders=around).cover(item) for around in (True, False)
+    )
+    assert repr(one) == repr(other)
 
 
 def test_less_inflation_takes_more_spheres() -> None:

@@ -64,10 +64,11 @@ def test_answers_of_many_runs_are_those_of_each(
     kept = {path.name for path in (tmp_path / "answers").iterdir()}
     assert len(kept) == sum(c.done for c in results.evolved)
     for c in results.evolved:
+        logs = {int(k): read_log(c.run.log_path(int(k))) for k in c.summaries.index}
         rows = [
-            (k, *row)
-            for k in c.summaries.index
-            for row in proven_answers._judged(c, read_log(c.run.log_path(int(k))))
+            (k, *row, log.cpu_s[row[0]])
+            for k, log in logs.items()
+            for row in proven_answers._judged(c, log)
         ]
         assert together[c.label].to_numpy().tolist() == [list(row) for row in rows]
         assert together[c.label].equals(answers(c))
@@ -174,6 +175,15 @@ def test_effort_in_other_coins(stored: Path, settings: ReportSettings) -> None:
     for row, condition in zip(rows, results.evolved, strict=True):
         assert row.body_tests == 9 * 9  # circles on two arms
         if row.proven:
-            assert row.evaluations == condition.column("evaluations").sum() / row.proven
-            assert row.cpu_s == condition.column("cpu_s").sum() / row.proven
+            spent = {"evaluations": 0.0, "cpu_s": 0.0}
+            for k in condition.summaries.index:
+                whole = condition.summaries.loc[k]
+                own = answers(condition).query("replicate == @k and certified")
+                last = whole if own.empty else own.iloc[0]
+                spent["evaluations"] += last["evaluations"]
+                own_s = whole["cpu_s"] - whole["certificate_s"]
+                spent["cpu_s"] += own_s if own.empty else last["cpu_s"]
+            assert row.evaluations == spent["evaluations"] / row.proven
+            assert row.cpu_s == pytest.approx(spent["cpu_s"] / row.proven)
+            assert 0.0 < row.cpu_s <= condition.column("cpu_s").sum() / row.proven
         assert row.own_cost.median == np.median(condition.column("best_cost"))

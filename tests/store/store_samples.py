@@ -2,7 +2,7 @@
 
 import hashlib
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -85,15 +85,16 @@ def write(
     written: Iterable[Generation],
     replicate: int = 7,
     fronts: Iterable[FrontRow] = (),
+    seconds: Sequence[float] = (),
     **changes: Any,
 ) -> Finished:
-    """Write a log of these generations."""
+    """Write a log of these generations, logged at the given seconds of CPU time."""
     rng = np.random.default_rng(5)
     log = Log(CONDITION, CONFIG, replicate, rng, {"map.txt": b"\x00\xff"}, ENVIRONMENT)
     by_generation = {front.generation: front for front in fronts}
     for generation in written:
         rng.random()
-        log.write(generation)
+        log.write(generation, seconds[generation.index] if seconds else 0.0)
         if generation.index in by_generation:
             log.write_front(by_generation[generation.index])
     return log.finish(summary(replicate, **changes))

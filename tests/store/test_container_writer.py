@@ -37,8 +37,8 @@ class ByMcap:
         return self.writer.register_channel(topic, encoding, schema)
 
     def add_messages(self, messages: Messages) -> None:
-        for channel, sequence, time, data in zip(*messages, strict=True):
-            self.writer.add_message(channel, time, data, time, sequence)
+        for channel, sequence, time, published, data in zip(*messages, strict=True):
+            self.writer.add_message(channel, time, data, published, sequence)
 
     def add_attachment(self, name: str, data: bytes) -> None:
         kind = "application/json" if name.endswith(".json") else "application/octet-stream"
@@ -79,7 +79,7 @@ def random_calls(rng: np.random.Generator) -> list[Callable[[Any], Any]]:
                 messages = Messages(
                     rng.integers(1, channels + 1, count).tolist(),
                     list(range(sequence, sequence + count)),
-                    rng.integers(0, 2**62, count).tolist(),
+                    *rng.integers(0, 2**62, (2, count)).tolist(),
                     [rng.bytes(rng.integers(0, longest)) for _ in range(count)],
                 )
                 sequence += count
@@ -101,7 +101,8 @@ def test_a_file_of_many_chunks_is_read_by_mcap() -> None:
     writer = ContainerWriter("evoexp", CHUNK_SIZE)
     channel = writer.add_channel("/x", "json", writer.add_schema("x", "jsonschema", b"{}"))
     data = [str(k).encode() for k in range(1000)]
-    writer.add_messages(Messages([channel] * 1000, list(range(1000)), list(range(1000)), data))
+    numbers = list(range(1000))
+    writer.add_messages(Messages([channel] * 1000, numbers, numbers, numbers, data))
     reader = make_reader(io.BytesIO(writer.finish()))
     assert [message.data for _, _, message in reader.iter_messages()] == data
     summary = reader.get_summary()

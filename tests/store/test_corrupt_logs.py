@@ -13,8 +13,9 @@ from store_samples import CONDITION, CONFIG, generations, summary, write
 
 from evoexp.errors import CorruptLog
 from evoexp.store import log as log_module
+from evoexp.store.generation_columns import generation_columns
 from evoexp.store.log import Log
-from evoexp.store.log_reader import generation_columns, read_log, read_solution, read_summary
+from evoexp.store.log_reader import read_log, read_solution, read_summary
 
 READERS = [read_log, read_summary, read_solution, generation_columns]
 Reader = Callable[[bytes | Path], object]

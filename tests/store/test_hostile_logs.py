@@ -35,9 +35,9 @@ from evoexp.commands.facts import log_facts
 from evoexp.errors import CorruptLog, EvoexpError
 from evoexp.records import FrontRow
 from evoexp.store import container, log_reader
+from evoexp.store.generation_columns import generation_columns
 from evoexp.store.log_reader import (
     array_names,
-    generation_columns,
     read_array,
     read_log,
     read_solution,

@@ -14,8 +14,9 @@ from store_samples import CONDITION, CONFIG, ENVIRONMENT, generations, summary, 
 
 from evoexp.records import FrontRow, GenerationRow
 from evoexp.store.digests import Chain, array_bytes
+from evoexp.store.generation_columns import generation_columns
 from evoexp.store.log import Log
-from evoexp.store.log_reader import generation_columns, read_log, read_solution, read_summary
+from evoexp.store.log_reader import read_log, read_solution, read_summary
 from evoexp.store.messages import encode_generations
 
 FRONT = FrontRow(4, 1, np.array([[1.0, math.inf], [math.nan, -2.5], [-math.inf, 0.1]]))
@@ -117,6 +118,20 @@ def test_same_content_same_digests_whatever_the_order_of_terms_and_the_clock() -
     assert one.content_digest == other.content_digest
     assert one.summary.digest == other.summary.digest
     assert [row.chain for row in one.generations] == [row.chain for row in other.generations]
+
+
+def test_cpu_times_are_publish_times_and_enter_no_digest() -> None:
+    seconds = [0.25 * index for index in range(150)]  # more than are encoded together
+    plain, timed = write(generations(150)), write(generations(150), seconds=seconds)
+    one, other = read_log(plain.content), read_log(timed.content)
+    assert other.cpu_s.tolist() == pytest.approx(seconds, abs=1e-9)
+    assert one.content_digest == other.content_digest
+    assert one.summary.digest == other.summary.digest
+    reader = make_reader(BytesIO(timed.content))
+    for _, channel, message in reader.iter_messages(topics=["/generation", "/solution"]):
+        row = orjson.loads(message.data)
+        index = row["index"] if channel.topic == "/generation" else row["generation"]
+        assert message.publish_time == index * 250_000_000
 
 
 def test_same_content_same_bytes() -> None:

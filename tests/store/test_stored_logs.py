@@ -10,13 +10,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from evoexp.cli import main
 from evoexp.condition import Condition, revisions
+from evoexp.store.generation_columns import generation_columns
 from evoexp.store.log_reader import (
     array_names,
-    generation_columns,
     read_array,
     read_log,
     read_solution,
@@ -63,6 +64,8 @@ def test_it_loads(name: str) -> None:
     assert (read_solution(of(name)).values == log.solutions[-1].values).all()
     assert len(generation_columns(of(name))["best_cost"]) == len(log.generations) > 0
     assert bool(log.fronts) == (name == "coevolution")
+    assert np.isnan(log.cpu_s).all()  # older than that these times were logged
+    assert len(log.cpu_s) == len(log.generations)
     assert array_names(of(name)) == (["minima"] if name == "placement_optimum" else [])
     assert all(read_array(of(name), array).size for array in array_names(of(name)))
     assert bool(set(log.attachments) - {"minima.npy"}) == (name == "urdf")

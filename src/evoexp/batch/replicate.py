@@ -43,7 +43,7 @@ def run_replicate(condition: Condition, index: int, config_json: bytes | None = 
             ended = BUDGET_SPENT
             break
         last = generation
-        log.write(last)  # the planner knows nothing of files
+        log.write(last, (now() - begun).cpu_s)  # the planner knows nothing of files
         if first_feasible is None and last.num_feasible > 0:
             first_feasible = last.index
     if last is None:

@@ -18,6 +18,7 @@ from evoexp.errors import SettingError
 from evoexp.numeric.convex_hull import hull_of
 from evoexp.numeric.elementary import DEGREE
 from evoexp.planners.answers import CoverShape
+from evoexp.planners.floor_tasks import floor_motion, within_floor
 from evoexp.planners.moveit_tasks import (
     arm_motion,
     hull_notes,
@@ -29,13 +30,14 @@ from evoexp.records import FloatArray, IntArray
 from evoexp.robots.assembly import Assembly, Robot
 from evoexp.robots.mesh_pieces import convex_shape
 from evoexp.scenarios.arm_motion import ArmMotion
+from evoexp.scenarios.grid_motion import GridMotion
 from evoexp.scenarios.link_motion import LinkMotion
 from evoexp.scenarios.moveit import MoveitTask
 
 ROUNDING = 1e-9  # [rad, m] by which an end may lie beyond a limit
 UNLIMITED = 1e6  # [rad] a joint without limits has larger ones in the model
 FIELDS = "scenario.q_start", "scenario.q_goal"
-ArmTask = ArmMotion | LinkMotion | MoveitTask
+ArmTask = ArmMotion | LinkMotion | MoveitTask | GridMotion
 """Scenarios in which robots go from one configuration to another."""
 
 
@@ -91,6 +93,8 @@ def arm_problem(
     assembly = robot.build()
     if isinstance(scenario, MoveitTask):
         assembly = with_allowed_pairs(assembly, scenario)
+    elif isinstance(scenario, GridMotion):
+        assembly = within_floor(assembly, scenario)
     task = _arm_motion(assembly, scenario)
     start, goal = ends_of(assembly, task)
     collision: SphereCollision | CoveredCollision
@@ -115,6 +119,8 @@ def _arm_motion(assembly: Assembly, task: ArmTask) -> ArmMotion:
     Raises:
         SettingError: If its goal is a pose, it is silent about a joint, or robots stand still.
     """
+    if isinstance(task, GridMotion):
+        return floor_motion(task)
     if not isinstance(task, LinkMotion):
         return arm_motion(assembly, task)
     if task.stationary:

@@ -17,50 +17,13 @@ from evoexp.paths.motion import Motion
 from evoexp.planners.answers import CoverShape, Listing
 from evoexp.planners.answers import Shape as Shape
 from evoexp.planners.answers import num_values as num_values
+from evoexp.planners.judgements import Judgement as Judgement
+from evoexp.planners.judgements import JudgementArrays as JudgementArrays
 from evoexp.records import BoolArray, FloatArray, Generation
 
 Reproducibility = Literal["bits", "environment"]
 # Copies of a population that a run of most planners holds: parents, offspring, paths between them.
 COPIES = 5
-
-
-class Judgement(Protocol):
-    """A judged population."""
-
-    @property
-    def cost(self) -> FloatArray:
-        """(individuals,) lower is better; inf: infeasible."""
-
-    @property
-    def feasible(self) -> np.ndarray:
-        """(individuals,) whether the planner's own model accepts each."""
-
-    @property
-    def collision_queries(self) -> int:
-        """Configurations that the algorithm asks for, also those that the kernels skip."""
-
-    def named_terms(self, individual: int) -> dict[str, float]:
-        """Return the paper's own terms of one individual."""
-
-
-class JudgementArrays(NamedTuple):
-    """A `Judgement` as plain arrays.
-
-    Attributes:
-        cost: (individuals,) lower is better; inf: infeasible.
-        feasible: (individuals,) whether the planner's own model accepts each.
-        collision_queries: Configurations that the algorithm asks for.
-        terms: Name → (individuals,) of the planner's own terms.
-    """
-
-    cost: FloatArray
-    feasible: BoolArray
-    collision_queries: int
-    terms: Mapping[str, NDArray[Any]]
-
-    def named_terms(self, individual: int) -> dict[str, float]:
-        """Return the terms of one individual."""
-        return {name: float(values[individual]) for name, values in self.terms.items()}
 
 
 @runtime_checkable
@@ -164,6 +127,12 @@ class Planner(Protocol):
         a run that would take more than there is is refused before it begins.
         """
 
+    def prior_queries(self, problem: Any) -> int:
+        """Return how many configurations the task itself says to be free or not, as a map does.
+
+        Comparisons add them to the queries of a run: another planner asks for them one by one.
+        """
+
     def listing(self, problem: Any, solution: FloatArray) -> Listing | None:
         """Return a table with one row per configuration; None if the planner has none."""
 
@@ -243,6 +212,10 @@ class PlannerDefaults:
         """Return the memory of `COPIES` populations of solutions."""
         individuals = max(self.num_evaluations(0), self.num_evaluations(1))
         return 8 * COPIES * num_values(self.shape(problem)) * individuals
+
+    def prior_queries(self, problem: Any) -> int:
+        """Return 0: a search asks for all that it knows."""
+        return 0
 
     def listing(self, problem: Any, solution: FloatArray) -> Listing | None:
         """Return None: there is no table."""

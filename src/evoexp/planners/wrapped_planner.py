@@ -98,6 +98,10 @@ class WrappedPlanner(PlannerDefaults, Component):
         """Return the wrapped planner's estimate; a subclass that takes more adds to it."""
         return self.planner.memory(problem)
 
+    def prior_queries(self, problem: Any) -> int:
+        """Return those that the wrapped planner's problem holds."""
+        return self.planner.prior_queries(problem)
+
     def listing(self, problem: Any, solution: FloatArray) -> Listing | None:
         """Return the wrapped planner's table of a solution."""
         return self.planner.listing(problem, solution)

@@ -47,8 +47,8 @@ def as_csv(rows: Sequence[Rated]) -> bytes:
 
     Columns: planner, problem, n (runs), proven (runs with a proven answer), effort (expected
     running time [collision queries]) with its interval, length (median [rad, m]) with quartiles;
-    body_queries (the effort in pairs of shapes), evaluations and cpu_s (of all runs, per run with a
-    proven answer), empty where they are not known.
+    body_queries (the effort in pairs of shapes), evaluations and cpu_s (expected to a proven
+    answer, as the effort is), empty where they are not known.
     """
     file = io.StringIO(newline="")
     writer = csv.writer(file, lineterminator="\n")

@@ -65,7 +65,7 @@ class PlannerRuns(NamedTuple):
         label: Of both, in tables.
         table: Its answers in order; columns replicate, collision_queries, length and certified.
         replicates: (runs,) in order.
-        spent: (runs,) collision queries of the whole runs.
+        spent: (runs,) collision queries of the whole runs, those that the task tells of included.
         condition: That was run; None: the runs were given, nobody here judged them.
     """
 
@@ -95,6 +95,12 @@ class PlannerRuns(NamedTuple):
 def stored_conditions(runs: Iterable[PlannerRuns]) -> tuple[ConditionResults, ...]:
     """Return the conditions of those runs that were not given."""
     return tuple(own.condition for own in runs if own.condition is not None)
+
+
+def prior_queries(condition: ConditionResults) -> int:
+    """Return how many configurations the task itself says to be free or not, as a map does."""
+    planner, problem = condition.prepared
+    return int(planner.prior_queries(problem))
 
 
 def problem_key(condition: Condition) -> str:
@@ -136,7 +142,7 @@ def of_results(
             c.label,
             found[c.label],
             tuple(int(k) for k in c.summaries.index),
-            c.column("collision_queries"),
+            c.column("collision_queries") + prior_queries(c),
             c,
         )
         for c in kept

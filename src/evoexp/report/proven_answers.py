@@ -37,11 +37,13 @@ class Answer(NamedTuple):
         replicate: Of the run.
         generation: In which it was found.
         evaluations: Since the start.
-        collision_queries: Configurations judged since the start.
+        collision_queries: Configurations judged since the start, those that the task tells of
+            (`Planner.prior_queries`) included.
         length: Of the joints' path [rad, m].
         straight: Distance of its ends, which no path is shorter than [rad, m].
         solved: Whether the planner's own model accepts it.
         certified: Whether the exact certifier proves it, and it is a solution of the task.
+        cpu_s: CPU time of the run until it was logged [s]; NaN where the log does not tell.
     """
 
     replicate: int
@@ -52,6 +54,7 @@ class Answer(NamedTuple):
     straight: float
     solved: bool
     certified: bool
+    cpu_s: float = np.nan
 
 
 def answers(condition: ConditionResults) -> pd.DataFrame:
@@ -92,21 +95,27 @@ def motion_length(motion: Motion) -> float:
     return total
 
 
-def first_reached(table: pd.DataFrame, replicates: Any, longest: float, spent: FloatArray) -> Any:
+def first_reached(
+    table: pd.DataFrame,
+    replicates: Any,
+    longest: float,
+    spent: FloatArray,
+    effort: str = "collision_queries",
+) -> Any:
     """Return the effort of every run up to its first proven answer that is so short.
 
     Args:
         table: Of `answers`.
         replicates: (runs,) in order.
         longest: Length that an answer may have.
-        spent: (runs,) collision queries of the whole runs.
+        spent: (runs,) effort of the whole runs.
+        effort: The column that is the effort.
 
     Returns:
-        (runs,) collision queries, those of the whole run without such an answer; (runs,) whether
-        there was one.
+        (runs,) effort, that of the whole run without such an answer; (runs,) whether there was one.
     """
     good = table[table["certified"] & (table["length"] <= longest)]
-    first = good.groupby("replicate")["collision_queries"].min().reindex(replicates)
+    first = good.groupby("replicate")[effort].min().reindex(replicates)
     reached = first.notna().to_numpy()
     return np.where(reached, first.to_numpy(np.float64, na_value=0.0), spent), reached
 
@@ -125,7 +134,8 @@ def straight_line(table: pd.DataFrame) -> float:
 
 def _of_replicate(condition: ConditionResults, replicate: int, code: bytes) -> list[Answer]:
     log = read_log(condition.run.log_path(replicate))
-    return [Answer(replicate, *answer) for answer in _kept(condition, log, code)]
+    kept = [Answer(replicate, *answer) for answer in _kept(condition, log, code)]
+    return [answer._replace(cpu_s=float(log.cpu_s[answer.generation])) for answer in kept]
 
 
 def _kept(condition: ConditionResults, log: LogContents, code: bytes) -> list[list[Any]]:
@@ -144,6 +154,7 @@ def _kept(condition: ConditionResults, log: LogContents, code: bytes) -> list[li
 
 def _judged(condition: ConditionResults, log: LogContents) -> Iterator[list[Any]]:
     planner, problem = condition.prepared
+    known = planner.prior_queries(problem)
     for row in log.solutions:
         if not np.isfinite(row.cost):  # infeasible, as the planner says itself
             continue
@@ -159,5 +170,5 @@ def _judged(condition: ConditionResults, log: LogContents) -> Iterator[list[Any]
         )
         ends = motion.q[-1] - motion.q[0]
         straight = float(np.sqrt((ends * ends).sum()))
-        counts = row.generation, at.evaluations, at.collision_queries
+        counts = row.generation, at.evaluations, known + at.collision_queries
         yield [*counts, length, straight, bool(at.solved), proven]

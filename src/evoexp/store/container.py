@@ -58,7 +58,14 @@ _UNREADABLE = (
 )
 
 
-Message = tuple[int, int, int, bytes]  # channel id, sequence, log_time, data
+class Message(NamedTuple):
+    """A message; both times are in nanoseconds."""
+
+    channel_id: int
+    sequence: int
+    log_time: int
+    publish_time: int
+    data: bytes
 
 
 class Container(NamedTuple):
@@ -84,6 +91,16 @@ class Container(NamedTuple):
     def messages_at(self, index: ChunkIndex) -> Iterator[Message]:
         """Yield the messages of one chunk that the summary section points to."""
         return chunk_messages(self.record_at(index.chunk_start_offset))
+
+    def messages(self) -> Iterator[Message]:
+        """Yield all messages; no chunk is decompressed that would bring them above the limit."""
+        size = 0
+        for opcode, body in self.data_section():
+            if opcode == Opcode.CHUNK:
+                size += uncompressed_size(body)
+                if size > MAX_LOG:
+                    raise ValueError(f"too large: {too_large(size)}")
+                yield from chunk_messages(body)
 
 
 @contextmanager
@@ -154,8 +171,9 @@ def chunk_messages(body: bytes) -> Iterator[Message]:
         if stop > end:
             raise ValueError(f"a message ends at byte {stop} of a chunk of {end}")
         if opcode == kind:
-            _, _, channel_id, sequence, log_time, _ = _MESSAGE.unpack_from(content, start)
-            yield channel_id, sequence, log_time, content[start + _MESSAGE.size : stop]
+            _, _, channel, number, logged, published = _MESSAGE.unpack_from(content, start)
+            data = content[start + _MESSAGE.size : stop]
+            yield Message(channel, number, logged, published, data)
         elif opcode not in _BESIDE_MESSAGES:
             raise ValueError(f"a chunk holds a record of kind {opcode}")
         start = stop

@@ -32,13 +32,15 @@ class Messages(NamedTuple):
     Attributes:
         channels: Ids.
         sequences: Numbers within their channels.
-        times: Both log time and publish time [ns].
+        times: Log times [ns].
+        published: Publish times [ns].
         data: Encoded.
     """
 
     channels: list[int]
     sequences: list[int]
     times: list[int]
+    published: list[int]
     data: list[bytes]
 
 
@@ -87,7 +89,7 @@ class ContainerWriter:
 
     def add_messages(self, messages: Messages) -> None:
         """Add messages; chunks that they fill are written."""
-        channels, sequences, times, data = messages
+        channels, sequences, times, published, data = messages
         if not data:
             return
         if not self._counts:
@@ -97,9 +99,8 @@ class ContainerWriter:
         for channel in dict.fromkeys(channels):  # in the order of their first messages
             self._counts[channel] = self._counts.get(channel, 0) + channels.count(channel)
         lengths = list(map(add, map(len, data), repeat(_FIELDS_BEFORE_DATA)))
-        heads = map(
-            _MESSAGE.pack, repeat(int(Opcode.MESSAGE)), lengths, channels, sequences, times, times
-        )
+        fields = lengths, channels, sequences, times, published
+        heads = map(_MESSAGE.pack, repeat(int(Opcode.MESSAGE)), *fields)
         records = list(map(add, heads, data))
         begin = 0
         while begin < len(records):

@@ -37,6 +37,7 @@ ENVIRONMENT = "evoexp.environment"
 CONFIG = "config.json"
 ARRAY = ".npy"  # the ending of an attached array's name
 CONTENT_DIGEST = "content_digest"
+PUBLISHED, CPU_TIME = "publish_time", "cpu"  # the entry of `RUN` that tells publish times
 GENERATION_TOPIC, SOLUTION_TOPIC, FRONT_TOPIC = "/generation", "/solution", "/front"
 
 _CHUNK_SIZE = 56 * 1024  # [B] a chunk ends with the message that passes this, hence within 64 KiB
@@ -61,6 +62,7 @@ class _Pending(NamedTuple):
         are_floats: Whether the costs are float64.
         best: `array_bytes` of the best so far.
         state: Of the generator.
+        cpu: Of the replicate until then [ns].
     """
 
     values: tuple[Any, ...]
@@ -70,6 +72,7 @@ class _Pending(NamedTuple):
     are_floats: bool
     best: bytes
     state: bytes
+    cpu: int
 
 
 class Finished(NamedTuple):
@@ -174,12 +177,14 @@ class Log:
             b""  # of the generation encoded last, and of the last solution written
         )
         self._best_cost, self._written_cost, self._size = np.inf, np.inf, 0  # [B] of messages
-        self._messages = Messages([], [], [], [])  # that wait to be written
+        self._messages = Messages([], [], [], [], [])  # that wait to be written
+        self._cpu = 0  # [ns] of the replicate, when the generation encoded last was written
         self._writer = ContainerWriter(LIBRARY, _CHUNK_SIZE)
         run = {
             "condition": condition_id,
             "replicate": str(replicate),
             "schema_version": str(SCHEMA_VERSION),
+            PUBLISHED: CPU_TIME,
         }
         self._writer.add_metadata(RUN, run)
         self._writer.add_attachment(CONFIG, config_json)
@@ -188,12 +193,17 @@ class Log:
                 raise ValueError(f"attachments: '{CONFIG}' is the configuration's own name")
             self._writer.add_attachment(name, data)
 
-    def write(self, generation: Generation) -> None:
+    def write(self, generation: Generation, cpu_s: float = 0.0) -> None:
         """Append a generation, and its best solution where that is better than the last written.
 
         What the planner may change is copied here; encoding waits for a batch of generations,
         because between kernels its code would run from a cold cache each time (a fifth of a
         replicate's time).
+
+        Args:
+            generation: The generation.
+            cpu_s: CPU time of the replicate until then [s]: the publish time of the messages, no
+                part of any digest.
         """
         if generation.terms.keys() != self._terms.keys():
             self._terms = {name: TERM + name for name in sorted(generation.terms)}
@@ -210,6 +220,7 @@ class Log:
                 are_floats,
                 self._best_bytes,
                 self._chain.state(),
+                int(cpu_s * 1e9),
             )
         )
         self._last = generation
@@ -229,7 +240,7 @@ class Log:
         # rows, with the links of the chain
         update, rows = self._chain.update, []
         nan = any_nan(each.costs for each in self._pending if each.are_floats)
-        for values, terms, columns, costs, are_floats, best, state in self._pending:
+        for values, terms, columns, costs, are_floats, best, state, _ in self._pending:
             if nan and are_floats:
                 costs = array_bytes(np.frombuffer(costs))
             row = generation_row(values, terms, columns)
@@ -238,6 +249,7 @@ class Log:
         # messages; a better solution stands behind its generation
         for row, each, data in zip(rows, self._pending, encode_generations(rows), strict=True):
             index, self._best, self._best_cost = row["index"], each.best, row["best_cost"]
+            self._cpu = each.cpu
             first = GENERATION_TOPIC not in self._channels
             self._add(GENERATION_TOPIC, GenerationRow, index, data)
             if first or self._best_cost < self._written_cost:
@@ -257,7 +269,7 @@ class Log:
         identities = {channel.id: channel.identity for channel in self._channels.values()}
         channels = map(identities.__getitem__, self._messages.channels)
         self._content.update_all(channels, self._messages)
-        self._messages = Messages([], [], [], [])
+        self._messages = Messages([], [], [], [], [])
 
     def write_front(self, front: FrontRow) -> None:
         """Append the front of a population of the generation last written."""
@@ -304,9 +316,10 @@ class Log:
             self._send()  # the channel comes behind the messages before
             terms = tuple(self._terms) if record is GenerationRow else ()
             channel = self._channels[topic] = _Channel(self._writer, topic, record, terms)
-        channels, sequences, times, contents = self._messages
+        channels, sequences, times, published, contents = self._messages
         channels.append(channel.id)
         sequences.append(channel.num_messages)
         times.append(int(generation) * _TICK)
+        published.append(self._cpu)
         contents.append(data)
         channel.num_messages += 1

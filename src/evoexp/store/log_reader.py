@@ -5,15 +5,13 @@ message and compares the content digest. Limits of size and memory stand in `con
 """
 
 import errno
-import operator
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import orjson
 from mcap.opcode import Opcode
 from mcap.records import (
     Attachment,
@@ -28,36 +26,27 @@ from numpy.typing import NDArray
 
 from evoexp.errors import CorruptLog, OtherVersion
 from evoexp.input_files import read_bounded, read_npy
-from evoexp.records import FrontRow, GenerationRow, ReplicateSummary, SolutionRow
+from evoexp.records import FloatArray, FrontRow, GenerationRow, ReplicateSummary, SolutionRow
 from evoexp.store import log as written
 from evoexp.store.container import (
     MAX_ATTACHMENTS,
     MAX_LOG,
-    MAX_MESSAGE,
     MAX_METADATA,
     Container,
     Message,
     check,
-    chunk_messages,
     parse,
-    too_large,
-    uncompressed_size,
     unreadable_is_corrupt,
 )
 from evoexp.store.messages import (
-    NONFINITE,
-    TERM,
     decode_environment,
     decode_front,
     decode_generation,
     decode_solution,
     decode_summary,
     decode_values,
-    field_types,
-    restore,
 )
 
-DTYPES: dict[Any, Any] = {int: np.int64, float: np.float64, bool: np.bool_}  # of generation_columns
 Source = str | PathLike[str] | bytes
 
 
@@ -74,6 +63,8 @@ class LogContents(NamedTuple):
     environment: dict[str, Any]
     attachments: dict[str, bytes]  # without the configuration
     content_digest: str  # 32 hex digits, over all messages
+    # (generations,) [s] CPU time of the replicate when each was logged; NaN in logs of older code
+    cpu_s: FloatArray
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return the attached arrays by their names, in alphabetical order.
@@ -114,6 +105,7 @@ def read_log(source: Source) -> LogContents:
         run = _run(container, index, name)
         attachments = {a.name: a.data for a in _bodies(container, Opcode.ATTACHMENT, Attachment)}
         messages, content_digest = _messages(container, index)
+        generations = messages.get(written.GENERATION_TOPIC, ())
         metadata = _metadata(container, index, written.SUMMARY, name)
         if content_digest != decode_values(metadata)[written.CONTENT_DIGEST]:
             raise CorruptLog(
@@ -124,15 +116,14 @@ def read_log(source: Source) -> LogContents:
             condition_id=run["condition"],
             config_json=attachments.pop(written.CONFIG),
             replicate=summary.replicate,
-            generations=[
-                decode_generation(data) for data in messages.get(written.GENERATION_TOPIC, ())
-            ],
-            solutions=[decode_solution(data) for data in messages.get(written.SOLUTION_TOPIC, ())],
-            fronts=[decode_front(data) for data in messages.get(written.FRONT_TOPIC, ())],
+            generations=[decode_generation(m.data) for m in generations],
+            solutions=[decode_solution(m.data) for m in messages.get(written.SOLUTION_TOPIC, ())],
+            fronts=[decode_front(m.data) for m in messages.get(written.FRONT_TOPIC, ())],
             summary=summary,
             environment=decode_environment(_metadata(container, index, written.ENVIRONMENT, name)),
             attachments=attachments,
             content_digest=content_digest,
+            cpu_s=_cpu_times(run, generations),
         )
 
 
@@ -150,7 +141,7 @@ def read_summary(source: Source) -> ReplicateSummary:
 
 
 @contextmanager
-def _indexed(source: Source) -> Iterator[tuple[Container, "_Index"]]:
+def indexed(source: Source) -> Iterator[tuple[Container, "_Index"]]:
     """Open a log of a run by its index; a body that cannot be read is a damaged log."""
     container, name = _open(source)
     with unreadable_is_corrupt(name):
@@ -165,12 +156,10 @@ def read_solution(source: Source) -> SolutionRow:
     Raises:
         CorruptLog: As `read_log`, except that the content digest is not compared.
     """
-    with _indexed(source) as (container, index):
+    with indexed(source) as (container, index):
         channel_id = index.channels[written.SOLUTION_TOPIC].id
         last = [chunk for chunk in index.chunks if channel_id in chunk.message_index_offsets][-1]
-        solutions = [
-            data for channel, _, _, data in container.messages_at(last) if channel == channel_id
-        ]
+        solutions = [m.data for m in container.messages_at(last) if m.channel_id == channel_id]
         return decode_solution(solutions[-1])
 
 
@@ -180,7 +169,7 @@ def array_names(source: Source) -> list[str]:
     Raises:
         CorruptLog: As `read_log`, except that the content digest is not compared.
     """
-    with _indexed(source) as (_, index):
+    with indexed(source) as (_, index):
         return sorted(
             n.removesuffix(written.ARRAY) for n in index.attachments if n.endswith(written.ARRAY)
         )
@@ -197,7 +186,7 @@ def read_array(source: Source, array: str) -> NDArray[Any]:
         KeyError: There is none of this name.
         CorruptLog: As `read_log`, except that the content digest is not compared.
     """
-    with _indexed(source) as (container, index):
+    with indexed(source) as (container, index):
         offset = index.attachments.get(array + written.ARRAY)
         if offset is not None:
             return decode_array(parse(Attachment, container.record_at(offset)).data)
@@ -212,87 +201,6 @@ def decode_array(data: bytes) -> NDArray[Any]:
     """
     with unreadable_is_corrupt("attached array"):
         return read_npy(data)
-
-
-def generation_columns(source: Source) -> dict[str, NDArray[Any]]:
-    """Return the records on /generation, without their chain, as arrays (generations,) by name.
-
-    A term that a generation does not have is NaN there.
-
-    Raises:
-        CorruptLog: As `read_log`, except that the content digest is not compared.
-    """
-    with _indexed(source) as (container, index):
-        channel_id = index.channels[written.GENERATION_TOPIC].id
-        messages = (m[3] for m in _all_messages(container) if m[0] == channel_id)
-        parts = [_columns(orjson.loads(text)) for text in _joined(messages)]
-        return parts[0] if len(parts) == 1 else _one_below_another(parts)
-
-
-def _joined(messages: Iterable[bytes]) -> Iterator[bytes]:
-    """Yield messages as JSON lists of about `MAX_MESSAGE` bytes, one list at least.
-
-    Decoded, they take many times that: never all of them together.
-    """
-    size, found = 0, list[bytes]()
-    for data in messages:
-        if size > MAX_MESSAGE:
-            yield b"[" + b",".join(found) + b"]"
-            size, found = 0, []
-        size += len(data)
-        found.append(data)
-    yield b"[" + b",".join(found) + b"]"
-
-
-def _one_below_another(parts: list[dict[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
-    """Return the columns of all parts, NaN where a part does not have one."""
-    lengths = [len(part["index"]) for part in parts]
-    own = list(_own_columns())
-    names = own + sorted({name for part in parts for name in part} - set(own))
-    _refuse_wide(names, sum(lengths))
-    return {
-        name: np.concatenate(
-            [
-                part[name] if name in part else np.full(length, np.nan)
-                for part, length in zip(parts, lengths, strict=True)
-            ]
-        )
-        for name in names
-    }
-
-
-def _own_columns() -> dict[str, Any]:
-    """Return the columns that every generation has, and their kinds."""
-    fields = field_types(GenerationRow).items()
-    return {name: DTYPES[kind] for name, kind in fields if name != "chain"}
-
-
-def _refuse_wide(names: Collection[str], num_rows: int) -> None:
-    """Refuse rows that each have terms of their own: their table would be larger than any log."""
-    if len(names) * num_rows * 8 > MAX_LOG:
-        raise ValueError(f"{num_rows} generations with {len(names)} different terms")
-
-
-def _columns(rows: list[dict[str, Any]]) -> dict[str, NDArray[Any]]:
-    kinds = _own_columns()
-    for row in rows:
-        if NONFINITE in row:
-            restore(row)
-            del row[NONFINITE]
-    names = rows[0].keys() if rows else set()
-    if not all(row.keys() == names for row in rows):
-        names = {name for row in rows for name in row}
-        _refuse_wide(names, len(rows))
-        absent = dict.fromkeys((name for name in names if name.startswith(TERM)), np.nan)
-        rows = [absent | row for row in rows]
-    kinds |= dict.fromkeys(sorted(name for name in names if name.startswith(TERM)), np.float64)
-    values = (
-        zip(*map(operator.itemgetter(*kinds), rows), strict=True) if rows else [()] * len(kinds)
-    )
-    return {
-        name: np.array(column, dtype=kinds[name])
-        for name, column in zip(kinds, values, strict=True)
-    }
 
 
 def _open(source: Source) -> tuple[Container, str]:
@@ -374,27 +282,24 @@ def _bodies(container: Container, opcode: int, record: Any) -> Iterator[Any]:
     return (parse(record, body) for kind, body in container.data_section() if kind == opcode)
 
 
-def _all_messages(container: Container) -> Iterator[Message]:
-    """Yield all messages; no chunk is decompressed that would bring them above the limit."""
-    size = 0
-    for opcode, body in container.data_section():
-        if opcode == Opcode.CHUNK:
-            size += uncompressed_size(body)
-            if size > MAX_LOG:
-                raise ValueError(f"too large: {too_large(size)}")
-            yield from chunk_messages(body)
-
-
-def _messages(container: Container, index: _Index) -> tuple[dict[str, list[bytes]], str]:
-    """Return the data of all messages by topic, and the content digest over them."""
+def _messages(container: Container, index: _Index) -> tuple[dict[str, list[Message]], str]:
+    """Return all messages by topic, and the content digest over them."""
     digest = written.ContentDigest()
     topics = {channel.id: topic for topic, channel in index.channels.items()}
     identities = {
         c.id: written.channel_identity(c.topic, index.schemas[c.schema_id], c.message_encoding)
         for c in index.channels.values()
     }
-    messages: dict[str, list[bytes]] = {}
-    for channel_id, sequence, log_time, data in _all_messages(container):
+    messages: dict[str, list[Message]] = {}
+    for message in container.messages():
+        channel_id, sequence, log_time, _, data = message
         digest.update(identities[channel_id], log_time, sequence, data)
-        messages.setdefault(topics[channel_id], []).append(data)
+        messages.setdefault(topics[channel_id], []).append(message)
     return messages, digest.hexdigest()
+
+
+def _cpu_times(run: dict[str, str], generations: Sequence[Message]) -> FloatArray:
+    """Return the CPU time at which each generation was logged [s]; NaN where logs do not tell."""
+    if run.get(written.PUBLISHED) != written.CPU_TIME:
+        return np.full(len(generations), np.nan)
+    return 1e-9 * np.array([message.publish_time for message in generations], dtype=np.float64)

@@ -192,6 +192,13 @@ def capsule_cover(item: Any) -> Cover:
     return _placed(item, start[None], end[None], np.array([radius * WIDER]), reach)
 
 
+def around_cylinder(item: Any) -> Cover:
+    """Return the capsule as thick as a cylinder, its ends on the middles of both faces."""
+    half, radius = float(item.geometry.halfLength), float(item.geometry.radius)
+    ends = np.array([[0.0, 0.0, -half]]), np.array([[0.0, 0.0, half]])
+    return _placed(item, *ends, np.array([radius * WIDER]), radius)
+
+
 class _Solid(NamedTuple):
     """A convex body in its own frame.
 

@@ -11,7 +11,13 @@ import numpy as np
 
 from evoexp.collision.box_support import coal
 from evoexp.collision.derived_pairs import Pair
-from evoexp.collision.models.body_covers import Cover, capsule_cover, given_cover, sphere_cover
+from evoexp.collision.models.body_covers import (
+    Cover,
+    around_cylinder,
+    capsule_cover,
+    given_cover,
+    sphere_cover,
+)
 from evoexp.collision.models.body_pairs import BodyPairs, body_pairs
 from evoexp.collision.models.inner_balls import inner_balls
 from evoexp.collision.models.primitive_tables import Shapes
@@ -84,15 +90,20 @@ class BodyCapsules(CollisionModel):
 
     Attributes:
         padding: By how much every capsule is thicker than it must be [length unit].
+        around_cylinders: Whether the capsule of a cylinder is as thick as the cylinder and reaches
+            beyond its faces, or lies along its longest edge and is thicker: what moves upright over
+            a floor is covered best by the first.
     """
 
     component: ClassVar[str] = "body_capsules"
 
     padding: NonNegative
+    around_cylinders: bool = False
 
     def cover(self, item: Any) -> Cover:
         """Return the capsule around a geometry object."""
-        found = capsule_cover(item)
+        is_around = self.around_cylinders and isinstance(item.geometry, coal.Cylinder)
+        found = around_cylinder(item) if is_around else capsule_cover(item)
         return found._replace(
             radius=found.radius + self.padding, inflation=found.inflation + self.padding
         )

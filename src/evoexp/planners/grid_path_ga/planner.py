@@ -36,7 +36,9 @@ from evoexp.planners.grid_path_ga.kernels import (
     Population,
 )
 from evoexp.planners.grid_path_ga.path_operators import Breeding, Scratch, World
+from evoexp.planners.grid_path_ga.proven_moves import only_proven
 from evoexp.planners.planner import Candidate, PlannerDefaults
+from evoexp.planners.proofs import Acceptance
 from evoexp.planners.stretches import Stretches
 from evoexp.records import BoolArray, FloatArray, Generation
 from evoexp.robots.floor_platform import FloorPlatform
@@ -113,6 +115,8 @@ class GridPathGa(PlannerDefaults, Component):
         ga: Population, generations, rates; `mutation_rate` is per path.
         objective: Weights of Eq. 1.
         collision: The potential fields.
+        acceptance: Which moves a path may make: those between free nodes, or those of them that the
+            exact certifier proves.
     """
 
     component: ClassVar[str] = "grid_path_ga"
@@ -123,6 +127,7 @@ class GridPathGa(PlannerDefaults, Component):
     ga: ScaledGenetic
     objective: PathCost
     collision: PotentialFields
+    acceptance: Acceptance = "model"
 
     def prepare(self, robot: FloorPlatform, scenario: GridMotion) -> Problem:
         """Work out the fields, and check that the goal can be reached.
@@ -130,7 +135,12 @@ class GridPathGa(PlannerDefaults, Component):
         Raises:
             SettingError: If it cannot, start or goal is blocked, or robot and grid do not fit.
         """
-        return _prepared(self.collision, robot, scenario)
+        return _prepared(self.collision, self.acceptance, robot, scenario)
+
+    def prior_queries(self, problem: Problem) -> int:
+        """Return the number of nodes of the map, which says of each whether it is free."""
+        grid = problem.fields.grid
+        return int(grid.inner(grid.free).size)
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield the population of random paths, then every generation."""
@@ -294,13 +304,22 @@ def trimmed(paths: NodeArray) -> NodeArray:
 
 
 @functools.lru_cache(maxsize=32)
-def _prepared(collision: PotentialFields, robot: FloorPlatform, scenario: GridMotion) -> Problem:
+def _prepared(
+    collision: PotentialFields,
+    acceptance: Acceptance,
+    robot: FloorPlatform,
+    scenario: GridMotion,
+) -> Problem:
     """Prepare a problem, kept for planners that differ in weights and rates alone."""
     if robot.dimensions != len(scenario.size):
         raise SettingError(
             "robot.dimensions", f"as many as the grid has ({len(scenario.size)})", robot.dimensions
         )
-    fields = collision.bind(scenario.blocked())
+    fields, margin = collision.bind(scenario.blocked()), scenario.security_margin
+    bodies, between = scene(robot.build(), scenario.bodies()), "obstacles"
+    if acceptance != "model":
+        proven = only_proven(fields.grid, bodies, margin, acceptance == "margin")
+        fields, between = fields._replace(grid=proven), "obstacles, or moves that are not proven,"
     own = fields.grid
     start, goal = own.index_of(scenario.start), own.index_of(scenario.goal)
     for name, node in (("start", start), ("goal", goal)):
@@ -313,8 +332,8 @@ def _prepared(collision: PotentialFields, robot: FloorPlatform, scenario: GridMo
     steps = fields.steps_to(goal)
     if steps[start] == UNREACHED:
         must = (
-            f"a node that can be reached from the start {list(scenario.start)}; obstacles are "
-            "between"
+            f"a node that can be reached from the start {list(scenario.start)}; "
+            f"{between} are between"
         )
         raise SettingError("scenario.goal", must, list(scenario.goal))
     fronts = _fronts(fields)
@@ -329,7 +348,6 @@ def _prepared(collision: PotentialFields, robot: FloorPlatform, scenario: GridMo
         _weights(fields, fronts),
     )
     moves = Moves(own.neighbours, fields.potentials, steps)
-    bodies, margin = scene(robot.build(), scenario.bodies()), scenario.security_margin
     return Problem(fields, moves, choice_table(*moves), (start, goal), world, bodies, margin)
 
 

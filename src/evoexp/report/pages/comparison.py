@@ -21,8 +21,10 @@ from evoexp.report.pages import ranking
 from evoexp.report.planner_runs import PlannerRuns, Problem, of_results, stored_conditions
 from evoexp.report.problem_ranks import standing
 from evoexp.report.proportions import Proportion
+from evoexp.report.proven_answers import first_reached
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results
+from evoexp.report.run_measures import search_seconds
 from evoexp.report.statistics import (
     Interval,
     Spread,
@@ -38,7 +40,8 @@ INTRODUCTION = (
     "solution of the task, whatever the planner's own model says. It is rated by the length of its "
     "path in joint space; a path as long as the straight line from start to goal would be the "
     "shortest of all. Effort is counted in configurations that a planner asked to be judged for "
-    "collision."
+    "collision; a map that the task comes with counts as one of each of its nodes, before the "
+    "search."
 )
 TARGETS = (
     "any at all, or one at most 4, 3, 2, 1.5, 1.2, 1.1, 1.05 times as long as the unit of the "
@@ -59,7 +62,8 @@ EFFORT = (
 
 COINS = (
     "Pairs of shapes: what a planner's own collision model compares in one configuration, if it "
-    "skips nothing. Whole runs: to their end, and the verdict's CPU time is part of theirs. Own "
+    "skips nothing. Evaluations and CPU time per proven answer: counted as the queries are, up to "
+    "each run's first one, else of the whole run; –: logged by code that did not record it. Own "
     "cost: of the last solutions, median and quartiles over runs, ∞: infeasible; planners with "
     "different costs cannot be compared by it."
 )
@@ -84,8 +88,8 @@ class Rated(NamedTuple):
         refuted: Last solutions that the planner's own model accepts and the certifier refutes.
         judged: Last solutions that were judged.
         body_tests: Pairs of shapes that one collision query stands for; NaN: not known.
-        evaluations: Evaluations of all runs per run with a proven answer.
-        cpu_s: CPU time of all runs per run with a proven answer [s].
+        evaluations: Expected evaluations to a proven answer.
+        cpu_s: Expected CPU time to a proven answer [s].
         own_cost: The planner's own cost of its last solution: median and quartiles over runs.
     """
 
@@ -240,21 +244,23 @@ def _rated(own: PlannerRuns, settings: ReportSettings) -> Rated:
         verdicts.solved_refuted if verdicts else 0,
         verdicts.judged if verdicts else 0,
     )
-    return found if own.condition is None else _in_other_coins(found, own.condition)
+    return found if own.condition is None else _in_other_coins(found, own, own.condition)
 
 
-def _in_other_coins(row: Rated, condition: ConditionResults) -> Rated:
-    """Add what runs took in tests of bodies, evaluations and CPU time, and their own cost."""
+def _in_other_coins(row: Rated, own: PlannerRuns, condition: ConditionResults) -> Rated:
+    """Add tests of bodies, evaluations and CPU time to an answer, and the planner's own cost."""
 
-    def per_answer(name: str) -> float:
-        total = float(condition.column(name).sum())
-        return total / row.proven if row.proven else np.inf
+    def to_an_answer(name: str, spent: FloatArray) -> float:
+        if own.table[name].isna().any():
+            return np.nan
+        effort, reached = first_reached(own.table, own.replicates, np.inf, spent, name)
+        return expected_effort(effort, reached)
 
     _, problem = condition.prepared
     return row._replace(
         body_tests=num_body_tests(problem),
-        evaluations=per_answer("evaluations"),
-        cpu_s=per_answer("cpu_s"),
+        evaluations=to_an_answer("evaluations", condition.column("evaluations")),
+        cpu_s=to_an_answer("cpu_s", search_seconds(condition)),
         own_cost=spread(condition.column("best_cost")),
     )
 
@@ -328,8 +334,8 @@ def _coin_table(rows: Sequence[Rated]) -> Table:
         "condition",
         "pairs of shapes per query",
         "body queries per proven answer",
-        "evaluations of whole runs per proven answer",
-        "CPU time of whole runs per proven answer [s]",
+        "evaluations per proven answer",
+        "CPU time per proven answer [s]",
         "the planner's own cost",
     )
     cells = tuple(

@@ -19,11 +19,15 @@ from evoexp.commands.console import add_columns, add_hash_column, new_table, pla
 from evoexp.condition import Condition
 from evoexp.configuration import expansions
 from evoexp.configuration.experiment import Experiment, Labelled
+from evoexp.configuration.search_path import folders
 from evoexp.errors import SettingError, printable
 from evoexp.extras import lacking
 from evoexp.report.pages import page_registration
+from evoexp.report.standing_reports import StandingReport
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_table as stored_summaries
+
+INDEX = "index.md"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -71,20 +75,28 @@ def main(arguments: argparse.Namespace) -> int:
         for experiment in experiments:
             console.print(summary_table(experiment))
             if not arguments.no_report:
-                from evoexp.commands.report import of_experiment  # pandas
-
-                page = of_experiment(
-                    experiment,
-                    arguments.overrides,
-                    arguments.multirun,
-                    arguments.only,
-                    arguments.config_dir,
-                )
-                console.print(f"report: {page}", soft_wrap=True)
+                console.print(f"report: {_report(experiment, arguments)}", soft_wrap=True)
     finally:
         if failures:
             console.print(_failure_table(batch, failures))
     return 1 if failures or left else 0
+
+
+def _report(experiment: Experiment, arguments: argparse.Namespace) -> str:
+    """Draw the report of an experiment, unless it stands as it would be drawn."""
+    directory = outputs_root() / "reports" / experiment.report_name
+    conditions = ((c.label, c.condition.id) for c in experiment.conditions)
+    asked = arguments.overrides, arguments.multirun, arguments.only, arguments.config_dir
+    words = repr((*conditions, experiment.num_replicates, experiment.report, *asked))
+    paths = tuple(folder.path for folder in folders())
+    standing = StandingReport(directory, (experiment.name, words), outputs_root(), paths)
+    if standing.stands():
+        return f"{directory / INDEX} (as it was)"
+    from evoexp.commands.report import of_experiment  # pandas
+
+    page = of_experiment(experiment, *asked)
+    standing.remember()
+    return str(page)
 
 
 def _that_can_run(experiment: Experiment, console: Console) -> list[Labelled]:

@@ -1,9 +1,8 @@
 """Recordings of stored replicates: the condition attached to a log, and the best solution in it."""
 
+import math
 from collections.abc import Iterable
 from pathlib import Path
-
-import pandas as pd
 
 from evoexp.attachments import PREFIX, keep_all
 from evoexp.condition import Condition
@@ -12,7 +11,7 @@ from evoexp.playback.recording import Heading, Recording, record
 from evoexp.playback.timing import SpeedLimits
 from evoexp.store.log_reader import read_log
 from evoexp.store.run_directory import RunDirectory
-from evoexp.store.tables import read_summaries
+from evoexp.store.summaries import summary_table
 
 CHOICES = ("best", "worst", "refuted")
 
@@ -51,30 +50,30 @@ def chosen_log(run: RunDirectory, choice: str | int) -> Path:
         NothingStored: If there is no such replicate.
     """
     if isinstance(choice, int):
-        done = sorted(run.completed())
-        if choice not in done:
+        finished = sorted(run.completed())
+        if choice not in finished:
             raise NothingStored(
-                f"run {run.hash12}: no finished replicate {choice} (finished: {_listed(done)})"
+                f"run {run.hash12}: no finished replicate {choice} (finished: {_listed(finished)})"
             )
         return run.log_path(choice)
-    rows = read_summaries(run, thorough=True)
-    rows = rows[rows["status"] == "done"].sort_values("replicate")
-    num_done = len(rows)
+    names = ["replicate", "status", "best_cost", "certified"]
+    table = summary_table(run, thorough=True).select(names).to_pylist()
+    done = sorted((r for r in table if r["status"] == "done"), key=lambda row: row["replicate"])
     if choice == "refuted":
-        rows = rows[rows["certified"].fillna(True) == False]  # noqa: E712  # a column, not a truth
+        rows = [row for row in done if row["certified"] is False]
     else:
-        rows = rows.sort_values("best_cost", ascending=choice == "best", kind="stable")
-        rows = _finite_first(rows)
-    if rows.empty:
+        sign = 1.0 if choice == "best" else -1.0
+        rows = sorted(done, key=lambda row: _rank(row["best_cost"], sign))
+    if not rows:
         what = "refuted replicate" if choice == "refuted" else "finished replicate"
-        raise NothingStored(f"run {run.hash12}: no {what} among {num_done}")
-    return run.log_path(int(rows["replicate"].iloc[0]))
+        raise NothingStored(f"run {run.hash12}: no {what} among {len(done)}")
+    return run.log_path(int(rows[0]["replicate"]))
 
 
-def _finite_first(rows: pd.DataFrame) -> pd.DataFrame:
-    """Move the replicates without a feasible solution behind the others, in either order."""
-    infinite = rows["best_cost"].astype("float64") == float("inf")
-    return pd.concat([rows[~infinite], rows[infinite]])
+def _rank(cost: float | None, sign: float) -> tuple[bool, float]:
+    """Return the key by which replicates are sorted: those of no finite cost come last."""
+    is_finite = cost is not None and math.isfinite(cost)
+    return not is_finite, sign * cost if cost is not None and is_finite else 0.0
 
 
 def _listed(done: Iterable[int]) -> str:

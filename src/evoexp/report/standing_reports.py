@@ -1,0 +1,77 @@
+"""Reports that stand: nothing that they were drawn from has changed since, nor have their files.
+
+Drawing a report takes seconds, looking at what it depends on milliseconds: code, options, package
+data, versions of libraries, all stored runs (a page may tell of other experiments), what was asked
+for, and the files that were written, by their sizes and times.
+"""
+
+import contextlib
+import hashlib
+import importlib.metadata
+import json
+import os
+import sys
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
+from evoexp.store.kept_facts import installed_code
+
+_DRAWERS = ("matplotlib", "numpy", "pandas", "scipy", "pyarrow", "pin", "coal", "numba")
+_PACKAGE = Path(__file__).parents[1]
+
+
+class StandingReport(NamedTuple):
+    """A report that may stand.
+
+    Attributes:
+        directory: Its folder.
+        asked: What it was asked for in, words and identities that it follows from.
+        outputs: Root of all outputs.
+        folders: Folders of options.
+    """
+
+    directory: Path
+    asked: tuple[str, ...]
+    outputs: Path
+    folders: tuple[Path, ...]
+
+    def stands(self) -> bool:
+        """Whether it would be drawn as it is."""
+        with contextlib.suppress(FileNotFoundError, Damaged):
+            return read_kept(self._path) == self._state()
+        return False
+
+    def remember(self) -> None:
+        """Note that it has just been drawn; silent where nothing can be kept."""
+        with contextlib.suppress(OSError):
+            write_kept(self._path, self._state())
+
+    @property
+    def _path(self) -> Path:
+        name = hashlib.sha256(os.fsencode(self.directory.resolve())).hexdigest()[:32]
+        return cache_root() / "reports" / name
+
+    def _state(self) -> bytes:
+        """Return the hash of all that it follows from, and of its files."""
+        versions = [sys.version, *(importlib.metadata.version(name) for name in _DRAWERS)]
+        digest = hashlib.sha256(json.dumps([*versions, *self.asked]).encode())
+        digest.update(installed_code())
+        roots = _PACKAGE / "assets", *self.folders, self.outputs / "runs", self.directory
+        for stamp in _stamps(roots):
+            digest.update(json.dumps(stamp).encode(errors="surrogateescape"))
+        return digest.hexdigest().encode()
+
+
+def _stamps(roots: Iterable[Path]) -> Iterator[tuple[str, int, int]]:
+    """Yield path, size and time of every file in folders and those within, in order."""
+    for root in roots:
+        for folder, names, files in os.walk(root):
+            names.sort()
+            for name in sorted(files):
+                if name.startswith("."):  # locks
+                    continue
+                with contextlib.suppress(OSError):
+                    status = os.stat(path := os.path.join(folder, name))
+                    yield path, status.st_size, status.st_mtime_ns

@@ -79,7 +79,7 @@ def page(stored: Path) -> Path:
 def test_a_report_is_seven_figures_with_data_and_sidecars(page: Path) -> None:
     kinds = ("csv", "json", "png", "svg")
     assert sorted(contents(page)) == sorted(
-        [f"{stem}.{kind}" for stem in FIGURES for kind in kinds] + ["index.md"]
+        [f"{stem}.{kind}" for stem in FIGURES for kind in kinds] + ["index.html", "index.md"]
     )
 
 
@@ -181,7 +181,7 @@ def test_partial_results_are_drawn_and_said(tmp_path: Path) -> None:
         tmp_path, "rana", "rana_planar", "ga.num_generations=1", formats=("svg",)
     ).read_text()
     assert "0 of 2 replicates done, 1 failed" in text
-    assert sorted(contents(page)) == ["index.md"]  # the figures of before are gone
+    assert sorted(contents(page)) == ["index.html", "index.md"]  # the figures of before are gone
 
 
 @pytest.mark.matrix
@@ -299,7 +299,7 @@ def test_an_experiment_without_a_page_has_results_pictures_and_parameters(stored
     files = {f"{stem}.{kind}" for stem in stems for kind in kinds}
     found, text = set(contents(page)), page.read_text()
     assert files < found
-    motions = found - files - {"index.md"}
+    motions = found - files - {"index.html", "index.md"}
     assert motions and all(f"({name})" in text and name.startswith("motion") for name in motions)
     assert "## Claims" not in text
 

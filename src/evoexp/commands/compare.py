@@ -84,7 +84,7 @@ def main(arguments: argparse.Namespace) -> int:
         strange = list(strange_problems(given, runs))
         runs += of_given(given, runs)
     page = comparison.page_of_runs(runs, found, settings, given)
-    path = build.write_page(request, page, found, settings)
+    path = build.write_report(build.page_files(request, page, found, settings))
     rows = comparison.rated(runs, settings)
     _write_files(arguments, runs, rows, f"evoexp compare {request.words}", settings)
     if arguments.json:

@@ -1,4 +1,4 @@
-"""Builds a report; no other module of it writes files."""
+"""Builds a report; no other module of it writes its files."""
 
 import hashlib
 import json
@@ -7,9 +7,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from evoexp.condition import Condition
+from evoexp.report import markdown
 from evoexp.report.drawing_processes import on_all_cores
-from evoexp.report.index import render
+from evoexp.report.html_page import html_page
+from evoexp.report.index import document
 from evoexp.report.page_parts import Drawing, Page
+from evoexp.report.page_summary import HTML
 from evoexp.report.pages import page_of
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results, gather
@@ -63,10 +66,29 @@ class Request(NamedTuple):
         return f"evoexp run {self.words}" if self.arguments else f"evoexp show {self.words}"
 
 
+class ReportFiles(NamedTuple):
+    """A report before it is written.
+
+    Attributes:
+        directory: Its folder.
+        files: Name → content.
+    """
+
+    directory: Path
+    files: dict[str, bytes]
+
+
 def report(
     request: Request, settings: ReportSettings, outputs: Path, num_replicates: int | None
 ) -> Path:
-    """Write a report and return the path of its `index.md`.
+    """Write a report and return the path of its `index.md`; see `derived`."""
+    return write_report(derived(request, settings, outputs, num_replicates))
+
+
+def derived(
+    request: Request, settings: ReportSettings, outputs: Path, num_replicates: int | None
+) -> ReportFiles:
+    """Return a report as it follows from the outputs; nothing is written.
 
     Args:
         request: Names its conditions.
@@ -88,11 +110,13 @@ def report(
         request.hint,
         request.options,
     )
-    return write_page(request, page_of(found, settings), found, settings)
+    return page_files(request, page_of(found, settings), found, settings)
 
 
-def write_page(request: Request, page: Page, found: Results, settings: ReportSettings) -> Path:
-    """Draw a page's figures, write all its files, and return the path of its `index.md`.
+def page_files(
+    request: Request, page: Page, found: Results, settings: ReportSettings
+) -> ReportFiles:
+    """Draw a page's figures and return all its files.
 
     Args:
         request: Names the folder, and the command.
@@ -100,21 +124,37 @@ def write_page(request: Request, page: Page, found: Results, settings: ReportSet
         found: The results that it was made from.
         settings: Formats and levels.
     """
-    directory = found.outputs / "reports" / request.report_name
     files: dict[str, bytes] = {}
     for drawn in on_all_cores(lambda drawing: _drawn(drawing, settings), page.drawings):
         files |= drawn
+    text = document(page, found, settings, f"evoexp {request.command} {request.words}")
+    files[HTML] = html_page(text, files)
     for motion in page.motions:
         files[f"{motion.stem}.html"] = motion.content()
-    files[INDEX] = render(
-        page, found, settings, f"evoexp {request.command} {request.words}"
-    ).encode()
+    files[INDEX] = markdown.page(text).encode()
+    return ReportFiles(found.outputs / "reports" / request.report_name, files)
+
+
+def write_report(report: ReportFiles) -> Path:
+    """Write the files of a report and return the path of its `index.md`."""
+    directory, files = report
     directory.mkdir(parents=True, exist_ok=True)
     write_files({directory / name: content for name, content in files.items()})
-    for path in directory.iterdir():  # files of an earlier report that this report does not have
-        if path.name not in files and not path.name.startswith("."):
-            path.unlink()
+    for path in stale_files(report):
+        path.unlink()
     return directory / INDEX
+
+
+def stale_files(report: ReportFiles) -> list[Path]:
+    """Return the files in a report's folder that it does not have: those of an earlier one."""
+    directory, files = report
+    if not directory.is_dir():
+        return []
+    return sorted(
+        path
+        for path in directory.iterdir()
+        if path.name not in files and not path.name.startswith(".")
+    )
 
 
 def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:

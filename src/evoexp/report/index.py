@@ -1,9 +1,19 @@
-"""The text of a report: `index.md`."""
+"""The text of a report, from its page and its results."""
 
 from collections.abc import Iterable, Iterator, Sequence
 
 from evoexp.report import markdown
 from evoexp.report.page_parts import Drawing, Page
+from evoexp.report.page_text import (
+    Document,
+    FigureText,
+    MotionText,
+    Notice,
+    RunText,
+    Section,
+    TableText,
+    Verdict,
+)
 from evoexp.report.parameters import Parameter, parameters, planned_replicates
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results, Verdicts
@@ -12,10 +22,11 @@ from evoexp.report.verdicts import Claim, Comparison
 
 FEW = 3  # damaged logs named of each condition
 WIDEST = 20  # conditions side by side; more stand one below the other
+CLAIMS, FAILURES = "Claims", "Failures"  # headings
 
 
-def render(page: Page, results: Results, settings: ReportSettings, command: str) -> str:
-    """Return the page as Markdown; the same results give the same text.
+def document(page: Page, results: Results, settings: ReportSettings, command: str) -> Document:
+    """Return the text of a page; the same results give the same text.
 
     Args:
         page: Its parts.
@@ -23,54 +34,61 @@ def render(page: Page, results: Results, settings: ReportSettings, command: str)
         settings: Levels and formats.
         command: The command that makes it.
     """
-    parts = [
-        f"# {page.title}\n",
-        _made_by(results, command),
-        _incomplete(results),
-        _damaged(results),
-        _added(results),
-        f"{page.introduction}\n" if page.introduction else "",
-        _section("Conditions", _conditions(results, settings)),
-        _section("Results", _quantities(page, results)),
+    notices = (_incomplete(results), _damaged(results), _added(results))
+    sections = (
+        Section("Conditions", table=_conditions(results, settings)),
+        Section("Results", table=_quantities(page, results)),
+        *(Section(t.heading, table=TableText(t.headers, t.rows, t.note)) for t in page.tables),
+        Section(CLAIMS, table=_claims(page.claims)),
+        Section("Known defects and checks", table=_checks(page.checks)),
         *(
-            _section(t.heading, markdown.table(t.headers, t.rows) + f"\n{t.note}\n" * bool(t.note))
-            for t in page.tables
+            Section(heading, table=_comparison(rows, settings))
+            for heading, rows in page.comparisons
         ),
-        _section("Claims", _claims(page.claims)),
-        _section("Known defects and checks", _checks(page.checks)),
-        *(_section(heading, _comparison(rows, settings)) for heading, rows in page.comparisons),
-        _section("Motions", _motions(page)),
-        _section("Figures", "\n".join(_figure(drawing, settings) for drawing in page.drawings)),
-        _section("Parameters", _parameters(results)),
-        _section("Failures", _failures(results)),
-    ]
-    return markdown.inert("\n".join(part for part in parts if part))
+        Section(
+            "Motions",
+            "Played in a browser, with every exact distance:",
+            motions=tuple(MotionText(each.title, f"{each.stem}.html") for each in page.motions),
+        ),
+        Section("Figures", figures=tuple(_figure(each, settings) for each in page.drawings)),
+        Section("Parameters", table=_parameters(results)),
+        Section(FAILURES, table=_failures(results)),
+    )
+    return Document(
+        page.title,
+        command,
+        results.experiment,
+        results.budget,
+        tuple(notice for notice in notices if notice.text),
+        page.introduction,
+        tuple(each for each in sections if each.table or each.figures or each.motions),
+        tuple(
+            RunText(c.label, c.condition.id, c.done, c.planned, c.failed, c.is_reference)
+            for c in results.conditions
+        ),
+    )
 
 
-def _section(heading: str, text: str) -> str:
-    return f"## {heading}\n\n{text}" if text else ""
+def render(page: Page, results: Results, settings: ReportSettings, command: str) -> str:
+    """Return the page as Markdown; see `document`."""
+    return markdown.page(document(page, results, settings, command))
 
 
-def _made_by(results: Results, command: str) -> str:
-    named = {"experiment": results.experiment, "budget": results.budget}
-    words = [f"{kind} `{name}`" for kind, name in named.items() if name]
-    return ", ".join([f"Made by `{command}`", *words]) + ".\n"
-
-
-def _incomplete(results: Results) -> str:
+def _incomplete(results: Results) -> Notice:
     """Name the replicates that are missing; empty if none is."""
     missing = [
         f"{c.label}: {c.done} of {c.planned} replicates done, {c.failed} failed"
         for c in results.conditions
         if c.done < c.planned
     ]
-    return (
-        f"> **Partial results.** {'; '.join(missing)}. Everything below is drawn from the "
-        "finished replicates.\n" * bool(missing)
+    return Notice(
+        "Partial results",
+        f"{'; '.join(missing)}. Everything below is drawn from the finished replicates."
+        * bool(missing),
     )
 
 
-def _damaged(results: Results) -> str:
+def _damaged(results: Results) -> Notice:
     """Name the logs that are damaged and left out; empty if none is."""
     lost = [
         f"{c.label}: {len(c.damaged)} ({', '.join(list(c.damaged)[:FEW])}"
@@ -78,13 +96,14 @@ def _damaged(results: Results) -> str:
         for c in results.conditions
         if c.damaged
     ]
-    return (
-        f"> **Damaged logs.** {'; '.join(lost)} could not be read and are left out; the command "
-        "that ran the experiment runs them again.\n" * bool(lost)
+    return Notice(
+        "Damaged logs",
+        f"{'; '.join(lost)} could not be read and are left out; the command that ran the "
+        "experiment runs them again." * bool(lost),
     )
 
 
-def _added(results: Results) -> str:
+def _added(results: Results) -> Notice:
     """Name the replicates that were added when results could be known; empty if none was."""
     fixed = planned_replicates(results) if results.experiment else 0
     added = [
@@ -92,13 +111,14 @@ def _added(results: Results) -> str:
         for c in results.conditions
         if (n := c.added(c.condition.num_replicates(fixed)))
     ]
-    return (
-        f"> **Replicates added later.** {'; '.join(added)}: asked for when results of earlier ones "
-        "were stored already. Numbers and verdicts below use all of them.\n" * bool(added)
+    return Notice(
+        "Replicates added later",
+        f"{'; '.join(added)}: asked for when results of earlier ones were stored already. Numbers "
+        "and verdicts below use all of them." * bool(added),
     )
 
 
-def _conditions(results: Results, settings: ReportSettings) -> str:
+def _conditions(results: Results, settings: ReportSettings) -> TableText:
     rows = []
     for c in results.conditions:
         interval = (
@@ -127,9 +147,9 @@ def _conditions(results: Results, settings: ReportSettings) -> str:
         "\"Solved\": the paper's own model accepts the best solution; in brackets Wilson's "
         f'{level} interval. "Certified", "refuted": the exact verdict on the whole continuous '
         'motion, by the distance of the bodies themselves; "required margin not kept": certified, '
-        "yet somewhere closer than the scenario's security margin.\n"
+        "yet somewhere closer than the scenario's security margin."
     )
-    return f"{markdown.table(headers, rows)}\n{note}"
+    return TableText(headers, tuple(rows), note)
 
 
 def _verdicts(verdicts: Verdicts) -> tuple[object, ...]:
@@ -138,11 +158,11 @@ def _verdicts(verdicts: Verdicts) -> tuple[object, ...]:
     return verdicts.certified, verdicts.refuted, verdicts.undecided, verdicts.solved_refuted
 
 
-def _quantities(page: Page, results: Results) -> str:
+def _quantities(page: Page, results: Results) -> TableText | None:
     labels = [c.label for c in results.with_data]
     if not labels or not page.quantities:
-        return ""
-    note = "Median [first quartile, third quartile] over finished replicates.\n"
+        return None
+    note = "Median [first quartile, third quartile] over finished replicates."
     heads = [f"{c.label} (n = {c.done})" for c in results.with_data]
     if len(labels) > WIDEST:
         cells = [
@@ -150,29 +170,29 @@ def _quantities(page: Page, results: Results) -> str:
             for head, c in zip(heads, labels, strict=True)
         ]
         names = [q.name if q.unit == "–" else f"{q.name} [{q.unit}]" for q in page.quantities]
-        return f"{markdown.table(('condition', *names), cells)}\n{note}"
+        return TableText(("condition", *names), tuple(cells), note)
     rows = [
         (q.name, q.unit, *(markdown.spread(q.spreads[label]) for label in labels))
         for q in page.quantities
     ]
-    return f"{markdown.table(('quantity', 'unit', *heads), rows)}\n{note}"
+    return TableText(("quantity", "unit", *heads), tuple(rows), note)
 
 
-def _claims(claims: Sequence[Claim]) -> str:
+def _claims(claims: Sequence[Claim]) -> TableText | None:
     if not claims:
-        return ""
+        return None
     rows = [
-        (c.text, c.source, c.evidence, c.n or "–", c.rule or "–", f"**{c.verdict}**")
+        (c.text, c.source, c.evidence, c.n or "–", c.rule or "–", Verdict(c.verdict))
         for c in claims
     ]
-    return markdown.table(("claim", "paper", "evidence", "n", "rule", "verdict"), rows)
+    return TableText(("claim", "paper", "evidence", "n", "rule", "verdict"), tuple(rows))
 
 
-def _checks(checks: Sequence[tuple[str, str]]) -> str:
-    return markdown.table(("check", "finding"), checks) if checks else ""
+def _checks(checks: Sequence[tuple[str, str]]) -> TableText | None:
+    return TableText(("check", "finding"), tuple(checks)) if checks else None
 
 
-def _comparison(rows: Iterable[Comparison], settings: ReportSettings) -> str:
+def _comparison(rows: Iterable[Comparison], settings: ReportSettings) -> TableText:
     cells = [
         (
             c.quantity,
@@ -194,30 +214,16 @@ def _comparison(rows: Iterable[Comparison], settings: ReportSettings) -> str:
         f"the {100 * settings.confidence:g} % percentile interval of {settings.num_resamples} "
         "resamples of seeds. Two tests, two-sided: Wilcoxon's signed-rank test of the pairs, "
         "which verdicts follow, and Mann and Whitney's of the same values as independent "
-        "samples; adjusted: Holm over the rows of this table, test by test.\n"
+        "samples; adjusted: Holm over the rows of this table, test by test."
     )
-    return f"{markdown.table(headers, cells)}\n{note}"
+    return TableText(headers, tuple(cells), note)
 
 
-def _motions(page: Page) -> str:
-    """Link the pages that play motions."""
-    links = [f"- [{motion.title}]({motion.stem}.html)" for motion in page.motions]
-    return (
-        "\n".join(["Played in a browser, with every exact distance:\n", *links, ""])
-        if links
-        else ""
-    )
+def _figure(drawing: Drawing, settings: ReportSettings) -> FigureText:
+    return FigureText(drawing.stem, drawing.title, drawing.caption, tuple(settings.formats))
 
 
-def _figure(drawing: Drawing, settings: ReportSettings) -> str:
-    shown = next((kind for kind in ("png", "svg") if kind in settings.formats), None)
-    kinds = (*settings.formats, "csv", "json")
-    links = " · ".join(f"[{kind}]({drawing.stem}.{kind})" for kind in kinds)
-    picture = f"![{drawing.title}]({drawing.stem}.{shown})\n\n" if shown else ""
-    return f"### {drawing.title}\n\n{picture}{drawing.caption}\n\n{links}\n"
-
-
-def _parameters(results: Results) -> str:
+def _parameters(results: Results) -> TableText:
     """Return one row per setting, and one per value where conditions differ in it."""
     by_name: dict[str, dict[Parameter, list[str]]] = {}
     for condition in results.conditions:
@@ -234,7 +240,7 @@ def _parameters(results: Results) -> str:
         for name in _ordered(by_name)
         for parameter, labels in by_name[name].items()
     ]
-    return markdown.table(("setting", "value", "unit", "source"), rows)
+    return TableText(("setting", "value", "unit", "source"), tuple(rows))
 
 
 def _ordered(by_name: dict[str, dict[Parameter, list[str]]]) -> Iterator[str]:
@@ -245,10 +251,10 @@ def _ordered(by_name: dict[str, dict[Parameter, list[str]]]) -> Iterator[str]:
         yield from (name for name in by_name if name.split(".")[0].split("[")[0] == group)
 
 
-def _failures(results: Results) -> str:
+def _failures(results: Results) -> TableText | None:
     rows = [
         (c.label, replicate, reason)
         for c in results.conditions
         for replicate, reason in c.failures.items()
     ]
-    return markdown.table(("condition", "replicate", "reason"), rows) if rows else ""
+    return TableText(("condition", "replicate", "reason"), tuple(rows)) if rows else None

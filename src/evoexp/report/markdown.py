@@ -1,14 +1,49 @@
-"""Pieces of a page in Markdown."""
+"""A page in Markdown, and its numbers as text."""
 
 import math
 import re
 from collections.abc import Iterable, Sequence
 
+from evoexp.report.page_text import PICTURES, Document, FigureText, Section, TableText
 from evoexp.report.statistics import Interval, Spread
 
 _HTML = re.compile("<(?=[A-Za-z/!?])")  # begins an element, a comment, an address
 _LINK = re.compile(r"\]\(([^)]*)\)?")
 _OWN_FILE = re.compile(r"[\w.-]+\.(png|svg|pdf|csv|json)")
+
+
+def page(document: Document) -> str:
+    """Return a page as Markdown."""
+    parts = [
+        f"# {document.title}\n",
+        f"{document.origin}\n",
+        *(f"> **{notice.title}.** {notice.text}\n" for notice in document.notices),
+        f"{document.introduction}\n" if document.introduction else "",
+        *(f"## {each.heading}\n\n{_section(each)}" for each in document.sections),
+    ]
+    return inert("\n".join(part for part in parts if part))
+
+
+def _section(section: Section) -> str:
+    links = [f"- [{motion.title}]({motion.file})\n" for motion in section.motions]
+    parts = [
+        f"{section.introduction}\n" if section.introduction else "",
+        _table_with_note(section.table) if section.table else "",
+        "".join(links),
+        *(_figure(figure) for figure in section.figures),
+    ]
+    return "\n".join(part for part in parts if part)
+
+
+def _table_with_note(text: TableText) -> str:
+    return table(text.headers, text.rows) + f"\n{text.note}\n" * bool(text.note)
+
+
+def _figure(figure: FigureText) -> str:
+    links = " · ".join(f"[{kind}]({name})" for kind, name in figure.files)
+    shown = figure.picture(*PICTURES)
+    picture = f"![{figure.title}]({shown})\n\n" if shown else ""
+    return f"### {figure.title}\n\n{picture}{figure.caption}\n\n{links}\n"
 
 
 def table(headers: Sequence[str], rows: Iterable[Sequence[object]]) -> str:

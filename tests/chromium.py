@@ -72,7 +72,7 @@ class Browser:
         for domain in ("Page", "Runtime", "Network", "Log"):
             self._call(f"{domain}.enable")
 
-    def open(self, url: str) -> None:
+    def open(self, url: str, ready: str = "typeof motionPage === 'object'") -> None:
         """Load a page anew and wait for it."""
         self._call("Page.navigate", url="about:blank")
         self.run("0")
@@ -80,9 +80,16 @@ class Browser:
         self.complaints.clear()
         self._call("Page.navigate", url=url)
         end = time.monotonic() + PATIENCE
-        while not self.run("document.readyState === 'complete' && typeof motionPage === 'object'"):
+        while not self.run(f"document.readyState === 'complete' && {ready}"):
             assert time.monotonic() < end, f"{url} does not load: {self.complaints}"
             time.sleep(0.05)
+
+    def look(self, width: int, height: int, scheme: str = "light") -> None:
+        """Set the size of the window [px], and the scheme of colours that the reader prefers."""
+        size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+        self._call("Emulation.setDeviceMetricsOverride", **size)
+        preferred = [{"name": "prefers-color-scheme", "value": scheme}]
+        self._call("Emulation.setEmulatedMedia", features=preferred)
 
     def run(self, script: str) -> Any:
         """Return the value of an expression in the page."""

@@ -1,0 +1,120 @@
+"""Templates of HTML pages: every value that is put into one is escaped."""
+
+import functools
+import json
+import re
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from typing import TYPE_CHECKING, Any
+
+from evoexp.report.page_text import Verdict
+
+if TYPE_CHECKING:  # loaded only where a page is written
+    from jinja2 import Environment
+    from markupsafe import Markup
+
+NO_VALUE = ("–", "")  # cells of a column of numbers that hold none
+LONGEST_NUMBER = 48  # characters of a cell that is still a number, with its interval and unit
+_NUMBER = re.compile(r"[-−]?(\d[\d.]*(e[-+−]?\d+)?|∞)($|[ \[%°])")
+_HASH = re.compile("[0-9a-f]{12}")
+
+
+@functools.cache
+def asset(name: str) -> str:
+    """Return a file of `assets/site`: a template, the style sheet, the script."""
+    path = resources.files("evoexp").joinpath("assets/site", name)
+    return path.read_text(encoding="utf-8")
+
+
+@functools.cache
+def _environment() -> "Environment":
+    from jinja2 import Environment, FunctionLoader, StrictUndefined
+
+    environment = Environment(
+        loader=FunctionLoader(asset),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.globals |= {
+        "is_verdict": lambda value: isinstance(value, Verdict),
+        "verdict_class": verdict_class,
+        "number_columns": number_columns,
+    }
+    return environment
+
+
+def written(template: str, hashes: Sequence[str] = (), **values: Any) -> bytes:
+    """Return a page.
+
+    Args:
+        template: Name of its file in `assets/site`.
+        hashes: Of runs that the page has a place for: codes that name one link to it.
+        values: By the names that the template has for them.
+    """
+    from markupsafe import Markup
+
+    known = frozenset(hashes)
+    text = (
+        _environment()
+        .get_template(template)
+        .render(
+            inline=lambda value: inline(str(value), known),
+            style=Markup(asset("site.css")),
+            script=Markup(asset("site.js")),
+            **values,
+        )
+    )
+    return text.lstrip("\n").encode()
+
+
+def inline(text: str, hashes: frozenset[str] = frozenset()) -> "Markup":
+    """Return a text as HTML: words between grave accents as code, and all else as it is.
+
+    Args:
+        text: Anybody's.
+        hashes: Codes that link to the place of their run.
+    """
+    from markupsafe import Markup, escape
+
+    parts = text.split("`")
+    if len(parts) % 2 == 0:  # the last accent begins nothing
+        parts[-2:] = [f"{parts[-2]}`{parts[-1]}"]
+    pieces = [escape(part) if k % 2 == 0 else _code(part, hashes) for k, part in enumerate(parts)]
+    return Markup("").join(pieces)
+
+
+def _code(text: str, hashes: frozenset[str]) -> "Markup":
+    from markupsafe import Markup
+
+    code = Markup("<code>{}</code>").format(text)
+    if _HASH.fullmatch(text) and text in hashes:
+        return Markup('<a href="#run-{}">{}</a>').format(text, code)
+    return code
+
+
+def script_json(value: Any) -> "Markup":
+    """Return data for a script element: nothing in it can end the element."""
+    from markupsafe import Markup
+
+    text = json.dumps(value, ensure_ascii=False, separators=(",", ":"), sort_keys=True)
+    return Markup(text.replace("<", "\\u003c"))
+
+
+def verdict_class(verdict: str) -> str:
+    """Return the class of a verdict's badge: its first word."""
+    word = re.match("[a-z]*", verdict)
+    return word[0] if word else ""
+
+
+def number_columns(headers: Sequence[str], rows: Sequence[Sequence[object]]) -> Mapping[int, bool]:
+    """Return position → whether every cell of a column begins with a number, or has no value."""
+    found = {}
+    for k in range(len(headers)):
+        cells = [text for row in rows if (text := str(row[k])) not in NO_VALUE]
+        found[k] = bool(cells) and all(
+            len(text) <= LONGEST_NUMBER and _NUMBER.match(text) for text in cells
+        )
+    return found

@@ -1,0 +1,153 @@
+"""The text of a page before it is written as Markdown or HTML.
+
+Texts are plain but for one mark: `words between grave accents` are code.
+"""
+
+from typing import NamedTuple
+
+PICTURES = ("png", "svg")  # kinds of files that a page can show
+
+
+class Verdict(NamedTuple):
+    """A cell of a table that holds the verdict on a claim.
+
+    Attributes:
+        text: Such as "reproduced", or "not judged (budget smoke)".
+    """
+
+    text: str
+
+    def __str__(self) -> str:
+        """Return the verdict as Markdown."""
+        return f"**{self.text}**"
+
+
+class Notice(NamedTuple):
+    """A remark at the top of a page, of its results as a whole."""
+
+    title: str
+    text: str
+
+
+class TableText(NamedTuple):
+    """A table.
+
+    Attributes:
+        headers: Of its columns.
+        rows: Their cells: texts, numbers, verdicts.
+        note: Below it.
+    """
+
+    headers: tuple[str, ...]
+    rows: tuple[tuple[object, ...], ...]
+    note: str = ""
+
+
+class FigureText(NamedTuple):
+    """A figure.
+
+    Attributes:
+        stem: Of its files.
+        title: Heading.
+        caption: Below it.
+        formats: Kinds of its pictures.
+    """
+
+    stem: str
+    title: str
+    caption: str
+    formats: tuple[str, ...]
+
+    @property
+    def files(self) -> tuple[tuple[str, str], ...]:
+        """(kind, name) of every file: pictures, data rows, sidecar."""
+        return tuple((kind, f"{self.stem}.{kind}") for kind in (*self.formats, "csv", "json"))
+
+    def picture(self, *preferred: str) -> str:
+        """Return the name of the first picture there is of these kinds; empty if there is none."""
+        return next((f"{self.stem}.{kind}" for kind in preferred if kind in self.formats), "")
+
+
+class MotionText(NamedTuple):
+    """A page that plays a motion: its title and its file."""
+
+    title: str
+    file: str
+
+
+class Section(NamedTuple):
+    """A section: one table, or figures, or motions.
+
+    Attributes:
+        heading: Above it.
+        introduction: Between heading and content.
+        table: Its table.
+        figures: Its figures.
+        motions: Its motions.
+    """
+
+    heading: str
+    introduction: str = ""
+    table: TableText | None = None
+    figures: tuple[FigureText, ...] = ()
+    motions: tuple[MotionText, ...] = ()
+
+
+class RunText(NamedTuple):
+    """A stored run that the page shows.
+
+    Attributes:
+        label: Of the condition.
+        condition_id: Full hash, 64 hex digits.
+        done: Finished replicates.
+        planned: Planned replicates.
+        failed: Failed replicates.
+        is_reference: Whether it is a reference, which has no motion to view.
+    """
+
+    label: str
+    condition_id: str
+    done: int
+    planned: int
+    failed: int
+    is_reference: bool
+
+    @property
+    def hash12(self) -> str:
+        """The twelve hex digits that name the run."""
+        return self.condition_id[:12]
+
+
+class Document(NamedTuple):
+    """The whole text of a page.
+
+    Attributes:
+        title: Heading.
+        command: That makes it.
+        experiment: Name of the experiment; empty for runs given by their hashes.
+        budget: Name of the budget; empty for runs given by their hashes.
+        notices: Remarks on the results as a whole.
+        introduction: One paragraph.
+        sections: Without empty ones.
+        runs: Those that it shows.
+    """
+
+    title: str
+    command: str
+    experiment: str
+    budget: str
+    notices: tuple[Notice, ...]
+    introduction: str
+    sections: tuple[Section, ...]
+    runs: tuple[RunText, ...]
+
+    @property
+    def origin(self) -> str:
+        """The sentence that names command, experiment and budget."""
+        named = {"experiment": self.experiment, "budget": self.budget}
+        words = [f"{kind} `{name}`" for kind, name in named.items() if name]
+        return ", ".join([f"Made by `{self.command}`", *words]) + "."
+
+    def section(self, heading: str) -> Section | None:
+        """Return the section of a heading; None if there is none."""
+        return next((each for each in self.sections if each.heading == heading), None)

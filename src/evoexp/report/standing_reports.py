@@ -18,7 +18,7 @@ from typing import NamedTuple
 from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
 from evoexp.store.kept_facts import installed_code
 
-_DRAWERS = ("matplotlib", "numpy", "pandas", "scipy", "pyarrow", "pin", "coal", "numba")
+_DRAWERS = ("jinja2", "matplotlib", "numpy", "pandas", "scipy", "pyarrow", "pin", "coal", "numba")
 _PACKAGE = Path(__file__).parents[1]
 
 

@@ -85,3 +85,5 @@ def build_settings(kind: type[AnySettings], config: dict[str, Any], group: str) 
         return kind(**values)
     except ValidationError as error:
         raise settings_error(kind, error, values, group) from None
+    except SettingError as error:
+        raise SettingError(f"{group}.{error.field}", error.must, error.was, error.hint) from None

@@ -159,10 +159,11 @@ def stale_files(report: ReportFiles) -> list[Path]:
 
 def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:
     """Return the files of one figure: pictures, data rows, sidecar."""
-    from evoexp.report.style import drawn
+    from evoexp.report.style import Look, drawn
 
     table = drawing.table()
-    images = drawn(lambda: drawing.draw(table), settings.formats, settings.dpi)
+    look = Look(settings.width, settings.style)
+    images = drawn(lambda: drawing.draw(table), settings.formats, settings.dpi, look)
     pictures = {f"{drawing.stem}.{kind}": image for kind, image in images.items()}
     rows = table.to_csv(index=False, lineterminator="\n").encode()
     sidecar = {

@@ -1,8 +1,12 @@
 """The look of figures: sizes, fonts, colours and legends; it leaves no global state behind."""
 
+import contextlib
 import io
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+import logging
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextvars import ContextVar
+from typing import Any, Literal, NamedTuple
 
 import matplotlib as mpl
 import pandas as pd
@@ -12,6 +16,8 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter, LogLocator, MaxNLocator, NullFormatter
+
+from evoexp.errors import SettingError, brief
 
 ARM_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")  # Okabe & Ito 2008
 CONDITION_COLOURS = (
@@ -33,10 +39,37 @@ DOTS: dict[str, Any] = {"mec": "white", "ms": 5, "clip_on": False}  # configurat
 THOUSANDS = 10_000  # from here on numbers along an axis are written with k and M
 FEW_DECADES = 30.0  # [-] last over first number of an axis, below which powers of ten are few
 WIDTH = 7.2  # [inch] of a figure over the whole page
+SMALLEST_TEXT = 3.0  # [pt] of a legend whose names are wide
+
+
+class Look(NamedTuple):
+    """How figures are drawn.
+
+    Attributes:
+        width: Over the whole page, or over one of two columns.
+        style: Path of a matplotlib style file, applied over evoexp's own style; None: that alone.
+    """
+
+    width: Literal["page", "column"] = "page"
+    style: str | None = None
+
+
+class _Scale(NamedTuple):
+    """Shares of the sizes of a figure over the whole page: its width, its height, its text."""
+
+    width: float
+    height: float
+    text: float
+
+
+_SCALES = {"page": _Scale(1.0, 1.0, 1.0), "column": _Scale(3.5 / WIDTH, 0.62, 0.78)}
+_scale: ContextVar[_Scale] = ContextVar("_scale", default=_SCALES["page"])
+_SCALED = ("size", "labelpad", "handlelength", ".major.pad", "_pad", "linewidth")
+"""Endings of the names of parameters that are sizes of text, or distances between parts."""
 
 _RC: dict[str, Any] = {
     "svg.hashsalt": "evoexp",  # else ids in an SVG are random
-    "svg.fonttype": "path",
+    "svg.fonttype": "none",  # text as text: found, selected, and edited in a drawing program
     "pdf.fonttype": 42,
     "font.family": "DejaVu Sans",  # comes with matplotlib
     "font.size": 8.5,
@@ -57,12 +90,20 @@ _RC: dict[str, Any] = {
     "legend.handlelength": 1.8,
     "xtick.labelsize": 7.5,
     "ytick.labelsize": 7.5,
+    "xtick.major.size": 3.5,
+    "ytick.major.size": 3.5,
+    "xtick.major.pad": 3.5,
+    "ytick.major.pad": 3.5,
+    "axes.labelpad": 4.0,
     "figure.constrained_layout.w_pad": 0.08,  # [inch]
     "figure.constrained_layout.h_pad": 0.06,
     "figure.facecolor": "white",
     "savefig.facecolor": "white",
 }
 
+PLAIN = Look()
+_FONT = b"'DejaVu Sans'"  # as matplotlib names it in an SVG
+_FONTS = b"'DejaVu Sans', Verdana, sans-serif"  # Verdana's letters are as wide
 
 # nothing that changes from one day, or one machine, to the next
 _METADATA: dict[str, dict[str, Any]] = {
@@ -72,30 +113,38 @@ _METADATA: dict[str, dict[str, Any]] = {
 }
 
 
-def drawn(draw: Callable[[], Figure], formats: Sequence[str], dpi: int) -> dict[str, bytes]:
+def drawn(
+    draw: Callable[[], Figure], formats: Sequence[str], dpi: int, look: Look = PLAIN
+) -> dict[str, bytes]:
     """Draw a figure in evoexp's style, whatever the user's own settings are.
 
     Args:
         draw: Gives the figure; called anew where a name is no formula, though it looks like one.
         formats: File formats.
         dpi: Resolution of raster formats [1/inch].
+        look: Width and style.
 
     Returns:
         One file per format; the same figure gives the same bytes.
+
+    Raises:
+        SettingError: If the style file is none of matplotlib's.
     """
     try:
-        return _drawn(draw, formats, dpi)
+        return _drawn(draw, formats, dpi, look)
     except ValueError:  # a name with a $ that begins no formula
-        return _drawn(draw, formats, dpi, formulas=False)
+        return _drawn(draw, formats, dpi, look, formulas=False)
 
 
 def _drawn(
-    draw: Callable[[], Figure], formats: Sequence[str], dpi: int, *, formulas: bool = True
+    draw: Callable[[], Figure],
+    formats: Sequence[str],
+    dpi: int,
+    look: Look,
+    *,
+    formulas: bool = True,
 ) -> dict[str, bytes]:
-    with mpl.rc_context():
-        mpl.rcdefaults()
-        for name, value in _RC.items():
-            mpl.rcParams[name] = value  # type: ignore[index]
+    with _looking(look):
         mpl.rcParams["text.parse_math"] = formulas
         mpl.rcParams["figure.dpi"] = dpi  # arranged with the widths that text has when it is saved
         figure, images = draw(), {}
@@ -106,12 +155,68 @@ def _drawn(
             buffer = io.BytesIO()
             figure.savefig(buffer, format=kind, dpi=dpi, metadata=_METADATA[kind])
             images[kind] = buffer.getvalue()
+    if "svg" in images:
+        images["svg"] = images["svg"].replace(_FONT, _FONTS)
     return images
 
 
+@contextlib.contextmanager
+def _looking(look: Look) -> Iterator[None]:
+    """Let figures be drawn in a look, for as long as the context lasts."""
+    scale = _SCALES[look.width]
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        for name, value in _RC.items():
+            is_scaled = isinstance(value, float) and name.endswith(_SCALED)
+            mpl.rcParams[name] = value * scale.text if is_scaled else value  # type: ignore[index]
+        if look.style is not None:
+            for name, value in _style_file(look.style).items():
+                mpl.rcParams[name] = value  # type: ignore[index]
+        token = _scale.set(scale)
+        try:
+            yield
+        finally:
+            _scale.reset(token)
+
+
+def _style_file(path: str) -> dict[str, Any]:
+    """Return the parameters that a matplotlib style file sets, but those that name files' ids.
+
+    Raises:
+        SettingError: If it cannot be read, or sets what matplotlib does not know.
+    """
+    found: list[str] = []
+    logger, handler = logging.getLogger("matplotlib"), _Lines(found)
+    logger.addHandler(handler)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            style = dict(mpl.rc_params_from_file(path, use_default_template=False))
+    except (OSError, ValueError, Warning) as error:
+        found.append(str(error))
+    finally:
+        logger.removeHandler(handler)
+    if found:
+        wrong = brief(found[0].strip().partition("\n")[0])
+        raise SettingError("report.style", f"a matplotlib style file ({wrong})", path)
+    return {name: value for name, value in style.items() if name != "svg.hashsalt"}
+
+
+class _Lines(logging.Handler):
+    """Keeps the lines that are logged: matplotlib logs what a style file has wrong."""
+
+    def __init__(self, lines: list[str]) -> None:
+        super().__init__(logging.WARNING)
+        self._lines = lines
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._lines.append(record.getMessage())
+
+
 def figure(height: float, width: float = WIDTH) -> Figure:
-    """Return an empty figure that arranges itself [inch]."""
-    return Figure(figsize=(width, height), layout="constrained")
+    """Return an empty figure that arranges itself [inch]; smaller where it is for a column."""
+    scale = _scale.get()
+    return Figure(figsize=(width * scale.width, height * scale.height), layout="constrained")
 
 
 def row_of_panels(height: float, count: int, *, sharey: bool = False) -> tuple[Figure, list[Axes]]:
@@ -240,12 +345,18 @@ def legend_below(figure: Figure, axes: Axes, columns: int) -> None:
 def _put_below(
     figure: Figure, handles: Sequence[Artist], labels: Sequence[str], columns: int
 ) -> None:
-    """Put a legend under the whole figure, in as many columns as are wanted and as fit."""
-    for count in range(max(columns, 1), 0, -1):
-        legend = figure.legend(handles, labels, loc="outside lower center", ncols=count)
-        if count == 1 or legend.get_window_extent().width <= figure.bbox.width:
-            return
+    """Put a legend under the whole figure, in as many columns as are wanted and as fit.
+
+    Names that are wider than the figure are written smaller.
+    """
+    count, look = max(columns, 1), dict[str, Any](loc="outside lower center")
+    legend = figure.legend(handles, labels, ncols=count, **look)
+    size = float(legend.get_texts()[0].get_fontsize()) if labels else SMALLEST_TEXT
+    while legend.get_window_extent().width > figure.bbox.width and size > SMALLEST_TEXT:
+        size *= 1.0 if count > 1 else 0.95
+        count = max(count - 1, 1)
         legend.remove()
+        legend = figure.legend(handles, labels, ncols=count, fontsize=size, **look)
 
 
 def key(label: str, **look: Any) -> Line2D:

@@ -78,8 +78,11 @@ def page(stored: Path) -> Path:
 
 def test_a_report_is_seven_figures_with_data_and_sidecars(page: Path) -> None:
     kinds = ("csv", "json", "png", "svg")
+    tables = [name for name in contents(page) if name.endswith(".tex")]
+    assert "table_1_conditions.tex" in tables and len(tables) == 7
     assert sorted(contents(page)) == sorted(
-        [f"{stem}.{kind}" for stem in FIGURES for kind in kinds] + ["index.html", "index.md"]
+        [f"{stem}.{kind}" for stem in FIGURES for kind in kinds]
+        + ["index.html", "index.md", *tables]
     )
 
 
@@ -299,7 +302,9 @@ def test_an_experiment_without_a_page_has_results_pictures_and_parameters(stored
     files = {f"{stem}.{kind}" for stem in stems for kind in kinds}
     found, text = set(contents(page)), page.read_text()
     assert files < found
-    motions = found - files - {"index.html", "index.md"}
+    tables = {name for name in found if name.endswith(".tex")}
+    assert tables and all(f"[tex]({name})" in text for name in tables)
+    motions = found - files - tables - {"index.html", "index.md"}
     assert motions and all(f"({name})" in text and name.startswith("motion") for name in motions)
     assert "## Claims" not in text
 

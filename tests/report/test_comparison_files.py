@@ -2,14 +2,10 @@
 
 import csv
 import io
-import re
 
 import numpy as np
-import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from evoexp.report.comparison_files import as_csv, as_latex, escaped
+from evoexp.report.comparison_files import as_csv, as_latex
 from evoexp.report.pages.comparison import Rated
 from evoexp.report.statistics import Interval, Spread
 
@@ -74,17 +70,3 @@ def test_latex_has_a_row_per_planner_and_problem() -> None:
         r"& $\infty$ [$\infty$, $\infty$] \\",
     ]
     assert lines[2] == r"\begin{tabular}{llrrrr}" and lines[-1] == r"\end{tabular}"
-
-
-@given(st.text(alphabet=st.sampled_from(r"""ab \{}$&#_%~^<>|"[]*'(λ""")))
-def test_escaped_names_hold_no_commands_but_ours(text: str) -> None:
-    found = escaped(text)
-    words = "textbackslash|textasciitilde|textasciicircum|textless|textgreater|textbar"
-    bare = re.sub(rf"\\(?:{words})\{{\}}|\\[{{}}$&#_%]|\{{[\[*]\}}", "", found)
-    assert not set(bare) & set("\\{}$&#_%~^<>|[*"), (text, found)
-    assert bare.count("a") == text.count("a") and bare.count("λ") == text.count("λ")
-
-
-@pytest.mark.parametrize("name", ["A", "via-point GA", "λ = 10", "rana (given)"])
-def test_plain_names_stay_as_they_are(name: str) -> None:
-    assert escaped(name) == name

@@ -11,6 +11,7 @@ from evoexp.report import markdown
 from evoexp.report.drawing_processes import on_all_cores
 from evoexp.report.html_page import html_page
 from evoexp.report.index import document
+from evoexp.report.latex_tables import latex_tables
 from evoexp.report.page_parts import Drawing, Page
 from evoexp.report.page_summary import HTML
 from evoexp.report.pages import page_of
@@ -128,6 +129,7 @@ def page_files(
     for drawn in on_all_cores(lambda drawing: _drawn(drawing, settings), page.drawings):
         files |= drawn
     text = document(page, found, settings, f"evoexp {request.command} {request.words}")
+    files |= latex_tables(text)
     files[HTML] = html_page(text, files)
     for motion in page.motions:
         files[f"{motion.stem}.html"] = motion.content()

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 from evoexp.report import markdown
+from evoexp.report.latex_tables import escaped
 from evoexp.report.pages.comparison import Rated, effort_text
 
 COLUMNS = (
@@ -23,23 +24,6 @@ COLUMNS = (
     "evaluations",
     "cpu_s",
 )
-_SIGNS = {
-    "\\": r"\textbackslash{}",
-    "{": r"\{",
-    "}": r"\}",
-    "$": r"\$",
-    "&": r"\&",
-    "#": r"\#",
-    "_": r"\_",
-    "%": r"\%",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-    "<": r"\textless{}",
-    ">": r"\textgreater{}",
-    "|": r"\textbar{}",
-    "[": "{[}",  # behind the end of a line it would begin an option
-    "*": "{*}",
-}
 
 
 def as_csv(rows: Sequence[Rated]) -> bytes:
@@ -100,11 +84,6 @@ def _cells(row: Rated) -> tuple[str, ...]:
     effort = f"{effort} ({low}--{high})"
     names = escaped(row.planner), escaped(row.problem)
     return (*names, str(row.runs), str(row.proven), effort, length)
-
-
-def escaped(text: str) -> str:
-    """Return a text that LaTeX prints as it is."""
-    return "".join(_SIGNS.get(sign, sign) for sign in " ".join(text.split()))
 
 
 def _latex(number: str) -> str:

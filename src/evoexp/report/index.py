@@ -1,5 +1,6 @@
 """The text of a report, from its page and its results."""
 
+import re
 from collections.abc import Iterable, Iterator, Sequence
 
 from evoexp.report import markdown
@@ -13,15 +14,17 @@ from evoexp.report.page_text import (
     Section,
     TableText,
     Verdict,
+    provenance,
 )
 from evoexp.report.parameters import Parameter, parameters, planned_replicates
 from evoexp.report.report_settings import ReportSettings
-from evoexp.report.results import Results, Verdicts
+from evoexp.report.results import ConditionResults, Results, Verdicts
 from evoexp.report.statistics import wilson
 from evoexp.report.verdicts import Claim, Comparison
 
 FEW = 3  # damaged logs named of each condition
 WIDEST = 20  # conditions side by side; more stand one below the other
+LONGEST_NAME = 40  # letters of a table's heading in the name of its file
 CLAIMS, FAILURES = "Claims", "Failures"  # headings
 
 
@@ -61,12 +64,29 @@ def document(page: Page, results: Results, settings: ReportSettings, command: st
         results.budget,
         tuple(notice for notice in notices if notice.text),
         page.introduction,
-        tuple(each for each in sections if each.table or each.figures or each.motions),
+        _with_files(each for each in sections if each.table or each.figures or each.motions),
         tuple(
             RunText(c.label, c.condition.id, c.done, c.planned, c.failed, c.is_reference)
             for c in results.conditions
         ),
+        _seeds(results.conditions),
     )
+
+
+def _with_files(sections: Iterable[Section]) -> tuple[Section, ...]:
+    """Name the files of tables: by their number and heading."""
+    found: list[Section] = []
+    for section in sections:
+        table, number = section.table, 1 + sum(each.table is not None for each in found)
+        if table is not None:
+            words = "_".join(re.findall("[a-z0-9]+", section.heading.lower()))[:LONGEST_NAME]
+            table = table._replace(file=f"table_{number}_{words}".rstrip("_") + ".tex")
+        found.append(section._replace(table=table))
+    return tuple(found)
+
+
+def _seeds(conditions: Iterable[ConditionResults]) -> tuple[int, ...]:
+    return tuple(sorted({c.condition.seed for c in conditions}))
 
 
 def render(page: Page, results: Results, settings: ReportSettings, command: str) -> str:
@@ -220,7 +240,10 @@ def _comparison(rows: Iterable[Comparison], settings: ReportSettings) -> TableTe
 
 
 def _figure(drawing: Drawing, settings: ReportSettings) -> FigureText:
-    return FigureText(drawing.stem, drawing.title, drawing.caption, tuple(settings.formats))
+    runs = [(c.condition.id[:12], c.done) for c in drawing.conditions]
+    whose = provenance(runs, _seeds(drawing.conditions))
+    caption = f"{drawing.caption} {whose}".strip()
+    return FigureText(drawing.stem, drawing.title, caption, tuple(settings.formats))
 
 
 def _parameters(results: Results) -> TableText:

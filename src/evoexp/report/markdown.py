@@ -9,7 +9,7 @@ from evoexp.report.statistics import Interval, Spread
 
 _HTML = re.compile("<(?=[A-Za-z/!?])")  # begins an element, a comment, an address
 _LINK = re.compile(r"\]\(([^)]*)\)?")
-_OWN_FILE = re.compile(r"[\w.-]+\.(png|svg|pdf|csv|json)")
+_OWN_FILE = re.compile(r"[\w.-]+\.(png|svg|pdf|csv|json|tex)")
 
 
 def page(document: Document) -> str:
@@ -36,7 +36,8 @@ def _section(section: Section) -> str:
 
 
 def _table_with_note(text: TableText) -> str:
-    return table(text.headers, text.rows) + f"\n{text.note}\n" * bool(text.note)
+    note = f"\n{text.note}\n" * bool(text.note)
+    return table(text.headers, text.rows) + note + f"\n[tex]({text.file})\n" * bool(text.file)
 
 
 def _figure(figure: FigureText) -> str:

@@ -3,9 +3,11 @@
 Texts are plain but for one mark: `words between grave accents` are code.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 PICTURES = ("png", "svg")  # kinds of files that a page can show
+MOST_NAMED = 4  # runs whose hashes a caption spells out
 
 
 class Verdict(NamedTuple):
@@ -36,11 +38,13 @@ class TableText(NamedTuple):
         headers: Of its columns.
         rows: Their cells: texts, numbers, verdicts.
         note: Below it.
+        file: Name of the file that holds it as LaTeX; empty: there is none.
     """
 
     headers: tuple[str, ...]
     rows: tuple[tuple[object, ...], ...]
     note: str = ""
+    file: str = ""
 
 
 class FigureText(NamedTuple):
@@ -130,6 +134,7 @@ class Document(NamedTuple):
         introduction: One paragraph.
         sections: Without empty ones.
         runs: Those that it shows.
+        seeds: Of their conditions, each once.
     """
 
     title: str
@@ -140,6 +145,12 @@ class Document(NamedTuple):
     introduction: str
     sections: tuple[Section, ...]
     runs: tuple[RunText, ...]
+    seeds: tuple[int, ...] = ()
+
+    @property
+    def provenance(self) -> str:
+        """The sentence that tells the runs: how many, of which seeds and hashes."""
+        return provenance([(run.hash12, run.done) for run in self.runs], self.seeds)
 
     @property
     def origin(self) -> str:
@@ -151,3 +162,22 @@ class Document(NamedTuple):
     def section(self, heading: str) -> Section | None:
         """Return the section of a heading; None if there is none."""
         return next((each for each in self.sections if each.heading == heading), None)
+
+
+def provenance(runs: Sequence[tuple[str, int]], seeds: Sequence[int]) -> str:
+    """Return the sentence that tells whose runs something shows; empty without any.
+
+    Args:
+        runs: (hash, finished replicates) of every condition.
+        seeds: Of their conditions, each once.
+    """
+    counts = sorted({done for _, done in runs})
+    if not counts:
+        return ""
+    number = str(counts[0]) if len(counts) == 1 else f"{counts[0]}–{counts[-1]}"
+    each = " of each condition" if len(runs) > 1 else ""
+    seed = f"seed{'s' * (len(seeds) > 1)} {', '.join(map(str, seeds))}"
+    names = dict.fromkeys(name for name, _ in runs)
+    shown = ", ".join(list(names)[:MOST_NAMED])
+    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+    return f"n = {number}{each}, {seed}; runs {shown}{more}."

@@ -4,9 +4,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from test_home_page import RANA, RUN, summary
 from test_html_page import ID, page_of
 
 from chromium import CHROMIUM, Browser
+from evoexp.report.home_page import home_page
 from evoexp.report.html_page import html_page
 from evoexp.report.page_text import FigureText, RunText, Section, TableText
 from report_samples import smoke_report
@@ -86,3 +88,15 @@ def test_a_page_never_scrolls_sideways(
     assert picture.startswith(b"\x89PNG") and len(picture) > 10_000
     assert browser.complaints == []
     assert not [url for url in browser.requests if not url.startswith(("data:", "file:"))]
+
+
+def test_the_search_finds_claims_and_hashes(browser: Browser, tmp_path: Path) -> None:
+    found = [summary("rana_planar"), summary("rana_puma")]
+    (tmp_path / "index.html").write_bytes(home_page(found, [RANA], [RUN]))
+    browser.open((tmp_path / "index.html").as_uri(), "true")
+    assert browser.run("document.querySelector('section.search').hidden") is False
+    for words, count in (("SHORT puma", 1), ("0123", 2), ("nothing like it", 0), ("", 0)):
+        field = "document.getElementById('search')"
+        browser.run(f"{field}.value = '{words}', {field}.dispatchEvent(new Event('input'))")
+        assert browser.run("document.querySelectorAll('#found li').length") == count
+    assert browser.complaints == []

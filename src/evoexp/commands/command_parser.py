@@ -12,6 +12,7 @@ COMMANDS = {
     "run": "run an experiment: its missing replicates, then its report",
     "plan": "list what a run would start: there, missing, failed, damaged; time and memory",
     "report": "draw an experiment's figures and tables again, from outputs alone",
+    "site": "write the home page of all reports: papers, claims, runs, a search",
     "compare": "compare planners by their proven answers, over collision queries",
     "claims": "list the papers' claims: rule, numbers, verdict",
     "reproduce": "run stored replicates again: MATCH, or the first generation that differs",

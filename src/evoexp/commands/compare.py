@@ -6,7 +6,7 @@ import re
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from rich.table import Table
 
@@ -60,13 +60,51 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print JSON: an object per condition")
 
 
+class Drawn(NamedTuple):
+    """A comparison before it is written.
+
+    Attributes:
+        files: Of its page.
+        request: That it answers.
+        settings: Levels and formats.
+        runs: Of all planners, those given by `--data` included.
+        strange: Lines on problems that only the given data know.
+    """
+
+    files: build.ReportFiles
+    request: build.Request
+    settings: ReportSettings
+    runs: list[PlannerRuns]
+    strange: list[str]
+
+
 def main(arguments: argparse.Namespace) -> int:
     """Draw the page, and print its table."""
     arguments.overrides = unpacked(arguments.overrides)
-    given = read_given(arguments.data) if arguments.data else None
-    known = _best_known(arguments.best_known)
     if arguments.ioh:
         _check_empty(arguments.ioh)
+    files, request, settings, runs, strange = drawn(arguments)
+    path = build.write_report(files)
+    rows = comparison.rated(runs, settings)
+    _write_files(arguments, runs, rows, f"evoexp compare {request.words}", settings)
+    if arguments.json:
+        print_json([row._asdict() | _parts(row) for row in rows])
+        return 0
+    console = plain_console()
+    console.print(_table(rows, request.report_name))
+    for line in strange:
+        console.print(line, highlight=False, soft_wrap=True)
+    for kind in ("csv", "latex", "ioh"):
+        if written := getattr(arguments, kind):
+            console.print(f"{kind}: {written}", highlight=False, soft_wrap=True)
+    console.print(f"compare: {path}", highlight=False, soft_wrap=True)
+    return 0
+
+
+def drawn(arguments: argparse.Namespace) -> Drawn:
+    """Draw the page that is asked for; nothing is written."""
+    given = read_given(arguments.data) if arguments.data else None
+    known = _best_known(arguments.best_known)
     request, settings, planned = _asked(arguments)
     if given:
         request = _with_data(request, arguments.data, given)
@@ -84,21 +122,7 @@ def main(arguments: argparse.Namespace) -> int:
         strange = list(strange_problems(given, runs))
         runs += of_given(given, runs)
     page = comparison.page_of_runs(runs, found, settings, given)
-    path = build.write_report(build.page_files(request, page, found, settings))
-    rows = comparison.rated(runs, settings)
-    _write_files(arguments, runs, rows, f"evoexp compare {request.words}", settings)
-    if arguments.json:
-        print_json([row._asdict() | _parts(row) for row in rows])
-        return 0
-    console = plain_console()
-    console.print(_table(rows, request.report_name))
-    for line in strange:
-        console.print(line, highlight=False, soft_wrap=True)
-    for kind in ("csv", "latex", "ioh"):
-        if written := getattr(arguments, kind):
-            console.print(f"{kind}: {written}", highlight=False, soft_wrap=True)
-    console.print(f"compare: {path}", highlight=False, soft_wrap=True)
-    return 0
+    return Drawn(build.page_files(request, page, found, settings), request, settings, runs, strange)
 
 
 def _table(rows: Sequence[comparison.Rated], title: str) -> Table:

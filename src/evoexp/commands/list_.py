@@ -78,7 +78,7 @@ def _print_failed(*, as_json: bool) -> int:
     for name, run in stored_runs(outputs_root()):
         if isinstance(run, EvoexpError) or not run.failed():
             continue
-        label = _named(run)["label"] or ""
+        label = origin_of(run)["label"] or ""
         for replicate in sorted(run.failed()):
             try:
                 reason = str(run.failure(replicate)["reason"])
@@ -135,7 +135,7 @@ def _run(name: str, run: RunDirectory | EvoexpError) -> dict[str, Any]:
         | {"hash": run.condition_id, "done": len(done), "failed": len(rows) - len(done)}
         | {"solved": sum(bool(each["solved"]) for each in done)}
         | {"median_best_cost": np.median([each["best_cost"] for each in done]) if done else None}
-        | _named(run)
+        | origin_of(run)
         | {"damage": _damage(run)}
     )
 
@@ -171,7 +171,7 @@ def _run_table(runs: list[dict[str, Any]]) -> Table:
     return table
 
 
-def _named(run: RunDirectory) -> dict[str, Any]:
+def origin_of(run: RunDirectory) -> dict[str, Any]:
     """Return experiment, label and budget of a run as it was asked for: experiments share runs."""
     try:
         notes = run.manifest()

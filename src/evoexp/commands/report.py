@@ -10,6 +10,8 @@ from pathlib import Path
 from rich.console import Console
 
 from evoexp.commands.arguments import add_experiment_arguments, folder_words, is_override
+from evoexp.commands.console import plain_console
+from evoexp.commands.drafts import Draft, check_reports
 from evoexp.commands.pack import unpacked
 from evoexp.condition import Condition
 from evoexp.configuration import expansions
@@ -33,21 +35,42 @@ _SILENT = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     words = add_experiment_arguments(parser)
-    words.metavar, words.nargs = "EXPERIMENT | HASH | RUNS.tar ... [KEY=VALUE ...]", "+"
+    words.metavar, words.nargs = "EXPERIMENT | HASH | RUNS.tar ... [KEY=VALUE ...]", "*"
     words.help = (
         "an experiment and overrides as for run, or prefixes of the hashes of stored runs; "
         f"`{ASSUMPTIONS}`: every paper's page of assumed numbers"
     )
+    parser.add_argument(
+        "--all",
+        action="store_true",
+        help="every experiment of which something is stored, every report that is there, and the "
+        "home page (evoexp site)",
+    )
+    parser.add_argument(
+        "--check",
+        action="store_true",
+        help="write nothing: derive every file again, name those that differ, are missing or left "
+        "over; exit code 1 if there are any",
+    )
 
 
 def main(arguments: argparse.Namespace) -> int:
-    """Draw; exit code 0."""
-    console = Console()
+    """Draw, or check; exit code 1 if something differs or cannot be drawn."""
+    console = plain_console()
+    if arguments.all:
+        from evoexp.commands.all_reports import report_all
+
+        return report_all(arguments, console)
+    if not arguments.overrides:
+        raise SettingError("experiment", "named, or --all given", "none")
     arguments.overrides = unpacked(arguments.overrides)
     if ASSUMPTIONS in arguments.overrides:
         arguments.overrides = _with_assumptions(arguments.overrides, console)
-    for page in _pages(arguments):
-        console.print(f"report: {page}", highlight=False, soft_wrap=True)
+    found = drafts(arguments)
+    if arguments.check:
+        return check_reports((draft.files() for draft in found), console)
+    for draft in found:
+        console.print(f"report: {build.write_report(draft.files())}", soft_wrap=True)
     return 0
 
 
@@ -69,12 +92,17 @@ def _with_assumptions(words: Sequence[str], console: Console) -> list[str]:
     if not stored:
         raise NothingStored(f"{ASSUMPTIONS}: nothing stored in {outputs}; try: {missing[:-1]}")
     if missing:
-        console.print(f"nothing stored yet: {missing[:-1]}", highlight=False, soft_wrap=True)
+        console.print(f"nothing stored yet: {missing[:-1]}", soft_wrap=True)
     return [name for word in words for name in (stored if word == ASSUMPTIONS else [word])]
 
 
-def _pages(arguments: argparse.Namespace) -> list[Path]:
-    """Draw a report of every named experiment, or a single report of all named runs."""
+def drafts(arguments: argparse.Namespace) -> list[Draft]:
+    """Return a report of every named experiment, or a single report of all named runs.
+
+    Raises:
+        UnknownOption: If a word is neither an experiment nor a hash.
+        SettingError: If runs are given by their hashes, and overrides beside them.
+    """
     multirun, only, known = arguments.multirun, arguments.only, options("experiment")
     overrides = [word for word in arguments.overrides if is_override(word)]
     names = [word for word in arguments.overrides if word not in overrides]
@@ -94,7 +122,7 @@ def _pages(arguments: argparse.Namespace) -> list[Path]:
         [*chosen, *overrides], multirun=multirun or len(names) > 1, only=only
     )
     return [
-        of_experiment(experiment, overrides, multirun, only, arguments.config_dir)
+        draft_of(experiment, overrides, multirun, only, arguments.config_dir)
         for experiment in experiments
     ]
 
@@ -106,7 +134,23 @@ def of_experiment(
     only: Sequence[str] = (),
     config_dir: Sequence[str] = (),
 ) -> Path:
-    """Draw the report of one experiment, as `run` does at its end.
+    """Draw the report of one experiment, as `run` does at its end; see `draft_of`.
+
+    Returns:
+        Path of its `index.md`.
+    """
+    draft = draft_of(experiment, overrides, multirun, only, config_dir)
+    return build.write_report(draft.files())
+
+
+def draft_of(
+    experiment: Experiment,
+    overrides: Sequence[str],
+    multirun: bool = False,
+    only: Sequence[str] = (),
+    config_dir: Sequence[str] = (),
+) -> Draft:
+    """Return the report of one experiment.
 
     Args:
         experiment: As `expansions.expand` gives it.
@@ -114,9 +158,6 @@ def of_experiment(
         multirun: Whether `-m` was given.
         only: The labels of `--only`.
         config_dir: The folders of `--config-dir`.
-
-    Returns:
-        Path of its `index.md`.
     """
     file = [word.split("=")[1] for word in overrides if word.startswith("experiment=")]
     words = [experiment.name] if experiment.name in options("experiment") else []
@@ -134,11 +175,11 @@ def of_experiment(
         shlex.join(words),
         experiment.options,
     )
-    return build.report(request, experiment.report, outputs_root(), experiment.num_replicates)
+    return Draft(request, experiment.report, experiment.num_replicates)
 
 
-def _of_runs(prefixes: Sequence[str]) -> Path:
-    """Draw one report of several stored runs."""
+def _of_runs(prefixes: Sequence[str]) -> Draft:
+    """Return one report of several stored runs."""
     runs = [resolve(outputs_root(), prefix) for prefix in prefixes]
     found = {run.hash12: Condition.from_json(run.config_json()) for run in runs}
     name = "+".join(found)
@@ -146,4 +187,4 @@ def _of_runs(prefixes: Sequence[str]) -> Path:
         name = f"{len(found)}_runs+{hashlib.sha256(name.encode()).hexdigest()[:8]}"
     plain = expansions.expand([f"experiment={shipped()[0].experiment}", "report=paper"])[0]
     request = build.Request(name, "", "", tuple(found.items()))
-    return build.report(request, plain.report, outputs_root(), None)
+    return Draft(request, plain.report, None)

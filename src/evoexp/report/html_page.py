@@ -58,6 +58,8 @@ def html_page(document: Document, pictures: Mapping[str, bytes]) -> bytes:
     """
     sections = tuple(_places(document, pictures))
     failures = document.section(FAILURES)
+    places = [(section.heading, section.anchor) for section in sections]
+    places += [(each.text.title, each.anchor) for section in sections for each in section.figures]
     return written(
         "report_page.html",
         [run.hash12 for run in document.runs],
@@ -66,7 +68,7 @@ def html_page(document: Document, pictures: Mapping[str, bytes]) -> bytes:
         failures=failures.table if failures else None,
         failures_anchor=next((s.anchor for s in sections if s.heading == FAILURES), ""),
         few=FEW,
-        summary=script_json(summary_of(document)),
+        summary=script_json(summary_of(document, places)),
     )
 
 

@@ -3,6 +3,7 @@
 import html
 import json
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,7 +27,7 @@ class ReportSummary(NamedTuple):
         command: That draws it, without `evoexp`; empty where it is not known.
         partial: The remark that results are missing; empty if none is.
         failed: Number of failed replicates.
-        headings: Of its sections.
+        headings: (text, place on the page) of its sections and figures.
         claims: (text, verdict).
         runs: (hash, label) of its conditions, twelve hex digits.
         picture: File of the figure that shows best what it is about; empty if there is none.
@@ -38,7 +39,7 @@ class ReportSummary(NamedTuple):
     command: str = ""
     partial: str = ""
     failed: int = 0
-    headings: tuple[str, ...] = ()
+    headings: tuple[tuple[str, str], ...] = ()
     claims: tuple[tuple[str, str], ...] = ()
     runs: tuple[tuple[str, str], ...] = ()
     picture: str = ""
@@ -49,19 +50,24 @@ class ReportSummary(NamedTuple):
         return re.split("[@+]", self.folder)[0]
 
 
-def summary_of(document: Document) -> dict[str, Any]:
-    """Return the summary of a page as plain data."""
+def summary_of(document: Document, places: Iterable[tuple[str, str]]) -> dict[str, Any]:
+    """Return the summary of a page as plain data.
+
+    Args:
+        document: Its text.
+        places: Heading and address of its sections and figures.
+    """
     claims = document.section(CLAIMS)
     figures = [figure for section in document.sections for figure in section.figures]
     names = [name for each in figures if (name := each.picture("svg", "png"))]
-    ranked = sorted(names, key=_rank)
+    ranked = sorted(names, key=telling_rank)
     partial = [n.text for n in document.notices if n.title == "Partial results"]
     return {
         "title": document.title,
         "command": document.command.removeprefix("evoexp "),
         "partial": "".join(partial),
         "failed": sum(run.failed for run in document.runs),
-        "headings": [s.heading for s in document.sections] + [f.title for f in figures],
+        "headings": [list(place) for place in places],
         "claims": [
             [str(row[0]), row[-1].text]
             for row in (claims.table.rows if claims and claims.table else ())
@@ -72,7 +78,8 @@ def summary_of(document: Document) -> dict[str, Any]:
     }
 
 
-def _rank(name: str) -> int:
+def telling_rank(name: str) -> int:
+    """Return the place of a figure among those that tell what an experiment is about; 0: best."""
     return next((k for k, word in enumerate(TELLING) if word in name), len(TELLING))
 
 
@@ -104,8 +111,8 @@ def _checked(folder: str, data: Any) -> ReportSummary:
         ValueError, KeyError, TypeError: If it is none.
     """
     texts = [data[name] for name in ("title", "command", "partial", "picture")]
-    pairs = [tuple(pair) for name in ("claims", "runs") for pair in data[name]]
-    words = [*texts, *data["headings"], *(word for pair in pairs for word in pair)]
+    pairs = [tuple(pair) for name in ("claims", "runs", "headings") for pair in data[name]]
+    words = [*texts, *(word for pair in pairs for word in pair)]
     if not all(isinstance(word, str) for word in words) or any(len(pair) != 2 for pair in pairs):
         raise ValueError(f"{folder}: no summary of a report")
     title, command, partial, picture = texts
@@ -118,7 +125,7 @@ def _checked(folder: str, data: Any) -> ReportSummary:
         command,
         partial,
         int(data["failed"]),
-        tuple(data["headings"]),
+        tuple((text, place) for text, place in data["headings"]),
         tuple((text, verdict) for text, verdict in data["claims"]),
         tuple((name, label) for name, label in data["runs"] if re.fullmatch("[0-9a-f]{12}", name)),
         picture,

@@ -41,14 +41,16 @@ def values_drawing(results: Results, values: Mapping[str, Values], caption: str 
     return Drawing("values", "Every condition", caption, table, effects.draw_values, shown)
 
 
-def effects_drawing(
+def effects_drawings(
     results: Results,
     settings: ReportSettings,
     rows: Mapping[str, Sequence[Comparison]],
     first: str,
     caption: str = f"{A12} {BETTER}",
-) -> Drawing:
+) -> tuple[Drawing, ...]:
     """Return the figure of effect sizes: a first condition against each of the others.
+
+    There is none where nothing can be compared: a sweep has only begun.
 
     Args:
         results: Whose conditions are drawn.
@@ -57,9 +59,11 @@ def effects_drawing(
         first: Name of the first condition, or of the first ones.
         caption: Of the figure.
     """
+    if not any(rows.values()):
+        return ()
     table = partial(effects.effects_table, rows, settings.significance)
     title, shown = f"How often {first} is better", results.with_data
-    return Drawing("effects", title, caption, table, effects.draw_effects, shown)
+    return (Drawing("effects", title, caption, table, effects.draw_effects, shown),)
 
 
 def shares_drawing(

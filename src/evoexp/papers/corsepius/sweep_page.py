@@ -221,7 +221,7 @@ def _drawings(
         first = shown[0].label
         drawn += [
             boxes._replace(conditions=shown),
-            sweep_figures.effects_drawing(results, settings, by_name, first, EFFECTS),
+            *sweep_figures.effects_drawings(results, settings, by_name, first, EFFECTS),
         ]
     return tuple(drawn)
 

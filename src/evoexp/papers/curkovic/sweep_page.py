@@ -116,7 +116,7 @@ def _drawings(
             facets.draw_convergence,
             shown,
         ),
-        sweep_figures.effects_drawing(
+        *sweep_figures.effects_drawings(
             results, settings, by_name, "the first condition of a family", EFFECTS
         ),
         Drawing(

@@ -189,7 +189,7 @@ def _drawings(
         *([stopping_values] if differ else []),
         sweep_figures.shares_drawing(results, settings, shares, caption, references),
         sweep_figures.values_drawing(results, values),
-        sweep_figures.effects_drawing(
+        *sweep_figures.effects_drawings(
             results, settings, rows, "the first condition of an arm", a12
         ),
     )

@@ -89,7 +89,7 @@ def page(results: Results, settings: ReportSettings) -> Page:
             sweep_figures.values_drawing(
                 results, {f"{one.short} [{units[one.name]}]": one.values for one in shown}
             ),
-            sweep_figures.effects_drawing(
+            *sweep_figures.effects_drawings(
                 results, settings, {one.short: tables[one.name] for one in shown}, first.label
             ),
             generic.best_drawing(results),

@@ -1,0 +1,134 @@
+"""`evoexp site`: the home page of all reports."""
+
+import argparse
+import importlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import cast
+
+from rich.console import Console
+
+from evoexp.commands.console import plain_console
+from evoexp.commands.hashes import stored_runs
+from evoexp.commands.list_ import origin_of
+from evoexp.configuration.search_path import options
+from evoexp.errors import EvoexpError, NothingStored
+from evoexp.registry import CLAIMS, names, registered
+from evoexp.report.build import ReportFiles
+from evoexp.report.claim_rules import Rules
+from evoexp.report.home_page import Paper, StoredRun, home_page, summaries
+from evoexp.report.page_summary import HTML
+from evoexp.store.busy_runs import is_being_written
+from evoexp.store.files import write_file
+from evoexp.store.identity import DamagedFile
+from evoexp.store.run_directory import RunDirectory, outputs_root
+
+MAX_NAMED = 4  # runs that are named as being written
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the command's arguments: none."""
+    parser.epilog = (
+        "The page is reports/index.html under the outputs. Reports are drawn by `evoexp report`; "
+        "`evoexp report --all` draws all of them, and this page."
+    )
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Write the page."""
+    console = plain_console()
+    write_site(console)
+    return 0
+
+
+def write_site(console: Console) -> None:
+    """Write the home page, and name it.
+
+    Raises:
+        NothingStored: If there is neither a report nor a run.
+    """
+    directory, files = home_files()
+    directory.mkdir(parents=True, exist_ok=True)
+    write_file(directory / HTML, files[HTML])
+    console.print(f"site: {directory / HTML}", soft_wrap=True)
+    say_busy(console)
+
+
+def home_files() -> ReportFiles:
+    """Return the home page as it follows from the reports and runs that are there.
+
+    Raises:
+        NothingStored: If there is neither a report nor a run.
+    """
+    outputs = outputs_root()
+    found, runs = summaries(outputs / "reports"), list(_runs(outputs))
+    if not found and not runs:
+        raise NothingStored(
+            f"site: nothing stored in {outputs}; try: evoexp run experiment=rana_planar"
+        )
+    runs.sort(key=lambda run: (run.experiment, run.budget, run.label, run.hash12))
+    return ReportFiles(outputs / "reports", {HTML: home_page(found, papers(), runs)})
+
+
+def say_busy(console: Console) -> None:
+    """Name the unfinished runs that another process is writing now."""
+    busy = [
+        name
+        for name, run in stored_runs(outputs_root())
+        if isinstance(run, RunDirectory) and _planned(run) > _done(run) and is_being_written(run)
+    ]
+    if busy:
+        more = ", …" if len(busy) > MAX_NAMED else ""
+        which = "runs are" if len(busy) > 1 else "run is"
+        console.print(
+            f"{len(busy)} {which} being written now ({', '.join(busy[:MAX_NAMED])}{more}): "
+            "their results are partial",
+            soft_wrap=True,
+        )
+
+
+def papers() -> list[Paper]:
+    """Return the papers that packages register claims of, the oldest first."""
+    found = [_paper(name) for name in names(CLAIMS)]
+    return sorted(found, key=lambda paper: (paper.title[-4:], paper.title))
+
+
+def _paper(name: str) -> Paper:
+    """Return a paper; its title is the first sentence of its package."""
+    registration = registered(CLAIMS, name)
+    assert registration is not None
+    rules = cast(Rules, registration.load())
+    module = importlib.import_module(registration.module)
+    text = importlib.import_module(module.__package__ or module.__name__).__doc__ or name
+    title, _, subtitle = text.strip().partition("\n")[0].rstrip(".").partition(": ")
+    claims: dict[str, int] = {}
+    for rule in rules.values():
+        for experiment in rule.experiments:
+            claims[experiment] = claims.get(experiment, 0) + 1
+    return Paper(name, title, subtitle, tuple(options("experiment")), claims)
+
+
+def _runs(outputs: Path) -> Iterator[StoredRun]:
+    for name, run in stored_runs(outputs):
+        if isinstance(run, EvoexpError):
+            yield StoredRun(name, "", "", "", 0, 0, 0, str(run))
+            continue
+        origin = origin_of(run)
+        experiment, label, budget = (
+            str(origin[key] or "") for key in ("experiment", "label", "budget")
+        )
+        done, failed = len(run.completed()), len(run.failed())
+        yield StoredRun(name, experiment, label, budget, done, _planned(run), failed)
+
+
+def _done(run: RunDirectory) -> int:
+    return len(run.completed())
+
+
+def _planned(run: RunDirectory) -> int:
+    """Return how many replicates were asked for; at least those that are there."""
+    try:
+        plans = [plan.num_replicates for plan in run.plans()]
+    except DamagedFile:
+        plans = []
+    return max([*plans, _done(run) + len(run.failed())])

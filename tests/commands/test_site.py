@@ -1,0 +1,151 @@
+"""`evoexp site`, `evoexp report --all` and `evoexp report --check`."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from command_samples import SMALL, Evoexp, content
+
+from evoexp.store.run_directory import RunDirectory, find_runs
+from html_reader import Page
+
+WORDS = ("rana_planar", *SMALL, "report.formats=[svg]")
+
+
+@pytest.fixture
+def drawn(stored: Path, evoexp: Evoexp) -> Path:
+    """Return the folder of a report."""
+    said = evoexp("report", *WORDS)
+    assert said.code == 0, said
+    return Path(said.out.removeprefix("report: ").strip()).parent
+
+
+def reports(outputs: Path) -> dict[Path, bytes]:
+    return content(outputs / "reports")
+
+
+def test_the_home_page_lists_reports_and_runs(drawn: Path, stored: Path, evoexp: Evoexp) -> None:
+    said = evoexp("site")
+    home = stored / "reports" / "index.html"
+    assert (said.code, said.out, said.err) == (0, f"site: {home}\n", "")
+    first = home.read_bytes()
+    page = Page(first)
+    page.check(stored / "reports")
+    runs = {run.hash12 for run in find_runs(stored)}
+    assert {row[0] for row in page.tables()[0][1:]} == runs
+    assert {row[7] for row in page.tables()[0][1:]} == {"done"}
+    places = {f"run-{name}" for name in runs}
+    linked = {each.partition("#")[2] for each in page.addresses() if "?home#" in each}
+    assert linked == places
+    report = Page((drawn / "index.html").read_bytes())
+    assert places <= {str(each.attributes.get("id")) for each in report.elements}
+    assert len(page.all("li", class_="card")) == 5
+    assert "Rana & Zalzala 1995" in {each.text for each in page.all("h3")}
+    assert str(stored).encode() not in first
+    evoexp("site")
+    assert home.read_bytes() == first
+
+
+def test_nothing_stored_is_one_line(refused: Callable[..., str], outputs: Path) -> None:
+    assert refused("site") == (
+        f"site: nothing stored in {outputs}; try: evoexp run experiment=rana_planar"
+    )
+    assert "no experiment is stored" in refused("report", "--all")
+    assert "no experiment is stored" in refused("report", "--all", "--check")
+
+
+def test_all_is_given_alone(refused: Callable[..., str]) -> None:
+    assert refused("report", "--all", "rana") == "--all: must be given alone, was 'rana'"
+    assert refused("report") == "experiment: must be named, or --all given, was 'none'"
+
+
+def test_all_reports_are_drawn_again_by_their_own_commands(
+    drawn: Path, stored: Path, evoexp: Evoexp
+) -> None:
+    evoexp("site")
+    before = reports(stored)
+    for path in (drawn / "index.html", drawn / "fig_5_fitness.svg"):
+        path.write_bytes(b"")
+    (drawn / "index.md").write_bytes(before[drawn / "index.md"])  # which names the command
+    said = evoexp("report", "--all")
+    assert said.code == 0, said
+    assert said.out.splitlines() == [
+        f"report: {drawn / 'index.md'}",
+        f"site: {stored / 'reports' / 'index.html'}",
+    ]
+    assert reports(stored) == before
+
+
+def test_the_check_names_every_file_that_is_not_as_it_should_be(
+    drawn: Path, stored: Path, evoexp: Evoexp
+) -> None:
+    said = evoexp("report", "--check", *WORDS)
+    assert (said.code, said.out.count("\n")) == (0, 1)
+    assert said.out.startswith("check: ")
+    csv = (drawn / "fig_5_fitness.csv").read_bytes()
+    (drawn / "fig_5_fitness.csv").write_bytes(csv[:-2] + bytes([csv[-2] ^ 1]) + csv[-1:])
+    (drawn / "index.html").write_bytes((drawn / "index.html").read_bytes() + b"\n")
+    (drawn / "fig_6_paths.svg").unlink()
+    (drawn / "fig_99.svg").write_bytes(b"of an earlier report")
+    before = content(stored)
+    said = evoexp("report", "--check", *WORDS)
+    assert said.code == 1
+    assert said.out.splitlines()[:-1] == [
+        f"differs: {drawn / 'fig_5_fitness.csv'}",
+        f"missing: {drawn / 'fig_6_paths.svg'}",
+        f"differs: {drawn / 'index.html'}",
+        f"left over: {drawn / 'fig_99.svg'}",
+    ]
+    assert said.out.splitlines()[-1].endswith(": 4 not as they follow from the outputs")
+    assert content(stored) == before
+
+
+def test_the_check_of_all_looks_at_the_home_page_too(
+    drawn: Path, stored: Path, evoexp: Evoexp
+) -> None:
+    home = stored / "reports" / "index.html"
+    said = evoexp("report", "--check", "--all")
+    assert said.code == 1
+    assert said.out.splitlines()[0] == f"missing: {home}"
+    evoexp("site")
+    assert evoexp("report", "--check", "--all").code == 0
+    run = find_runs(stored)[0]
+    run.write_failure(7, "ValueError: no luck", "traceback")  # the page is stale now
+    said = evoexp("report", "--check", "--all")
+    assert said.code == 1
+    lines = said.out.splitlines()
+    assert f"differs: {drawn / 'index.html'}" in lines
+    assert f"differs: {home}" in lines
+
+
+def test_a_report_that_names_no_command_is_left_as_it_is(
+    drawn: Path, stored: Path, evoexp: Evoexp
+) -> None:
+    strange = stored / "reports" / "strange"
+    strange.mkdir()
+    (strange / "index.md").write_text("# strange\n\nMade by `evoexp clean --delete`.\n")
+    other = stored / "reports" / "other"
+    other.mkdir()
+    (other / "index.md").write_text("# other\n\nMade by `evoexp report --nonsense`.\n")
+    before = content(strange)
+    said = evoexp("report", "--all")
+    assert said.code == 1
+    assert "cannot be drawn: strange: strange: names no command that draws it" in said.out
+    assert "cannot be drawn: other: no option '--nonsense'" in said.out
+    assert content(strange) == before
+
+
+def test_a_sweep_that_runs_is_told(drawn: Path, stored: Path, evoexp: Evoexp) -> None:
+    run = find_runs(stored)[0]
+    run.note_plan(9)
+    assert "being written now" not in evoexp("site").out
+    with RunDirectory(stored, run.condition_id).lock():
+        said = evoexp("site")
+    assert f"1 run is being written now ({run.hash12})" in said.out
+    home = Page((stored / "reports" / "index.html").read_bytes())
+    states = {row[0]: row[7] for row in home.tables()[0][1:]}
+    assert states[run.hash12] == "partial"
+    evoexp("report", *WORDS)
+    evoexp("site")
+    home = Page((stored / "reports" / "index.html").read_bytes())
+    assert "Partial results." in home.all("div", class_="notice")[0].text

@@ -11,7 +11,7 @@ from evoexp.report.statistics import (
     EXACT_PAIRS,
     EXACT_VALUES,
     Interval,
-    _percentiles,
+    percentiles,
     _weights,
     effect,
     effort_ratio,
@@ -158,7 +158,7 @@ def test_the_effect_is_that_of_all_pairs_counted_one_by_one(
     resampled = ((weights @ wins) * weights).sum(axis=1) / len(x) ** 2
     found = effect(x, y, 0.9, num_resamples)
     assert found.a12 == wins.sum() / wins.size
-    assert found.interval == _percentiles(resampled, 0.9)
+    assert found.interval == percentiles(resampled, 0.9)
     assert vargha_delaney(x, y[: len(y) // 2 + 1]) == wins[:, : len(y) // 2 + 1].mean()
 
 

@@ -9,7 +9,7 @@ from evoexp.report.statistics import Interval, Spread
 
 _HTML = re.compile("<(?=[A-Za-z/!?])")  # begins an element, a comment, an address
 _LINK = re.compile(r"\]\(([^)]*)\)?")
-_OWN_FILE = re.compile(r"[\w.-]+\.(png|svg|pdf|csv|json|tex)")
+_OWN_FILE = re.compile(r"[\w.-]+\.(png|svg|pdf|csv|json|tex|html)")
 
 
 def page(document: Document) -> str:

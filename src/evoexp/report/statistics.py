@@ -208,7 +208,7 @@ def effect(x: FloatArray, y: FloatArray, confidence: float, num_resamples: int) 
         np.cumsum(own[order], out=passed[1:])
         # multiples of 1/2 are exact in any order
         resampled[k] = 0.5 * np.sum(own * (passed[below] + passed[up_to]))
-    return Effect(vargha_delaney(x, y), _percentiles(resampled / len(x) ** 2, confidence))
+    return Effect(vargha_delaney(x, y), percentiles(resampled / len(x) ** 2, confidence))
 
 
 def expected_effort(effort: FloatArray, solved: np.ndarray) -> float:
@@ -236,7 +236,7 @@ def expected_interval(
         confidence: Level of the interval.
         num_resamples: Of the bootstrap.
     """
-    low, high = _percentiles(_resampled_effort(effort, solved, num_resamples), confidence)
+    low, high = percentiles(_resampled_effort(effort, solved, num_resamples), confidence)
     return Interval(low, high if solved.any() else math.inf)
 
 
@@ -264,7 +264,7 @@ def effort_ratio(
         return Interval(ratio, ratio)
     above = _resampled_effort(effort_one, solved_one, num_resamples)
     below = _resampled_effort(effort_two, solved_two, num_resamples, stream=1)
-    return _percentiles(above / below, confidence)
+    return percentiles(above / below, confidence)
 
 
 @functools.lru_cache(maxsize=8)
@@ -309,6 +309,7 @@ def _random_weights(size: int, num_resamples: int, shape: float, stream: int) ->
     return rng.gamma(shape, size=(num_resamples, size))
 
 
-def _percentiles(values: FloatArray, confidence: float) -> Interval:
+def percentiles(values: FloatArray, confidence: float) -> Interval:
+    """Return the interval between the percentiles that leave out the rest on both sides."""
     tail = 0.5 * (1.0 - confidence)
     return Interval(quantile(values, tail), quantile(values, 1.0 - tail))

@@ -32,10 +32,16 @@ def page_registration(settings: ReportSettings) -> Registration:
 
 
 def page_of(results: "Results", settings: ReportSettings) -> "Page":
-    """Return the page that the settings name, filled from results.
+    """Return the page that the settings name, filled from results; a sweep has a page of its own.
 
     Raises:
         UnknownOption: If there is none of this name.
         RegistrationError: If its package registered it wrongly.
     """
-    return cast("Page", page_registration(settings).load()(results, settings))
+    from evoexp.report.pages import swept
+    from evoexp.report.swept_settings import sweep_of
+
+    chosen = page_registration(settings)
+    if sweep := sweep_of(results):
+        return swept.page(results, sweep, settings)
+    return cast("Page", chosen.load()(results, settings))

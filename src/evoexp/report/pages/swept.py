@@ -1,0 +1,159 @@
+"""The page of a sweep: each combination, the effect of each setting, convergence in facets.
+
+What does not depend on the sweep, the scene and the motion, is shown once, of the best condition.
+"""
+
+from collections.abc import Iterator
+from functools import partial
+
+import numpy as np
+
+from evoexp.report import markdown, motion_pictures
+from evoexp.report.figures import sweep_grids
+from evoexp.report.page_parts import Drawing, Page, Table
+from evoexp.report.pages import generic
+from evoexp.report.proportions import Proportion
+from evoexp.report.report_settings import ReportSettings
+from evoexp.report.results import ConditionResults, Results
+from evoexp.report.statistics import spread
+from evoexp.report.swept_settings import MainEffect, Sweep, labelled, main_effects, measures
+
+MOST_CURVES = 60  # curves of convergence on a page
+INTRODUCTION = (
+    "A sweep: {conditions} conditions, {combinations} combinations of {settings}{bases}. Costs, "
+    "lower is better. Claims of papers are about their own settings and not judged here; the "
+    "page of a single condition is drawn by `evoexp report HASH`."
+)
+EFFECTS = (
+    "One value of a setting against its first one, all other settings and the seed being the same: "
+    "median difference of the best cost (below 0: the other value is better), its interval at "
+    "{level:g} % by resampling seeds, and the share of pairs in which the other value is better, "
+    "ties counting half. Effects of values that depend on other settings hide in it: see the grid."
+)
+
+
+def page(results: Results, sweep: Sweep, settings: ReportSettings) -> Page:
+    """Build the page of a sweep."""
+    cost = measures()["best cost"]
+    effects = tuple(main_effects(sweep, cost, settings.confidence, settings.num_resamples))
+    done = [each.results for each in sweep.conditions if each.results.done]
+    bases = [base for base in sweep.bases if base]
+    words = INTRODUCTION.format(
+        conditions=len(sweep.conditions),
+        combinations=len({each.values for each in sweep.conditions}),
+        settings=" and ".join(f"`{name}`" for name in sweep.settings),
+        bases=f", each of {', '.join(bases)}" if len(bases) > 1 else "",
+    )
+    if len({(c.condition.robot, c.condition.scenario) for c in done}) > 1:
+        words += f" {generic.SCENES}"
+    shown = motion_pictures.best_motions(_best_only(results, done)) if done else []
+    return Page(
+        title=f"{results.experiment or 'stored runs'}: a sweep",
+        introduction=words,
+        quantities=(),
+        tables=(_combinations(sweep, settings), *_effect_tables(effects, settings)),
+        drawings=(
+            *_drawings(results, sweep, effects),
+            *(motion_pictures.drawings(shown) if shown else ()),
+        ),
+        motions=motion_pictures.pages(shown),
+    )
+
+
+def _best_only(results: Results, done: list[ConditionResults]) -> Results:
+    """Return the results of the condition with the lowest median cost alone."""
+    best = min(done, key=_median_cost)
+    return results._replace(conditions=(best,))
+
+
+def _median_cost(condition: ConditionResults) -> float:
+    return spread(condition.column("best_cost")).median
+
+
+def _combinations(sweep: Sweep, settings: ReportSettings) -> Table:
+    values = measures()
+    rows = tuple(
+        (
+            *((each.base,) if any(sweep.bases) else ()),
+            *each.values,
+            f"`{each.results.condition.id[:12]}`",
+            each.results.done,
+            *_shares(each.results, settings),
+            *(markdown.spread(spread(of(each.results))) for of in values.values()),
+        )
+        for each in sweep.conditions
+    )
+    first = ("condition",) if any(sweep.bases) else ()
+    shares = ("solved", "solved and proven free of contact")
+    headers = (*first, *sweep.settings, "hash", "n", *shares, *values)
+    note = "Medians with first and third quartile; shares with Wilson's interval."
+    return Table("Every combination", headers, rows, note)
+
+
+def _shares(condition: ConditionResults, settings: ReportSettings) -> tuple[str, str]:
+    if not condition.done:
+        return "–", "–"
+    solved = condition.summaries["solved"].to_numpy(dtype=bool)
+    proven = condition.summaries["certified"].fillna(False).to_numpy(dtype=bool) & solved
+    told = (Proportion(int(np.count_nonzero(which)), condition.done) for which in (solved, proven))
+    one, two = (each.with_interval(settings.confidence, 0) for each in told)
+    return one, two
+
+
+def _effect_tables(effects: tuple[MainEffect, ...], settings: ReportSettings) -> Iterator[Table]:
+    if not effects:
+        return
+    rows = tuple(
+        (
+            *((each.base,) if any(e.base for e in effects) else ()),
+            each.setting,
+            f"{each.first} → {each.other}",
+            each.num_pairs,
+            f"{markdown.number(each.difference)} [{markdown.number(each.interval.low)}, "
+            f"{markdown.number(each.interval.high)}]",
+            f"{100.0 * each.better:.0f} %",
+        )
+        for each in effects
+    )
+    first = ("condition",) if any(each.base for each in effects) else ()
+    headers = (*first, "setting", "value", "pairs", "change of the best cost", "better in")
+    note = EFFECTS.format(level=100.0 * settings.confidence)
+    yield Table("Effect of each setting", headers, rows, note)
+
+
+def _drawings(results: Results, sweep: Sweep, effects: tuple[MainEffect, ...]) -> Iterator[Drawing]:
+    conditions = tuple(each.results for each in sweep.conditions if each.results.done)
+    if not conditions:
+        return
+    where = labelled(sweep, ["…"] * len(sweep.settings)).replace(" = …", "")
+    for stem, name in (("grid_cost", "best cost"), ("grid_cpu", "CPU time of the search [s]")):
+        of = measures()[name]
+        yield Drawing(
+            stem,
+            f"{name[0].upper()}{name[1:]} over {where}",
+            "Medians over runs; all panels share one scale of colours. ∞: at least half of the "
+            "runs have no feasible solution.",
+            partial(sweep_grids.grid_table, sweep, of),
+            partial(sweep_grids.draw_grid, name=name),
+            conditions,
+        )
+    if effects:
+        yield Drawing(
+            "main_effects",
+            "Effect of each setting on the best cost",
+            "Median difference of pairs of runs with the same seed and the same other settings, "
+            "and its interval; left of the dashed line the second value is better.",
+            partial(sweep_grids.effect_table, effects),
+            sweep_grids.draw_effects,
+            conditions,
+        )
+    if len(conditions) <= MOST_CURVES:
+        yield Drawing(
+            "convergence",
+            "Convergence",
+            f"Median of the best cost so far; at the end of each curve its {where}. Costs of the "
+            "first twentieth of a run may lie above the panel.",
+            partial(sweep_grids.convergence_table, results, sweep),
+            sweep_grids.draw_convergence,
+            conditions,
+        )

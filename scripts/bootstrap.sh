@@ -125,7 +125,7 @@ install() {
   exec 9<"$root/requirements.lock" || return
   "$(find_python)" -c 'import fcntl; fcntl.flock(9, fcntl.LOCK_EX)' || return  # one process at a time; freed at its end
   is_complete && return
-  for one in requirements.lock requirements-test.lock; do  # a lock that changed: what it no longer names shall go
+  for one in requirements.lock requirements-test.lock requirements-docs.lock; do  # a lock that changed: what it no longer names shall go
     if was_installed "$one" && ! is_installed "$one"; then rm -rf "$marks"; fi
   done
   { [ -x "$PYTHON" ] && [ -d "$marks" ]; } || create || return

@@ -16,3 +16,8 @@ def __getattr__(name: str) -> Any:
     if name in ("load", "Frames"):
         return getattr(importlib.import_module("evoexp.load"), name)
     raise AttributeError(f"module 'evoexp' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    """Return the names that the package offers."""
+    return list(__all__)

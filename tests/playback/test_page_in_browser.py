@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from chromium import CHROMIUM, PATIENCE, Browser
 
+from chromium import CHROMIUM, PATIENCE, Browser
 from evoexp.playback.player_page import page
 from playback_samples import SAMPLES, recording, refuted
 

@@ -31,6 +31,15 @@ def test_an_experiment_with_overrides(outputs: Path, capsys: pytest.CaptureFixtu
     assert f"Made by `evoexp report rana_planar budget=smoke {arguments}`" in index.read_text()
 
 
+def test_an_experiment_may_be_named_as_the_folder_of_its_report(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    small = [word for word in SMALL if not word.startswith("budget")]
+    assert report("rana_planar@smoke", *small, "report.dpi=40") == 0
+    text = page(capsys).read_text()
+    assert "Made by `evoexp report rana_planar budget=smoke" in text
+
+
 @pytest.mark.matrix
 def test_the_experiment_may_be_an_override_as_for_run(capsys: pytest.CaptureFixture[str]) -> None:
     assert report("experiment=rana_planar", *SMALL, "--only", "random search") == 0
@@ -62,6 +71,9 @@ def test_runs_by_prefixes_of_their_hashes(
         (["rana_planar", "ga.pop_size=3"], "ga.pop_size: unknown setting"),
         (["rana_planar", "report.dpi=0"], "report.dpi: must be at least 1, was 0"),
         (["rana_planar", *SMALL, "report.figures=nope"], "report.figures: no option 'nope'"),
+        (["rana_planar@smok"], "budget: no option 'smok'; did you mean 'smoke'?"),
+        (["rana_planar@smoke", "rana_puma"], "budget: must be one for all experiments, was 'rana_"),
+        (["rana_planar@smoke", "budget=quick"], "budget: must be one for all experiments"),
     ],
 )
 def test_what_cannot_be_reported_is_one_line(

@@ -106,6 +106,7 @@ def drafts(arguments: argparse.Namespace) -> list[Draft]:
     multirun, only, known = arguments.multirun, arguments.only, options("experiment")
     overrides = [word for word in arguments.overrides if is_override(word)]
     names = [word for word in arguments.overrides if word not in overrides]
+    names, overrides = _with_budget(names, overrides)
     if names and not any(name in known or is_file(name) for name in names):
         for name in names:
             if not _HASH.fullmatch(name):
@@ -125,6 +126,23 @@ def drafts(arguments: argparse.Namespace) -> list[Draft]:
         draft_of(experiment, overrides, multirun, only, arguments.config_dir)
         for experiment in experiments
     ]
+
+
+def _with_budget(names: Sequence[str], overrides: list[str]) -> tuple[list[str], list[str]]:
+    """Read `rana_planar@smoke`, as the folder of a report is named, as its words.
+
+    Raises:
+        SettingError: If experiments are named with several budgets.
+    """
+    parted = [name.partition("@") if not is_file(name) else (name, "", "") for name in names]
+    budgets = dict.fromkeys(budget for _, at, budget in parted if at)
+    if not budgets:
+        return list(names), overrides
+    given = {word for word in overrides if word.startswith("budget=")}
+    found = {f"budget={budget}" for budget in budgets} | given
+    if len(found) > 1 or not all(at for _, at, _ in parted):
+        raise SettingError("budget", "one for all experiments", " ".join(names))
+    return [name for name, _, _ in parted], [*overrides, *(found - given)]
 
 
 def of_experiment(

@@ -1,0 +1,84 @@
+"""Progress of a batch: condition by condition on a terminal, lines in a pipe, an honest ETA."""
+
+import io
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from evoexp.batch.jobs import Outcome
+from evoexp.commands import progress
+from evoexp.commands.progress import BatchProgress
+
+WANTED = {"a": ("via-point GA", 3), "b": ("[bold]random search", 2)}
+
+
+def outcome(key: str, cost: float | None = None) -> Outcome:
+    summary: Any = None if cost is None else SimpleNamespace(best_cost=cost)
+    return Outcome(key, 0, "" if cost is not None else "broken", "", b"", 0.1, summary)
+
+
+def console(is_terminal: bool, width: int = 60) -> Console:
+    found = Console(
+        file=io.StringIO(), force_terminal=is_terminal, width=width, markup=False, color_system=None
+    )
+    assert isinstance(found.file, io.StringIO)
+    return found
+
+
+def text(of: Console) -> str:
+    assert isinstance(of.file, io.StringIO)
+    return of.file.getvalue()
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    now = [0.0]
+    monkeypatch.setattr(progress.time, "monotonic", lambda: now[0])
+    return now
+
+
+def test_a_pipe_has_lines(clock: list[float]) -> None:
+    out = console(is_terminal=False)
+    with BatchProgress(out, WANTED) as shown:
+        for second, key in enumerate("ab"):
+            clock[0] = 10.0 * (second + 1)
+            shown.advance(outcome(key, 5.0))
+        clock[0] = 21.0
+        shown.advance(outcome("a"))
+    assert text(out).splitlines() == [
+        "replicates: 1 of 5 done, 0 failed, ETA –",
+        "replicates: 2 of 5 done, 0 failed, ETA 30 s",
+        "replicates: 2 of 5 done, 1 failed, ETA 11 s",
+    ]
+
+
+def test_the_first_replicate_does_not_count_for_the_rest(clock: list[float]) -> None:
+    shown = BatchProgress(console(is_terminal=False), {"a": ("GA", 60)})
+    clock[0] = 60.0  # kernels were compiled
+    shown.advance(outcome("a", 1.0))
+    clock[0] = 61.0
+    shown.advance(outcome("a", 1.0))
+    assert shown._eta() == "58 s"
+
+
+def test_a_terminal_has_a_row_per_condition() -> None:
+    out = console(is_terminal=True)
+    with BatchProgress(out, WANTED) as shown:
+        shown.advance(outcome("a", 5.0))
+        shown.advance(outcome("a", 3.0))
+        shown.advance(outcome("b"))
+    last = [line.split() for line in text(out).splitlines() if "random" in line or "GA" in line]
+    assert ["via-point", "GA", "2", "of", "3", "0", "3"] in last
+    assert ["[bold]random", "search", "0", "of", "2", "1", "–"] in last
+
+
+def test_of_many_conditions_the_last_ones_are_shown() -> None:
+    out = console(is_terminal=True)
+    with BatchProgress(out, {str(k): (f"condition {k}", 1) for k in range(40)}) as shown:
+        for k in range(40):
+            shown.advance(outcome(str(k), 1.0))
+        table = shown._shown().renderables[0]
+    assert table.row_count == progress.MOST_ROWS  # type: ignore[union-attr]
+    assert "condition 39" in text(out)

@@ -1,5 +1,6 @@
 """The page in a browser: it plays, says no error, and asks the network for nothing."""
 
+import json
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -88,6 +89,25 @@ def test_it_plays_and_stops(browser: Browser, tmp_path: Path) -> None:
         refuted().clearance.contacts
     )
     assert browser.complaints == []
+
+
+def test_the_address_links_to_the_moment(browser: Browser, tmp_path: Path) -> None:
+    opened(browser, tmp_path / "page.html", page([refuted()]))
+    browser.run("motionPage.jump(0.25)")
+    assert browser.run("location.hash") == "#t=0.2500"
+    opened(browser, tmp_path / "page.html", page([refuted()]), fragment="#t=0.2500")
+    assert browser.run("motionPage.state.share") == 0.25
+    assert browser.complaints == []
+
+
+def test_motions_side_by_side_have_one_scale(browser: Browser, tmp_path: Path) -> None:
+    shown = [recording("two arms"), refuted()]
+    sizes = {each.view.radius for each in shown}
+    opened(browser, tmp_path / "page.html", page(shown))
+    found = browser.run("JSON.stringify(motionPage.motions.map(m => [m.radius, m.extent]))")
+    one, other = json.loads(found)
+    assert one == other
+    assert one[0] == pytest.approx(max(sizes))
 
 
 def test_it_plays_by_itself_and_the_bodies_that_touch_are_red(

@@ -353,6 +353,10 @@
 
   const motions = JSON.parse($("motions").textContent);
   document.body.classList.toggle("several", motions.length > 1);
+  if (new Set(motions.map(m => `${m.unit} ${m.planar}`)).size === 1) {  // side by side in one scale
+    const radius = Math.max(...motions.map(m => m.radius)), extent = [0, 1].map(k => Math.max(...motions.map(m => m.extent[k])));
+    for (const motion of motions) Object.assign(motion, { radius, extent });
+  }
   const cards = motions.map(card);
 
   let pending = false;
@@ -375,16 +379,19 @@
     $("play").textContent = on ? "❚❚" : "▶";
     show();
   }
-  function jump(share) { state.share = Math.min(1, Math.max(0, share)); play(false); }
+  function jump(share) {
+    state.share = Math.min(1, Math.max(0, share)); play(false);
+    history.replaceState(null, "", `#t=${state.share.toFixed(4)}`);  // the address is a link to this moment
+  }
 
-  $("play").addEventListener("click", () => play(!state.playing));
+  $("play").addEventListener("click", () => state.playing ? jump(state.share) : play(true));
   $("time").addEventListener("input", e => jump(Number(e.target.value)));
   $("ghosts").addEventListener("change", e => { state.ghosts = e.target.checked; show(); });
   $("ways").addEventListener("change", e => { state.ways = e.target.checked; show(); });
   $("view").addEventListener("click", () => { for (const { view } of cards) view.reset(); show(); });
   document.addEventListener("keydown", e => {
     if (["SELECT", "BUTTON"].includes(e.target.tagName)) return;
-    if (e.key === " ") { e.preventDefault(); play(!state.playing); }
+    if (e.key === " ") { e.preventDefault(); $("play").click(); }
     if (e.key === "ArrowRight" && e.target.id !== "time") jump(state.share + 0.01);
     if (e.key === "ArrowLeft" && e.target.id !== "time") jump(state.share - 0.01);
   });

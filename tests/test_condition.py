@@ -214,7 +214,7 @@ def test_components_in_the_wrong_place_are_refused(config: dict[str, Any]) -> No
     )
     assert (
         refusal(config | {"scenario": robot}) == "scenario: must be one that via_point_ga takes "
-        "(ArmMotion or LinkMotion or MoveitTask), was 'arms'"
+        "(ArmMotion or LinkMotion or MoveitTask or GridMotion), was 'arms'"
     )
     assert refusal(config | {"planner": robot}) == "planner: must be a planner, was 'arms'"
     search = {"_target_": "random_search", "revision": 1}

@@ -8,6 +8,8 @@ import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
+import matplotlib as mpl
+import matplotlib.pyplot as plt
 import pytest
 import yaml
 
@@ -99,7 +101,9 @@ def test_commands_are_commands(page: Path) -> None:
 def fresh_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.delenv("EVOEXP_OUTPUTS", raising=False)
     monkeypatch.chdir(tmp_path)
-    yield tmp_path
+    with mpl.rc_context():
+        yield tmp_path
+    plt.close("all")
 
 
 @pytest.mark.matrix

@@ -206,7 +206,7 @@ def test_overrides(refused: Refused, override: str, message: str) -> None:
         ),
         (
             ("rum", "experiment=rana_planar"),
-            "no command 'rum'; did you mean 'run'? (commands: run, plan, report, compare, claims,",
+            "no command 'rum'; did you mean 'run'? (commands: run, plan, report, site, compare,",
         ),
         (("--fast",), "no option '--fast'"),
         (("list", "runs"), "no option 'runs'"),

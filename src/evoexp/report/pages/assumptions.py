@@ -217,12 +217,12 @@ def _claims(judge: Judge, judged: Sequence[Judged]) -> Iterator[Claim]:
 
 
 def _effects(judged: Sequence[Judged]) -> Table:
-    """Return the table of all verdicts, one row per condition."""
+    """Return the table of all verdicts, one row per condition and family that it is of."""
     headlines = list(dict.fromkeys(one.headline for one in judged))
     rows = []
-    for condition in dict.fromkeys(one.condition for one in judged):
-        own = [one for one in judged if one.condition is condition]
-        changed = dict(own[0].family.varied).get(condition, ())
+    for family, condition in dict.fromkeys((one.family, one.condition) for one in judged):
+        own = [one for one in judged if one.family is family and one.condition is condition]
+        changed = dict(family.varied).get(condition, ())
         cells = (
             f"{markdown.spread(spread(one.headline.values(condition)))}: "
             f"{one.claim.verdict if one.same else f'**{one.claim.verdict}**'}"

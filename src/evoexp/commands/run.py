@@ -4,7 +4,7 @@ import argparse
 import contextlib
 import shlex
 import sys
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Sequence
 from typing import Any
 
@@ -145,14 +145,13 @@ def _run(
     )
     from evoexp.commands.progress import BatchProgress
 
-    failures, counts = [], Counter(job.condition_id for job in batch.jobs)
-    labels = {condition.id: notes["label"] for condition, _, notes in wanted}
+    failures = []
     with (
-        BatchProgress(console, {key: (labels[key], counts[key]) for key in counts}) as progress,
+        BatchProgress(console, len(batch.jobs)) as progress,
         contextlib.closing(batch.run()) as outcomes,
     ):
         for outcome in outcomes:
-            progress.advance(outcome)
+            progress.advance(outcome.failed)
             if outcome.failed:
                 failures.append(outcome)
                 failed = f"failed: {outcome.condition_id[:12]} #{outcome.replicate}"

@@ -217,10 +217,12 @@ def _claims(judge: Judge, judged: Sequence[Judged]) -> Iterator[Claim]:
 
 
 def _effects(judged: Sequence[Judged]) -> Table:
-    """Return the table of all verdicts, one row per condition and family that it is of."""
+    """Return the table of all verdicts, one row per condition: in the first family it is of."""
     headlines = list(dict.fromkeys(one.headline for one in judged))
+    first = {one.condition: one.family for one in reversed(judged)}
     rows = []
-    for family, condition in dict.fromkeys((one.family, one.condition) for one in judged):
+    for condition in dict.fromkeys(one.condition for one in judged):
+        family = first[condition]
         own = [one for one in judged if one.family is family and one.condition is condition]
         changed = dict(family.varied).get(condition, ())
         cells = (

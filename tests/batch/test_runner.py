@@ -8,17 +8,20 @@ import sys
 from collections import deque
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import joblib
 import pytest
 from batch_samples import WORDS, digests, new_batch, run
 from hypothesis import given
 from hypothesis import strategies as st
+from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from evoexp.batch import fan_out as fanning
-from evoexp.batch import jobs
+from evoexp.batch import jobs, live_curves, workers
 from evoexp.batch.fan_out import MAX_BUNDLE, TASK_S, Bundles, compile_all, fan_out
 from evoexp.batch.jobs import Job, Outcome, run_jobs
+from evoexp.batch.live_curves import read_curves
 from evoexp.batch.replicate import run_replicate
 from evoexp.batch.workers import in_workers, loading
 from evoexp.cli import main
@@ -125,6 +128,30 @@ def test_a_worker_that_dies_while_it_loads_is_replaced(fresh_workers: None) -> N
     with loading(2, os._exit, 1):
         pass
     assert sorted(in_workers(2, (joblib.delayed(abs)(-k) for k in range(4)))) == [0, 1, 2, 3]
+
+
+def test_workers_that_die_before_they_are_given_anything_are_replaced(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def in_dead_workers(*arguments: Any) -> None:
+        raise TerminatedWorkerError("killed while the pool was filled")
+
+    monkeypatch.setattr(workers, "in_workers", in_dead_workers)
+    with loading(2, abs, 1) as loaded:
+        assert loaded is None
+
+
+def test_a_batch_tells_how_its_replicates_converge(
+    faulty: Condition, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(live_curves, "INTERVAL_S", 0.0)
+    (tmp_path / "curves").mkdir()
+    batch = new_batch(tmp_path / "outputs", (faulty, 1), num_workers=1, curves=tmp_path / "curves")
+    deque(batch.run(), maxlen=0)
+    (curve,) = read_curves(tmp_path / "curves")
+    log = read_log(RunDirectory(tmp_path / "outputs", faulty.id).log_path(0))
+    assert curve[:3] == (faulty.id, 0, log.summary.num_generations)
+    assert curve.costs[-1] == log.summary.best_cost
 
 
 def test_kernels_are_compiled_once_for_conditions_that_differ_in_numbers(

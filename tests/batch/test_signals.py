@@ -27,6 +27,7 @@ from evoexp.condition import Condition
 from evoexp.store.run_directory import RunDirectory
 from matrix import examples
 
+PROGRESS = re.compile(r".{0,20}replicates|condition +done +failed|.* of 12 +\d+ ")
 LINE = f"evoexp: interrupted; {KEPT}"
 MOMENTS_S = (0.2, 0.4, 0.6, 0.9, 1.2, 1.5, 2.0, 2.5, 3.5)  # after the command was started
 
@@ -142,7 +143,7 @@ WAYS = {once: 130, repeatedly: 130, terminate: 143, terminate_all: 143}
 def check_ended(window: Terminal, way: Callable[[Terminal], None], folder: Path) -> None:
     assert window.ended() == WAYS[way], window.shown
     lines = re.sub("\x1b\\[[?0-9;]*[a-zA-Z]|\\^C", "", window.shown).replace("\r", "\n")
-    said = [line for line in lines.split("\n") if line.strip() and "replicates" not in line[:20]]
+    said = [line for line in lines.split("\n") if line.strip() and not PROGRESS.match(line)]
     assert said == ["begun", LINE], window.shown
     assert window.left() == []
     assert list(window.temporary.iterdir()) == [], "no socket is left"

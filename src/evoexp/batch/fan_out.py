@@ -8,6 +8,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
+from pathlib import Path
 from typing import Any, cast
 
 from evoexp.batch.jobs import NO_LIMITS, Job, Outcome, run_jobs
@@ -23,7 +24,10 @@ _NUMBER = re.compile(r"-?\d+(\.\d+)?([eE][-+]?\d+)?")
 
 
 def fan_out(
-    jobs: Sequence[Job], num_workers: int, limits: ReplicateLimits = NO_LIMITS
+    jobs: Sequence[Job],
+    num_workers: int,
+    limits: ReplicateLimits = NO_LIMITS,
+    curves: Path | None = None,
 ) -> Iterator[list[Outcome]]:
     """Run jobs in worker processes; yield outcomes as they come.
 
@@ -35,10 +39,11 @@ def fan_out(
         jobs: The replicates.
         num_workers: Worker processes; 1: they run in this process.
         limits: Of each replicate.
+        curves: Folder for the convergence of those that are running; None: it is not told.
     """
     if num_workers == 1:
         for job in jobs:
-            outcomes = run_jobs([job], limits)
+            outcomes = run_jobs([job], limits, curves=curves)
             yield run_jobs([job], limits) if outcomes[0].may_pass else outcomes
         return
     import joblib  # which takes long to load
@@ -49,7 +54,7 @@ def fan_out(
     waiting = deque(jobs)
     by_key = {job.key: job for job in jobs}
     again: list[Job] = []
-    run = joblib.delayed(partial(run_jobs, limits=limits, in_worker=True))
+    run = joblib.delayed(partial(run_jobs, limits=limits, in_worker=True, curves=curves))
     while waiting:
         in_flight: dict[tuple[str, int], Job] = {}
         bundles = Bundles(waiting, in_flight, num_workers)

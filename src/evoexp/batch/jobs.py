@@ -4,13 +4,15 @@ import contextlib
 import functools
 import time
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 from evoexp.attachments import keep_all
+from evoexp.batch.live_curves import CurveFile
 from evoexp.batch.replicate_limits import ReplicateLimits, TookTooLong, limited
 from evoexp.condition import Condition
-from evoexp.records import ReplicateSummary
+from evoexp.records import Generation, ReplicateSummary
 
 NO_LIMITS = ReplicateLimits()
 LONGEST_TASK_S = 2.0  # [s] a task that has taken so long begins no further replicate
@@ -73,7 +75,11 @@ class Outcome(NamedTuple):
 
 
 def run_jobs(
-    jobs: Sequence[Job], limits: ReplicateLimits = NO_LIMITS, *, in_worker: bool = False
+    jobs: Sequence[Job],
+    limits: ReplicateLimits = NO_LIMITS,
+    *,
+    in_worker: bool = False,
+    curves: Path | None = None,
 ) -> list[Outcome]:
     """Run replicates in this process, one after the other; a failure is an outcome.
 
@@ -81,6 +87,7 @@ def run_jobs(
         jobs: The replicates.
         limits: Of each.
         in_worker: Whether this process is a worker.
+        curves: Folder for their convergence while they run; None: it is not told.
 
     Returns:
         Their outcomes, one at least; no further replicate begins after `LONGEST_TASK_S`.
@@ -98,7 +105,9 @@ def run_jobs(
             condition = _condition(job.condition_json)
             condition.prepare()
             with limited(limits, in_worker=in_worker):
-                content, summary = run_replicate(condition, job.replicate, job.condition_json)
+                content, summary = run_replicate(
+                    condition, job.replicate, job.condition_json, _heard(curves, job)
+                )
             reason, trace, may_pass = "", "", False
         except Exception as error:
             content, summary, trace = b"", None, traceback.format_exc()
@@ -112,6 +121,10 @@ def run_jobs(
             )
         )
     return outcomes
+
+
+def _heard(curves: Path | None, job: Job) -> Callable[[Generation], None] | None:
+    return None if curves is None else CurveFile(curves, *job.key).hear
 
 
 def load(config_jsons: Sequence[bytes], files: Sequence[bytes] = ()) -> None:

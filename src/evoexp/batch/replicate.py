@@ -1,6 +1,7 @@
 """The one loop: a planner yields generations, a log takes them, the certifier judges the best."""
 
 import hashlib
+from collections.abc import Callable
 
 from evoexp.attachments import SHA256
 from evoexp.batch.compile_clock import now
@@ -18,7 +19,12 @@ EXACT_BOXES = "exact_boxes"  # the entry of a log's environment; logs without it
 HASHED = f'"{SHA256}"'.encode()  # stands in configurations that refer to files, and only there
 
 
-def run_replicate(condition: Condition, index: int, config_json: bytes | None = None) -> Finished:
+def run_replicate(
+    condition: Condition,
+    index: int,
+    config_json: bytes | None = None,
+    hear: Callable[[Generation], None] | None = None,
+) -> Finished:
     """Run one seeded replicate; return its finished log as bytes and its summary row.
 
     Args:
@@ -26,6 +32,7 @@ def run_replicate(condition: Condition, index: int, config_json: bytes | None = 
         index: Of the replicate.
         config_json: The condition's canonical form, if the caller has it; making it takes as long
             as a short run.
+        hear: Told every generation, after the log was.
     """
     planner, problem = condition.prepare()  # once per process: no part of a replicate's time
     begun = now()
@@ -44,11 +51,12 @@ def run_replicate(condition: Condition, index: int, config_json: bytes | None = 
             break
         last = generation
         log.write(last, (now() - begun).cpu_s)  # the planner knows nothing of files
+        if hear is not None:
+            hear(last)
         if first_feasible is None and last.num_feasible > 0:
             first_feasible = last.index
     if last is None:
-        must = f"at least what the initial population asks for ({generation.collision_queries:,})"
-        raise SettingError("budget.collision_queries", must, most)
+        raise _too_few(most, generation)
     evolved = now()
     verdict = judge_motion(planner, problem, planner.motion(problem, last.best))
     certified = now()
@@ -71,3 +79,8 @@ def run_replicate(condition: Condition, index: int, config_json: bytes | None = 
         **(now() - begun)._asdict(),
     )
     return log.finish(summary)
+
+
+def _too_few(most: float | None, first: Generation) -> SettingError:
+    must = f"at least what the initial population asks for ({first.collision_queries:,})"
+    return SettingError("budget.collision_queries", must, most)

@@ -42,6 +42,7 @@ class Batch:
         outputs: Path,
         *,
         retry_failed: bool = False,
+        curves: Path | None = None,
     ) -> None:
         """Plan; nothing is written yet but summary tables that were out of date.
 
@@ -51,7 +52,9 @@ class Batch:
             settings: Number of workers, and where they run.
             outputs: Root of all outputs.
             retry_failed: Whether replicates that failed before run again; else they stay failed.
+            curves: Folder for the convergence of replicates while they run; None: it is not told.
         """
+        self._curves = curves
         self._settings, self._outputs, self._retry_failed = settings, outputs, retry_failed
         self._wanted: dict[str, tuple[Condition, int, dict[str, Any]]] = {}
         for condition, count, notes in conditions:
@@ -138,7 +141,7 @@ class Batch:
             return cluster_fan_out(self.jobs, self._settings, limits)
         from evoexp.batch.fan_out import fan_out
 
-        return fan_out(self.jobs, num_workers, limits)
+        return fan_out(self.jobs, num_workers, limits, self._curves)
 
     @property
     def num_workers(self) -> int:

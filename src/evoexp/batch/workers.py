@@ -105,11 +105,14 @@ def in_workers(num_workers: int, tasks: Iterable[Any], ordered: bool = False) ->
 def loading(num_workers: int, load: Callable[..., None], *arguments: Any) -> Iterator[None]:
     """Call `load` in every worker while the body runs; wait for the workers at its end.
 
-    A worker that dies meanwhile is no error: whoever gives work to workers starts new ones.
+    A worker that dies meanwhile, or before it is given anything, is no error: whoever gives work to
+    workers starts new ones.
     """
-    loaded = in_workers(
-        num_workers, (joblib.delayed(_load)(load, *arguments) for _ in range(num_workers))
-    )
+    loaded: Iterator[Any] = iter(())
+    with suppress(TerminatedWorkerError):
+        loaded = in_workers(
+            num_workers, (joblib.delayed(_load)(load, *arguments) for _ in range(num_workers))
+        )
     try:
         yield
     finally:

@@ -1,10 +1,14 @@
-"""Progress of a batch: a live bar on a terminal, plain lines in a pipe."""
+"""Progress of a batch: a live table and bar on a terminal, plain lines in a pipe."""
 
 import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from rich.console import Console
+import numpy as np
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -13,23 +17,82 @@ from rich.progress import (
     TextColumn,
     TimeElapsedColumn,
 )
+from rich.table import Table
+
+from evoexp.batch.jobs import Outcome
+from evoexp.batch.live_curves import Curve, read_curves
+from evoexp.commands.console import add_columns
 
 PLAIN_INTERVAL_S = 5.0  # [s] between plain lines
+MOST_ROWS = 12  # conditions in the table: those that a replicate ended of last
+MINUTES_FROM_S = 100.0  # [s] from which the rest is told in minutes
+BURST_S = 0.1  # [s] replicates that end so soon after the first one came with it, in one task
+REFRESHED = 4  # [1/s] how often the table is drawn
+CURVE_WIDTH = 16  # characters of a curve
+LEVELS, PLAIN_LEVELS = "▁▂▃▄▅▆▇█", "_.-=+*%#"  # from the least to the largest cost
+UNSOLVED = "x"
+LIVE_NOTE = (
+    "convergence: best cost so far of the replicate heard last, from its first generation to the "
+    f"one shown, each between its own extremes; {UNSOLVED}: nothing solved yet"
+)
+
+
+class ConditionCount:
+    """A condition while it runs: its counts and its best cost.
+
+    Attributes:
+        place: Its row among those that are shown.
+        label: Its name.
+        total: Replicates to run.
+        done: Of these.
+        failed: Of these.
+        best: Least cost of those that are done.
+        curve: Of one that is running, or was; None: nothing is known.
+    """
+
+    def __init__(self, place: int, label: str, total: int) -> None:
+        """Begin with nothing done."""
+        self.place, self.label, self.total = place, label, total
+        self.done = self.failed = 0
+        self.best = np.inf
+        self.curve: Curve | None = None
+
+    def count(self, outcome: Outcome) -> None:
+        """Count one replicate."""
+        self.failed += outcome.failed
+        self.done += not outcome.failed
+        if outcome.summary is not None:
+            self.best = min(self.best, outcome.summary.best_cost)
 
 
 class BatchProgress:
-    """Counts replicates done and failed, and says when the rest will be."""
+    """Counts replicates done and failed, condition by condition, and says when the rest will be.
 
-    def __init__(self, console: Console, total: int) -> None:
+    The first replicate compiles or loads kernels, so that the time of the others is told by those
+    that end after it.
+    """
+
+    def __init__(
+        self,
+        console: Console,
+        wanted: Mapping[str, tuple[str, int]],
+        curves: Path | None = None,
+    ) -> None:
         """Prepare; shown from `__enter__` to `__exit__`.
 
         Args:
             console: Where to show it.
-            total: Replicates to run.
+            wanted: Condition's id → its label, and its replicates to run.
+            curves: Folder in which workers leave the convergence of what they run; None: it is not
+                shown.
         """
-        self._console, self._total = console, total
-        self._done = self._failed = 0
-        self._start = self._last_line = time.monotonic()
+        self._console, self._curves = console, curves
+        self._counts = {
+            key: ConditionCount(place, *each) for place, (key, each) in enumerate(wanted.items())
+        }
+        self._total = sum(each.total for each in self._counts.values())
+        self._last_line = time.monotonic()
+        self._first: tuple[float, int] | None = None  # when the first had ended, and how many
         self._bar = Progress(
             SpinnerColumn(),
             TextColumn("{task.description}"),
@@ -39,17 +102,18 @@ class BatchProgress:
             TimeElapsedColumn(),
             TextColumn("ETA {task.fields[eta]}"),
             console=console,
-            disable=not console.is_terminal,
         )
-        self._task = self._bar.add_task("replicates", total=total, failed=0, eta="–")
+        self._task = self._bar.add_task("replicates", total=self._total, failed=0, eta="–")
+        self._live = Live(console=console, get_renderable=self._shown, refresh_per_second=REFRESHED)
 
     def __enter__(self) -> Self:
         """Show it."""
-        try:
-            self._bar.start()
-        except BaseException:  # interrupted: nobody else would give the terminal back
-            self._bar.stop()
-            raise
+        if self._console.is_terminal:
+            try:
+                self._live.start()
+            except BaseException:  # interrupted: nobody else would give the terminal back
+                self._live.stop()
+                raise
         return self
 
     def __exit__(
@@ -59,19 +123,70 @@ class BatchProgress:
         trace: TracebackType | None,
     ) -> None:
         """Leave its last state."""
-        self._bar.stop()
-        if not self._console.is_terminal and self._done + self._failed:
+        if self._console.is_terminal:
+            self._live.stop()
+        elif self._ended:
             self._plain()
 
-    def advance(self, failed: bool) -> None:
+    @property
+    def _done(self) -> int:
+        return sum(each.done for each in self._counts.values())
+
+    @property
+    def _failed(self) -> int:
+        return sum(each.failed for each in self._counts.values())
+
+    @property
+    def _ended(self) -> int:
+        return self._done + self._failed
+
+    def advance(self, outcome: Outcome) -> None:
         """Count one replicate."""
-        self._failed += failed
-        self._done += not failed
-        self._bar.update(self._task, advance=1, failed=self._failed, eta=self._eta())
+        own = self._counts.pop(outcome.condition_id)
+        self._counts[outcome.condition_id] = own  # the last one of all
+        own.count(outcome)
         now = time.monotonic()
+        if self._first is None or now - self._first[0] < BURST_S:
+            self._first = now if self._first is None else self._first[0], self._ended
+        self._bar.update(self._task, advance=1, failed=self._failed, eta=self._eta())
         if not self._console.is_terminal and now - self._last_line >= PLAIN_INTERVAL_S:
             self._last_line = now
             self._plain()
+
+    def _shown(self) -> Group:
+        self._hear()
+        table = Table(box=None, pad_edge=False)
+        add_columns(table, "condition")
+        add_columns(table, "done", "failed", "best cost", right=True)
+        if self._curves is not None:
+            add_columns(table, "generation", right=True)
+            table.add_column("convergence", no_wrap=True, min_width=CURVE_WIDTH)
+        begun = [each for each in self._counts.values() if each.done or each.failed or each.curve]
+        last = begun[-MOST_ROWS:]
+        for each in sorted(last, key=lambda one: one.place):
+            best = f"{each.best:.4g}" if np.isfinite(each.best) else "–"
+            row = [each.label, f"{each.done} of {each.total}", str(each.failed), best]
+            table.add_row(*row, *self._curve(each.curve))
+        parts: list[RenderableType] = [table] if begun else []
+        if begun and self._curves is not None:
+            parts.append(LIVE_NOTE)
+        return Group(*parts, self._bar.get_renderable())
+
+    def _hear(self) -> None:
+        """Take note of what the workers left; conditions that are running stand last."""
+        for curve in [] if self._curves is None else read_curves(self._curves):
+            own = self._counts.get(curve.condition_id)
+            if own is not None and own.curve != curve:
+                own.curve = curve
+                self._counts[curve.condition_id] = self._counts.pop(curve.condition_id)
+
+    def _curve(self, curve: Curve | None) -> list[str]:
+        if self._curves is None:
+            return []
+        if curve is None:
+            return ["–", ""]
+        is_plain = not self._console.encoding.startswith("utf")
+        return [str(curve.generation), drawn(curve.costs, PLAIN_LEVELS if is_plain else LEVELS)]
 
     def _plain(self) -> None:
         text = (
@@ -81,6 +196,35 @@ class BatchProgress:
         self._console.print(text, soft_wrap=True)
 
     def _eta(self) -> str:
-        ended = self._done + self._failed
-        seconds = (time.monotonic() - self._start) / ended * (self._total - ended)
-        return f"{seconds / 60:.0f} min" if seconds >= 100 else f"{seconds:.0f} s"
+        left = self._total - self._ended
+        if left == 0:
+            return "0 s"
+        since, num_first = self._first or (0.0, self._ended)
+        if self._ended == num_first:
+            return "–"
+        seconds = (time.monotonic() - since) / (self._ended - num_first) * left
+        return f"{seconds / 60:.0f} min" if seconds >= MINUTES_FROM_S else f"{seconds:.0f} s"
+
+
+def drawn(costs: Sequence[float], levels: str = LEVELS) -> str:
+    """Draw costs as a line of characters.
+
+    Args:
+        costs: Of one replicate, in order.
+        levels: Characters for the least to the largest of them.
+
+    Returns:
+        At most `CURVE_WIDTH` characters, with the first and the last cost.
+    """
+    places = np.linspace(0, len(costs) - 1, min(len(costs), CURVE_WIDTH)).round().astype(int)
+    shown = np.asarray(costs, dtype=np.float64)[places]
+    finite = shown[np.isfinite(shown)]
+    if not finite.size:
+        return UNSOLVED * len(shown)
+    least, extent = finite.min(), np.ptp(finite) or 1.0
+    return "".join(
+        levels[round((cost - least) / extent * (len(levels) - 1))]
+        if np.isfinite(cost)
+        else UNSOLVED
+        for cost in shown
+    )

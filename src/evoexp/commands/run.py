@@ -4,8 +4,10 @@ import argparse
 import contextlib
 import shlex
 import sys
-from collections import deque
-from collections.abc import Sequence
+import tempfile
+from collections import Counter, deque
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -36,6 +38,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--retry-failed", action="store_true", help="run replicates again that failed before"
     )
+    parser.add_argument(
+        "--live",
+        action="store_true",
+        help="show how the replicates converge while they run (on a terminal)",
+    )
     parser.add_argument("--no-report", action="store_true", help="run only; draw nothing")
 
 
@@ -58,14 +65,18 @@ def main(arguments: argparse.Namespace) -> int:
         for experiment in experiments
         for labelled in _that_can_run(experiment, console)
     ]
-    batch = Batch(
-        wanted, experiments[0].runner, outputs_root(), retry_failed=arguments.retry_failed
-    )
-    if batch.num_workers > 1:
-        _start_server(arguments)
-    batch.prepare()
-    left = batch.num_left_failed
-    failures = _run(batch, wanted, console)
+    runner = experiments[0].runner
+    if arguments.live and runner.backend != "loky":
+        raise SettingError("--live", "a run on this machine: runner.backend=loky", runner.backend)
+    with _folder_for_curves(arguments.live) as curves:
+        batch = Batch(
+            wanted, runner, outputs_root(), retry_failed=arguments.retry_failed, curves=curves
+        )
+        if batch.num_workers > 1:
+            _start_server(arguments)
+        batch.prepare()
+        left = batch.num_left_failed
+        failures = _run(batch, wanted, console, curves)
     if left:
         which = f"{left} replicates failed before" if left > 1 else "1 replicate failed before"
         console.print(
@@ -80,6 +91,15 @@ def main(arguments: argparse.Namespace) -> int:
         if failures:
             console.print(_failure_table(batch, failures))
     return 1 if failures or left else 0
+
+
+@contextlib.contextmanager
+def _folder_for_curves(wanted: bool) -> Iterator[Path | None]:
+    if not wanted:
+        yield None
+        return
+    with tempfile.TemporaryDirectory(prefix="evoexp-", ignore_cleanup_errors=True) as folder:
+        yield Path(folder)
 
 
 def _report(experiment: Experiment, arguments: argparse.Namespace) -> str:
@@ -131,7 +151,10 @@ def _command(arguments: argparse.Namespace) -> str:
 
 
 def _run(
-    batch: Batch, wanted: Sequence[tuple[Condition, int, dict[str, Any]]], console: Console
+    batch: Batch,
+    wanted: Sequence[tuple[Condition, int, dict[str, Any]]],
+    console: Console,
+    curves: Path | None,
 ) -> list[Outcome]:
     if not batch.jobs:
         if batch.is_damaged:
@@ -145,13 +168,15 @@ def _run(
     )
     from evoexp.commands.progress import BatchProgress
 
-    failures = []
+    failures, counts = [], Counter(job.condition_id for job in batch.jobs)
+    labels = {condition.id: notes["label"] for condition, _, notes in wanted}
+    shown = {key: (labels[key], counts[key]) for key in counts}
     with (
-        BatchProgress(console, len(batch.jobs)) as progress,
+        BatchProgress(console, shown, curves) as progress,
         contextlib.closing(batch.run()) as outcomes,
     ):
         for outcome in outcomes:
-            progress.advance(outcome.failed)
+            progress.advance(outcome)
             if outcome.failed:
                 failures.append(outcome)
                 failed = f"failed: {outcome.condition_id[:12]} #{outcome.replicate}"

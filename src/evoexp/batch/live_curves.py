@@ -1,0 +1,76 @@
+"""Convergence of the replicates that are running: each worker leaves it in a file, now and then."""
+
+import json
+import os
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import NamedTuple
+
+from evoexp.records import Generation
+
+INTERVAL_S = 0.2  # [s] between two files of a worker
+NUM_POINTS = 48  # of a curve, at most
+
+_written: dict[str, float] = {}  # folder → when this process left a curve there last
+
+
+class Curve(NamedTuple):
+    """Convergence of a replicate so far.
+
+    Attributes:
+        condition_id: 64 hex digits.
+        replicate: Its index.
+        generation: The last one.
+        costs: Best cost so far at up to `NUM_POINTS` generations, from the first to the last one;
+            inf where nothing is solved.
+    """
+
+    condition_id: str
+    replicate: int
+    generation: int
+    costs: list[float]
+
+
+class CurveFile:
+    """Hears the generations of one replicate, and leaves their convergence for others to see."""
+
+    def __init__(self, folder: Path, condition_id: str, replicate: int) -> None:
+        """Begin with no generation.
+
+        Args:
+            folder: Where the files of all workers are.
+            condition_id: 64 hex digits.
+            replicate: Its index.
+        """
+        self._folder, self._of = folder, (condition_id, replicate)
+        self._costs: list[float] = []
+
+    def hear(self, generation: Generation) -> None:
+        """Note a generation; write at most every `INTERVAL_S`, whatever replicate is running."""
+        self._costs.append(float(generation.best_cost))
+        now, key = time.monotonic(), str(self._folder)
+        if now - _written.setdefault(key, now) >= INTERVAL_S:
+            _written[key] = now
+            curve = Curve(*self._of, int(generation.index), thinned(self._costs))
+            with suppress(OSError):  # nobody looks any more, or the disk is full
+                unfinished = self._folder / f"{os.getpid()}.unfinished"
+                unfinished.write_text(json.dumps(curve))
+                unfinished.replace(self._folder / f"{os.getpid()}.json")
+
+
+def thinned(values: list[float]) -> list[float]:
+    """Return up to `NUM_POINTS` of the values, evenly spread, with the first and the last one."""
+    last, steps = len(values) - 1, NUM_POINTS - 1
+    if last < NUM_POINTS:
+        return values
+    return [values[k * last // steps] for k in range(NUM_POINTS)]
+
+
+def read_curves(folder: Path) -> list[Curve]:
+    """Return the curves that the workers left last, one of each."""
+    curves = []
+    for path in sorted(folder.glob("*.json")):
+        with suppress(OSError, ValueError, TypeError):
+            curves.append(Curve(*json.loads(path.read_text())))
+    return curves

@@ -5,6 +5,7 @@ import functools
 import json
 import re
 import shlex
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from evoexp.configuration.search_path import options
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")])
 MENU = ROOT / "scripts/mkdocs.yml"
+ELSEWHERE = "tcp:|my_search|HASH"  # a cluster; a package, which `test_new` installs
 each_page = pytest.mark.parametrize("page", PAGES, ids=lambda path: path.name)
 
 
@@ -104,6 +106,49 @@ def fresh_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Pa
     with mpl.rc_context():
         yield tmp_path
     plt.close("all")
+
+
+@pytest.fixture(scope="module")
+def readers_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with the runs and files that pages speak of."""
+    folder = tmp_path_factory.mktemp("reader")
+    (folder / "tests").symlink_to(ROOT / "tests")
+    (folder / "PATH").symlink_to(ROOT / "src/evoexp/assets/motionbenchmaker")
+    (folder / "thesis.mplstyle").write_text("font.family: serif\n")
+    for name in ("path/to", "my_options/experiment", "my_options/ga"):
+        (folder / name).mkdir(parents=True)
+    (folder / "my_options/ga/gentle.yaml").write_text(
+        (ROOT / "conf/ga/rana_planar.yaml").read_text()
+    )
+    for path in ("path/to/mine.yaml", "my_options/experiment/mine.yaml"):
+        (folder / path).write_text((ROOT / "conf/experiment/rana_planar.yaml").read_text())
+    with pytest.MonkeyPatch.context() as patch, fresh_folder(folder, patch):
+        assert main(["run", "experiment=rana_planar"]) == 0
+        assert main(["pack", "4da921", "-o", "path/to/runs.tar"]) == 0
+        log = next(Path("outputs/runs").glob("4da921*")) / "replicates/0007.mcap"
+        Path("path/to/0007.mcap").write_bytes(log.read_bytes())
+    return folder
+
+
+def shortened(words: list[str]) -> list[str]:
+    """Return a command with which a long run is over in seconds."""
+    is_long = words[0] == "run" and not {"experiment=rana_planar", "-m"} & set(words)
+    is_short = any(word.startswith("budget=") for word in words)
+    return [*words, "budget=smoke", "num_replicates=1"] if is_long and not is_short else words
+
+
+@pytest.mark.matrix
+@each_page
+def test_every_command_can_be_run(
+    page: Path, readers_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = [words for words in commands(page) if not re.search(ELSEWHERE, " ".join(words))]
+    if not found or page.name == "README.md":
+        pytest.skip("no commands, or run in a folder of their own")
+    folder = shutil.copytree(readers_folder, tmp_path / "reader", symlinks=True)
+    with fresh_folder(folder, monkeypatch):
+        for words in found:
+            assert main(shortened(words)) == (words[0] == "diff"), words
 
 
 @pytest.mark.matrix

@@ -12,6 +12,7 @@ from command_samples import SMALL, Evoexp
 
 from evoexp import shipped
 from evoexp.collision.certifier.certificate import Certificate
+from evoexp.commands import given_motion
 from evoexp.commands.given_motion import flatten
 from evoexp.configuration import compose
 from evoexp.store.log_reader import read_log
@@ -282,3 +283,81 @@ def test_an_experiment_that_does_not_exist(refused: Callable[..., str], motion: 
     assert "experiment: no option 'rana_planr'; did you mean" in refused(
         "evaluate", "experiment=rana_planr", str(motion)
     )
+
+
+# Motions that evoexp knows, and templates
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("experiment=rana_planar",),
+        ("experiment=curkovic_motion",),
+        ("experiment=lavoie", "--only", "7-DOF"),
+        ("experiment=chen_path", "--only", "(b)"),
+        ("experiment=chen_placement",),
+        ("experiment=corsepius_ball",),
+    ],
+    ids=lambda words: words[0].partition("=")[2],
+)
+def test_a_template_is_written_and_read(
+    evoexp: Evoexp, tmp_path: Path, words: tuple[str, ...]
+) -> None:
+    path = str(tmp_path / "motion.json")
+    written = evoexp("evaluate", *words, "--write", path)
+    assert (written.code, written.err) == (0, "")
+    judged = evoexp("evaluate", *words, path, "--json")
+    assert judged.code == 0
+    assert json.loads(judged.out)
+
+
+def test_solutions_of_several_shapes_have_no_common_template(
+    evoexp: Evoexp, tmp_path: Path
+) -> None:
+    answer = evoexp("evaluate", "experiment=lavoie", "--write", str(tmp_path / "motion.json"))
+    assert answer.code == 2
+    assert answer.err == (
+        "evoexp: --write: solutions differ in shape (3 × 7; 3 × 10); choose with --only '7-DOF' | "
+        "'10-DOF'\n"
+    )
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_stored_run_is_judged_again_and_written(
+    evoexp: Evoexp, runs: dict[str, RunDirectory], tmp_path: Path
+) -> None:
+    run, path = runs[LABELS[0]], tmp_path / "best.json"
+    table = read_summaries(run).sort_values("best_cost")
+    for words, replicate in (
+        ([run.hash12], int(table["replicate"].iloc[0])),
+        ([run.hash12, "--replicate", "1"], 1),
+        ([str(run.log_path(1))], 1),
+    ):
+        said = json.loads(evoexp("evaluate", *words, "--write", str(path), "--json").out)
+        log = read_log(run.log_path(replicate))
+        assert said["label"] == f"{run.hash12} #{replicate}"
+        assert said["clearance"] == log.summary.clearance
+        assert said["certified"] is log.summary.certified
+        nested = json.loads(path.read_text())
+        assert np.array_equal(np.ravel(nested), log.solutions[-1].values)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--write", "motion.txt"), "--write: must be a file that ends in .json, was motion.txt"),
+        (("--replicate", "3"), "--replicate: must go with a hash, was given with an experiment"),
+    ],
+)
+def test_options_that_do_not_fit_are_refused(
+    evoexp: Evoexp, words: tuple[str, ...], said: str
+) -> None:
+    answer = evoexp("evaluate", *PLANAR, *words)
+    assert (answer.code, answer.err) == (2, f"evoexp: {said}\n")
+
+
+def test_any_number_of_parts_are_nested_and_flattened() -> None:
+    solution = np.arange(12.0)
+    for shape in ((..., (3,)), ((2, 3), (6,)), ((), *[(11,)]), ((4, 3),)):
+        lists = given_motion.nested(solution, shape)
+        assert np.array_equal(flatten(lists, shape), solution)

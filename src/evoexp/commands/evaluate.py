@@ -1,6 +1,10 @@
 """`evoexp evaluate`: judge a given motion by a configuration's criteria."""
 
 import argparse
+import json
+import re
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from rich.table import Table
@@ -8,21 +12,43 @@ from rich.table import Table
 from evoexp.collision.certifier.certificate import PAIR
 from evoexp.commands.arguments import add_experiment_arguments
 from evoexp.commands.console import add_columns, new_table, plain_console, print_json
-from evoexp.commands.given_motion import fitting_motions
+from evoexp.commands.given_motion import (
+    FittingMotion,
+    fitting_motions,
+    initial_motion,
+    is_motion,
+    nested,
+    stored_motion,
+)
+from evoexp.commands.motion_files import run_or_log, write
+from evoexp.errors import MotionFileError
 from evoexp.planners.answers import Listing
 from evoexp.planners.proofs import judge_motion
+from evoexp.playback.stored import CHOICES, chosen_log
 
 DEPARTURES = "departures"  # of a row: the ways in which the motion is none of the task
+HEX = re.compile("[0-9a-fA-F]{1,64}")  # a prefix of a hash
 HEAD = ("label", "condition", "length_unit")  # of a row; its other entries are terms and verdict
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the command's arguments."""
     words = add_experiment_arguments(parser)
-    words.metavar, words.nargs = "MOTION | KEY=VALUE", "+"
+    words.metavar, words.nargs = "HASH | LOG.mcap | MOTION KEY=VALUE", "+"
     words.help = (
-        "a motion file (.json: nested lists, .npy: an array) in the planner's documented shape, "
-        "start and goal included, and an experiment with overrides as for run"
+        "any unique prefix of a run's hash, or a replicate's log; or a motion file (.json: nested "
+        "lists, .npy: an array) in the planner's documented shape, start and goal included, and an "
+        "experiment with overrides as for run"
+    )
+    parser.add_argument(
+        "--replicate", type=int, metavar="K", help="of a hash: this one, not that of least cost"
+    )
+    parser.add_argument(
+        "--write",
+        type=Path,
+        metavar="FILE.json",
+        help="write the motion, too; without a motion file, as a template for your own: the best "
+        "of an initial population",
     )
     parser.add_argument(
         "--json", action="store_true", help="print flat JSON: one object, or a list of them"
@@ -31,9 +57,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Print terms and exact verdict of the motion, one column per condition that it fits."""
-    _, fitting = fitting_motions(
-        arguments.overrides, multirun=arguments.multirun, only=arguments.only
-    )
+    fitting = _motions(arguments)
+    if arguments.write is not None:
+        _, _, planner, problem, solution = fitting[0]
+        lists = nested(solution, planner.shape(problem))
+        write(arguments.write, json.dumps(lists).encode(), is_said=not arguments.json)
     rows: list[dict[str, Any]] = []
     listings: list[Listing | None] = []
     for label, condition, planner, problem, solution in fitting:
@@ -58,6 +86,33 @@ def main(arguments: argparse.Namespace) -> int:
         for departure in row[DEPARTURES]:
             console.print(f"{row['label']} – no solution of the task: {departure}")
     return 0
+
+
+def _motions(arguments: argparse.Namespace) -> Sequence[FittingMotion]:
+    """Return the motion that the words name, in every condition that it fits."""
+    words: list[str] = arguments.overrides
+    if arguments.write is not None and arguments.write.suffix != ".json":
+        raise MotionFileError(f"--write: must be a file that ends in .json, was {arguments.write}")
+    if all(_is_stored(word) for word in words):
+        return [stored_motion(_log(word, arguments.replicate)) for word in words]
+    if arguments.replicate is not None:
+        raise MotionFileError("--replicate: must go with a hash, was given with an experiment")
+    asked: Any = {"multirun": arguments.multirun, "only": arguments.only}
+    if arguments.write is not None and not any(is_motion(word) for word in words):
+        return [initial_motion(words, **asked)]
+    return fitting_motions(words, **asked)[1]
+
+
+def _is_stored(word: str) -> bool:
+    path = Path(word)
+    return path.suffix == ".mcap" or (HEX.fullmatch(word) is not None and not path.exists())
+
+
+def _log(word: str, replicate: int | None) -> Path:
+    run = run_or_log(word)
+    if isinstance(run, Path):
+        return run
+    return chosen_log(run, CHOICES[0] if replicate is None else replicate)
 
 
 def _with_rows(row: dict[str, Any], listing: Listing | None) -> dict[str, Any]:

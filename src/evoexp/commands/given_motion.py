@@ -1,4 +1,4 @@
-"""A motion out of a file: recognised among the overrides, read, and fitted to a condition."""
+"""A motion out of a file or a log: recognised among the words, read, fitted to a condition."""
 
 import json
 import math
@@ -8,12 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from evoexp.attachments import PREFIX, keep_all
 from evoexp.commands.arguments import is_override
 from evoexp.condition import Condition
 from evoexp.configuration import expansions
 from evoexp.errors import MotionFileError, printable
 from evoexp.input_files import MEGABYTE, read_bounded, read_npy
 from evoexp.records import FloatArray
+from evoexp.store.log_reader import read_log
 
 ENDINGS = (".json", ".npy")
 LARGEST = 1e7  # as of the numbers of robots and scenarios, in any unit
@@ -88,6 +90,55 @@ def fitting_motions(
             f"was {_shape_of(values)}"
         )
     return path, fitting
+
+
+def stored_motion(log: Path) -> FittingMotion:
+    """Return the best solution of a log, in the condition that is attached to it.
+
+    Raises:
+        CorruptLog: If the log cannot be trusted.
+        RevisionMismatch: If it was made by another revision of a component.
+    """
+    contents = read_log(log)
+    keep_all(data for name, data in contents.attachments.items() if name.startswith(PREFIX))
+    condition = Condition.from_json(contents.config_json)
+    label = f"{contents.condition_id[:12]} #{contents.replicate}"
+    return FittingMotion(label, condition, *condition.prepare(), contents.solutions[-1].values)
+
+
+def initial_motion(
+    words: Sequence[str], *, multirun: bool = False, only: Sequence[str] = ()
+) -> FittingMotion:
+    """Return the best of an initial population, in the first of the conditions that words choose.
+
+    Raises:
+        MotionFileError: If their solutions have different shapes.
+    """
+    chosen = [
+        each
+        for experiment in expansions.expand(words, multirun=multirun, only=only)
+        for each in experiment.conditions
+    ]
+    prepared = [each.condition.prepare() for each in chosen]
+    shapes = dict.fromkeys(shape_text(planner.shape(problem)) for planner, problem in prepared)
+    if len(shapes) > 1:
+        raise MotionFileError(
+            f"--write: solutions differ in shape ({'; '.join(shapes)}); choose with --only "
+            + " | ".join(repr(each.label) for each in chosen)
+        )
+    (label, condition), (planner, problem) = chosen[0], prepared[0]
+    first = next(planner.evolve(problem, condition.rng(0)))
+    return FittingMotion(label, condition, planner, problem, first.best)
+
+
+def nested(solution: FloatArray, shape: Any) -> list[Any]:
+    """Return a flat solution as nested lists of a planner's documented shape, for `flatten`."""
+    if len(shape) and shape[0] is ...:
+        count = solution.size // sum(math.prod(part) for part in shape[1:])
+        shape = tuple(shape[1:]) * count
+    ends = np.cumsum([math.prod(part) for part in shape])
+    parts = zip(np.split(solution, ends[:-1]), shape, strict=True)
+    return [values.reshape(part).tolist() for values, part in parts]
 
 
 def read_motion(path: Path) -> Any:

@@ -78,7 +78,7 @@ def recordings(arguments: argparse.Namespace) -> list[Recording]:
         return _own(words, arguments.only, limits)
     if len(words) > MANY:
         raise MotionFileError(f"motions: at most {MANY} go together, got {len(words)}")
-    runs = [_run(word) for word in words]
+    runs = [run_or_log(word) for word in words]
     titles = _titles([run for run in runs if isinstance(run, RunDirectory)])
     return [
         stored_recording(run, run.name, limits)
@@ -109,10 +109,12 @@ def output_path(arguments: argparse.Namespace, found: list[Recording], ending: s
     return outputs_root() / FOLDER / ("+".join(names) + ending)
 
 
-def write(path: Path, content: bytes) -> None:
+def write(path: Path, content: bytes, *, is_said: bool = True) -> None:
     """Write a file whole or not at all, and say where it is and how large."""
     path.parent.mkdir(parents=True, exist_ok=True)
     write_file(path, content)
+    if not is_said:
+        return
     size = len(content) / 1000
     print(
         f"{printable(str(path))}  ({f'{size / 1000:.2f} MB' if size >= 1000 else f'{size:.0f} kB'})"
@@ -132,8 +134,12 @@ def speed_limits(arguments: argparse.Namespace) -> SpeedLimits:
     return SpeedLimits(math.radians(arguments.turn_speed), arguments.slide_speed)
 
 
-def _run(word: str) -> RunDirectory | Path:
-    """Return the run that a hash names, or the path of a log."""
+def run_or_log(word: str) -> RunDirectory | Path:
+    """Return the run that a hash names, or the path of a log.
+
+    Raises:
+        EvoexpError: If the hash names none.
+    """
     path = Path(word)
     if path.suffix == ".mcap" or path.is_file():
         return path

@@ -4,8 +4,10 @@ import pinocchio as pin
 import pytest
 
 from evoexp.collision.scene import Part, geometry_scene
+from evoexp.configuration.compose import expand
 from evoexp.paths.motion import Motion, clamped_cubic
 from evoexp.planners.proofs import judge_motion
+from evoexp.playback import contacts
 from evoexp.playback.body_poses import MAX_TICKS, ticks
 from evoexp.playback.contacts import at_instant, clearance, remainder
 from evoexp.playback.recording import Recording
@@ -231,3 +233,19 @@ def test_a_motion_that_stands_still_takes_its_time() -> None:
 def test_its_verdict_is_the_one_that_logs_have(shown: Recording) -> None:
     planner, problem = condition(shown.heading.title).prepare()
     assert repr(judge_motion(planner, problem, shown.motion)) == repr(shown.verdict)
+
+
+def test_distances_are_those_of_all_pairs_though_few_are_asked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    words = ("experiment=motionbenchmaker", "budget=smoke")
+    (panda,) = expand(words, only=("box_panda",))[0].conditions
+    planner, problem = panda.condition.prepare()
+    motion = planner.motion(problem, next(planner.evolve(problem, panda.condition.rng(0))).best)
+    parts = list(planner.parts(problem, motion))
+    times = np.linspace(0.0, motion.num_segments, 7)
+    few = clearance(parts, motion, times)
+    monkeypatch.setattr(contacts, "FEW", 10**6)
+    every = clearance(parts, motion, times)
+    assert np.array_equal(few.least, every.least)
+    assert few[1:] == every[1:]

@@ -12,6 +12,8 @@ from evoexp.paths.motion import Motion
 from evoexp.records import FloatArray
 
 UNLIMITED = 10**12  # queries of coal
+SLACK = 1e-6  # [-] of the scene's size: what coal's distances may be below their bounds
+FEW = 8  # pairs that are asked about one by one as fast
 END_RESOLUTION = 1e-6  # [instants] of the end of a contact
 
 
@@ -81,8 +83,13 @@ class _Watch:
 
     def nearest(self, t: float) -> tuple[float, int]:
         """Return the least distance and its pair; inf and −1 without pairs."""
-        found = [(self._distance(pair, t), pair) for pair in range(len(self.scene.pairs))]
-        return min(found, default=(np.inf, -1))
+        best: tuple[float, int] = np.inf, -1
+        least = self._least(t)
+        for pair in np.argsort(least, kind="stable"):
+            if least[pair] > best[0]:
+                break
+            best = min(best, (self._distance(int(pair), t), int(pair)))
+        return best
 
     def name(self, pair: int) -> str:
         """Return the names of a pair."""
@@ -90,9 +97,14 @@ class _Watch:
 
     def touching(self, t: float) -> bool:
         """Return whether any pair is in contact."""
-        return any(
-            self._distance(pair, t) <= level for pair, level in enumerate(self.scene.tolerances)
-        )
+        near = np.flatnonzero(self._least(t) <= self.scene.tolerances)
+        return any(self._distance(int(pair), t) <= self.scene.tolerances[pair] for pair in near)
+
+    def _least(self, t: float) -> FloatArray:
+        """Return bounds of the distances from below, (pairs,); coal is asked where they are low."""
+        if len(self.scene.pairs) < FEW:
+            return np.full(len(self.scene.pairs), -np.inf)
+        return self._distance.least(t) - SLACK * self.scene.size
 
 
 def _contacts(watch: _Watch, part: Part, motion: Motion, ticks: FloatArray) -> list[Contact]:

@@ -11,6 +11,7 @@ from evoexp.collision.certifier.near_triangles import NearPart, mesh_of, near_tr
 from evoexp.collision.scene import Scene
 from evoexp.errors import EvoexpError
 from evoexp.paths.motion import Motion
+from evoexp.records import FloatArray
 
 GJK_TOLERANCE = 1e-9
 """[-] relative: the tightest that coal keeps with all shapes (at 1e-12 some distances of ellipsoids
@@ -83,6 +84,7 @@ class CoalDistance:
         self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
         self._request.gjk_tolerance = GJK_TOLERANCE
         self._request.gjk_max_iterations = GJK_ITERATIONS
+        self._balls: list[tuple[int, FloatArray, float]] | None = None
         self._t = np.nan
         self._known: dict[tuple[int, float], float] = {}
         self._near: list[NearPart] = []  # each within the one before it
@@ -99,6 +101,23 @@ class CoalDistance:
         found = self._known.get((pair, t))
         if found is None:
             found = self._known[pair, t] = self._computed(pair, t)
+        return found
+
+    def least(self, t: float) -> FloatArray:
+        """Return bounds of all pairs' distances at t from below, by the balls around the bodies.
+
+        Returns:
+            (pairs,) [length unit]; −inf where one of the two has no end, such as a half-space.
+        """
+        self._place(t)
+        if self._balls is None:
+            self._balls = [_ball(_body(*shape)) for shape in self.scene.shapes]
+        places = self._data.oMi
+        middles = np.array([places[joint].act(middle) for joint, middle, _ in self._balls])
+        radii = np.array([radius for _, _, radius in self._balls])
+        one, two = self.scene.pairs.T
+        away = middles[one] - middles[two]
+        found: FloatArray = np.sqrt((away * away).sum(axis=1)) - radii[one] - radii[two]
         return found
 
     def narrow(
@@ -164,6 +183,14 @@ class CoalDistance:
 
 def _body(shape: Any, joint: int, local: Any) -> _Body:
     return _Body(shape, joint, local, getattr(shape, "num_tris", 0))
+
+
+def _ball(body: _Body) -> tuple[int, FloatArray, float]:
+    """Return a body's joint, and middle and radius of the ball around it in the joint's frame."""
+    body.shape.computeLocalAABB()
+    radius = float(body.shape.aabb_radius)
+    middle = body.shape.aabb_center if np.isfinite(radius) else np.zeros(3)
+    return body.joint, np.asarray(body.local.act(middle)), radius
 
 
 def _transform(placement: Any) -> Any:

@@ -16,10 +16,10 @@ from evoexp.collision.models.body_covers import (
     around_cylinder,
     capsule_cover,
     given_cover,
-    sphere_cover,
 )
 from evoexp.collision.models.body_pairs import BodyPairs, body_pairs
 from evoexp.collision.models.inner_balls import inner_balls
+from evoexp.collision.models.kept_covers import kept_sphere_cover
 from evoexp.collision.models.primitive_tables import Shapes
 from evoexp.collision.models.primitives import PrimitiveCollision
 from evoexp.records import FloatArray
@@ -78,7 +78,7 @@ class SphereSets(CollisionModel):
 
     def cover(self, item: Any) -> Cover:
         """Return spheres around a geometry object."""
-        return sphere_cover(item, self.inflation)
+        return kept_sphere_cover(item, self.inflation)
 
     def cover_of(self, item: Any, given: FloatArray | None) -> Cover:
         """Return the given spheres; spheres around a body for which there are none."""

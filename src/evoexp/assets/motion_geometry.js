@@ -74,12 +74,24 @@ const geometry = (() => {
     }
     return out;
   }
-  function mesh(points, triangles) {
-    const out = [];
-    for (const triangle of triangles) {
-      const [a, b, c] = triangle.map(k => points[k]), n = unit(cross(minus(b, a), minus(c, a)));
-      for (const p of [a, b, c]) out.push(...p, ...n);
-    }
+  const CREASE = Math.cos(0.6);  // faces that meet at more than some 35 degrees have an edge between them
+  function mesh(points, triangles) {  // light as on a smooth surface but for its edges
+    const out = [], around = new Map(), flat = triangles.map(t => {
+      const [a, b, c] = t.map(k => points[k]);
+      return cross(minus(b, a), minus(c, a));  // as long as twice the area
+    });
+    const unitary = flat.map(n => dot(n, n) > 0 ? unit(n) : n);
+    const key = k => points[k].join();
+    triangles.forEach((triangle, k) => {
+      for (const corner of triangle) around.set(key(corner), [...(around.get(key(corner)) || []), k]);
+    });
+    triangles.forEach((triangle, k) => {
+      for (const corner of triangle) {
+        const sum = [0, 0, 0];
+        for (const near of around.get(key(corner))) if (dot(unitary[near], unitary[k]) >= CREASE) flat[near].forEach((v, i) => sum[i] += v);
+        out.push(...points[corner], ...(dot(sum, sum) > 0 ? unit(sum) : unitary[k]));
+      }
+    });
     return out;
   }
   // Every shape once, of its true size; a half-space is a slab as large as what there is to see.

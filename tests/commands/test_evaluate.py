@@ -324,16 +324,18 @@ def test_solutions_of_several_shapes_have_no_common_template(
 
 
 def test_a_stored_run_is_judged_again_and_written(
-    evoexp: Evoexp, runs: dict[str, RunDirectory], tmp_path: Path
+    evoexp: Evoexp, stored: Path, runs: dict[str, RunDirectory], tmp_path: Path
 ) -> None:
-    run, path = runs[LABELS[0]], tmp_path / "best.json"
+    run, path = RunDirectory(stored, runs[LABELS[0]].condition_id), tmp_path / "best.json"
     table = read_summaries(run).sort_values("best_cost")
     for words, replicate in (
         ([run.hash12], int(table["replicate"].iloc[0])),
         ([run.hash12, "--replicate", "1"], 1),
         ([str(run.log_path(1))], 1),
     ):
-        said = json.loads(evoexp("evaluate", *words, "--write", str(path), "--json").out)
+        answer = evoexp("evaluate", *words, "--write", str(path), "--json")
+        assert (answer.code, answer.err) == (0, "")
+        said = json.loads(answer.out)
         log = read_log(run.log_path(replicate))
         assert said["label"] == f"{run.hash12} #{replicate}"
         assert said["clearance"] == log.summary.clearance

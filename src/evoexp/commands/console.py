@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from evoexp.commands.word_tables import WordTable
 from evoexp.errors import printable
 
 PIPED_WIDTH = 160  # columns of a table in a pipe, where nobody has to read it on a narrow screen
@@ -46,7 +47,7 @@ def coloured(text: str, colour: str = "") -> Text:
 
 def new_table(title: str = "") -> Table:
     """Return an empty table."""
-    return Table(title=title or None, title_justify="left")
+    return WordTable(title=title or None, title_justify="left")
 
 
 def add_hash_column(table: Table, name: str = "hash") -> None:

@@ -269,7 +269,7 @@ def test_failures_on_the_command_line(
     words.append("--retry-failed")
     assert main(words) == 1
     narrow = capsys.readouterr().out
-    assert max(map(len, narrow[narrow.index("\n1 failed ") :].splitlines())) <= 80
+    assert max(map(len, narrow[narrow.index("\n1 failed\n") :].splitlines())) <= 80
     assert "…" not in narrow
 
     monkeypatch.delenv("FAULTY")
@@ -300,7 +300,7 @@ def test_where_every_replicate_failed_there_is_still_a_table_and_exit_code_1(
     )
     out = capsys.readouterr().out
     assert code == 1
-    assert "\n2 failed " in out
+    assert "\n2 failed\n" in out
     assert "report: " in out
 
 

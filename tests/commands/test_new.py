@@ -65,7 +65,8 @@ def test_every_number_has_unit_and_source(package: Path) -> None:
 
 
 @pytest.mark.usefixtures("installed")
-def test_its_options_come_from_the_package(evoexp: Evoexp) -> None:
+def test_its_options_come_from_the_package(evoexp: Evoexp, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "160")
     assert origin("experiment", NAME) == f"{NAME} 0.1.0"
     assert f"{NAME} 0.1.0" in evoexp("list").out
 

@@ -1,8 +1,11 @@
 """A command that is done leaves, whatever has become of its workers."""
 
+import os
 import signal
 import subprocess
 import sys
+import time
+from pathlib import Path
 
 import pytest
 
@@ -61,3 +64,51 @@ def test_an_interrupted_command_leaves_whatever_libraries_wait_for() -> None:
     )
     assert done.returncode == 128 + signal.SIGTERM
     assert done.stderr.splitlines()[-1] == "evoexp: interrupted"
+
+
+INTERRUPTED = """
+import os, signal, sys
+import joblib
+from joblib.externals.loky import process_executor, reusable_executor
+from evoexp import cli
+from evoexp.batch import workers
+
+def start(thread):
+    print(*reusable_executor._executor._processes, flush=True)
+    os.kill(os.getpid(), signal.SIGINT)
+
+def command(words, is_process):
+    workers.start_server()
+    list(workers.in_workers(2, (joblib.delayed(abs)(-k) for k in range(20))))
+    return 0
+
+process_executor._ExecutorManagerThread.start = start
+cli._run = command
+sys.exit(cli.main())
+"""
+
+
+def test_workers_end_where_the_thread_that_manages_them_never_started() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED], capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 128 + signal.SIGINT
+    assert done.stderr == "evoexp: interrupted\n"
+    workers = [int(word) for word in done.stdout.split()]
+    assert len(workers) == 2
+    assert not [worker for worker in workers if is_running(worker)]
+
+
+def is_running(number: int, patience_s: float = 20.0) -> bool:
+    """Return whether a process is there after some time; a dead one that nobody waits for is not."""
+    end = time.monotonic() + patience_s
+    while time.monotonic() < end:
+        try:
+            os.kill(number, 0)
+        except ProcessLookupError:
+            return False
+        stat = Path(f"/proc/{number}/stat")
+        if stat.exists() and stat.read_text().rpartition(")")[2].split()[0] == "Z":
+            return False
+        time.sleep(0.1)
+    return True

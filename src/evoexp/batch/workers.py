@@ -62,7 +62,11 @@ def end_all() -> None:
     """
     pool = reusable_executor._executor
     if pool is not None:
-        pool.shutdown(wait=True, kill_workers=True)
+        try:
+            pool.shutdown(wait=True, kill_workers=True)
+        except RuntimeError:  # interrupted while the thread that manages them started
+            for worker in list(pool._processes.values()):
+                worker.kill()
     server: Any = forkserver._forkserver
     if server._forkserver_pid is not None:
         with suppress(OSError):

@@ -54,9 +54,10 @@ class Interruption:
             if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
                 signal.signal(number, self._heard)
                 self._numbers.append(number)
-        # What a callback cannot raise is printed elsewhere; this is raised again instead.
+        # What a callback cannot raise is printed elsewhere; this is raised again instead, and what
+        # a library's destructors say of their interrupted work helps nobody.
         unraised, printed = sys.unraisablehook, sys.excepthook
-        sys.unraisablehook = lambda it: None if it.exc_type is Interrupted else unraised(it)
+        sys.unraisablehook = lambda it: None if self.number is not None else unraised(it)
         sys.excepthook = lambda *it: None if it[0] is Interrupted else printed(*it)
 
     def end(self) -> None:

@@ -100,7 +100,7 @@ def test_workers_end_where_the_thread_that_manages_them_never_started() -> None:
 
 
 def is_running(number: int, patience_s: float = 20.0) -> bool:
-    """Return whether a process is there after some time; a dead one that nobody waits for is not."""
+    """Return whether a process is still there after some time; a zombie is not."""
     end = time.monotonic() + patience_s
     while time.monotonic() < end:
         try:

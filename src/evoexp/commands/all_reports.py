@@ -12,9 +12,8 @@ from typing import NamedTuple
 from rich.console import Console
 
 from evoexp.commands import compare
-from evoexp.commands import report as report_command
 from evoexp.commands.command_parser import command_parser
-from evoexp.commands.drafts import check_reports
+from evoexp.commands.drafts import check_reports, draft_of, drafts
 from evoexp.commands.site import home_files, write_site
 from evoexp.configuration import expansions
 from evoexp.configuration.search_path import options, searched_first
@@ -96,9 +95,7 @@ def planned_reports(outputs: Path) -> Iterator[Planned]:
             ids = [condition.id for _, condition in experiment.conditions]
             if experiment.report_name not in seen and _is_stored(outputs, ids):
                 seen.add(experiment.report_name)
-                yield Planned(
-                    experiment.report_name, report_command.draft_of(experiment, words).files
-                )
+                yield Planned(experiment.report_name, draft_of(experiment, words).files)
     for each in summaries(outputs / "reports"):
         if each.folder not in seen:
             yield Planned(each.folder, functools.partial(_again, each.folder, each.command))
@@ -131,7 +128,7 @@ def _again(folder: str, command: str) -> build.ReportFiles:
     with searched_first(arguments.config_dir):
         if name == "compare":
             return compare.drawn(arguments).files
-        found = [] if arguments.all else report_command.drafts(arguments)
+        found = [] if arguments.all else drafts(arguments)
         if len(found) != 1:
             raise StoreError(f"{folder}: names no command that draws it alone")
         return found[0].files()

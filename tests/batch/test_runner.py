@@ -17,9 +17,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-from evoexp.batch import fan_out as fanning
 from evoexp.batch import jobs, live_curves, workers
-from evoexp.batch.fan_out import MAX_BUNDLE, TASK_S, Bundles, compile_all, fan_out
+from evoexp.batch.fan_out import MAX_BUNDLE, TASK_S, Bundles, fan_out
 from evoexp.batch.jobs import Job, Outcome, run_jobs
 from evoexp.batch.live_curves import read_curves
 from evoexp.batch.replicate import run_replicate
@@ -152,27 +151,6 @@ def test_a_batch_tells_how_its_replicates_converge(
     log = read_log(RunDirectory(tmp_path / "outputs", faulty.id).log_path(0))
     assert curve[:3] == (faulty.id, 0, log.summary.num_generations)
     assert curve.costs[-1] == log.summary.best_cost
-
-
-def test_kernels_are_compiled_once_for_conditions_that_differ_in_numbers(
-    faulty: Condition, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    noted: set[str] = set()
-    asked: list[bytes] = []
-    from_json = Condition.from_json
-    monkeypatch.setattr(fanning, "is_compiled", lambda kind, modules: kind in noted)
-    monkeypatch.setattr(fanning, "note_compiled", lambda kind, modules: noted.add(kind))
-    monkeypatch.setattr(
-        Condition, "from_json", lambda text: (asked.append(text), from_json(text))[1]
-    )
-    texts = [faulty._replace(seed=seed).to_json() for seed in (0, 7, 12345)]
-    compile_all([texts[0], *texts])
-    assert asked == texts[:1]
-    assert len(noted) == 1
-    compile_all([b"{}"])  # no condition: nothing is noted, and it is asked again
-    compile_all([b"{}"])
-    assert asked[1:] == [b"{}", b"{}"]
-    assert len(noted) == 1
 
 
 def test_a_condition_wanted_twice_runs_once(faulty: Condition, tmp_path: Path) -> None:

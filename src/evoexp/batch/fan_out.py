@@ -1,26 +1,19 @@
-"""Fans jobs out to worker processes, once every kernel that they need is compiled."""
+"""Fans jobs out to worker processes."""
 
 import contextlib
-import itertools
-import json
-import re
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
 from evoexp.batch.jobs import NO_LIMITS, Job, Outcome, run_jobs
 from evoexp.batch.replicate_limits import ReplicateLimits
-from evoexp.condition import Condition
-from evoexp.numeric.compiled_kinds import is_compiled, note_compiled
-from evoexp.registry import component_modules
 
 # [s] replicates are bundled into tasks of about this length; a task costs the parent some 2 ms
 TASK_S = 0.2
 MAX_BUNDLE = 64  # replicates per task at most, so that results keep streaming
-_NUMBER = re.compile(r"-?\d+(\.\d+)?([eE][-+]?\d+)?")
 
 
 def fan_out(
@@ -151,30 +144,3 @@ def _run_alone(job: Job, limits: ReplicateLimits) -> Outcome:
     if limits.timeout_s is not None and time.perf_counter() - begun >= limits.timeout_s:
         reason = f"{limits.reason}, in compiled code: its process was ended"
     return Outcome(job.condition_id, job.replicate, reason, trace, b"", 0.0)
-
-
-def compile_all(config_jsons: Iterable[bytes]) -> None:
-    """Compile every kernel that some conditions need, once and here, unless they are kept."""
-    for text in config_jsons:
-        kind = _NUMBER.sub("0", text.decode())  # another number needs no other kernel
-        modules = set(component_modules(json.loads(text)))
-        if is_compiled(kind, modules):
-            continue
-        from evoexp.paths.motion import Motion  # and numba
-        from evoexp.planners.proofs import judge_motion
-
-        # A planner that fails does so again in its replicate, and is noted there.
-        with contextlib.suppress(Exception):
-            condition = Condition.from_json(text)
-            planner, problem = condition.prepare()
-            # A reference takes long, and mostly needs the kernels of the planner beside it.
-            if condition.is_reference:
-                planner = planner.planner
-            for generation in itertools.islice(planner.evolve(problem, condition.rng(0)), 2):
-                planner.evaluate(problem, generation.best)
-                motion = planner.motion(problem, generation.best)
-                judge_motion(planner, problem, motion)
-                # A motion that touches nothing needs the kernels of the closest approach.
-                if motion is not None:
-                    judge_motion(planner, problem, Motion(motion.q[[0, 0]]))
-            note_compiled(kind, modules)

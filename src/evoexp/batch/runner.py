@@ -9,7 +9,7 @@ from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from evoexp.batch.jobs import Job, Outcome, load
+from evoexp.batch.jobs import Job, Outcome
 from evoexp.batch.known_times import LongestTimes, are_short
 from evoexp.batch.memory_limit import GIGABYTE, allowed_memory, refuse_large
 from evoexp.batch.replicate_limits import ReplicateLimits
@@ -96,7 +96,8 @@ class Batch:
         Raises:
             Busy: If another process writes one of the runs.
         """
-        from evoexp.batch.fan_out import compile_all, loading
+        from evoexp.batch.fan_out import loading
+        from evoexp.batch.first_compilation import compile_all, load_and_compile
 
         with lock_all(self.runs.values()):
             lost = {key: lost_replicates(run) for key, run in self.runs.items()}
@@ -107,7 +108,7 @@ class Batch:
             config_jsons = list(dict.fromkeys(job.condition_json for job in self.jobs))
             files = list(dict.fromkeys(content for job in self.jobs for content in job.files))
             on_cluster = self._settings.backend == "dask"
-            with loading(1 if on_cluster else num_workers, load, config_jsons, files):
+            with loading(1 if on_cluster else num_workers, load_and_compile, config_jsons, files):
                 wanted = ((run, *self._wanted[key]) for key, run in self.runs.items())
                 create_all(
                     (run, text, _manifest(run, text) | notes, own.files())

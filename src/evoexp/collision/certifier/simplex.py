@@ -1,9 +1,14 @@
 """The point of a simplex that is closest to the origin, for GJK: by looking at all its faces."""
 
+from typing import cast
+
 import numpy as np
 
 from evoexp.numeric.compilation import inlined
 from evoexp.records import FloatArray
+
+ZERO, ONE, TWO, THREE = (cast(int, np.int64(k)) for k in range(4))
+"""Corners by type int64: numba compiles a function once more for every literal it is given."""
 
 
 @inlined
@@ -23,16 +28,16 @@ def closest_of_simplex(p: FloatArray, count: int, out: FloatArray) -> int:
         out[0], out[1], out[2] = p[0, 0], p[0, 1], p[0, 2]
         return 1
     if count == 2:
-        _, keep = _edge(p, 0, 1, np.inf, 0, out)
+        _, keep = _edge(p, ZERO, ONE, np.inf, ZERO, out)
     elif count == 3:
-        _, keep = _face(p, 0, 1, 2, np.inf, 0, out)
+        _, keep = _face(p, ZERO, ONE, TWO, np.inf, ZERO, out)
     else:
         if _within(p):
             return 4
-        best, keep = _face(p, 0, 1, 2, np.inf, 0, out)
-        best, keep = _face(p, 0, 1, 3, best, keep, out)
-        best, keep = _face(p, 0, 2, 3, best, keep, out)
-        best, keep = _face(p, 1, 2, 3, best, keep, out)
+        best, keep = _face(p, ZERO, ONE, TWO, np.inf, ZERO, out)
+        best, keep = _face(p, ZERO, ONE, THREE, best, keep, out)
+        best, keep = _face(p, ZERO, TWO, THREE, best, keep, out)
+        best, keep = _face(p, ONE, TWO, THREE, best, keep, out)
     # the corners that carry the point to the front
     kept = 0
     for k in range(4):

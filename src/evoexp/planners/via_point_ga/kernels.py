@@ -225,7 +225,8 @@ def breed(
     for k in range(new):
         if uniforms[first + new + k] < breeding.mutation_rate:
             slots[num] = slots[k]
-            walks[num] = walks[k]
+            for j in range(walks.shape[1]):  # assigning rows compiles numba's message on shapes
+                walks[num, j] = walks[k, j]
             num += 1
     walk_strings(
         offspring,
@@ -278,13 +279,12 @@ def judge(strings: FloatArray, arm_slices: IntArray, judging: Judging, terms: St
     # Eqs. 2–5: lengths, and how uneven the distances of via-points are
     measure_paths(strings, arm_slices, terms.lengths, terms.unevenness)
     # Eq. 6: contacts at the instants, which follow the start, and at the substeps before them
+    configurations, start = strings, lanes
+    if substeps > 1:
+        configurations, start = np.empty((nq, (num_points - 1) * substeps, lanes)), 0
+        interpolate(strings, substeps, configurations)
     hits = np.empty((num_points - 1) * substeps * lanes)
-    if substeps == 1:
-        contacts(judging.tables, strings.reshape((nq, -1)), lanes, hits)
-    else:
-        between = np.empty((nq, (num_points - 1) * substeps, lanes))
-        interpolate(strings, substeps, between)
-        contacts(judging.tables, between.reshape((nq, -1)), 0, hits)
+    contacts(judging.tables, configurations.reshape((nq, -1)), start, hits)
     by_instant = hits.reshape((1, num_points - 1, substeps, lanes))
     count_collisions(by_instant, terms.collisions)
     # Eq. 7

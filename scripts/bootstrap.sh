@@ -92,7 +92,9 @@ with_uv() {  # whatever fails is tried again with pip, which says what is wrong
 
 with_pip() {
   "$PYTHON" -m pip --version >/dev/null 2>&1 || "$PYTHON" -m ensurepip >/dev/null || return
-  "$PYTHON" -m pip install --quiet --disable-pip-version-check "$@"
+  local bytecode=--no-compile  # as with uv
+  [ -z "${PYTHONDONTWRITEBYTECODE-}" ] || bytecode=--compile
+  "$PYTHON" -m pip install --quiet --disable-pip-version-check "$bytecode" "$@"
 }
 
 choose_tool() {

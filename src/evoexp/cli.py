@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from evoexp.commands.command_parser import COMMANDS, command_module, command_parser, whole_parser
 from evoexp.commands.damage_lines import damage_in_lines
 from evoexp.commands.interruption import Interrupted, Interruption
+from evoexp.commands.quick_end import leave, search_less
 from evoexp.commands.standard_streams import (
     OUTPUT,
     complain,
@@ -43,6 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if is_process:
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # no threads that have nothing to do
         open_streams()
+        search_less()
         interruption.hear()
         warnings.filterwarnings("ignore", GIVEN_UP, UserWarning)
     words = list(sys.argv[1:] if arguments is None else arguments)
@@ -53,6 +55,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             sys.stdout.flush()  # here, where an error is explained
         if is_process:
             _end_workers()
+            settle_streams()
+            leave(code)
         return code
     except BaseException as error:
         interruption.end()

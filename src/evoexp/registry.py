@@ -94,11 +94,10 @@ def _registrations() -> dict[str, tuple[Registration, ...]]:
         points = [point for point in distribution.entry_points if point.group in found]
         if points and (name := distribution.metadata["Name"]) not in seen:  # the first on the path
             seen.add(name)
+            version = distribution.version  # read out of the metadata whenever it is asked for
             for point in points:
                 target = point.value.replace(" ", "")
-                found[point.group].append(
-                    Registration(point.name, target, name, distribution.version)
-                )
+                found[point.group].append(Registration(point.name, target, name, version))
     if OWN not in seen:
         raise RegistrationError("evoexp: is not installed (in its checkout: pip install -e .)")
     return {group: tuple(sorted(each)) for group, each in found.items()}

@@ -64,7 +64,7 @@ class ContentLocator(caching._CacheLocator):
         return self._code
 
 
-class SharedCache(caching.FunctionCache):
+class _OpenedCache(caching.FunctionCache):
     """A kernel's cache that lets one process compile while all others wait for its result."""
 
     def __init__(self, function: Any) -> None:
@@ -107,6 +107,21 @@ class SharedCache(caching.FunctionCache):
         if self._held is not None:
             self._held.release()
             self._held = None
+
+
+class SharedCache:
+    """A kernel's cache, opened when it is first asked: most kernels of a process never are."""
+
+    def __init__(self, function: Any) -> None:
+        """Note whose it is."""
+        self._function = function
+        self._opened: _OpenedCache | None = None
+
+    def __getattr__(self, name: str) -> Any:
+        """Return what numba asks the cache for."""
+        if self._opened is None:
+            self._opened = _OpenedCache(self._function)
+        return getattr(self._opened, name)
 
 
 def use_content_cache() -> None:

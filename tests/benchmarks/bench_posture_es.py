@@ -27,7 +27,7 @@ def bench_search(beside: Any) -> None:
     """
     found = condition("corsepius_bottle")
     planner, problem = found.prepare()
-    evaluations = posture_es_python.path(problem, planner.ga, found.rng(0))[1]
+    evaluations = posture_es_python.path(problem, planner, found.rng(0))[1]
 
     def ours() -> None:
         for _ in planner.evolve(problem, found.rng(0)):
@@ -38,7 +38,7 @@ def bench_search(beside: Any) -> None:
         ours,
         {
             "lists": (
-                lambda: posture_es_python.path(problem, planner.ga, found.rng(0)),
+                lambda: posture_es_python.path(problem, planner, found.rng(0)),
                 evaluations,
                 1,
             )

@@ -21,6 +21,7 @@ from references import arms_6r, arms_7r, primitives_numpy
 SIZE = 100
 IGNORED = [(1, arms_6r.FLOOR)]
 DRAWN = {"random": arms_6r.random_configurations, "population": arms_6r.population}
+DRAWN_7R = {"random": arms_7r.random_configurations, "population": arms_7r.population}
 
 
 def collision_of(shapes: str) -> PrimitiveCollision:
@@ -96,7 +97,7 @@ def bench_collides_7r(beside: Any, drawn: str) -> None:
     """A 7R arm of 59 spheres among ten spheres: all answers, and whether any collides."""
     model, table = arms_7r.model(), obstacle_table(arms_7r.OBSTACLES)
     collision = PrimitiveCollision.build(model, arms_7r.shapes(), table, arms_7r.SELF_PAIRS)
-    q = getattr(arms_7r, drawn)(SIZE)
+    q = DRAWN_7R[drawn](SIZE)
     pool = pin.BroadPhaseManagerPool_DynamicAABBTreeCollisionManager(
         model, arms_7r.geometry(model), 1
     )

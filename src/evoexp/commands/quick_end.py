@@ -1,7 +1,7 @@
 """Start and end of a short process: no search for garbage at the start, no taking apart at the end.
 
-What is imported stays, so the many searches for garbage while Python imports find none. And freeing
-one by one what numba, LLVM and Pinocchio hold takes a quarter of a second when Python ends.
+Imported modules stay, so searches for garbage while Python imports find none. And freeing
+one by one the objects of numba, LLVM and Pinocchio takes a quarter of a second when Python ends.
 """
 
 import atexit
@@ -19,7 +19,7 @@ def search_less() -> None:
 
 
 def leave(code: int) -> None:
-    """End this process as Python does, threads first, then what was registered for the end.
+    """End this process as Python does: threads first, then functions registered for its end.
 
     Nothing is done where there are worker processes. Standard output and error are flushed already.
     """

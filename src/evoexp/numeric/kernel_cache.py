@@ -118,7 +118,7 @@ class SharedCache:
         self._opened: _OpenedCache | None = None
 
     def __getattr__(self, name: str) -> Any:
-        """Return what numba asks the cache for."""
+        """Open the cache, and return its attribute of this name."""
         if self._opened is None:
             self._opened = _OpenedCache(self._function)
         return getattr(self._opened, name)

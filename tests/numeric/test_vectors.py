@@ -24,6 +24,7 @@ from evoexp.numeric.vectors import (
     spread,
     store,
     upper,
+    whole,
 )
 from evoexp.records import FloatArray
 
@@ -54,12 +55,12 @@ def over_lanes(function: Callable[..., Any]) -> Callable[..., FloatArray]:
         for k in range(0, len(x), LANES):
             store(out, np.uint64(k), function(load(x, np.uint64(k)), load(y, np.uint64(k))))
 
-    def whole(x: FloatArray, y: FloatArray) -> FloatArray:
+    def over_arrays(x: FloatArray, y: FloatArray) -> FloatArray:
         out = np.empty_like(x)
         run(x, y, out)
         return out
 
-    return whole
+    return over_arrays
 
 
 @pytest.mark.parametrize("operation", [operator.add, operator.sub, operator.mul, operator.truediv])
@@ -80,6 +81,7 @@ def test_roots_magnitudes_and_choices() -> None:
         assert same(over_lanes(kernel(lambda a, b: root(a)))(x, y), np.sqrt(x))
     assert same(over_lanes(kernel(lambda a, b: magnitude(a)))(x, y), np.abs(x))
     assert same(over_lanes(kernel(lambda a, b: ceiling(a)))(x, y), np.ceil(x))
+    assert same(over_lanes(kernel(lambda a, b: whole(a)))(x, y), np.rint(x))
     assert same(over_lanes(kernel(lambda a, b: spread(2.5)))(x, y), np.full_like(x, 2.5))
     # a comparison with NaN is false: the second of the choices, the first of lower and upper
     assert same(over_lanes(kernel(lambda a, b: select(a < b, a, b)))(x, y), np.where(x < y, x, y))
@@ -100,6 +102,23 @@ def test_a_condition_holds_in_any_lane() -> None:
         assert any_below(x, 0.0)
         assert not any_below(x, -1.0)
     assert not any_below(np.full(LANES, np.nan), np.inf)
+
+
+def test_conditions_hold_together_in_the_lanes_of_both() -> None:
+    @kernel
+    def between(x: FloatArray, low: float, high: float) -> int:
+        one = load(x, np.uint64(0))
+        return mask_bits((one > low) & (one < high))
+
+    @kernel
+    def below_if(x: FloatArray, high: float, asked: bool) -> int:
+        return mask_bits((load(x, np.uint64(0)) < high) & asked)
+
+    x = np.arange(LANES, dtype=np.float64)
+    assert between(x, 1.5, 4.5) == 0b11100
+    assert between(x, 4.5, 1.5) == 0
+    assert below_if(x, 3.0, True) == 0b111
+    assert below_if(x, 3.0, False) == 0
 
 
 def test_sines_and_cosines_have_the_bits_of_scalars() -> None:

@@ -34,6 +34,8 @@ _BITS = ir.VectorType(ir.IntType(1), LANES)
 class Mask(Protocol):
     """Eight truth values, of a comparison of vectors."""
 
+    def __and__(self, other: "Mask | bool") -> "Mask": ...
+
 
 class Vector(Protocol):
     """Eight float64. This is their type for annotations; in kernels it is `vector_type`."""
@@ -148,6 +150,7 @@ def _define_operators() -> None:
     _define(operator.gt, vector_type, types.float64, mask_type, greater)
     _define(operator.eq, vector_type, types.float64, mask_type, equal)
     _define(operator.ne, word_type, types.int64, mask_type, unequal)
+    _define(operator.and_, mask_type, types.boolean, mask_type, ir.IRBuilder.and_)
 
 
 _define_operators()
@@ -309,6 +312,9 @@ magnitude: Callable[[Vector], Vector] = _of_llvm("fabs")
 
 ceiling: Callable[[Vector], Vector] = _of_llvm("ceil")
 """Return the least whole number not below the value of every lane."""
+
+whole: Callable[[Vector], Vector] = _of_llvm("rint")
+"""Return the whole number that is nearest to the value of every lane, the even one of two."""
 
 to_bits: Callable[[Any], Any] = _reinterpretation(
     {types.float64: types.int64, vector_type: word_type}

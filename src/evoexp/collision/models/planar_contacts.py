@@ -1,10 +1,11 @@
 """Kernel of yes and no for touching circles in the plane, links as equal steps along lines.
 
 Of two links whose circles stand at equal steps along lines, the circle of one that is nearest to a
-given circle of the other follows by rounding: |d + i e − j f|² is a parabola in j. So a link of n
-circles and one of m take n steps instead of n · m. The angles of a chain are summed, not its
-rotations multiplied. Each step of the way is done for several vectors of eight configurations
-before the next: neighbouring operations wait for no result of each other.
+given circle of the other follows by rounding its place on the other's line. So a link of n circles
+and one of m take min(n, m) steps instead of n · m. The angles of a chain are summed, not its
+rotations multiplied, in quarter turns. Joints and lines are placed for several vectors of eight
+configurations before the next, so that constants stay in registers and neighbouring operations wait
+for no result of each other.
 
 Answers that rounding errors could change are left to the kernel `clearances`, and so are robots in
 space or among obstacles: the answer is the sign of its clearance.
@@ -16,7 +17,6 @@ import numpy as np
 
 from evoexp.collision.models.obstacle_kernels import MARGIN
 from evoexp.collision.models.sphere_kernels import (
-    LinkLines,
     Memory,
     SphereTables,
     memory_for,
@@ -24,7 +24,8 @@ from evoexp.collision.models.sphere_kernels import (
     write_clearances,
 )
 from evoexp.numeric.compilation import borrowed, inlined, kernel
-from evoexp.numeric.elementary import DEGREE, sincos
+from evoexp.numeric.elementary import DEGREE
+from evoexp.numeric.quarter_turns import QUARTER_TURN, sincos_of_turn
 from evoexp.numeric.vectors import (
     LANES,
     Vector,
@@ -36,13 +37,11 @@ from evoexp.numeric.vectors import (
     spread,
     store,
     upper,
+    whole,
 )
 from evoexp.records import FloatArray, IntArray
-from evoexp.robots.forward_kinematics import PLANAR_FRAME, VECTOR, Eight, eight_of
+from evoexp.robots.forward_kinematics import VECTOR, Eight, eight_of
 from evoexp.robots.kinematics import KinematicChain, U
-
-BLOCK = 8
-"""Vectors that go through each step together."""
 
 ROUNDING = 1e-12
 """Squared distances that differ from the limit by less, times the squared scale, are in doubt."""
@@ -50,13 +49,20 @@ ROUNDING = 1e-12
 LARGEST_Q = 1e4
 """[deg] beyond it everything is in doubt, and NaN."""
 
-_ROUND = 1.5 * 2.0**52  # adding it rounds to an integer
+BLOCK = 8
+"""Vectors that are placed together."""
+
+FRAME = U(5) * VECTOR
+"""Numbers of a joint of eight configurations: sine, cosine, x, y, angle in quarter turns."""
 
 LINE = U(4) * VECTOR
-"""Numbers of a line of eight configurations: first centre, step."""
+"""Numbers of a line of eight configurations: middle, step."""
 
-OF_JOINT, OF_LINE = U(BLOCK) * PLANAR_FRAME, U(BLOCK) * LINE
+OF_JOINT, OF_LINE = U(BLOCK) * FRAME, U(BLOCK) * LINE
 """The same of a block."""
+
+X, Y, STEP_X, STEP_Y, STEPS, LENGTH, HALF = range(7)
+"""Columns of `LinkLines.line`."""
 
 
 @kernel
@@ -74,8 +80,7 @@ def contacts(tables: tuple[Any, ...], q: FloatArray, start: int, out: FloatArray
     if named.space is None and len(named.obstacles.kind) == 0 and named.lines.scale < np.inf:
         frames = np.empty(U(len(named.chain.parent)) * OF_JOINT)
         lines = np.empty(U(len(named.bounds.joint)) * OF_LINE)
-        least = np.empty(BLOCK * LANES)
-        _contacts(named, flat, count, start, out, memory, frames, lines, least)
+        _contacts(named, flat, count, start, out, memory, frames, lines, np.empty(BLOCK * LANES))
     else:
         _exact_contacts(named, flat, count, start, count, out, memory)
 
@@ -90,36 +95,32 @@ def _contacts(
     memory: Memory,
     frames: FloatArray,
     lines: FloatArray,
-    least: FloatArray,
+    total: FloatArray,
 ) -> None:
     """Do the work of `contacts` in given memory, so that inner loops count no references."""
-    tables, q, out, memory, frames, lines, least = borrowed(
-        (tables, q, out, memory, frames, lines, least)
+    tables, q, out, memory, frames, lines, total = borrowed(
+        (tables, q, out, memory, frames, lines, total)
     )
     limit = 4.0 * tables.spheres.radius * tables.spheres.radius
     slack = ROUNDING * tables.lines.scale * tables.lines.scale
-    reach = np.sqrt(limit + 2.0 * slack) * MARGIN
+    arm_links, line = tables.bounds.arm_links, tables.lines.line
     first = start
     while first < count:
         vectors = min(BLOCK, max((count - first) // LANES, 1))
         eight = eight_of(q, first, count, memory.q)
-        _sum_angles(tables.chain, tables.lines.turn, eight, vectors, frames, least)
-        _place_joints(tables.chain, vectors, frames)
-        _place_lines(tables.bounds.joint, tables.lines.line, vectors, frames, lines)
-        # squared distances of the arms, as far as they are below the limit
+        _place_joints(tables.chain, tables.lines.turn, eight, vectors, frames, total)
+        _place_lines(tables.bounds.joint, line, vectors, frames, lines)
         for v in range(vectors):
-            own = U(v) * VECTOR
-            sound = load(least, own) < LARGEST_Q
-            store(least, own, select(sound, spread(limit + 2.0 * slack), spread(limit)))
-        _between_arms(tables.bounds.arm_links, tables.lines, reach, vectors, lines, least)
-        for v in range(vectors):
-            begin, found = first + v * LANES, load(least, U(v) * VECTOR)
-            sure = select(spread(slack) < magnitude(found - limit), spread(1.0), spread(0.0))
+            begin, sound = first + v * LANES, load(total, U(v) * VECTOR) < LARGEST_Q
+            # the squared distance of the arms, as far as it is below the limit, or in doubt
+            least = select(sound, spread(limit + 2.0 * slack), spread(limit))
+            least = _between_arms(arm_links, line, limit, slack, lines, U(v) * LINE, least)
+            sure = select(spread(slack) < magnitude(least - limit), spread(1.0), spread(0.0))
             if any_lane(sure < 1.0) or begin + LANES > count:
                 stop = min(begin + LANES, count)
                 _exact_contacts(tables, q, count, begin, stop, out[begin - start :], memory)
             else:
-                store(out, U(begin - start), found - limit)
+                store(out, U(begin - start), least - limit)
         first += vectors * LANES
 
 
@@ -141,7 +142,7 @@ def _exact_contacts(
 
 
 @inlined
-def _sum_angles(
+def _place_joints(
     chain: KinematicChain,
     turn: FloatArray,
     eight: Eight,
@@ -149,77 +150,81 @@ def _sum_angles(
     frames: FloatArray,
     total: FloatArray,
 ) -> None:
-    """Write sines, cosines and angles of all joints, and the sum of |q|, of neighbouring eights."""
-    for k in range(len(chain.parent)):
-        own, before = U(k) * OF_JOINT, U(chain.parent[k]) * OF_JOINT
-        place, added = U(chain.index_q[k]) * eight.stride + eight.place, turn[k]
-        for v in range(vectors):
-            at, frame = U(v) * VECTOR, U(v) * PLANAR_FRAME
-            q = load(eight.q, place + at)
-            angle = q * DEGREE + added
-            if chain.parent[k] >= 0:
-                angle = angle + load(frames, before + frame + U(2) * VECTOR)
-            s, c = sincos(angle)
-            store(frames, own + frame, s)
-            store(frames, own + frame + VECTOR, c)
-            store(frames, own + frame + U(2) * VECTOR, angle)
-            store(total, at, magnitude(q) + (load(total, at) if k > 0 else spread(0.0)))
-
-
-@inlined
-def _place_joints(chain: KinematicChain, vectors: int, frames: FloatArray) -> None:
-    """Write x and y of all joints over their angles."""
+    """Write frames of all joints, and the sum of |q|, of neighbouring eights."""
     for k in range(len(chain.parent)):
         own, before = U(k) * OF_JOINT, U(chain.parent[k]) * OF_JOINT
         dx, dy = chain.translation[k, 0], chain.translation[k, 1]
+        place, added = U(chain.index_q[k]) * eight.stride + eight.place, turn[k]
+        moves = chain.parent[k] >= 0
         for v in range(vectors):
-            frame = U(v) * PLANAR_FRAME
-            x, y = spread(dx), spread(dy)
-            if chain.parent[k] >= 0:
-                s, c = load(frames, before + frame), load(frames, before + frame + VECTOR)
-                x = load(frames, before + frame + U(2) * VECTOR) + (c * dx - s * dy)
-                y = load(frames, before + frame + U(3) * VECTOR) + (s * dx + c * dy)
-            store(frames, own + frame + U(2) * VECTOR, x)
-            store(frames, own + frame + U(3) * VECTOR, y)
+            at, o, b = U(v) * VECTOR, own + U(v) * FRAME, before + U(v) * FRAME
+            q = load(eight.q, place + at)
+            angle, x, y = q * (DEGREE / QUARTER_TURN) + added, spread(dx), spread(dy)
+            if moves:
+                s, c = load(frames, b), load(frames, b + VECTOR)
+                x = load(frames, b + U(2) * VECTOR) + (c * dx - s * dy)
+                y = load(frames, b + U(3) * VECTOR) + (s * dx + c * dy)
+                angle = angle + load(frames, b + U(4) * VECTOR)
+            s, c = sincos_of_turn(angle)
+            store(frames, o, s)
+            store(frames, o + VECTOR, c)
+            store(frames, o + U(2) * VECTOR, x)
+            store(frames, o + U(3) * VECTOR, y)
+            store(frames, o + U(4) * VECTOR, angle)
+            store(total, at, magnitude(q) + (load(total, at) if k > 0 else spread(0.0)))
 
 
 @inlined
 def _place_lines(
     joint: IntArray, line: FloatArray, vectors: int, frames: FloatArray, lines: FloatArray
 ) -> None:
-    """Write the first centre of every link, and the step to the next."""
+    """Write the middle of every link's circles, and the step from one to the next."""
     for k in range(len(joint)):
-        x, y, ex, ey = line[k, 0], line[k, 1], line[k, 3], line[k, 4]
+        x, y, step_x, step_y = line[k, X], line[k, Y], line[k, STEP_X], line[k, STEP_Y]
         for v in range(vectors):
-            j = U(joint[k]) * OF_JOINT + U(v) * PLANAR_FRAME
+            j, own = U(joint[k]) * OF_JOINT + U(v) * FRAME, U(k) * OF_LINE + U(v) * LINE
             s, c = load(frames, j), load(frames, j + VECTOR)
-            own = U(k) * OF_LINE + U(v) * LINE
-            store(lines, own, load(frames, j + U(2) * VECTOR) + (c * x - s * y))
-            store(lines, own + VECTOR, load(frames, j + U(3) * VECTOR) + (s * x + c * y))
-            store(lines, own + U(2) * VECTOR, c * ex - s * ey)
-            store(lines, own + U(3) * VECTOR, s * ex + c * ey)
+            mx, my, ex, ey = c * x, s * x, c * step_x, s * step_x
+            if y != 0.0 or step_y != 0.0:  # a link that is not along its frame's x axis
+                mx, my, ex, ey = mx - s * y, my + c * y, ex - s * step_y, ey + c * step_y
+            store(lines, own, load(frames, j + U(2) * VECTOR) + mx)
+            store(lines, own + VECTOR, load(frames, j + U(3) * VECTOR) + my)
+            store(lines, own + U(2) * VECTOR, ex)
+            store(lines, own + U(3) * VECTOR, ey)
 
 
 @inlined
 def _between_arms(
     arm_links: IntArray,
-    links: LinkLines,
-    reach: float,
-    vectors: int,
+    line: FloatArray,
+    limit: float,
+    slack: float,
     lines: FloatArray,
-    least: FloatArray,
-) -> None:
-    """Lower squared distances to the least ones of circles of two arms."""
+    at: np.uint64,
+    least: Vector,
+) -> Vector:
+    """Lower squared distances to the least ones of circles of two arms.
+
+    Args:
+        arm_links: See `LinkBalls`.
+        line: See `LinkLines`.
+        limit: Squared distance at which circles touch [length unit²].
+        slack: Squared distances nearer to the limit than this are in doubt.
+        lines: (links · OF_LINE,).
+        at: Of a vector in a block of lines.
+        least: The squared distances so far.
+    """
+    reach = np.sqrt(limit + 2.0 * slack) * MARGIN
     for a in range(len(arm_links)):
         for b in range(a + 1, len(arm_links)):
             for one in range(arm_links[a, 0], arm_links[a, 1]):
                 for two in range(arm_links[b, 0], arm_links[b, 1]):
-                    for v in range(vectors):
-                        i = U(one) * OF_LINE + U(v) * LINE
-                        j = U(two) * OF_LINE + U(v) * LINE
-                        found = load(least, U(v) * VECTOR)
-                        found = _nearest_steps(links.line, one, two, lines, i, j, reach, found)
-                        store(least, U(v) * VECTOR, found)
+                    # the circles of the link that has fewer, each beside the other's line
+                    i, j = one, two
+                    if line[two, STEPS] < line[one, STEPS]:
+                        i, j = two, one
+                    least = _nearest_steps(line, i, j, lines, at, reach, limit - slack, least)
+    return least
 
 
 @inlined
@@ -228,30 +233,37 @@ def _nearest_steps(
     one: int,
     two: int,
     lines: FloatArray,
-    i: np.uint64,
-    j: np.uint64,
+    at: np.uint64,
     reach: float,
+    sure: float,
     least: Vector,
 ) -> Vector:
-    """Lower a squared distance to the least one of two links' circles, if that is below reach²."""
-    n, m, inverse = line[one, 6], line[two, 6], line[two, 7]
-    e2, f2, within = line[one, 8], line[two, 8], reach + line[one, 9] + line[two, 9]
+    """Lower a squared distance to the least one of two links' circles, if that is below reach².
+
+    Lanes whose distance is below `sure` are not looked at.
+    """
+    half_n, half_m, length = 0.5 * line[one, STEPS], 0.5 * line[two, STEPS], line[two, LENGTH]
+    i, j, within = U(one) * OF_LINE + at, U(two) * OF_LINE + at, line[one, HALF] + line[two, HALF]
+    # from middle to middle: the balls around both links
     dx, dy = load(lines, i) - load(lines, j), load(lines, i + VECTOR) - load(lines, j + VECTOR)
-    ex, ey = load(lines, i + U(2) * VECTOR), load(lines, i + U(3) * VECTOR)
-    fx, fy = load(lines, j + U(2) * VECTOR), load(lines, j + U(3) * VECTOR)
-    # the balls around both links
-    x, y = dx + (ex * (0.5 * n) - fx * (0.5 * m)), dy + (ey * (0.5 * n) - fy * (0.5 * m))
-    if not any_lane(x * x + y * y < within * within):
+    within, open_ = reach + within, sure < least
+    if not any_lane((dx * dx + dy * dy < within * within) & open_):
         return least
-    # in units of the other's step: |d + i e|² is the squared distance from its first centre, and
-    # u the place on its line that is nearest, which is rounded to a step
-    square, p = (dx * dx + dy * dy) * inverse, (ex * dx + ey * dy) * (2.0 * inverse)
-    w, g, e2 = (fx * dx + fy * dy) * inverse, (ex * fx + ey * fy) * inverse, e2 * inverse
-    # from step to step u, the square and its increase grow by sums
-    u, increase, twice = w, p + e2, e2 + e2
-    found, nothing, last = spread(np.inf), spread(0.0), spread(m)
-    for _ in range(int(n) + 1):
-        nearest = lower(upper((u + _ROUND) - _ROUND, nothing), last)
-        found = lower(found, square + nearest * (nearest - (u + u)))
-        u, square, increase = u + g, square + increase, increase + twice
-    return lower(least, found * f2)
+    square, inverse = length * length, 1.0 / (length * length)
+    ex, ey = load(lines, i + U(2) * VECTOR), load(lines, i + U(3) * VECTOR)
+    fx, fy = load(lines, j + U(2) * VECTOR) * inverse, load(lines, j + U(3) * VECTOR) * inverse
+    # along the other's line and across it, in units of its step: one's step, and its middle
+    g, h = ex * fx + ey * fy, ey * fx - ex * fy
+    u, v = dx * fx + dy * fy, dy * fx - dx * fy
+    beyond = magnitude(u) - (magnitude(g) * half_n + half_m)
+    beside = magnitude(v) - magnitude(h) * half_n
+    if not any_lane((upper(beyond, beside) < reach / length * MARGIN) & open_):
+        return least
+    # from circle to circle
+    u, v = u - g * half_n + half_m, v - h * half_n
+    found, nothing, last = spread(np.inf), spread(0.0), spread(2.0 * half_m)
+    for _ in range(int(2.0 * half_n) + 1):
+        d = u - lower(upper(whole(u), nothing), last)
+        found = lower(found, d * d + v * v)
+        u, v = u + g, v + h
+    return lower(least, found * square)

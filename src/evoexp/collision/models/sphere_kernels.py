@@ -62,12 +62,13 @@ class Spheres(NamedTuple):
 
 
 class LinkLines(NamedTuple):
-    """Spheres of every link as equal steps along a line.
+    """Spheres of every link of a planar robot as equal steps along a line.
 
     Attributes:
-        line: (links, 10) first centre; step to the next; number of steps; 1 / squared step; squared
-            step, 1 where there is none; half the length.
-        turn: (joints,) angle of the placement of each joint of a planar robot [rad].
+        line: (links, LINE_COLUMNS) x and y of the middle; x and y of the step from one centre to
+            the next, (1, 0) where there is none; number of steps; length of a step; half the length
+            of all, a little more.
+        turn: (joints,) angle of the placement of each joint [quarter turns].
         scale: Bound of all coordinates [length unit]; inf where steps are not equal.
     """
 
@@ -113,6 +114,9 @@ class Memory(NamedTuple):
     middles: FloatArray
     out: FloatArray
 
+
+LINE_COLUMNS = 7
+"""See `LinkLines`."""
 
 JOINT = CHAIN_BLOCKS + OBSTACLE_BLOCKS
 LOCAL, RADIUS, LINKS, LINES = JOINT + 1, JOINT + 2, JOINT + 3, JOINT + 8
@@ -170,7 +174,9 @@ def named_tables(tables: tuple[Any, ...]) -> SphereTables:
         table_of(i, i, LINKS + 3, 2),
         table_of(i, i, LINKS + 4, 2),
     )
-    lines = LinkLines(table_of(n, i, LINES, 10), column_of(n, i, LINES + 1), n[i[2 * LINES + 4]])
+    lines = LinkLines(
+        table_of(n, i, LINES, LINE_COLUMNS), column_of(n, i, LINES + 1), n[i[2 * LINES + 4]]
+    )
     chain, obstacles = chain_of(n, i, 0), obstacles_of(n, i, CHAIN_BLOCKS)
     return SphereTables(chain, space, spheres, links, obstacles, lines)
 

@@ -13,6 +13,7 @@ from pydantic import Field
 from evoexp.collision.models.obstacle_kernels import MARGIN, LinkBalls
 from evoexp.collision.models.planar_contacts import contacts
 from evoexp.collision.models.sphere_kernels import (
+    LINE_COLUMNS,
     LinkLines,
     Space,
     Spheres,
@@ -23,6 +24,7 @@ from evoexp.collision.models.sphere_kernels import (
 )
 from evoexp.errors import SettingError
 from evoexp.numeric.elementary import atan2
+from evoexp.numeric.quarter_turns import QUARTER_TURN
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.assembly import Assembly, sphere_geometry
 from evoexp.robots.kinematics import KinematicChain
@@ -135,23 +137,21 @@ def _balls(joint: IntArray, local: FloatArray, spheres: IntArray, arm_links: Int
 
 def sphere_lines(chain: KinematicChain, spheres: Spheres, of_links: IntArray) -> LinkLines:
     """Return the spheres of every link as equal steps along a line."""
-    rows = np.zeros((len(of_links), 10))
+    rows = np.zeros((len(of_links), LINE_COLUMNS))
     reach = np.sqrt((chain.translation**2).sum(axis=1)).sum() + 2.0 * spheres.radius
     reach += np.sqrt((spheres.local**2).sum(axis=1)).max()
     scale = 2.0 * float(reach)
     for row, (first, stop) in zip(rows, of_links, strict=True):
         own = spheres.local[first:stop]
-        steps = len(own) - 1
-        row[:3], row[6] = own[0], steps
-        row[7], row[8] = 1.0, 1.0  # of a sphere alone
-        if steps and (own[-1] != own[0]).any():
-            row[3:6] = (own[-1] - own[0]) / steps
-            squared = (row[3:6] ** 2).sum()
-            row[7], row[8] = 1.0 / squared, squared
-            row[9] = 0.5 * steps * np.sqrt(squared) * MARGIN
-        if np.abs(own - (own[0] + np.outer(np.arange(steps + 1), row[3:6]))).max() > 1e-14 * scale:
+        steps = len(own) - 1 if (own[-1] != own[0]).any() else 0
+        step = (own[-1] - own[0]) / steps if steps else np.array([1.0, 0.0, 0.0])
+        length = np.sqrt((step**2).sum())
+        row[:2], row[2:4] = (own[0] + 0.5 * steps * step)[:2], step[:2]
+        row[4:] = steps, length, 0.5 * steps * length * MARGIN
+        places = np.arange(len(own)) if steps else np.zeros(len(own))
+        if np.abs(own - (own[0] + np.outer(places, step))).max() > 1e-14 * scale:
             scale = np.inf  # nothing is sure then
-    turn = np.array([atan2(row[3], row[0]) for row in chain.rotation])
+    turn = np.array([atan2(row[3], row[0]) / QUARTER_TURN for row in chain.rotation])
     return LinkLines(rows, turn, scale)
 
 

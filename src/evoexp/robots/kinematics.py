@@ -69,6 +69,7 @@ class KinematicTable(NamedTuple):
         planar: Whether every joint turns about the world's z, so that everything moves in parallel
             planes; not if a joint follows another.
         free: (joints,) whether a joint has a coordinate of its own, and follows no other.
+        num_coordinates: Number of values of a configuration.
     """
 
     parent: IntArray
@@ -81,16 +82,12 @@ class KinematicTable(NamedTuple):
     alignment: FloatArray
     planar: bool
     free: BoolArray
+    num_coordinates: int
 
     @property
     def chain(self) -> KinematicChain:
         """The seven arrays that kernels read."""
         return KinematicChain(*self[:7])
-
-    @property
-    def num_coordinates(self) -> int:
-        """Number of values of a configuration."""
-        return int(self.free.sum())
 
     @property
     def slides(self) -> BoolArray:
@@ -147,7 +144,17 @@ def kinematic_table(model: Any) -> KinematicTable:
         and all(_keeps_plane(matrix) for matrix in rotation)
     )
     return KinematicTable(
-        parent, index_q, prismatic, turned, rotation, translation, rule, alignment, planar, free
+        parent,
+        index_q,
+        prismatic,
+        turned,
+        rotation,
+        translation,
+        rule,
+        alignment,
+        planar,
+        free,
+        int(free.sum()),
     )
 
 

@@ -217,8 +217,8 @@ def _from_obstacles(
     for t in range(first, stop):
         k = U(t)
         value = (x * entries[k, 0] + y * entries[k, 1]) + (z * entries[k, 2] + entries[k, 3])
-        least = lower(least, square + value)
-    return least
+        least = lower(least, value)
+    return square + least  # rounding keeps the order
 
 
 @inlined

@@ -36,14 +36,12 @@ from evoexp.collision.models.ball_tests import (
 )
 from evoexp.collision.models.contact_kernels import find_contacts
 from evoexp.collision.models.encounter_kernels import body_meets_body, body_meets_obstacles
+from evoexp.collision.models.flat_primitives import named_primitives
 from evoexp.collision.models.packed_shapes import (
     FIRST_LISTED,
     STOP_LISTED,
     ContactTables,
-    PackedObstacles,
-    PackedShapes,
     PrimitiveTables,
-    Units,
 )
 from evoexp.collision.models.primitive_distances import FIXED_ROWS, VALUE, WIDTH
 from evoexp.numeric.compilation import borrowed, kernel
@@ -56,7 +54,7 @@ from evoexp.robots.forward_kinematics import (
     eight_of,
     spatial_frames,
 )
-from evoexp.robots.kinematics import SPATIAL_ROWS, KinematicChain, U
+from evoexp.robots.kinematics import SPATIAL_ROWS, U
 
 WORD = 64
 """Encounters of one configuration that fit a word of bits."""
@@ -118,24 +116,16 @@ def primitive_clearances(
     """Run the kernel of `PrimitiveCollision`.
 
     Args:
-        tables: `PrimitiveCollision.tables`: fields of `PrimitiveTables` as plain tuples.
+        tables: `PrimitiveCollision.tables`, of `flat_primitives`.
         limit: Above it no clearance is measured [length unit].
         decide: Whether the first clearance below 0 ends the judgement of a configuration: all rows
             are −inf then. The limit is 0.
         q: (nq, configurations) [rad].
         out: (3, configurations), written: rows OBSTACLES, BETWEEN, SELF.
     """
-    chain, units, shapes, obstacles, pairs, contacts = tables
-    if decide and len(contacts[1]) > 0 and _decide(contacts, limit, q, out):
+    named = named_primitives(tables)
+    if decide and len(named.contacts.indices) > 0 and _decide(named.contacts, limit, q, out):
         return
-    named = PrimitiveTables(
-        KinematicChain(*chain),
-        Units(*units),
-        PackedShapes(*shapes),
-        PackedObstacles(*obstacles),
-        pairs,
-        ContactTables(*contacts),
-    )
     num_joints, num_units = len(named.chain.parent), len(named.units.whole)
     memory = Memory(
         np.zeros(U(q.shape[0]) * VECTOR),
@@ -144,19 +134,17 @@ def primitive_clearances(
         np.empty(num_units * 3 * LANES),
         np.empty(3 * LANES),
         np.empty(LANES, dtype=np.uint64),
-        np.empty(_room(named.units.whole, pairs), dtype=np.uint64),
+        np.empty(_room(named.units.whole, named.pairs), dtype=np.uint64),
         np.empty((FIXED_ROWS + 3 * named.shapes.most) * WIDTH),
     )
     _clearances(named, limit, decide, q.reshape(-1), q.shape[1], out, memory)
 
 
 @kernel
-def _decide(
-    contacts: tuple[FloatArray, IntArray], limit: float, q: FloatArray, out: FloatArray
-) -> bool:
+def _decide(contacts: ContactTables, limit: float, q: FloatArray, out: FloatArray) -> bool:
     """Write the rows of a robot made of spheres; false if a configuration is in doubt."""
     hits = np.empty(q.shape[1], dtype=np.bool_)
-    if find_contacts(contacts[0], contacts[1], False, q, hits) != 0:
+    if find_contacts(contacts.numbers, contacts.indices, False, q, hits) != 0:
         return False
     for row in range(3):
         for n in range(len(hits)):

@@ -13,6 +13,7 @@ import numpy as np
 
 from evoexp.collision.models.contact_kernels import HIT, find_contacts
 from evoexp.collision.models.contact_tables import contact_tables
+from evoexp.collision.models.flat_primitives import flat_primitives
 from evoexp.collision.models.packed_shapes import (
     FIRST_LISTED,
     PackedObstacles,
@@ -28,7 +29,6 @@ from evoexp.collision.models.primitive_tables import (
     pack_obstacles,
     pack_shapes,
 )
-from evoexp.numeric.compilation import plain
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.kinematics import KinematicTable, kinematic_table
 from evoexp.scenarios.obstacles import ObstacleTable
@@ -101,7 +101,7 @@ class PrimitiveCollision(NamedTuple):
         table: The kinematic table of the model.
         joints: (bodies,) the Pinocchio joint of each body.
         packed: Bodies, obstacles and pairs as arrays.
-        tables: Fields of `packed` as plain tuples, for the kernel `primitive_clearances`.
+        tables: `packed` in flat arrays, for the kernel `primitive_clearances`.
     """
 
     table: KinematicTable
@@ -177,7 +177,7 @@ class PrimitiveCollision(NamedTuple):
             table.chain, units, own, around.listed, obstacles, rows, of_bodies, parts
         )
         packed = PrimitiveTables(table.chain, units, own, around, rows, contacts)
-        return cls(table, joints, packed, plain(packed))
+        return cls(table, joints, packed, flat_primitives(packed))
 
     @classmethod
     def from_geometry(
@@ -226,9 +226,10 @@ class PrimitiveCollision(NamedTuple):
             ValueError: If q has another number of rows than the model has coordinates.
         """
         q, contacts = self._checked(q), self.packed.contacts
-        out = np.empty(q.shape[1], dtype=np.bool_)
-        if contacts.known and find_contacts(*contacts, False, q, out) == 0:
-            return out
+        if contacts.known:
+            out = np.empty(q.shape[1], dtype=np.bool_)
+            if find_contacts(*contacts, False, q, out) == 0:
+                return out
         rows = np.empty((3, q.shape[1]))
         primitive_clearances(self.tables, 0.0, True, q, rows)
         return np.asarray(~(rows[0] >= 0.0))  # all rows say the same

@@ -70,15 +70,6 @@ def _without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     return value
 
 
-def plain(value: Any) -> Any:
-    """Return a named tuple, and those within it, as plain tuples of the same values.
-
-    numba recognises a plain tuple of arrays in a tenth of the time that a named one takes (some
-    2 µs each); so a kernel that is called often takes plain ones and names them itself.
-    """
-    return tuple(map(plain, value)) if isinstance(value, tuple) else value
-
-
 def _viewing(num_widths: int) -> Any:
     """Return a function for kernels that views part of a flat array, with rows or without."""
 

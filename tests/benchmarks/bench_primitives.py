@@ -18,7 +18,7 @@ from evoexp.collision.models.primitives import PrimitiveCollision, shapes_of_geo
 from evoexp.scenarios.obstacles import obstacle_table
 from references import arms_6r, arms_7r, primitives_numpy
 
-SIZE = 100
+SIZE, MANY = 100, 4000
 IGNORED = [(1, arms_6r.FLOOR)]
 DRAWN = {"random": arms_6r.random_configurations, "population": arms_6r.population}
 DRAWN_7R = {"random": arms_7r.random_configurations, "population": arms_7r.population}
@@ -30,6 +30,11 @@ def collision_of(shapes: str) -> PrimitiveCollision:
     return PrimitiveCollision.from_geometry(
         model, getattr(arms_6r, shapes)(model), table, arms_6r.SELF_PAIRS, IGNORED
     )
+
+
+def collision_of_7r() -> PrimitiveCollision:
+    table = obstacle_table(arms_7r.OBSTACLES)
+    return PrimitiveCollision.build(arms_7r.model(), arms_7r.shapes(), table, arms_7r.SELF_PAIRS)
 
 
 def coal_collisions(shapes: str, broad_phase: bool) -> Callable[[Any], Any]:
@@ -92,24 +97,28 @@ def bench_collides(beside: Any, shapes: str, drawn: str) -> None:
     )
 
 
+@pytest.mark.parametrize("size", [SIZE, MANY])
 @pytest.mark.parametrize("drawn", DRAWN)
-def bench_collides_7r(beside: Any, drawn: str) -> None:
-    """A 7R arm of 59 spheres among ten spheres: all answers, and whether any collides."""
-    model, table = arms_7r.model(), obstacle_table(arms_7r.OBSTACLES)
-    collision = PrimitiveCollision.build(model, arms_7r.shapes(), table, arms_7r.SELF_PAIRS)
-    q = DRAWN_7R[drawn](SIZE)
+def bench_collides_7r(beside: Any, drawn: str, size: int) -> None:
+    """A 7R arm of 59 spheres among ten spheres: all answers, and whether any collides.
+
+    Of `MANY` configurations no processor remembers which way the branches went the last time.
+    """
+    model, collision = arms_7r.model(), collision_of_7r()
+    q = DRAWN_7R[drawn](size)
     pool = pin.BroadPhaseManagerPool_DynamicAABBTreeCollisionManager(
         model, arms_7r.geometry(model), 1
     )
-    hits = pin.computeCollisionsInParallel(1, pool, q, True, False)
-    assert np.array_equal(collision.collides(q), hits)
+    some = np.ascontiguousarray(q[:, :SIZE])
+    hits = pin.computeCollisionsInParallel(1, pool, some, True, False)
+    assert np.array_equal(collision.collides(q)[:SIZE], hits)
     edges = [np.ascontiguousarray(q[:, k : k + 20]) for k in range(0, SIZE, 20)]
     beside(
-        f"collisions of a 7R arm, 59 spheres, {SIZE} {drawn} configurations",
+        f"collisions of a 7R arm, 59 spheres, {size} {drawn} configurations",
         lambda: collision.collides(q),
         {
             "coal, broad phase, 59 spheres": (
-                lambda: pin.computeCollisionsInParallel(1, pool, q, True, False),
+                lambda: pin.computeCollisionsInParallel(1, pool, some, True, False),
                 SIZE,
                 1,
             ),
@@ -120,8 +129,8 @@ def bench_collides_7r(beside: Any, drawn: str) -> None:
             ),
         },
         unit="configuration",
-        amount=SIZE,
-        repeat=10,
+        amount=size,
+        repeat=10 if size == SIZE else 1,
     )
 
 
@@ -149,15 +158,46 @@ def bench_clearance(beside: Any, drawn: str, limit: float) -> None:
     )
 
 
-@pytest.mark.parametrize("shapes", ["spheres"])
+@pytest.mark.parametrize("shapes", ["spheres", "capsules"])
 def bench_collides_one_by_one(beside: Any, shapes: str) -> None:
     """What a planner pays that asks for one configuration at a time: eight are computed."""
     collision, q = collision_of(shapes), arms_6r.random_configurations(SIZE)
-    one, broad_phase = np.ascontiguousarray(q[:, :1]), coal_collisions("capsules", broad_phase=True)
+    every = [np.ascontiguousarray(q[:, k : k + 1]) for k in range(SIZE)]
+    broad_phase = coal_collisions("capsules", broad_phase=True)
     beside(
         f"collisions of a 6R arm, {shapes}, a single configuration",
-        lambda: collision.collides(one),
-        {"coal, broad phase, 11 capsules": (lambda: broad_phase(one), 1, 10)},
+        lambda: [collision.collides(one) for one in every],
+        {
+            "coal, broad phase, 11 capsules": (
+                lambda: [broad_phase(one) for one in every],
+                SIZE,
+                1,
+            )
+        },
         unit="configuration",
-        repeat=10,
+        amount=SIZE,
+    )
+
+
+def bench_collides_one_by_one_7r(beside: Any) -> None:
+    model, collision = arms_7r.model(), collision_of_7r()
+    q = arms_7r.random_configurations(SIZE)
+    every = [np.ascontiguousarray(q[:, k : k + 1]) for k in range(SIZE)]
+    pool = pin.BroadPhaseManagerPool_DynamicAABBTreeCollisionManager(
+        model, arms_7r.geometry(model), 1
+    )
+    beside(
+        "collisions of a 7R arm, 59 spheres, a single configuration",
+        lambda: [collision.collides(one) for one in every],
+        {
+            "coal, broad phase, 59 spheres": (
+                lambda: [
+                    pin.computeCollisionsInParallel(1, pool, one, True, False) for one in every
+                ],
+                SIZE,
+                1,
+            )
+        },
+        unit="configuration",
+        amount=SIZE,
     )

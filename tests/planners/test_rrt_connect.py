@@ -212,3 +212,39 @@ def test_solutions_of_another_size_are_refused() -> None:
     planner, problem = condition(PLANAR).prepare()
     with pytest.raises(ValueError, match="a multiple of 4 values"):
         planner.evaluate(problem, np.zeros(7))
+
+
+COARSE = "collision.collision_substeps=1", "planner.range=60"  # an edge is tested at its end alone
+
+
+def test_by_proof_no_edge_passes_through_a_gap_between_tests() -> None:
+    refuted = 0
+    for acceptance in ("model", "certified"):
+        chosen = condition(PLANAR, *COARSE, f"planner.acceptance={acceptance}")
+        for seed in range(3):
+            planner, problem, records = ran(chosen, seed)
+            for record in records:
+                assert record.solved == math.isfinite(record.best_cost)
+                if record.solved:
+                    found = judge_motion(planner, problem, planner.motion(problem, record.best))
+                    assert found.certified or acceptance == "model"
+                    refuted += found.certified is False
+            assert records[-1].solved
+            assert ("certificates" in records[-1].terms) == (acceptance == "certified")
+    assert refuted > 0
+
+
+def test_the_cost_of_a_path_by_proof_is_inf_where_it_is_refuted() -> None:
+    trusting = condition(PLANAR, *COARSE)
+    planner, problem, records = ran(trusting, 1)  # whose path the certifier refutes
+    path = records[-1].best.reshape(-1, 4).T[:, :, None]
+    proving = condition(PLANAR, *COARSE, "planner.acceptance=certified").prepare()[0]
+    assert planner.cost(problem, path).feasible.all()
+    assert proving.cost(problem, path).cost.tolist() == [math.inf]
+
+
+def test_acceptance_is_no_part_of_the_identity_unless_it_is_asked_for() -> None:
+    plain, named = condition(PLANAR), condition(PLANAR, "planner.acceptance=model")
+    assert plain.id == named.id
+    assert b"acceptance" not in plain.to_json()
+    assert condition(PLANAR, "planner.acceptance=certified").id != plain.id

@@ -11,7 +11,7 @@ from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.errors import SettingError
 from evoexp.planners.planner import Keeper
-from evoexp.planners.proofs import judge_motion
+from evoexp.planners.proofs import Proofs, judge_motion
 from evoexp.robots.floor_manipulator import FloorManipulator
 from evoexp.store.log_reader import read_log
 
@@ -98,6 +98,7 @@ def test_the_first_stage_has_no_plan_yet(condition: Condition) -> None:
         (row.best_cost == np.inf) == (stage == 1.0) for row, stage in zip(rows, stages, strict=True)
     )
     assert [row.index for row in rows] == list(range(len(rows)))
+    assert planner.prior_queries(problem) == 1024  # the map's nodes, 32 × 32
     assert (
         rows[-1].evaluations
         == planner.placement.ga.num_evaluations + planner.path.ga.num_evaluations
@@ -123,3 +124,33 @@ def test_a_mission_is_over_a_floor(condition: Condition) -> None:
     scenario = condition.scenario.model_copy(update={"grid": grid})
     with pytest.raises(SettingError, match=r"scenario\.grid\.size: must be of a floor"):
         condition.planner.prepare(condition.robot, scenario)  # type: ignore[attr-defined]
+
+
+def test_by_proof_every_mission_is_proven() -> None:
+    """A wider platform touches corners that its moves over the grid pass."""
+    refuted = 0
+    for acceptance in ("model", "certified"):
+        words = "robot.body_radius=0.8", f"planner.acceptance={acceptance}"
+        (experiment,) = compose.expand(["experiment=chen_mission", "budget=smoke", *words])
+        planner, problem = experiment.conditions[0].condition.prepare()
+        for seed in (0, 3):
+            *_, last = planner.evolve(problem, np.random.default_rng(seed))
+            verdict = judge_motion(planner, problem, planner.motion(problem, last.best))
+            assert last.solved
+            assert verdict.certified or acceptance == "model"
+            refuted += verdict.certified is False
+    assert refuted > 0
+
+
+def test_a_mission_whose_end_is_refuted_is_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    words = "experiment=chen_mission", "budget=smoke", "planner.acceptance=certified"
+    planner, problem = compose.expand(words)[0].conditions[0].condition.prepare()
+    monkeypatch.setattr(Proofs, "is_proven", lambda self, plan: False)
+    *_, last = planner.evolve(problem, np.random.default_rng(0))
+    assert not last.solved
+    assert last.best_cost == np.inf
+
+
+def test_a_posture_is_no_motion_to_prove() -> None:
+    with pytest.raises(SettingError, match=r"planner\.acceptance: must be 'model': the answer is"):
+        compose.expand(["experiment=chen_placement", "planner.acceptance=certified"])

@@ -9,10 +9,10 @@ flat: θ1, θ2 [deg].
 """
 
 from collections.abc import Iterator
-from typing import Annotated, ClassVar, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
@@ -25,6 +25,7 @@ from evoexp.planners.departures import of_limits
 from evoexp.planners.placement_ga import kernels
 from evoexp.planners.placement_ga.kernels import GENES, ROWS, Breeding, Coding, Population
 from evoexp.planners.planner import Candidate, PlannerDefaults
+from evoexp.planners.proofs import Acceptance
 from evoexp.planners.stretches import Stretches
 from evoexp.records import BoolArray, FloatArray, Generation, IntArray
 from evoexp.robots.assembly import Assembly
@@ -86,6 +87,7 @@ class PlacementGa(PlannerDefaults, Component):
         coding: Plain binary numbers, or Gray codes.
         ga: Population, generations, rates, scaling.
         objective: Weights of Eq. 14.
+        acceptance: `model`: other planners may prove motions, here there are none.
     """
 
     component: ClassVar[str] = "placement_ga"
@@ -96,6 +98,14 @@ class PlacementGa(PlannerDefaults, Component):
     coding: Literal["binary", "gray"]
     ga: ScaledGenetic
     objective: PlacementCriteria
+    acceptance: Acceptance = "model"
+
+    @model_validator(mode="after")
+    def _has_no_motion(self) -> Self:
+        if self.acceptance != "model":
+            must = "'model': the answer is a posture, there is no motion to prove"
+            raise SettingError("acceptance", must, self.acceptance)
+        return self
 
     def prepare(self, robot: MobileArm, scenario: Docking) -> Problem:
         """Build the robot and check that the end-effector can reach its target.

@@ -24,6 +24,7 @@ from evoexp.planners.arm_tasks import (
 )
 from evoexp.planners.departures import joint_names, of_limits, of_place
 from evoexp.planners.planner import JudgementArrays, PlannerDefaults
+from evoexp.planners.proofs import Proofs
 from evoexp.planners.sampling_based.kernels import distance, lengths_along
 from evoexp.planners.sampling_based.settings import EdgeSettings
 from evoexp.planners.sampling_based.trees import EdgeTest
@@ -69,6 +70,11 @@ class NodePaths(PlannerDefaults, EdgeSettings):
             np.where(free_high, last + self.free_turn, np.maximum(high, last)),
         )
 
+    def edge_test(self, problem: ArmProblem) -> EdgeTest:
+        """Return the test of edges by the collision model and, if so asked, by proof."""
+        proofs = Proofs(self, problem) if self.answers_are_proven else None
+        return EdgeTest(problem.collision, self.resolution, proofs)
+
     def sample(self, problem: ArmProblem, rng: np.random.Generator, count: int) -> FloatArray:
         """Refuse: trees are grown, paths are not drawn one by one.
 
@@ -78,12 +84,16 @@ class NodePaths(PlannerDefaults, EdgeSettings):
         raise SettingError("planner", "one that draws paths one by one", self.component)
 
     def cost(self, problem: ArmProblem, population: FloatArray) -> JudgementArrays:
-        """Judge paths (nq, nodes, individuals): their length, inf where a tested edge collides."""
-        edges = EdgeTest(problem.collision, self.resolution)
+        """Judge paths (nq, nodes, individuals): their length, inf where a tested edge collides.
+
+        And, if so asked, where a path is not proven.
+        """
+        edges = self.edge_test(problem)
         paths = [np.ascontiguousarray(path) for path in population.transpose(2, 1, 0)]
         lengths = np.array([path_length(path) for path in paths])
         collisions = np.array([edges.num_contacts(path) for path in paths])
         feasible = (collisions == 0) & np.isfinite(lengths)
+        feasible[feasible] = [edges.is_proven(paths[k]) for k in np.flatnonzero(feasible)]
         segments = np.full(len(paths), population.shape[1] - 1)
         terms = {"length_deg": lengths, "segments": segments, "collisions": collisions}
         return JudgementArrays(np.where(feasible, lengths, np.inf), feasible, edges.queries, terms)

@@ -10,10 +10,12 @@ random shortcuts (Geraerts & Overmars 2007).
 """
 
 import importlib.util
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, ClassVar
 
 import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
 
 from evoexp.errors import SettingError
 from evoexp.evolution.cost_statistics import cost_statistics
@@ -31,6 +33,8 @@ from evoexp.validation import Component
 SEEDS = 2**31
 BYTES_PER_QUERY = 500  # of a graph in OMPL, for the estimate of memory
 DONE_WITH_A_PATH = ("RRTConnect",)
+ROADMAPS = ("PRMstar",)
+MOST_IDLE = 10_000  # iterations of OMPL without a query, after which it is done
 
 
 class OmplPlanner(NodePaths, OmplSettings, Component):
@@ -48,6 +52,11 @@ class OmplPlanner(NodePaths, OmplSettings, Component):
         if importlib.util.find_spec("ompl") is None:
             must = "another planner: ompl needs pip install 'evoexp[baselines]'"
             raise SettingError("planner", must, self.component)
+        if not _has(self.algorithm):
+            must = (
+                f"another algorithm: the OMPL that is installed has no {self.algorithm} in Python"
+            )
+            raise SettingError("planner.algorithm", must, self.algorithm)
         if self.num_shortcuts and self.algorithm not in DONE_WITH_A_PATH:
             must = f"0: {self.algorithm} goes on to shorten its path by itself"
             raise SettingError("planner.num_shortcuts", must, self.num_shortcuts)
@@ -97,8 +106,9 @@ class _Search:
 
     def __init__(self, planner: OmplPlanner, problem: ArmProblem, seed: int) -> None:
         self._settings, self.stop_reason = planner, ""
-        self.edges = EdgeTest(problem.collision, planner.resolution)
-        self._library = _Library(planner, problem, self.edges, seed)
+        self.edges = planner.edge_test(problem)
+        kind = _Roadmap if planner.algorithm in ROADMAPS else _Library
+        self._library = kind(planner, problem, self.edges, seed)
         self.nodes, self._shown = problem.start[None], problem.start.copy()
         self._path: ShortenedPath | None = None
 
@@ -111,8 +121,11 @@ class _Search:
         """Search until so many configurations were asked for since the start, or to the end."""
         if self._path is None:
             found = self._library.solve(most)
-            if found is not None and path_length(found) < self.cost:
+            shorter = found is not None and path_length(found) < self.cost
+            if found is not None and shorter and self.edges.is_proven(found):
                 self.nodes, self._shown = found, found.flatten()
+            if self._library.is_done:
+                self.stop_reason = "solution" if len(self.nodes) > 1 else "no solution"
             if self._settings.algorithm not in DONE_WITH_A_PATH or len(self.nodes) == 1:
                 return
             self._path = ShortenedPath(self.nodes, self.edges)
@@ -122,25 +135,31 @@ class _Search:
             self._path.attempt(rng.random(2))
         else:
             self.stop_reason = "solution"
-        if self._path.nodes is not self.nodes:
+        if self._path.nodes is not self.nodes and self.edges.is_proven(self._path.nodes):
             self.nodes, self._shown = self._path.nodes, self._path.nodes.flatten()
 
     def candidate(self) -> Candidate:
         """Return the path in hand as it is recorded; the same array as long as it is the same."""
-        return Candidate(self._shown, {"length_deg": self.cost}, len(self.nodes) > 1)
+        terms = {"length_deg": self.cost} | self.edges.certificates()
+        return Candidate(self._shown, terms, len(self.nodes) > 1)
 
 
 class _Library:
-    """OMPL's objects for one run: space, motion tests, problem, and planner."""
+    """OMPL's objects for one run: space, motion tests, problem, and planner.
+
+    Attributes:
+        is_done: Whether the planner has come to ask for no further configuration.
+    """
 
     def __init__(
         self, planner: OmplPlanner, problem: ArmProblem, edges: EdgeTest, seed: int
     ) -> None:
         from ompl import base, geometric, util
 
-        util.setLogLevel(util.LogLevel.LOG_NONE)
+        util.setLogLevel(getattr(util, "LogLevel", util).LOG_NONE)  # OMPL 2, 1
         util.RNG.setSeed(seed)
         self._edges, self._base, nq = edges, base, len(problem.start)
+        self.is_done = False
         low, high = planner.box(problem)
         space, bounds = base.RealVectorStateSpace(nq), base.RealVectorBounds(nq)
         for joint in range(nq):
@@ -148,7 +167,8 @@ class _Library:
             bounds.setHigh(joint, float(high[joint]))
         space.setBounds(bounds)
         self._info = base.SpaceInformation(space)
-        self._info.setStateValidityChecker(lambda state: edges.is_free_at(_array(state, nq)))
+        is_free = _function("StateValidityCheckerFn", lambda q: edges.is_free_at(_array(q, nq)))
+        self._info.setStateValidityChecker(is_free)
 
         class Edges(base.MotionValidator):  # type: ignore[misc]
             """Tests whole edges."""
@@ -180,12 +200,70 @@ class _Library:
         Returns:
             (nodes, nq) the best path so far [deg]; None: no path from start to goal yet.
         """
-        enough = self._base.PlannerTerminationCondition(lambda: self._edges.queries >= most)
-        self._planner.solve(enough)
+        self._planner.solve(self._enough(most))
         if not self._problem.hasExactSolution():
             return None
         states = self._problem.getSolutionPath().getStates()
         return np.array([_array(state, self._nq) for state in states])
+
+    def _enough(self, most: int) -> Any:
+        """Return OMPL's condition to stop once so many configurations were asked for."""
+        asked, idle = self._edges.queries, 0
+
+        def is_enough() -> bool:
+            nonlocal asked, idle
+            idle = idle + 1 if self._edges.queries == asked else 0
+            asked = self._edges.queries
+            self.is_done = idle >= MOST_IDLE
+            return self.is_done or asked >= most
+
+        condition = _function("PlannerTerminationConditionFn", is_enough)
+        return self._base.PlannerTerminationCondition(condition)
+
+
+class _Roadmap(_Library):
+    """PRM*, whose roadmap grows without OMPL's second thread.
+
+    `PRMstar.solve` looks for a path in a thread of its own, which waits for Python's lock for ever,
+    and would end the search at another moment each time. So that call only adds start and goal to
+    the roadmap, which then grows in this thread, and the shortest path over it is looked for here.
+    """
+
+    def solve(self, most: int) -> FloatArray | None:
+        """Let the roadmap grow until so many configurations were asked for; see `_Library`."""
+        if self._planner.milestoneCount() == 0:
+            self._planner.solve(self._base.plannerAlwaysTerminatingCondition())
+        self._planner.growRoadmapPtc(self._enough(most))
+        data = self._base.PlannerData(self._info)
+        self._planner.getPlannerData(data)
+        count = data.numVertices()
+        nodes = np.array([_array(data.getVertex(k).getState(), self._nq) for k in range(count)])
+        ends = [(k, int(j)) for k in range(count) for j in data.getEdges(k)]
+        if not ends:
+            return None
+        one, two = np.array(ends).T
+        lengths = np.sqrt(((nodes[one] - nodes[two]) ** 2).sum(axis=1))
+        graph = csr_array((lengths, (one, two)), shape=(count, count))
+        start, goal = data.getStartIndex(0), data.getGoalIndex(0)
+        _, before = dijkstra(graph, False, start, return_predecessors=True)
+        found = [goal]
+        while before[found[-1]] >= 0:
+            found.append(int(before[found[-1]]))
+        return nodes[found[::-1]] if found[-1] == start else None
+
+
+def _has(algorithm: str) -> bool:
+    """Whether the installed OMPL has an algorithm; its Python packages have not the same ones."""
+    from ompl import geometric
+
+    return hasattr(geometric, algorithm)
+
+
+def _function(kind: str, function: Callable[..., bool]) -> Any:
+    """Return a function as OMPL takes it: wrapped by OMPL 1, as it is by OMPL 2."""
+    from ompl import base
+
+    return getattr(base, kind, lambda plain: plain)(function)
 
 
 def _array(state: Any, nq: int) -> FloatArray:

@@ -21,7 +21,7 @@ from evoexp.planners.sampling_based.kernels import distance
 from evoexp.planners.sampling_based.node_paths import NodePaths
 from evoexp.planners.sampling_based.settings import RrtSettings
 from evoexp.planners.sampling_based.shortcuts import ShortenedPath
-from evoexp.planners.sampling_based.trees import EdgeTest, TreePair
+from evoexp.planners.sampling_based.trees import TreePair
 from evoexp.records import Generation
 from evoexp.validation import Component
 
@@ -95,7 +95,7 @@ class _Search:
     def __init__(self, planner: RrtConnect, problem: ArmProblem) -> None:
         self._planner, self._ends = planner, (problem.start, problem.goal)
         self._low, self._high = planner.box(problem)
-        self.edges = EdgeTest(problem.collision, planner.resolution)
+        self.edges = planner.edge_test(problem)
         self.pair = TreePair(*self._ends, self.edges, planner.range)
         self._path: ShortenedPath | None = None
         self._first = {"first_solution_queries": np.inf, "first_solution_length_deg": np.inf}
@@ -123,7 +123,8 @@ class _Search:
             self._path.attempt(rng.random(2))
         else:
             self._grow(rng)
-        if self._path is not None and self._path.length < self.best_cost:
+        shorter = self._path is not None and self._path.length < self.best_cost
+        if self._path is not None and shorter and self.edges.is_proven(self._path.nodes):
             self.best_cost, self._shown = self._path.length, self._path.nodes
             self._solution = self._shown.flatten()
 
@@ -134,7 +135,8 @@ class _Search:
             "iterations": float(self._iterations),
             "nodes": float(sum(tree.count for tree in self.pair.trees)),
         }
-        return Candidate(self._solution, terms | self._first, bool(np.isfinite(self.best_cost)))
+        terms |= self._first | self.edges.certificates()
+        return Candidate(self._solution, terms, bool(np.isfinite(self.best_cost)))
 
     def _is_done(self) -> bool:
         """Whether the present start has come to its end."""

@@ -43,12 +43,16 @@ class EdgeSettings(Settings):
         free_turn: How far joints without limits may go beyond start and goal [deg].
         collision: The touching circles or spheres, or covers of the bodies. An edge as long as
             `range` is tested at `collision_substeps` configurations, other edges as densely.
+        acceptance: Which edges are free: those whose tested configurations are (`model`), or those
+            of them that the exact certifier proves free of contact all along (`certified`), or
+            free by the task's margins (`margin`). An edge that is refuted counts as colliding.
     """
 
     range: Positive
     num_shortcuts: NonNegativeCount
     free_turn: Positive
     collision: TouchingSpheres | CoveredBodies
+    acceptance: Acceptance = "model"
 
     @property
     def resolution(self) -> float:
@@ -124,5 +128,5 @@ class OmplSettings(EdgeSettings):
         ga: Configurations asked for per record, and records.
     """
 
-    algorithm: Literal["RRTConnect", "RRTstar", "InformedRRTstar", "BITstar"]
+    algorithm: Literal["RRTConnect", "RRTstar", "InformedRRTstar", "BITstar", "AITstar", "PRMstar"]
     ga: QueryChunks

@@ -8,6 +8,7 @@ import numpy as np
 from evoexp.collision.models.covered_bodies import CoveredCollision
 from evoexp.collision.models.ellipse_configurations import EllipseConfigurations
 from evoexp.collision.models.touching_spheres import SphereCollision
+from evoexp.planners.proofs import Proofs
 from evoexp.planners.sampling_based.kernels import nearest_node, step_toward, tested_configurations
 from evoexp.records import FloatArray, IntArray
 
@@ -25,25 +26,41 @@ class EdgeTest:
         self,
         collision: SphereCollision | CoveredCollision | EllipseConfigurations,
         resolution: float,
+        proofs: Proofs | None = None,
     ) -> None:
         """Begin with no query.
 
         Args:
             collision: The model.
             resolution: Greatest distance of configurations that are tested [deg].
+            proofs: Judge the edges that the model calls free; None: the model is trusted.
         """
         self._collision, self._resolution, self.queries = collision, resolution, 0
+        self._proofs = proofs
 
     def is_free(self, one: FloatArray, two: FloatArray) -> bool:
         """Whether an edge is free at the configurations tested; its first end is known to be.
 
-        Its second end is asked for first, and the others only if that one is free.
+        Its second end is asked for first, and the others only if that one is free. With proofs an
+        edge is free only if all that lies between its ends is proven, too.
         """
         if not self.is_free_at(two):
             return False
         inside = tested_configurations(one, two, self._resolution)[:, 1:]
         self.queries += inside.shape[1]
-        return not inside.size or not self._collision.any_collides(np.ascontiguousarray(inside))
+        if inside.size and self._collision.any_collides(np.ascontiguousarray(inside)):
+            return False
+        return self.is_proven(np.stack([one, two]))
+
+    def is_proven(self, path: FloatArray) -> bool:
+        """Whether the certifier proves a path (nodes, nq) [deg]; True where none is asked for."""
+        return self._proofs is None or self._proofs.is_proven(path.ravel())
+
+    def certificates(self) -> dict[str, float]:
+        """Return how many paths and edges were judged as a term; none where none are."""
+        return (
+            {} if self._proofs is None else {"certificates": float(self._proofs.num_certificates)}
+        )
 
     def is_free_at(self, q: FloatArray) -> bool:
         """Whether one configuration (nq,) [deg] is free."""

@@ -24,6 +24,7 @@ from evoexp.planners.grid_path_ga.planner import Problem as PathProblem
 from evoexp.planners.placement_ga.planner import PlacementGa
 from evoexp.planners.placement_ga.planner import Problem as PlacementProblem
 from evoexp.planners.planner import Candidate, Judgement, Keeper, PlannerDefaults
+from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.records import FloatArray
 from evoexp.records import Generation as Record
 from evoexp.robots.floor_manipulator import NUM_JOINTS, FloorManipulator
@@ -61,12 +62,16 @@ class TwoStage(PlannerDefaults, Component):
     Attributes:
         placement: The planner of the first stage.
         path: The planner of the second one.
+        acceptance: Which missions are an answer: those that both stages accept (`model`), or those
+            of them whose whole motion, driving and docking, the exact certifier proves
+            (`certified`, `margin`). Moves over the grid that it refutes are forbidden then.
     """
 
     component: ClassVar[str] = "two_stage"
 
     placement: PlacementGa
     path: GridPathGa
+    acceptance: Acceptance = "model"
 
     def prepare(self, robot: FloorManipulator, scenario: Mission) -> Problem:
         """Prepare both stages.
@@ -79,7 +84,7 @@ class TwoStage(PlannerDefaults, Component):
                 "scenario.grid.size", "of a floor, two numbers", list(scenario.grid.size)
             )
         placement = self.placement.prepare(robot.arm(), scenario.docking)
-        path = self.path.prepare(robot.platform(), scenario.grid)
+        path = self._driving.prepare(robot.platform(), scenario.grid)
         bodies = scene(robot.build(), scenario.grid.bodies(), self_pairs=True)
         return Problem(robot, scenario, placement, path, bodies, scenario.grid.security_margin)
 
@@ -108,12 +113,16 @@ class TwoStage(PlannerDefaults, Component):
         """Search the path to the docking place that was found."""
         posture = self._posture_terms(problem, docked.best) | {"sub_path": 2.0}
         path_problem, nodes = self._path_problem(problem, docked.best), np.empty(0)
-        for found in self.path.evolve(path_problem, rng):
+        proofs = Proofs(self, problem) if self.answers_are_proven else None
+        for found in self._driving.evolve(path_problem, rng):
             if found.best is not nodes:
                 nodes, terms = found.best, posture | {name: found.terms[name] for name in PATH}
                 plan = np.concatenate([docked.best, nodes])
-                solved = docked.solved and found.solved
-                keeper.keep(docked.best_cost + found.best_cost, Candidate(plan, terms, solved))
+                cost, solved = docked.best_cost + found.best_cost, docked.solved and found.solved
+                if proofs is not None and not (solved and proofs.is_proven(plan)):
+                    cost, solved = np.inf, False
+                if proofs is None or solved or not keeper.best.solved:
+                    keeper.keep(cost, Candidate(plan, terms, solved))
             lowest = docked.best_cost + found.best_cost_in_generation
             yield _recorded(keeper, found, self.path.num_evaluations(found.index), lowest)
 
@@ -123,9 +132,16 @@ class TwoStage(PlannerDefaults, Component):
         node = tuple(int(np.floor(value + 0.5)) for value in self.docking_place(problem, angles))
         if node == grid.goal:
             return problem.path
-        return self.path.prepare(
+        return self._driving.prepare(
             problem.robot.platform(), type(grid)(**(dict(grid) | {"goal": node}))
         )
+
+    @property
+    def _driving(self) -> GridPathGa:
+        """The planner of the path, which may be asked for proofs of its moves."""
+        if not self.answers_are_proven:
+            return self.path
+        return self.path.model_copy(update={"acceptance": self.acceptance})
 
     def docking_place(self, problem: Problem, angles: FloatArray) -> FloatArray:
         """Return the platform's place on the floor (2,) in a posture (θ1, θ2) [length unit]."""
@@ -196,6 +212,10 @@ class TwoStage(PlannerDefaults, Component):
             return found
         path = self.path.departures(self._path_problem(problem, angles), nodes.ravel())
         return [*found, *path]
+
+    def prior_queries(self, problem: Problem) -> int:
+        """Return the nodes of the floor's map."""
+        return self.path.prior_queries(problem.path)
 
     def memory(self, problem: Problem) -> int:
         """Return the memory of both stages."""

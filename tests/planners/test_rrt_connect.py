@@ -248,3 +248,29 @@ def test_acceptance_is_no_part_of_the_identity_unless_it_is_asked_for() -> None:
     assert plain.id == named.id
     assert b"acceptance" not in plain.to_json()
     assert condition(PLANAR, "planner.acceptance=certified").id != plain.id
+
+
+def test_corners_are_cut_behind_the_shortcuts_and_paths_stay_free() -> None:
+    """A path of few nodes becomes one of many: shorter, with lesser turns, and as free."""
+    for seed in range(3):
+        planner, problem, records = ran(condition(PLANAR, "planner.num_smoothings=4"), seed)
+        _, _, plain = ran(condition(PLANAR), seed)
+        smooth, angular = (each[-1].best.reshape(-1, 4) for each in (records, plain))
+        assert records[-1].best_cost < plain[-1].best_cost
+        assert np.array_equal(smooth[[0, -1]], angular[[0, -1]])
+        assert len(smooth) > 2 * len(angular)
+        assert sharpest(smooth) < sharpest(angular)
+        assert planner.evaluate(problem, records[-1].best)["collisions"] == 0.0
+
+
+def sharpest(path: np.ndarray) -> float:
+    """Return the greatest turn between two edges of a path [rad]."""
+    steps = np.diff(path, axis=0)
+    steps /= np.linalg.norm(steps, axis=1)[:, None]
+    return float(np.arccos(np.clip((steps[1:] * steps[:-1]).sum(axis=1), -1.0, 1.0)).max())
+
+
+def test_smoothings_are_no_part_of_the_identity_unless_there_are_some() -> None:
+    assert condition(PLANAR).id == condition(PLANAR, "planner.num_smoothings=0").id
+    with pytest.raises(SettingError, match=r"planner\.num_smoothings: must be"):
+        condition(PLANAR, "planner.num_smoothings=9")

@@ -23,6 +23,13 @@ SMOKE = (
     "experiment=rana_planar,rana_obstacles",
     "budget=smoke",
 )  # GA, random search, GA among obstacles
+PROVEN = (  # searches that ask the certifier, and answer by what it says
+    ("certified_search", "curkovic_a: proofs"),
+    ("certified_search", "lavoie_7dof: proofs"),
+    ("certified_search", "corsepius_shelf: proofs"),
+    ("rana_puma", "via-point GA"),
+    ("rrt_connect", "rana_planar"),
+)
 THREADS = [
     f"{name}_NUM_THREADS"
     for name in ("OMP", "OPENBLAS", "MKL", "BLIS", "VECLIB", "NUMEXPR", "NUMBA")
@@ -56,9 +63,20 @@ def conditions() -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def run(conditions: list[str], tmp_path_factory: pytest.TempPathFactory) -> Run:
+def proven() -> list[str]:
+    """Conditions of certified search, none of them in `conditions`."""
+    found = []
+    for experiment, label in PROVEN:
+        words = f"experiment={experiment}", "budget=smoke", "planner.acceptance=certified"
+        (chosen,) = (each for each in compose.expand(words)[0].conditions if each.label == label)
+        found.append(chosen.condition.to_json().decode())
+    return found
+
+
+@pytest.fixture(scope="module")
+def run(conditions: list[str], proven: list[str], tmp_path_factory: pytest.TempPathFactory) -> Run:
     file = tmp_path_factory.mktemp("digests") / "conditions"
-    file.write_text("\n".join(conditions))
+    file.write_text("\n".join([*conditions, *proven]))
     return lambda *arguments, **environment: execute(
         "smoke_digests.py", str(file), *arguments, **environment
     )
@@ -84,8 +102,8 @@ def generic_cache() -> str:
 
 
 def test_the_digests_tell_replicates_and_conditions_apart(plain: Any) -> None:
-    assert len(plain["digests"]) == 12
-    assert len(set(plain["digests"].values())) == 12
+    count = 3 * (4 + len(PROVEN))
+    assert len(plain["digests"]) == len(set(plain["digests"].values())) == count
 
 
 @pytest.mark.matrix

@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 
 from evoexp.report import markdown
+from evoexp.report.condition_labels import have_two_parts, in_few_words
 from evoexp.report.page_parts import Drawing, Page
 from evoexp.report.page_text import (
     Document,
@@ -25,6 +26,10 @@ from evoexp.report.verdicts import Claim, Comparison
 FEW = 3  # damaged logs named of each condition
 WIDEST = 20  # conditions side by side; more stand one below the other
 LONGEST_NAME = 40  # letters of a table's heading in the name of its file
+PARTS = (
+    "In brackets: the conditions that have the value, where not all have it. A planner alone stands "
+    "for it on all problems, a problem alone for all of its planners."
+)
 CLAIMS, FAILURES = "Claims", "Failures"  # headings
 
 
@@ -252,10 +257,11 @@ def _parameters(results: Results) -> TableText:
     for condition in results.conditions:
         for parameter in parameters(results, condition):
             by_name.setdefault(parameter.name, {}).setdefault(parameter, []).append(condition.label)
-    every = len(results.conditions)
+    every = [condition.label for condition in results.conditions]
     rows = [
         (
-            f"`{name}`" + ("" if len(labels) == every else f" ({', '.join(labels)})"),
+            f"`{name}`"
+            + ("" if len(labels) == len(every) else f" ({in_few_words(labels, every)})"),
             parameter.value,
             parameter.unit or "–",
             parameter.source or "–",
@@ -263,7 +269,8 @@ def _parameters(results: Results) -> TableText:
         for name in _ordered(by_name)
         for parameter, labels in by_name[name].items()
     ]
-    return TableText(("setting", "value", "unit", "source"), tuple(rows))
+    note = PARTS * have_two_parts(every)
+    return TableText(("setting", "value", "unit", "source"), tuple(rows), note)
 
 
 def _ordered(by_name: dict[str, dict[Parameter, list[str]]]) -> Iterator[str]:

@@ -57,9 +57,10 @@ class OmplPlanner(NodePaths, OmplSettings, Component):
                 f"another algorithm: the OMPL that is installed has no {self.algorithm} in Python"
             )
             raise SettingError("planner.algorithm", must, self.algorithm)
-        if self.num_shortcuts and self.algorithm not in DONE_WITH_A_PATH:
-            must = f"0: {self.algorithm} goes on to shorten its path by itself"
-            raise SettingError("planner.num_shortcuts", must, self.num_shortcuts)
+        for name in ("num_shortcuts", "num_smoothings"):
+            if getattr(self, name) and self.algorithm not in DONE_WITH_A_PATH:
+                must = f"0: {self.algorithm} goes on to shorten its path by itself"
+                raise SettingError(f"planner.{name}", must, getattr(self, name))
         return super().prepare(robot, scenario)
 
     def evolve(self, problem: ArmProblem, rng: np.random.Generator) -> Iterator[Generation]:
@@ -129,10 +130,10 @@ class _Search:
             if self._settings.algorithm not in DONE_WITH_A_PATH or len(self.nodes) == 1:
                 return
             self._path = ShortenedPath(self.nodes, self.edges)
-        while self._path.num_attempts < self._settings.num_shortcuts:
+        while self._path.num_attempts < self._settings.num_improvements:
             if self.edges.queries >= most:
                 break
-            self._path.attempt(rng.random(2))
+            self._path.improve(self._settings, rng)
         else:
             self.stop_reason = "solution"
         if self._path.nodes is not self.nodes and self.edges.is_proven(self._path.nodes):

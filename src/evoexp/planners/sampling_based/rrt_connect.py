@@ -80,7 +80,7 @@ class RrtConnect(NodePaths, RrtSettings, Component):
     @property
     def _most_iterations(self) -> int:
         """Iterations of a run that finds its paths last of all, shortcuts included."""
-        return (1 + self.num_restarts) * (self.max_iterations + self.num_shortcuts)
+        return (1 + self.num_restarts) * (self.max_iterations + self.num_improvements)
 
 
 class _Search:
@@ -120,7 +120,7 @@ class _Search:
             self.pair = TreePair(*self._ends, self.edges, self._planner.range)
             self._path, self._starts = None, self._starts + 1
         if self._path is not None:
-            self._path.attempt(rng.random(2))
+            self._path.improve(self._planner, rng)
         else:
             self._grow(rng)
         shorter = self._path is not None and self._path.length < self.best_cost
@@ -141,7 +141,7 @@ class _Search:
     def _is_done(self) -> bool:
         """Whether the present start has come to its end."""
         if self._path is not None:
-            return self._path.num_attempts >= self._planner.num_shortcuts
+            return self._path.num_attempts >= self._planner.num_improvements
         return self.pair.num_iterations >= self._planner.max_iterations
 
     def _grow(self, rng: np.random.Generator) -> None:

@@ -1,6 +1,8 @@
 """Settings of planners of straight edges between random configurations."""
 
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field
 
 from evoexp.collision.models.covered_bodies import CoveredBodies
 from evoexp.collision.models.link_ellipses import LinkEllipses
@@ -46,6 +48,7 @@ class EdgeSettings(Settings):
         acceptance: Which edges are free: those whose tested configurations are (`model`), or those
             of them that the exact certifier proves free of contact all along (`certified`), or
             free by the task's margins (`margin`). An edge that is refuted counts as colliding.
+        num_smoothings: How often all corners of the path are cut behind the shortcuts; 0: never.
     """
 
     range: Positive
@@ -53,11 +56,17 @@ class EdgeSettings(Settings):
     free_turn: Positive
     collision: TouchingSpheres | CoveredBodies
     acceptance: Acceptance = "model"
+    num_smoothings: Annotated[int, Field(ge=0, le=8)] = 0
 
     @property
     def resolution(self) -> float:
         """Greatest distance between configurations that are tested on an edge [deg]."""
         return self.range / self.collision.collision_substeps
+
+    @property
+    def num_improvements(self) -> int:
+        """Attempts to make a path better: shortcuts, then passes over all of its corners."""
+        return self.num_shortcuts + self.num_smoothings
 
 
 class RrtSettings(EdgeSettings):

@@ -1,12 +1,18 @@
-"""Shortcuts of paths between random places (Geraerts & Overmars 2007, section 4)."""
+"""Shortcuts of paths between random places (Geraerts & Overmars 2007, section 4), and corners cut.
+
+Corners are cut at a quarter of their segments (Chaikin 1974), which tends to a smooth curve.
+"""
 
 import itertools
 
 import numpy as np
 
 from evoexp.planners.sampling_based.kernels import lengths_along, place_on_path
+from evoexp.planners.sampling_based.settings import EdgeSettings
 from evoexp.planners.sampling_based.trees import EdgeTest
 from evoexp.records import FloatArray
+
+CUT = 0.25  # [-] of a segment, from a corner to where it is cut
 
 
 class ShortenedPath:
@@ -31,6 +37,13 @@ class ShortenedPath:
         """Length of the path [deg]."""
         return float(self.lengths[-1])
 
+    def improve(self, settings: EdgeSettings, rng: np.random.Generator) -> None:
+        """Try a shortcut, or cut the corners where all shortcuts were tried."""
+        if self.num_attempts < settings.num_shortcuts:
+            self.attempt(rng.random(2))
+        else:
+            self.cut_corners()
+
     def attempt(self, uniforms: FloatArray) -> None:
         """Try the straight line between two places of the path.
 
@@ -48,6 +61,23 @@ class ShortenedPath:
         found = np.array(rows)
         lengths = lengths_along(found)
         if lengths[-1] < self.length and self._is_free(first, last, one, two):
+            self.nodes, self.lengths = found, lengths
+
+    def cut_corners(self) -> None:
+        """Cut every corner whose cut is free, if all that is left of the segments is free, too."""
+        self.num_attempts += 1
+        nodes, kept, tested = self.nodes, [self.nodes[0]], set[bytes]()
+        for before, corner, behind in zip(nodes, nodes[1:], nodes[2:], strict=False):
+            one, two = corner + CUT * (before - corner), corner + CUT * (behind - corner)
+            is_free = self._edges.is_free(one, two)
+            kept += [one, two] if is_free else [corner]
+            tested.add(one.tobytes() + two.tobytes())
+        found = np.array([*kept, nodes[-1]])
+        tested |= {a.tobytes() + b.tobytes() for a, b in itertools.pairwise(nodes)}
+        edges = itertools.pairwise(found)
+        left = [(a, b) for a, b in edges if a.tobytes() + b.tobytes() not in tested]
+        lengths = lengths_along(found)
+        if lengths[-1] < self.length and all(self._edges.is_free(a, b) for a, b in left):
             self.nodes, self.lengths = found, lengths
 
     def _is_free(self, first: int, last: int, one: FloatArray, two: FloatArray) -> bool:

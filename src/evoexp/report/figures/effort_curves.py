@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from evoexp.records import FloatArray
 from evoexp.report import style
+from evoexp.report.figures.end_labels import name_curves
 from evoexp.report.planner_runs import PlannerRuns
 from evoexp.report.statistics import quantile
 
@@ -108,9 +109,9 @@ def problem_order(runs: Iterable[PlannerRuns]) -> list[str]:
 def draw_shares(table: pd.DataFrame) -> Figure:
     """Draw the shares of targets reached."""
     figure, (axes,) = style.row_of_panels(3.6, 1)
-    _draw_share_curves(axes, table, list(table["planner"].unique()), counted=True)
-    axes.set(xlabel="collision queries", ylabel="share of targets reached")
-    style.legend_below(figure, axes, 4)
+    _draw_share_curves(axes, table, list(table["planner"].unique()))
+    axes.set(xlabel="collision queries", ylabel="share of targets")
+    name_curves(figure, axes, 4)
     return figure
 
 
@@ -136,16 +137,19 @@ def draw_shares_by_problem(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _draw_share_curves(
-    axes: Axes, table: pd.DataFrame, planners: Sequence[str], *, counted: bool = False
-) -> None:
-    """Draw a curve for each planner that a table has, in the look of its place among all."""
+def _draw_share_curves(axes: Axes, table: pd.DataFrame, planners: Sequence[str]) -> None:
+    """Draw a curve for each planner that a table has, in the look of its place among all.
+
+    The name of one that was run on fewer problems than others tells on how many targets.
+    """
+    most = int(table["targets"].max())
     for k, planner in enumerate(planners):
         curve = table[table["planner"] == planner]
         if not len(curve):
             continue
         x, y = (curve[name].astype(float) for name in ("collision_queries", "share"))
-        count = f" ({int(curve['targets'].iloc[0])} targets)" if counted else ""
+        targets = int(curve["targets"].iloc[0])
+        count = f" ({targets} of {most})" if targets < most else ""
         axes.step(x, y, where="post", label=f"{planner}{count}", **style.curve_look(k))
     axes.set(ylim=(0.0, 1.02))
     style.log_axis(axes, *_ends(table))
@@ -165,7 +169,7 @@ def draw_lengths(table: pd.DataFrame) -> Figure:
     axes.set_xlabel("collision queries")
     style.log_axis(axes, *_ends(table))
     axes.set_ylabel("best proven length so far [rad, m]")
-    style.legend_below(figure, axes, 4)
+    name_curves(figure, axes, 4)
     return figure
 
 

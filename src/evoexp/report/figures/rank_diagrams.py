@@ -5,6 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from evoexp.report import style
+from evoexp.report.figures.end_labels import name_curves
 from evoexp.report.problem_ranks import alike
 
 LINE = 0.24  # [inch] between names of planners
@@ -24,7 +25,7 @@ def draw_profiles(table: pd.DataFrame) -> Figure:
     style.log_axis(axes, 1.0, float(table["ratio"].max()))
     axes.set(ylim=(0.0, 1.02), ylabel=f"share of {count} problems")
     axes.set_xlabel("expected running time to a proven answer, times that of the best planner [–]")
-    style.legend_below(figure, axes, 3)
+    name_curves(figure, axes, 3)
     return figure
 
 

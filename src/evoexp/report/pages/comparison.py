@@ -216,7 +216,7 @@ def _unequal(runs: Sequence[PlannerRuns]) -> str:
         return ""
     return (
         " Each planner's curve is over the problems that it was run on, which are not the same for "
-        "all: compare them problem by problem."
+        "all: compare them problem by problem. In brackets: targets of those run on fewer."
     )
 
 

@@ -27,7 +27,7 @@ FEW = 3  # damaged logs named of each condition
 WIDEST = 20  # conditions side by side; more stand one below the other
 LONGEST_NAME = 40  # letters of a table's heading in the name of its file
 PARTS = (
-    "In brackets: the conditions that have the value, where not all have it. A planner alone stands "
+    "In brackets: the conditions that have a value, where not all have it. A planner alone stands "
     "for it on all problems, a problem alone for all of its planners."
 )
 CLAIMS, FAILURES = "Claims", "Failures"  # headings

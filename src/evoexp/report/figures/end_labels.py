@@ -27,17 +27,16 @@ def name_curves(figure: Figure, axes: Axes, columns: int) -> None:
         axes: Their curves have labels, and limits are set.
         columns: Of a legend, at most.
     """
-    curves, names = axes.get_legend_handles_labels()
+    curves: list[tuple[Any, str]] = list(zip(*axes.get_legend_handles_labels(), strict=True))
     if len(curves) < MANY or figure.get_figwidth() < style.WIDTH:
         style.legend_below(figure, axes, columns)
         return
-    drawn = sorted(zip(curves, names, strict=True), key=lambda each: _height(each[0]), reverse=True)
-    curves, names = zip(*drawn, strict=True)
+    curves.sort(key=lambda each: _height(each[0]), reverse=True)
     low, high = axes.get_ylim()
-    ends = np.array([_height(curve)[0] for curve in curves])
+    ends = np.array([_height(curve)[0] for curve, _ in curves])
     ends = np.clip((ends - low) / (high - low), 0.0, 1.0)
     gap = SIZE * LINE / 72.0 / (HIGH * figure.get_figheight())
-    for curve, name, end, place in zip(curves, names, ends, spread_out(ends, gap), strict=True):
+    for (curve, name), end, place in zip(curves, ends, spread_out(ends, gap), strict=True):
         look = {"color": curve.get_color(), "transform": axes.transAxes, "clip_on": False}
         dashes, width = curve.get_linestyle(), curve.get_linewidth()
         axes.plot([BEGIN, END], [end, place], linestyle=dashes, linewidth=width, **look)

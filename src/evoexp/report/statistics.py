@@ -18,6 +18,7 @@ EXACT_PAIRS = 200  # up to here the signed-rank distribution is exact, beyond it
 EXACT_VALUES = 100  # of both samples together: the same of the rank-sum distribution
 MOST_SIGNED = 8  # tied differences whose signs are all permuted: 256 ways
 MOST_CHOSEN = 9  # tied values of both samples that are all permuted: at most 126 ways
+MOST_AT_ONCE = 50_000  # weights of resamples that are worked on at a time
 BOOTSTRAP_SEED = 20_250_419  # of the report's own generator; any fixed number
 
 
@@ -92,6 +93,33 @@ def quantile(values: FloatArray, share: float) -> float:
     low, high = float(ordered[below]), float(ordered[min(below + 1, len(ordered) - 1)])
     fraction = position - below
     return low if fraction == 0.0 or low == high else low + fraction * (high - low)
+
+
+def quantiles(values: FloatArray, shares: Sequence[float]) -> FloatArray:
+    """Return the same quantiles as `quantile` of each row.
+
+    Args:
+        values: (rows, n); NaN is ignored, ±inf is a value.
+        shares: In [0, 1].
+
+    Returns:
+        (shares, rows); NaN where a row has no values.
+    """
+    ordered, rows = np.sort(values, axis=1), np.arange(len(values))  # NaN comes last
+    last = np.count_nonzero(~np.isnan(values), axis=1) - 1
+    found = np.full((len(shares), len(values)), np.nan)
+    for own, share in zip(found, shares, strict=True):
+        position = share * np.maximum(last, 0)
+        below = np.floor(position).astype(np.int64)
+        low, high = (
+            ordered[rows, np.minimum(k, np.maximum(last, 0))] for k in (below, below + 1)
+        )
+        fraction = position - below
+        between = (fraction != 0.0) & (low != high) & (last >= 0)
+        own[last >= 0] = low[last >= 0]
+        with np.errstate(invalid="ignore"):  # NaN lies between −inf and inf
+            own[between] += fraction[between] * (high[between] - low[between])
+    return found
 
 
 def spread(values: FloatArray) -> Spread:
@@ -203,11 +231,14 @@ def effect(x: FloatArray, y: FloatArray, confidence: float, num_resamples: int) 
     (below, up_to), order = _ranks(x, y), np.argsort(y, kind="stable")
     weights = _weights(len(x), num_resamples)
     resampled = np.empty(num_resamples)
-    passed = np.zeros(len(x) + 1)  # pairs of a resample whose y is among the k lowest
-    for k, own in enumerate(weights):
-        np.cumsum(own[order], out=passed[1:])
+    some = max(1, MOST_AT_ONCE // len(x))  # resamples at a time
+    passed = np.zeros((some, len(x) + 1))  # pairs of a resample whose y is among the k lowest
+    for k in range(0, num_resamples, some):
+        own = weights[k : k + some]
+        here = passed[: len(own)]
+        np.cumsum(own[:, order], axis=1, out=here[:, 1:])
         # multiples of 1/2 are exact in any order
-        resampled[k] = 0.5 * np.sum(own * (passed[below] + passed[up_to]))
+        resampled[k : k + some] = 0.5 * np.sum(own * (here[:, below] + here[:, up_to]), axis=1)
     return Effect(vargha_delaney(x, y), percentiles(resampled / len(x) ** 2, confidence))
 
 
@@ -271,9 +302,10 @@ def effort_ratio(
 def _weights(size: int, num_resamples: int) -> np.ndarray:
     """Return how often each of `size` runs is drawn, (resamples, size)."""
     rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
-    return np.array(
-        [np.bincount(rng.integers(0, size, size), minlength=size) for _ in range(num_resamples)]
-    )
+    weights = np.empty((num_resamples, size), dtype=np.int32)
+    for own in weights:
+        own[:] = np.bincount(rng.integers(0, size, size), minlength=size)
+    return weights
 
 
 def _resampled_effort(

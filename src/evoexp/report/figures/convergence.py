@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from evoexp.report import style
 from evoexp.report.results import ConditionResults, Results
 from evoexp.report.rows import groups
-from evoexp.report.statistics import quantile
+from evoexp.report.statistics import quantiles
 
 COLUMNS = ("best_cost", "mean_cost")
 NAMES = {"best_cost": "best so far", "mean_cost": "average"}
@@ -127,7 +127,8 @@ def _condition(results: Results, condition: ConditionResults, objective: Any) ->
         replicates = rows.groupby("index").size().to_numpy()
         if column == "best_cost":  # a run that has ended keeps its best
             wide, replicates = wide.ffill(), np.full(len(wide), wide.shape[1])
-        values = wide.to_numpy(np.float64)
+        median, lower, upper = quantiles(wide.to_numpy(np.float64), (0.5, 0.25, 0.75))
+        spent = rows.pivot(index="index", columns="replicate", values="evaluations")
         parts.append(
             pd.DataFrame(
                 {
@@ -135,13 +136,10 @@ def _condition(results: Results, condition: ConditionResults, objective: Any) ->
                     "position": results.position(condition.label),
                     "quantity": NAMES[column],
                     "generation": wide.index,
-                    "evaluations": [
-                        quantile(group["evaluations"].to_numpy(np.float64), 0.5)
-                        for _, group in groups(rows, "index")
-                    ],
-                    "median": [quantile(v, 0.5) for v in values],
-                    "lower": [quantile(v, 0.25) for v in values],
-                    "upper": [quantile(v, 0.75) for v in values],
+                    "evaluations": quantiles(spent.to_numpy(np.float64), (0.5,))[0],
+                    "median": median,
+                    "lower": lower,
+                    "upper": upper,
                     "replicates": replicates,
                 }
             )

@@ -12,7 +12,7 @@ from evoexp.records import FloatArray
 from evoexp.report import style
 from evoexp.report.figures.end_labels import name_curves
 from evoexp.report.planner_runs import PlannerRuns
-from evoexp.report.statistics import quantile
+from evoexp.report.statistics import quantiles
 
 POINTS = 200  # along the axis of effort
 MAX_PANELS = 24  # problems that have a panel of their own
@@ -85,10 +85,9 @@ def length_table(runs: Sequence[PlannerRuns]) -> pd.DataFrame:
         least = float(table["collision_queries"].min()) if len(table) else 0.5 * most
         axis = np.geomspace(max(least, 1.0), most, POINTS // 2)
         best = np.array([_best_until(own, x) for x in axis])  # (points, runs)
-        spread = {
-            name: [quantile(row, share) for row in best]
-            for name, share in (("median", 0.5), ("lower", 0.25), ("upper", 0.75))
-        }
+        spread = dict(
+            zip(("median", "lower", "upper"), quantiles(best, (0.5, 0.25, 0.75)), strict=True)
+        )
         columns: dict[str, Any] = {"planner": own.planner}
         parts.append(pd.DataFrame(columns | {"collision_queries": axis} | spread))
     return pd.concat(parts, ignore_index=True)

@@ -14,6 +14,7 @@ protocol (`ConditionResults.evaluate`, `motion`, `problem`). Its parts are:
 
 from evoexp.report import (
     body_contacts,
+    distance_ranges,
     judging,
     markdown,
     motion_geometry,
@@ -79,6 +80,7 @@ __all__ = [
     "compared_with_controls",
     "convergence",
     "counted",
+    "distance_ranges",
     "effort_ratio",
     "evidence",
     "expected_effort",

@@ -164,7 +164,12 @@ class BodyDistance:
 
     def __call__(self, q: FloatArray) -> FloatArray:
         """Return the least distance at each configuration (nq, configurations) [rad]."""
-        return np.array([self.nearest(one).distance for one in np.ascontiguousarray(q.T)])
+        robot, results = (self._model, self._data, self._geometry), self._placements.distanceResults
+        least = np.empty(q.shape[1])
+        for k, one in enumerate(np.ascontiguousarray(q.T)):
+            closest = pin.computeDistances(*robot, self._placements, one)
+            least[k] = max(0.0, results[closest].min_distance)
+        return least
 
 
 def link_distance(assembly: Assembly) -> BodyDistance:

@@ -131,12 +131,20 @@ def obstacle_distance(found: Problem) -> motion_geometry.BodyDistance:
 def approaches(condition: ConditionResults) -> pd.DataFrame:
     """Return how close the bodies of each kind of pairs come in every replicate's motion, exactly.
 
+    Where all pairs are of one kind, the verdicts of the runs have said it.
+
     Returns:
         Columns kind (see `kinds_of_pairs`), replicate, clearance [length unit], clearance_at,
         refuted_at [instant] (NaN: they touch nowhere), kept (whether the required distance is).
     """
-    rows = []
-    for name, (kept, margin) in kinds_of_pairs(condition).items():
+    rows, kinds = [], kinds_of_pairs(condition)
+    if len(kinds) == 1 and condition.summaries["certified"].notna().all():
+        (kind,), where = kinds, ("clearance", "clearance_at", "refuted_at")
+        told = {"kind": kind, "replicate": condition.summaries.index.to_numpy(np.int64)}
+        told |= {name: condition.column(name) for name in where}
+        kept = condition.summaries["certified_margin"].eq(True).fillna(False)
+        return pd.DataFrame(told | {"kept": kept.to_numpy(bool)})
+    for name, (kept, margin) in kinds.items():
         bodies = problem(condition).scene.of_pairs(kept)
         for k in condition.solutions:
             verdict = certify(bodies, condition.motion(k), margin)

@@ -191,7 +191,7 @@ def _checks(one: MeasuredMotions) -> list[tuple[str, str]]:
     """Return known defects and checks of the scene, as numbers."""
     c, unit = one.condition, one.condition.condition.length_unit
     line = c.evaluate(motions.straight_line(c))
-    straight = one.sampled[one.sampled["replicate"] == -1]
+    straight = one.sampled[one.sampled["series"] == motions.STRAIGHT]
     dips = int(np.count_nonzero(c.column(BETWEEN) < one.margin))
     closer = int(np.count_nonzero(c.column("clearance") < one.margin))
     verdicts = c.verdicts

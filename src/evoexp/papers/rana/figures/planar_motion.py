@@ -14,7 +14,15 @@ from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.rana import motions
 from evoexp.papers.rana.figures.planar_models import ANGLES, configuration_planes, path_table
 from evoexp.papers.rana.motions import STRAIGHT
-from evoexp.report.kit import ConditionResults, groups, motion_geometry, rounded, style
+from evoexp.records import FloatArray
+from evoexp.report.kit import (
+    ConditionResults,
+    distance_ranges,
+    groups,
+    motion_geometry,
+    rounded,
+    style,
+)
 from evoexp.scenarios.obstacles import obstacle_table
 
 STAGES = 5  # panels that a motion is cut into; the sixth holds all of it
@@ -132,39 +140,71 @@ def draw_paths(table: pd.DataFrame) -> Figure:
 
 
 def sampled_distances(condition: ConditionResults, samples: int) -> pd.DataFrame:
-    """Return the distances along every replicate's motion and the straight line.
+    """Return the distances along the best motion and the straight line, and their range over all.
 
     Args:
         condition: With data.
         samples: Configurations per segment.
 
     Returns:
-        Columns replicate (−1: the straight line), instant (a fraction between via-points), centres
-        and links: least distances between two arms, of circle centres and of the links themselves;
-        where there are obstacles, also centres_to_obstacles and links_to_obstacles [length unit].
+        Columns series (straight line, best replicate, lowest and highest of all replicates),
+        instant (a fraction between via-points), centres and links: least distances between two
+        arms, of circle centres and of the links themselves; where there are obstacles, also
+        centres_to_obstacles and links_to_obstacles [length unit].
     """
-    problem = motions.problem(condition)
-    links, to_obstacles = motion_geometry.link_distance(problem.assembly), None
-    if motions.OBSTACLES in motions.kinds_of_pairs(condition):
-        to_obstacles = motions.obstacle_distance(problem)
-    parts = []
-    for replicate, solution in {
-        -1: motions.straight_line(condition),
-        **condition.solutions,
-    }.items():
-        path = motion_geometry.configurations(condition.prepared, solution)
-        instants, q = motion_geometry.dense(path, samples)
-        columns = {
-            "replicate": replicate,
-            "instant": instants,
-            "centres": problem.centre_distances(q),
-            "links": links(DEGREE * q),
+    problem, prepared = motions.problem(condition), condition.prepared
+    measures = _measures(condition)
+
+    def sampled(solution: FloatArray) -> FloatArray:
+        return motion_geometry.dense(motion_geometry.configurations(prepared, solution), samples)[1]
+
+    series = {
+        STRAIGHT: sampled(motions.straight_line(condition)),
+        BEST: sampled(condition.solutions[condition.best_replicate]),
+    }
+    parts = [
+        {"series": name, "instant": np.arange(q.shape[1]) / samples}
+        | {column: exactly(q) for column, (exactly, _) in measures.items()}
+        for name, q in series.items()
+    ]
+    ranges = distance_ranges.extremes(
+        list(condition.solutions),
+        lambda replicate: sampled(condition.solutions[replicate]),
+        [quickly for _, quickly in measures.values()],
+    )
+    for name, which in ((LOWEST, "lowest"), (HIGHEST, "highest")):
+        values = {
+            column: exactly(getattr(found, f"at_{which}"))
+            for found, (column, (exactly, _)) in zip(ranges, measures.items(), strict=True)
         }
-        if to_obstacles is not None:
-            columns["centres_to_obstacles"] = problem.obstacle_distances(q)
-            columns["links_to_obstacles"] = to_obstacles(DEGREE * q)
-        parts.append(pd.DataFrame(columns))
-    return rounded(pd.concat(parts, ignore_index=True))
+        instants = np.arange(len(ranges[0].lowest)) / samples
+        parts.append({"series": name, "instant": instants} | values)
+    return rounded(pd.concat(map(pd.DataFrame, parts), ignore_index=True))
+
+
+def _measures(
+    condition: ConditionResults,
+) -> dict[str, tuple[distance_ranges.Measure, distance_ranges.Measure]]:
+    """Return column of `sampled_distances` → its exact measure, and one that is as good and quick.
+
+    Both take configurations (nq, instants) [deg].
+    """
+    problem, kinds = motions.problem(condition), motions.kinds_of_pairs(condition)
+    by_coal = {motions.ARMS: motion_geometry.link_distance(problem.assembly)}
+    centres = {motions.ARMS: problem.centre_distances, motions.OBSTACLES: problem.obstacle_distances}
+    if motions.OBSTACLES in kinds:
+        by_coal[motions.OBSTACLES] = motions.obstacle_distance(problem)
+    found = {}
+    for kind, bodies in by_coal.items():
+        pairs = kinds[kind][0]
+        quick = distance_ranges.distance_measure(problem.scene.of_pairs(pairs), bodies)
+        found[COLUMNS[kind][CENTRES]] = (centres[kind], centres[kind])
+        found[COLUMNS[kind][LINKS]] = (_in_radians(bodies), _in_radians(quick))
+    return found
+
+
+def _in_radians(measure: distance_ranges.Measure) -> distance_ranges.Measure:
+    return lambda q: measure(DEGREE * q)
 
 
 def distances_table(condition: ConditionResults, sampled: pd.DataFrame) -> pd.DataFrame:
@@ -178,29 +218,23 @@ def distances_table(condition: ConditionResults, sampled: pd.DataFrame) -> pd.Da
         Columns kind (between arms, to obstacles), measure (circle centres, links), series, instant,
         distance, safety_distance (of the kind) [length unit], length_unit.
     """
-    best = sampled[sampled["replicate"] == condition.best_replicate]
-    straight = sampled[sampled["replicate"] == -1]
-    every = sampled[sampled["replicate"] >= 0].groupby("instant", sort=True)
-    at_via_points = best[best["instant"] == best["instant"].round()]
+    found = {name: rows.set_index("instant") for name, rows in groups(sampled, "series")}
+    best = found[BEST]
+    found[AT_VIA_POINTS] = best[best.index == best.index.to_numpy().round()]
+    drawn = (BEST, AT_VIA_POINTS, LOWEST, HIGHEST, STRAIGHT)
     exact, parts = motions.approaches(condition), []
     for kind, (_, margin) in motions.kinds_of_pairs(condition).items():
         own = exact[exact["kind"] == kind]
         for measure, column in COLUMNS[kind].items():
-            series = {
-                BEST: best.set_index("instant")[column],
-                AT_VIA_POINTS: at_via_points.set_index("instant")[column],
-                LOWEST: every[column].min(),
-                HIGHEST: every[column].max(),
-                STRAIGHT: straight.set_index("instant")[column],
-            }
+            series = {name: found[name][column] for name in drawn}
             if measure == LINKS:
                 free = own[own["refuted_at"].isna()].set_index("clearance_at")["clearance"]
                 touching = own[own["refuted_at"].notna()].set_index("refuted_at")["clearance"]
                 series |= {CLOSEST: free, REFUTED: touching}
             for name, values in series.items():
                 columns = {"measure": measure, "series": name, "instant": values.index}
-                found = pd.DataFrame(columns | {"distance": values.to_numpy()})
-                parts.append(found.assign(kind=kind, safety_distance=margin))
+                rows = pd.DataFrame(columns | {"distance": values.to_numpy()})
+                parts.append(rows.assign(kind=kind, safety_distance=margin))
     table = rounded(pd.concat(parts, ignore_index=True))
     return table.assign(length_unit=condition.condition.length_unit)
 

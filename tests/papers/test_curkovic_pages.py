@@ -10,7 +10,12 @@ import pytest
 from evoexp.configuration import compose
 from evoexp.papers.curkovic import claims as sweep_claims
 from evoexp.papers.curkovic import families, hall_shares, link_motions, measures, motion_page
-from evoexp.papers.curkovic.figures import link_intersection, pareto_fronts, robot_motions
+from evoexp.papers.curkovic.figures import (
+    body_distances,
+    link_intersection,
+    pareto_fronts,
+    robot_motions,
+)
 from evoexp.papers.curkovic.pareto_page import read_fronts
 from evoexp.report import judging, style, verdicts
 from evoexp.report.page_parts import Page
@@ -127,12 +132,20 @@ def test_other_scenes_are_drawn_and_claimed(
     assert (table["element"] == "obstacle").any() == (robots == 2)
     assert set(drawing(found, "joints_1_configurations_only")["robot"]) == set(range(robots))
     distances = drawing(found, "distances")
-    assert sorted(distances["replicate"].unique()) == [-1, 0, 1]
-    for (position, replicate), rows in distances[distances["replicate"] >= 0].groupby(
-        ["position", "replicate"]
-    ):
-        exact = smoke_results(outputs, name).conditions[position].column("clearance")[replicate]
-        assert rows["distance"].min() >= exact - 1e-6  # sampled
+    for (position, series), rows in distances.groupby(["position", "series"]):
+        condition = smoke_results(outputs, name).conditions[position]
+        least = condition.column("clearance")
+        if series == body_distances.BEST:
+            least = least[[condition.best_replicate]]
+        if series != body_distances.STRAIGHT:
+            assert rows["distance"].min() >= least.min() - 1e-6  # sampled
+        assert set(rows["replicates"]) == {2}
+    lowest, best, highest = (
+        distances.loc[distances["series"] == series, "distance"].to_numpy()
+        for series in (body_distances.LOWEST, body_distances.BEST, body_distances.HIGHEST)
+    )
+    assert (lowest <= best).all()
+    assert (best <= highest).all()
 
 
 @pytest.mark.matrix

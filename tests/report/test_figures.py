@@ -158,7 +158,7 @@ def test_paths_of_all_replicates(results: Results) -> None:
 def test_distances_are_best_and_envelope(results: Results) -> None:
     condition = results.conditions[0]
     sampled = planar_motion.sampled_distances(condition, 4)
-    assert len(sampled) == 3 * 81
+    assert len(sampled) == 4 * 81  # straight line, best replicate, lowest and highest of all
     table = planar_motion.distances_table(condition, sampled)
     sets = {
         key: rows.set_index("instant")["distance"]

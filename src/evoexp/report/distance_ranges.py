@@ -104,8 +104,3 @@ def distance_measure(scene: Scene, exact: BodyDistance) -> Measure:
         exact: The same pairs, by coal.
     """
     return LeastDistance(scene) if known(scene) else exact
-
-
-def by_coal(found: Extremes, exact: BodyDistance) -> Extremes:
-    """Return extremes of distances with the values that coal gives at their configurations."""
-    return found._replace(lowest=exact(found.at_lowest), highest=exact(found.at_highest))

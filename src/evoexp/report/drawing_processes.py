@@ -5,6 +5,7 @@ process would have to be sent them, and to load matplotlib first.
 """
 
 import contextlib
+import gc
 import multiprocessing
 import sys
 import warnings
@@ -27,6 +28,11 @@ def on_all_cores(function: Callable[[Item], Result], items: Sequence[Item]) -> l
         function: Called here or in a copy of this process; its results are pickled.
         items: Taken one by one, by whichever process is free.
     """
+    with _collecting_between_items():
+        return _on_all_cores(lambda item: _then_collect(function(item)), items)
+
+
+def _on_all_cores(function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
     num_copies = min(int(joblib.cpu_count()), len(items)) - 1
     if num_copies < 1 or sys.platform != "linux":  # elsewhere libraries do not survive a fork
         return [function(item) for item in items]
@@ -62,6 +68,30 @@ def on_all_cores(function: Callable[[Item], Result], items: Sequence[Item]) -> l
         results[number] if number in results else function(item)
         for number, item in enumerate(items)
     ]
+
+
+@contextlib.contextmanager
+def _collecting_between_items() -> Iterator[None]:
+    """Let Python look for garbage after each item, among what is made from now on.
+
+    While a figure is drawn it would look through all modules and tables again and again, a tenth of
+    the time, and find nothing.
+    """
+    if not gc.isenabled():
+        yield
+        return
+    gc.freeze()
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
+        gc.unfreeze()
+
+
+def _then_collect(result: Result) -> Result:
+    gc.collect()
+    return result
 
 
 def _start(context: Any, work: Callable[[Any], None]) -> tuple[Any, Any]:

@@ -52,6 +52,7 @@ from evoexp.report.statistics import (
     expected_interval,
     holm,
     quantile,
+    quantiles,
     spread,
 )
 from evoexp.report.verdicts import Claim, Comparison
@@ -100,6 +101,7 @@ __all__ = [
     "planned_by",
     "planned_replicates",
     "quantile",
+    "quantiles",
     "read_rules",
     "records",
     "rounded",

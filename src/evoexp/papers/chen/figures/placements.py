@@ -12,7 +12,7 @@ from matplotlib.ticker import MultipleLocator
 
 from evoexp.papers.chen.cases import CLOSE, METHODS, Case
 from evoexp.records import FloatArray
-from evoexp.report.kit import groups, quantile, records, rounded, spread, style
+from evoexp.report.kit import groups, quantiles, records, rounded, style
 
 RUNS = ("GA", "GA, elitism", "random search")
 ORDER = (*RUNS, *METHODS)  # the place of a method gives its colour
@@ -37,6 +37,7 @@ LOOKS: dict[str, dict[str, Any]] = {
 LABEL = "E [-], lower is better"
 # range of a colour bar → its ticks, both in units of the least E
 TICKS = {20.0: [1.0, 2.0, 5.0, 10.0, 20.0], 3.0: [1.0, 1.5, 2.0, 3.0]}
+GIVEN = "panel", "case", "quantity"
 LANDSCAPE = ["panel", "case", "element", "theta_1_deg", "theta_2_deg", "cost"]
 
 
@@ -56,27 +57,27 @@ def fitness_table(cases: list[Case]) -> pd.DataFrame:
         Columns panel, case, quantity, method, generation, median, lower, upper, average (of a
         generation, median over runs), runs, optimum.
     """
-    rows: list[tuple[object, ...]] = []
+    parts = []
     for panel, case in enumerate(cases):
         given = panel, case.name, "fitness f"
         offset, sign = float(case.conditions[0].planner.objective.greatest), -1.0
         if case.name == "least torque norm":
             given, offset, sign = (panel, case.name, "torque norm E₁"), 0.0, 1.0
         for method, condition in case.evolved.items():
-            for index, own in groups(condition.generations, "index"):
-                best, mean = offset + sign * own[["best_cost", "mean_cost"]].to_numpy().T
-                median, lower, upper, _ = spread(best)
-                told = median, lower, upper, quantile(mean, 0.5), len(best)
-                rows.append((*given, method, index, *told, offset + sign * case.least))
-    return rounded(
-        pd.DataFrame(
-            rows,
-            columns=[
-                *("panel", "case", "quantity", "method", "generation"),
-                *("median", "lower", "upper", "average", "runs", "optimum"),
-            ],
-        )
-    )
+            rows = condition.generations
+            wide = rows.pivot(index="index", columns="replicate", values=["best_cost", "mean_cost"])
+            best, mean = (
+                offset + sign * wide[name].to_numpy(np.float64)
+                for name in ("best_cost", "mean_cost")
+            )
+            columns: dict[str, Any] = dict(zip(GIVEN, given, strict=True))
+            columns |= {"method": method, "generation": wide.index}
+            spreads = quantiles(best, (0.5, 0.25, 0.75))
+            columns |= dict(zip(("median", "lower", "upper"), spreads, strict=True))
+            (columns["average"],) = quantiles(mean, (0.5,))
+            columns["runs"] = rows.groupby("index").size().to_numpy()
+            parts.append(pd.DataFrame(columns | {"optimum": offset + sign * case.least}))
+    return rounded(pd.concat(parts, ignore_index=True))
 
 
 def draw_fitness(table: pd.DataFrame) -> Figure:

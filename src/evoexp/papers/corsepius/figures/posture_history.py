@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from evoexp.papers.corsepius import measures
-from evoexp.report.kit import Results, counted, groups, quantile, records, style
+from evoexp.report.kit import Results, counted, groups, quantile, quantiles, records, style
 
 DISTANCE, COST = "distance to the goal", "cost"
 PER_LINE = 3  # panels
@@ -40,7 +40,7 @@ def history_table(results: Results) -> pd.DataFrame:
             for quantity, column in ((DISTANCE, "term_goal_distance"), (COST, "term_cost")):
                 wide = numbered.pivot(index="cycle", columns="replicate", values=column)
                 values = wide.abs().ffill().to_numpy(dtype=np.float64)
-                quartiles = ([quantile(row, share) for row in values] for share in QUARTILES)
+                quartiles = quantiles(values, QUARTILES)
                 table = {
                     "position": position,
                     "condition": c.label,

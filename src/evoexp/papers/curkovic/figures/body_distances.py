@@ -1,5 +1,6 @@
 """Least distances of bodies along motions: of robots from each other and from obstacles."""
 
+import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
@@ -8,9 +9,11 @@ from matplotlib.ticker import MaxNLocator
 from evoexp.numeric.elementary import DEGREE
 from evoexp.papers.curkovic import link_motions
 from evoexp.planners.coevolution.link_problem import Problem
+from evoexp.records import FloatArray
 from evoexp.report.kit import (
     ConditionResults,
     body_contacts,
+    distance_ranges,
     groups,
     motion_geometry,
     rounded,
@@ -18,42 +21,55 @@ from evoexp.report.kit import (
 )
 
 COLUMNS = 2  # of panels
-STRAIGHT = -1  # instead of a replicate
+LOWEST, HIGHEST, BEST, STRAIGHT = "lowest", "highest", "best replicate", "straight line"
 
 
 def distances_table(conditions: tuple[ConditionResults, ...], samples: int) -> pd.DataFrame:
-    """Return the bodies' least distance along every replicate's motion and the straight line.
+    """Return the bodies' least distance: range over all motions, best replicate, straight line.
 
     Args:
         conditions: With data.
         samples: Configurations per segment.
 
     Returns:
-        Columns condition, position, replicate (−1: straight line in link angles), best (whether it
-        is the best one), refuted (by the exact verdict), instant, distance [length unit],
-        length_unit.
+        Columns condition, position, series (lowest and highest of all replicates, best replicate,
+        straight line in link angles), instant, distance [length unit], replicates, refuted (of
+        them, by the exact verdict), length_unit.
     """
     parts = []
     for position, c in enumerate(conditions):
-        prepared, refuted = c.prepared, body_contacts.refuted(c)
-        scene = c.problem(Problem).scene
-        distance = motion_geometry.BodyDistance(scene.model, scene.geometry)
-        solutions = {STRAIGHT: link_motions.straight(prepared), **c.solutions}
-        for replicate, solution in solutions.items():
-            found = link_motions.sampled(link_motions.executed(prepared, solution), samples)
-            columns = {
-                "condition": c.label,
-                "position": position,
-                "replicate": replicate,
-                "best": replicate == c.best_replicate,
-                "refuted": replicate in refuted,
-                "instant": found.instants,
-                "distance": distance(DEGREE * found.q),
-            }
-            parts.append(pd.DataFrame(columns))
+        columns = {"condition": c.label, "position": position}
+        counts = {"replicates": c.done, "refuted": len(body_contacts.refuted(c))}
+        for name, distances in _series(c, samples).items():
+            columns["series"] = name
+            instants = np.arange(len(distances)) / samples
+            parts.append(
+                pd.DataFrame(columns | {"instant": instants, "distance": distances} | counts)
+            )
     return rounded(pd.concat(parts, ignore_index=True)).assign(
         length_unit=conditions[0].condition.length_unit
     )
+
+
+def _series(condition: ConditionResults, samples: int) -> dict[str, FloatArray]:
+    """Return the distances of each series, (instants,) [length unit]."""
+    prepared, solutions = condition.prepared, condition.solutions
+    scene = condition.problem(Problem).scene
+    distance = motion_geometry.BodyDistance(scene.model, scene.geometry)
+    quick = distance_ranges.distance_measure(scene, distance)
+
+    def sampled(solution: FloatArray) -> FloatArray:
+        executed = link_motions.executed(prepared, solution)
+        return DEGREE * link_motions.sampled(executed, samples).q
+
+    (found,) = distance_ranges.extremes(list(solutions), lambda k: sampled(solutions[k]), [quick])
+    series = {
+        LOWEST: found.at_lowest,
+        HIGHEST: found.at_highest,
+        BEST: sampled(solutions[condition.best_replicate]),
+        STRAIGHT: sampled(link_motions.straight(prepared)),
+    }
+    return {name: distance(q) for name, q in series.items()}
 
 
 def draw_distances(table: pd.DataFrame) -> Figure:
@@ -67,19 +83,17 @@ def draw_distances(table: pd.DataFrame) -> Figure:
         axes.set_axis_off()
     for axes, (position, rows) in zip(panels, groups(table, "position"), strict=False):
         colour = style.condition_colour(int(position))
-        of_runs = rows[rows["replicate"] != STRAIGHT]
-        found = of_runs.groupby("instant")["distance"]
-        low, high = found.min(), found.max()
-        axes.fill_between(low.index, low, high, color=colour, alpha=0.18, linewidth=0)
-        for (replicate, best), own in groups(rows, ["replicate", "best"]):
-            if replicate == STRAIGHT:
-                axes.plot(own["instant"], own["distance"], ":", color=style.FAINT)
-            elif best:
-                axes.plot(own["instant"], own["distance"], color=colour)
-                at = own[own["instant"] == own["instant"].round()]
-                axes.plot(at["instant"], at["distance"], "o", color=colour, **style.DOTS)
-        refuted = of_runs.groupby("replicate")["refuted"].first()
-        title = f"{rows['condition'].iloc[0]}: {int(refuted.sum())} of {len(refuted)} refuted"
+        own = dict(groups(rows, "series"))
+        low, high, best, straight = (own[name] for name in (LOWEST, HIGHEST, BEST, STRAIGHT))
+        axes.fill_between(
+            low["instant"], low["distance"], high["distance"], color=colour, alpha=0.18, linewidth=0
+        )
+        axes.plot(straight["instant"], straight["distance"], ":", color=style.FAINT)
+        axes.plot(best["instant"], best["distance"], color=colour)
+        at = best[best["instant"] == best["instant"].round()]
+        axes.plot(at["instant"], at["distance"], "o", color=colour, **style.DOTS)
+        refuted, replicates = (int(rows[name].iloc[0]) for name in ("refuted", "replicates"))
+        title = f"{rows['condition'].iloc[0]}: {refuted} of {replicates} refuted"
         axes.set_title(title, fontsize=7.5)
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     below = -0.02 * float(table["distance"].max())
@@ -89,9 +103,9 @@ def draw_distances(table: pd.DataFrame) -> Figure:
             axes.set_ylabel(f"least distance [{table['length_unit'].iloc[0]}]")
         if k >= len(panels) - columns:
             axes.set_xlabel("sampling step (whole: configurations)")
-    grey, best = style.NEUTRAL, "best replicate, dots: configurations"
+    grey = style.NEUTRAL
     keys = [
-        style.key(best, color=grey, marker="o", mec="white", ms=5),
+        style.key(f"{BEST}, dots: configurations", color=grey, marker="o", mec="white", ms=5),
         Patch(color=grey, alpha=0.18, linewidth=0, label="range over replicates"),
         style.key("straight line in link angles", linestyle=":", color=style.FAINT),
     ]

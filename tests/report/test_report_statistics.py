@@ -19,6 +19,7 @@ from evoexp.report.statistics import (
     holm,
     percentiles,
     quantile,
+    quantiles,
     rank_sum,
     signed_rank,
     spread,
@@ -32,6 +33,18 @@ FLOATS = st.floats(-1e3, 1e3)
 @given(st.lists(FLOATS, min_size=1, max_size=30), st.floats(0.0, 1.0))
 def test_quantiles_are_those_of_numpy(values: list[float], share: float) -> None:
     assert quantile(np.array(values), share) == pytest.approx(np.quantile(values, share), abs=1e-9)
+
+
+ROW = st.lists(
+    st.sampled_from([-np.inf, -2.5, -1.0, 0.0, 0.1, 3.0, np.inf, np.nan]), min_size=6, max_size=6
+)
+
+
+@given(st.lists(ROW, min_size=1, max_size=5))
+def test_quantiles_of_rows_are_those_of_each_row(rows: list[list[float]]) -> None:
+    values, shares = np.array(rows), (0.0, 0.25, 0.3, 0.5, 1.0)
+    expected = [[quantile(row, share) for row in values] for share in shares]
+    np.testing.assert_array_equal(quantiles(values, shares), expected)
 
 
 def test_quantiles_of_infinite_and_missing_values() -> None:
@@ -160,6 +173,15 @@ def test_the_effect_is_that_of_all_pairs_counted_one_by_one(
     assert found.a12 == wins.sum() / wins.size
     assert found.interval == percentiles(resampled, 0.9)
     assert vargha_delaney(x, y[: len(y) // 2 + 1]) == wins[:, : len(y) // 2 + 1].mean()
+
+
+def test_the_effect_of_many_pairs_is_computed_in_blocks() -> None:
+    rng = np.random.default_rng(6)
+    x, y = rng.integers(0, 40, size=(2, 700)).astype(float)
+    wins = (x[:, None] > y) + 0.5 * (x[:, None] == y)
+    weights = _weights(700, 150)
+    resampled = ((weights @ wins) * weights).sum(axis=1) / 700**2
+    assert effect(x, y, 0.9, 150).interval == percentiles(resampled, 0.9)
 
 
 def test_effect_of_separated_and_of_no_values() -> None:

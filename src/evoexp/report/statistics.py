@@ -111,9 +111,7 @@ def quantiles(values: FloatArray, shares: Sequence[float]) -> FloatArray:
     for own, share in zip(found, shares, strict=True):
         position = share * np.maximum(last, 0)
         below = np.floor(position).astype(np.int64)
-        low, high = (
-            ordered[rows, np.minimum(k, np.maximum(last, 0))] for k in (below, below + 1)
-        )
+        low, high = (ordered[rows, np.minimum(k, np.maximum(last, 0))] for k in (below, below + 1))
         fraction = position - below
         between = (fraction != 0.0) & (low != high) & (last >= 0)
         own[last >= 0] = low[last >= 0]

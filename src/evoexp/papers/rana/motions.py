@@ -15,6 +15,7 @@ from evoexp.records import FloatArray
 from evoexp.report.kit import ConditionResults, groups, motion_geometry, style
 
 STRAIGHT, OTHERS = "straight line", "replicate"
+MOST_PATHS = 200  # replicates whose paths are drawn, beside the best one; more hide each other
 ARMS, OBSTACLES = "between arms", "to obstacles"  # kinds of pairs of bodies
 WHITE: dict[str, Any] = {"color": "white", "markeredgecolor": style.NEUTRAL, "zorder": 5}
 
@@ -48,7 +49,9 @@ def paths_table(
     table_of: Callable[[ConditionResults, FloatArray], pd.DataFrame],
     best: str,
 ) -> pd.DataFrame:
-    """Return one table of all replicates' solutions and of the straight line.
+    """Return one table of the replicates' solutions and of the straight line.
+
+    Of more than `MOST_PATHS` replicates the first ones are in it, and the best one.
 
     Args:
         condition: With data.
@@ -57,12 +60,16 @@ def paths_table(
 
     Returns:
         The columns of `table_of`, series (best, replicate, straight line) and replicate (−1: none).
+        If replicates are left out, a series "replicate of N" tells how many there are.
     """
+    solutions, best_replicate = condition.solutions, condition.best_replicate
+    shown = [k for n, k in enumerate(solutions) if n < MOST_PATHS or k == best_replicate]
+    others = OTHERS if len(shown) == len(solutions) else f"{OTHERS} of {len(solutions)}"
     parts = [
-        table_of(condition, solution).assign(
-            series=best if k == condition.best_replicate else OTHERS, replicate=k
+        table_of(condition, solutions[k]).assign(
+            series=best if k == best_replicate else others, replicate=k
         )
-        for k, solution in condition.solutions.items()
+        for k in shown
     ]
     straight = table_of(condition, straight_line(condition))
     return pd.concat([*parts, straight.assign(series=STRAIGHT, replicate=-1)], ignore_index=True)
@@ -99,9 +106,11 @@ def stage_title(rows: pd.DataFrame, whole: bool) -> str:
 def path_keys(table: pd.DataFrame) -> list[Line2D]:
     """Return the entries of the legend of `draw_paths`."""
     count, grey = table.loc[table["replicate"] >= 0, "replicate"].nunique(), style.NEUTRAL
+    some = [name for name in table["series"].unique() if name.startswith(f"{OTHERS} of ")]
+    shown = f"{count} {some[0].replace(OTHERS, f'{OTHERS}s')}" if some else ""
     return [
         style.key("best replicate, its via-points", color=grey, linewidth=1.8, marker="o", ms=3),
-        style.key(f"all replicates (n = {count})", color=grey, linewidth=0.8, alpha=0.4),
+        style.key(shown or f"all replicates (n = {count})", color=grey, linewidth=0.8, alpha=0.4),
         style.key(STRAIGHT, color=grey, linewidth=1.1, linestyle=":"),
         style.key("start", marker="s", ms=6.5, color="none", mec=grey, mfc="white"),
         style.key("goal", marker="*", ms=10.5, color="none", mec=grey, mfc="white"),
@@ -138,19 +147,19 @@ def approaches(condition: ConditionResults) -> pd.DataFrame:
         refuted_at [instant] (NaN: they touch nowhere), kept (whether the required distance is).
     """
     rows, kinds = [], kinds_of_pairs(condition)
+    names = ["kind", "replicate", "clearance", "clearance_at", "refuted_at", "kept"]
     if len(kinds) == 1 and condition.summaries["certified"].notna().all():
-        (kind,), where = kinds, ("clearance", "clearance_at", "refuted_at")
-        told = {"kind": kind, "replicate": condition.summaries.index.to_numpy(np.int64)}
-        told |= {name: condition.column(name) for name in where}
-        kept = condition.summaries["certified_margin"].eq(True).fillna(False)
-        return pd.DataFrame(told | {"kept": kept.to_numpy(bool)})
+        told: dict[str, Any] = {"kind": next(iter(kinds))}
+        told["replicate"] = condition.summaries.index.to_numpy(np.int64)
+        told |= {name: condition.column(name) for name in names[2:-1]}
+        told["kept"] = condition.summaries["certified_margin"].eq(True).fillna(False).to_numpy(bool)
+        return pd.DataFrame(told)
     for name, (kept, margin) in kinds.items():
         bodies = problem(condition).scene.of_pairs(kept)
         for k in condition.solutions:
             verdict = certify(bodies, condition.motion(k), margin)
             where = verdict.clearance, verdict.clearance_at, verdict.refuted_at
             rows.append((name, k, *where, verdict.margin_status == "certified"))
-    names = ["kind", "replicate", "clearance", "clearance_at", "refuted_at", "kept"]
     return pd.DataFrame(rows, columns=names)
 
 

@@ -33,7 +33,10 @@ SNAPSHOTS = (
     "Motion of the best replicate (lowest cost), stage by stage; links that cross on paper in "
     "one panel do so at different instants unless both are drawn in the same shade."
 )
-PATHS = "Paths of all replicates in the planes of the joint angles; angles are not wrapped."
+PATHS = (
+    "Paths of all replicates, or of 200 if there are more, in the planes of the joint angles; "
+    "angles are not wrapped."
+)
 DISTANCES = (
     "Least distance against the instant: of the centres of circles or spheres, and of the bodies "
     "themselves; at via-points (dots) and sampled between them (line); diamonds and crosses: the "

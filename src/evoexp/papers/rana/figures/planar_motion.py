@@ -52,6 +52,7 @@ COLUMNS = {  # of `sampled_distances`, by kind of pairs and measure
     motions.ARMS: {CENTRES: "centres", LINKS: "links"},
     motions.OBSTACLES: {CENTRES: "centres_to_obstacles", LINKS: "links_to_obstacles"},
 }
+Measure = distance_ranges.Measure
 TITLES = {CENTRES: "circle centres", LINKS: "bodies (exact)"}
 LOWEST, HIGHEST = "lowest of all replicates", "highest of all replicates"
 
@@ -152,7 +153,7 @@ def sampled_distances(condition: ConditionResults, samples: int) -> pd.DataFrame
         arms, of circle centres and of the links themselves; where there are obstacles, also
         centres_to_obstacles and links_to_obstacles [length unit].
     """
-    problem, prepared = motions.problem(condition), condition.prepared
+    prepared = condition.prepared
     measures = _measures(condition)
 
     def sampled(solution: FloatArray) -> FloatArray:
@@ -182,19 +183,20 @@ def sampled_distances(condition: ConditionResults, samples: int) -> pd.DataFrame
     return rounded(pd.concat(map(pd.DataFrame, parts), ignore_index=True))
 
 
-def _measures(
-    condition: ConditionResults,
-) -> dict[str, tuple[distance_ranges.Measure, distance_ranges.Measure]]:
+def _measures(condition: ConditionResults) -> dict[str, tuple[Measure, Measure]]:
     """Return column of `sampled_distances` → its exact measure, and one that is as good and quick.
 
     Both take configurations (nq, instants) [deg].
     """
     problem, kinds = motions.problem(condition), motions.kinds_of_pairs(condition)
     by_coal = {motions.ARMS: motion_geometry.link_distance(problem.assembly)}
-    centres = {motions.ARMS: problem.centre_distances, motions.OBSTACLES: problem.obstacle_distances}
+    centres = {
+        motions.ARMS: problem.centre_distances,
+        motions.OBSTACLES: problem.obstacle_distances,
+    }
     if motions.OBSTACLES in kinds:
         by_coal[motions.OBSTACLES] = motions.obstacle_distance(problem)
-    found = {}
+    found = dict[str, tuple[Measure, Measure]]()
     for kind, bodies in by_coal.items():
         pairs = kinds[kind][0]
         quick = distance_ranges.distance_measure(problem.scene.of_pairs(pairs), bodies)
@@ -203,7 +205,7 @@ def _measures(
     return found
 
 
-def _in_radians(measure: distance_ranges.Measure) -> distance_ranges.Measure:
+def _in_radians(measure: Measure) -> Measure:
     return lambda q: measure(DEGREE * q)
 
 

@@ -13,6 +13,7 @@ import pandas as pd
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter, LogLocator, MaxNLocator, NullFormatter
@@ -148,6 +149,7 @@ def _drawn(
         mpl.rcParams["text.parse_math"] = formulas
         mpl.rcParams["figure.dpi"] = dpi  # arranged with the widths that text has when it is saved
         figure, images = draw(), {}
+        FigureCanvasAgg(figure)  # what it has measured of texts is known when a PNG is drawn
         if engine := figure.get_layout_engine():  # arranged once, for all formats
             engine.execute(figure)
         figure.set_layout_engine(None)  # with "none" every file would be drawn twice

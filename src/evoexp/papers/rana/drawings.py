@@ -149,7 +149,8 @@ def _spatial(one: MeasuredMotions) -> list[Drawing]:
             f"fig_12b_configuration_space{suffix}",
             "Fig. 12b: paths in configuration space",
             "The paper's caption says configuration space, its text operational space: both are "
-            "drawn. Paths of all replicates through the joint angles; angles are not wrapped. "
+            "drawn. Paths of all replicates (200 at most) through the joint angles; angles are not "
+            "wrapped. "
             f"{_ratio(c)}",
             paths,
             spatial_paths.draw_configuration_space,

@@ -278,7 +278,11 @@ def test_damaged_logs_have_no_row_and_are_named(run: RunDirectory, add: Add) -> 
     assert read_generations(run)["replicate"].unique().tolist() == [0]
 
 
-def test_read_generations(run: RunDirectory, add: Add, tmp_path: Path) -> None:
+@pytest.mark.parametrize("logs_at_once", [1, 2, 500])
+def test_read_generations(
+    run: RunDirectory, add: Add, monkeypatch: pytest.MonkeyPatch, logs_at_once: int
+) -> None:
+    monkeypatch.setattr(tables, "LOGS_AT_ONCE", logs_at_once)
     for replicate in (1, 0):
         add(replicate)
     given = [g._replace(terms={"other": float(g.index)}) for g in generations(4, seed=2)]

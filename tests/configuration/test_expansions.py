@@ -65,6 +65,38 @@ def test_other_words_are_composed(composed: Callable[[], int]) -> None:
     assert one.changed
 
 
+def test_several_experiments_are_kept_one_by_one(composed: Callable[[], int]) -> None:
+    first = expansions.expand(["experiment=lavoie_7dof", "budget=smoke"])
+    words = ["experiment=lavoie_7dof,chen_fields", "budget=smoke"]
+    assert not expansions.is_kept(words, multirun=True)
+    both = expansions.expand(words, multirun=True)
+    assert composed() == 2, "the first one was kept"
+    assert both[:1] == first
+    assert both == compose.expand(words, multirun=True)
+    assert expansions.is_kept(words, multirun=True)
+    swept = [*words, "seed=0,1"]
+    assert expansions.expand(swept, multirun=True) == compose.expand(swept, multirun=True)
+
+
+@pytest.mark.parametrize(
+    ("words", "multirun"),
+    [
+        (["experiment=lavoie_7dof,chen_fields"], False),
+        (["experiment=lavoie_7dof,lavoie_7dof"], True),
+        (["experiment=lavoie_7dof,nothing_like_it"], True),
+        (["experiment=lavoie_7dof,"], True),
+    ],
+)
+def test_several_experiments_are_refused_as_hydra_refuses_them(
+    composed: Callable[[], int], words: list[str], multirun: bool
+) -> None:
+    with pytest.raises(EvoexpError) as expected:
+        compose.expand(words, multirun=multirun)
+    with pytest.raises(EvoexpError) as found:
+        expansions.expand(words, multirun=multirun)
+    assert str(found.value) == str(expected.value)
+
+
 def test_a_changed_file_of_conf_is_composed_anew(
     composed: Callable[[], int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

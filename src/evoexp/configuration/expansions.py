@@ -34,6 +34,7 @@ from evoexp.shipped import Option
 from evoexp.store.kept_facts import add_files, installed_code
 
 NUM_KEPT = 200  # [-] expansions, the newest ones
+_NAME = re.compile(r"\w+")  # of an option; a file has a dot or a slash
 _COMPOSERS = ("hydra-core", "omegaconf")
 
 
@@ -42,9 +43,13 @@ def expand(
 ) -> list[Experiment]:
     """Expand overrides into experiments, by `compose.expand` where nothing is kept.
 
+    Several experiments are kept one by one, each as if it had been asked for alone.
+
     Raises:
         EvoexpError: For whatever cannot be run.
     """
+    if parts := _by_experiment(overrides, multirun):
+        return [one for part in parts for one in expand(part, multirun=_has_sweep(part), only=only)]
     path = _path(overrides, multirun, list(only))
     if path is not None and (kept := _read(path)) is not None:
         return kept
@@ -58,8 +63,28 @@ def expand(
 
 def is_kept(overrides: Sequence[str], *, multirun: bool = False, only: Sequence[str] = ()) -> bool:
     """Return whether an expansion is kept, so that nothing has to be composed."""
+    if parts := _by_experiment(overrides, multirun):
+        return all(is_kept(part, multirun=_has_sweep(part), only=only) for part in parts)
     path = _path(overrides, multirun, list(only))
     return path is not None and path.is_file()
+
+
+def _by_experiment(overrides: Sequence[str], multirun: bool) -> list[list[str]]:
+    """Return the overrides of each experiment, if several options of that group are swept over."""
+    places = [k for k, word in enumerate(overrides) if word.startswith(f"{EXPERIMENT}=")]
+    if not multirun or len(places) != 1:
+        return []
+    (place,) = places
+    names = overrides[place].partition("=")[2].split(",")
+    if len(set(names)) < max(2, len(names)) or not all(_NAME.fullmatch(name) for name in names):
+        return []
+    before, after = overrides[:place], overrides[place + 1 :]
+    return [[*before, f"{EXPERIMENT}={name}", *after] for name in names]
+
+
+def _has_sweep(overrides: Sequence[str]) -> bool:
+    """Return whether any value may be swept over."""
+    return any(mark in word for word in overrides for mark in ",(")
 
 
 def _files(experiments: Sequence[Experiment]) -> list[tuple[str, str]] | None:

@@ -1,9 +1,12 @@
+import copy
+
 import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
+from evoexp.papers.rana import motions
 from evoexp.papers.rana.figures import planar_models, planar_motion
 from evoexp.report import motion_geometry, style
 from evoexp.report.figures import convergence
@@ -153,6 +156,21 @@ def test_paths_of_all_replicates(results: Results) -> None:
     ends = table[(table["arm"] == 0) & (table["instant"] == 20)]
     np.testing.assert_allclose(ends[["joint_1_deg", "joint_2_deg"]], [[135.0, 135.0]] * 3)
     assert "all replicates (n = 2)" in texts(planar_motion.draw_paths(table))
+
+
+def test_of_many_replicates_some_paths_are_drawn(
+    results: Results, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    condition = copy.copy(results.conditions[0])
+    first, second = condition.solutions.values()
+    vars(condition)["solutions"] = {0: first, 1: second, 2: first, 3: second}
+    monkeypatch.setattr(motions, "MOST_PATHS", 2)
+    table = planar_motion.paths_table(condition)
+    assert sorted(table["replicate"].unique()) == [-1, 0, 1]
+    assert "2 of 4 replicates" in texts(planar_motion.draw_paths(table))
+    monkeypatch.setattr(motions, "MOST_PATHS", 4)
+    everything = planar_motion.paths_table(condition)
+    assert "all replicates (n = 4)" in texts(planar_motion.draw_paths(everything))
 
 
 def test_distances_are_best_and_envelope(results: Results) -> None:

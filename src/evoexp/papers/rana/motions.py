@@ -107,7 +107,7 @@ def path_keys(table: pd.DataFrame) -> list[Line2D]:
     """Return the entries of the legend of `draw_paths`."""
     count, grey = table.loc[table["replicate"] >= 0, "replicate"].nunique(), style.NEUTRAL
     some = [name for name in table["series"].unique() if name.startswith(f"{OTHERS} of ")]
-    shown = f"{count} {some[0].replace(OTHERS, f'{OTHERS}s')}" if some else ""
+    shown = f"{count} of {some[0].split()[-1]} replicates" if some else ""
     return [
         style.key("best replicate, its via-points", color=grey, linewidth=1.8, marker="o", ms=3),
         style.key(shown or f"all replicates (n = {count})", color=grey, linewidth=0.8, alpha=0.4),

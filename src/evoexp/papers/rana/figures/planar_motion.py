@@ -48,6 +48,11 @@ LOOKS: dict[str, dict[str, Any]] = {  # of the series of distances that are draw
         **{"clip_on": False, "zorder": 5},
     },
 }
+MANY = 200  # marks of a series, from which on they are drawn small, below the curves
+CROWDED: dict[str, dict[str, Any]] = {
+    CLOSEST: {"ms": 1.5, "mew": 0.0, "alpha": 0.35, "zorder": 2},
+    REFUTED: {"ms": 4.0, "mew": 0.3},
+}
 COLUMNS = {  # of `sampled_distances`, by kind of pairs and measure
     motions.ARMS: {CENTRES: "centres", LINKS: "links"},
     motions.OBSTACLES: {CENTRES: "centres_to_obstacles", LINKS: "links_to_obstacles"},
@@ -282,7 +287,10 @@ def _distances(axes: Axes, rows: pd.DataFrame, safety: float, required: str) -> 
     )
     for name, look in LOOKS.items():
         if name in series and len(series[name]):
-            axes.plot(series[name]["instant"], series[name]["distance"], **{"label": name} | look)
+            shown = (
+                {"label": name} | look | (CROWDED.get(name, {}) if len(series[name]) > MANY else {})
+            )
+            axes.plot(series[name]["instant"], series[name]["distance"], **shown)
     label = f"below the required distance: {required}"
     axes.axhspan(0.0, safety, color=style.FORBIDDEN, alpha=0.08, linewidth=0, label=label)
     axes.axhline(safety, color=style.FORBIDDEN, linewidth=1.0, linestyle=(0, (5, 2)))

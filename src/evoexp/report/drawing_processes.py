@@ -33,6 +33,7 @@ def on_all_cores(function: Callable[[Item], Result], items: Sequence[Item]) -> l
 
 
 def _on_all_cores(function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+    """Do what `on_all_cores` says, whatever collects garbage."""
     num_copies = min(int(joblib.cpu_count()), len(items)) - 1
     if num_copies < 1 or sys.platform != "linux":  # elsewhere libraries do not survive a fork
         return [function(item) for item in items]

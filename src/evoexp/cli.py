@@ -6,7 +6,6 @@ Exit codes: 0 done; 1 a replicate or a comparison failed; 2 the command could no
 
 import contextlib
 import errno
-import gc
 import importlib
 import os
 import sys
@@ -47,7 +46,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         open_streams()
         search_less()
         interruption.hear()
-        gc.disable()  # nothing that is loaded becomes garbage
         warnings.filterwarnings("ignore", GIVEN_UP, UserWarning)
     words = list(sys.argv[1:] if arguments is None else arguments)
     try:
@@ -58,6 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if is_process:
             _end_workers()
             settle_streams()
+            interruption.end()
             leave(code)
         return code
     except BaseException as error:
@@ -86,9 +85,6 @@ def _run(words: Sequence[str], is_process: bool) -> int:
         importlib.import_module("evoexp.batch.workers").start_server()
     given = command_parser(chosen).parse_intermixed_args(words[1:])
     given.is_process = is_process
-    if is_process:
-        gc.freeze()
-        gc.enable()
     with contextlib.ExitStack() as stack:
         if folders := getattr(given, "config_dir", ()):
             from evoexp.configuration.search_path import searched_first

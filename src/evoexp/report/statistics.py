@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import special, stats
+from scipy import stats
 
 from evoexp.records import FloatArray
 
@@ -126,20 +126,13 @@ def spread(values: FloatArray) -> Spread:
     return Spread(median, lower, upper, int(np.count_nonzero(~np.isnan(values))))
 
 
+@functools.cache  # a distribution function's band asks for the same ones again and again
 def wilson(successes: int, trials: int, confidence: float) -> Interval:
-    """Return Wilson's score interval of a proportion; [0, 1] without trials.
-
-    It is scipy's, which computes a p-value with it.
-    """
+    """Return Wilson's score interval of a proportion; [0, 1] without trials."""
     if trials == 0:
         return Interval(0.0, 1.0)
-    share, z = successes / trials, float(special.ndtri(0.5 + 0.5 * confidence))
-    scale = 2.0 * (trials + z**2)
-    middle = (2.0 * trials * share + z**2) / scale
-    half = z / scale * math.sqrt(4.0 * trials * share * (1.0 - share) + z**2)
-    return Interval(
-        middle - half if successes else 0.0, middle + half if successes < trials else 1.0
-    )
+    found = stats.binomtest(successes, trials).proportion_ci(confidence, method="wilson")
+    return Interval(float(found.low), float(found.high))
 
 
 def signed_rank(x: FloatArray, y: FloatArray) -> SignedRank:

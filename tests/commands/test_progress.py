@@ -1,6 +1,7 @@
 """Progress of a batch: condition by condition on a terminal, lines in a pipe, an honest ETA."""
 
 import io
+import os
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -106,6 +107,27 @@ def test_workers_leave_curves_that_are_shown(tmp_path: Path) -> None:
         shown.advance(outcome("a", 5.0))
     last = [line.split() for line in text(out).splitlines() if "random" in line or "GA" in line]
     assert last[-1] == ["[bold]random", "search", "0", "of", "2", "0", "–", "2", "x█▁"]
+
+
+@pytest.mark.parametrize("width", [100, 80, 60, 48])
+def test_no_word_is_broken_however_narrow_the_terminal(tmp_path: Path, width: int) -> None:
+    wanted = {"a": ("no redistribution", 60), "b": ("no new trajectories", 60)}
+    for key in wanted:
+        file = CurveFile(tmp_path, key, 0)
+        for index in range(40):
+            live_curves._written[str(tmp_path)] = 0.0  # long ago
+            generation: Any = SimpleNamespace(index=index, best_cost=40.0 - index)
+            file.hear(generation)
+        (tmp_path / f"{os.getpid()}.json").rename(tmp_path / f"{key}.json")
+    out = console(is_terminal=False, width=width)
+    shown = BatchProgress(out, wanted, tmp_path)
+    shown.advance(outcome("a", 162.25))
+    out.print(shown._shown())
+    words = text(out).split()
+    headers = ("condition", "done", "failed", "best", "cost", "convergence")
+    for word in (*headers, "redistribution", "trajectories", "162.2", "60"):
+        assert word in words
+    assert max(map(len, text(out).splitlines())) <= width
 
 
 @pytest.mark.parametrize(

@@ -27,6 +27,10 @@ class _Console(Console):
         """Render a text as it is, its control characters made visible."""
         return super().render_str(printable(text), **look)
 
+    def print(self, *objects: Any, soft_wrap: bool | None = None, **look: Any) -> None:
+        """Print; what is one line in a pipe is broken between words on a terminal."""
+        super().print(*objects, soft_wrap=soft_wrap and not self.is_terminal, **look)
+
     def on_broken_pipe(self) -> None:
         self.quiet = True
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -45,9 +49,16 @@ def coloured(text: str, colour: str = "") -> Text:
     return Text(printable(text), colour)
 
 
-def new_table(title: str = "") -> Table:
+def new_table(title: str = "") -> WordTable:
     """Return an empty table."""
     return WordTable(title=title or None, title_justify="left")
+
+
+def table_without_lines() -> WordTable:
+    """Return an empty table whose cells stand two columns apart."""
+    table = WordTable(box=None)
+    table.gap = 2
+    return table
 
 
 def add_hash_column(table: Table, name: str = "hash") -> None:

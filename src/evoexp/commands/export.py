@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from evoexp.commands.console import plain_console
 from evoexp.commands.motion_files import (
     add_motion_arguments,
     output_path,
@@ -72,7 +73,7 @@ def main(arguments: argparse.Namespace) -> int:
         content = as_csv(timed) if arguments.format == "csv" else as_json(found, timed)
     ending = ".csv" if arguments.format == "csv" else ".json"
     write(output_path(arguments, [found], ending), content)
-    print(_described(timed, limits))
+    plain_console().print(_described(timed, limits), soft_wrap=True)
     return 0
 
 

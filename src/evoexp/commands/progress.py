@@ -17,18 +17,18 @@ from rich.progress import (
     TextColumn,
     TimeElapsedColumn,
 )
-from rich.table import Table
 
 from evoexp.batch.jobs import Outcome
 from evoexp.batch.live_curves import Curve, read_curves
-from evoexp.commands.console import add_columns
+from evoexp.commands.console import add_columns, table_without_lines
+from evoexp.commands.word_tables import WordTable
 
 PLAIN_INTERVAL_S = 5.0  # [s] between plain lines
 MOST_ROWS = 12  # conditions in the table: those that a replicate ended of last
 MINUTES_FROM_S = 100.0  # [s] from which the rest is told in minutes
 BURST_S = 0.1  # [s] replicates that end so soon after the first one came with it, in one task
 REFRESHED = 4  # [1/s] how often the table is drawn
-CURVE_WIDTH = 16  # characters of a curve
+CURVE_WIDTH, NARROW_CURVE_WIDTH = 16, 11  # characters of a curve; where a terminal is narrow
 LEVELS, PLAIN_LEVELS = "▁▂▃▄▅▆▇█", "_.-=+*%#"  # from the least to the largest cost
 UNSOLVED = "x"
 LIVE_NOTE = (
@@ -155,22 +155,35 @@ class BatchProgress:
 
     def _shown(self) -> Group:
         self._hear()
-        table = Table(box=None, pad_edge=False)
-        add_columns(table, "condition")
-        add_columns(table, "done", "failed", "best cost", right=True)
-        if self._curves is not None:
-            add_columns(table, "generation", right=True)
-            table.add_column("convergence", no_wrap=True, min_width=CURVE_WIDTH)
         begun = [each for each in self._counts.values() if each.done or each.failed or each.curve]
-        last = begun[-MOST_ROWS:]
-        for each in sorted(last, key=lambda one: one.place):
-            best = f"{each.best:.4g}" if np.isfinite(each.best) else "–"
-            row = [each.label, f"{each.done} of {each.total}", str(each.failed), best]
-            table.add_row(*row, *self._curve(each.curve))
+        last = sorted(begun[-MOST_ROWS:], key=lambda one: one.place)
+        table = self._table(last)
+        if not table.fits(self._console):
+            table = self._table(last, is_narrow=True)
         parts: list[RenderableType] = [table] if begun else []
         if begun and self._curves is not None:
             parts.append(LIVE_NOTE)
         return Group(*parts, self._bar.get_renderable())
+
+    def _table(self, rows: Sequence[ConditionCount], *, is_narrow: bool = False) -> WordTable:
+        """Return the conditions; where it is narrow, with shorter curves and fewer columns."""
+        table = table_without_lines()
+        add_columns(table, "condition")
+        add_columns(table, "done", "failed", "best\ncost" if is_narrow else "best cost", right=True)
+        if self._curves is not None:
+            if not is_narrow:
+                add_columns(table, "generation", right=True)
+            width = NARROW_CURVE_WIDTH if is_narrow else CURVE_WIDTH
+            table.add_column("convergence", no_wrap=True, min_width=width)
+        for each in rows:
+            best = f"{each.best:.4g}" if np.isfinite(each.best) else "–"
+            cells = [each.label, f"{each.done} of {each.total}", str(each.failed), best]
+            if self._curves is not None:
+                generation = str(each.curve.generation) if each.curve else "–"
+                cells += [] if is_narrow else [generation]
+                cells.append(self._drawn(each.curve, width) if each.curve else "")
+            table.add_row(*cells)
+        return table
 
     def _hear(self) -> None:
         """Take note of what the workers left; conditions that are running stand last."""
@@ -180,13 +193,9 @@ class BatchProgress:
                 own.curve = curve
                 self._counts[curve.condition_id] = self._counts.pop(curve.condition_id)
 
-    def _curve(self, curve: Curve | None) -> list[str]:
-        if self._curves is None:
-            return []
-        if curve is None:
-            return ["–", ""]
+    def _drawn(self, curve: Curve, width: int) -> str:
         is_plain = not self._console.encoding.startswith("utf")
-        return [str(curve.generation), drawn(curve.costs, PLAIN_LEVELS if is_plain else LEVELS)]
+        return drawn(curve.costs, PLAIN_LEVELS if is_plain else LEVELS, width)
 
     def _plain(self) -> None:
         text = (
@@ -206,17 +215,18 @@ class BatchProgress:
         return f"{seconds / 60:.0f} min" if seconds >= MINUTES_FROM_S else f"{seconds:.0f} s"
 
 
-def drawn(costs: Sequence[float], levels: str = LEVELS) -> str:
+def drawn(costs: Sequence[float], levels: str = LEVELS, width: int = CURVE_WIDTH) -> str:
     """Draw costs as a line of characters.
 
     Args:
         costs: Of one replicate, in order.
         levels: Characters for the least to the largest of them.
+        width: The most characters.
 
     Returns:
-        At most `CURVE_WIDTH` characters, with the first and the last cost.
+        The characters, with the first and the last cost.
     """
-    places = np.linspace(0, len(costs) - 1, min(len(costs), CURVE_WIDTH)).round().astype(int)
+    places = np.linspace(0, len(costs) - 1, min(len(costs), width)).round().astype(int)
     shown = np.asarray(costs, dtype=np.float64)[places]
     finite = shown[np.isfinite(shown)]
     if not finite.size:

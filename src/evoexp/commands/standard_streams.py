@@ -2,7 +2,9 @@
 
 import contextlib
 import os
+import shutil
 import sys
+import textwrap
 from collections.abc import Iterator
 from typing import Any, TextIO, cast
 
@@ -73,6 +75,10 @@ def settle_streams() -> None:
 
 
 def complain(text: str) -> None:
-    """Print one line of words on standard error, if that can be done."""
+    """Print words on standard error, if that can be done: one line, no word broken on a terminal."""
+    line = f"evoexp: {printable(' '.join(text.split()))}"
     with contextlib.suppress(OSError, ValueError):
-        print(f"evoexp: {printable(' '.join(text.split()))}", file=sys.stderr, flush=True)
+        if sys.stderr.isatty():
+            columns = shutil.get_terminal_size().columns
+            line = textwrap.fill(line, columns, break_long_words=False, break_on_hyphens=False)
+        print(line, file=sys.stderr, flush=True)

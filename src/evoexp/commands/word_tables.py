@@ -13,19 +13,33 @@ class WordTable(Table):
 
     If its columns do not fit beside each other, it loses its lines; if they still do not, every row
     is shown as a list of names and values.
+
+    Attributes:
+        gap: Columns between cells where the table has no lines.
     """
+
+    gap = 1
+
+    def fits(self, console: Console) -> bool:
+        """Return whether its columns, without lines, fit beside each other on a console."""
+        ranges = [_range(column, console, console.options) for column in self.columns]
+        return self._bare(ranges) <= console.width
+
+    def _bare(self, ranges: Sequence[Measurement]) -> int:
+        """Return the least width without lines."""
+        return sum(size.minimum for size in ranges) + self.gap * (len(ranges) - 1)
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         """Render it for a width."""
         room = options.max_width
         ranges = [_range(column, console, options) for column in self.columns]
         least = sum(size.minimum for size in ranges)
-        if self.columns and least + _lines(ranges) > room:
-            if least + len(ranges) - 1 > room:
+        if self.columns and (self.box is None or least + _lines(ranges) > room):
+            if self._bare(ranges) > room:
                 yield from _stacked(self)
                 return
-            self.box, self.padding, self.pad_edge = None, (0, 1, 0, 0), False
-        lines = _lines(ranges) if self.box else len(ranges) - 1
+            self.box, self.padding, self.pad_edge = None, (0, self.gap, 0, 0), False
+        lines = _lines(ranges) if self.box else self.gap * (len(ranges) - 1)
         for column, width in zip(self.columns, _widths(ranges, room - lines), strict=True):
             column.width = width
         yield from super().__rich_console__(console, options)

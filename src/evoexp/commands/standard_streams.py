@@ -75,7 +75,7 @@ def settle_streams() -> None:
 
 
 def complain(text: str) -> None:
-    """Print words on standard error, if that can be done: one line, no word broken on a terminal."""
+    """Print words on standard error, if it can be: one line; on a terminal, no word broken."""
     line = f"evoexp: {printable(' '.join(text.split()))}"
     with contextlib.suppress(OSError, ValueError):
         if sys.stderr.isatty():

@@ -3,6 +3,7 @@
 import json
 import math
 import os
+import shutil
 import sys
 from collections.abc import Mapping
 from typing import Any
@@ -38,10 +39,12 @@ class _Console(Console):
 
 def plain_console() -> Console:
     """Return a console on stdout that prints text as it is: a label like `[4, 4]` is no markup."""
-    piped = not sys.stdout.isatty() and "COLUMNS" not in os.environ
-    return _Console(
-        markup=False, emoji=False, highlight=False, width=PIPED_WIDTH if piped else None
-    )
+    size: Any = {}
+    if not sys.stdout.isatty() and "COLUMNS" not in os.environ:
+        size["width"] = PIPED_WIDTH
+    elif os.environ.get("TERM") == "dumb":  # which rich takes to be 80 columns wide
+        size["width"], size["height"] = shutil.get_terminal_size()
+    return _Console(markup=False, emoji=False, highlight=False, **size)
 
 
 def coloured(text: str, colour: str = "") -> Text:

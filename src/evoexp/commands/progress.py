@@ -169,7 +169,8 @@ class BatchProgress:
         """Return the conditions; where it is narrow, with shorter curves and fewer columns."""
         table = table_without_lines()
         add_columns(table, "condition")
-        add_columns(table, "done", "failed", "best\ncost" if is_narrow else "best cost", right=True)
+        table.add_column("done", justify="right", no_wrap=not is_narrow)
+        add_columns(table, "failed", "best\ncost" if is_narrow else "best cost", right=True)
         if self._curves is not None:
             if not is_narrow:
                 add_columns(table, "generation", right=True)

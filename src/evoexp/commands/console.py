@@ -29,7 +29,7 @@ class _Console(Console):
         return super().render_str(printable(text), **look)
 
     def print(self, *objects: Any, soft_wrap: bool | None = None, **look: Any) -> None:
-        """Print; what is one line in a pipe is broken between words on a terminal."""
+        """Print; on a terminal, break between words a line that a pipe has whole."""
         super().print(*objects, soft_wrap=soft_wrap and not self.is_terminal, **look)
 
     def on_broken_pipe(self) -> None:

@@ -9,19 +9,19 @@ instants. A solution is flat: instant by instant, joint by joint (instants × nq
 """
 
 from collections.abc import Iterator
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
-from evoexp.collision.models.touching_spheres import SphereCollision, TouchingSpheres
-from evoexp.collision.scene import Scene, scene
-from evoexp.errors import SettingError
+from evoexp.collision.models.covered_bodies import CoveredBodies
+from evoexp.collision.models.touching_spheres import TouchingSpheres
 from evoexp.numeric.elementary import DEGREE
+from evoexp.paths.interpolation import interpolate_linear
 from evoexp.paths.motion import Motion
+from evoexp.planners.arm_tasks import ArmProblem, ArmTask, arm_problem
 from evoexp.planners.planner import JudgementArrays, Keeper, PlannerDefaults, Shape
 from evoexp.records import FloatArray, Generation
 from evoexp.robots.assembly import Robot
-from evoexp.scenarios.arm_motion import ArmMotion
 from evoexp.validation import Component, Count, NonNegative, Positive
 
 
@@ -41,22 +41,6 @@ class SearchSettings(Component):
     num_generations: Count
 
 
-class Problem(NamedTuple):
-    """Robot and scenario as the search needs them.
-
-    Attributes:
-        straight: (nq, instants) the straight path from start to goal [deg].
-        collision: The collision model.
-        scene: The bodies, for the exact verdict on a motion.
-        security_margin: Clearance that the task requires [length unit].
-    """
-
-    straight: FloatArray
-    collision: SphereCollision
-    scene: Scene
-    security_margin: float
-
-
 class MyPlanner(PlannerDefaults, Component):
     """The search.
 
@@ -74,74 +58,63 @@ class MyPlanner(PlannerDefaults, Component):
     max_displacement: Positive
     collision_weight: NonNegative
     ga: SearchSettings
-    collision: TouchingSpheres
+    collision: TouchingSpheres | CoveredBodies
 
-    def prepare(self, robot: Robot, scenario: ArmMotion) -> Problem:
-        """Build the robot, and check that start and goal are free of collision.
+    def prepare(self, robot: Robot, scenario: ArmTask) -> ArmProblem:
+        """Build robot and scene, and check that start and goal are free of collision."""
+        return arm_problem(robot, scenario, self.collision)
 
-        Raises:
-            SettingError: If they are not.
-        """
-        assembly = robot.build()
-        start, goal = scenario.ends(assembly.arm_slices)
-        collision = self.collision.bind(assembly, scenario.obstacles)
-        for name, q in (("q_start", start), ("q_goal", goal)):
-            if collision.clearance(q[:, None]).least[0] < 0.0:
-                raise SettingError(f"scenario.{name}", "free of collision", q.tolist())
-        straight = np.linspace(start, goal, self.num_via_points + 2, axis=1)
-        bodies = scene(assembly, scenario.obstacles)
-        return Problem(straight, collision, bodies, scenario.security_margin)
-
-    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
+    def evolve(self, problem: ArmProblem, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield the initial population, then λ displaced paths per generation."""
         keeper = Keeper()
         population = self.sample(problem, rng, self.ga.population_size)
         for _ in range(self.ga.num_generations + 1):
             yield keeper.record_judged(self, problem, population, self.cost(problem, population))
-            parent = keeper.best.solution.reshape(problem.straight.T.shape).T
-            population = self._displaced(parent, rng, self.ga.num_offspring)
+            parent = self._path(problem, keeper.best.solution)
+            population = self._displaced(problem, parent, rng, self.ga.num_offspring)
 
-    def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
+    def sample(self, problem: ArmProblem, rng: np.random.Generator, count: int) -> FloatArray:
         """Return displaced straight paths."""
-        return self._displaced(problem.straight, rng, count)
+        straight = np.linspace(problem.start, problem.goal, self.num_via_points + 2, axis=1)
+        return self._displaced(problem, straight, rng, count)
 
-    def _displaced(self, path: FloatArray, rng: np.random.Generator, count: int) -> FloatArray:
-        """Return copies of a path (nq, instants) whose via-points are displaced at random."""
+    def _displaced(
+        self, problem: ArmProblem, path: FloatArray, rng: np.random.Generator, count: int
+    ) -> FloatArray:
+        """Return copies of a path (nq, instants) with via-points displaced, within joint limits."""
         population = np.repeat(path[:, :, None], count, axis=2)
         moves = 2.0 * rng.random((len(path), self.num_via_points, count)) - 1.0
         population[:, 1:-1] += self.max_displacement * moves
-        return population
+        return np.clip(population, *problem.limits.T[:, :, None, None])
 
-    def cost(self, problem: Problem, population: FloatArray) -> JudgementArrays:
+    def cost(self, problem: ArmProblem, population: FloatArray) -> JudgementArrays:
         """Judge paths: their length, and how many of the tested configurations collide."""
         steps = np.diff(population, axis=1)  # (nq, segments, individuals)
         length = np.sqrt((steps**2).sum(axis=0)).sum(axis=0)
         # configurations at equal distances along every segment, its end included
-        part = np.linspace(0.0, 1.0, self.collision.collision_substeps + 1)[1:, None]
-        q = population[:, :-1, None] + part * steps[:, :, None]
-        clearance = problem.collision.clearance(q.reshape(len(q), -1), limit=0.0).least
-        collisions = (clearance < 0.0).reshape(-1, population.shape[2]).sum(axis=0)
+        q = interpolate_linear(population, self.collision.collision_substeps)
+        collides = problem.collision.collides(q.reshape(len(q), -1)).reshape(q.shape[1:])
+        collisions = collides.sum(axis=0)
         cost = length + self.collision_weight * collisions
         terms = {"length_deg": length, "collisions": collisions}
-        return JudgementArrays(cost, collisions == 0, q[0].size, terms)
+        return JudgementArrays(cost, collisions == 0, collides.size, terms)
 
-    def solution(self, problem: Problem, population: FloatArray, individual: int) -> FloatArray:
+    def solution(self, problem: ArmProblem, population: FloatArray, individual: int) -> FloatArray:
         """Return one path as a flat solution."""
         return population[:, :, individual].T.ravel()
 
-    def motion(self, problem: Problem, solution: FloatArray) -> Motion:
+    def _path(self, problem: ArmProblem, solution: FloatArray) -> FloatArray:
+        """Return the path (nq, instants) of a solution; ValueError if it has another size."""
+        return solution.reshape(-1, len(problem.start)).T
+
+    def motion(self, problem: ArmProblem, solution: FloatArray) -> Motion:
         """Return the motion of a solution: straight from instant to instant."""
-        return Motion(DEGREE * solution.reshape(problem.straight.T.shape))
+        return Motion(DEGREE * self._path(problem, solution).T)
 
-    def evaluate(self, problem: Problem, solution: FloatArray) -> dict[str, float]:
-        """Return length and collisions of a solution.
+    def evaluate(self, problem: ArmProblem, solution: FloatArray) -> dict[str, float]:
+        """Return length and collisions of a solution."""
+        return self.cost(problem, self._path(problem, solution)[:, :, None]).named_terms(0)
 
-        Raises:
-            ValueError: If the solution has another size.
-        """
-        path = solution.reshape(problem.straight.T.shape).T
-        return self.cost(problem, path[:, :, None]).named_terms(0)
-
-    def shape(self, problem: Problem) -> Shape:
+    def shape(self, problem: ArmProblem) -> Shape:
         """Return the shape of a solution: one part, (instants, nq)."""
-        return (problem.straight.T.shape,)
+        return ((self.num_via_points + 2, len(problem.start)),)

@@ -8,7 +8,9 @@ import shlex
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
+import duckdb
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import pytest
@@ -23,25 +25,62 @@ from evoexp.configuration.search_path import options
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")])
 MENU = ROOT / "scripts/mkdocs.yml"
-ELSEWHERE = "tcp:|my_search|HASH"  # a cluster; a package, which `test_new` installs
+RUN = {"bash": "commands", "python": "code", "sql": "queries"}  # languages of blocks that are run
+FILES = {"xml", "yaml", "csv", "ini"}  # of blocks that are files: `title="…"` names each
+# Commands that the tests of this module leave out, each with the reason.
+LEFT_OUT = {
+    "git clone": "only the reader knows the address",
+    "cd evoexp": "the same",
+    "pip install": "tests/test_guest_package.py installs packages in environments",
+    "-m venv": "tests/test_guest_package.py makes environments",
+    "my_env/bin/activate": "the same",
+    "my_search": "a package that is installed: tests/test_guest_package.py",
+    "HASH": "a run of that package: tests/test_guest_package.py",
+    "tcp:": "a cluster: tests/batch/test_cluster.py",
+    "scripts/test": "the command that runs this very test",
+    "scripts/check-matrix": "other interpreters: tests/reproducibility/test_check_matrix.py",
+}
 each_page = pytest.mark.parametrize("page", PAGES, ids=lambda path: path.name)
 
 
-def blocks(text: str, *languages: str) -> list[str]:
-    found = re.findall(r"^```(\w*)\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
-    return [block for language, block in found if language in languages]
+class Block(NamedTuple):
+    """A block of a page: its language, the name of the file that it is, its text."""
+
+    language: str
+    name: str
+    text: str
+
+
+def blocks(page: Path, *languages: str) -> list[Block]:
+    """Return the blocks of a page, or those in some languages."""
+    pattern = r'^```(\w*)(?: title="([^"]+)")?\n(.*?)^```$'
+    found = re.findall(pattern, page.read_text(), flags=re.MULTILINE | re.DOTALL)
+    return [Block(*each) for each in found if not languages or each[0] in languages]
+
+
+def lines(page: Path) -> list[str]:
+    """Return every command of a page's blocks."""
+    found = []
+    for block in blocks(page, "bash"):
+        for line in block.text.replace("\\\n", " ").splitlines():
+            line = re.sub(r'^eval "\$\((.*)\)"', r"\1", line)
+            words = shlex.join(shlex.split(line, comments=True))
+            found += [part.strip() for part in re.split(r"';'|;|'&&'|&&", words)]
+    return [line for line in found if line]
 
 
 def commands(page: Path) -> list[list[str]]:
     """Return the words of every evoexp command of a page, without the program's name."""
-    found = []
-    for block in blocks(page.read_text(), "bash", ""):
-        for line in block.replace("\\\n", " ").splitlines():
-            for part in re.split(";|&&", line):
-                words = shlex.split(part, comments=True)
-                if words and words[0] in ("evoexp", "./scripts/evoexp"):
-                    found.append(words[1:])
-    return found
+    every = [shlex.split(line) for line in lines(page)]
+    return [words[1:] for words in every if words[0] in ("evoexp", "./scripts/evoexp")]
+
+
+def write_files(page: Path, folder: Path) -> None:
+    """Write the files that a page shows."""
+    for block in blocks(page, *FILES):
+        path = folder / block.name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(block.text)
 
 
 def anchors(page: Path) -> set[str]:
@@ -60,6 +99,34 @@ def test_links_lead_to_files_and_headings(page: Path) -> None:
         path = (page.parent / name).resolve() if name else page
         assert path.exists(), target
         assert not anchor or anchor in anchors(path), target
+
+
+@each_page
+def test_every_block_is_run_or_is_a_file(page: Path) -> None:
+    for block in blocks(page):
+        assert block.language in RUN if not block.name else block.language in FILES, block
+    outside = re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+    assert "```" not in outside
+    assert not re.findall(r"^\n(?: {4,}|\t)\S.*", outside, flags=re.MULTILINE)  # by indentation
+
+
+@each_page
+def test_every_command_is_run_or_left_out_for_a_reason(page: Path) -> None:
+    for line in lines(page):
+        is_ours = shlex.split(line)[0] in ("evoexp", "./scripts/evoexp")
+        assert is_ours or any(part in line for part in LEFT_OUT), line
+
+
+def test_every_reason_is_needed() -> None:
+    every = "\n".join(line for page in PAGES for line in lines(page))
+    assert [part for part in LEFT_OUT if part not in every] == []
+
+
+@each_page
+def test_commands_within_sentences_are_commands(page: Path) -> None:
+    text = re.sub(r"^```.*?^```$", "", page.read_text(), flags=re.MULTILINE | re.DOTALL)
+    for name in re.findall(r"`(?:\./scripts/)?evoexp ([^\s`]+)[^`]*`", text):
+        assert name in COMMANDS, name
 
 
 def test_the_readme_is_short() -> None:
@@ -85,7 +152,7 @@ def experiments() -> frozenset[str]:
 
 def is_elsewhere(words: list[str]) -> bool:
     """Whether a command names files or packages that only the reader has."""
-    return any(re.search(r"path/to|PATH|my_|mine|HASH|tcp:|tests/robots|my-", w) for w in words)
+    return any(re.search(r"path/to|PATH|my_|mine|HASH|tcp:|arm.urdf|[.]csv", w) for w in words)
 
 
 @each_page
@@ -114,16 +181,11 @@ def fresh_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Pa
 def readers_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with the runs and files that pages speak of."""
     folder = tmp_path_factory.mktemp("reader")
-    (folder / "tests").symlink_to(ROOT / "tests")
-    (folder / "PATH").symlink_to(ROOT / "src/evoexp/assets/motionbenchmaker")
-    (folder / "thesis.mplstyle").write_text("font.family: serif\n")
-    for name in ("path/to", "my_options/experiment", "my_options/ga"):
-        (folder / name).mkdir(parents=True)
-    (folder / "my_options/ga/gentle.yaml").write_text(
-        (ROOT / "conf/ga/rana_planar.yaml").read_text()
+    (folder / "path/to").mkdir(parents=True)
+    (folder / "path/to/problems").symlink_to(ROOT / "src/evoexp/assets/motionbenchmaker/problems")
+    (folder / "path/to/mine.yaml").write_text(
+        (ROOT / "conf/experiment/rana_planar.yaml").read_text()
     )
-    for path in ("path/to/mine.yaml", "my_options/experiment/mine.yaml"):
-        (folder / path).write_text((ROOT / "conf/experiment/rana_planar.yaml").read_text())
     with pytest.MonkeyPatch.context() as patch, fresh_folder(folder, patch):
         assert main(["run", "experiment=rana_planar"]) == 0
         assert main(["pack", "4da921", "-o", "path/to/runs.tar"]) == 0
@@ -136,7 +198,10 @@ def shortened(words: list[str]) -> list[str]:
     """Return a command with which a long run is over in seconds."""
     is_long = words[0] == "run" and not {"experiment=rana_planar", "-m"} & set(words)
     is_short = any(word.startswith("budget=") for word in words)
-    return [*words, "budget=smoke", "num_replicates=1"] if is_long and not is_short else words
+    if is_long and not is_short:
+        return [*words, "budget=smoke", "num_replicates=1"]
+    # what was run above at the smoke budget, if anything, is compared at it
+    return [*words, "budget=smoke"] if words[0] == "compare" and "arena" in words[1] else words
 
 
 @pytest.mark.matrix
@@ -144,39 +209,50 @@ def shortened(words: list[str]) -> list[str]:
 def test_every_command_can_be_run(
     page: Path, readers_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    found = [words for words in commands(page) if not re.search(ELSEWHERE, " ".join(words))]
-    if not found or page.name == "README.md":
-        pytest.skip("no commands, or run in a folder of their own")
+    found = [
+        words
+        for words in commands(page)
+        if not any(part in " ".join(words) for part in ("my_search", "HASH", "tcp:"))
+    ]
+    if not found:
+        pytest.skip("the page has no commands that are run here")
+    if page.name == "README.md":
+        pytest.skip("run as they stand, in an empty folder, by the next test")
     folder = shutil.copytree(readers_folder, tmp_path / "reader", symlinks=True)
+    write_files(page, folder)
     with fresh_folder(folder, monkeypatch):
         for words in found:
             assert main(shortened(words)) == (words[0] == "diff"), words
 
 
 @pytest.mark.matrix
-def test_the_readmes_commands_run_as_they_stand(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("page", [ROOT / "README.md", ROOT / "docs/index.md"], ids=lambda p: p.name)
+def test_first_commands_run_as_they_stand(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with fresh_folder(tmp_path, monkeypatch):
-        found = commands(ROOT / "README.md")
-        assert len(found) >= 8
+        found = commands(page)
+        assert len(found) >= 5
         for words in found:
             assert main(words) == 0, words
         assert (tmp_path / "outputs/reports/index.html").is_file()
 
 
 @each_page
-def test_code_runs_as_it_stands(
+def test_code_and_queries_run_as_they_stand(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    code = blocks(page.read_text(), "python")
-    if not code:
+    found = blocks(page, "python", "sql")
+    if not found:
         pytest.skip("no code")
     with fresh_folder(tmp_path, monkeypatch):
         assert main(["run", "experiment=rana_planar", "budget=smoke", "--no-report"]) == 0
         names: dict[str, object] = {}
-        for block in code:
-            exec(compile(block, page.name, "exec"), names)
+        for block in found:
+            if block.language == "sql":
+                assert duckdb.sql(block.text).fetchall(), block.text
+            else:
+                exec(compile(block.text, page.name, "exec"), names)
 
 
 def test_the_notebook_remakes_a_figure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -21,6 +21,7 @@ from evoexp.cli import main
 from evoexp.commands.command_parser import COMMANDS, command_parser
 from evoexp.configuration import expansions
 from evoexp.configuration.search_path import options
+from evoexp.version import __version__
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")])
@@ -141,6 +142,7 @@ def test_every_page_is_in_the_menu() -> None:
 def test_the_citation_can_be_read() -> None:
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
     assert citation["cff-version"] and citation["license"] == "MIT"
+    assert citation["version"] == __version__
     assert len(citation["references"]) == 5
     assert all(reference["authors"] and reference["year"] for reference in citation["references"])
 

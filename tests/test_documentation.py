@@ -202,8 +202,9 @@ def shortened(words: list[str]) -> list[str]:
     is_short = any(word.startswith("budget=") for word in words)
     if is_long and not is_short:
         return [*words, "budget=smoke", "num_replicates=1"]
-    # what was run above at the smoke budget, if anything, is compared at it
-    return [*words, "budget=smoke"] if words[0] == "compare" and "arena" in words[1] else words
+    # a comparison of what was run above, at that budget
+    is_of_page = words[0] == "compare" and "rana_planar" not in words
+    return [*words, "budget=smoke"] if is_of_page else words
 
 
 @pytest.mark.matrix

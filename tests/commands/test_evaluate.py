@@ -80,6 +80,8 @@ def test_several_conditions_are_several_objects_and_columns(evoexp: Evoexp, moti
     assert all(row["condition"][:12] in table and row["label"] in table for row in rows)
     apart = {"label", "condition", "length_unit", "departures"}
     assert all(f"│ {name} " in table for name in rows[0].keys() - apart)
+    (fitness,) = (line for line in table.splitlines() if "│ fitness " in line)
+    assert fitness.count("│") == 3, "conditions that judge the motion alike share a column"
 
 
 def test_a_motion_that_stays_at_the_start_is_no_solution_though_it_touches_nothing(
@@ -112,9 +114,10 @@ def test_overrides_and_only_narrow_it_down(evoexp: Evoexp, motion: Path) -> None
 def test_tables_are_never_cut(
     evoexp: Evoexp, motion: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    words = ("evaluate", "-m", "experiment=rana_obstacles", "seed=0,1", str(motion))
+    swept = "objective.length_weight=0.5,1.0"
+    words = ("evaluate", "-m", "experiment=rana_obstacles", swept, str(motion))
     rows = json.loads(evoexp(*words, "--json").out)
-    assert [row["label"] for row in rows] == ["seed=0", "seed=1"]
+    assert len(rows) == 2
     for width in (60, 140):
         monkeypatch.setenv("COLUMNS", str(width))
         out = evoexp(*words).out

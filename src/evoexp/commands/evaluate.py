@@ -28,6 +28,7 @@ from evoexp.playback.stored import CHOICES, chosen_log
 
 DEPARTURES = "departures"  # of a row: the ways in which the motion is none of the task
 HEX = re.compile("[0-9a-fA-F]{1,64}")  # a prefix of a hash
+_Judged = tuple[dict[str, Any], Listing | None]  # a row, and its table of configurations
 HEAD = ("label", "condition", "length_unit")  # of a row; its other entries are terms and verdict
 
 
@@ -56,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def main(arguments: argparse.Namespace) -> int:
-    """Print terms and exact verdict of the motion, one column per condition that it fits."""
+    """Print terms and exact verdict of the motion; conditions that say the same share a column."""
     fitting = _motions(arguments)
     if arguments.write is not None:
         _, _, planner, problem, solution = fitting[0]
@@ -77,15 +78,29 @@ def main(arguments: argparse.Namespace) -> int:
         print_json(whole if len(whole) > 1 else whole[0])
         return 0
     console = plain_console()
-    for row, listing in zip(rows, listings, strict=True):
-        if listing is not None:
-            console.print(_listing(row["label"], listing))
-    for table in _tables(rows, console.width):
+    groups = _alike(list(zip(rows, listings, strict=True)))
+    for group in groups:
+        if (listing := group[0][1]) is not None:
+            console.print(_listing(_labels(group), listing))
+    for table in _tables([[row for row, _ in group] for group in groups], console.width):
         console.print(table)
-    for row in rows:
-        for departure in row[DEPARTURES]:
-            console.print(f"{row['label']} – no solution of the task: {departure}")
+    for group in groups:
+        for departure in group[0][0][DEPARTURES]:
+            console.print(f"{_labels(group)} – no solution of the task: {departure}")
     return 0
+
+
+def _labels(group: Sequence[_Judged]) -> str:
+    return ", ".join(row["label"] for row, _ in group)
+
+
+def _alike(judged: Sequence[_Judged]) -> list[list[_Judged]]:
+    """Return conditions in groups: those of one group say the same of the motion."""
+    groups: dict[str, list[_Judged]] = {}
+    for row, listing in judged:
+        said = {name: value for name, value in row.items() if name not in HEAD[:2]}
+        groups.setdefault(repr((said, listing)), []).append((row, listing))
+    return list(groups.values())
 
 
 def _motions(arguments: argparse.Namespace) -> Sequence[FittingMotion]:
@@ -131,23 +146,24 @@ def _listing(label: str, listing: Listing) -> Table:
     return table
 
 
-def _tables(rows: list[dict[str, Any]], width: int) -> list[Table]:
-    """Return a table with one column per condition; more in a narrow terminal."""
-    apart = (*HEAD, DEPARTURES)
+def _tables(columns: list[list[dict[str, Any]]], width: int) -> list[Table]:
+    """Return a table with one column per group of conditions; more in a narrow terminal."""
+    apart, rows = (*HEAD, DEPARTURES), [row for group in columns for row in group]
     names = list(dict.fromkeys(name for row in rows for name in row if name not in apart))
     longest_word = max(len(word) for row in rows for word in row["label"].split())
     column = min(max(12, longest_word), 40) + 3
     count = max(1, (width - max(map(len, names)) - 4) // column)
-    return [_table(rows[k : k + count], names) for k in range(0, len(rows), count)]
+    return [_table(columns[k : k + count], names) for k in range(0, len(columns), count)]
 
 
-def _table(rows: list[dict[str, Any]], names: list[str]) -> Table:
+def _table(columns: list[list[dict[str, Any]]], names: list[str]) -> Table:
     table = new_table()
     table.add_column("", no_wrap=True)
-    for row in rows:
-        add_columns(table, f"{row['label']}\n{row['condition'][:12]}", right=True)
+    for group in columns:
+        heads = (f"{row['label']}\n{row['condition'][:12]}" for row in group)
+        add_columns(table, "\n".join(heads), right=True)
     for name in names:
-        table.add_row(name, *(_cell(row.get(name)) for row in rows))
+        table.add_row(name, *(_cell(group[0].get(name)) for group in columns))
     return table
 
 

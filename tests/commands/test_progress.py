@@ -55,7 +55,7 @@ def test_a_pipe_has_lines(clock: list[float]) -> None:
     assert text(out).splitlines() == [
         "replicates: 1 of 5 done, 0 failed, ETA –",
         "replicates: 2 of 5 done, 0 failed, ETA 30 s",
-        "replicates: 2 of 5 done, 1 failed, ETA 11 s",
+        "replicates: 2 of 5 done, 1 failed, ETA 2 s",
     ]
 
 
@@ -68,6 +68,13 @@ def test_the_first_replicate_does_not_count_for_the_rest(clock: list[float]) -> 
     clock[0] = 61.0
     shown.advance(outcome("a", 1.0))
     assert shown._eta() == "57 s"
+
+
+def test_nor_does_the_first_one_of_another_condition(clock: list[float]) -> None:
+    shown = BatchProgress(console(is_terminal=False), {"a": ("GA", 20), "b": ("RRT", 20)})
+    for clock[0], key in [(60.0, "a"), (61.0, "a"), (62.0, "a"), (100.0, "b"), (101.0, "b")]:
+        shown.advance(outcome(key, 1.0))
+    assert shown._eta() == "35 s"
 
 
 def test_a_terminal_has_a_row_per_condition() -> None:

@@ -48,6 +48,7 @@ class ConditionCount:
         failed: Of these.
         best: Least cost of those that are done.
         curve: Of one that is running, or was; None: nothing is known.
+        first_end: When the first of its replicates ended [s]; None: none has.
     """
 
     def __init__(self, place: int, label: str, total: int) -> None:
@@ -56,6 +57,7 @@ class ConditionCount:
         self.done = self.failed = 0
         self.best = np.inf
         self.curve: Curve | None = None
+        self.first_end: float | None = None
 
     def count(self, outcome: Outcome) -> None:
         """Count one replicate."""
@@ -68,8 +70,8 @@ class ConditionCount:
 class BatchProgress:
     """Counts replicates done and failed, condition by condition, and says when the rest will be.
 
-    The first replicate compiles or loads kernels, so that the time of the others is told by those
-    that end after it.
+    The first replicate of a condition compiles or loads kernels, so that the time of the others is
+    told by those that end after it.
     """
 
     def __init__(
@@ -93,6 +95,8 @@ class BatchProgress:
         self._total = sum(each.total for each in self._counts.values())
         self._last_line = time.monotonic()
         self._first: tuple[float, int] | None = None  # when the first had ended, and how many
+        self._last_end = self._last_line  # of a replicate
+        self._measured = (0.0, 0)  # [s] up to the ends of later ones of a condition, and how many
         self._bar = Progress(
             SpinnerColumn(),
             TextColumn("{task.description}"),
@@ -146,6 +150,12 @@ class BatchProgress:
         self._counts[outcome.condition_id] = own  # the last one of all
         own.count(outcome)
         now = time.monotonic()
+        if own.first_end is None:
+            own.first_end = now
+        elif now - own.first_end >= BURST_S:
+            seconds, count = self._measured
+            self._measured = seconds + now - self._last_end, count + 1
+        self._last_end = now
         if self._first is None or now - self._first[0] < BURST_S:
             self._first = now if self._first is None else self._first[0], self._ended
         self._bar.update(self._task, advance=1, failed=self._failed, eta=self._eta())
@@ -212,7 +222,10 @@ class BatchProgress:
         since, num_first = self._first or (0.0, self._ended)
         if self._ended == num_first:
             return "–"
-        seconds = (time.monotonic() - since) / (self._ended - num_first) * left
+        took, count = self._measured
+        if not count:  # all were the first of a condition
+            took, count = time.monotonic() - since, self._ended - num_first
+        seconds = took / count * left
         return f"{seconds / 60:.0f} min" if seconds >= MINUTES_FROM_S else f"{seconds:.0f} s"
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from command_samples import SMALL, Evoexp
 
+from evoexp.commands.list_ import origin_of
 from evoexp.store.run_directory import find_runs
 
 Refused = Callable[..., str]
@@ -29,11 +30,17 @@ def test_view_writes_a_page_of_the_best_replicate(
     assert "rana_planar · " in path.read_text()
 
 
-def test_view_puts_two_runs_side_by_side(evoexp: Evoexp, tmp_path: Path, runs: list[str]) -> None:
+def test_view_puts_two_runs_side_by_side(
+    evoexp: Evoexp, tmp_path: Path, stored: Path, runs: list[str]
+) -> None:
     path = tmp_path / "deep" / "two.html"
     assert evoexp("view", *runs, "--worst", "-o", str(path)).code == 0
     text = path.read_text()
     assert all(run in text for run in runs)
+    for run in find_runs(stored):  # named as `list` names them
+        origin = origin_of(run)
+        title = json.dumps(f"{origin['experiment']} · {origin['label']}")
+        assert f'"title":{title}' in text
 
 
 def test_a_log_alone_is_enough(

@@ -24,6 +24,10 @@
     return made;
   };
 
+  function written(pen, text, x, y, colour, behind) {  // with a rim, so that lines behind it do not cross it out
+    pen.lineJoin = "round"; pen.lineWidth = 3.5; pen.strokeStyle = behind; pen.strokeText(text, x, y);
+    pen.fillStyle = colour; pen.fillText(text, x, y);
+  }
   function sized(canvas) {  // in device pixels; whether anything is to be seen
     const scale = Math.max(2, window.devicePixelRatio || 1), { clientWidth: w, clientHeight: h } = canvas;
     if (canvas.width !== Math.round(w * scale) || canvas.height !== Math.round(h * scale)) {
@@ -232,7 +236,7 @@
       pen.beginPath();
       for (const [a, b] of [[-5, -5], [-5, 5]]) { pen.moveTo(x + a, y + b); pen.lineTo(x - a, y - b); }
       pen.stroke();
-      pen.fillText(name, x + 8, y - 6);
+      written(pen, name, x + 8, y - 6, css("target"), css("stage"));
     }
     listen() {
       let from = null;
@@ -286,13 +290,13 @@
       if (motion.margin > 0) {
         pen.strokeStyle = css("faint"); pen.setLineDash([5, 4]); pen.beginPath(); pen.moveTo(left, Y(motion.margin)); pen.lineTo(right, Y(motion.margin));
         pen.stroke(); pen.setLineDash([]);
-        pen.fillStyle = css("faint"); pen.textAlign = "right"; pen.fillText(`required ${shown(motion.margin)}`, right, Y(motion.margin) - 4);
       }
       pen.strokeStyle = css("ink"); pen.lineWidth = 1.6; pen.beginPath();
       this.values.forEach((v, k) => { if (isFinite(v)) pen.lineTo(X(clock.times[k]), Y(v)); });
       pen.stroke();
       const at = motion.least_at;
       if (at !== null) this.mark(pen, X(at), Y(motion.least), motion.contacts.length ? css("bad") : css("ink"));
+      if (motion.margin > 0) this.required(pen, X, Y, { left, right, top, bottom });
       this.cursor(pen, share, X, Y, top, bottom);
     }
     axes(pen, X, Y, { left, right, top, bottom, w }) {
@@ -308,6 +312,19 @@
       pen.fillText("instant", (left + right) / 2, bottom + 28);
       pen.textAlign = "left"; pen.fillStyle = css("ink");
       pen.fillText(`clearance [${this.motion.unit}]${this.any ? "" : ": no two bodies are watched"}`, 10, 14);
+    }
+    required(pen, X, Y, { left, right, top, bottom }) {  // the margin's name, where it is farthest from the curve
+      const text = `required ${shown(this.motion.margin)}`, wide = pen.measureText(text).width, line = Y(this.motion.margin);
+      const curve = this.values.map((v, k) => [X(this.clock.times[k]), Y(v)]).filter(p => isFinite(p[1]));
+      let best = [-1, left, line - 4];
+      for (let k = 0; k <= 12; k++) for (const base of [line - 4, line + 12]) {
+        if (base - 9 < top || base > bottom) continue;
+        const x = left + 3 + (right - left - wide - 6) * k / 12;
+        const near = curve.filter(p => p[0] > x - 6 && p[0] < x + wide + 6).map(p => Math.max(base - 9 - p[1], p[1] - base, 0));
+        const room = Math.min(40, ...near);
+        if (room > best[0]) best = [room, x, base];
+      }
+      pen.textAlign = "left"; written(pen, text, best[1], best[2], css("faint"), css("card"));
     }
     mark(pen, x, y, colour) {
       pen.fillStyle = colour; pen.beginPath();
@@ -355,7 +372,13 @@
   document.body.classList.toggle("several", motions.length > 1);
   if (new Set(motions.map(m => `${m.unit} ${m.planar}`)).size === 1) {  // side by side in one scale
     const radius = Math.max(...motions.map(m => m.radius)), extent = [0, 1].map(k => Math.max(...motions.map(m => m.extent[k])));
-    for (const motion of motions) Object.assign(motion, { radius, extent });
+    const bound = (k, way) => way * Math.max(...motions.map(m => way * m.center[k] + m.extent[k]));
+    const low = [0, 1, 2].map(k => bound(k, -1)), high = [0, 1, 2].map(k => bound(k, 1));
+    const together = low.map((v, k) => 0.5 * (high[k] - v)), same = together.every((v, k) => v <= 1.25 * Math.max(...motions.map(m => m.extent[k])));
+    for (const motion of motions) {
+      Object.assign(motion, { radius, extent });
+      if (same) Object.assign(motion, { radius: Math.max(radius, Math.hypot(...together)), extent: together, center: low.map((v, k) => 0.5 * (v + high[k])) });
+    }
   }
   const cards = motions.map(card);
 
@@ -379,19 +402,40 @@
     $("play").textContent = on ? "❚❚" : "▶";
     show();
   }
+  async function copied(text) {
+    try { await navigator.clipboard.writeText(text); return true; } catch { }
+    const field = element("textarea", { value: text });
+    document.body.append(field); field.select();
+    const done = document.execCommand("copy");
+    field.remove();
+    return done;
+  }
   function jump(share) {
     state.share = Math.min(1, Math.max(0, share)); play(false);
-    history.replaceState(null, "", `#t=${state.share.toFixed(4)}`);  // the address is a link to this moment
+    try { history.replaceState(null, "", `#t=${state.share.toFixed(4)}`); } catch { }  // browsers bear only so many a second
   }
 
   $("play").addEventListener("click", () => state.playing ? jump(state.share) : play(true));
   $("time").addEventListener("input", e => jump(Number(e.target.value)));
   $("ghosts").addEventListener("change", e => { state.ghosts = e.target.checked; show(); });
   $("ways").addEventListener("change", e => { state.ways = e.target.checked; show(); });
+  $("link").addEventListener("click", async () => {
+    jump(state.share);
+    const told = await copied(location.href) ? "copied" : "see the address";
+    $("link").textContent = told;
+    setTimeout(() => { $("link").textContent = "copy link"; }, 1500);
+  });
   $("view").addEventListener("click", () => { for (const { view } of cards) view.reset(); show(); });
   document.addEventListener("keydown", e => {
     if (["SELECT", "BUTTON"].includes(e.target.tagName)) return;
     if (e.key === " ") { e.preventDefault(); $("play").click(); }
+    const faster = { ArrowUp: 1, ArrowDown: -1 }[e.key], end = { Home: 0, End: 1 }[e.key];
+    if (faster) {
+      const speed = $("speed");
+      speed.selectedIndex = Math.min(speed.options.length - 1, Math.max(0, speed.selectedIndex + faster));
+      e.preventDefault();
+    }
+    if (end !== undefined) { jump(end); e.preventDefault(); }
     if (e.key === "ArrowRight" && e.target.id !== "time") jump(state.share + 0.01);
     if (e.key === "ArrowLeft" && e.target.id !== "time") jump(state.share - 0.01);
   });
@@ -399,6 +443,7 @@
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", show);
   const asked = /[#&]t=([\d.]+)/.exec(location.hash);  // page.html#t=0.5 stands still half way
   play(false);
-  if (asked) jump(Number(asked[1])); else if (!matchMedia("(prefers-reduced-motion: reduce)").matches) play(true);
+  const still = window.parent !== window || matchMedia("(prefers-reduced-motion: reduce)").matches;  // within a report it waits
+  if (asked) jump(Number(asked[1])); else if (!still) play(true);
   window.motionPage = { jump, play, state, motions, picture: k => { draw(0); return cards[k].view.canvas.toDataURL(); } };
 })();

@@ -2,13 +2,13 @@
 
 import argparse
 import math
-from collections.abc import Mapping
 from pathlib import Path
 
 from evoexp import shipped
 from evoexp.commands.arguments import add_config_dir_argument, is_override
 from evoexp.commands.given_motion import fitting_motions, is_motion
 from evoexp.commands.hashes import with_candidates
+from evoexp.commands.list_ import origin_of
 from evoexp.errors import (
     EvoexpError,
     MotionFileError,
@@ -79,11 +79,10 @@ def recordings(arguments: argparse.Namespace) -> list[Recording]:
     if len(words) > MANY:
         raise MotionFileError(f"motions: at most {MANY} go together, got {len(words)}")
     runs = [run_or_log(word) for word in words]
-    titles = _titles([run for run in runs if isinstance(run, RunDirectory)])
     return [
         stored_recording(run, run.name, limits)
         if isinstance(run, Path)
-        else _stored(run, titles, arguments, limits)
+        else _stored(run, arguments, limits)
         for run in runs
     ]
 
@@ -149,14 +148,12 @@ def run_or_log(word: str) -> RunDirectory | Path:
         raise _not_here(word, error) from None
 
 
-def _stored(
-    run: RunDirectory, titles: Mapping[str, str], arguments: argparse.Namespace, limits: SpeedLimits
-) -> Recording:
+def _stored(run: RunDirectory, arguments: argparse.Namespace, limits: SpeedLimits) -> Recording:
     choice = (
         arguments.replicate if arguments.replicate is not None else arguments.choice or CHOICES[0]
     )
     try:
-        return stored_recording(chosen_log(run, choice), titles[run.condition_id], limits)
+        return stored_recording(chosen_log(run, choice), _title(run), limits)
     except RevisionMismatch as error:
         raise RevisionMismatch(
             f"run {run.hash12}: {error}; run it anew with what is installed: {run.command}"
@@ -172,27 +169,11 @@ def _not_here(word: str, error: UnknownHash) -> EvoexpError:
     return with_candidates(error, outputs_root())
 
 
-def _titles(runs: list[RunDirectory]) -> dict[str, str]:
-    """Name the runs: the experiment that has all of them, and their labels in it.
-
-    Else what they ran as.
-    """
-    names: dict[str, dict[str, str]] = {run.condition_id: {} for run in runs}
-    for row in shipped.shipped() if len(names) > 1 else ():
-        if row.condition_id in names:
-            names[row.condition_id].setdefault(row.experiment, row.label)
-    common = set.intersection(*(set(labels) for labels in names.values())) if names else set()
-    if common:
-        first = next(name for name in next(iter(names.values())) if name in common)
-        return {
-            condition_id: f"{first} · {labels[first]}" for condition_id, labels in names.items()
-        }
-    found = {}
-    for run in runs:
-        manifest = run.manifest()
-        words = [str(manifest[name]) for name in ("experiment", "label") if manifest.get(name)]
-        found[run.condition_id] = " · ".join(dict.fromkeys(words)) or run.hash12
-    return found
+def _title(run: RunDirectory) -> str:
+    """Name a run's experiment and condition as `list` does; by its hash if these are not known."""
+    origin = origin_of(run)
+    words = [str(origin[name]) for name in ("experiment", "label") if origin.get(name)]
+    return " · ".join(dict.fromkeys(words)) or run.hash12
 
 
 def _own(words: list[str], only: str, limits: SpeedLimits) -> list[Recording]:

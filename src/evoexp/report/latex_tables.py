@@ -1,11 +1,15 @@
 r"""Tables as LaTeX, for `\input` in a paper; they need `\usepackage{booktabs}`."""
 
 import re
+from collections.abc import Sequence
 
 from evoexp.report.page_text import Document, Section, TableText
 
 LONG_TEXT = 30  # letters of a cell, from which on its column breaks lines
-LINE = 0.95  # [-] of the width of the text, shared by columns that break lines
+NARROWEST = 14  # letters of a line in such a column
+BETWEEN = 3  # letters that the space between two columns takes
+SIZES = {"small": 84, "footnotesize": 94, "scriptsize": 108}
+"""Size of the type → its letters in a line of 345 pt, the width of LaTeX's own classes."""
 _SIGNS = {
     "\\": r"\textbackslash{}",
     "{": r"\{",
@@ -89,20 +93,23 @@ def latex_tables(document: Document) -> dict[str, bytes]:
 
 
 def _latex(section: Section, table: TableText, document: Document) -> str:
+    size, columns, fits = _layout(table)
     lines = [
         f"% made by {' '.join(document.command.split())}",
         f"% runs: {', '.join(run.hash12 for run in document.runs)}",
+        *([] if fits else [r"% wider than a line, so made smaller: needs \usepackage{graphicx}"]),
         r"\begin{table}",
-        r"\centering\small",
+        rf"\centering\{size}",
         rf"\caption{{{escaped(_caption(section, table, document))}}}",
         rf"\label{{tab:{_label(section, document)}}}",
-        rf"\begin{{tabular}}{{{_columns(table)}}}",
+        *([] if fits else [r"\resizebox{\linewidth}{!}{%"]),
+        rf"\begin{{tabular}}{{{columns}}}",
         r"\toprule",
         " & ".join(map(_cell, table.headers)) + r" \\",
         r"\midrule",
         *(" & ".join(map(_cell, row)) + r" \\" for row in table.rows),
         r"\bottomrule",
-        r"\end{tabular}",
+        r"\end{tabular}" + "}" * (not fits),
         r"\end{table}",
         "",
     ]
@@ -120,20 +127,32 @@ def _label(section: Section, document: Document) -> str:
     return "-".join(re.findall("[a-z0-9]+", words.lower()))
 
 
-def _columns(table: TableText) -> str:
-    """Return how columns stand: numbers to the right, long texts as paragraphs."""
+def _layout(table: TableText) -> tuple[str, str, bool]:
+    """Return the size of the type, how columns stand, and whether all of it fits on a line.
+
+    Numbers stand to the right, long texts as paragraphs in the room that the others leave.
+    """
     cells = [[_plain(row[k]) for row in table.rows] for k in range(len(table.headers))]
     longest = [max(map(len, column), default=0) for column in cells]
-    wide = {k: size for k, size in enumerate(longest) if size > LONG_TEXT}
-    share = LINE / (len(wide) + 0.3 * (len(longest) - len(wide))) if wide else 0.0
-    kinds = []
-    for k, column in enumerate(cells):
-        if k in wide:
-            kinds.append(rf"p{{{share:.2f}\linewidth}}")
-        else:
-            is_number = all(cell[:1] in "0123456789−–∞" for cell in column if cell)
-            kinds.append("r" if k and is_number else "l")
-    return "".join(kinds)
+    wide = [k for k, letters in enumerate(longest) if letters > LONG_TEXT]
+    heads = [len(_plain(header)) for header in table.headers]
+    taken = BETWEEN * len(cells) + sum(
+        max(letters, heads[k]) for k, letters in enumerate(longest) if k not in wide
+    )
+    room = {size: letters - taken for size, letters in SIZES.items()}
+    fitting = [size for size, letters in room.items() if letters >= NARROWEST * len(wide)]
+    size = fitting[0] if fitting else next(iter(SIZES))
+    letters = max(room[size] // max(len(wide), 1), NARROWEST)
+    share = letters / SIZES[size]
+    kinds = [
+        rf"p{{{share:.2f}\linewidth}}" if k in wide else "r" if k and _is_number(cells[k]) else "l"
+        for k in range(len(cells))
+    ]
+    return size, "".join(kinds), bool(fitting)
+
+
+def _is_number(column: Sequence[str]) -> bool:
+    return all(cell[:1] in "0123456789−–∞" for cell in column if cell)
 
 
 def _cell(value: object) -> str:

@@ -80,10 +80,20 @@ def test_a_report_is_seven_figures_with_data_and_sidecars(page: Path) -> None:
     kinds = ("csv", "json", "png", "svg")
     tables = [name for name in contents(page) if name.endswith(".tex")]
     assert "table_1_conditions.tex" in tables and len(tables) == 7
+    motions = [name for name in contents(page) if name.startswith("motion_")]
+    assert len(motions) == 1
     assert sorted(contents(page)) == sorted(
         [f"{stem}.{kind}" for stem in FIGURES for kind in kinds]
-        + ["index.html", "index.md", *tables]
+        + ["index.html", "index.md", *motions, *tables]
     )
+
+
+def test_the_motion_is_played_beside_the_figure_that_shows_it(page: Path, results: Results) -> None:
+    first = results.conditions[0]
+    name = f"motion_{first.condition.id[:12]}_{first.best_replicate:04d}.html"
+    assert f"rana_planar · {first.label}" in (page.parent / name).read_text()
+    figures = page.read_text().split("### ")
+    assert [part.split(":")[0] for part in figures if f"]({name})" in part] == ["Fig. 4"]
 
 
 def test_sidecars_tell_what_a_figure_was_drawn_from(page: Path, results: Results) -> None:
@@ -93,7 +103,10 @@ def test_sidecars_tell_what_a_figure_was_drawn_from(page: Path, results: Results
         data = sidecar["data"]
         for name, digest in [*sidecar["files"].items(), (data["file"], data["sha256"])]:
             assert hashlib.sha256((page.parent / name).read_bytes()).hexdigest() == digest
-        assert len(pd.read_csv(page.parent / data["file"])) == data["rows"]
+        rows = pd.read_csv(page.parent / data["file"])
+        assert len(rows) == data["rows"] and set(data["columns"]) == set(rows.columns)
+        assert set(data["columns"].values()) <= {"text", "integer", "number", "true or false"}
+        assert all(name in data["description"] for name in rows.columns), (stem, data)
         shown = results.conditions if stem == "fig_5_fitness" else results.conditions[:1]
         assert [c["run"] for c in sidecar["conditions"]] == [c.condition.id for c in shown]
         assert [c["label"] for c in sidecar["conditions"]] == [c.label for c in shown]

@@ -12,6 +12,7 @@ from evoexp.report.page_templates import inline, number_columns
 from evoexp.report.page_text import (
     Document,
     FigureText,
+    LogText,
     MotionText,
     Notice,
     RunText,
@@ -33,6 +34,12 @@ HOSTILE = (
 )
 ID = "0123456789ab" + "0" * 52
 
+LOGS = (
+    LogText(0, f"../../runs/{ID[:12]}/replicates/0000.mcap", "162.8, certified"),
+    LogText(1, f"../../runs/{ID[:12]}/replicates/0001.failed.json", "failed"),
+)
+FIGURE = FigureText("figure", "", "", ("svg", "png"), (MotionText("GA", "motion_1.html"),))
+
 
 def page_of(text: str) -> Document:
     """Return a page on which nothing is told but one text."""
@@ -49,11 +56,10 @@ def page_of(text: str) -> Document:
         (
             Section(text, text, table),
             Section("Claims", table=claims),
-            Section("Motions", motions=(MotionText(text, "motion_1.html"),)),
-            Section("Figures", figures=(FigureText("figure", text, text, ("svg", "png")),)),
+            Section("Figures", figures=(FIGURE._replace(title=text, caption=text),)),
             Section("Failures", table=failures),
         ),
-        (RunText(text, ID, 1, 2, 1, False),),
+        (RunText(text, ID, 1, 2, 1, False, LOGS),),
     )
 
 
@@ -129,6 +135,30 @@ def test_codes_that_name_a_run_of_the_page_link_to_its_commands() -> None:
     assert inline("`a` `b") == "<code>a</code> `b"
 
 
+def test_heads_that_name_a_condition_link_to_its_run() -> None:
+    table = TableText(("quantity", "GA (n\u00a0=\u00a020)", "GA 2"), (("GA", "GA", 1),))
+    text = page_of("plain")._replace(sections=(Section("Results", table=table),))
+    page = Page(html_page(text._replace(runs=(RunText("GA", ID, 1, 1, 0, False),)), {}))
+    links = [e.text for e in page.all("a") if e.attributes["href"] == f"#run-{ID[:12]}"]
+    assert links == ["GA (n\u00a0=\u00a020)", "GA"]
+
+
+def test_every_log_of_a_run_is_linked() -> None:
+    page = Page(html_page(page_of("plain"), {}))
+    found = {e.attributes["href"]: e.text for e in page.all("a")}
+    assert {file: str(k) for k, file, _ in LOGS}.items() <= found.items()
+    (logs,) = page.all("ol", class_="logs")
+    assert logs.text == "0 162.8, certified1 failed"
+
+
+def test_a_motion_is_played_inside_the_figure_that_shows_it() -> None:
+    page = Page(html_page(page_of("plain"), {}))
+    (frame,) = page.all("iframe")
+    figure, after = page.all("figure")[0], page.all("section", id="failures")[0]
+    order = [page.elements.index(each) for each in (figure, frame, after)]
+    assert order == sorted(order) and frame.attributes["src"] == "motion_1.html"
+
+
 @pytest.mark.parametrize(
     ("cells", "numeric"),
     [
@@ -187,7 +217,7 @@ def test_a_report_in_html_says_what_it_says_in_markdown(
     assert page.tables() == markdown_tables(text)
     headings = [line.lstrip("# ") for line in text.splitlines() if line.startswith("#")]
     shown = [e.text for e in page.elements if e.tag in ("h1", "h2", "h3")]
-    assert [markdown.inert(each) for each in shown] == [*headings, "Commands"]
+    assert [markdown.inert(each) for each in shown] == [*headings, "Runs, logs, commands"]
     assert b"http" not in content
     assert len(content) < 5_000_000
     files = {path.name for path in folder.iterdir()} - {"index.html"}

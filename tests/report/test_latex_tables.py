@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoexp.report.latex_tables import escaped, latex_tables
+from evoexp.report.latex_tables import SIZES, escaped, latex_tables
 from evoexp.report.page_text import (
     Document,
     RunText,
@@ -53,10 +53,24 @@ def test_rows_columns_and_rules() -> None:
     assert all(balance(line) == 0 for line in lines if not line.startswith("%"))
 
 
+def test_a_table_fits_on_a_line_or_is_made_to() -> None:
+    number = "162.8 [160.7, 168.1]"
+    for count, size, fits in ((1, "small", True), (3, "footnotesize", True), (7, "small", False)):
+        headers, row = ("quantity", *"abcdefg"[:count]), (LONG, *[number] * count)
+        lines = lines_of(TableText(headers, (row,), "", "t.tex"))
+        assert rf"\centering\{size}" in lines
+        assert (r"\resizebox{\linewidth}{!}{%" in lines) is not fits
+        assert (r"\end{tabular}}" in lines) is not fits
+        share = float(re.findall(r"p\{(0\.\d+)", "".join(lines))[0])
+        letters = share * SIZES[size] + count * (len(number) + 3) + 3
+        assert letters <= SIZES[size] + 1 or not fits
+        assert balance("".join(line for line in lines if not line.startswith("%"))) == 0
+
+
 def test_the_caption_tells_title_note_and_whose_runs() -> None:
     lines = lines_of()
     assert lines[0] == "% made by evoexp report x"
-    assert r"\caption{A \& B: Claims. Median a\_b. n = 20, seeds 0, 7; runs 000000000000.}" in lines
+    assert r"\caption{A \& B: Claims. Median a\_b. n = 20, seeds 0, 7; run 000000000000.}" in lines
     assert r"\label{tab:exp-1-claims}" in lines
 
 
@@ -68,13 +82,13 @@ def test_only_tables_that_have_a_file() -> None:
     ("runs", "seeds", "expected"),
     [
         ([], (0,), ""),
-        ([("a", 1)], (3,), "n = 1, seed 3; runs a."),
-        ([("a", 5), ("b", 7)], (0,), "n = 5–7 of each condition, seed 0; runs a, b."),
-        ([("a", 5), ("a", 5)], (0,), "n = 5 of each condition, seed 0; runs a."),
+        ([("a", 1)], (3,), "n = 1, seed 3; run `a`."),
+        ([("a", 5), ("b", 7)], (0,), "n = 5–7 of each condition, seed 0; runs `a`, `b`."),
+        ([("a", 5), ("a", 5)], (0,), "n = 5 of each condition, seed 0; run `a`."),
         (
             [(str(k), 2) for k in range(9)],
             (0, 1),
-            "n = 2 of each condition, seeds 0, 1; runs 0, 1, 2, 3 and 5 more.",
+            "n = 2 of each condition, seeds 0, 1; runs `0`, `1`, `2`, `3` and 5 more.",
         ),
     ],
 )

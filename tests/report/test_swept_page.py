@@ -9,12 +9,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from evoexp.cli import main
 from evoexp.configuration import expansions
 from evoexp.configuration.search_path import options
 from evoexp.report import style
-from evoexp.report.figures import sweep_grids
+from evoexp.report.figures import direct_labels, sweep_curves, sweep_grids
+from evoexp.report.figures.direct_labels import CurveEnd, name_ends
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results, gather
 from evoexp.report.swept_settings import main_effects, sweep_of
@@ -125,12 +128,35 @@ def test_three_settings_have_a_panel_for_each_value_of_the_first() -> None:
 
 def test_names_at_the_ends_of_curves_keep_apart() -> None:
     figure, (axes,) = style.row_of_panels(3.0, 1)
-    axes.set_ylim(0.0, 1.0)
-    sweep_grids.name_ends(axes, [(y, str(k), "#000000") for k, y in enumerate([0.5] * 5 + [0.99])])
-    places = sorted(text.xy[1] for text in axes.texts)  # type: ignore[attr-defined]
-    assert np.diff(places).min() >= sweep_grids.APART - 1e-9
+    axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
+    heights = [0.5] * 5 + [0.99, np.nan]
+    name_ends(axes, [CurveEnd(0.5, y, str(k), "#000000") for k, y in enumerate(heights)])
+    places = sorted(text.xyann[1] for text in axes.texts)  # type: ignore[attr-defined]
+    assert len(places) == 6 and np.diff(places).min() >= direct_labels.APART - 1e-9
     assert places[0] >= 0.0 and places[-1] <= 1.0
+    assert np.mean(places[:5]) == pytest.approx(0.5)  # around their curves
+    assert {text.xy for text in axes.texts} == {(0.5, 0.5), (0.5, 0.99)}  # type: ignore[attr-defined]
     assert figure.axes == [axes]
+
+
+@given(st.lists(st.floats(0.0, 1.0), max_size=40), st.floats(0.01, 0.2))
+def test_places_of_names_are_apart_in_order_and_inside(wanted: list[float], gap: float) -> None:
+    found = direct_labels.apart(np.sort(np.array(wanted)), gap)
+    least = min(gap, 1.0 / max(len(wanted) - 1, 1))
+    assert len(found) == len(wanted)
+    assert (np.diff(found) >= least - 1e-9).all()
+    assert ((found >= -1e-9) & (found <= 1.0 + 1e-9)).all()
+
+
+def test_convergence_has_a_panel_for_each_value_of_the_first_setting(swept: Results) -> None:
+    sweep = sweep_of(two_settings())
+    assert sweep is not None
+    assert sweep_curves.facets(sweep) == [("GA", "ga.size = 20"), ("GA", "ga.size = 100")]
+    own = sweep_of(swept)
+    assert own is not None
+    table = sweep_curves.convergence_table(swept, own)
+    assert set(table["facet"]) == {""} and set(table["setting"]) == {"num_elites"}
+    assert {(row.value, row.level) for row in table.itertuples()} == {("0", 0), ("2", 1)}
 
 
 @pytest.fixture(scope="module")
@@ -170,5 +196,5 @@ def test_the_command_draws_it(
     assert main(["run", "-m", *words, "--only", "via-point GA", "report.dpi=40"]) == 0
     (folder,) = (tmp_path / "reports").iterdir()
     text = (folder / "index.md").read_text()
-    assert "## Effect of each setting" in text and "](motion.html)" in text
+    assert "## Effect of each setting" in text and "](motion_" in text
     assert not capsys.readouterr().err

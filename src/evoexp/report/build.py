@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from evoexp.condition import Condition
 from evoexp.report import markdown
+from evoexp.report.data_schema import schema
 from evoexp.report.drawing_processes import on_all_cores
 from evoexp.report.html_page import html_page
 from evoexp.report.index import document
@@ -15,6 +16,7 @@ from evoexp.report.latex_tables import latex_tables
 from evoexp.report.page_parts import Drawing, Page
 from evoexp.report.page_summary import HTML
 from evoexp.report.pages import page_of
+from evoexp.report.players import players_of
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results, gather
 from evoexp.shipped import Option
@@ -128,11 +130,12 @@ def page_files(
     files: dict[str, bytes] = {}
     for drawn in on_all_cores(lambda drawing: _drawn(drawing, settings), page.drawings):
         files |= drawn
-    text = document(page, found, settings, f"evoexp {request.command} {request.words}")
+    players = players_of(page.drawings, found.experiment)
+    command = f"evoexp {request.command} {request.words}"
+    text = document(page, found, settings, command, players)
     files |= latex_tables(text)
     files[HTML] = html_page(text, files)
-    for motion in page.motions:
-        files[f"{motion.stem}.html"] = motion.content()
+    files |= {player.text.file: player.content for player in players.values()}
     files[INDEX] = markdown.page(text).encode()
     return ReportFiles(found.outputs / "reports" / request.report_name, files)
 
@@ -172,7 +175,12 @@ def _drawn(drawing: Drawing, settings: ReportSettings) -> dict[str, bytes]:
         "figure": drawing.title,
         "code_version": __version__,
         "conditions": _provenance(drawing),
-        "data": {"file": f"{drawing.stem}.csv", "rows": len(table), "sha256": _sha256(rows)},
+        "data": {
+            "file": f"{drawing.stem}.csv",
+            "rows": len(table),
+            "sha256": _sha256(rows),
+            **schema(table, drawing.table),
+        },
         "files": {name: _sha256(content) for name, content in pictures.items()},
     }
     text = json.dumps(sidecar, indent=2, sort_keys=True, ensure_ascii=False) + "\n"

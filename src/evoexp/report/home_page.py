@@ -103,7 +103,7 @@ class PaperCard(NamedTuple):
         subtitle: What it is about.
         picture: Of one of its reports; None if none has any.
         counts: (verdict, number of claims), over the reports of its experiments.
-        unjudged: Claims of experiments without a report.
+        unjudged: Claims of experiments without a report at the paper's budget.
         links: To its reports.
         missing: Experiments without a report.
     """
@@ -191,7 +191,7 @@ def _begins(experiment: str, name: str) -> bool:
 def _card(paper: Paper, reports: Sequence[ReportSummary]) -> PaperCard:
     """Return the card of a paper; its claims are those of whole experiments, not of variants."""
     whole = [each for each in reports if each.folder == each.experiment]
-    drawn = {each.folder for each in whole}
+    drawn, shown = {each.folder for each in whole}, {each.experiment for each in reports}
     names = (*paper.experiments, *paper.claims)
     pictured = min(
         (each for each in whole or reports if each.picture),
@@ -205,7 +205,7 @@ def _card(paper: Paper, reports: Sequence[ReportSummary]) -> PaperCard:
         verdict_counts([verdict for each in whole for _, verdict in each.claims]),
         sum(count for name, count in paper.claims.items() if name not in drawn),
         tuple(map(_link, reports)),
-        tuple(sorted({name for name in names if _begins(name, paper.name)} - drawn)),
+        tuple(sorted({name for name in names if _begins(name, paper.name)} - shown)),
     )
 
 

@@ -62,7 +62,7 @@ def html_page(document: Document, pictures: Mapping[str, bytes]) -> bytes:
     places += [(each.text.title, each.anchor) for section in sections for each in section.figures]
     return written(
         "report_page.html",
-        [run.hash12 for run in document.runs],
+        {run.hash12: run.label for run in document.runs},
         document=document,
         sections=sections,
         failures=failures.table if failures else None,

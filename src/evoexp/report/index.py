@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
 
 from evoexp.report import markdown
 from evoexp.report.condition_labels import have_two_parts, in_few_words
@@ -9,7 +10,7 @@ from evoexp.report.page_parts import Drawing, Page
 from evoexp.report.page_text import (
     Document,
     FigureText,
-    MotionText,
+    LogText,
     Notice,
     RunText,
     Section,
@@ -18,6 +19,7 @@ from evoexp.report.page_text import (
     provenance,
 )
 from evoexp.report.parameters import Parameter, parameters, planned_replicates
+from evoexp.report.players import Players, key
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import ConditionResults, Results, Verdicts
 from evoexp.report.statistics import wilson
@@ -33,7 +35,13 @@ PARTS = (
 CLAIMS, FAILURES = "Claims", "Failures"  # headings
 
 
-def document(page: Page, results: Results, settings: ReportSettings, command: str) -> Document:
+def document(
+    page: Page,
+    results: Results,
+    settings: ReportSettings,
+    command: str,
+    players: Players | None = None,
+) -> Document:
     """Return the text of a page; the same results give the same text.
 
     Args:
@@ -41,6 +49,7 @@ def document(page: Page, results: Results, settings: ReportSettings, command: st
         results: The results that it was drawn from.
         settings: Levels and formats.
         command: The command that makes it.
+        players: Of the motions that its figures show.
     """
     notices = (_incomplete(results), _damaged(results), _added(results))
     sections = (
@@ -54,11 +63,9 @@ def document(page: Page, results: Results, settings: ReportSettings, command: st
             for heading, rows in page.comparisons
         ),
         Section(
-            "Motions",
-            "Played in a browser, with every exact distance:",
-            motions=tuple(MotionText(each.title, f"{each.stem}.html") for each in page.motions),
+            "Figures",
+            figures=tuple(_figure(each, settings, players or {}) for each in page.drawings),
         ),
-        Section("Figures", figures=tuple(_figure(each, settings) for each in page.drawings)),
         Section("Parameters", table=_parameters(results)),
         Section(FAILURES, table=_failures(results)),
     )
@@ -69,13 +76,30 @@ def document(page: Page, results: Results, settings: ReportSettings, command: st
         results.budget,
         tuple(notice for notice in notices if notice.text),
         page.introduction,
-        _with_files(each for each in sections if each.table or each.figures or each.motions),
-        tuple(
-            RunText(c.label, c.condition.id, c.done, c.planned, c.failed, c.is_reference)
-            for c in results.conditions
-        ),
+        _with_files(each for each in sections if each.table or each.figures),
+        tuple(map(_run, results.conditions)),
         _seeds(results.conditions),
     )
+
+
+def _run(c: ConditionResults) -> RunText:
+    """Return a run, with the addresses of its logs as seen from `reports/<name>/`."""
+
+    def address(path: Path) -> str:
+        return Path("../..", *path.parts[-4:]).as_posix()  # runs/<hash>/replicates/<file>
+
+    words = {True: ", certified", False: ", refuted"}
+    results = {
+        int(k): f"{markdown.number(float(cost))}{words.get(certified, '')}"
+        for k, cost, certified in zip(
+            c.summaries.index, c.column("best_cost"), c.column("certified"), strict=True
+        )
+    }
+    done = (LogText(k, address(c.run.log_path(k)), text) for k, text in results.items())
+    failed = (LogText(k, address(c.run.failure_path(k)), "failed") for k in c.failures)
+    logs = tuple(sorted((*done, *failed)))
+    own = c.label, c.condition.id, c.done, c.planned, c.failed, c.is_reference
+    return RunText(*own, logs)
 
 
 def _with_files(sections: Iterable[Section]) -> tuple[Section, ...]:
@@ -188,7 +212,7 @@ def _quantities(page: Page, results: Results) -> TableText | None:
     if not labels or not page.quantities:
         return None
     note = "Median [first quartile, third quartile] over finished replicates."
-    heads = [f"{c.label} (n = {c.done})" for c in results.with_data]
+    heads = [f"{c.label} (n\u00a0=\u00a0{c.done})" for c in results.with_data]
     if len(labels) > WIDEST:
         cells = [
             (head, *(markdown.spread(q.spreads[c]) for q in page.quantities))
@@ -207,10 +231,10 @@ def _claims(claims: Sequence[Claim]) -> TableText | None:
     if not claims:
         return None
     rows = [
-        (c.text, c.source, c.evidence, c.n or "–", c.rule or "–", Verdict(c.verdict))
+        (c.text, Verdict(c.verdict), c.evidence, c.n or "–", c.rule or "–", c.source)
         for c in claims
     ]
-    return TableText(("claim", "paper", "evidence", "n", "rule", "verdict"), tuple(rows))
+    return TableText(("claim", "verdict", "evidence", "n", "rule", "paper"), tuple(rows))
 
 
 def _checks(checks: Sequence[tuple[str, str]]) -> TableText | None:
@@ -244,11 +268,12 @@ def _comparison(rows: Iterable[Comparison], settings: ReportSettings) -> TableTe
     return TableText(headers, tuple(cells), note)
 
 
-def _figure(drawing: Drawing, settings: ReportSettings) -> FigureText:
+def _figure(drawing: Drawing, settings: ReportSettings, players: Players) -> FigureText:
     runs = [(c.condition.id[:12], c.done) for c in drawing.conditions]
     whose = provenance(runs, _seeds(drawing.conditions))
     caption = f"{drawing.caption} {whose}".strip()
-    return FigureText(drawing.stem, drawing.title, caption, tuple(settings.formats))
+    motions = tuple(players[key(run)].text for run in drawing.plays if key(run) in players)
+    return FigureText(drawing.stem, drawing.title, caption, tuple(settings.formats), motions)
 
 
 def _parameters(results: Results) -> TableText:

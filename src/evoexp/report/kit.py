@@ -8,7 +8,8 @@ protocol (`ConditionResults.evaluate`, `motion`, `problem`). Its parts are:
   `claims.yaml`, see `claim_rules` and `judging.judge`),
   `Comparison` (of `compared`) and `Drawing`, each with its words in `markdown`;
 - a `Drawing` is two functions: results → table (columns by `records`, `groups`, `rounded`), and
-  table → figure (`style`); `sweep_figures` has those that all sweeps share;
+  table → figure (`style`); `sweep_figures` has those that all sweeps share; its `plays` name the
+  runs whose motions it shows (`PlayedRun`): the page plays them beside it;
 - the seed is the unit of all statistics: `spread`, `Proportion`, `fisher_exact`, `holm`, ….
 """
 
@@ -27,7 +28,7 @@ from evoexp.report.claim_rules import read_rules
 from evoexp.report.comparisons import Values, beside, by_column, compared, compared_with_controls
 from evoexp.report.figures import convergence, shares
 from evoexp.report.judging import Judge, evidence
-from evoexp.report.page_parts import Drawing, Page, Quantity, Table
+from evoexp.report.page_parts import Drawing, Page, PlayedRun, Quantity, Table
 from evoexp.report.pages import assumptions, generic
 from evoexp.report.pages.assumptions import Headline
 from evoexp.report.parameters import overridden, parameters, planned_replicates
@@ -67,6 +68,7 @@ __all__ = [
     "Interval",
     "Judge",
     "Page",
+    "PlayedRun",
     "Proportion",
     "Quantity",
     "ReportSettings",

@@ -25,11 +25,9 @@ def page(document: Document) -> str:
 
 
 def _section(section: Section) -> str:
-    links = [f"- [{motion.title}]({motion.file})\n" for motion in section.motions]
     parts = [
         f"{section.introduction}\n" if section.introduction else "",
         _table_with_note(section.table) if section.table else "",
-        "".join(links),
         *(_figure(figure) for figure in section.figures),
     ]
     return "\n".join(part for part in parts if part)
@@ -44,7 +42,9 @@ def _figure(figure: FigureText) -> str:
     links = " · ".join(f"[{kind}]({name})" for kind, name in figure.files)
     shown = figure.picture(*PICTURES)
     picture = f"![{figure.title}]({shown})\n\n" if shown else ""
-    return f"### {figure.title}\n\n{picture}{figure.caption}\n\n{links}\n"
+    motions = "".join(f"- [{one.title}, in motion]({one.file})\n" for one in figure.motions)
+    after = f"\n{motions}" * bool(motions)
+    return f"### {figure.title}\n\n{picture}{figure.caption}\n\n{links}\n{after}"
 
 
 def table(headers: Sequence[str], rows: Iterable[Sequence[object]]) -> str:

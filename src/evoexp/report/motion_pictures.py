@@ -1,4 +1,4 @@
-"""Pictures and pages of the motions that any planner found: scene, stages, joints, covers."""
+"""Pictures of the motions that any planner found: scene, stages, joints, covers."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -6,11 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.playback import player_page
 from evoexp.playback.recording import Heading, NoMotion, Recording, record
 from evoexp.records import FloatArray
 from evoexp.report.figures import motion_scenes, motion_tables
-from evoexp.report.page_parts import Drawing, MotionPage
+from evoexp.report.page_parts import Drawing, PlayedRun
 from evoexp.report.results import ConditionResults, Results
 
 MOST = 4  # conditions whose motions are shown, those with the least best cost
@@ -33,6 +32,11 @@ class ShownMotion(NamedTuple):
         verdict = {True: "certified", False: "refuted", None: "undecided"}
         return f"{self.condition.label}: {verdict[self.recording.verdict.certified]}"
 
+    @property
+    def run(self) -> PlayedRun:
+        """The run, to be played beside a figure."""
+        return PlayedRun(self.condition, self.recording.heading.replicate)
+
 
 def best_motions(results: Results) -> list[ShownMotion]:
     """Return the best motions of the conditions that have one, at most `MOST`, best ones first."""
@@ -54,19 +58,9 @@ def drawings(shown: Sequence[ShownMotion]) -> tuple[Drawing, ...]:
     """Return the figures of motions; none without motions."""
     if not shown:
         return ()
-    titled = [(each.title, each.recording) for each in shown]
-    conditions = tuple(each.condition for each in shown)
     best = min(shown, key=lambda each: _best_cost(each.condition))
     found = [
-        Drawing(
-            "scene",
-            "Robot, scene and way",
-            "The best replicate of each condition: exact bodies at start and goal, and the way of "
-            "each tool. Meshes are drawn by their convex hulls.",
-            partial(motion_tables.scenes_table, titled),
-            motion_scenes.draw_scenes,
-            conditions,
-        ),
+        *scene_drawing(shown),
         Drawing(
             "stages",
             "The motion, stage by stage",
@@ -87,16 +81,23 @@ def drawings(shown: Sequence[ShownMotion]) -> tuple[Drawing, ...]:
     return (*found, *_cover_drawing(shown))
 
 
-def pages(shown: Sequence[ShownMotion]) -> tuple[MotionPage, ...]:
-    """Return the pages that play the motions, one per motion."""
-    return tuple(
-        MotionPage(
-            "motion" if len(shown) == 1 else f"motion_{k + 1}",
-            f"{each.title}, replicate {each.recording.heading.replicate}",
-            partial(player_page.page, [each.recording]),
-        )
-        for k, each in enumerate(shown)
+def scene_drawing(shown: Sequence[ShownMotion]) -> tuple[Drawing, ...]:
+    """Return the figure of robots and scenes, with the motions to be played; none without any."""
+    if not shown:
+        return ()
+    titled = [(each.title, each.recording) for each in shown]
+    conditions = tuple(each.condition for each in shown)
+    found = Drawing(
+        "scene",
+        "Robot, scene and way",
+        "The best replicate of each condition: exact bodies at start and goal, and the way of "
+        "each tool. Meshes are drawn by their convex hulls.",
+        partial(motion_tables.scenes_table, titled),
+        motion_scenes.draw_scenes,
+        conditions,
+        tuple(each.run for each in shown),
     )
+    return (found,)
 
 
 def notes(shown: Sequence[ShownMotion]) -> tuple[tuple[str, str], ...]:

@@ -13,6 +13,13 @@ if TYPE_CHECKING:  # loaded only where something is drawn
     from matplotlib.figure import Figure
 
 
+class PlayedRun(NamedTuple):
+    """A replicate whose motion a figure shows: the page plays it beside the figure."""
+
+    condition: ConditionResults
+    replicate: int
+
+
 class Drawing(NamedTuple):
     """One figure: from results to its table, from its table to a picture.
 
@@ -23,6 +30,7 @@ class Drawing(NamedTuple):
         table: Gives the data.
         draw: Draws the data.
         conditions: Whose results it shows.
+        plays: Runs whose motions it shows.
     """
 
     stem: str
@@ -31,6 +39,7 @@ class Drawing(NamedTuple):
     table: Callable[[], pd.DataFrame]
     draw: "Callable[[pd.DataFrame], Figure]"
     conditions: tuple[ConditionResults, ...]
+    plays: tuple[PlayedRun, ...] = ()
 
 
 class Quantity(NamedTuple):
@@ -57,20 +66,6 @@ class Table(NamedTuple):
     note: str = ""
 
 
-class MotionPage(NamedTuple):
-    """A page that plays a motion in any browser, offline; `evoexp view` writes the same.
-
-    Attributes:
-        stem: Of its file.
-        title: Names the motion.
-        content: Gives the HTML.
-    """
-
-    stem: str
-    title: str
-    content: Callable[[], bytes]
-
-
 class Page(NamedTuple):
     """A report before it is written.
 
@@ -83,7 +78,6 @@ class Page(NamedTuple):
         comparisons: Of conditions on common seeds, by heading.
         drawings: The figures.
         tables: Of its own, shown behind the table of results.
-        motions: Pages that play motions.
     """
 
     title: str
@@ -94,4 +88,3 @@ class Page(NamedTuple):
     comparisons: tuple[tuple[str, tuple[Comparison, ...]], ...] = ()
     drawings: tuple[Drawing, ...] = ()
     tables: tuple[Table, ...] = ()
-    motions: tuple[MotionPage, ...] = ()

@@ -69,9 +69,10 @@ def summary_of(document: Document, places: Iterable[tuple[str, str]]) -> dict[st
         "failed": sum(run.failed for run in document.runs),
         "headings": [list(place) for place in places],
         "claims": [
-            [str(row[0]), row[-1].text]
+            [str(row[0]), cell.text]
             for row in (claims.table.rows if claims and claims.table else ())
-            if isinstance(row[-1], Verdict)
+            for cell in row
+            if isinstance(cell, Verdict)
         ],
         "runs": [[run.hash12, run.label] for run in document.runs],
         "picture": ranked[0] if ranked else "",

@@ -17,6 +17,7 @@ NO_VALUE = ("–", "")  # cells of a column of numbers that hold none
 LONGEST_NUMBER = 48  # characters of a cell that is still a number, with its interval and unit
 _NUMBER = re.compile(r"[-−]?(\d[\d.]*(e[-+−]?\d+)?|∞)($|[ \[%°])")
 _HASH = re.compile("[0-9a-f]{12}")
+_COUNT = re.compile(r"\s\(n\s=\s\d+\)")  # behind a condition in the head of a table
 
 
 @functools.cache
@@ -46,22 +47,25 @@ def _environment() -> "Environment":
     return environment
 
 
-def written(template: str, hashes: Sequence[str] = (), **values: Any) -> bytes:
+def written(template: str, runs: Mapping[str, str] | None = None, **values: Any) -> bytes:
     """Return a page.
 
     Args:
         template: Name of its file in `assets/site`.
-        hashes: Of runs that the page has a place for: codes that name one link to it.
+        runs: Hash → label of the runs that the page has a place for: codes that name a hash, and
+            heads of tables that name a label, link to it.
         values: By the names that the template has for them.
     """
     from markupsafe import Markup
 
-    known = frozenset(hashes)
+    known = frozenset(runs or {})
+    places = {label: name for name, label in reversed(list((runs or {}).items()))}
     text = (
         _environment()
         .get_template(template)
         .render(
             inline=lambda value: inline(str(value), known),
+            label=lambda value: label(str(value), known, places),
             style=Markup(asset("site.css")),
             script=Markup(asset("site.js")),
             **values,
@@ -84,6 +88,22 @@ def inline(text: str, hashes: frozenset[str] = frozenset()) -> "Markup":
         parts[-2:] = [f"{parts[-2]}`{parts[-1]}"]
     pieces = [escape(part) if k % 2 == 0 else _code(part, hashes) for k, part in enumerate(parts)]
     return Markup("").join(pieces)
+
+
+def label(text: str, hashes: frozenset[str], places: Mapping[str, str]) -> "Markup":
+    """Return the head of a row or column as HTML: the label of a condition links to its run.
+
+    Args:
+        text: Anybody's; behind a label the number of runs may stand: "random search (n = 20)".
+        hashes: As for `inline`.
+        places: Label → hash.
+    """
+    from markupsafe import Markup
+
+    name = places.get(_COUNT.sub("", text))
+    if name is None:
+        return inline(text, hashes)
+    return Markup('<a href="#run-{}">{}</a>').format(name, inline(text))
 
 
 def _code(text: str, hashes: frozenset[str]) -> "Markup":

@@ -47,6 +47,13 @@ class TableText(NamedTuple):
     file: str = ""
 
 
+class MotionText(NamedTuple):
+    """A page that plays a motion: its title and its file."""
+
+    title: str
+    file: str
+
+
 class FigureText(NamedTuple):
     """A figure.
 
@@ -55,12 +62,14 @@ class FigureText(NamedTuple):
         title: Heading.
         caption: Below it.
         formats: Kinds of its pictures.
+        motions: Pages that play the motions that it shows.
     """
 
     stem: str
     title: str
     caption: str
     formats: tuple[str, ...]
+    motions: tuple[MotionText, ...] = ()
 
     @property
     def files(self) -> tuple[tuple[str, str], ...]:
@@ -72,29 +81,34 @@ class FigureText(NamedTuple):
         return next((f"{self.stem}.{kind}" for kind in preferred if kind in self.formats), "")
 
 
-class MotionText(NamedTuple):
-    """A page that plays a motion: its title and its file."""
-
-    title: str
-    file: str
-
-
 class Section(NamedTuple):
-    """A section: one table, or figures, or motions.
+    """A section: one table, or figures.
 
     Attributes:
         heading: Above it.
         introduction: Between heading and content.
         table: Its table.
         figures: Its figures.
-        motions: Its motions.
     """
 
     heading: str
     introduction: str = ""
     table: TableText | None = None
     figures: tuple[FigureText, ...] = ()
-    motions: tuple[MotionText, ...] = ()
+
+
+class LogText(NamedTuple):
+    """A replicate of a stored run: where its log is, or why there is none.
+
+    Attributes:
+        replicate: Its index.
+        file: The log, or the file that tells why it failed, relative to the page.
+        result: Best cost and exact verdict, or "failed".
+    """
+
+    replicate: int
+    file: str
+    result: str
 
 
 class RunText(NamedTuple):
@@ -107,6 +121,7 @@ class RunText(NamedTuple):
         planned: Planned replicates.
         failed: Failed replicates.
         is_reference: Whether it is a reference, which has no motion to view.
+        logs: Of every finished or failed replicate, in order.
     """
 
     label: str
@@ -115,6 +130,7 @@ class RunText(NamedTuple):
     planned: int
     failed: int
     is_reference: bool
+    logs: tuple[LogText, ...] = ()
 
     @property
     def hash12(self) -> str:
@@ -178,6 +194,6 @@ def provenance(runs: Sequence[tuple[str, int]], seeds: Sequence[int]) -> str:
     each = " of each condition" if len(runs) > 1 else ""
     seed = f"seed{'s' * (len(seeds) > 1)} {', '.join(map(str, seeds))}"
     names = dict.fromkeys(name for name, _ in runs)
-    shown = ", ".join(list(names)[:MOST_NAMED])
+    shown = ", ".join(f"`{name}`" for name in list(names)[:MOST_NAMED])
     more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
-    return f"n = {number}{each}, {seed}; runs {shown}{more}."
+    return f"n = {number}{each}, {seed}; run{'s' * (len(names) > 1)} {shown}{more}."

@@ -24,8 +24,8 @@
     if (rows.length < 2) continue;
     heads.forEach((head, column) => {
       const button = element("button", { type: "button", title: "sort" });
-      button.append(...head.childNodes);
-      head.append(button);
+      if (head.querySelector("a")) button.append("⇅"); else button.append(...head.childNodes);  // no link within a button
+      head.append(" ", button);
       button.addEventListener("click", () => {
         const next = { ascending: "descending", descending: "none" }[head.getAttribute("aria-sort")] || "ascending";
         heads.forEach(each => each.removeAttribute("aria-sort"));
@@ -86,8 +86,9 @@
     const back = element("a", { href: "../index.html", className: "home" }, "← all reports");
     document.querySelector("nav.side").prepend(back);
   }
-  const contents = document.querySelector("nav.side details");
-  if (contents && innerWidth < 980) contents.open = false;
+  if (innerWidth < 980) {  // on a telephone pages begin with their text, and a player takes the screen when it is asked for
+    for (const each of document.querySelectorAll("nav.side details, details.motion")) each.open = false;
+  }
 
   // search
   const field = document.getElementById("search"), index = document.getElementById("search-index");

@@ -113,10 +113,15 @@ def _numbers(condition: ConditionResults, table: pd.DataFrame) -> Drawing:
         "Fig. 1: two numerical potential fields",
         "Number of every node as the wave fronts give it; black: obstacles (in (b) those with a "
         "free node beside them have o₀ = 10, as printed). Framed: where the print differs.",
-        lambda: table,
+        partial(_compared_table, table),
         field_grids.draw_fields,
         (condition,),
     )
+
+
+def _compared_table(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the compared fields: columns as of `field_grids.compare`."""
+    return table
 
 
 def _map(condition: ConditionResults) -> Drawing:

@@ -10,6 +10,7 @@ from evoexp.report.kit import (
     ConditionResults,
     Drawing,
     Page,
+    PlayedRun,
     Proportion,
     ReportSettings,
     Results,
@@ -46,6 +47,9 @@ def page(results: Results, settings: ReportSettings) -> Page:
         partial(missions.missions_table, found),
         missions.draw_missions,
         found,
+        tuple(
+            PlayedRun(c, run_measures.median_replicate(c, column("best_cost")(c))) for c in found
+        ),
     )
     return Page(
         title=f"Chen & Zalzala 1995: {results.experiment or 'stored runs'}",

@@ -125,11 +125,15 @@ def routes_of(condition: ConditionResults, found: Routes) -> dict[str, list[int]
     return {name: members for name, members in own.items() if members}
 
 
-def median_path(condition: ConditionResults, replicates: list[int] | None = None) -> FloatArray:
-    """Return the path of median cost (the lower one of two) among some replicates, or all."""
+def median_replicate(condition: ConditionResults, replicates: list[int] | None = None) -> int:
+    """Return the replicate of median cost (the lower one of two) among some, or all."""
     among = None if replicates is None else condition.summaries.index.isin(replicates)
-    costs = condition.column("best_cost")
-    return paths(condition)[run_measures.median_replicate(condition, costs, among)]
+    return run_measures.median_replicate(condition, condition.column("best_cost"), among)
+
+
+def median_path(condition: ConditionResults, replicates: list[int] | None = None) -> FloatArray:
+    """Return the path of the `median_replicate`."""
+    return paths(condition)[median_replicate(condition, replicates)]
 
 
 def signature(path: FloatArray, centres: FloatArray) -> tuple[int, ...]:

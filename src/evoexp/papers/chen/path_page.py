@@ -16,6 +16,7 @@ from evoexp.report.kit import (
     ConditionResults,
     Drawing,
     Page,
+    PlayedRun,
     Quantity,
     ReportSettings,
     Results,
@@ -224,6 +225,7 @@ def drawings(groups: tuple[Group, ...], found: Routes) -> tuple[Drawing, ...]:
             partial(grid_paths.paths_table, panels),
             grid_paths.draw_paths,
             shown,
+            tuple(PlayedRun(g.main, measures.median_replicate(g.main)) for g in groups),
         ),
         Drawing(
             "routes",
@@ -320,6 +322,7 @@ def _lingering_drawings(groups: tuple[Group, ...]) -> tuple[Drawing, ...]:
             partial(grid_paths.paths_table, panels),
             grid_paths.draw_paths,
             tuple(c for group in groups for c in group.all),
+            tuple(PlayedRun(g.main, measures.median_replicate(g.main)) for g in groups),
         ),
         Drawing(
             "lingering",

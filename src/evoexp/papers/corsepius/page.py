@@ -20,6 +20,7 @@ from evoexp.report.kit import (
     ConditionResults,
     Drawing,
     Page,
+    PlayedRun,
     Quantity,
     ReportSettings,
     Results,
@@ -304,7 +305,8 @@ def drawings(results: Results, settings: ReportSettings) -> tuple[Drawing, ...]:
 def _paths(stem: str, title: str, caption: str, shown: list[ShownPath]) -> Drawing:
     table = partial(posture_motions.motions_table, shown)
     draw = partial(posture_motions.draw_motions, same_scene=shown[0].by_phase)
-    return Drawing(stem, title, caption, table, draw, tuple(one.condition for one in shown))
+    plays = tuple(PlayedRun(one.condition, one.replicate) for one in shown)
+    return Drawing(stem, title, caption, table, draw, tuple(one.condition for one in shown), plays)
 
 
 def _manoeuvres(results: Results, settings: ReportSettings) -> list[Drawing]:

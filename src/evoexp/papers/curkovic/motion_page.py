@@ -21,6 +21,7 @@ from evoexp.report.kit import (
     ConditionResults,
     Drawing,
     Page,
+    PlayedRun,
     ReportSettings,
     Results,
     compared,
@@ -246,6 +247,7 @@ def _of_condition(results: Results, condition: ConditionResults, suffix: str) ->
             partial(robot_motions.motion_table, condition),
             robot_motions.draw_motion,
             (condition,),
+            (PlayedRun(condition, condition.best_replicate),),
         ),
         Drawing(
             f"fig_9_joints{suffix}" if number == "8" else f"joints{suffix}",

@@ -15,6 +15,7 @@ from evoexp.report.kit import (
     ConditionResults,
     Drawing,
     Page,
+    PlayedRun,
     Proportion,
     Quantity,
     ReportSettings,
@@ -243,7 +244,8 @@ def _solutions(results: Results) -> Iterator[Drawing]:
 
 def _postures(stem: str, title: str, caption: str, shown: list[ShownMotion]) -> Drawing:
     table, draw = partial(reaching_motions.reaching_table, shown), reaching_motions.draw_reaching
-    return Drawing(stem, title, caption, table, draw, tuple(one.condition for one in shown))
+    plays = tuple(PlayedRun(c, k) for _, c, k, _ in shown if k is not None)
+    return Drawing(stem, title, caption, table, draw, tuple(one.condition for one in shown), plays)
 
 
 def _solution(condition: ConditionResults, replicate: int) -> ShownMotion:

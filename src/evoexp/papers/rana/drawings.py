@@ -13,6 +13,7 @@ from evoexp.papers.rana.figures import planar_models, planar_motion, spatial_mod
 from evoexp.report.kit import (
     ConditionResults,
     Drawing,
+    PlayedRun,
     ReportSettings,
     Results,
     convergence,
@@ -144,6 +145,7 @@ def _spatial(one: MeasuredMotions) -> list[Drawing]:
             partial(spatial_models.snapshots_table, c),
             spatial_models.draw_snapshots,
             (c,),
+            (PlayedRun(c, c.best_replicate),),
         ),
         Drawing(
             f"fig_12b_configuration_space{suffix}",

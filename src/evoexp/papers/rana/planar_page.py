@@ -15,6 +15,7 @@ from evoexp.report.kit import (
     Drawing,
     Judge,
     Page,
+    PlayedRun,
     ReportSettings,
     Results,
     generic,
@@ -120,6 +121,7 @@ def motion_drawings(condition: ConditionResults, suffix: str) -> list[Drawing]:
             partial(planar_motion.snapshots_table, condition),
             planar_motion.draw_snapshots,
             (condition,),
+            (PlayedRun(condition, condition.best_replicate),),
         ),
         Drawing(
             f"paths{suffix}",

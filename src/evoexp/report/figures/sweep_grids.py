@@ -1,4 +1,4 @@
-"""A sweep at a glance: a quantity over its settings, their effects, and convergence."""
+"""A sweep at a glance: a quantity over its settings, and their effects."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -9,18 +9,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from evoexp.report import style
-from evoexp.report.figures.convergence import NAMES, cost_table
+from evoexp.report.figures.direct_labels import CurveEnd, name_ends
 from evoexp.report.figures.matrix import DARK, LUMINANCE
-from evoexp.report.results import Results
-from evoexp.report.rows import groups, records
+from evoexp.report.rows import records
 from evoexp.report.statistics import quantile
 from evoexp.report.swept_settings import MainEffect, Sweep, Values
 
 PER_LINE = 3  # panels side by side
-MOST_PANELS = 9
-APART = 0.07  # [-] of the height of a panel, between names at the ends of curves
-SETTLED = 0.05  # [-] of a run, after which the panels of convergence show all costs
-ORDINAL = "viridis"  # colours of values that have an order
+MOST_PANELS = 18
 
 
 def grid_table(sweep: Sweep, values: Values) -> pd.DataFrame:
@@ -109,7 +105,9 @@ def _draw_curves(table: pd.DataFrame, name: str) -> Figure:
         errors = [own["median"] - own["lower"], own["upper"] - own["median"]]
         look: dict[str, Any] = {"color": style.condition_colour(k), "marker": "o", "ms": 4}
         axes.errorbar(own["column"], own["median"], yerr=errors, capsize=2.0, **look)
-        ends.append((float(own["median"].iloc[-1]), panel, style.condition_colour(k)))
+        last = own.iloc[-1]
+        place = float(last["column"]), float(last["median"])
+        ends.append(CurveEnd(*place, panel, style.condition_colour(k)))
     ticks = table.drop_duplicates("column").sort_values("column")
     axes.set_xticks(ticks["column"], ticks["x"])
     axes.margins(x=0.05)
@@ -146,73 +144,3 @@ def draw_effects(table: pd.DataFrame) -> Figure:
         axes.set(title=base, xlabel="change of the cost", ylim=(len(own) - 0.5, -0.5))
         axes.xaxis.set_major_locator(style.few_ticks())
     return figure
-
-
-def convergence_table(results: Results, sweep: Sweep) -> pd.DataFrame:
-    """Return the best cost so far of each combination.
-
-    Returns:
-        Columns of `convergence.cost_table`, base and values.
-    """
-    table = cost_table(results)
-    best = table[table["quantity"] == NAMES["best_cost"]]
-    bases = {each.results.label: each.base for each in sweep.conditions}
-    values = {each.results.label: ", ".join(each.values) for each in sweep.conditions}
-    named = best[best["condition"].isin(bases.keys())]
-    return named.assign(base=named["condition"].map(bases), values=named["condition"].map(values))
-
-
-def draw_convergence(table: pd.DataFrame) -> Figure:
-    """Draw one panel per swept condition, the name of each combination at the end of its curve."""
-    import matplotlib as mpl
-
-    shown = table.replace([np.inf, -np.inf], np.nan)
-    bases = list(dict.fromkeys(shown["base"]))[:MOST_PANELS]
-    figure, panels = style.lines_of_panels(3.4, len(bases), 2, 0.0)
-    names = list(dict.fromkeys(shown["values"]))
-    colours = mpl.colormaps[ORDINAL](np.linspace(0.0, 0.88, len(names)))
-    for k, (axes, base) in enumerate(zip(panels, bases, strict=True)):
-        own, ends, early = shown[shown["base"] == base], [], []
-        for values, curve in groups(own, "values"):
-            colour = mpl.colors.to_hex(colours[names.index(values)])
-            axes.plot(curve["evaluations"], curve["median"], color=colour, linewidth=1.1)
-            ends.append((float(curve["median"].iloc[-1]), values, colour))
-            early.append(float(curve["median"].iloc[int(SETTLED * len(curve))]))
-        low, high = _limits([y for y, _, _ in ends], early)
-        axes.set(title=base, xlabel="evaluations", ylim=(low, high), xlim=(0.0, None))
-        axes.set_ylabel("best cost so far (median)" if k % 2 == 0 else "")
-        style.shorten_thousands(axes.xaxis)
-        name_ends(axes, ends)
-    return figure
-
-
-def _limits(ends: Sequence[float], early: Sequence[float]) -> tuple[float, float]:
-    known = [value for value in (*ends, *early) if np.isfinite(value)]
-    low, high = (min(known), max(known)) if known else (0.0, 1.0)
-    room = 0.05 * (high - low) or 1.0
-    return low - room, high + room
-
-
-def name_ends(axes: Axes, ends: Sequence[tuple[float, str, str]]) -> None:
-    """Write names beside the ends of curves, moved apart where they would overlap.
-
-    Args:
-        axes: Whose limits are set.
-        ends: (height of the end, name, colour).
-    """
-    low, high = axes.get_ylim()
-    known = sorted(end for end in ends if np.isfinite(end[0]))
-    places = [min(max((y - low) / (high - low), 0.0), 1.0) for y, _, _ in known]
-    gap = min(APART, 1.0 / max(len(places), 1))
-    for k in range(1, len(places)):  # from below: none closer to the one before than a gap
-        places[k] = max(places[k], places[k - 1] + gap)
-    over = places[-1] - 1.0 if places else 0.0
-    if over > 0.0:  # from above: back into the panel
-        places[-1] = 1.0
-        for k in reversed(range(len(places) - 1)):
-            places[k] = min(places[k], places[k + 1] - gap)
-    for place, (_, name, colour) in zip(places, known, strict=True):
-        look: dict[str, Any] = {"va": "center", "fontsize": 7.0, "color": colour}
-        axes.annotate(
-            name, (1.0, place), (3, 0), "axes fraction", textcoords="offset points", **look
-        )

@@ -48,7 +48,6 @@ def page(results: Results, settings: ReportSettings) -> Page:
             *pairwise.matrix_drawing(results, settings),
             *motion_pictures.drawings(shown),
         ),
-        motions=motion_pictures.pages(shown),
     )
 
 

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from evoexp.report import markdown, motion_pictures
-from evoexp.report.figures import sweep_grids
+from evoexp.report.figures import sweep_curves, sweep_grids
 from evoexp.report.page_parts import Drawing, Page, Table
 from evoexp.report.pages import generic
 from evoexp.report.proportions import Proportion
@@ -56,7 +56,6 @@ def page(results: Results, sweep: Sweep, settings: ReportSettings) -> Page:
             *_drawings(results, sweep, effects),
             *(motion_pictures.drawings(shown) if shown else ()),
         ),
-        motions=motion_pictures.pages(shown),
     )
 
 
@@ -132,7 +131,7 @@ def _drawings(results: Results, sweep: Sweep, effects: tuple[MainEffect, ...]) -
             stem,
             f"{name[0].upper()}{name[1:]} over {where}",
             "Medians over runs; all panels share one scale of colours. ∞: at least half of the "
-            "runs have no feasible solution.",
+            f"runs have no feasible solution.{_more(_num_maps(sweep))}",
             partial(sweep_grids.grid_table, sweep, of),
             partial(sweep_grids.draw_grid, name=name),
             conditions,
@@ -151,9 +150,20 @@ def _drawings(results: Results, sweep: Sweep, effects: tuple[MainEffect, ...]) -
         yield Drawing(
             "convergence",
             "Convergence",
-            f"Median of the best cost so far; at the end of each curve its {where}. Costs of the "
-            "first twentieth of a run may lie above the panel.",
-            partial(sweep_grids.convergence_table, results, sweep),
-            sweep_grids.draw_convergence,
+            "Median of the best cost so far; panels of one condition share one scale; at the end "
+            f"of each curve its {sweep.settings[-1]}. Costs of the first twentieth of a run may "
+            f"lie above the panel.{_more(len(sweep_curves.facets(sweep)))}",
+            partial(sweep_curves.convergence_table, results, sweep),
+            sweep_curves.draw_convergence,
             conditions,
         )
+
+
+def _num_maps(sweep: Sweep) -> int:
+    return len({(each.base, *each.values[:-2]) for each in sweep.conditions})
+
+
+def _more(count: int) -> str:
+    """Tell how many panels are left out; empty if none is."""
+    most = sweep_grids.MOST_PANELS
+    return f" The first {most} of {count} panels; the data have all." if count > most else ""

@@ -1,0 +1,70 @@
+"""Names at the ends of curves, in place of a legend."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from evoexp.records import FloatArray
+from evoexp.report import style
+
+APART = 0.075  # [-] of the height of a panel, between names at the ends of curves
+DOTTED = (0, (1, 1.5))  # so that no line to a name is taken for a curve
+BESIDE = 1.06  # [-] of the width of a panel, where names begin
+
+
+class CurveEnd(NamedTuple):
+    """The end of a curve in a panel: its place, its name, its colour."""
+
+    x: float
+    y: float
+    name: str
+    colour: str
+
+
+def apart(wanted: FloatArray, gap: float) -> FloatArray:
+    """Return places within 0 to 1 with a gap between neighbours, nearest to the wanted ones.
+
+    Neighbours that are too close become a block around the mean of what they want.
+
+    Args:
+        wanted: Sorted, (n,).
+        gap: Between neighbours; smaller where so many do not fit.
+    """
+    gap = min(gap, 1.0 / max(len(wanted) - 1, 1))
+    steps = gap * np.arange(len(wanted))
+    blocks: list[list[float]] = []
+    for place in wanted - steps:  # without gaps the places only have to be in order
+        blocks.append([float(place)])
+        while len(blocks) > 1 and np.mean(blocks[-2]) > np.mean(blocks[-1]):
+            last = blocks.pop()
+            blocks[-1] += last
+    found = np.concatenate([np.full(len(block), np.mean(block)) for block in blocks] or [steps])
+    last_step = steps[-1] if len(steps) else 0.0
+    return np.asarray(np.clip(found, 0.0, 1.0 - last_step) + steps)
+
+
+def name_ends(axes: Axes, ends: Sequence[CurveEnd]) -> None:
+    """Write names to the right of a panel, each joined with the end of its curve by a line.
+
+    Args:
+        axes: Whose limits are set.
+        ends: Of its curves; those that end at infinity get no name.
+    """
+    low, high = axes.get_ylim()
+    known = sorted((end for end in ends if np.isfinite(end.y)), key=lambda end: end.y)
+    heights = np.clip([(end.y - low) / (high - low) for end in known], 0.0, 1.0)
+    for end, place in zip(known, apart(np.asarray(heights), APART), strict=True):
+        line = {"arrowstyle": "-", "color": end.colour, "lw": 0.8, "shrinkA": 1.0, "shrinkB": 0.0}
+        look: dict[str, Any] = {"va": "center", "fontsize": 7.0, "color": style.NEUTRAL}
+        axes.annotate(
+            end.name,
+            (end.x, end.y),
+            (BESIDE, place),
+            "data",
+            "axes fraction",
+            {**line, "linestyle": DOTTED, "relpos": (0.0, 0.5)},
+            annotation_clip=False,
+            **look,
+        )

@@ -6,6 +6,8 @@ from pathlib import Path
 import pytest
 from command_samples import SMALL, Evoexp, content
 
+from evoexp.commands import all_reports
+from evoexp.shipped import shipped
 from evoexp.store.run_directory import RunDirectory, find_runs
 from html_reader import Page
 
@@ -57,6 +59,44 @@ def test_nothing_stored_is_one_line(refused: Callable[..., str], outputs: Path) 
 def test_all_is_given_alone(refused: Callable[..., str]) -> None:
     assert refused("report", "--all", "rana") == "--all: must be given alone, was 'rana'"
     assert refused("report") == "experiment: must be named, or --all given, was 'none'"
+
+
+def test_all_reports_are_those_of_experiments_that_were_run(
+    monkeypatch: pytest.MonkeyPatch, outputs: Path
+) -> None:
+    """Experiments share runs: a shared one alone does not make a report of each of them."""
+    ids = {
+        (row.experiment, row.label): row.condition_id for row in shipped() if row.budget == "paper"
+    }
+    planar = [ids["rana_planar", label] for label in ("via-point GA", "random search")]
+    assert ids["rana_planar_ablations", "as printed"] == planar[0]
+    done = dict.fromkeys(planar, ("rana_planar", "quick", 5))
+
+    class Run(RunDirectory):
+        def completed(self) -> set[int]:
+            return set(range(done[self.condition_id][2])) if self.condition_id in done else set()
+
+        def failed(self) -> set[int]:
+            return set()
+
+        def manifest(self) -> dict[str, object]:
+            experiment, budget, _ = done[self.condition_id]
+            return {"experiment": experiment, "budget": budget}
+
+    monkeypatch.setattr(all_reports, "RunDirectory", Run)
+
+    def folders() -> list[str]:
+        return [each.folder for each in all_reports.planned_reports(outputs)]
+
+    assert folders() == ["rana_planar@quick"]
+    done[planar[1]] = ("rana_planar", "quick", 20)  # the paper's number of replicates, later
+    assert folders() == ["rana_planar"]
+    done[planar[1]] = ("rana_planar", "paper", 3)
+    assert folders() == ["rana_planar"]
+    for (name, _), condition_id in ids.items():  # all conditions of another one, of any origin
+        if name == "rana_planar_ablations":
+            done.setdefault(condition_id, ("", "quick", 5))
+    assert folders() == ["rana_planar", "rana_planar_ablations"]
 
 
 def test_all_reports_are_drawn_again_by_their_own_commands(

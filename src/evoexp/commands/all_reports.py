@@ -5,9 +5,9 @@ import contextlib
 import functools
 import io
 import shlex
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rich.console import Console
 
@@ -22,8 +22,6 @@ from evoexp.report import build
 from evoexp.report.home_page import summaries
 from evoexp.shipped import shipped
 from evoexp.store.run_directory import RunDirectory, outputs_root
-
-BUDGETS = ("paper", "smoke")  # those of the other budgets have the same hashes as one of them
 
 
 class Planned(NamedTuple):
@@ -87,31 +85,65 @@ def planned_reports(outputs: Path) -> Iterator[Planned]:
     """Yield the reports of all experiments that are stored, then the others that are there."""
     seen = set()
     for name in options("experiment"):
-        for budget in BUDGETS:
-            if not _may_be_stored(outputs, name, budget):
-                continue
-            words = [f"experiment={name}", *([f"budget={budget}"] if budget != "paper" else [])]
-            (experiment,) = expansions.expand(words)
-            ids = [condition.id for _, condition in experiment.conditions]
-            if experiment.report_name not in seen and _is_stored(outputs, ids):
-                seen.add(experiment.report_name)
-                yield Planned(experiment.report_name, draft_of(experiment, words).files)
+        for budget in _budgets(outputs, name):
+            folder, words = name, [f"experiment={name}"]
+            if budget != "paper":
+                folder, words = f"{name}@{budget}", [*words, f"budget={budget}"]
+            seen.add(folder)
+            yield Planned(folder, functools.partial(_of_experiment, words))
     for each in summaries(outputs / "reports"):
         if each.folder not in seen:
             yield Planned(each.folder, functools.partial(_again, each.folder, each.command))
 
 
-def _may_be_stored(outputs: Path, name: str, budget: str) -> bool:
-    """Return whether an experiment has to be composed to see if it is stored: others take long."""
+def _of_experiment(words: Sequence[str]) -> build.ReportFiles:
+    (experiment,) = expansions.expand(words)
+    return draft_of(experiment, words).files()
+
+
+def _budgets(outputs: Path, name: str) -> Iterator[str]:
+    """Yield the budgets at which an experiment was run.
+
+    It began one of its runs, or all of them are there: experiments share conditions, so one of
+    them alone does not mean that all were asked for.
+    """
+    for budget in ("paper", "smoke"):
+        ids = _ids(name, budget)
+        begun = _begun(outputs, ids)
+        own = [run for run in begun if _notes(run).get("experiment") == name]
+        if own or (begun and len(begun) == len(ids)):
+            is_quick = budget == "paper" and _is_quick(name, own or begun)
+            yield "quick" if is_quick else budget
+
+
+def _ids(name: str, budget: str) -> set[str]:
+    """Return the hashes of an experiment's conditions; one that is not shipped is composed."""
     rows = [row for row in shipped() if row.experiment == name]
-    return not rows or _is_stored(
-        outputs, [row.condition_id for row in rows if row.budget == budget]
-    )
+    if rows:
+        return {row.condition_id for row in rows if row.budget == budget}
+    (experiment,) = expansions.expand([f"experiment={name}", f"budget={budget}"])
+    return {condition.id for _, condition in experiment.conditions}
 
 
-def _is_stored(outputs: Path, ids: Sequence[str]) -> bool:
+def _is_quick(name: str, begun: Sequence[RunDirectory]) -> bool:
+    """Return whether runs, whose hashes are those of the paper's budget, are of `quick`."""
+    if any(_notes(run).get("budget") != "quick" for run in begun):
+        return False
+    (quick,) = expansions.expand([f"experiment={name}", "budget=quick"])
+    return all(len(run.completed()) <= quick.num_replicates for run in begun)
+
+
+def _begun(outputs: Path, ids: Iterable[str]) -> list[RunDirectory]:
+    """Return the runs that have a finished or failed replicate."""
     runs = (RunDirectory(outputs, each) for each in ids)
-    return any(run.completed() or run.failed() for run in runs)
+    return [run for run in runs if run.completed() or run.failed()]
+
+
+def _notes(run: RunDirectory) -> dict[str, Any]:
+    """Return the notes on a run's origin; none if they are damaged."""
+    with contextlib.suppress(EvoexpError):
+        return run.manifest()
+    return {}
 
 
 def _again(folder: str, command: str) -> build.ReportFiles:

@@ -126,13 +126,20 @@ def spread(values: FloatArray) -> Spread:
     return Spread(median, lower, upper, int(np.count_nonzero(~np.isnan(values))))
 
 
-@functools.cache  # a distribution function's band asks for the same ones again and again
 def wilson(successes: int, trials: int, confidence: float) -> Interval:
     """Return Wilson's score interval of a proportion; [0, 1] without trials."""
     if trials == 0:
         return Interval(0.0, 1.0)
-    found = stats.binomtest(successes, trials).proportion_ci(confidence, method="wilson")
+    found = _binomial_result()(
+        k=successes, n=trials, alternative="two-sided", statistic=successes / trials, pvalue=np.nan
+    ).proportion_ci(confidence, method="wilson")
     return Interval(float(found.low), float(found.high))
+
+
+@functools.cache
+def _binomial_result() -> type[Any]:
+    """Return scipy's class of results: its intervals want no p-value, which takes long to find."""
+    return type(stats.binomtest(0, 1))
 
 
 def signed_rank(x: FloatArray, y: FloatArray) -> SignedRank:

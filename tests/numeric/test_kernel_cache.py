@@ -4,6 +4,7 @@ import math
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -175,3 +176,40 @@ def test_old_states_go_but_recent_and_used_ones_stay(tmp_path: Path) -> None:
     kept = {path.name for path in tmp_path.iterdir()}
     assert kept == {states[i].name for i in (7, 6, 0, 1)}
     kernel_cache._remove_old(tmp_path / "file" / "nothing")  # silent where nothing is there
+
+
+EDITED = """
+import pathlib, sys
+from guest.kernels import f  # its code is loaded, nothing is compiled
+constants = pathlib.Path(sys.argv[1])
+constants.write_text(constants.read_text().replace("1.0", "5.0"))
+print(f(1.0))
+"""
+
+
+def test_code_that_is_edited_while_it_runs_leaves_no_stale_kernel(tmp_path: Path) -> None:
+    """The kernel of the loaded code would be kept under the key of the edited one."""
+    package = tmp_path / "guest"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    (package / "constants.py").write_text("ADDED = 1.0\n")
+    code = GUEST.replace("1.0", "ADDED").replace("\n@", "\nfrom guest.constants import ADDED\n@")
+    (package / "kernels.py").write_text(code)
+    paths = [str(tmp_path), str(Path(kernel_cache.__file__).parents[2])]
+    environment = os.environ | {
+        "PYTHONPATH": os.pathsep.join(paths),
+        "EVOEXP_CACHE": str(tmp_path / "cache"),
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
+
+    def said(script: str) -> tuple[str, str]:
+        time.sleep(2.0 * code_keys.GRAIN_S)
+        command = [sys.executable, "-c", script, str(package / "constants.py")]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        return done.stdout, done.stderr
+
+    text = f"evoexp: {package / 'constants.py'}: written while this process ran; "
+    assert said(EDITED) == ("2.0\n", f"{text}kernels of this code are not kept\n")
+    call = "from guest.kernels import f; print(f(1.0), sum(f.stats.cache_hits.values()))"
+    assert said(call) == ("6.0 0\n", "")
+    assert said(call) == ("6.0 1\n", "")

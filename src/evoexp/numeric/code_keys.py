@@ -3,6 +3,9 @@
 That is its code and the code of every module that it imports, down to the last one, without
 comments, docstrings and annotations. So no stale kernel can be loaded, an edit recompiles only what
 depends on it, an edit of words recompiles nothing, and two checkouts share what is alike in them.
+
+The key tells what the files hold, and kernels are made of what was loaded. Where a file is written
+while a process runs, the two may differ: `written_since` names such a file.
 """
 
 import ast
@@ -17,6 +20,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
+from evoexp.version import LOADED_FROM
+
+GRAIN_S = 0.02  # [s] that a file's time may be behind the clock
 
 _PACKAGE = "evoexp"
 # Modules that keep kernels and change none; their own format is named by the folder `kernels`.
@@ -60,6 +66,26 @@ def module_key(module: str) -> str:
     return digest.hexdigest()
 
 
+def written_since(module: str, since: float = LOADED_FROM) -> Path | None:
+    """Return a file of a module's key that was written while this process ran; None: there is none.
+
+    Args:
+        module: Dotted name.
+        since: When this process began to load code [s].
+    """
+    for name in _reached(module):
+        path = _file_of(name)
+        if path is None:
+            continue
+        try:
+            found = path.stat()
+        except OSError:  # removed meanwhile
+            return path
+        if max(found.st_mtime, found.st_ctime) >= since - GRAIN_S:
+            return path
+    return None
+
+
 def is_kernel_module(module: str) -> bool:
     """Return whether a module is evoexp's, or imports something of it."""
     if _file_of(module) is None:
@@ -68,7 +94,8 @@ def is_kernel_module(module: str) -> bool:
     return source is not None and any(name.split(".")[0] == _PACKAGE for name in source.imports)
 
 
-def _reached(module: str) -> set[str]:
+@functools.cache
+def _reached(module: str) -> frozenset[str]:
     """Return a module and all modules that it imports, directly or not."""
     found, waiting = {module}, [module]
     while waiting:
@@ -78,7 +105,7 @@ def _reached(module: str) -> set[str]:
             if inner not in found | _KEEPERS and _file_of(inner) is not None:
                 found.add(inner)
                 waiting.append(inner)
-    return found
+    return frozenset(found)
 
 
 def _file_of(module: str) -> Path | None:

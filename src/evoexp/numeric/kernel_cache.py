@@ -18,7 +18,7 @@ import numba
 from filelock import BaseFileLock, FileLock, Timeout
 from numba.core import caching
 
-from evoexp.numeric.code_keys import is_kernel_module, module_key
+from evoexp.numeric.code_keys import is_kernel_module, module_key, written_since
 from evoexp.numeric.kept_files import MESSAGES, cache_root
 from evoexp.numeric.kernel_files import KernelFiles
 
@@ -115,13 +115,26 @@ class SharedCache:
     def __init__(self, function: Any) -> None:
         """Note whose it is."""
         self._function = function
-        self._opened: _OpenedCache | None = None
+        self._opened: Any = None
 
     def __getattr__(self, name: str) -> Any:
         """Open the cache, and return its attribute of this name."""
         if self._opened is None:
-            self._opened = _OpenedCache(self._function)
+            self._opened = _opened(self._function)
         return getattr(self._opened, name)
+
+
+def _opened(function: Any) -> Any:
+    """Return a kernel's cache; one that keeps nothing where its code was written meanwhile.
+
+    What is loaded may be older than the files then, whose content would name it.
+    """
+    path = written_since(function.__module__)
+    if path is None:
+        return _OpenedCache(function)
+    text = f"{path}: written while this process ran; kernels of this code are not kept"
+    MESSAGES.say("written", text)
+    return caching.NullCache()
 
 
 def use_content_cache() -> None:

@@ -9,18 +9,16 @@ import functools
 import hashlib
 import importlib.metadata
 import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from evoexp.collision.box_support import EXACT, coal
-from evoexp.collision.models import body_covers, varied_spheres
 from evoexp.collision.models.body_covers import Cover, sphere_cover
-from evoexp.numeric import ordered_sums
+from evoexp.numeric.code_keys import module_key, written_since
 from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
 
-_CODE = (body_covers, varied_spheres, ordered_sums)
+_CODE = sphere_cover.__module__
 _LIBRARIES = ("numpy", "scipy", "coal")
 _SIZES = ("radius", "halfLength", "halfSide", "radii")  # of coal's shapes
 
@@ -35,7 +33,7 @@ def kept_sphere_cover(item: Any, inflation: float) -> Cover:
     Raises:
         UnsupportedShape: As `sphere_cover`.
     """
-    if isinstance(item.geometry, coal.Sphere | coal.Capsule):
+    if isinstance(item.geometry, coal.Sphere | coal.Capsule) or written_since(_CODE):
         return sphere_cover(item, inflation)
     digest = hashlib.sha256(_code())
     for part in (*_shape(item.geometry), item.placement.homogeneous, inflation):
@@ -71,7 +69,4 @@ def _corners(triangle: Any) -> list[int]:
 @functools.cache
 def _code() -> bytes:
     versions = [importlib.metadata.version(name) for name in _LIBRARIES]
-    digest = hashlib.sha256(json.dumps([*versions, EXACT]).encode())
-    for module in _CODE:
-        digest.update(Path(str(module.__file__)).read_bytes())
-    return digest.digest()
+    return hashlib.sha256(json.dumps([*versions, EXACT, module_key(_CODE)]).encode()).digest()

@@ -58,3 +58,11 @@ def test_arrays_outlive_the_tuple_that_they_came_in() -> None:
 def test_a_tuple_of_another_length_is_refused() -> None:
     with pytest.raises((TypingError, ValueError)):
         difference(((np.ones(2), 0.5), 4))
+
+
+def test_interpreted_kernels_name_them_too() -> None:
+    given = Outer(Inner(np.array([1.0, 3.0]), 0.5), 4, (7, 2))
+    found = named(Outer, plain(given))
+    assert found == given
+    assert type(found) is Outer
+    assert type(found.inner) is Inner

@@ -4,7 +4,15 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evoexp.numeric.random_stream import Block, Draws, draw, draw_index, draw_many, used_up
+from evoexp.numeric.random_stream import (
+    Block,
+    DrawnAhead,
+    Draws,
+    draw,
+    draw_index,
+    draw_many,
+    used_up,
+)
 
 
 def rng() -> np.random.Generator:
@@ -43,3 +51,14 @@ def test_indices_stay_below_their_count() -> None:
         np.zeros(1, dtype=np.int64),
     )
     assert [draw_index(block, count) for count in (3, 3, 3, 2**53)] == [0, 1, 2, 2**53 - 1]
+
+
+@given(st.integers(0, 7), st.lists(st.integers(1, 5), min_size=1, max_size=6))
+def test_a_generator_follows_numbers_that_are_drawn_ahead(count: int, stretches: list[int]) -> None:
+    own, step_by_step = rng(), rng()
+    ahead = DrawnAhead(own, count)
+    for steps in stretches:
+        for numbers in ahead.draw(steps):
+            assert np.array_equal(numbers, step_by_step.random(count))
+            ahead.follow()
+            assert own.bit_generator.state == step_by_step.bit_generator.state

@@ -15,8 +15,8 @@ import pytest
 
 from evoexp.condition import Condition
 from evoexp.configuration import compose
+from evoexp.planners.coevolution import breeder as breeder_module
 from evoexp.planners.coevolution import kernels
-from evoexp.planners.coevolution import planner as planner_module
 from evoexp.planners.coevolution.planner import Coevolution
 from references import curkovic_numpy
 
@@ -168,7 +168,7 @@ def swapped_readings_of_eq_9(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def constant_rate_for_eq_10(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(planner_module, "decayed_rate", lambda rate, *_: rate)
+    monkeypatch.setattr(breeder_module, "decayed_rate", lambda rate, *_: rate)
 
 
 def c1_without_obstacles(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -234,7 +234,7 @@ def test_every_planted_fault_is_noticed(
     changes = {"ga.num_elites": 2, "scenario.obstacles": DISCS, "ga.hall_distinct": distinct}
     given = condition(SMALL | changes)
     for name in ("breed", "renew"):
-        monkeypatch.setattr(planner_module, name, getattr(kernels, name).py_func)
+        monkeypatch.setattr(breeder_module, name, getattr(kernels, name).py_func)
     plant(monkeypatch)
     if plant is nothing:
         compare(given, 0)

@@ -7,8 +7,8 @@ import pytest
 
 from evoexp.condition import Condition
 from evoexp.configuration import compose
+from evoexp.planners.coevolution import breeder as breeder_module
 from evoexp.planners.coevolution import kernels
-from evoexp.planners.coevolution import planner as planner_module
 from matrix import first
 
 METHODS = ("V", "VI", "VII", "VIII")
@@ -66,11 +66,11 @@ def halls(given: Condition, seed: int, monkeypatch: pytest.MonkeyPatch) -> list[
 
     def watched(populations: Any, *rest: Any) -> int:
         held = renew(populations, *rest)
-        found.append((populations.copy(), rest[4].teams[:held].copy()))
+        found.append((populations.copy(), rest[4][0][:held].copy()))
         return int(held)
 
     with monkeypatch.context() as patch:
-        patch.setattr(planner_module, "renew", watched)
+        patch.setattr(breeder_module, "renew", watched)
         planner, problem = given.prepare()
         for _ in planner.evolve(problem, np.random.default_rng(seed)):
             pass

@@ -237,7 +237,7 @@ def test_links_are_those_of_costs_one_by_one() -> None:
     for generation in given:
         log.write(generation)
         costs, best = array_bytes(generation.costs), array_bytes(generation.best)
-        expected.append(chain.update(costs, best, chain.state()))
+        expected += chain.extend([costs], [best], [chain.state()])
         rng.random(3)
     found = read_log(log.finish(summary()).content).generations
     assert [row.chain for row in found] == expected

@@ -10,7 +10,7 @@ from typing import Any, TypeVar, cast, get_type_hints
 
 from numba.core import types
 from numba.core.imputils import impl_ret_borrowed
-from numba.extending import intrinsic
+from numba.extending import intrinsic, overload
 
 Named = TypeVar("Named", bound=tuple[Any, ...])
 
@@ -31,17 +31,33 @@ def _named_type(kind: type, value: Any) -> Any:
     """Return numba's type of a named tuple class whose fields have the types of a plain tuple."""
     items = []
     for hint, item in zip(get_type_hints(kind).values(), value, strict=True):
-        is_named = isinstance(hint, type) and issubclass(hint, tuple) and hasattr(hint, "_fields")
-        items.append(_named_type(hint, item) if is_named else item)
+        items.append(_named_type(hint, item) if _is_named(hint) else item)
     return types.BaseTuple.from_types(items, pyclass=kind)
 
 
-named: Callable[[type[Named], Any], Named] = cast(Any, intrinsic(_name))
-"""Return a plain tuple as a named one, in kernels.
+def _is_named(hint: Any) -> bool:
+    return isinstance(hint, type) and issubclass(hint, tuple) and hasattr(hint, "_fields")
 
-Fields that are annotated as named tuples are named, too, to any depth.
 
-Args:
-    kind: The class of named tuples.
-    value: From `plain`.
-"""
+_named: Callable[[Any, Any], Any] = cast(Any, intrinsic(_name))
+
+
+def named(kind: type[Named], value: Any) -> Named:
+    """Return a plain tuple as a named one, in kernels, also where they are interpreted.
+
+    Fields that are annotated as named tuples are named, too, to any depth.
+
+    Args:
+        kind: The class of named tuples.
+        value: From `plain`.
+    """
+    items = zip(get_type_hints(kind).values(), value, strict=True)
+    return kind(*(named(hint, item) if _is_named(hint) else item for hint, item in items))
+
+
+@overload(named)
+def _compile_named(kind: Any, value: Any) -> Any:
+    def compiled(kind: Any, value: Any) -> Any:  # numba compares annotations, too
+        return _named(kind, value)
+
+    return compiled

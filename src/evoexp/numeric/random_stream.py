@@ -49,6 +49,33 @@ class Draws:
         self.block.taken[0] = 0
 
 
+class DrawnAhead:
+    """Uniform numbers for several steps at once, drawn ahead of a generator by a twin of it.
+
+    The generator follows step by step: between two steps it is where it would be if each step had
+    drawn its own numbers.
+    """
+
+    def __init__(self, rng: np.random.Generator, count: int) -> None:
+        """Begin where a generator is.
+
+        Args:
+            rng: The generator.
+            count: Numbers that each step takes.
+        """
+        bits = type(rng.bit_generator)(0)
+        bits.state = rng.bit_generator.state
+        self._rng, self._twin, self._passed = rng, np.random.Generator(bits), np.empty(count)
+
+    def draw(self, steps: int) -> NDArray[np.float64]:
+        """Return the numbers of the next steps, (steps, count)."""
+        return self._twin.random((steps, len(self._passed)))
+
+    def follow(self) -> None:
+        """Let the generator pass the numbers of one step."""
+        self._rng.random(out=self._passed)
+
+
 @kernel
 def draw(draws: Block) -> float:
     """Return the next uniform number of a block; 0 behind its end."""

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoexp.evolution.cost_statistics import CostStatistics
-from evoexp.evolution.genetic_settings import ScaledGenetic
+from evoexp.evolution.genetic_settings import GeneticSettings, ScaledGenetic
 from evoexp.evolution.scaled_selection import SelectionMemory
-from evoexp.numeric.random_stream import Draws
+from evoexp.numeric.random_stream import DrawnAhead, Draws
 from evoexp.planners.planner import Candidate, Keeper
 from evoexp.records import FloatArray, Generation
 
@@ -28,11 +28,85 @@ class Stretches(ABC):
         num_places: Generations computed per call, and the one before them.
         summaries: (places, SUMMARY).
         costs: (places, individuals).
+        queries_each: Configurations that judging an individual asks for.
+        drawn: Numbers of the generations, where they are drawn ahead: the generator follows.
+    """
+
+    costs: FloatArray
+    queries_each = 0
+    drawn: DrawnAhead | None = None
+
+    def __init__(self, ga: GeneticSettings, stretch: int) -> None:
+        """Begin a run.
+
+        Args:
+            ga: Its settings.
+            stretch: Generations computed per call, at most.
+        """
+        self.num_places = min(stretch, ga.num_generations) + 1
+        self.summaries = np.empty((self.num_places, SUMMARY))
+        self._ga, self._known = ga, 0
+
+    def generations(self, rng: np.random.Generator) -> Iterator[Generation]:
+        """Yield the initial population, then every generation."""
+        ga, keeper, index = self._ga, Keeper(), 0
+        self.begin(rng)
+        evaluated, last = ga.population_size, ga.num_generations
+        while True:
+            place = index % self.num_places
+            if index > 0 and self.drawn is not None:
+                self.drawn.follow()
+            self.keep(keeper, place)
+            best, mean, std, num_feasible = self.summaries[place].tolist()
+            individual, costs = int(best), self.costs[place]
+            yield keeper.record(
+                CostStatistics(individual, mean, std),
+                costs,
+                self.population(place, index == last),
+                lowest=costs.item(individual),
+                num_feasible=int(num_feasible),
+                evaluations=evaluated,
+                collision_queries=evaluated * self.queries_each,
+            )
+            if index == last:
+                return
+            if index == self._known:
+                self._known = min(index + self.num_places - 1, last)
+                self.go_on(rng, index, self._known)
+            index, evaluated = index + 1, ga.num_offspring
+
+    def keep(self, keeper: Keeper, place: int) -> None:
+        """Keep the best individual of a generation if it is better than all before."""
+        individual = int(self.summaries[place, 0])
+        lowest = self.costs.item(place, individual)
+        if keeper.improves(lowest):
+            keeper.keep(lowest, self.candidate(place, individual))
+
+    @abstractmethod
+    def begin(self, rng: np.random.Generator) -> None:
+        """Draw and judge the initial population, at place 0."""
+
+    @abstractmethod
+    def go_on(self, rng: np.random.Generator, first: int, last: int) -> None:
+        """Compute the generations that follow one, up to another."""
+
+    @abstractmethod
+    def candidate(self, place: int, individual: int) -> Candidate:
+        """Return an individual as it is recorded."""
+
+    @abstractmethod
+    def population(self, place: int, is_last: bool) -> NDArray[Any]:
+        """Return the population at a place; that of the last generation is hashed."""
+
+
+class ScaledStretches(Stretches):
+    """Generations whose parents are chosen as in `scaled_selection`, by blocks of draws.
+
+    Attributes:
         chosen: Memory of the selection.
         arguments: All that `evolve` takes behind the draws and the first and the last generation.
     """
 
-    costs: FloatArray
     arguments: tuple[Any, ...]
 
     def __init__(
@@ -47,53 +121,12 @@ class Stretches(ABC):
             stretch: Generations computed per call, at most.
             block: Uniform numbers drawn at once, at least.
         """
-        self.num_places = min(stretch, ga.num_generations) + 1
-        self.summaries = np.empty((self.num_places, SUMMARY))
+        super().__init__(ga, stretch)
         self.chosen = SelectionMemory.of(ga.num_offspring, ga.num_elites, ga.population_size)
-        self._ga, self._evolve, self._known, self._draws = ga, evolve, -1, Draws(block)
+        self._evolve, self._draws = evolve, Draws(block)
 
-    def generations(self, rng: np.random.Generator) -> Iterator[Generation]:
-        """Yield the initial population, then every generation."""
-        ga, keeper = self._ga, Keeper()
-        for index in range(ga.num_generations + 1):
-            place = self._place(index, rng)
-            best, mean, std, num_feasible = self.summaries[place].tolist()
-            individual, costs = int(best), self.costs[place]
-            lowest = float(costs[individual])
-            if keeper.improves(lowest):
-                keeper.keep(lowest, self.candidate(place, individual))
-            yield keeper.record(
-                CostStatistics(individual, mean, std),
-                costs,
-                self.population(place, index == ga.num_generations),
-                lowest=lowest,
-                num_feasible=int(num_feasible),
-                evaluations=ga.num_offspring if index else ga.population_size,
-                collision_queries=0,
-            )
-
-    def _place(self, index: int, rng: np.random.Generator) -> int:
-        """Return the place of a generation; it is computed if need be, with some that follow it."""
-        if index == 0:
-            self.begin(rng)
-            self._known = 0
-        elif index > self._known:
-            last = min(self._known + self.num_places - 1, self._ga.num_generations)
-            arguments = self.arguments
-            while (known := self._evolve(self._draws.block, self._known, last, *arguments)) < last:
-                self._known = known
-                self._draws.extend(rng)
-            self._known = last
-        return index % self.num_places
-
-    @abstractmethod
-    def begin(self, rng: np.random.Generator) -> None:
-        """Draw and judge the initial population, at place 0."""
-
-    @abstractmethod
-    def candidate(self, place: int, individual: int) -> Candidate:
-        """Return an individual as it is recorded."""
-
-    @abstractmethod
-    def population(self, place: int, is_last: bool) -> NDArray[Any]:
-        """Return the population at a place, and the last population, which is hashed, unpadded."""
+    def go_on(self, rng: np.random.Generator, first: int, last: int) -> None:
+        """Compute generations; draw more numbers whenever they do not suffice."""
+        arguments = self.arguments
+        while (first := self._evolve(self._draws.block, first, last, *arguments)) < last:
+            self._draws.extend(rng)

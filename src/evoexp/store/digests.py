@@ -31,19 +31,25 @@ class Chain:
         self.link = b""
 
     def state(self) -> bytes:
-        """Return the state of the generator now, for `update`."""
+        """Return the state of the generator now, for `extend`."""
         return self._state()
 
-    def update(self, costs: bytes, best: bytes, state: bytes) -> str:
-        """Append one generation and return its link in hex.
+    def extend(
+        self, costs: Iterable[bytes], best: Iterable[bytes], states: Iterable[bytes]
+    ) -> list[str]:
+        """Append generations and return their links in hex.
 
         Args:
-            costs: `array_bytes` of the costs of the generation.
-            best: `array_bytes` of the best solution so far.
-            state: What `state` returned at that generation.
+            costs: `array_bytes` of the costs of each generation.
+            best: `array_bytes` of the best solution until each of them.
+            states: What `state` returned at each of them.
         """
-        self.link = xxhash.xxh3_128_digest(b"".join((self.link, costs, best, state)))
-        return self.link.hex()
+        link, links, digest, join = self.link, [], xxhash.xxh3_128_digest, b"".join
+        for parts in zip(costs, best, states, strict=True):
+            link = digest(join((link, *parts)))
+            links.append(link.hex())
+        self.link = link
+        return links
 
     def finish(self, population: NDArray[Any]) -> str:
         """Return the replicate's digest, xxh3_128(last link ‖ population), as 32 hex digits."""

@@ -2,8 +2,8 @@
 
 import io
 import struct
-from collections.abc import Iterable, Mapping
-from itertools import chain
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import chain, compress, repeat
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -49,30 +49,6 @@ _TICK = 1_000_000_000  # [ns] the synthetic clock: one second per generation
 
 class LogTooLarge(EvoexpError):
     """A replicate whose log no reader would take."""
-
-
-class _Pending(NamedTuple):
-    """The part of a generation that waits to be encoded, without views of the planner's memory.
-
-    Attributes:
-        values: Of its fields from `index` to `solved`.
-        terms: A copy.
-        columns: (name, column) of every term.
-        costs: Their bytes; of floats every NaN still has the bits that it had.
-        are_floats: Whether the costs are float64.
-        best: `array_bytes` of the best so far.
-        state: Of the generator.
-        cpu: Of the replicate until then [ns].
-    """
-
-    values: tuple[Any, ...]
-    terms: dict[str, float]
-    columns: Iterable[tuple[str, str]]
-    costs: bytes
-    are_floats: bool
-    best: bytes
-    state: bytes
-    cpu: int
 
 
 class Finished(NamedTuple):
@@ -171,7 +147,11 @@ class Log:
         self._channels: dict[str, _Channel] = {}
         self._terms: dict[str, str] = {}  # name → column, in the order of the columns
         self._last: Generation | None = None
-        self._pending: list[_Pending] = []
+        # Generations that wait to be encoded: values up to `solved`; a copy of the terms; (name,
+        # column) of all terms; the bytes of the costs; whether these are floats, whose NaNs have
+        # the bits that they had; `array_bytes` of the best; the generator's state; CPU time [ns].
+        self._pending: list[tuple[Any, ...]] = []
+        self._state = self._chain.state
         self._best_bytes = b""  # array_bytes of the best so far
         self._best = self._written = (
             b""  # of the generation encoded last, and of the last solution written
@@ -205,21 +185,21 @@ class Log:
             cpu_s: CPU time of the replicate until then [s]: the publish time of the messages, no
                 part of any digest.
         """
-        if generation.terms.keys() != self._terms.keys():
-            self._terms = {name: TERM + name for name in sorted(generation.terms)}
+        terms, costs = generation.terms, generation.costs
+        are_floats = costs.dtype.char == "d"
+        if terms.keys() != self._terms.keys():
+            self._terms = {name: TERM + name for name in sorted(terms)}
         if self._last is None or generation.best is not self._last.best:
             self._best_bytes = array_bytes(np.asarray(generation.best, dtype=np.float64))
-        costs = generation.costs
-        are_floats = costs.dtype.char == "d"
         self._pending.append(
-            _Pending(
-                generation[:_NUM_VALUES],
-                generation.terms.copy(),
+            (
+                generation[:_NUM_VALUES],  # without views of the planner's memory
+                terms.copy(),
                 self._terms.items(),
                 costs.tobytes() if are_floats else array_bytes(costs),
                 are_floats,
                 self._best_bytes,
-                self._chain.state(),
+                self._state(),
                 int(cpu_s * 1e9),
             )
         )
@@ -235,26 +215,26 @@ class Log:
                 self.write_front(FrontRow(generation.index, population, criteria.T))
 
     def _flush(self) -> None:
+        """Encode the generations that wait; a better solution stands behind its generation."""
         if not self._pending:
             return
-        # rows, with the links of the chain
-        update, rows = self._chain.update, []
-        nan = any_nan(each.costs for each in self._pending if each.are_floats)
-        for values, terms, columns, costs, are_floats, best, state, _ in self._pending:
-            if nan and are_floats:
-                costs = array_bytes(np.frombuffer(costs))
-            row = generation_row(values, terms, columns)
-            row["chain"] = update(costs, best, state)
-            rows.append(row)
-        # messages; a better solution stands behind its generation
-        for row, each, data in zip(rows, self._pending, encode_generations(rows), strict=True):
-            index, self._best, self._best_cost = row["index"], each.best, row["best_cost"]
-            self._cpu = each.cpu
-            first = GENERATION_TOPIC not in self._channels
-            self._add(GENERATION_TOPIC, GenerationRow, index, data)
-            if first or self._best_cost < self._written_cost:
-                self._write_solution(index)
+        values, terms, columns, costs, are_floats, solutions, states, cpu = zip(
+            *self._pending, strict=True
+        )
         self._pending.clear()
+        links = self._chain.extend(_without_payloads(costs, are_floats), solutions, states)
+        rows = list(map(generation_row, values, terms, columns, links))
+        data, indices, begin = encode_generations(rows), [row["index"] for row in rows], 0
+        for k, row in enumerate(rows):
+            lowest = row["best_cost"]
+            if lowest < self._written_cost or GENERATION_TOPIC not in self._channels:
+                own, begin = slice(begin, k + 1), k + 1
+                self._add(GENERATION_TOPIC, GenerationRow, indices[own], data[own], cpu[own])
+                self._best, self._best_cost, self._cpu = solutions[k], lowest, cpu[k]
+                self._write_solution(row["index"])
+        own = slice(begin, len(rows))
+        self._add(GENERATION_TOPIC, GenerationRow, indices[own], data[own], cpu[own])
+        self._best, self._best_cost, self._cpu = solutions[-1], rows[-1]["best_cost"], cpu[-1]
         self._send()
 
     def _send(self) -> None:
@@ -274,7 +254,8 @@ class Log:
     def write_front(self, front: FrontRow) -> None:
         """Append the front of a population of the generation last written."""
         self._flush()
-        self._add(FRONT_TOPIC, FrontRow, front.generation, encode_front(front))
+        data = encode_front(front)
+        self._add(FRONT_TOPIC, FrontRow, [front.generation], [data], [self._cpu])
 
     def finish(self, summary: ReplicateSummary) -> Finished:
         """Close the log.
@@ -308,18 +289,44 @@ class Log:
     def _write_solution(self, index: int) -> None:
         self._written, self._written_cost = self._best, self._best_cost
         data = encode_solution(index, self._best_cost, np.frombuffer(self._best))
-        self._add(SOLUTION_TOPIC, SolutionRow, index, data)
+        self._add(SOLUTION_TOPIC, SolutionRow, [index], [data], [self._cpu])
 
-    def _add(self, topic: str, record: type, generation: int, data: bytes) -> None:
+    def _add(
+        self,
+        topic: str,
+        record: type,
+        generations: Sequence[int],
+        data: Sequence[bytes],
+        cpu: Sequence[int],
+    ) -> None:
+        """Let messages of one channel wait to be written.
+
+        Args:
+            topic: Of the channel.
+            record: Whose messages it has.
+            generations: Their indices.
+            data: Encoded.
+            cpu: Times of the replicate [ns].
+        """
         channel = self._channels.get(topic)
         if channel is None:  # registered with its first message, when the terms are known
             self._send()  # the channel comes behind the messages before
             terms = tuple(self._terms) if record is GenerationRow else ()
             channel = self._channels[topic] = _Channel(self._writer, topic, record, terms)
         channels, sequences, times, published, contents = self._messages
-        channels.append(channel.id)
-        sequences.append(channel.num_messages)
-        times.append(int(generation) * _TICK)
-        published.append(self._cpu)
-        contents.append(data)
-        channel.num_messages += 1
+        first, channel.num_messages = channel.num_messages, channel.num_messages + len(data)
+        channels.extend(repeat(channel.id, len(data)))
+        sequences.extend(range(first, channel.num_messages))
+        times.extend([int(generation) * _TICK for generation in generations])
+        published.extend(cpu)
+        contents.extend(data)
+
+
+def _without_payloads(costs: Sequence[bytes], are_floats: Sequence[bool]) -> Sequence[bytes]:
+    """Return costs as `array_bytes` does, of which those that are floats hold NaNs of any bits."""
+    if not any_nan(compress(costs, are_floats)):
+        return costs
+    return [
+        array_bytes(np.frombuffer(each)) if is_float else each
+        for each, is_float in zip(costs, are_floats, strict=True)
+    ]

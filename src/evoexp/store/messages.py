@@ -63,7 +63,10 @@ def json_schema(record: type, terms: tuple[str, ...] = ()) -> bytes:
 
 
 def generation_row(
-    values: Sequence[Any], terms: Mapping[str, Any], columns: Iterable[tuple[str, str]]
+    values: Sequence[Any],
+    terms: Mapping[str, Any],
+    columns: Iterable[tuple[str, str]],
+    chain: str,
 ) -> dict[str, Any]:
     """Return the recorded part of a generation as plain values, for `encode_generations`.
 
@@ -71,6 +74,7 @@ def generation_row(
         values: Of the fields of `Generation`, from `index` to `solved`.
         terms: Its terms.
         columns: (name, column) of every term, in the order of the columns.
+        chain: Its link.
     """
     index, _, best, lowest, mean, std, num_feasible, evaluations, queries, solved = values
     row: dict[str, Any] = {
@@ -86,6 +90,7 @@ def generation_row(
     }
     for name, column in columns:
         row[column] = float(terms[name])
+    row["chain"] = chain
     return row
 
 
@@ -95,7 +100,7 @@ def encode_generations(rows: Sequence[dict[str, Any]]) -> list[bytes]:
     All rows together take little more than half the time that they take one by one.
 
     Args:
-        rows: Of `generation_row`, with `chain`, the generation's link as 32 hex digits.
+        rows: Of `generation_row`.
     """
     text = orjson.dumps(rows)
     if b"null" not in text:  # every number is finite

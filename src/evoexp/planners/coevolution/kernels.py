@@ -1,6 +1,6 @@
 """Breeding and measuring co-evolving populations, compiled (Curkovic et al. 2013, section 3)."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from evoexp.evolution.selection import (
     spin_roulette,
 )
 from evoexp.numeric.compilation import kernel
+from evoexp.numeric.named_tuples import named
 from evoexp.objectives.motion_criteria import measure_motions
 from evoexp.records import BoolArray, FloatArray, IntArray
 
@@ -50,7 +51,7 @@ def breed(
     costs: FloatArray,
     moving: BoolArray,
     teams: IntArray,
-    breeding: Breeding,
+    plain_breeding: tuple[Any, ...],
     bred: FloatArray,
 ) -> None:
     """Write the next populations: offspring, then elites, then the members of the hall, unchanged.
@@ -61,10 +62,11 @@ def breed(
         populations: (robots, genes, individuals).
         costs: (robots, individuals).
         moving: (robots,) false for robots that stand still: their populations are copied.
-        teams: (teams, robots) members of the hall.
-        breeding: Settings.
+        teams: (teams, robots) members of the hall; written: their places in the next populations.
+        plain_breeding: `Breeding`, made plain.
         bred: Like populations, written.
     """
+    breeding = named(Breeding, plain_breeding)
     size, num_elites = populations.shape[2], breeding.num_elites
     count = size - num_elites - len(teams)
     last = count + 2 * (count // 2)  # behind the numbers of cross-over
@@ -97,11 +99,18 @@ def breed(
         )
         # elites and members of the hall, untouched
         choose_elites(costs[robot], elites)
-        for gene in range(len(genes)):
-            for k in range(num_elites):
-                genes[gene, count + k] = before[gene, elites[k]]
-            for k in range(len(teams)):
-                genes[gene, count + num_elites + k] = before[gene, teams[k, robot]]
+        copy_members(before, elites, genes, count)
+        copy_members(before, teams[:, robot], genes, count + num_elites)
+    for k in range(len(teams)):
+        teams[k] = count + num_elites + k
+
+
+@kernel
+def copy_members(before: FloatArray, members: IntArray, genes: FloatArray, first: int) -> None:
+    """Copy some individuals of a population (genes, individuals) to places from `first` on."""
+    for gene in range(len(genes)):
+        for k in range(len(members)):
+            genes[gene, first + k] = before[gene, members[k]]
 
 
 @kernel
@@ -111,9 +120,9 @@ def renew(
     collisions: CollisionCounts,
     own: FloatArray,
     best: IntArray,
-    hall: Hall,
+    plain_hall: tuple[Any, ...],
     num_teams: int,
-    rules: HallRules,
+    plain_rules: tuple[Any, ...],
     by_genome: bool,
 ) -> int:
     """Renew the hall of fame from the Pareto fronts of all populations, without copies.
@@ -124,15 +133,16 @@ def renew(
         collisions: See `best_team`.
         own: See `best_team`.
         best: (robots,) see `renew_hall`, as the rest.
-        hall: With room for as many teams as it may hold.
+        plain_hall: `Hall`, made plain, with room for as many teams as it may hold.
         num_teams: Teams of the hall at present.
-        rules: Which teams it takes.
+        plain_rules: `HallRules`, made plain: which teams it takes.
         by_genome: Whether copies count as one individual, and members of the hall are offered
             again; else members of the hall and their copies leave the fronts.
 
     Returns:
         Number of teams that the hall holds then.
     """
+    hall, rules = named(Hall, plain_hall), named(HallRules, plain_rules)
     count = populations.shape[2]
     fronts = np.empty((len(populations), count), dtype=np.bool_)
     for robot in range(len(populations)):

@@ -10,7 +10,7 @@ configuration 2, …. A solution is flat: robot by robot, configuration by confi
 (robots × (K + 2) × 2) [deg], start and goal included.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import combinations
 from typing import ClassVar, Literal, Self
 
@@ -20,20 +20,16 @@ from pydantic import model_validator
 from evoexp.collision.models.link_collision import LinkCrossings
 from evoexp.collision.scene import scene
 from evoexp.errors import SettingError
-from evoexp.evolution.best_team import BestTeam, best_team
-from evoexp.evolution.cost_statistics import cost_statistics
-from evoexp.evolution.crossover import num_single_point_uniforms
-from evoexp.evolution.hall_of_fame import Hall, HallRules
-from evoexp.evolution.mutation import decayed_rate, num_allele_uniforms
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.motion_criteria import MotionCriteria
 from evoexp.paths.motion import Motion, clamped_cubic, joint_ranges, top_speeds
+from evoexp.planners.coevolution.breeder import HALF_TURN, Breeder
 from evoexp.planners.coevolution.chromosome_length import SpeedLimit, length_notes
-from evoexp.planners.coevolution.kernels import Breeding, breed, measure, renew
+from evoexp.planners.coevolution.kernels import measure
 from evoexp.planners.coevolution.link_problem import Problem, check_ends
 from evoexp.planners.coevolution.proven_teams import ProvenTeams
 from evoexp.planners.coevolution.settings import CoevolutionSettings
-from evoexp.planners.coevolution.teams import Evaluated, Judgement
+from evoexp.planners.coevolution.teams import Evaluated, Judgement, Standing
 from evoexp.planners.departures import of_limits, of_place
 from evoexp.planners.planner import COPIES, Candidate, Keeper, PlannerDefaults, num_values
 from evoexp.planners.proofs import Acceptance
@@ -43,7 +39,6 @@ from evoexp.scenarios.link_motion import LinkMotion
 from evoexp.validation import Component, LayoutCount
 
 PAIR_BYTES = 5  # of a pair of individuals: their collisions, and whether they are a team
-HALF_TURN = DEGREE * 180.0  # genes live in [0, π)
 
 
 class Coevolution(PlannerDefaults, Component):
@@ -114,33 +109,26 @@ class Coevolution(PlannerDefaults, Component):
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield the initial populations, then one generation after the other (Fig. 2)."""
-        ga, keeper = self.ga, Keeper()
+        ga, keeper, breeder = self.ga, Keeper(), Breeder(self.ga, problem.moving)
+        proven, waiting = ProvenTeams(self, problem) if self.answers_are_proven else None, 0
         populations = self.sample(problem, rng, ga.population_size)
-        hall, waiting = Hall.empty(len(problem.start)), 0
-        best_of = self._choice(problem)
-        found = self.evaluated(problem, populations)
-        best = best_of(populations, found)
-        yield self._recorded(keeper, problem, populations, found, best)
-        for index in range(1, ga.num_generations + 1):
-            hall = self._renewed(problem, populations, found, best, hall)
+        for index in range(1, ga.num_generations + 2):
+            found = self.evaluated(problem, populations)
+            settled = proven.settle(populations, found) if proven else None
+            standing = found.standing()
+            best = settled or standing.best
+            yield self._recorded(keeper, problem, populations, found, standing._replace(best=best))
+            if index > ga.num_generations:
+                return
+            breeder.renew_hall(populations, found, best)
             waiting = 0 if keeper.best.solved else waiting + 1
             if ga.restart_after is not None and waiting >= ga.restart_after:
                 # "If no convergence has occurred, …, the algorithm generates new populations"
                 # (section 3).
                 populations, waiting = self.sample(problem, rng, ga.population_size), 0
-                hall = Hall.empty(len(problem.start))
+                breeder.num_teams = 0
             else:
-                populations = self._bred(rng, problem, populations, found, hall, index)
-                hall = hall.moved(ga.population_size - hall.num_teams)
-            found = self.evaluated(problem, populations)
-            best = best_of(populations, found)
-            yield self._recorded(keeper, problem, populations, found, best)
-
-    def _choice(self, problem: Problem) -> Callable[[FloatArray, Evaluated], BestTeam]:
-        """Return the choice of the best team of populations; it keeps the verdicts of a run."""
-        if self.answers_are_proven:
-            return ProvenTeams(self, problem).settle
-        return lambda _, found: best_team(found.collisions, found.teamable)
+                populations = breeder.bred(rng, populations, found.costs, index)
 
     def _recorded(
         self,
@@ -148,87 +136,24 @@ class Coevolution(PlannerDefaults, Component):
         problem: Problem,
         populations: FloatArray,
         found: Evaluated,
-        best: BestTeam,
+        standing: Standing,
     ) -> Generation:
         """Keep the best team if it is better, and return the generation's record."""
-        robots, _, count = populations.shape
+        (robots, _, count), best = populations.shape, standing.best
         if keeper.improves(best.cost):
             team = best.individuals if best.found else found.costs.argmin(axis=1)
             solution = self.team_solution(problem, populations, team)
             keeper.keep(best.cost, Candidate(solution, found.terms_of(team), best.found))
         return keeper.record(
-            cost_statistics(found.costs.ravel()),
+            standing.statistics,
             found.costs,
             populations,
             lowest=best.cost,
-            num_feasible=found.num_feasible,
+            num_feasible=standing.num_feasible,
             evaluations=robots * count,
             collision_queries=self.queries(problem, count),
             criteria=found.criteria if keeper.index + 1 == self.ga.num_generations else None,
         )
-
-    def _renewed(
-        self,
-        problem: Problem,
-        populations: FloatArray,
-        found: Evaluated,
-        best: BestTeam,
-        hall: Hall,
-    ) -> Hall:
-        """Return the hall of fame: members of the Pareto fronts with their best collaborators.
-
-        With distinct genomes the best team of the generation is offered as it is, so that it is
-        never lost; and a robot that stands still, which has one genome, may be in all teams.
-        """
-        ga = self.ga
-        if not ga.num_hall_teams:
-            return hall
-        by_genome, renewed = ga.hall_distinct == "genome", hall.with_room(ga.num_hall_teams)
-        rules = HallRules(
-            memory=ga.hall_memory or 0,
-            frozen=ga.hall_frozen,
-            exclusive=problem.moving if by_genome else np.ones_like(problem.moving),
-        )
-        held = renew(
-            populations,
-            found.criteria,
-            found.collisions,
-            found.teamable,
-            best.individuals if by_genome else np.full_like(best.individuals, -1),
-            renewed,
-            hall.num_teams,
-            rules,
-            by_genome,
-        )
-        return renewed.first(held)
-
-    def _bred(
-        self,
-        rng: np.random.Generator,
-        problem: Problem,
-        populations: FloatArray,
-        found: Evaluated,
-        hall: Hall,
-        index: int,
-    ) -> FloatArray:
-        """Return the next populations: offspring, then elites, then the hall's members."""
-        ga, bred = self.ga, np.empty_like(populations)
-        count = ga.population_size - ga.num_elites - hall.num_teams
-        numbers = count + num_single_point_uniforms(count // 2) + num_allele_uniforms(count)
-        uniforms = rng.random((int(np.count_nonzero(problem.moving)), numbers))
-        breeding = Breeding(
-            num_elites=ga.num_elites,
-            inverse=ga.selection == "inverse",
-            crossover_rate=ga.crossover_rate,
-            mutation_rate=decayed_rate(
-                ga.mutation_rate, ga.mutation_decay, index, ga.num_generations
-            ),
-            mutation_step=DEGREE * ga.mutation_step,
-            limit=HALF_TURN,
-            symmetric=ga.mutation_direction == "symmetric",
-        )
-        breed(uniforms, populations, found.costs, problem.moving, hall.teams, breeding, bred)
-        return bred
 
     def num_evaluations(self, index: int) -> int:
         """Return the size of each population: elites are judged again, by other collaborators."""

@@ -9,7 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.evolution.best_team import CollisionCounts, best_team, pair_index
+from evoexp.evolution.best_team import (
+    BestTeam,
+    CollisionCounts,
+    best_team,
+    find_best_team,
+    pair_index,
+)
+from evoexp.evolution.cost_statistics import CostStatistics, summarise
 from evoexp.numeric.compilation import kernel
 from evoexp.records import BoolArray, FloatArray, IntArray
 
@@ -36,10 +43,11 @@ class Evaluated(NamedTuple):
         """(robots, individuals) own cost; inf for those that collide with an obstacle."""
         return np.where(self.blocked > 0, np.inf, self.own) if self.blocked.any() else self.own
 
-    @property
-    def num_feasible(self) -> int:
-        """Individuals of the first robot with a collision-free partner in every population."""
-        return int(count_partnered(self.collisions, self.blocked))
+    def standing(self) -> "Standing":
+        """Return the best team, the statistics of all costs, and the number of feasible ones."""
+        team = np.empty(len(self.own), dtype=np.int64)
+        cost, num_feasible, best, mean, std = survey(self.costs, *self[2:], team)
+        return Standing(BestTeam(team, cost), CostStatistics(best, mean, std), num_feasible)
 
     def team_of(self, individual: int) -> IntArray:
         """Return the cheapest collision-free team with an individual of the first robot.
@@ -79,22 +87,38 @@ class Evaluated(NamedTuple):
 
         C1 against the team's other robots only.
         """
-        met = [int(self.blocked[r, i]) for r, i in enumerate(team)]
-        for pair, (a, b) in enumerate(combinations(range(len(team)), 2)):
-            hits = int(self.collisions[pair, team[a], team[b]])
-            met[a] += hits
-            met[b] += hits
+        members = team.tolist()
+        met = [self.blocked.item(r, i) for r, i in enumerate(members)]
+        total = sum(met)
+        for pair, (a, b) in enumerate(combinations(range(len(members)), 2)):
+            hits = self.collisions.item(pair, members[a], members[b])
+            total, met[a], met[b] = total + hits, met[a] + hits, met[b] + hits
         terms = {
-            "team_cost": float(sum(self.own[r, i] for r, i in enumerate(team))),
-            "team_collisions": float(self.collisions_of(team)),
+            "team_cost": float(sum(self.own.item(r, i) for r, i in enumerate(members))),
+            "team_collisions": float(total),
         }
-        for r, individual in enumerate(team):
-            _, path, rotation, evenness = self.criteria[r, :, individual]
+        for r, individual in enumerate(members):
+            _, path, rotation, evenness = self.criteria[r, :, individual].tolist()
             terms[f"collisions_robot_{r + 1}"] = float(met[r])
-            terms[f"tip_path_robot_{r + 1}"] = float(path)
-            terms[f"rotation_robot_{r + 1}_rad"] = float(rotation)
-            terms[f"tip_unevenness_robot_{r + 1}"] = float(evenness)
+            terms[f"tip_path_robot_{r + 1}"] = path
+            terms[f"rotation_robot_{r + 1}_rad"] = rotation
+            terms[f"tip_unevenness_robot_{r + 1}"] = evenness
         return terms
+
+
+class Standing(NamedTuple):
+    """How populations stand.
+
+    Attributes:
+        best: The cheapest team without a collision.
+        statistics: Of the costs of all individuals.
+        num_feasible: Individuals of the first robot with a collision-free partner in every
+            population.
+    """
+
+    best: BestTeam
+    statistics: CostStatistics
+    num_feasible: int
 
 
 class Judgement(NamedTuple):
@@ -121,8 +145,37 @@ class Judgement(NamedTuple):
 
 
 @kernel
+def survey(
+    costs: FloatArray,
+    own: FloatArray,
+    collisions: CollisionCounts,
+    blocked: IntArray,
+    team: IntArray,
+) -> tuple[float, int, int, float, float]:
+    """Write the best team.
+
+    Args:
+        costs: See `Evaluated`, and so are the next three.
+        own: As it is there.
+        collisions: As they are there.
+        blocked: As they are there.
+        team: (robots,) written; −1 if there is none.
+
+    Returns:
+        Its cost, `Standing.num_feasible`, and `CostStatistics`.
+    """
+    teamable = np.empty(own.shape)
+    for r in range(len(own)):
+        for k in range(own.shape[1]):
+            teamable[r, k] = np.inf if blocked[r, k] > 0 else own[r, k]
+    cost = find_best_team(collisions, teamable, own.shape[1], team)
+    best, mean, std = summarise(costs.reshape(-1))
+    return cost, count_partnered(collisions, blocked), best, mean, std
+
+
+@kernel
 def count_partnered(collisions: CollisionCounts, blocked: IntArray) -> int:
-    """The kernel of `Evaluated.num_feasible`."""
+    """Count the individuals of the first robot with a collision-free partner everywhere."""
     count = 0
     for i in range(blocked.shape[1]):
         partnered = blocked[0, i] == 0

@@ -39,7 +39,7 @@ from evoexp.planners.grid_path_ga.path_operators import Breeding, Scratch, World
 from evoexp.planners.grid_path_ga.proven_moves import only_proven
 from evoexp.planners.planner import Candidate, PlannerDefaults
 from evoexp.planners.proofs import Acceptance
-from evoexp.planners.stretches import Stretches
+from evoexp.planners.stretches import ScaledStretches
 from evoexp.records import BoolArray, FloatArray, Generation
 from evoexp.robots.floor_platform import FloorPlatform
 from evoexp.scenarios.grid_motion import GridMotion
@@ -253,7 +253,7 @@ class GridPathGa(PlannerDefaults, Component):
         return np.asarray(solution).reshape(-1, problem.fields.grid.free.ndim)
 
 
-class _Search(Stretches):
+class _Search(ScaledStretches):
     """One run, and memory for its kernels."""
 
     def __init__(self, planner: GridPathGa, problem: Problem) -> None:

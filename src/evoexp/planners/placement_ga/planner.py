@@ -26,7 +26,7 @@ from evoexp.planners.placement_ga import kernels
 from evoexp.planners.placement_ga.kernels import GENES, ROWS, Breeding, Coding, Population
 from evoexp.planners.planner import Candidate, PlannerDefaults
 from evoexp.planners.proofs import Acceptance
-from evoexp.planners.stretches import Stretches
+from evoexp.planners.stretches import ScaledStretches
 from evoexp.records import BoolArray, FloatArray, Generation, IntArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.mobile_arm import MobileArm
@@ -206,7 +206,7 @@ class PlacementGa(PlannerDefaults, Component):
         return ((),) * GENES
 
 
-class _Search(Stretches):
+class _Search(ScaledStretches):
     """One run, and memory for its kernels."""
 
     def __init__(self, planner: PlacementGa, problem: Problem) -> None:

@@ -5,7 +5,7 @@ genes themselves in real coding and follow them in binary coding; then cost, pos
 joint displacement. A whole generation is one call.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from evoexp.evolution.selection import (
 )
 from evoexp.evolution.succession import succeed_rows
 from evoexp.numeric.compilation import borrowed, kernel
+from evoexp.numeric.named_tuples import named
 from evoexp.objectives.reaching import measure_reach, measure_reach_from
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.planar_ends import PlanarArm
@@ -120,26 +121,28 @@ class Memory(NamedTuple):
 
 @kernel
 def advance(
-    draws: Draws,
+    plain_draws: tuple[Any, ...],
     spread: float,
-    breeding: Breeding,
-    judging: Judging,
+    plain_breeding: tuple[Any, ...],
+    plain_judging: tuple[Any, ...],
     starts: FloatArray,
-    memory: Memory,
+    plain_memory: tuple[Any, ...],
 ) -> tuple[int, float, float, int]:
     """Replace a population by the next one.
 
     Args:
-        draws: Random numbers.
+        plain_draws: `Draws`, made plain.
         spread: Of mutation, see `mutate_genes`.
-        breeding: Settings of the operators.
-        judging: Collision model and objective.
+        plain_breeding: `Breeding`, made plain.
+        plain_judging: `Judging`, made plain.
         starts: (joints, ≥ offspring) start of the sub-path, the same for all [rad].
-        memory: Population and scratch.
+        plain_memory: `Memory`, made plain: population and scratch.
 
     Returns:
         See `summary`.
     """
+    draws, breeding = named(Draws, plain_draws), named(Breeding, plain_breeding)
+    judging, memory = named(Judging, plain_judging), named(Memory, plain_memory)
     draws, breeding, judging, starts, memory = borrowed((draws, breeding, judging, starts, memory))
     population, offspring, count = memory.population, memory.offspring, len(memory.parents)
     num_joints, num_genes, binary = len(starts), breeding.num_genes, breeding.binary

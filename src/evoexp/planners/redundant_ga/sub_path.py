@@ -23,6 +23,7 @@ from evoexp.evolution.mutation import (
     num_mutation_uniforms,
 )
 from evoexp.numeric.elementary import standard_normal
+from evoexp.numeric.named_tuples import plain
 from evoexp.numeric.vectors import LANES
 from evoexp.planners.redundant_ga import kernels
 from evoexp.planners.redundant_ga.kernels import RESULTS, Breeding, Draws, Judging, Memory
@@ -92,6 +93,7 @@ class Search:
             np.arange(size + LANES),
             np.zeros(size, dtype=np.bool_),
         )
+        self._plain = plain(self._breeding), plain(judging), plain(self._memory)
         table = self._memory.population
         self._starts = np.repeat(start[:, None], size, axis=1)
         self._angles, self._results = table[first:-RESULTS], table[-RESULTS:]
@@ -143,7 +145,8 @@ class Search:
                 ga.mutation_std,
             )
         draws = Draws(uniforms[:chosen], uniforms[chosen:crossed], uniforms[crossed:], normals)
-        found = kernels.advance(draws, spread, breeding, self._judging, self._starts, self._memory)
+        settings, judging, memory = self._plain
+        found = kernels.advance(tuple(draws), spread, settings, judging, self._starts, memory)
         self._take(found, len(self._starts[0]))
 
     def _take(self, summary: tuple[int, float, float, int], count: int) -> None:

@@ -4,14 +4,12 @@ A generation goes through the same steps as one of `strings`, between kernels of
 covered bodies are tested for takes far longer than what Python does between the steps.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable
 
 import numpy as np
 
 from evoexp.collision.models.covered_bodies import CoveredCollision
-from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.evolution.selection import choose_elites
-from evoexp.evolution.succession import succeed
 from evoexp.numeric.elementary import DEGREE
 from evoexp.objectives.string_fitness import count_collisions, weigh
 from evoexp.paths.interpolation import interpolate_linear
@@ -19,12 +17,14 @@ from evoexp.paths.lengths import measure_paths
 from evoexp.planners.arm_tasks import UNLIMITED
 from evoexp.planners.via_point_ga import kernels
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
-from evoexp.planners.via_point_ga.strings import JudgedGeneration, Judgement, Problem, Strings
+from evoexp.planners.via_point_ga.strings import Judgement, Problem, Strings
 from evoexp.records import FloatArray
 
 
 class CoveredStrings(Strings):
     """The population-wide steps of one planner on one problem with covered bodies."""
+
+    stretch = 1
 
     def __init__(self, planner: ViaPointSettings, problem: Problem) -> None:
         super().__init__(planner, problem)
@@ -54,26 +54,29 @@ class CoveredStrings(Strings):
         self._judge(strings, judged)
         return judged
 
-    def generations(
-        self, rng: np.random.Generator, population: FloatArray, costs: FloatArray, hits: FloatArray
-    ) -> Iterator[JudgedGeneration]:
-        """Replace a population by the next one at every step, without end; see `Strings`."""
-        ga, counts, slices = self.planner.ga, self.counts, self.problem.arm_slices
-        count, offspring = ga.num_offspring, self.empty(ga.num_offspring)
-        judged, elites = self.unjudged(offspring, count), np.empty(ga.num_elites, int)
-        terms, num_drawn = judged.terms, sum(counts) + counts.new * (1 + self.num_uniforms)
-        while True:
-            choose_elites(costs, elites)
-            kernels.breed(
-                rng.random(num_drawn), counts, slices, self.breeding, population, costs, offspring
-            )
-            self.smooth(offspring, count)
-            self._judge(offspring, judged)
-            succeed(population, offspring, count, elites)
-            succeed(costs[None], terms.cost[None], count, elites)
-            succeed(hits[None], terms.collisions[None], count, elites)
-            num_feasible = int(np.count_nonzero(hits == 0.0))
-            yield JudgedGeneration(judged, cost_statistics(costs), num_feasible)
+    def evolver(
+        self, table: kernels.Population, summaries: FloatArray
+    ) -> Callable[[FloatArray, int], None]:
+        """Return a function that goes on from a generation to those behind it; see `Strings`."""
+        scratch, counts, places = self.scratch(), self.counts, len(summaries)
+        judged = Judgement(scratch.terms.cost, scratch.terms, 0)
+
+        def go_on(uniforms: FloatArray, first: int) -> None:
+            for step, drawn in enumerate(uniforms, start=first):
+                population, following = (
+                    kernels.Population(*(array[g % places] for array in table))
+                    for g in (step, step + 1)
+                )
+                strings, costs, _ = population
+                choose_elites(costs, scratch.elites)
+                slices, offspring = self.problem.arm_slices, scratch.offspring
+                kernels.breed(drawn, counts, slices, self.breeding, strings, costs, offspring)
+                self.smooth(offspring, counts.offspring)
+                self._judge(offspring, judged)
+                kernels.follow(population, scratch, counts.offspring, following)
+                kernels.summarise_strings(*following[1:], summaries[(step + 1) % places])
+
+        return go_on
 
     def _judge(self, strings: FloatArray, judged: Judgement) -> None:
         """Write the terms of strings (Eqs. 2–7)."""

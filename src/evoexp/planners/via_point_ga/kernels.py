@@ -1,6 +1,6 @@
 """One generation of strings of via-points, compiled (Rana & Zalzala 1995, section 3.4).
 
-A whole generation is one call: between kernels, Python's own work would cost half as much as
+Several generations are one call: between kernels, Python's own work would cost half as much as
 theirs. Populations are arrays (nq, N + 1, individuals), padded to whole vectors.
 """
 
@@ -12,8 +12,8 @@ from evoexp.collision.models.planar_contacts import contacts
 from evoexp.evolution.cost_statistics import summarise
 from evoexp.evolution.crossover import cross_at_sites
 from evoexp.evolution.selection import choose_elites, shuffle_head, spin_roulette
-from evoexp.evolution.succession import succeed_rows
-from evoexp.numeric.compilation import kernel
+from evoexp.evolution.succession import follow_rows
+from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.named_tuples import named
 from evoexp.objectives.string_fitness import StringTerms, count_collisions, fill_wheel, weigh
 from evoexp.paths.interpolation import interpolate
@@ -114,69 +114,130 @@ class Settings(NamedTuple):
     judging: Judging
 
 
-class Memory(NamedTuple):
-    """Arrays that a generation reads and rewrites.
+class Population(NamedTuple):
+    """One generation; or all of several, with a first axis of places.
 
     Attributes:
-        population: Strings; offspring first, then the elites.
-        costs: (individuals,) of the population.
-        collisions: (individuals,) of the population.
+        strings: (nq, N + 1, individuals, padded); offspring first, then the elites.
+        costs: (individuals,).
+        collisions: (individuals,) colliding instants.
+    """
+
+    strings: FloatArray
+    costs: FloatArray
+    collisions: FloatArray
+
+
+class Scratch(NamedTuple):
+    """Arrays that a generation writes on its way.
+
+    Attributes:
         offspring: Strings.
         terms: Of the offspring.
         elites: Places of the elites, best first.
     """
 
-    population: FloatArray
-    costs: FloatArray
-    collisions: FloatArray
     offspring: FloatArray
     terms: StringTerms
     elites: IntArray
 
 
 @kernel
+def evolve(
+    uniforms: FloatArray,
+    first: int,
+    arm_slices: IntArray,
+    plain_settings: tuple[Any, ...],
+    plain_table: tuple[Any, ...],
+    plain_scratch: tuple[Any, ...],
+    summaries: FloatArray,
+) -> None:
+    """Go on from one generation to others.
+
+    Args:
+        uniforms: (generations, numbers) those of every generation, in the order in which they are
+            used.
+        first: The present generation.
+        arm_slices: (arms, 2) rows of each arm.
+        plain_settings: `Settings`, made plain.
+        plain_table: `Population`, made plain: some generations; number g is at place g modulo the
+            number of places.
+        plain_scratch: `Scratch`, made plain.
+        summaries: (places, 4) written, see `summarise_strings`.
+    """
+    settings = borrowed(named(Settings, plain_settings))
+    table = borrowed(named(Population, plain_table))
+    scratch, summaries = borrowed((named(Scratch, plain_scratch), summaries))
+    strings, costs, collisions = table
+    for step in range(len(uniforms)):
+        own, other = (first + step) % len(costs), (first + step + 1) % len(costs)
+        population = Population(strings[own], costs[own], collisions[own])
+        following = Population(strings[other], costs[other], collisions[other])
+        advance(uniforms[step], arm_slices, settings, population, following, scratch)
+        summarise_strings(following.costs, following.collisions, summaries[other])
+
+
+@kernel
 def advance(
     uniforms: FloatArray,
     arm_slices: IntArray,
-    plain_settings: tuple[Any, ...],
-    plain_memory: tuple[Any, ...],
-) -> tuple[int, float, float, int]:
-    """Replace a population by the next one.
+    settings: Settings,
+    population: Population,
+    following: Population,
+    scratch: Scratch,
+) -> None:
+    """Write the population that follows another: its offspring, then the elites, best first.
 
     Args:
-        uniforms: Random numbers of the whole generation, in the order in which they are used.
+        uniforms: Random numbers of the generation, in the order in which they are used.
         arm_slices: (arms, 2) rows of each arm.
-        plain_settings: `Settings`, made plain.
-        plain_memory: `Memory`, made plain.
-
-    Returns:
-        Index of the best, mean and standard deviation of the finite costs, number of collision-free
-        individuals.
+        settings: Of a generation.
+        population: The present one.
+        following: Written.
+        scratch: Written.
     """
-    settings, memory = named(Settings, plain_settings), named(Memory, plain_memory)
-    counts, elites = settings.counts, memory.elites
-    population, costs, offspring = memory.population, memory.costs, memory.offspring
-    collisions, terms = memory.collisions, memory.terms
+    counts, (offspring, terms, elites) = settings.counts, scratch
     # elites: the lowest costs
-    choose_elites(costs, elites)
+    choose_elites(population.costs, elites)
     # (a) reproduction, (b) cross-over, and (d) mutation before (c): a new trajectory, too, is
     # redistributed and relaxed once
-    breed(uniforms, counts, arm_slices, settings.breeding, population, costs, offspring)
+    breeding, costs = settings.breeding, population.costs
+    breed(uniforms, counts, arm_slices, breeding, population.strings, costs, offspring)
     # (c) redistribution and relaxation
     smooth(offspring, counts.offspring, arm_slices, settings.smoothing)
     # Eqs. 2–7
     judge(offspring, arm_slices, settings.judging, terms)
-    # succession: the elites stand behind the offspring, untouched and not evaluated again
-    count, rows = counts.offspring, population.shape[0] * population.shape[1]
-    succeed_rows(population.reshape((rows, -1)), offspring.reshape((rows, -1)), count, elites)
-    succeed_rows(costs.reshape((1, -1)), terms.cost.reshape((1, -1)), count, elites)
-    succeed_rows(collisions.reshape((1, -1)), terms.collisions.reshape((1, -1)), count, elites)
-    # numbers for the record
-    feasible = 0
+    follow(population, scratch, counts.offspring, following)
+
+
+@kernel
+def follow(population: Population, scratch: Scratch, count: int, following: Population) -> None:
+    """Write the population that follows another: elites are not evaluated again."""
+    offspring, terms, elites = scratch
+    rows = population.strings.shape[0] * population.strings.shape[1]
+    follow_rows(
+        population.strings.reshape((rows, -1)),
+        offspring.reshape((rows, -1)),
+        count,
+        elites,
+        following.strings.reshape((rows, -1)),
+    )
+    for before, new, after in (
+        (population.costs, terms.cost, following.costs),
+        (population.collisions, terms.collisions, following.collisions),
+    ):
+        one = before.reshape((1, -1))
+        follow_rows(one, new.reshape((1, -1)), count, elites, after.reshape((1, -1)))
+
+
+@kernel
+def summarise_strings(costs: FloatArray, collisions: FloatArray, out: FloatArray) -> None:
+    """Write index of the best, mean and deviation of the costs, number of free individuals."""
+    out[0], out[1], out[2] = summarise(costs)
+    free = 0
     for k in range(len(collisions)):
-        feasible += collisions[k] == 0.0
-    best, mean, std = summarise(costs)
-    return best, mean, std, feasible
+        free += collisions[k] == 0.0
+    out[3] = free
 
 
 @kernel
@@ -194,7 +255,7 @@ def breed(
     Args:
         uniforms: See `advance`.
         counts: Sizes.
-        arm_slices: See `advance`.
+        arm_slices: (arms, 2) rows of each arm.
         breeding: Settings.
         population: The parents' generation.
         costs: (individuals,) of the parents.

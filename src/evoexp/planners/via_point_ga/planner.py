@@ -10,7 +10,6 @@ arm, instant by instant, joint by joint (arms × (N + 1) × joints) [deg], start
 """
 
 from collections.abc import Iterator
-from itertools import chain, islice
 from typing import ClassVar
 
 import numpy as np
@@ -19,7 +18,6 @@ from evoexp.collision.models.covered_bodies import CoveredCollision
 from evoexp.collision.models.touching_spheres import Clearance
 from evoexp.collision.scene import Part
 from evoexp.errors import SettingError
-from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion
 from evoexp.paths.workspace import prepare_redistribution
@@ -32,16 +30,12 @@ from evoexp.planners.arm_tasks import (
     cover_shapes,
 )
 from evoexp.planners.departures import joint_names, of_limits, of_place
-from evoexp.planners.planner import COPIES, Candidate, Keeper, PlannerDefaults, num_values
+from evoexp.planners.planner import COPIES, PlannerDefaults, num_values
 from evoexp.planners.via_point_ga.covered_strings import CoveredStrings
+from evoexp.planners.via_point_ga.search import ProvenSearch, Search
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
 from evoexp.planners.via_point_ga.string_proofs import Prover
-from evoexp.planners.via_point_ga.strings import (
-    JudgedGeneration,
-    Judgement,
-    Problem,
-    Strings,
-)
+from evoexp.planners.via_point_ga.strings import Judgement, Problem, Strings
 from evoexp.records import FloatArray, Generation
 from evoexp.robots.assembly import Robot
 from evoexp.validation import Component
@@ -77,65 +71,8 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield the initial population, then one generation after the other."""
-        size, strings, keeper = self.ga.population_size, self._strings(problem), Keeper()
-        population = strings.drawn(rng, size)
-        judged = strings.judge(population, size)
-        costs, hits = judged.cost.copy(), judged.terms.collisions[:size].copy()
-        num_feasible = int(np.count_nonzero(judged.feasible))
-        first = JudgedGeneration(judged, cost_statistics(costs), num_feasible)
-        later = strings.generations(rng, population, costs, hits)
-        prover = Prover(self, problem) if self.answers_are_proven else None
-        for judged, statistics, num_feasible in chain(
-            [first], islice(later, self.ga.num_generations)
-        ):
-            if prover is None:
-                k = statistics.best
-                lowest = float(costs[k])
-                if keeper.improves(lowest):
-                    solution, terms = self.solution(problem, population, k), judged.named_terms(k)
-                    keeper.keep(lowest, Candidate(solution, terms, terms["collisions"] == 0.0))
-            else:
-                self._keep_proven(problem, prover, keeper, (population, costs, hits), judged)
-                statistics = cost_statistics(costs)
-                num_feasible = int(np.count_nonzero(hits == 0.0))
-            yield keeper.record(
-                statistics,
-                costs,
-                population,
-                lowest=float(costs[statistics.best]),
-                num_feasible=num_feasible,
-                evaluations=len(judged.cost),
-                collision_queries=judged.collision_queries,
-            )
-
-    def _keep_proven(
-        self,
-        problem: Problem,
-        prover: Prover,
-        keeper: Keeper,
-        individuals: tuple[FloatArray, FloatArray, FloatArray],
-        judged: Judgement,
-    ) -> None:
-        """Keep a proven string that costs less than the one kept, where a generation has one.
-
-        Args:
-            problem: The problem.
-            prover: Of the run.
-            keeper: Of the run.
-            individuals: Strings (nq, N + 1, individuals), costs and colliding instants of the
-                population, its new ones first; the prover changes what it refutes.
-            judged: Of the new ones.
-        """
-        strings, costs, _ = individuals
-        k, proven = prover.settle(*individuals, keeper.cost), np.zeros(len(costs), bool)
-        if k is not None:
-            proven[k] = True
-
-        def candidate(k: int, solved: bool) -> Candidate:
-            terms = judged.named_terms(k) | {"certificates": float(prover.num_certificates)}
-            return Candidate(self.solution(problem, strings, k), terms, solved)
-
-        keeper.keep_proven(costs, proven, candidate)
+        search = ProvenSearch if self.answers_are_proven else Search
+        return search(self, problem, self._strings(problem)).generations(rng)
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
         """Return new trajectories as in the initial population, (nq, N + 1, count)."""

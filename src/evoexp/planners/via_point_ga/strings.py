@@ -1,6 +1,6 @@
 """Populations of strings of via-points: the problem they solve, and the steps they go through."""
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +10,6 @@ from evoexp.collision.models.covered_bodies import CoveredCollision
 from evoexp.collision.models.touching_spheres import SphereCollision
 from evoexp.collision.scene import Scene
 from evoexp.evolution import crossover
-from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.numeric.elementary import DEGREE
 from evoexp.numeric.named_tuples import plain
 from evoexp.objectives.string_fitness import StringTerms
@@ -23,6 +22,7 @@ from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
 
 LANES = 8  # individuals are padded to whole vectors
+STRETCH = 8  # generations that are computed in one call of a kernel, at most
 
 
 class Problem(NamedTuple):
@@ -136,22 +136,14 @@ class Judgement(NamedTuple):
         return named | {"collisions": float(collisions[individual])}
 
 
-class JudgedGeneration(NamedTuple):
-    """A generation as it is recorded.
+class Strings:
+    """The population-wide steps of one planner on one problem.
 
     Attributes:
-        judged: The individuals that it evaluated: they come first in its population.
-        statistics: Of the costs of the whole population.
-        num_feasible: Individuals of the whole population that are free of collision.
+        stretch: Generations that are best computed at once.
     """
 
-    judged: Judgement
-    statistics: CostStatistics
-    num_feasible: int
-
-
-class Strings:
-    """The population-wide steps of one planner on one problem."""
+    stretch = STRETCH
 
     def __init__(self, planner: ViaPointSettings, problem: Problem) -> None:
         self.planner, self.problem, ga, spline = planner, problem, planner.ga, problem.spline
@@ -183,6 +175,11 @@ class Strings:
             weights=planner.objective.weights,
             tables=getattr(problem.collision, "tables", ()),
         )
+
+    @property
+    def num_drawn(self) -> int:
+        """Uniform numbers that a generation takes."""
+        return sum(self.counts) + self.counts.new * (1 + self.num_uniforms)
 
     @property
     def limits(self) -> tuple[FloatArray, FloatArray]:
@@ -222,29 +219,35 @@ class Strings:
         kernels.judge(strings, self.problem.arm_slices, self.judging, judged.terms)
         return judged
 
-    def generations(
-        self, rng: np.random.Generator, population: FloatArray, costs: FloatArray, hits: FloatArray
-    ) -> Iterator[JudgedGeneration]:
-        """Replace a population by the next one (section 3.4) at every step, without end.
+    def table(self, places: int) -> kernels.Population:
+        """Return memory for the populations of some generations; the padding holds zeros."""
+        size = self.planner.ga.population_size
+        costs, collisions = np.empty((2, places, size))
+        return kernels.Population(np.array([self.empty(size)] * places), costs, collisions)
+
+    def scratch(self) -> kernels.Scratch:
+        """Return memory that `evolve` takes."""
+        count, elites = self.counts.offspring, np.empty(self.planner.ga.num_elites, int)
+        offspring = self.empty(count)
+        return kernels.Scratch(offspring, self.unjudged(offspring, count).terms, elites)
+
+    def evolver(
+        self, table: kernels.Population, summaries: FloatArray
+    ) -> Callable[[FloatArray, int], None]:
+        """Return a function that goes on from a generation to those behind it (section 3.4).
 
         Args:
-            rng: Source of all random numbers.
-            population: Padded strings, replaced.
-            costs: (individuals,) of the population, replaced.
-            hits: (individuals,) colliding instants of the population, replaced.
+            table: Of the populations of some generations, written.
+            summaries: (places, 4) written; see `kernels.summarise_strings`.
+
+        Returns:
+            It takes the numbers (generations, `num_drawn`) and the present generation.
         """
-        ga, counts = self.planner.ga, self.counts
-        offspring = self.empty(ga.num_offspring)
-        judged, elites = self.unjudged(offspring, ga.num_offspring), np.empty(ga.num_elites, int)
-        memory = plain(kernels.Memory(population, costs, hits, offspring, judged.terms, elites))
         settings = plain(kernels.Settings(self.counts, self.breeding, self.smoothing, self.judging))
-        num_drawn = sum(counts) + counts.new * (1 + self.num_uniforms)
-        while True:
-            uniforms = rng.random(num_drawn)
-            best, mean, std, num_feasible = kernels.advance(
-                uniforms, self.problem.arm_slices, settings, memory
-            )
-            yield JudgedGeneration(judged, CostStatistics(best, mean, std), num_feasible)
+        memory, slices = (plain(table), plain(self.scratch())), self.problem.arm_slices
+        return lambda uniforms, first: kernels.evolve(
+            uniforms, first, slices, settings, *memory, summaries
+        )
 
     def unjudged(self, strings: FloatArray, count: int) -> Judgement:
         """Return memory for a judgement."""

@@ -1,0 +1,91 @@
+"""One run of the search over strings of via-points, and one whose answers are proven."""
+
+from typing import Any
+
+import numpy as np
+
+from evoexp.numeric.random_stream import DrawnAhead
+from evoexp.planners.planner import Candidate, Keeper
+from evoexp.planners.stretches import Stretches
+from evoexp.planners.via_point_ga import kernels
+from evoexp.planners.via_point_ga.string_proofs import Prover
+from evoexp.planners.via_point_ga.strings import Problem, Strings
+from evoexp.records import FloatArray
+
+
+class Search(Stretches):
+    """One run, and memory for its generations."""
+
+    def __init__(
+        self, planner: Any, problem: Problem, strings: Strings, stretch: int | None = None
+    ) -> None:
+        """Begin a run.
+
+        Args:
+            planner: A `ViaPointGa`.
+            problem: Its problem.
+            strings: Its steps on this problem.
+            stretch: Generations computed at once; None: as many as is best.
+        """
+        super().__init__(planner.ga, stretch or strings.stretch)
+        self._planner, self._problem, self._strings = planner, problem, strings
+        self._table = strings.table(self.num_places)
+        self._evolve = strings.evolver(self._table, self.summaries)
+        self.costs = self._table.costs
+        self.queries_each = planner.num_via_points * planner.collision.collision_substeps
+
+    def begin(self, rng: np.random.Generator) -> None:
+        """Draw and judge the initial population."""
+        strings, size = self._strings, self.costs.shape[1]
+        self._table.strings[:] = strings.drawn(rng, size)
+        _, terms, _ = strings.judge(self._table.strings[0], size)
+        self.costs[0], self._table.collisions[0] = terms.cost, terms.collisions[:size]
+        self._summarise(0)
+        self.drawn = self._ahead = DrawnAhead(rng, strings.num_drawn)
+
+    def go_on(self, rng: np.random.Generator, first: int, last: int) -> None:
+        """Compute generations with numbers that are drawn ahead."""
+        self._evolve(self._ahead.draw(last - first), first)
+
+    def candidate(self, place: int, individual: int) -> Candidate:
+        """Return a string and its terms, judged once more by itself."""
+        own = self._table.strings[place, :, :, individual, None]
+        terms = self._strings.judge(self._strings.padded(own), 1).named_terms(0)
+        solution = self._planner.solution(self._problem, own, 0)
+        return Candidate(solution, terms, terms["collisions"] == 0.0)
+
+    def population(self, place: int, is_last: bool) -> FloatArray:
+        """Return the strings, padded."""
+        strings: FloatArray = self._table.strings[place]
+        return strings
+
+    def _summarise(self, place: int) -> None:
+        costs, collisions = self.costs[place], self._table.collisions[place]
+        kernels.summarise_strings(costs, collisions, self.summaries[place])
+
+
+class ProvenSearch(Search):
+    """A run whose best string is proven: what is refuted costs more in the next generation."""
+
+    def __init__(self, planner: Any, problem: Problem, strings: Strings) -> None:
+        """Begin a run, see `Search`, without any verdict."""
+        super().__init__(planner, problem, strings, stretch=1)
+        self._prover = Prover(planner, problem)
+
+    def keep(self, keeper: Keeper, place: int) -> None:
+        """Keep a proven string that costs less than the one kept, if the generation has one."""
+        strings, costs, hits = (array[place] for array in self._table)
+        k, proven = (
+            self._prover.settle(strings, costs, hits, keeper.cost),
+            np.zeros(len(costs), bool),
+        )
+        if k is not None:
+            proven[k] = True
+
+        def candidate(k: int, solved: bool) -> Candidate:
+            found = super(ProvenSearch, self).candidate(place, k)
+            found.terms["certificates"] = float(self._prover.num_certificates)
+            return found._replace(solved=solved)
+
+        keeper.keep_proven(costs, proven, candidate)
+        self._summarise(place)

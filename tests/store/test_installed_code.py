@@ -45,3 +45,20 @@ def test_pages_do_not_count_where_verdicts_are_kept(
     path.write_text(f"{path.read_text()}# another line\n")
     after = hashes(copy)
     assert [a != b for a, b in zip(before, after, strict=True)] == changed
+
+
+def test_code_that_is_written_while_it_runs_is_nobody_elses(copy: Path) -> None:
+    """Facts of the loaded code would be kept as facts of the written one."""
+    edit = f"open({str(copy / 'evoexp/report/style.py')!r}, 'a').write('# one more line\\n')"
+    command = [sys.executable, "-c"]
+    found = [
+        subprocess.run(
+            [*command, f"import sys; sys.path.insert(0, {str(copy)!r})\nimport evoexp\n{script}"],
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout.split()[0]
+        for script in (f"{edit}\n{SCRIPT}", SCRIPT, SCRIPT)
+    ]
+    assert found[0] != found[1] == found[2]
+    assert found[0].startswith(found[1])

@@ -16,10 +16,13 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
+from evoexp.numeric.code_keys import GRAIN_S
 from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
 from evoexp.registry import COMPONENTS, Registration, registrations
+from evoexp.version import LOADED_FROM
 
 _LIBRARIES = ("numpy", "numba", "scipy", "pin", "coal")
+_OF_THIS_PROCESS = os.urandom(16)
 _LOADED_HERE = set[str]()  # modules that were loaded only to find a fact
 
 
@@ -57,6 +60,9 @@ def _versions() -> list[str]:
 def installed_code(without: Collection[str] = ()) -> bytes:
     """Return the hash of the code of evoexp and of all guests, as it is now.
 
+    Where a file was written while this process ran, what it loaded may be another code: the hash is
+    then one that no other process has.
+
     Args:
         without: Folders of evoexp that do not count.
     """
@@ -66,7 +72,9 @@ def installed_code(without: Collection[str] = ()) -> bytes:
     left_out = tuple(f"{own / folder}{os.sep}" for folder in without)
     found = {stamp for root in dict.fromkeys(code) for stamp in _stamps(str(root))}
     stamps = sorted(stamp for stamp in found if not stamp[0].startswith(left_out))
-    return _hash_of_code(json.dumps(components), tuple(stamps))
+    digest = _hash_of_code(json.dumps(components), tuple(stamps))
+    newest = max((written for _, _, written in stamps), default=0)
+    return digest if newest < 1e9 * (LOADED_FROM - GRAIN_S) else digest + _OF_THIS_PROCESS
 
 
 @functools.lru_cache(maxsize=2)

@@ -213,3 +213,22 @@ def test_code_that_is_edited_while_it_runs_leaves_no_stale_kernel(tmp_path: Path
     call = "from guest.kernels import f; print(f(1.0), sum(f.stats.cache_hits.values()))"
     assert said(call) == ("6.0 0\n", "")
     assert said(call) == ("6.0 1\n", "")
+
+
+def test_a_folder_without_init_keeps_no_kernel_of_an_edited_callee(tmp_path: Path) -> None:
+    folder = tmp_path / "loose"
+    folder.mkdir()
+    head = "from evoexp.numeric.compilation import kernel\n"
+    (folder / "outer.py").write_text(
+        f"{head}from loose.inner import g\n@kernel\ndef f(x):\n    return g(x)\n"
+    )
+    environment = os.environ | {
+        "PYTHONPATH": os.pathsep.join([str(tmp_path), str(Path(kernel_cache.__file__).parents[2])]),
+        "EVOEXP_CACHE": str(tmp_path / "cache"),
+    }
+    command = [sys.executable, "-c", "from loose import outer; print(outer.f(1.0))"]
+    for added in (1.0, 2.0):
+        (folder / "inner.py").write_text(f"{head}@kernel\ndef g(x):\n    return x + {added}\n")
+        found = subprocess.check_output(command, env=environment, text=True)
+        assert float(found) == 1.0 + added
+    assert not [*folder.rglob("*.nbi")]

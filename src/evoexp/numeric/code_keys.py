@@ -113,21 +113,23 @@ def _file_of(module: str) -> Path | None:
     if module in _files or module in _no_modules:
         return _files.get(module)
     package, *parts = module.split(".")
-    if package == _PACKAGE:
-        root = _ROOT
-    else:
-        loaded = getattr(sys.modules.get(package), "__file__", None)
-        if loaded is None:
-            return None
-        root = Path(loaded).parents[1] if Path(loaded).stem == "__init__" else Path(loaded).parent
-    path = root.joinpath(package, *parts)
-    for candidate in (path.with_suffix(".py"), path / "__init__.py"):
-        if candidate.is_file():
-            _files[module] = candidate
-            return candidate
+    for root in [_ROOT] if package == _PACKAGE else _roots_of(package):
+        path = root.joinpath(package, *parts)
+        for candidate in (path.with_suffix(".py"), path / "__init__.py"):
+            if candidate.is_file():
+                _files[module] = candidate
+                return candidate
     if package == _PACKAGE:
         _no_modules.add(module)
     return None
+
+
+def _roots_of(package: str) -> list[Path]:
+    """Return the folders in which an imported package lies: several if it is a namespace."""
+    loaded = sys.modules.get(package)
+    if file := getattr(loaded, "__file__", None):
+        return [Path(file).parents[1] if Path(file).stem == "__init__" else Path(file).parent]
+    return [Path(folder).parent for folder in getattr(loaded, "__path__", ())]
 
 
 def _source_of(module: str) -> Source | None:

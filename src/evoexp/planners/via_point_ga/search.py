@@ -31,7 +31,7 @@ class Search(Stretches):
         self._planner, self._problem, self._strings = planner, problem, strings
         self._table = strings.table(self.num_places)
         self._evolve = strings.evolver(self._table, self.summaries)
-        self.costs = self._table.costs
+        self.costs, self._shown = self._table.costs, np.empty_like(self._table.strings[0])
         self.queries_each = planner.num_via_points * planner.collision.collision_substeps
 
     def begin(self, rng: np.random.Generator) -> None:
@@ -55,9 +55,12 @@ class Search(Stretches):
         return Candidate(solution, terms, terms["collisions"] == 0.0)
 
     def population(self, place: int, is_last: bool) -> FloatArray:
-        """Return the strings, padded."""
-        strings: FloatArray = self._table.strings[place]
-        return strings
+        """Return the strings, padded, in the same array for all generations.
+
+        So the digest of a run that its budget ends is that of the first generation beyond it.
+        """
+        np.copyto(self._shown, self._table.strings[place])
+        return self._shown
 
     def _summarise(self, place: int) -> None:
         costs, collisions = self.costs[place], self._table.collisions[place]

@@ -186,4 +186,5 @@ def test_figures_name_every_planner() -> None:
     texts = " ".join(text.get_text() for text in axes.texts)
     assert all(name in texts for name in found.planners)
     (axes,) = draw_profiles(profile_table(found)).axes
-    assert [line.get_label() for line in axes.get_lines()] == list(found.planners)
+    labels = [str(line.get_label()) for line in axes.get_lines()]  # of the ways to names: "_…"
+    assert [label for label in labels if not label.startswith("_")] == list(found.planners)

@@ -31,7 +31,7 @@ class Search(Stretches):
         self._planner, self._problem, self._strings = planner, problem, strings
         self._table = strings.table(self.num_places)
         self._evolve = strings.evolver(self._table, self.summaries)
-        self.costs, self._shown = self._table.costs, np.empty_like(self._table.strings[0])
+        self.costs, self._shown = self._table.costs, np.empty(self._table.strings.shape[1:])
         self.queries_each = planner.num_via_points * planner.collision.collision_substeps
 
     def begin(self, rng: np.random.Generator) -> None:

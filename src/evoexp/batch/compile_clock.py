@@ -50,10 +50,5 @@ def now() -> Times:
     return _clocks() - Times(_compiler.cpu_s, _compiler.wall_s)
 
 
-def cpu_now() -> float:
-    """Return the processor time that `now` returns [s], in a third of the time."""
-    return time.process_time() - _compiler.cpu_s
-
-
 def _clocks() -> Times:
     return Times(time.process_time(), time.perf_counter())

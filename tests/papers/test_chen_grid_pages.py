@@ -101,7 +101,7 @@ def test_the_page_of_lingering_counts_repeated_nodes(outputs: Path) -> None:
 @pytest.mark.matrix
 def test_the_page_of_fig_1_names_every_slip(outputs: Path) -> None:
     directory = smoke_report(outputs, "chen_fields")
-    assert figure_stems(directory) == {"fig_1_fields", "fields_16_16", "fields_32_32"}
+    assert figure_stems(directory) == {"fig_1_fields", "fields_16_16", "fields_32_32", "scene"}
     text = (directory / "index.md").read_text()
     assert "255 of 256 nodes as printed" in text
     assert "row 9 from the top, column 13: 17 for 13" in text
@@ -126,7 +126,7 @@ def test_the_page_of_the_mission_shows_path_posture_and_verdict(outputs: Path) -
 @pytest.mark.matrix
 def test_the_page_of_assumptions_judges_three_claims_under_every_variation(outputs: Path) -> None:
     directory = smoke_report(outputs, "chen_assumptions")
-    assert figure_stems(directory) == {"assumptions"}
+    assert figure_stems(directory) == {"assumptions", "scene"}
     text = (directory / "index.md").read_text()
     for name in ("obstacles mirrored", "slow decay of unsafeness", "50 generations"):
         assert f"| {name} | `" in text

@@ -39,7 +39,7 @@ def test_conditions_are_told_apart(cases: list[Case]) -> None:
 @pytest.mark.matrix
 def test_the_page(outputs: Path) -> None:
     directory = smoke_report(outputs, "chen_placement")
-    assert figure_stems(directory) == {"fig_3_to_8_postures", "fig_4_to_8_fitness", "gaps"}
+    assert figure_stems(directory) == {"fig_3_to_8_postures", "fig_4_to_8_fitness", "gaps", "scene"}
     text = (directory / "index.md").read_text()
     assert (
         "| criterion | paper | exact optimum | GA | GA, elitism | random search | conventional, "
@@ -54,7 +54,7 @@ def test_the_page(outputs: Path) -> None:
 @pytest.mark.matrix
 def test_the_landscapes(outputs: Path) -> None:
     directory = smoke_report(outputs, "chen_landscapes")
-    assert figure_stems(directory) == {"fig_9_landscapes"}
+    assert figure_stems(directory) == {"fig_9_landscapes", "scene"}
     table = pd.read_csv(directory / "fig_9_landscapes.csv")
     assert set(table["element"]) == {*placements.LOOKS, placements.GRID}
     grid = table[table["element"] == placements.GRID]

@@ -90,7 +90,7 @@ def test_sweeps_have_figures_and_a_row_of_shares_per_condition(
     outputs: Path, name: str, expected: set[str]
 ) -> None:
     directory = smoke_report(outputs, name)
-    assert figure_stems(directory) == expected
+    assert figure_stems(directory) == {*expected, "scene"}
     text = (directory / "index.md").read_text()
     for label, _ in smoke_experiment(name).conditions:
         assert f"| {label}: shares of runs |" in text

@@ -242,7 +242,12 @@ def test_ablations_are_compared_with_the_first_condition(tmp_path: Path) -> None
     assert len(experiment.conditions) == 13
     store(tmp_path, experiment)
     page = draw(tmp_path, "ablations", "rana_planar_ablations", *words, formats=("svg",))
-    assert {path.stem for path in page.parent.glob("*.svg")} == {"values", "effects", "convergence"}
+    assert {path.stem for path in page.parent.glob("*.svg")} == {
+        "values",
+        "effects",
+        "convergence",
+        "scene",
+    }
     text = page.read_text()
     assert "## best cost: as printed against …" in text
     assert text.count("Relaxation and redistribution improve the search: against") == 3
@@ -389,7 +394,4 @@ def test_varied_conditions_are_told_apart_and_compared_with_their_own_control(
         "population_size=8)" in text
     )
     assert (page.parent / "fig_7_distances_2_via_point_ga_population_size_10.svg").is_file()
-    assert (
-        "| `ga.population_size` (via-point GA · population_size=8, random search · "
-        "population_size=8, multi-start · population_size=8) | 8 |" in text
-    )
+    assert re.search(r"\| `ga\.population_size` \([^|]*population_size=8[^|]*\) \| 8 \|", text)

@@ -99,6 +99,48 @@ def test_workers_end_where_the_thread_that_manages_them_never_started() -> None:
     assert not [worker for worker in workers if is_running(worker)]
 
 
+STRUCK = """
+import itertools, multiprocessing.popen_forkserver, os, signal, sys
+from multiprocessing import forkserver
+import joblib
+from joblib.externals.loky import reusable_executor
+from evoexp import cli
+from evoexp.batch import workers
+
+read, asked = forkserver.read_signed, itertools.count()
+
+def read_signed(fd):
+    if next(asked) == int(sys.argv[1]):
+        server = forkserver._forkserver._forkserver_pid
+        print(*(reusable_executor._executor._processes), flush=True)
+        os.kill(server, signal.SIGKILL)
+        raise EOFError("unexpected EOF")
+    return read(fd)
+
+def command(words, is_process):
+    workers.num_cores = lambda: 2
+    workers.start_server()
+    multiprocessing.popen_forkserver.forkserver.read_signed = read_signed
+    found = workers.in_workers(2, (joblib.delayed(abs)(-k) for k in range(20)), ordered=True)
+    assert list(found) == list(range(20))
+    return 0
+
+cli._run = command
+sys.exit(cli.main())
+"""
+
+
+@pytest.mark.parametrize("worker", [0, 1])
+def test_a_server_that_dies_while_it_starts_a_worker_is_started_again(worker: int) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", STRUCK, str(worker)], capture_output=True, text=True, timeout=60
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    started = [int(word) for word in done.stdout.split()]
+    assert len(started) == worker
+    assert not [process for process in started if is_running(process)]
+
+
 def is_running(number: int, patience_s: float = 20.0) -> bool:
     """Return whether a process is still there after some time; a zombie is not."""
     end = time.monotonic() + patience_s

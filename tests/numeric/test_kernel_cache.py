@@ -225,6 +225,7 @@ def test_a_folder_without_init_keeps_no_kernel_of_an_edited_callee(tmp_path: Pat
     environment = os.environ | {
         "PYTHONPATH": os.pathsep.join([str(tmp_path), str(Path(kernel_cache.__file__).parents[2])]),
         "EVOEXP_CACHE": str(tmp_path / "cache"),
+        "PYTHONDONTWRITEBYTECODE": "1",  # as long as before, in the same second: thought the same
     }
     command = [sys.executable, "-c", "from loose import outer; print(outer.f(1.0))"]
     for added in (1.0, 2.0):

@@ -9,6 +9,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from itertools import chain
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.util import get_temp_dir
 from typing import Any
@@ -54,24 +55,29 @@ def start_server() -> None:
 
 
 def end_all() -> None:
-    """End all workers and the server at once; for a process that leaves.
+    """End all workers and the server at once, for a process that leaves or starts them anew.
 
     None of them has anything to save: only this process writes. Nor is any of them waited for: one
     that died with the lock of the queue of tasks would keep all others from hearing that they may
     go.
     """
-    pool = reusable_executor._executor
-    if pool is not None:
-        try:
-            pool.shutdown(wait=True, kill_workers=True)
-        except RuntimeError:  # interrupted while the thread that manages them started
-            for worker in list(pool._processes.values()):
-                worker.kill()
+    _end_pool()
     server: Any = forkserver._forkserver
     if server._forkserver_pid is not None:
         with suppress(OSError):
             os.kill(server._forkserver_pid, signal.SIGKILL)
         server._stop()
+
+
+def _end_pool() -> None:
+    """End all workers at once."""
+    pool = reusable_executor._executor
+    if pool is None:
+        return
+    with suppress(RuntimeError):  # the thread that manages them was interrupted while it started
+        pool.shutdown(wait=True, kill_workers=True)
+    for worker in list(pool._processes.values()):  # there may be no such thread yet
+        worker.kill()
 
 
 def num_cores() -> int:
@@ -85,6 +91,23 @@ def in_workers(num_workers: int, tasks: Iterable[Any], ordered: bool = False) ->
     Raises:
         TerminatedWorkerError: If a worker dies.
     """
+    left, taken = iter(tasks), list[Any]()
+    try:
+        return _started(num_workers, _noted(left, taken), ordered)
+    except (EOFError, ConnectionError):  # the server died just when it was to start a worker
+        end_all()
+        return _started(num_workers, chain(taken, left), ordered)
+
+
+def _noted(tasks: Iterable[Any], taken: list[Any]) -> Iterator[Any]:
+    """Yield tasks; note which were taken."""
+    for task in tasks:
+        taken.append(task)
+        yield task
+
+
+def _started(num_workers: int, tasks: Iterable[Any], ordered: bool) -> Iterator[Any]:
+    """Start workers where there are none, and the server anew if it died; give them the tasks."""
     pool = joblib.Parallel(
         n_jobs=num_workers,
         batch_size=1,
@@ -97,7 +120,6 @@ def in_workers(num_workers: int, tasks: Iterable[Any], ordered: bool = False) ->
         initializer=leave_with_parent,
         initargs=(os.getpid(), get_start_method() == _SERVED),
     )
-    # starts the workers, and the server anew if it died
     for tracker in (resource_tracker, loky_tracker):  # they let signals through when they start
         tracker.ensure_running()
     with _children_ignore_signals(), _environment_of_workers():

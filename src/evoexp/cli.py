@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from evoexp.commands.command_parser import COMMANDS, command_module, command_parser, whole_parser
 from evoexp.commands.damage_lines import damage_in_lines
 from evoexp.commands.interruption import Interrupted, Interruption
-from evoexp.commands.quick_end import leave, search_less
+from evoexp.commands.quick_end import leave, leave_at_once, search_less
 from evoexp.commands.standard_streams import (
     OUTPUT,
     complain,
@@ -62,11 +62,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BaseException as error:
         interruption.end()
         try:
-            return _explain(error, words, interruption)
+            code = _explain(error, words, interruption)
         finally:
             interruption.leave()
             if is_process:
                 _end_workers()
+        if is_process and interruption.number is not None:
+            settle_streams()
+            leave_at_once(code)
+        return code
     finally:
         interruption.end()
         if is_process:

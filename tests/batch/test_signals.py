@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -215,12 +216,12 @@ def heard() -> Iterator[Interruption]:
     """Hear signals in this process for the length of a test."""
     names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGALRM")
     before = {getattr(signal, name): signal.getsignal(getattr(signal, name)) for name in names}
-    hooks = sys.unraisablehook, sys.excepthook
+    hooks = sys.unraisablehook, sys.excepthook, threading.excepthook
     interruption = Interruption()
     interruption.hear()
     yield interruption
     interruption.end()
-    sys.unraisablehook, sys.excepthook = hooks
+    sys.unraisablehook, sys.excepthook, threading.excepthook = hooks
     for number, handler in before.items():
         signal.signal(number, handler)
 
@@ -267,6 +268,33 @@ def test_cleaning_up_is_not_interrupted(heard: Interruption) -> None:
     signal.raise_signal(signal.SIGINT)
     assert cleaned == ["generator", "finally"]
     assert heard.exit_code == 130
+
+
+LEFT = """
+import os, signal, sys, threading
+from evoexp import cli
+from evoexp.batch import workers
+
+def command(words, is_process):
+    threading.Thread(target=threading.Event().wait).start()  # whom nobody will tell anything
+    interrupted = threading.Event()
+    broken = threading.Thread(target=lambda: interrupted.wait() and 1 / 0)
+    broken.start()
+    try:
+        os.kill(os.getpid(), signal.SIGINT)
+        interrupted.wait()
+    finally:
+        interrupted.set()
+        broken.join()
+
+cli._run = command
+sys.exit(cli.main())
+"""
+
+
+def test_threads_that_an_interruption_leaves_behind_keep_nobody_waiting_and_say_nothing() -> None:
+    done = subprocess.run([sys.executable, "-c", LEFT], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (130, "evoexp: interrupted\n")
 
 
 def test_closing_that_never_ends_ends_the_process() -> None:

@@ -98,6 +98,24 @@ def test_of_many_conditions_the_last_ones_are_shown() -> None:
     assert "condition 39" in text(out)
 
 
+@pytest.mark.parametrize("moment", ["clear_live", "line"])
+def test_a_terminal_is_given_back_by_an_end_that_is_interrupted(
+    moment: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before the last state is drawn, and between its parts."""
+
+    def interrupted(*_: object) -> None:
+        monkeypatch.undo()
+        raise KeyboardInterrupt
+
+    out = console(is_terminal=True)
+    shown = BatchProgress(out, WANTED)
+    with pytest.raises(KeyboardInterrupt), shown:
+        monkeypatch.setattr(out, moment, interrupted)
+    assert text(out).endswith(f"\n{progress.SHOWN_CURSOR}")
+    assert not shown._live.is_started
+
+
 # `--live`
 
 

@@ -14,6 +14,7 @@ import contextlib
 import os
 import signal
 import sys
+import threading
 import time
 from types import FrameType
 from typing import NoReturn
@@ -55,13 +56,16 @@ class Interruption:
                 signal.signal(number, self._heard)
                 self._numbers.append(number)
         # What a callback cannot raise is printed elsewhere; this is raised again instead, and what
-        # a library's destructors say of their interrupted work helps nobody.
-        unraised, printed = sys.unraisablehook, sys.excepthook
+        # a library's destructors and threads say of their interrupted work helps nobody.
+        unraised, printed, told = sys.unraisablehook, sys.excepthook, threading.excepthook
         sys.unraisablehook = lambda it: None if self.number is not None else unraised(it)
+        threading.excepthook = lambda it: None if self.number is not None else told(it)
         sys.excepthook = lambda *it: None if it[0] is Interrupted else printed(*it)
 
     def end(self) -> None:
         """Raise nothing any more: the command has ended, and the process soon will."""
+        if self._ended:
+            return
         self._ended = True
         if self.number is not None and hasattr(signal, "setitimer"):
             signal.setitimer(signal.ITIMER_REAL, 0.0)

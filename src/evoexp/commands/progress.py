@@ -27,6 +27,7 @@ PLAIN_INTERVAL_S = 5.0  # [s] between plain lines
 MOST_ROWS = 12  # conditions in the table: those that a replicate ended of last
 MINUTES_FROM_S = 100.0  # [s] from which the rest is told in minutes
 BURST_S = 0.1  # [s] replicates that end so soon after the first one came with it, in one task
+SHOWN_CURSOR = "\x1b[?25h"
 REFRESHED = 4  # [1/s] how often the table is drawn
 CURVE_WIDTH, NARROW_CURVE_WIDTH = 16, 11  # characters of a curve; where a terminal is narrow
 LEVELS, PLAIN_LEVELS = "▁▂▃▄▅▆▇█", "_.-=+*%#"  # from the least to the largest cost
@@ -126,9 +127,15 @@ class BatchProgress:
         value: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Leave its last state."""
+        """Leave its last state; where that is interrupted, too, at least the terminal."""
         if self._console.is_terminal:
-            self._live.stop()
+            try:
+                self._live.stop()
+            except BaseException:
+                self._live.stop()  # it may not have begun
+                self._console.file.write(f"\n{SHOWN_CURSOR}")
+                self._console.file.flush()
+                raise
         elif self._ended:
             self._plain()
 

@@ -9,6 +9,7 @@ import gc
 import os
 import sys
 import threading
+from typing import NoReturn
 
 NEW_OBJECTS = 100_000  # [-] between two searches for garbage; by default 700
 
@@ -26,5 +27,13 @@ def leave(code: int) -> None:
     if "evoexp.batch.workers" in sys.modules:
         return
     getattr(threading, "_shutdown", lambda: None)()
+    leave_at_once(code)
+
+
+def leave_at_once(code: int) -> NoReturn:
+    """End this process without its threads: they may wait for what an interrupted one left undone.
+
+    Nothing is lost by that: what they write are files that nobody has the name of yet.
+    """
     atexit._run_exitfuncs()
     os._exit(code)

@@ -61,27 +61,29 @@ def _write_all(files: Sequence[_File]) -> None:
         _write(files[0])
         return
     # one task per thread, not per file: handing a task over takes as long as writing a file
-    shares = (files[k::NUM_THREADS] for k in range(min(NUM_THREADS, len(files))))
-    stop = threading.Event()
-    writing = [_threads().submit(_write_share, share, stop) for share in shares]
+    shares = [files[k::NUM_THREADS] for k in range(min(NUM_THREADS, len(files)))]
+    stop, locks = threading.Event(), [threading.Lock() for _ in shares]
     try:
+        given = zip(shares, locks, strict=True)
+        writing = [_threads().submit(_write_share, share, stop, lock) for share, lock in given]
         wait(writing)  # for all of them, whatever happens to one
     except BaseException:  # Ctrl-C: no thread writes a file that is then removed
         stop.set()
-        for one in writing:
-            one.cancel()
-        wait(writing)
+        for lock in locks:  # also of one that was interrupted while it was given its share
+            with lock:
+                pass
         raise
     for one in writing:
         one.result()
 
 
-def _write_share(files: Sequence[_File], stop: threading.Event) -> None:
+def _write_share(files: Sequence[_File], stop: threading.Event, lock: threading.Lock) -> None:
     """Write files one after the other until one fails or nobody wants them any more."""
-    for file in files:
-        if stop.is_set():
-            return
-        _write(file)
+    with lock:
+        for file in files:
+            if stop.is_set():
+                return
+            _write(file)
 
 
 @cache

@@ -1,6 +1,8 @@
 """`view`, `play` and `export` on stored runs, logs, and motions of one's own."""
 
 import json
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -28,6 +30,21 @@ def test_view_writes_a_page_of_the_best_replicate(
     assert path.name.startswith(f"{runs[0]}-000")
     assert str(path) in said.out and "kB" in said.out
     assert "rana_planar · " in path.read_text()
+
+
+def test_a_page_that_was_drawn_is_written_again_without_what_draws_it(
+    evoexp: Evoexp, stored: Path, runs: list[str]
+) -> None:
+    assert evoexp("view", runs[1]).code == 0
+    (path,) = (stored / "motions").glob("*.html")
+    drawn = path.read_bytes()
+    path.unlink()
+    code = "import sys; from evoexp.cli import main; main(sys.argv[1:]); "
+    code += "print(*{'numba', 'pinocchio', 'coal', 'scipy'} & set(sys.modules))"
+    command = [sys.executable, "-c", code, "view", runs[1]]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
+    assert str(path) in said[0] and said[1:] == [""]
+    assert path.read_bytes() == drawn
 
 
 def test_view_puts_two_runs_side_by_side(

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from command_samples import SERIAL, Evoexp
 
-from evoexp.commands.arguments import is_override
-from evoexp.commands.given_motion import is_motion
+from evoexp.commands.arguments import is_motion, is_override
 from evoexp.store.run_directory import find_runs
 
 Refused = Callable[..., str]

@@ -5,6 +5,8 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+MOTION_ENDINGS = (".json", ".npy")
+
 
 def add_experiment_arguments(parser: argparse.ArgumentParser) -> argparse.Action:
     """Add the arguments that choose conditions: overrides, `-m`, `--only`, `--config-dir`.
@@ -43,6 +45,11 @@ def is_override(word: str) -> bool:
     A file of such a name, if there is one, is a file.
     """
     return ("=" in word or word.startswith(("~", "+"))) and not Path(word).exists()
+
+
+def is_motion(word: str) -> bool:
+    """Return whether a word of a command is the name of a motion file."""
+    return word.endswith(MOTION_ENDINGS) and not is_override(word)
 
 
 def add_config_dir_argument(parser: argparse.ArgumentParser) -> None:

@@ -10,21 +10,20 @@ from typing import Any
 from rich.table import Table
 
 from evoexp.collision.certifier.certificate import PAIR
-from evoexp.commands.arguments import add_experiment_arguments
+from evoexp.commands.arguments import add_experiment_arguments, is_motion
 from evoexp.commands.console import add_columns, new_table, plain_console, print_json
 from evoexp.commands.given_motion import (
     FittingMotion,
     fitting_motions,
     initial_motion,
-    is_motion,
     nested,
     stored_motion,
 )
-from evoexp.commands.motion_files import run_or_log, write
+from evoexp.commands.motion_words import run_or_log, write
 from evoexp.errors import MotionFileError
 from evoexp.planners.answers import Listing
 from evoexp.planners.proofs import judge_motion
-from evoexp.playback.stored import CHOICES, chosen_log
+from evoexp.store.chosen_logs import CHOICES, chosen_log
 
 DEPARTURES = "departures"  # of a row: the ways in which the motion is none of the task
 HEX = re.compile("[0-9a-fA-F]{1,64}")  # a prefix of a hash

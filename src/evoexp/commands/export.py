@@ -7,13 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from evoexp.commands.console import plain_console
-from evoexp.commands.motion_files import (
-    add_motion_arguments,
-    output_path,
-    single,
-    speed_limits,
-    write,
-)
+from evoexp.commands.motion_files import file_name, single, speed_limits
+from evoexp.commands.motion_words import add_motion_arguments, output_path, write
 from evoexp.errors import SettingError
 from evoexp.playback.joint_limits import Defaults, JointLimits, joint_limits
 from evoexp.playback.recording import Recording
@@ -72,7 +67,7 @@ def main(arguments: argparse.Namespace) -> int:
     else:
         content = as_csv(timed) if arguments.format == "csv" else as_json(found, timed)
     ending = ".csv" if arguments.format == "csv" else ".json"
-    write(output_path(arguments, [found], ending), content)
+    write(output_path(arguments, [file_name(found)], ending), content)
     plain_console().print(_described(timed, limits), soft_wrap=True)
     return 0
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from evoexp.attachments import PREFIX, keep_all
-from evoexp.commands.arguments import is_override
+from evoexp.commands.arguments import MOTION_ENDINGS, is_motion
 from evoexp.condition import Condition
 from evoexp.configuration import expansions
 from evoexp.errors import MotionFileError, printable
@@ -17,7 +17,6 @@ from evoexp.input_files import MEGABYTE, read_bounded, read_npy
 from evoexp.records import FloatArray
 from evoexp.store.log_reader import read_log
 
-ENDINGS = (".json", ".npy")
 LARGEST = 1e7  # as of the numbers of robots and scenarios, in any unit
 MAX_MOTION = 8 * MEGABYTE
 MOST_VALUES = 200_000  # numbers of a motion; the longest of a shipped experiment has 4,000
@@ -40,11 +39,6 @@ class FittingMotion(NamedTuple):
     planner: Any
     problem: Any
     solution: FloatArray
-
-
-def is_motion(word: str) -> bool:
-    """Return whether a word of a command is the name of a motion file."""
-    return word.endswith(ENDINGS) and not is_override(word)
 
 
 def fitting_motions(
@@ -149,7 +143,7 @@ def read_motion(path: Path) -> Any:
             numbers.
     """
     try:
-        if path.suffix not in ENDINGS:
+        if path.suffix not in MOTION_ENDINGS:
             raise MotionFileError(f"{path}: a motion file ends in .json or .npy")
         content = read_bounded(path, MAX_MOTION)
         is_array = path.suffix == ".npy"

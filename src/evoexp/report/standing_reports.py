@@ -11,12 +11,11 @@ import importlib.metadata
 import json
 import os
 import sys
-from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
-from evoexp.store.kept_facts import installed_code
+from evoexp.store.kept_facts import file_stamps, installed_code
 
 _DRAWERS = ("jinja2", "matplotlib", "numpy", "pandas", "scipy", "pyarrow", "pin", "coal", "numba")
 _PACKAGE = Path(__file__).parents[1]
@@ -59,19 +58,6 @@ class StandingReport(NamedTuple):
         digest = hashlib.sha256(json.dumps([*versions, *self.asked]).encode())
         digest.update(installed_code())
         roots = _PACKAGE / "assets", *self.folders, self.outputs / "runs", self.directory
-        for stamp in _stamps(roots):
+        for stamp in file_stamps(roots):
             digest.update(json.dumps(stamp).encode(errors="surrogateescape"))
         return digest.hexdigest().encode()
-
-
-def _stamps(roots: Iterable[Path]) -> Iterator[tuple[str, int, int]]:
-    """Yield path, size and time of every file in folders and those within, in order."""
-    for root in roots:
-        for folder, names, files in os.walk(root):
-            names.sort()
-            for name in sorted(files):
-                if name.startswith("."):  # locks
-                    continue
-                with contextlib.suppress(OSError):
-                    status = os.stat(path := os.path.join(folder, name))
-                    yield path, status.st_size, status.st_mtime_ns

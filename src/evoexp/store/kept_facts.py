@@ -96,6 +96,19 @@ def _stamps(root: str) -> Iterator[tuple[str, int, int]]:
                 yield from _stamps(entry.path)
 
 
+def file_stamps(roots: Iterable[Path]) -> Iterator[tuple[str, int, int]]:
+    """Yield path, size and time of every file in folders and those within, in order; no locks."""
+    for root in roots:
+        for folder, names, files in os.walk(root):
+            names.sort()
+            for name in sorted(files):
+                if name.startswith("."):  # locks
+                    continue
+                with contextlib.suppress(OSError):
+                    status = os.stat(path := os.path.join(folder, name))
+                    yield path, status.st_size, status.st_mtime_ns
+
+
 def add_files(digest: Any, paths: Iterable[Path]) -> None:
     """Add names and contents of files, of those that are there, to a hash."""
     for path in paths:

@@ -5,6 +5,7 @@ import pytest
 from evoexp.batch import first_compilation
 from evoexp.batch.first_compilation import compile_all, load_and_compile
 from evoexp.condition import Condition
+from evoexp.configuration import expansions
 from evoexp.paths.motion import Motion
 from evoexp.planners import proofs
 
@@ -58,3 +59,23 @@ def test_verdicts_follow_all_searches(faulty: Condition, monkeypatch: pytest.Mon
     other = faulty.to_json().replace(b'"faulty"', b'"via_point_ga"')
     compile_all([faulty.to_json(), other])
     assert steps == ["search"] * 2 + ["judge"] * 4
+
+
+def test_a_search_in_stages_is_followed_to_the_last_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else its kernels would never be known to be there, and be loaded by every command."""
+    ((_, condition),) = expansions.expand(["experiment=chen_mission", "budget=smoke"])[
+        0
+    ].conditions[:1]
+    noted: list[str] = []
+    judged: list[Motion | None] = []
+    monkeypatch.setattr(first_compilation, "is_compiled", lambda kind, modules: False)
+    monkeypatch.setattr(
+        first_compilation, "note_compiled", lambda kind, modules: noted.append(kind)
+    )
+    monkeypatch.setattr(
+        proofs, "judge_motion", lambda planner, problem, motion: judged.append(motion)
+    )
+    compile_all([condition.to_json()])
+    assert len(noted) == 1
+    assert len(judged) == 4
+    assert all(motion is not None for motion in judged)

@@ -14,9 +14,12 @@ from typing import Any, NamedTuple
 
 from evoexp.batch.jobs import load
 from evoexp.condition import Condition
+from evoexp.errors import SettingError
 from evoexp.numeric.compiled_kinds import is_compiled, note_compiled
 from evoexp.records import FloatArray
 from evoexp.registry import component_modules
+
+MOST_GENERATIONS = 1000  # of a search whose kernels are compiled
 
 _NUMBER = re.compile(r"-?\d+(\.\d+)?([eE][-+]?\d+)?")
 
@@ -37,7 +40,7 @@ class _Kind(NamedTuple):
 
 
 class _Searched(NamedTuple):
-    """Planner, problem, and the best solutions of the first two generations of a search."""
+    """Planner, problem, and the solutions of two generations of a search."""
 
     planner: Any
     problem: Any
@@ -90,14 +93,20 @@ def _prepared(kind: _Kind) -> tuple[Any, Any, Any]:
 
 
 def _search(kind: _Kind) -> _Searched | None:
-    """Search for two generations; None if the planner fails."""
+    """Search for two generations, in the last of several stages; None if the planner fails.
+
+    A solution of an earlier stage lacks what the later ones find, and cannot be evaluated.
+    """
     with contextlib.suppress(Exception):
         planner, problem, rng = _prepared(kind)
-        found = []
-        for generation in itertools.islice(planner.evolve(problem, rng), 2):
-            planner.evaluate(problem, generation.best)
-            found.append(generation.best.copy())
-        return _Searched(planner, problem, tuple(found))
+        found = list[FloatArray]()
+        for generation in itertools.islice(planner.evolve(problem, rng), MOST_GENERATIONS):
+            with contextlib.suppress(SettingError):
+                planner.evaluate(problem, generation.best)
+                found.append(generation.best.copy())
+            if len(found) == 2:
+                break
+        return _Searched(planner, problem, tuple(found)) if found else None
     return None
 
 

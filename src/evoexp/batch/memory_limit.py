@@ -37,7 +37,11 @@ def allowed_memory(settings: RunnerSettings, num_workers: int) -> float:
 
 def replicate_memory(condition: Condition) -> int:
     """Estimate the memory that a replicate of a condition takes, its log included [B]."""
-    generations, memory = _needs(condition)
+    return _memory(*_needs(condition))
+
+
+def _memory(generations: int, memory: float) -> int:
+    """Add the memory of a log with so many records [B]."""
     return int(memory + min(generations * USUAL_RECORD, MAX_LOG))
 
 
@@ -52,12 +56,12 @@ def refuse_large(condition: Condition, allowed: float, label: str = "") -> None:
     Raises:
         SettingError: If they would, or if the condition contradicts itself.
     """
-    generations, _ = _needs(condition)
+    generations, memory = _needs(condition)
     if generations * LEAST_RECORD > MAX_LOG:
         most = MAX_LOG // LEAST_RECORD
         must = f"of fewer than {most:,} generations: a log holds {MAX_LOG // MEGABYTE} MB"
         raise SettingError("planner", must, generations)
-    needed = replicate_memory(condition)
+    needed = _memory(generations, memory)
     if needed > allowed:
         whose = f"condition {label or condition.id[:12]}"
         must = f"at least {needed / GIGABYTE:,.2f}, the estimate of a replicate of {whose}"

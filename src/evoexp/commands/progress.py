@@ -94,6 +94,7 @@ class BatchProgress:
             key: ConditionCount(place, *each) for place, (key, each) in enumerate(wanted.items())
         }
         self._total = sum(each.total for each in self._counts.values())
+        self._done = self._failed = 0
         self._last_line = time.monotonic()
         self._first: tuple[float, int] | None = None  # when the first had ended, and how many
         self._last_end = self._last_line  # of a replicate
@@ -140,14 +141,6 @@ class BatchProgress:
             self._plain()
 
     @property
-    def _done(self) -> int:
-        return sum(each.done for each in self._counts.values())
-
-    @property
-    def _failed(self) -> int:
-        return sum(each.failed for each in self._counts.values())
-
-    @property
     def _ended(self) -> int:
         return self._done + self._failed
 
@@ -156,6 +149,8 @@ class BatchProgress:
         own = self._counts.pop(outcome.condition_id)
         self._counts[outcome.condition_id] = own  # the last one of all
         own.count(outcome)
+        self._failed += outcome.failed
+        self._done += not outcome.failed
         now = time.monotonic()
         if own.first_end is None:
             own.first_end = now

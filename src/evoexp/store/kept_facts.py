@@ -12,6 +12,7 @@ import importlib.util
 import json
 import os
 import sys
+import time
 from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,12 @@ from evoexp.numeric.code_keys import GRAIN_S
 from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
 from evoexp.registry import COMPONENTS, Registration, registrations
 from evoexp.version import LOADED_FROM
+
+Stamp = tuple[str, int, int]  # path, size and time of a file
+
+LOOK_S = (
+    0.05  # [s] for which code that was looked at is taken to stay as it is; a fact takes longer
+)
 
 _LIBRARIES = ("numpy", "numba", "scipy", "pin", "coal")
 _OF_THIS_PROCESS = os.urandom(16)
@@ -70,22 +77,42 @@ def installed_code(without: Collection[str] = ()) -> bytes:
     own = Path(__file__).parents[1]
     code = [own, *(root for each in components for root in _sources(each))]
     left_out = tuple(f"{own / folder}{os.sep}" for folder in without)
-    found = {stamp for root in dict.fromkeys(code) for stamp in _stamps(str(root))}
-    stamps = sorted(stamp for stamp in found if not stamp[0].startswith(left_out))
+    found = _LOOKED.stamps(tuple(map(str, dict.fromkeys(code))))
+    stamps = [stamp for stamp in found if not stamp[0].startswith(left_out)]
     digest = _hash_of_code(json.dumps(components), tuple(stamps))
     newest = max((written for _, _, written in stamps), default=0)
     return digest if newest < 1e9 * (LOADED_FROM - GRAIN_S) else digest + _OF_THIS_PROCESS
 
 
 @functools.lru_cache(maxsize=2)
-def _hash_of_code(components: str, stamps: tuple[tuple[str, int, int], ...]) -> bytes:
+def _hash_of_code(components: str, stamps: tuple[Stamp, ...]) -> bytes:
     """Read all code, once per process as long as no file is written again."""
     digest = hashlib.sha256(components.encode())
     add_files(digest, (Path(path) for path, _, _ in stamps))
     return digest.digest()
 
 
-def _stamps(root: str) -> Iterator[tuple[str, int, int]]:
+class _Looked:
+    """The files of code as they were when last looked at: a batch asks once per condition."""
+
+    def __init__(self) -> None:
+        """Begin without any."""
+        self._roots: tuple[str, ...] = ()
+        self._at, self._found = 0.0, list[Stamp]()
+
+    def stamps(self, roots: tuple[str, ...]) -> list[Stamp]:
+        """Return the stamps of all code in folders, sorted, no older than `LOOK_S`."""
+        now = time.monotonic()
+        if roots != self._roots or now - self._at > LOOK_S:
+            found = sorted({stamp for root in roots for stamp in _stamps(root)})
+            self._roots, self._at, self._found = roots, now, found
+        return self._found
+
+
+_LOOKED = _Looked()
+
+
+def _stamps(root: str) -> Iterator[Stamp]:
     """Yield path, size and time of every Python file in a folder and those within."""
     with contextlib.suppress(OSError), os.scandir(root) as entries:
         for entry in entries:
@@ -96,7 +123,7 @@ def _stamps(root: str) -> Iterator[tuple[str, int, int]]:
                 yield from _stamps(entry.path)
 
 
-def file_stamps(roots: Iterable[Path]) -> Iterator[tuple[str, int, int]]:
+def file_stamps(roots: Iterable[Path]) -> Iterator[Stamp]:
     """Yield path, size and time of every file in folders and those within, in order; no locks."""
     for root in roots:
         for folder, names, files in os.walk(root):

@@ -5,6 +5,7 @@ It notes size and time of every log behind it, and which ones are damaged and ha
 
 import contextlib
 import errno
+import functools
 import json
 import os
 import stat
@@ -196,7 +197,8 @@ def distinct(runs: Runs) -> list[RunDirectory]:
 def _current(run: RunDirectory, thorough: bool = False) -> _Summary:
     stored, stamps = _stored(run), _stamps(run)
     if not stamps:
-        return _build(run, None, stamps)
+        notes = _notes(run, _Summary(_empty_table(), {}, {}))
+        return _Summary(_empty_table().replace_schema_metadata(notes), {}, {})
     if stored is not None and _is_current(run, stored, stamps, thorough):
         return stored
     try:
@@ -328,19 +330,28 @@ def _build(
             if why:
                 damaged[name] = why
         tables.append(table_of(rows, schema_of({key for row in rows for key in row})))
-    table = pa.concat_tables([table_of([], schema_of(())), *tables], promote_options="default")
+    table = pa.concat_tables([_empty_table(), *tables], promote_options="default")
     places = dict(zip(names, range(len(names)), strict=True))
     order = [places[name] for name in stamps if name in places]
     table = _rows(table, order)
     # A stored row has null for the terms that only its neighbours have.
     schema = schema_of({key for key in table.column_names if table[key].null_count < len(table)})
-    notes = {"version": _VERSION, "condition": run.condition_id}
     damaged = {name: damaged[name] for name in stamps if name in damaged}
-    notes |= {"files": stamps, "damaged": damaged, "columns": schema.names}
-    table = table.select(schema.names).combine_chunks()
-    return _Summary(
-        table.replace_schema_metadata({_KEY: json.dumps(notes).encode()}), stamps, damaged
-    )
+    whole = _Summary(table.select(schema.names).combine_chunks(), stamps, damaged)
+    return whole._replace(table=whole.table.replace_schema_metadata(_notes(run, whole)))
+
+
+def _notes(run: RunDirectory, whole: _Summary) -> dict[bytes, bytes]:
+    """Return what a table notes of itself and of the files that it follows from."""
+    notes = {"version": _VERSION, "condition": run.condition_id}
+    notes |= {"files": whole.files, "damaged": whole.damaged, "columns": whole.table.column_names}
+    return {_KEY: json.dumps(notes).encode()}
+
+
+@functools.cache
+def _empty_table() -> pa.Table:
+    """Return the table of a run without logs: a batch asks for it several times per run."""
+    return table_of([], schema_of(()))
 
 
 def _rows(table: pa.Table, which: list[int]) -> pa.Table:

@@ -19,6 +19,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import EngFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from evoexp.errors import SettingError, brief
+from evoexp.report.kept_ticks import keep_ticks
 from evoexp.report.narrow_figures import narrow
 
 ARM_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")  # Okabe & Ito 2008
@@ -153,6 +154,7 @@ def _drawn(
         FigureCanvasAgg(figure)  # what it has measured of texts is known when a PNG is drawn
         if look.width == "column":
             narrow(figure)
+        keep_ticks(figure)
         if engine := figure.get_layout_engine():  # arranged once, for all formats
             engine.execute(figure)
         figure.set_layout_engine(None)  # with "none" every file would be drawn twice

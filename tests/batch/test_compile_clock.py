@@ -6,7 +6,7 @@ import pytest
 from numba.core.compiler_lock import global_compiler_lock
 
 from evoexp.batch import compile_clock, replicate
-from evoexp.batch.compile_clock import Times, now
+from evoexp.batch.compile_clock import Times, cpu_now, now
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 
@@ -17,12 +17,13 @@ HELD_S = 5.0  # [s] by which the clocks of the test go on at once
 def clocks(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """Let the clocks show the sum of a list."""
     passed = [0.0]
+    monkeypatch.setattr(compile_clock, "_processor_time", lambda: sum(passed))
     monkeypatch.setattr(compile_clock, "_clocks", lambda: Times(sum(passed), 2.0 * sum(passed)))
     return passed
 
 
 def test_time_under_the_compilers_lock_does_not_pass(clocks: list[float]) -> None:
-    begun = now()
+    begun, cpu_begun = now(), cpu_now()
     clocks.append(1.0)
     with global_compiler_lock:
         clocks.append(HELD_S)
@@ -31,6 +32,7 @@ def test_time_under_the_compilers_lock_does_not_pass(clocks: list[float]) -> Non
         clocks.append(HELD_S)
     clocks.append(2.0)
     assert now() - begun == pytest.approx(Times(3.0, 6.0))
+    assert cpu_now() - cpu_begun == pytest.approx(3.0)
 
 
 def test_a_replicate_that_compiles_takes_no_longer(

@@ -9,6 +9,7 @@ from numba.core.errors import TypingError
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.vector_rows import (
     lane_numbers,
+    load_each,
     load_pairs,
     load_quads,
     num_up_to,
@@ -36,6 +37,11 @@ def transpose(square: FloatArray, out: FloatArray) -> None:
     rows = transposed(vectors)
     for k in range(LANES):
         store(out, U(k * LANES), rows[k])
+
+
+@kernel
+def each(array: FloatArray, places: Any, at: int, offset: int, out: FloatArray) -> None:
+    store(out, U(0), load_each(array, places, U(at), U(offset)))
 
 
 @kernel
@@ -73,7 +79,7 @@ def test_a_square_is_transposed() -> None:
     assert np.array_equal(out.reshape(LANES, LANES), square.T)
 
 
-@pytest.mark.parametrize(("read", "width"), [(pairs, 2), (quads, 4)])
+@pytest.mark.parametrize(("read", "width"), [(each, 1), (pairs, 2), (quads, 4)])
 def test_columns_are_read_from_each_lanes_own_place(read: Any, width: int) -> None:
     rng = np.random.default_rng(1)
     array = rng.random(100)

@@ -41,6 +41,7 @@ class _CompilerTimes(event.Listener):
             self.wall_s += taken.wall_s
 
 
+_processor_time = time.process_time
 _compiler = _CompilerTimes()
 event.register("numba:compiler_lock", _compiler)
 
@@ -50,5 +51,10 @@ def now() -> Times:
     return _clocks() - Times(_compiler.cpu_s, _compiler.wall_s)
 
 
+def cpu_now() -> float:
+    """Return the processor time that `now` returns [s], in a third of the time."""
+    return _processor_time() - _compiler.cpu_s
+
+
 def _clocks() -> Times:
-    return Times(time.process_time(), time.perf_counter())
+    return Times(_processor_time(), time.perf_counter())

@@ -4,7 +4,7 @@ import hashlib
 from collections.abc import Callable
 
 from evoexp.attachments import SHA256
-from evoexp.batch.compile_clock import now
+from evoexp.batch.compile_clock import cpu_now, now
 from evoexp.collision.box_support import EXACT
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
@@ -50,7 +50,7 @@ def run_replicate(
             ended = BUDGET_SPENT
             break
         last = generation
-        log.write(last, (now() - begun).cpu_s)  # the planner knows nothing of files
+        log.write(last, cpu_now() - begun.cpu_s)  # the planner knows nothing of files
         if hear is not None:
             hear(last)
         if first_feasible is None and last.num_feasible > 0:

@@ -112,6 +112,17 @@ def _joined(builder: Any, parts: list[Any]) -> list[Any]:
 
 
 @intrinsic
+def _load_each(typing_context: Any, array: Any, places: Any, at: Any, offset: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        row = ir.Constant(_DOUBLES, ir.Undefined)
+        for lane, address in enumerate(_addresses(context, builder, signature, arguments)):
+            row = builder.insert_element(row, builder.load(address), ir.Constant(_INDEX, lane))
+        return row
+
+    return vector_type(array, places, types.uint64, types.uint64), generate
+
+
+@intrinsic
 def _count(
     typing_context: Any, array: Any, places: Any, at: Any, offset: Any, limits: Any, num: Any
 ) -> Any:
@@ -180,6 +191,9 @@ Places = NDArray[np.uint64]
 
 transposed: Callable[[Eight], Eight] = _for_kernels(_transpose)
 """Return eight vectors as rows of a square, transposed: lane j of row i becomes lane i of row j."""
+
+load_each: Callable[[FloatArray, Places, np.uint64, np.uint64], Vector] = _for_kernels(_load_each)
+"""Return the number that stands at an offset from each lane's place; see `load_pairs`."""
 
 load_pairs: Callable[[FloatArray, Places, np.uint64, np.uint64], tuple[Vector, Vector]] = (
     _for_kernels(_columns(2))

@@ -12,7 +12,7 @@ import numpy as np
 
 from evoexp.numeric.compilation import inlined
 from evoexp.numeric.vector_rows import Eight
-from evoexp.numeric.vectors import Vector, load, select, spread, store
+from evoexp.numeric.vectors import Vector, load, root, select, spread, store
 from evoexp.paths.spline import (
     PAIR,
     load_eight,
@@ -24,7 +24,7 @@ from evoexp.paths.spline import (
     store_eight,
     store_rows,
 )
-from evoexp.paths.workspace import EIGHT, U0, U1, U2, U6, U7, VECTOR, Layout
+from evoexp.paths.workspace import EIGHT, U0, U1, U2, VECTOR, Layout
 from evoexp.records import FloatArray
 
 
@@ -41,8 +41,10 @@ def between(v0: Vector, v1: Vector, v2: Vector, v3: Vector) -> Vector:
 def speeds_of_two(w: FloatArray, knot: np.uint64, at: Layout, u: float, h: float) -> Eight:
     """Return the speeds of an arm of two joints at eight samples from u on, h apart."""
     x, y = slope(w, knot), slope(w, knot + at.joint * VECTOR)
+    # where a segment begins only b0 counts
+    first = root(x[0] * x[0] + y[0] * y[0]) if u == 0.0 else speed_of_two(x, y, u)
     return (
-        speed_of_two(x, y, u),
+        first,
         speed_of_two(x, y, u + h),
         speed_of_two(x, y, u + 2.0 * h),
         speed_of_two(x, y, u + 3.0 * h),
@@ -82,13 +84,15 @@ def write_speeds(
     u: float,
     h: float,
 ) -> None:
-    """Write the speeds at eight samples of a segment, from u on, or behind the goal."""
+    """Write the speeds at eight samples of a segment, from u on, or at the goal and behind it."""
     if segment == N:
         # beyond the goal the speed is that of the parabola through the last three samples
-        behind, v = at.ahead + at.ahead + EIGHT - ahead, speed_at_goal(w, N, joints, at)
-        p1, p2 = load(w, behind + U7 * VECTOR), load(w, behind + U6 * VECTOR)
+        v = speed_at_goal(w, N, joints, at)
+        p1, p2 = load(w, ahead - VECTOR), load(w, ahead - U2 * VECTOR)
         store(w, ahead, v)
         store(w, ahead + VECTOR, 3.0 * (v - p1) + p2)
+    elif joints == U2 and h == 0.125:  # a segment is a block: constants instead of broadcasts
+        store_eight(w, ahead, speeds_of_two(w, segment * PAIR, at, 0.0, 0.125))
     elif joints == U2:
         store_eight(w, ahead, speeds_of_two(w, segment * PAIR, at, u, h))
     else:
@@ -108,13 +112,13 @@ def integrate_speed(
         Lengths up to the first sample and to the last one.
     """
     nothing, h = spread(0.0), 1.0 / np.float64(S)
-    here, ahead = at.ahead, at.ahead + EIGHT  # of the block, and of the one behind it
+    here = at.speeds
     write_speeds(w, joints, N, at, here, U0, 0.0, h)
     before, first, second = nothing, load(w, here), load(w, here + VECTOR)
     length = between(nothing, nothing, nothing, first) + between(nothing, nothing, first, second)
     origin, segment, begin, stop = nothing, U0, True, S
     for place in range(U0, N * S, VECTOR):
-        v = load_eight(w, here)
+        v, ahead = load_eight(w, here), here + EIGHT
         if begin:
             kept = segment * VECTOR
         if place + VECTOR == stop:
@@ -136,13 +140,10 @@ def integrate_speed(
         if begin:
             store(w, at.begins + kept, length)
         begin = place + VECTOR + S == stop
-        store_rows(w, at.speeds + place, at.sample, v)
         store_rows(w, at.lengths + place, at.sample, (length, l1, l2, l3, l4, l5, l6, l7))
         before, length = v[7], l7 + between(v[6], v[7], after[0], after[1])
-        here, ahead = ahead, here
+        here = ahead
     # the sample at the goal
-    v0 = load(w, here)
-    store_rows(w, at.speeds + N * S, at.sample, (v0, v0, v0, v0, v0, v0, v0, v0))
     ends = (length, length, length, length, length, length, length, length)
     store_rows(w, at.lengths + N * S, at.sample, ends)
     return origin, length

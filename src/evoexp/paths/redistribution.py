@@ -24,6 +24,7 @@ import numpy as np
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.vector_rows import (
     lane_numbers,
+    load_each,
     load_pairs,
     load_quads,
     num_up_to,
@@ -109,6 +110,8 @@ def find_samples(
         sample = sample + num_up_to(w, places, at.samples + own, at.lengths, target, 7)
         store(w, at.found + own, sample)
         store_places(places, at.samples + own, begin + sample)
+        instant = np.float64(S) * segment + sample
+        store_places(places, at.instants + own, 8.0 * instant + lane_numbers())
 
 
 @inlined
@@ -174,7 +177,10 @@ def move_points(
     # between two samples the speed is linear
     for i in range(U1, N):
         own = i * VECTOR
-        speeds = load_pairs(w, places, at.samples + own, at.speeds)
+        speeds = (
+            load_each(w, places, at.instants + own, at.speeds),
+            load_each(w, places, at.instants + own, at.speeds + VECTOR),
+        )
         lengths = load_pairs(w, places, at.samples + own, at.lengths)
         target, sample = load(w, at.targets + own), load(w, at.found + own)
         store(w, at.found + own, parameter(target, sample, speeds, lengths) * h)

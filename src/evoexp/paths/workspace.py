@@ -10,13 +10,12 @@ per segment:
 - `begins`: vectors of arc length up to the begin of each segment;
 - `targets`, `entered`, `found`: vectors of each target's length, of the last segment that it is the
   first to follow, and of its sample;
+- `speeds`: vectors of the speed at every sample, and at one beyond the goal;
 - `rows`: per lane a and m again, joint by joint and knot by knot;
-- `speeds`: per lane the speed at every sample;
-- `lengths`: per lane the arc length up to every sample;
-- `ahead`: vectors of the speeds at twice eight samples.
+- `lengths`: per lane the arc length up to every sample.
 
 Another array holds places: eight for a moment, then per target those of its segment in `rows`
-(`knots`) and of its sample in `speeds` (`samples`).
+(`knots`), of its sample in `lengths` (`samples`) and in `speeds` (`instants`).
 """
 
 from typing import Literal, NamedTuple
@@ -65,18 +64,18 @@ class Layout(NamedTuple):
     Attributes:
         joint: Distance of two joints, in `knots` of vectors and in `rows` of numbers.
         row: Distance of two lanes in `rows`.
-        sample: Distance of two lanes in `speeds` and in `lengths`.
+        sample: Distance of two lanes in `lengths`.
         begins: `knots` begin at 0.
         targets: In all, one per point.
         entered: As `targets`.
         found: As `targets`.
+        speeds: As `targets`, one per sample.
         rows: Of lane 0.
-        speeds: Of lane 0.
         lengths: Of lane 0.
-        ahead: In all.
         size: Of all.
         knots: In the other array.
         samples: In the other array.
+        instants: In the other array.
         num_places: Size of the other array.
     """
 
@@ -87,13 +86,13 @@ class Layout(NamedTuple):
     targets: np.uint64
     entered: np.uint64
     found: np.uint64
-    rows: np.uint64
     speeds: np.uint64
+    rows: np.uint64
     lengths: np.uint64
-    ahead: np.uint64
     size: np.uint64
     knots: np.uint64
     samples: np.uint64
+    instants: np.uint64
     num_places: np.uint64
 
 
@@ -105,10 +104,9 @@ def layout(joints: np.uint64, N: np.uint64, S: np.uint64) -> Layout:
     row, sample = joints * joint, N * S + VECTOR
     begins = row * VECTOR
     targets = begins + points
-    entered, found, rows = targets + points, targets + U2 * points, targets + U3 * points
-    speeds = rows + row * VECTOR
-    lengths = speeds + sample * VECTOR
-    ahead = lengths + sample * VECTOR
+    entered, found, speeds = targets + points, targets + U2 * points, targets + U3 * points
+    rows = speeds + (N * S + U2) * VECTOR
+    lengths = rows + row * VECTOR
     return Layout(
         joint,
         row,
@@ -117,14 +115,14 @@ def layout(joints: np.uint64, N: np.uint64, S: np.uint64) -> Layout:
         targets,
         entered,
         found,
-        rows,
         speeds,
+        rows,
         lengths,
-        ahead,
-        ahead + U2 * EIGHT,
+        lengths + sample * VECTOR,
         VECTOR,
         VECTOR + points,
         VECTOR + U2 * points,
+        VECTOR + U3 * points,
     )
 
 

@@ -76,6 +76,30 @@ def test_costs_are_the_papers_sums() -> None:
 
 
 @pytest.mark.examples(2)
+@pytest.mark.parametrize("experiment", ["curkovic_methods", "curkovic_three"])
+def test_lines_are_evaluated_in_one_call_as_step_by_step(
+    experiment: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    planner, problem = prepared(experiment=experiment)
+    problem = problem._replace(collision=problem.collision._replace(substeps=1))
+    assert problem.collision.is_lines
+    genes = planner.sample(problem, np.random.default_rng(1), 9)
+    found = planner.evaluated(problem, genes)
+    monkeypatch.setattr(type(problem.collision), "is_lines", False)
+    expected = planner.evaluated(problem, genes)
+    for name, one, other in zip(found._fields, found, expected, strict=True):
+        assert np.array_equal(one, other) and one.dtype == other.dtype, name
+    assert found.collisions.any()
+
+
+def test_lines_that_are_not_finite_are_refused() -> None:
+    planner, problem = prepared()
+    genes = planner.sample(problem, np.random.default_rng(1), 9)
+    genes[0, 3, 4] = np.inf
+    with pytest.raises(ValueError, match="must be finite"):
+        planner.evaluated(problem, genes)
+
+
 @pytest.mark.parametrize(
     "settings", [SMALL, NO_HALL, (*SMALL, "ga.hall_frozen=true"), (*SMALL, "ga.hall_memory=3")]
 )

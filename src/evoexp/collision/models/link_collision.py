@@ -88,6 +88,11 @@ class LinkCollision(NamedTuple):
         """Whether robots are more than their lines."""
         return self.half_width > 0.0 or self.tcp_radius > 0.0
 
+    @property
+    def is_lines(self) -> bool:
+        """Whether robots are lines, among no obstacles, at the configurations of their paths."""
+        return not (self.enveloped or len(self.obstacles.kind) or self.substeps > 1)
+
     def outlines(self, robot: int, path: FloatArray, points: FloatArray) -> FloatArray:
         """Return the tested points or outlines of a population's paths, (configurations, 4 | 8, N).
 

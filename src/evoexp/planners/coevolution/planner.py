@@ -25,7 +25,7 @@ from evoexp.objectives.motion_criteria import MotionCriteria
 from evoexp.paths.motion import Motion, clamped_cubic, joint_ranges, top_speeds
 from evoexp.planners.coevolution.breeder import HALF_TURN, Breeder
 from evoexp.planners.coevolution.chromosome_length import SpeedLimit, length_notes
-from evoexp.planners.coevolution.kernels import measure
+from evoexp.planners.coevolution.kernels import evaluate_lines, measure
 from evoexp.planners.coevolution.link_problem import Problem, check_ends
 from evoexp.planners.coevolution.proven_teams import ProvenTeams
 from evoexp.planners.coevolution.settings import CoevolutionSettings
@@ -176,6 +176,8 @@ class Coevolution(PlannerDefaults, Component):
             problem: The problem.
             populations: (robots, 2 K, individuals).
         """
+        if problem.collision.is_lines:
+            return self._evaluated_lines(problem, populations)
         collision, objective = problem.collision, self.objective
         robots, _, count = populations.shape
         # paths, and C2 … C4 (Eqs. 6–8)
@@ -196,6 +198,18 @@ class Coevolution(PlannerDefaults, Component):
         criteria[:, 0] = sums
         pairs = hits[0][np.newaxis] if len(hits) == 1 else np.array(hits)
         return Evaluated(objective.collision_weight * sums + own, criteria, own, pairs, blocked)
+
+    def _evaluated_lines(self, problem: Problem, populations: FloatArray) -> Evaluated:
+        """Evaluate populations of robots that are lines, by one kernel."""
+        robots, _, count = populations.shape
+        criteria, (own, costs) = np.empty((robots, 4, count)), np.empty((2, robots, count))
+        pairs = np.empty((robots * (robots - 1) // 2, count, count), dtype=np.int16)
+        objective, ends = self.objective, (problem.start, problem.goal)
+        weights = objective.own_weights, objective.collision_weight
+        written = criteria, own, pairs, costs
+        if not evaluate_lines(populations, *ends, problem.arms, *weights, *written):
+            raise ValueError("points and bases must be finite and below 1e150")
+        return Evaluated(costs, criteria, own, pairs, np.zeros((robots, count), dtype=np.int64))
 
     def cost(self, problem: Problem, population: FloatArray) -> Judgement:
         """Judge the individuals of the first robot, each by its cheapest collision-free team."""

@@ -135,6 +135,23 @@ def test_panels_that_begin_a_line_have_numbers_and_others_that_share_them_none()
         assert any(text.get_visible() for text in axes.get_yticklabels()) == begins
 
 
+def test_titles_of_a_page_are_broken_where_they_would_reach_into_the_next_panel() -> None:
+    def long_titles() -> Figure:
+        found, panels = style.row_of_panels(3.0, 2)
+        for axes in panels:
+            axes.set_title(
+                "a condition that has a name as long as those of a sweep: 4 exact bodies"
+            )
+        return found
+
+    first, second = of_grid(at_width(long_titles, "page"))
+    (title,) = (
+        one for one in words(first.figure) if "bodies" in one.get_text() and one.axes is first
+    )  # type: ignore[arg-type]
+    assert "\n" in title.get_text()
+    assert title.get_window_extent().x1 < second.get_window_extent().x0
+
+
 def test_panels_stay_about_as_wide_as_they_were() -> None:
     page, column = (
         [axes.get_window_extent().width for axes in of_grid(at_width(lambda: row(2), width))]

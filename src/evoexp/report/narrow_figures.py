@@ -129,17 +129,29 @@ def _fit_texts(figure: Figure) -> None:
     for part in (figure, *figure.subfigs):
         for text in part.texts:
             _break(text, part.bbox.x1 - text.get_window_extent().x0)
+    fit_titles(figure)
     for axes in figure.axes:
-        box, end = axes.get_window_extent(), _end(axes, figure)
-        titles = {axes.get_title(where) for where in ("left", "center", "right")} - {""}
-        for title in axes.get_children():
-            if isinstance(title, Text) and title.get_text() in titles:
-                left = title.get_horizontalalignment() == "left"
-                _break(title, end - title.get_window_extent().x0 if left else box.width)
+        box = axes.get_window_extent()
         if axes.name != "3d":
             _break(axes.xaxis.label, box.width)
             _break(axes.yaxis.label, box.height, is_upright=True)
             _thin(axes.xaxis)
+
+
+def fit_titles(figure: Figure) -> bool:
+    """Break titles that would reach into the next panel, or out of the figure; say if any would."""
+    found = False
+    for axes in figure.axes:
+        titles = {axes.get_title(where) for where in ("left", "center", "right")} - {""}
+        if not titles:
+            continue
+        box, end = axes.get_window_extent(), _end(axes, figure)
+        for title in axes.get_children():
+            if isinstance(title, Text) and title.get_text() in titles:
+                left = title.get_horizontalalignment() == "left"
+                room = end - title.get_window_extent().x0 if left else box.width
+                found |= _break(title, room)
+    return found
 
 
 def _end(axes: Axes, figure: Figure) -> float:
@@ -152,11 +164,15 @@ def _end(axes: Axes, figure: Figure) -> float:
     return min(ends) - GAP
 
 
-def _break(text: Text, room: float, *, is_upright: bool = False) -> None:
-    """Break a text into lines that are no longer than some room [pixel]; else write it smaller."""
+def _break(text: Text, room: float, *, is_upright: bool = False) -> bool:
+    """Break a text into lines that are no longer than some room [pixel]; else write it smaller.
+
+    Returns:
+        Whether it was longer.
+    """
     size = _length(text, is_upright)
     if not text.get_text() or size <= room or room <= 0.0:
-        return
+        return False
     longest = max(len(line) for line in text.get_text().split("\n"))
     width = max(LEAST_LINE, int(longest * room / size))
     lines = (
@@ -168,6 +184,7 @@ def _break(text: Text, room: float, *, is_upright: bool = False) -> None:
     while _length(text, is_upright) > room and points > SMALLEST_TEXT:
         points *= 0.95
         text.set_fontsize(points)
+    return True
 
 
 def _length(text: Text, is_upright: bool) -> float:

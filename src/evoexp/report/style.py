@@ -20,7 +20,7 @@ from matplotlib.ticker import EngFormatter, LogLocator, MaxNLocator, NullFormatt
 
 from evoexp.errors import SettingError, brief
 from evoexp.report.kept_ticks import keep_ticks
-from evoexp.report.narrow_figures import narrow
+from evoexp.report.narrow_figures import fit_titles, narrow
 
 ARM_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")  # Okabe & Ito 2008
 CONDITION_COLOURS = (
@@ -157,6 +157,8 @@ def _drawn(
         keep_ticks(figure)
         if engine := figure.get_layout_engine():  # arranged once, for all formats
             engine.execute(figure)
+            if fit_titles(figure):
+                engine.execute(figure)
         figure.set_layout_engine(None)  # with "none" every file would be drawn twice
         for kind in formats:
             buffer = io.BytesIO()

@@ -39,7 +39,7 @@ def draw_critical_difference(table: pd.DataFrame) -> Figure:
     axes = figure.add_subplot()
     axes.set(xlim=(1.0 - 0.45 * (count - 1), count + 0.45 * (count - 1)), ylim=(-foot, ABOVE))
     axes.axis("off")
-    _scale(axes, count, difference)
+    _scale(axes, count, difference, is_narrow=figure.get_figwidth() < style.WIDTH)
     for k, (first, last) in enumerate(groups):
         ends = ranks[first] - 0.008 * count, ranks[last] + 0.008 * count
         y = -BAR * (k + 1)
@@ -56,15 +56,17 @@ def draw_critical_difference(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _scale(axes: Axes, count: int, difference: float) -> None:
+def _scale(axes: Axes, count: int, difference: float, *, is_narrow: bool) -> None:
     """Draw the axis of mean ranks, and the critical difference above it."""
+    size = 6.0 if is_narrow else 7.5  # [pt]
     axes.plot([1.0, count], [0.0, 0.0], color=style.NEUTRAL, linewidth=1.0)
     for rank in range(1, count + 1):
         axes.plot([rank, rank], [0.0, 0.06], color=style.NEUTRAL, linewidth=1.0)
-        axes.text(rank, 0.09, str(rank), ha="center", va="bottom", fontsize=7.5)
-    axes.text(count + 0.06 * (count - 1), 0.0, "mean rank\n(1 is best)", va="center", fontsize=7.5)
+        if rank % 2 or not is_narrow:
+            axes.text(rank, 0.09, str(rank), ha="center", va="bottom", fontsize=size)
+    axes.text(count + 0.06 * (count - 1), 0.0, "mean rank\n(1 is best)", va="center", fontsize=size)
     axes.plot([1.0, 1.0 + difference], [0.4, 0.4], color=style.NEUTRAL, linewidth=1.0)
     for end in (1.0, 1.0 + difference):
         axes.plot([end, end], [0.36, 0.44], color=style.NEUTRAL, linewidth=1.0)
     text = f"critical difference {difference:.2f}"
-    axes.text(1.0 + 0.5 * difference, 0.45, text, ha="center", va="bottom", fontsize=7.5)
+    axes.text(1.0 + 0.5 * difference, 0.45, text, ha="center", va="bottom", fontsize=size)

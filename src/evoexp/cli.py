@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from evoexp.commands.command_parser import COMMANDS, command_module, command_parser, whole_parser
 from evoexp.commands.damage_lines import damage_in_lines
 from evoexp.commands.interruption import Interrupted, Interruption
-from evoexp.commands.quick_end import leave, leave_at_once, search_less
+from evoexp.commands.quick_end import leave, leave_at_once
 from evoexp.commands.standard_streams import (
     OUTPUT,
     complain,
@@ -24,6 +24,7 @@ from evoexp.commands.standard_streams import (
     silence_output,
 )
 from evoexp.errors import EvoexpError
+from evoexp.numeric.garbage import search_less
 
 WITH_WORKERS = ("reproduce",)  # `run` starts them by itself, if there is anything to run
 KEPT = "finished replicates are kept, the same command runs the others"
@@ -43,6 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     interruption, is_process = Interruption(), arguments is None
     if is_process:
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # no threads that have nothing to do
+        os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")  # its own one keeps 40 MB
         open_streams()
         search_less()
         interruption.hear()

@@ -25,7 +25,7 @@ from evoexp.numeric.kept_files import MESSAGES, cache_root
 WATCH_S = 1.0  # [s] between two looks whether the parent is alive
 
 _OF_THE_PARENT = ("SIGINT", "SIGTERM", "SIGHUP")  # signals that end a batch in an orderly way
-_PRELOADED = ["evoexp.batch.preloaded"]
+_PRELOADED = ["evoexp.batch.rare_searches", "evoexp.batch.preloaded"]
 _SERVED = "forkserver"  # the name of this way to start processes
 _NUM_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(2**26), "MALLOC_TRIM_THRESHOLD_": str(2**28)}

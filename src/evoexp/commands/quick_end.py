@@ -1,22 +1,14 @@
-"""Start and end of a short process: no search for garbage at the start, no taking apart at the end.
+"""The end of a short process, without taking it apart.
 
-Imported modules stay, so searches for garbage while Python imports find none. And freeing
-one by one the objects of numba, LLVM and Pinocchio takes a quarter of a second when Python ends.
+Freeing one by one the objects of numba, LLVM and Pinocchio takes a quarter of a second when Python
+ends.
 """
 
 import atexit
-import gc
 import os
 import sys
 import threading
 from typing import NoReturn
-
-NEW_OBJECTS = 100_000  # [-] between two searches for garbage; by default 700
-
-
-def search_less() -> None:
-    """Look for garbage more rarely."""
-    gc.set_threshold(NEW_OBJECTS, 20, 100)
 
 
 def leave(code: int) -> None:

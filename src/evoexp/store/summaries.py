@@ -342,7 +342,7 @@ def _build(
 
 
 def _notes(run: RunDirectory, whole: _Summary) -> dict[bytes, bytes]:
-    """Return what a table notes of itself and of the files that it follows from."""
+    """Return the notes of a table: its version, its columns, the files that it follows from."""
     notes = {"version": _VERSION, "condition": run.condition_id}
     notes |= {"files": whole.files, "damaged": whole.damaged, "columns": whole.table.column_names}
     return {_KEY: json.dumps(notes).encode()}

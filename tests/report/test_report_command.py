@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from evoexp import cli
+from evoexp.report import statistics
 from report_samples import SMALL, expand
 
 
@@ -36,6 +37,7 @@ def test_an_experiment_may_be_named_as_the_folder_of_its_report(
 ) -> None:
     small = [word for word in SMALL if not word.startswith("budget")]
     assert report("rana_planar@smoke", *small, "report.dpi=40") == 0
+    assert statistics._weights.cache_info().currsize == 0  # figures have that room
     text = page(capsys).read_text()
     assert "Made by `evoexp report rana_planar budget=smoke" in text
 

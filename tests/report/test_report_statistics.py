@@ -16,6 +16,7 @@ from evoexp.report.statistics import (
     effort_ratio,
     expected_effort,
     expected_interval,
+    forget_resamples,
     holm,
     percentiles,
     quantile,
@@ -182,6 +183,15 @@ def test_the_effect_of_many_pairs_is_computed_in_blocks() -> None:
     weights = _weights(700, 150)
     resampled = ((weights @ wins) * weights).sum(axis=1) / 700**2
     assert effect(x, y, 0.9, 150).interval == percentiles(resampled, 0.9)
+
+
+@pytest.mark.parametrize(("size", "bytes_each"), [(3000, 2), (70_000, 4)])
+def test_resamples_hold_every_run_that_is_drawn(size: int, bytes_each: int) -> None:
+    weights = _weights(size, 3)
+    assert weights.sum(axis=1).tolist() == [size] * 3
+    assert weights.itemsize == bytes_each
+    forget_resamples()
+    assert _weights.cache_info().currsize == 0
 
 
 def test_effect_of_separated_and_of_no_values() -> None:

@@ -19,6 +19,7 @@ from evoexp.report.pages import page_of
 from evoexp.report.players import players_of
 from evoexp.report.report_settings import ReportSettings
 from evoexp.report.results import Results, gather
+from evoexp.report.statistics import forget_resamples
 from evoexp.shipped import Option
 from evoexp.store.files import write_files
 from evoexp.version import __version__
@@ -113,7 +114,9 @@ def derived(
         request.hint,
         request.options,
     )
-    return page_files(request, page_of(found, settings), found, settings)
+    page = page_of(found, settings)
+    forget_resamples()  # before figures take their room
+    return page_files(request, page, found, settings)
 
 
 def page_files(

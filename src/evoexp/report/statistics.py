@@ -308,10 +308,15 @@ def effort_ratio(
 def _weights(size: int, num_resamples: int) -> np.ndarray:
     """Return how often each of `size` runs is drawn, (resamples, size)."""
     rng = np.random.Generator(np.random.PCG64(BOOTSTRAP_SEED))
-    weights = np.empty((num_resamples, size), dtype=np.int32)
+    weights = np.empty((num_resamples, size), dtype=np.uint16 if size < 2**16 else np.int32)
     for own in weights:
         own[:] = np.bincount(rng.integers(0, size, size), minlength=size)
     return weights
+
+
+def forget_resamples() -> None:
+    """Free the resamples that comparisons share: of thousands of runs they take tens of MB."""
+    _weights.cache_clear()
 
 
 def _resampled_effort(

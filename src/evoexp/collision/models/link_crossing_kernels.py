@@ -7,15 +7,13 @@ from what each individual has on its own; the latter is prepared once per indivi
 configuration of a pair takes 20 additions and multiplications for its line functions and 15 more
 for the sign products of its four link pairs.
 
-Those run in single precision, eight or more lanes at a time. A pair of links is apart where one of
-its two products is above `tau`, a bound on all rounding (proved at `_threshold`), and crosses where
-both are below −tau; what is neither, two pairs of ten thousand random ones, is decided anew by the
-exact predicates. So counts are exact, whatever the vector width.
+Those run on eight individuals at a time (`crossing_blocks`), and only where no axis separates them:
+that spares most. A pair of links is apart where one of its two products is above `tau`, a bound on
+all rounding (proved at `_threshold`), and crosses where both are below −tau; what is neither is
+decided by the exact predicates. So counts are exact, whatever the vector width.
 
-What limits the speed: by count the multipliers, which do 16 multiplications, 7 minima or maxima and
-2 comparisons of the 40 operations. Measured with vectors of eight (AVX2), 100 × 100 pairs in 4
-configurations: 42 µs from points to counts and sums, 28 µs of them this loop (5.4 ns per vector),
-the rest tables, lengths, sums, checks; fresh or gathered populations alike, for nothing is skipped.
+100 × 100 pairs in 4 configurations take 10 … 21 µs, the most where populations are fresh or spread.
+Without looking for axes, in single precision and blocks of 104, they took 27.
 
 `q` and points are (configurations, rows, individuals), any number of individuals; tables are padded
 to blocks.
@@ -26,29 +24,29 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from evoexp.collision.models.crossing_blocks import (
+    Table,
+    cross_block,
+    farthest_of,
+    fill_table,
+    new_table,
+)
 from evoexp.collision.models.segment_predicates import touching
-from evoexp.numeric.compilation import kernel
+from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.elementary import exact_sincos
+from evoexp.numeric.vectors import LANES, least_lane, load, mask_bits, spread, upper
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.kinematics import U
-
-LANES = 104
-"""Individuals per block of a table; the last block is computed up to the next multiple of eight."""
-
-ROWS = 6
-"""Rows of a table, in single precision: u1 (x, y), u2 (x, y), and both links' line functions at the
-other's base."""
 
 Point = tuple[float, float]
 
 MOST_CONFIGURATIONS = 32767  # both counters of a pair share an int32, and counts are int16
 
-_ONE, _MANY = np.int32(1), np.int32(65536)
-_NONE = np.int32(0)
-_UNIT = 2.0**-24  # half a unit in the last place of 1, single precision
-_FLOOR = 2.0**-100  # above all that underflow can lose
+_UNIT = 2.0**-53  # half a unit in the last place of 1
+_FLOOR = 2.0**-500  # above all that underflow can lose
 _LARGEST = 1e300
 _HIGHEST = 1000
+_ALL_LANES = 2**LANES - 1
 
 
 @kernel
@@ -130,129 +128,48 @@ def substeps(
 @kernel
 def longest_link(base_x: float, base_y: float, points: FloatArray) -> float:
     """Return the greatest squared length of a link; infinite where a coordinate is not finite."""
-    first = second = 0.0
-    wrong = 0
+    flat, num = borrowed(points.reshape(-1)), U(points.shape[2])
+    whole = points.shape[2] // LANES * LANES
+    most, sums, undefined = spread(0.0), spread(0.0), spread(0.0)
+    longest, wrong = 0.0, 0
     for k in range(points.shape[0]):
-        for n in range(points.shape[2]):
-            x, y = points[U(k), U(0), U(n)], points[U(k), U(1), U(n)]
+        row = U(4 * k) * num
+        for n in range(0, whole, LANES):
+            place = row + U(n)
+            x, y = load(flat, place), load(flat, place + num)
             u, v = x - base_x, y - base_y
-            w, z = points[U(k), U(2), U(n)] - x, points[U(k), U(3), U(n)] - y
+            w, z = load(flat, place + U(2) * num) - x, load(flat, place + U(3) * num) - y
+            one, two = u * u + v * v, w * w + z * z
+            both = one + two
+            most, sums = upper(most, upper(one, two)), upper(sums, both)
+            undefined = undefined + (both - both)  # NaN from infinity or NaN on
+        for n in range(whole, points.shape[2]):
+            place = row + U(n)
+            x, y = flat[place], flat[place + num]
+            u, v = x - base_x, y - base_y
+            w, z = flat[place + U(2) * num] - x, flat[place + U(3) * num] - y
             one, two = u * u + v * v, w * w + z * z
             wrong += not (one + two < _LARGEST)
-            first = one if one > first else first
-            second = two if two > second else second
-    return math.inf if wrong > 0 else max(first, second)
+            longest = max(longest, one, two)
+    in_range = mask_bits(undefined < 1.0) & mask_bits(sums < _LARGEST)
+    if wrong > 0 or in_range != _ALL_LANES:
+        return math.inf
+    return max(longest, -least_lane(0.0 - most))
 
 
 @kernel
-def _threshold(longest: float, distance: float) -> tuple[float, np.float32]:
+def _threshold(longest: float, distance: float) -> tuple[float, float]:
     """Return the scale 2^-e of tables, and tau, a bound on the error of line functions' products.
 
-    With links ≤ l, bases d apart and u = 2^-24, every line function is at most V = l (d + 3 l). Its
-    error is below 5 u V: the vectors are rounded (2 u), their products and differences (2 u, four
-    times), sums of at most three terms follow. So the product of two errs by less than (10 + 1) u
-    V² + 25 u² V²; taken are 16. The double precision of what is prepared and the sums of rounded
-    vectors add less than 2^-45 V².
+    With links ≤ l, bases d apart and u = 2^-53, every line function is at most V = l (d + 3 l). Its
+    error is at most 6 u V: vectors err by u, products by 3 u, their differences by 4 u, and sums of
+    three of these round twice. So the product of two errs by less than 13 u V² + 36 u² V²; taken
+    are 32.
     """
     exponent = max(math.frexp(max(longest, distance))[1], -_HIGHEST)
     scale = math.ldexp(1.0, -exponent)
     largest = longest * scale * (distance * scale + 3.0 * longest * scale)
-    return scale, np.float32(16.0 * _UNIT * largest * largest + _FLOOR)
-
-
-@kernel
-def _fill_table(
-    points: FloatArray,
-    base_x: float,
-    base_y: float,
-    other_x: float,
-    other_y: float,
-    members: IntArray,
-    scale: float,
-    out: NDArray[np.float32],
-) -> None:
-    """Write the table of some individuals of a population.
-
-    Lanes without an individual hold line functions that are apart from everything.
-    """
-    num_configurations = points.shape[0]
-    dx, dy = (other_x - base_x) * scale, (other_y - base_y) * scale
-    for block in range((len(members) + LANES - 1) // LANES):
-        count = min(LANES, len(members) - block * LANES)
-        for k in range(num_configurations):
-            o = U((block * num_configurations + k) * ROWS * LANES)
-            for lane in range(count):
-                n, at = U(members[block * LANES + lane]), o + U(lane)
-                x, y = points[U(k), U(0), n], points[U(k), U(1), n]
-                u, v = (x - base_x) * scale, (y - base_y) * scale
-                w, z = (points[U(k), U(2), n] - x) * scale, (points[U(k), U(3), n] - y) * scale
-                out[at] = np.float32(u)
-                out[at + U(LANES)] = np.float32(v)
-                out[at + U(2 * LANES)] = np.float32(w)
-                out[at + U(3 * LANES)] = np.float32(z)
-                out[at + U(4 * LANES)] = np.float32(u * dy - v * dx)
-                out[at + U(5 * LANES)] = np.float32(
-                    w * ((other_y - y) * scale) - z * ((other_x - x) * scale)
-                )
-            for lane in range(count, (count + 7) // 8 * 8):
-                for row in range(ROWS):
-                    out[o + U(row * LANES + lane)] = np.float32(row >= 4)
-
-
-@kernel
-def _add_crossings(
-    one: NDArray[np.float32],
-    own: np.uint64,
-    two: NDArray[np.float32],
-    other: np.uint64,
-    num_configurations: int,
-    lanes: int,
-    tau: np.float32,
-    seen: NDArray[np.int32],
-) -> None:
-    """Count the configurations in which an individual crosses those of a block.
-
-    Args:
-        one: Table of the individual's population.
-        own: Offset of the individual in it.
-        two: Table of the other population.
-        other: Offset of the block in it.
-        num_configurations: K.
-        lanes: Individuals of the block.
-        tau: Bound on rounding.
-        seen: (LANES,), written: certain crossings + 65536 · possible ones.
-    """
-    low = -tau
-    for n in range(lanes):
-        seen[U(n)] = _NONE
-    for k in range(num_configurations):
-        s, o = own + U(k * ROWS * LANES), other + U(k * ROWS * LANES)
-        ax, ay, bx, by = one[s], one[s + U(LANES)], one[s + U(2 * LANES)], one[s + U(3 * LANES)]
-        l1d, l2d = one[s + U(4 * LANES)], one[s + U(5 * LANES)]
-        for n in range(lanes):
-            j = o + U(n)
-            vx, vy, wx, wy = two[j], two[j + U(LANES)], two[j + U(2 * LANES)], two[j + U(3 * LANES)]
-            m1a, m2a = two[j + U(4 * LANES)], two[j + U(5 * LANES)]
-            # cross products, then line functions at the ends of the other's links
-            c11, c12 = ax * vy - ay * vx, ax * wy - ay * wx
-            c21, c22 = bx * vy - by * vx, bx * wy - by * wx
-            l1e, l2e = l1d + c11, l2d + c21
-            l1f, l2f = l1e + c12, l2e + c22
-            m1b, m2b = m1a - c11, m2a - c12
-            m1c, m2c = m1b - c21, m2b - c22
-            # per pair of links the greater sign product, of all four pairs the least
-            p, q = l1d * l1e, m1a * m1b
-            least = p if p > q else q
-            p, q = l1e * l1f, m2a * m2b
-            r = p if p > q else q
-            least = r if r < least else least
-            p, q = l2d * l2e, m1b * m1c
-            r = p if p > q else q
-            least = r if r < least else least
-            p, q = l2e * l2f, m2b * m2c
-            r = p if p > q else q
-            least = r if r < least else least
-            seen[U(n)] += (_ONE if least < low else _NONE) + (_MANY if least <= tau else _NONE)
+    return scale, 32.0 * _UNIT * largest * largest + _FLOOR
 
 
 @kernel
@@ -275,62 +192,46 @@ def colliding(
 def _count_rows(
     base_1: Point,
     points_1: FloatArray,
-    one: NDArray[np.float32],
+    table_1: Table,
     rows: IntArray,
     base_2: Point,
     points_2: FloatArray,
-    two: NDArray[np.float32],
+    table_2: Table,
     columns: IntArray,
-    tau: np.float32,
+    tau: float,
     counts: NDArray[np.int16],
 ) -> None:
-    """Fill counts[rows, columns] from the tables `one` of population 1 and `two` of the columns."""
-    num_configurations, dense = points_1.shape[0], len(columns) == points_2.shape[2]
-    seen = np.empty(LANES, dtype=np.int32)
-    for row in range(len(rows)):
-        i = rows[row]
-        own = U((i // LANES) * num_configurations * ROWS * LANES + i % LANES)
-        for block in range((len(columns) + LANES - 1) // LANES):
-            first = block * LANES
-            count = min(LANES, len(columns) - first)
-            lanes = (count + 7) // 8 * 8
-            other = U(block * num_configurations * ROWS * LANES)
-            _add_crossings(one, own, two, other, num_configurations, lanes, tau, seen)
-            # pairs that rounding leaves open are counted
-            undecided = 0
-            if dense:
-                for n in range(count):
-                    certain, possible = seen[U(n)] & 0xFFFF, seen[U(n)] >> 16
-                    counts[U(i), U(first + n)] = certain
-                    undecided += certain != possible
+    """Fill counts[rows, columns] from the tables of all of population 1 and of the columns."""
+    one, two = borrowed((table_1, table_2))
+    size, num_columns = points_1.shape[0] * LANES, len(columns)
+    width = (num_columns + LANES - 1) // LANES * LANES
+    most, found = np.empty(size), np.empty(2 * LANES * width)
+    # eight rows by eight columns at a time
+    for first in range(0, len(rows), LANES):
+        group = rows[first : first + LANES]
+        farthest_of(one[1], group, size, most)
+        for n in range(len(found)):
+            found[U(n)] = 0.0
+        for begin in range(0, num_columns, LANES):
+            cross_block(one, group, most, two, begin, tau, found)
+        for r in range(len(group)):
+            certain, possible = U(r * width), U((r + LANES) * width)
+            i, undecided = U(group[r]), 0
+            for n in range(num_columns):
+                undecided += found[certain + U(n)] != found[possible + U(n)]
+            if num_columns == points_2.shape[2]:
+                for n in range(num_columns):
+                    counts[i, U(n)] = np.int16(found[certain + U(n)])
             else:
-                for n in range(count):
-                    certain, possible = seen[U(n)] & 0xFFFF, seen[U(n)] >> 16
-                    counts[U(i), U(columns[first + n])] = certain
-                    undecided += certain != possible
-            if undecided > 0:
-                chosen = columns[first : first + count]
-                _decide(base_1, points_1, i, base_2, points_2, chosen, seen, counts)
-
-
-@kernel
-def _decide(
-    base_1: Point,
-    points_1: FloatArray,
-    i: int,
-    base_2: Point,
-    points_2: FloatArray,
-    columns: IntArray,
-    seen: NDArray[np.int32],
-    counts: NDArray[np.int16],
-) -> None:
-    """Count those pairs of a row anew that rounding leaves open, by the exact predicates."""
-    for n in range(len(columns)):
-        if (seen[n] >> 16) != (seen[n] & 0xFFFF):
-            j, total = columns[n], 0
-            for k in range(points_1.shape[0]):
-                total += colliding(base_1, points_1, i, base_2, points_2, j, k)
-            counts[i, j] = total
+                for n in range(num_columns):
+                    counts[i, U(columns[U(n)])] = np.int16(found[certain + U(n)])
+            # what rounding leaves open, by the exact predicates
+            for n in range(num_columns if undecided > 0 else 0):
+                if found[certain + U(n)] != found[possible + U(n)]:
+                    j, total = columns[n], 0
+                    for k in range(points_1.shape[0]):
+                        total += colliding(base_1, points_1, group[r], base_2, points_2, j, k)
+                    counts[i, U(j)] = total
 
 
 @kernel
@@ -384,17 +285,16 @@ def crossings(
     if not squared + apart < _LARGEST:
         return False
     scale, tau = _threshold(math.sqrt(squared), math.sqrt(apart))
-    num_1, num_2, size = points_1.shape[2], points_2.shape[2], points_1.shape[0] * ROWS * LANES
-    one = np.empty((num_1 + LANES - 1) // LANES * size, dtype=np.float32)
-    two = np.empty((num_2 + LANES - 1) // LANES * size, dtype=np.float32)
-    _fill_table(points_1, x_1, y_1, x_2, y_2, np.arange(num_1), scale, one)
+    num, num_1, num_2 = points_1.shape[0], points_1.shape[2], points_2.shape[2]
+    one, two = new_table(num_1, num, num_1 + LANES), new_table(num_2, num, num_2 // LANES + 1)
+    fill_table(points_1, base_1, base_2, np.arange(num_1), scale, True, one)
     # changed rows against all columns, then the other rows against changed columns
     if len(rows) > 0:
         everyone = np.arange(num_2)
-        _fill_table(points_2, x_2, y_2, x_1, y_1, everyone, scale, two)
+        fill_table(points_2, base_2, base_1, everyone, scale, False, two)
         _count_rows(base_1, points_1, one, rows, base_2, points_2, two, everyone, tau, counts)
     if len(columns) > 0 and len(other_rows) > 0:
-        _fill_table(points_2, x_2, y_2, x_1, y_1, columns, scale, two)
+        fill_table(points_2, base_2, base_1, columns, scale, False, two)
         _count_rows(base_1, points_1, one, other_rows, base_2, points_2, two, columns, tau, counts)
     sum_counts(counts, sums_1, sums_2)
     return True

@@ -206,8 +206,9 @@ class Coevolution(PlannerDefaults, Component):
         pairs = np.empty((robots * (robots - 1) // 2, count, count), dtype=np.int16)
         objective, ends = self.objective, (problem.start, problem.goal)
         weights = objective.own_weights, objective.collision_weight
-        written = criteria, own, pairs, costs
-        if not evaluate_lines(populations, *ends, problem.arms, *weights, *written):
+        if not evaluate_lines(
+            populations, *ends, problem.arms, *weights, criteria, own, pairs, costs
+        ):
             raise ValueError("points and bases must be finite and below 1e150")
         return Evaluated(costs, criteria, own, pairs, np.zeros((robots, count), dtype=np.int64))
 
@@ -296,7 +297,7 @@ class Coevolution(PlannerDefaults, Component):
     def memory(self, problem: Problem) -> int:
         """Return the memory of all pairs of individuals, and of everybody's path and outlines."""
         robots, count = len(problem.start), self.ga.population_size
-        copies = COPIES + 4 * self.collision.collision_substeps
+        copies = COPIES + 8 * self.collision.collision_substeps
         pairs = robots * (robots - 1) // 2 * PAIR_BYTES * count * count
         return pairs + 8 * copies * num_values(self.shape(problem)) * count
 

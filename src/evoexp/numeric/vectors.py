@@ -27,6 +27,7 @@ from evoexp.numeric.compilation import inlined
 LANES = 8
 
 _DOUBLES = ir.VectorType(ir.DoubleType(), LANES)
+_SINGLES = ir.VectorType(ir.FloatType(), LANES)
 _WORDS = ir.VectorType(ir.IntType(64), LANES)
 _BITS = ir.VectorType(ir.IntType(1), LANES)
 
@@ -52,6 +53,16 @@ class Vector(Protocol):
     def __gt__(self, other: "Vector | float") -> Mask: ...
 
 
+class Singles(Protocol):
+    """Eight float32, for what may be rough: half the work of a `Vector`."""
+
+    def __add__(self, other: "Singles") -> "Singles": ...
+    def __sub__(self, other: "Singles") -> "Singles": ...
+    def __mul__(self, other: "Singles") -> "Singles": ...
+    def __rmul__(self, other: np.float32) -> "Singles": ...
+    def __lt__(self, other: "Singles | np.float32") -> Mask: ...
+
+
 class _VectorType(types.Type):
     """numba's type of one kind of vector."""
 
@@ -61,8 +72,8 @@ class _VectorType(types.Type):
         return _LLVM_TYPES[self.name]
 
 
-_LLVM_TYPES = {"vector8": _DOUBLES, "words8": _WORDS, "mask8": _BITS}
-vector_type, word_type, mask_type = map(_VectorType, _LLVM_TYPES)
+_LLVM_TYPES = {"vector8": _DOUBLES, "words8": _WORDS, "mask8": _BITS, "singles8": _SINGLES}
+vector_type, word_type, mask_type, single_type = map(_VectorType, _LLVM_TYPES)
 
 
 @register_model(_VectorType)
@@ -131,6 +142,7 @@ def _define_operators() -> None:
     }
     for operation, instruction in arithmetic.items():
         _define(operation, vector_type, types.float64, vector_type, instruction)
+        _define(operation, single_type, types.float32, single_type, instruction)
     for operation, instruction in of_words.items():
         _define(operation, word_type, types.int64, word_type, instruction)
 
@@ -148,6 +160,7 @@ def _define_operators() -> None:
 
     _define(operator.lt, vector_type, types.float64, mask_type, less)
     _define(operator.gt, vector_type, types.float64, mask_type, greater)
+    _define(operator.lt, single_type, types.float32, mask_type, less)
     _define(operator.eq, vector_type, types.float64, mask_type, equal)
     _define(operator.ne, word_type, types.int64, mask_type, unequal)
     _define(operator.and_, mask_type, types.boolean, mask_type, ir.IRBuilder.and_)
@@ -156,16 +169,18 @@ def _define_operators() -> None:
 _define_operators()
 
 
-def _check_array(array: Any) -> None:
+def _check_array(array: Any, dtype: Any = types.float64) -> None:
     flat = isinstance(array, types.Array) and array.ndim == 1 and array.layout == "C"
-    if not (flat and array.dtype == types.float64):
-        raise TypingError(f"array must be contiguous float64 of one dimension, is {array}")
+    if not (flat and array.dtype == dtype):
+        raise TypingError(f"array must be contiguous {dtype} of one dimension, is {array}")
 
 
-def _pointer(context: Any, builder: Any, kind: Any, array: Any, place: Any) -> Any:
+def _pointer(
+    context: Any, builder: Any, kind: Any, array: Any, place: Any, lanes: Any = _DOUBLES
+) -> Any:
     """Return the address of eight numbers in an array's memory."""
     data = context.make_array(kind)(context, builder, array).data
-    return builder.bitcast(builder.gep(data, [place]), _DOUBLES.as_pointer())
+    return builder.bitcast(builder.gep(data, [place]), lanes.as_pointer())
 
 
 @intrinsic
@@ -194,11 +209,43 @@ def _store(typing_context: Any, array: Any, place: Any, vector: Any) -> Any:
 
 
 @intrinsic
-def _spread_scalar(typing_context: Any, value: Any) -> Any:
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return _spread(builder, arguments[0], _DOUBLES)
+def _load_singles(typing_context: Any, array: Any, place: Any) -> Any:
+    _check_array(array, types.float32)
 
-    return vector_type(types.float64), generate
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        array, place = arguments
+        value = builder.load(_pointer(context, builder, signature.args[0], array, place, _SINGLES))
+        value.align = 4  # [B] that of a float32
+        return value
+
+    return single_type(array, place), generate
+
+
+@intrinsic
+def _store_singles(typing_context: Any, array: Any, place: Any, vector: Any) -> Any:
+    _check_array(array, types.float32)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        array, place, value = arguments
+        rounded = value if vector == single_type else builder.fptrunc(value, _SINGLES)
+        pointer = _pointer(context, builder, signature.args[0], array, place, _SINGLES)
+        written = builder.store(rounded, pointer)
+        written.align = 4
+        return context.get_dummy_value()
+
+    return types.void(array, place, vector), generate
+
+
+@intrinsic
+def _spread_scalar(typing_context: Any, value: Any) -> Any:
+    scalar, kind = value, single_type
+    if value != types.float32:  # an int, too
+        scalar, kind = types.float64, vector_type
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return _spread(builder, arguments[0], kind.lanes)
+
+    return kind(scalar), generate
 
 
 @intrinsic
@@ -289,8 +336,19 @@ Neither `load` nor `store` checks that they lie within the array.
 store: Callable[[NDArray[np.float64], np.uint64, Vector], None] = _for_kernels(_store)
 """Write eight numbers side by side into a contiguous array, from an index on."""
 
+load_singles: Callable[[NDArray[np.float32], np.uint64], Singles] = _for_kernels(_load_singles)
+"""Return eight numbers of a contiguous array of float32; see `load`."""
+
+store_singles: Callable[[NDArray[np.float32], np.uint64, Vector | Singles], None] = _for_kernels(
+    _store_singles
+)
+"""Write eight numbers, rounded, side by side into a contiguous array of float32."""
+
 spread: Callable[[float], Vector] = _for_kernels(_spread_scalar)
 """Return a vector of one number in every lane."""
+
+spread_single: Callable[[np.float32], Singles] = _for_kernels(_spread_scalar)
+"""Return singles of one number in every lane."""
 
 select: Callable[[Any, Any, Any], Any] = _for_kernels(_select)
 """Return the first value in lanes where a condition holds, the second in the others."""

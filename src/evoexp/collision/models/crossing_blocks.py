@@ -10,19 +10,24 @@ block, at the price of a load and a comparison each, or once for eight arms and 
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.vector_rows import Eight, transposed
 from evoexp.numeric.vectors import (
     LANES,
     Mask,
+    Singles,
     Vector,
     any_lane,
     load,
+    load_singles,
     lower,
     select,
     spread,
+    spread_single,
     store,
+    store_singles,
     upper,
 )
 from evoexp.records import FloatArray, IntArray
@@ -35,15 +40,17 @@ the other's base."""
 MARGIN = 2.0**-40
 """Added to reaches, whose sums of at most six rounded numbers below 8 err by less than 2^-46."""
 
+_ONE, _NONE = np.float32(1.0), np.float32(0.0)
+
 Point = tuple[float, float]
-Table = tuple[FloatArray, FloatArray]
+Table = tuple[NDArray[np.float32], FloatArray]
 
 
 @kernel
 def new_table(num_members: int, num_configurations: int, num_reaches: int) -> Table:
     """Return memory for `fill_table`: the blocks of some individuals, and reaches."""
     num_blocks = (num_members + LANES - 1) // LANES
-    blocks = np.empty(num_blocks * num_configurations * ROWS * LANES)
+    blocks = np.empty(num_blocks * num_configurations * ROWS * LANES, dtype=np.float32)
     return blocks, np.empty(num_reaches * num_configurations * LANES)
 
 
@@ -84,13 +91,13 @@ def fill_table(
             w, z = (tip_x - x) * scale, (tip_y - y) * scale
             place = block * num + k
             o = U(place * ROWS * LANES)
-            store(blocks, o, u)
-            store(blocks, o + U(LANES), v)
-            store(blocks, o + U(2 * LANES), w)
-            store(blocks, o + U(3 * LANES), z)
-            store(blocks, o + U(4 * LANES), u * dy - v * dx)
+            store_singles(blocks, o, u)
+            store_singles(blocks, o + U(LANES), v)
+            store_singles(blocks, o + U(2 * LANES), w)
+            store_singles(blocks, o + U(3 * LANES), z)
+            store_singles(blocks, o + U(4 * LANES), u * dy - v * dx)
             at_base = w * ((other[1] - y) * scale) - z * ((other[0] - x) * scale)
-            store(blocks, o + U(5 * LANES), at_base)
+            store_singles(blocks, o + U(5 * LANES), at_base)
             elbow_x, elbow_y = origin_x + u, origin_y + v
             ends = elbow_x, elbow_y, elbow_x + w, elbow_y + z
             if is_first:
@@ -213,8 +220,8 @@ def cross_block(
     most: FloatArray,
     two: Table,
     begin: int,
-    tau: float,
-    found: FloatArray,
+    tau: np.float32,
+    found: NDArray[np.float32],
 ) -> None:
     """Count the configurations in which some arms 1 cross those of a block of arms 2.
 
@@ -247,13 +254,16 @@ def cross_block(
 
 
 @inlined
-def add_where(condition: Mask, found: FloatArray, place: np.uint64) -> None:
+def add_where(condition: Mask, found: NDArray[np.float32], place: np.uint64) -> None:
     """Add 1 to the numbers of a vector where a condition holds."""
-    store(found, place, load(found, place) + select(condition, spread(1.0), spread(0.0)))
+    more: Singles = select(condition, spread_single(_ONE), spread_single(_NONE))
+    store_singles(found, place, load_singles(found, place) + more)
 
 
 @inlined
-def least_product(one: FloatArray, s: np.uint64, two: FloatArray, o: np.uint64) -> Vector:
+def least_product(
+    one: NDArray[np.float32], s: np.uint64, two: NDArray[np.float32], o: np.uint64
+) -> Singles:
     """Return the sign products that tell whether an arm crosses those of a block.
 
     Args:
@@ -269,9 +279,9 @@ def least_product(one: FloatArray, s: np.uint64, two: FloatArray, o: np.uint64) 
     ax, ay = one[s], one[s + U(LANES)]
     bx, by = one[s + U(2 * LANES)], one[s + U(3 * LANES)]
     l1d, l2d = one[s + U(4 * LANES)], one[s + U(5 * LANES)]
-    vx, vy = load(two, o), load(two, o + U(LANES))
-    wx, wy = load(two, o + U(2 * LANES)), load(two, o + U(3 * LANES))
-    m1a, m2a = load(two, o + U(4 * LANES)), load(two, o + U(5 * LANES))
+    vx, vy = load_singles(two, o), load_singles(two, o + U(LANES))
+    wx, wy = load_singles(two, o + U(2 * LANES)), load_singles(two, o + U(3 * LANES))
+    m1a, m2a = load_singles(two, o + U(4 * LANES)), load_singles(two, o + U(5 * LANES))
     # cross products, then line functions at the ends of the other's links
     c11, c12 = ax * vy - ay * vx, ax * wy - ay * wx
     c21, c22 = bx * vy - by * vx, bx * wy - by * wx
@@ -279,7 +289,20 @@ def least_product(one: FloatArray, s: np.uint64, two: FloatArray, o: np.uint64) 
     l1f, l2f = l1e + c12, l2e + c22
     m1b, m2b = m1a - c11, m2a - c12
     m1c, m2c = m1b - c21, m2b - c22
-    first = lower(upper(l1d * l1e, m1a * m1b), upper(l1e * l1f, m2a * m2b))
-    second = lower(upper(l2d * l2e, m1b * m1c), upper(l2e * l2f, m2b * m2c))
-    found: Vector = lower(first, second)
+    first = lesser(greater(l1d * l1e, m1a * m1b), greater(l1e * l1f, m2a * m2b))
+    second = lesser(greater(l2d * l2e, m1b * m1c), greater(l2e * l2f, m2b * m2c))
+    return lesser(first, second)
+
+
+@inlined
+def lesser(one: Singles, two: Singles) -> Singles:
+    """Return the lesser of two numbers, lane by lane."""
+    found: Singles = select(two < one, two, one)
+    return found
+
+
+@inlined
+def greater(one: Singles, two: Singles) -> Singles:
+    """Return the greater of two numbers, lane by lane."""
+    found: Singles = select(one < two, two, one)
     return found

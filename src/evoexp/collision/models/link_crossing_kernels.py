@@ -7,13 +7,14 @@ from what each individual has on its own; the latter is prepared once per indivi
 configuration of a pair takes 20 additions and multiplications for its line functions and 15 more
 for the sign products of its four link pairs.
 
-Those run on eight individuals at a time (`crossing_blocks`), and only where no axis separates them:
-that spares most. A pair of links is apart where one of its two products is above `tau`, a bound on
-all rounding (proved at `_threshold`), and crosses where both are below −tau; what is neither is
-decided by the exact predicates. So counts are exact, whatever the vector width.
+Those run in single precision, on eight individuals at a time (`crossing_blocks`), and only where no
+axis separates them: that spares most. A pair of links is apart where one of its two products is
+above `tau`, a bound on all rounding (proved at `_threshold`), and crosses where both are below
+−tau; what is neither, two pairs of ten thousand random ones, is decided by the exact predicates. So
+counts are exact, whatever the vector width.
 
-100 × 100 pairs in 4 configurations take 10 … 21 µs, the most where populations are fresh or spread.
-Without looking for axes, in single precision and blocks of 104, they took 27.
+100 × 100 pairs in 4 configurations take 10 … 17 µs in a run of a search and 30 where all angles are
+random; blocks of 104 individuals, without a look for axes, took 27 in both.
 
 `q` and points are (configurations, rows, individuals), any number of individuals; tables are padded
 to blocks.
@@ -42,8 +43,8 @@ Point = tuple[float, float]
 
 MOST_CONFIGURATIONS = 32767  # both counters of a pair share an int32, and counts are int16
 
-_UNIT = 2.0**-53  # half a unit in the last place of 1
-_FLOOR = 2.0**-500  # above all that underflow can lose
+_UNIT = 2.0**-24  # half a unit in the last place of 1, single precision
+_FLOOR = 2.0**-100  # above all that underflow can lose
 _LARGEST = 1e300
 _HIGHEST = 1000
 _ALL_LANES = 2**LANES - 1
@@ -158,18 +159,19 @@ def longest_link(base_x: float, base_y: float, points: FloatArray) -> float:
 
 
 @kernel
-def _threshold(longest: float, distance: float) -> tuple[float, float]:
+def _threshold(longest: float, distance: float) -> tuple[float, np.float32]:
     """Return the scale 2^-e of tables, and tau, a bound on the error of line functions' products.
 
-    With links ≤ l, bases d apart and u = 2^-53, every line function is at most V = l (d + 3 l). Its
-    error is at most 6 u V: vectors err by u, products by 3 u, their differences by 4 u, and sums of
-    three of these round twice. So the product of two errs by less than 13 u V² + 36 u² V²; taken
-    are 32.
+    With links ≤ l, bases d apart and u = 2^-24, every line function is at most V = l (d + 3 l). Its
+    error is below 5 u V: the vectors are rounded (2 u), their products and differences (2 u, four
+    times), sums of at most three terms follow. So the product of two errs by less than (10 + 1) u
+    V² + 25 u² V²; taken are 16. The double precision of what is prepared and the sums of rounded
+    vectors add less than 2^-45 V².
     """
     exponent = max(math.frexp(max(longest, distance))[1], -_HIGHEST)
     scale = math.ldexp(1.0, -exponent)
     largest = longest * scale * (distance * scale + 3.0 * longest * scale)
-    return scale, 32.0 * _UNIT * largest * largest + _FLOOR
+    return scale, np.float32(16.0 * _UNIT * largest * largest + _FLOOR)
 
 
 @kernel
@@ -198,20 +200,20 @@ def _count_rows(
     points_2: FloatArray,
     table_2: Table,
     columns: IntArray,
-    tau: float,
+    tau: np.float32,
     counts: NDArray[np.int16],
 ) -> None:
     """Fill counts[rows, columns] from the tables of all of population 1 and of the columns."""
     one, two = borrowed((table_1, table_2))
     size, num_columns = points_1.shape[0] * LANES, len(columns)
     width = (num_columns + LANES - 1) // LANES * LANES
-    most, found = np.empty(size), np.empty(2 * LANES * width)
+    most, found = np.empty(size), np.empty(2 * LANES * width, dtype=np.float32)
     # eight rows by eight columns at a time
     for first in range(0, len(rows), LANES):
         group = rows[first : first + LANES]
         farthest_of(one[1], group, size, most)
         for n in range(len(found)):
-            found[U(n)] = 0.0
+            found[U(n)] = np.float32(0.0)
         for begin in range(0, num_columns, LANES):
             cross_block(one, group, most, two, begin, tau, found)
         for r in range(len(group)):

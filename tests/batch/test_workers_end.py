@@ -141,6 +141,33 @@ def test_a_server_that_dies_while_it_starts_a_worker_is_started_again(worker: in
     assert not [process for process in started if is_running(process)]
 
 
+REPLACED = """
+import time
+import joblib
+from evoexp.batch import workers
+
+def grow(k):
+    import builtins, os
+    builtins.held = [*getattr(builtins, "held", ()), bytearray(400_000_000)]
+    time.sleep(1.2)
+    return os.getpid()
+
+found = list(workers.in_workers(2, (joblib.delayed(grow)(k) for k in range(6))))
+print(len(found), len(set(found)))
+"""
+
+
+def test_a_batch_goes_on_where_workers_that_grew_large_are_replaced() -> None:
+    """Though loky warns of it, and warnings are errors here."""
+    pytest.importorskip("psutil")  # by which loky knows
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", REPLACED], capture_output=True, text=True, timeout=60
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    count, workers = map(int, done.stdout.split())
+    assert count == 6 and workers > 2
+
+
 def is_running(number: int, patience_s: float = 20.0) -> bool:
     """Return whether a process is still there after some time; a zombie is not."""
     end = time.monotonic() + patience_s

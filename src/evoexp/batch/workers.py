@@ -6,6 +6,7 @@ import os
 import signal
 import threading
 import time
+import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -23,6 +24,8 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 from evoexp.numeric.kept_files import MESSAGES, cache_root
 
 WATCH_S = 1.0  # [s] between two looks whether the parent is alive
+LEFT_EARLY = "A worker stopped while some jobs were given to the executor"
+"""What loky says of a worker that takes much more memory than at first, and that it replaces."""
 
 _OF_THE_PARENT = ("SIGINT", "SIGTERM", "SIGHUP")  # signals that end a batch in an orderly way
 _PRELOADED = ["evoexp.batch.rare_searches", "evoexp.batch.preloaded"]
@@ -108,6 +111,8 @@ def _noted(tasks: Iterable[Any], taken: list[Any]) -> Iterator[Any]:
 
 def _started(num_workers: int, tasks: Iterable[Any], ordered: bool) -> Iterator[Any]:
     """Start workers where there are none, and the server anew if it died; give them the tasks."""
+    # Raised as an error, it would end the thread that hears of results, and nobody would know.
+    warnings.filterwarnings("ignore", LEFT_EARLY, UserWarning)
     pool = joblib.Parallel(
         n_jobs=num_workers,
         batch_size=1,

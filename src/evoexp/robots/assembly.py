@@ -169,6 +169,7 @@ class Robot(Component):
         for k, chain in enumerate(chains):
             joint, prefix = model.njoints, f"arm_{k + 1}_" if prefixed[k] else ""
             own = chain.append_to(model, k)
+            check_size(model)  # before bodies are added, which takes ever longer
             if any(chain.own_names()):
                 for added in range(joint, model.njoints):
                     name = str(model.names[added]).removeprefix(f"arm_{k}_")
@@ -184,7 +185,6 @@ class Robot(Component):
             disabled |= {frozenset(prefix + name for name in pair) for pair in pairs}
             followers += chain.followers(joint)
             ranges.append((joint, model.njoints))
-        check_size(model)
         for follower in followers:
             source, joint, *rule = follower.source, follower.joint, *follower[2:]
             model = pin.transformJointIntoMimic(model, source, joint, *rule)

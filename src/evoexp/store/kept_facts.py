@@ -24,9 +24,7 @@ from evoexp.version import LOADED_FROM
 
 Stamp = tuple[str, int, int]  # path, size and time of a file
 
-LOOK_S = (
-    0.05  # [s] for which code that was looked at is taken to stay as it is; a fact takes longer
-)
+LOOK_S = 0.05  # [s] for which code that was looked at is taken to stay; a fact takes longer
 
 _LIBRARIES = ("numpy", "numba", "scipy", "pin", "coal")
 _OF_THIS_PROCESS = os.urandom(16)

@@ -25,7 +25,7 @@ from evoexp.numeric.kept_files import MESSAGES, cache_root
 
 WATCH_S = 1.0  # [s] between two looks whether the parent is alive
 LEFT_EARLY = "A worker stopped while some jobs were given to the executor"
-"""What loky says of a worker that takes much more memory than at first, and that it replaces."""
+"""Beginning of loky's warning of a worker that took ever more memory, and that it replaces."""
 
 _OF_THE_PARENT = ("SIGINT", "SIGTERM", "SIGHUP")  # signals that end a batch in an orderly way
 _PRELOADED = ["evoexp.batch.rare_searches", "evoexp.batch.preloaded"]

@@ -1,7 +1,7 @@
 """Figures for one of two columns: fewer panels side by side, and no text wider than its place.
 
 Two panels that stand side by side on a page stand below each other in a column, three or four in
-two lines, and so on: each stays about as wide as it was.
+two lines, and so on: each stays about as wide as it was. Titles of a page are fitted, too.
 """
 
 import textwrap
@@ -71,11 +71,11 @@ def _regrid(part: _Part) -> float:
     if grid.ncols == 1:
         return 1.0
     columns, shares = -(-grid.ncols // 2), [float(share) for share in grid.get_height_ratios()]
-    is_text = len(set(shares)) == 1 and all(last - first == 1 for _, first, last in panels)
+    flows = len(set(shares)) == 1 and all(last - first == 1 for _, first, last in panels)
     places, heights = dict[_Span, tuple[int, slice]](), list[float]()
     end = columns
     for line in sorted({line for line, _, _ in panels}):
-        end = end if is_text else columns
+        end = end if flows else columns
         for span in sorted(each for each in panels if each[0] == line):
             wide = min(columns, -(-(span[2] - span[1]) // 2))
             if end + wide > columns:

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from evoexp.numeric.random_stream import (
     Block,
     DrawnAhead,
+    DrawnByNeed,
     Draws,
     draw,
     draw_index,
@@ -62,3 +63,29 @@ def test_a_generator_follows_numbers_that_are_drawn_ahead(count: int, stretches:
             assert np.array_equal(numbers, step_by_step.random(count))
             ahead.follow()
             assert own.bit_generator.state == step_by_step.bit_generator.state
+
+
+@given(
+    st.integers(0, 6).flatmap(
+        lambda most: st.tuples(
+            st.just(most),
+            st.lists(st.lists(st.integers(0, most), min_size=1, max_size=4), max_size=6),
+        )
+    )
+)
+def test_a_generator_follows_steps_that_take_what_they_need(
+    wanted: tuple[int, list[list[int]]],
+) -> None:
+    most, stretches = wanted
+    own, step_by_step = rng(), rng()
+    ahead = DrawnByNeed(own, most)
+    for counts in stretches:
+        numbers, begin = ahead.draw(len(counts)), 0
+        assert len(numbers) >= most * len(counts)
+        ahead.took(counts)
+        for count in counts:
+            expected = step_by_step.random(count)
+            assert np.array_equal(numbers[begin : begin + count], expected)
+            ahead.follow()
+            assert own.bit_generator.state == step_by_step.bit_generator.state
+            begin += count

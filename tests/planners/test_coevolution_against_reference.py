@@ -17,6 +17,7 @@ from evoexp.condition import Condition
 from evoexp.configuration import compose
 from evoexp.planners.coevolution import breeder as breeder_module
 from evoexp.planners.coevolution import kernels
+from evoexp.planners.coevolution import settings as settings_module
 from evoexp.planners.coevolution.planner import Coevolution
 from references import curkovic_numpy
 
@@ -168,7 +169,7 @@ def swapped_readings_of_eq_9(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def constant_rate_for_eq_10(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(breeder_module, "decayed_rate", lambda rate, *_: rate)
+    monkeypatch.setattr(settings_module, "decayed_rate", lambda rate, *_: rate)
 
 
 def c1_without_obstacles(monkeypatch: pytest.MonkeyPatch) -> None:

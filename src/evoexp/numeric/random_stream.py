@@ -5,6 +5,7 @@ then repeats the step that took them, from the same place of a longer block. So 
 not depend on where blocks end.
 """
 
+from collections import deque
 from typing import NamedTuple
 
 import numpy as np
@@ -49,6 +50,13 @@ class Draws:
         self.block.taken[0] = 0
 
 
+def twin(rng: np.random.Generator) -> np.random.Generator:
+    """Return a generator that draws what another one will draw."""
+    bits = type(rng.bit_generator)(0)
+    bits.state = rng.bit_generator.state
+    return np.random.Generator(bits)
+
+
 class DrawnAhead:
     """Uniform numbers for several steps at once, drawn ahead of a generator by a twin of it.
 
@@ -63,9 +71,7 @@ class DrawnAhead:
             rng: The generator.
             count: Numbers that each step takes.
         """
-        bits = type(rng.bit_generator)(0)
-        bits.state = rng.bit_generator.state
-        self._rng, self._twin, self._passed = rng, np.random.Generator(bits), np.empty(count)
+        self._rng, self._twin, self._passed = rng, twin(rng), np.empty(count)
 
     def draw(self, steps: int) -> NDArray[np.float64]:
         """Return the numbers of the next steps, (steps, count)."""
@@ -74,6 +80,38 @@ class DrawnAhead:
     def follow(self) -> None:
         """Let the generator pass the numbers of one step."""
         self._rng.random(out=self._passed)
+
+
+class DrawnByNeed:
+    """Uniform numbers for several steps at once, as `DrawnAhead`, of steps that take more or less.
+
+    How many each one took is known only behind it; what is left is for the next steps.
+    """
+
+    def __init__(self, rng: np.random.Generator, most: int) -> None:
+        """Begin where a generator is.
+
+        Args:
+            rng: The generator.
+            most: Numbers that a step takes at most.
+        """
+        self._rng, self._twin, self._passed = rng, twin(rng), np.empty(most)
+        self._left, self._taken = np.empty(0), deque[int]()
+
+    def draw(self, steps: int) -> NDArray[np.float64]:
+        """Return at least as many numbers as the next steps may take."""
+        missing = max(0, steps * len(self._passed) - len(self._left))
+        self._left = np.concatenate([self._left, self._twin.random(missing)])
+        return self._left
+
+    def took(self, counts: list[int]) -> None:
+        """Tell how many of these numbers each of the steps took."""
+        self._taken.extend(counts)
+        self._left = self._left[sum(counts) :]
+
+    def follow(self) -> None:
+        """Let the generator pass the numbers of one step."""
+        self._rng.random(out=self._passed[: self._taken.popleft()])
 
 
 @kernel

@@ -6,19 +6,35 @@ time.
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evoexp.evolution.cost_statistics import CostStatistics
-from evoexp.evolution.genetic_settings import GeneticSettings, ScaledGenetic
+from evoexp.evolution.genetic_settings import ScaledGenetic
 from evoexp.evolution.scaled_selection import SelectionMemory
-from evoexp.numeric.random_stream import DrawnAhead, Draws
+from evoexp.numeric.random_stream import DrawnAhead, DrawnByNeed, Draws
 from evoexp.planners.planner import Candidate, Keeper
 from evoexp.records import FloatArray, Generation
 
 SUMMARY = 4  # of a generation: index of the best, mean and deviation of costs, number of feasible
+
+
+class Sizes(Protocol):
+    """How many individuals, and how often."""
+
+    @property
+    def population_size(self) -> int:
+        """Individuals that are evaluated at first."""
+
+    @property
+    def num_offspring(self) -> int:
+        """Individuals that are evaluated in every other generation."""
+
+    @property
+    def num_generations(self) -> int:
+        """Generations after the initial one."""
 
 
 class Stretches(ABC):
@@ -28,15 +44,13 @@ class Stretches(ABC):
         num_places: Generations computed per call, and the one before them.
         summaries: (places, SUMMARY).
         costs: (places, individuals).
-        queries_each: Configurations that judging an individual asks for.
         drawn: Numbers of the generations, where they are drawn ahead: the generator follows.
     """
 
     costs: FloatArray
-    queries_each = 0
-    drawn: DrawnAhead | None = None
+    drawn: DrawnAhead | DrawnByNeed | None = None
 
-    def __init__(self, ga: GeneticSettings, stretch: int) -> None:
+    def __init__(self, ga: Sizes, stretch: int) -> None:
         """Begin a run.
 
         Args:
@@ -56,31 +70,13 @@ class Stretches(ABC):
             place = index % self.num_places
             if index > 0 and self.drawn is not None:
                 self.drawn.follow()
-            self.keep(keeper, place)
-            best, mean, std, num_feasible = self.summaries[place].tolist()
-            individual, costs = int(best), self.costs[place]
-            yield keeper.record(
-                CostStatistics(individual, mean, std),
-                costs,
-                self.population(place, index == last),
-                lowest=costs.item(individual),
-                num_feasible=int(num_feasible),
-                evaluations=evaluated,
-                collision_queries=evaluated * self.queries_each,
-            )
+            yield self.record(keeper, place, evaluated, index == last)
             if index == last:
                 return
             if index == self._known:
                 self._known = min(index + self.num_places - 1, last)
                 self.go_on(rng, index, self._known)
             index, evaluated = index + 1, ga.num_offspring
-
-    def keep(self, keeper: Keeper, place: int) -> None:
-        """Keep the best individual of a generation if it is better than all before."""
-        individual = int(self.summaries[place, 0])
-        lowest = self.costs.item(place, individual)
-        if keeper.improves(lowest):
-            keeper.keep(lowest, self.candidate(place, individual))
 
     @abstractmethod
     def begin(self, rng: np.random.Generator) -> None:
@@ -91,6 +87,49 @@ class Stretches(ABC):
         """Compute the generations that follow one, up to another."""
 
     @abstractmethod
+    def record(self, keeper: Keeper, place: int, evaluated: int, is_last: bool) -> Generation:
+        """Keep the best of a generation if it is better than all before, and return its record.
+
+        Args:
+            keeper: Of the run.
+            place: Of the generation.
+            evaluated: Individuals of it that are new.
+            is_last: Whether it ends the run.
+        """
+
+
+class IndividualStretches(Stretches):
+    """Generations whose best is one individual.
+
+    Attributes:
+        queries_each: Configurations that judging an individual asks for.
+    """
+
+    queries_each = 0
+
+    def keep(self, keeper: Keeper, place: int) -> None:
+        """Keep the best individual of a generation if it is better than all before."""
+        individual = int(self.summaries[place, 0])
+        lowest = self.costs.item(place, individual)
+        if keeper.improves(lowest):
+            keeper.keep(lowest, self.candidate(place, individual))
+
+    def record(self, keeper: Keeper, place: int, evaluated: int, is_last: bool) -> Generation:
+        """Keep the best individual, and return the record of its generation; see `Stretches`."""
+        self.keep(keeper, place)
+        best, mean, std, num_feasible = self.summaries[place].tolist()
+        individual, costs = int(best), self.costs[place]
+        return keeper.record(
+            CostStatistics(individual, mean, std),
+            costs,
+            self.population(place, is_last),
+            lowest=costs.item(individual),
+            num_feasible=int(num_feasible),
+            evaluations=evaluated,
+            collision_queries=evaluated * self.queries_each,
+        )
+
+    @abstractmethod
     def candidate(self, place: int, individual: int) -> Candidate:
         """Return an individual as it is recorded."""
 
@@ -99,7 +138,7 @@ class Stretches(ABC):
         """Return the population at a place; that of the last generation is hashed."""
 
 
-class ScaledStretches(Stretches):
+class ScaledStretches(IndividualStretches):
     """Generations whose parents are chosen as in `scaled_selection`, by blocks of draws.
 
     Attributes:

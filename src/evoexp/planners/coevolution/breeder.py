@@ -1,13 +1,11 @@
 """The way from one generation of co-evolving populations to the next, and the hall of fame."""
 
-from typing import Any
-
 import numpy as np
 
 from evoexp.evolution.best_team import BestTeam
 from evoexp.evolution.crossover import num_single_point_uniforms
 from evoexp.evolution.hall_of_fame import Hall, HallRules
-from evoexp.evolution.mutation import decayed_rate, num_allele_uniforms
+from evoexp.evolution.mutation import num_allele_uniforms
 from evoexp.numeric.elementary import DEGREE
 from evoexp.numeric.named_tuples import plain
 from evoexp.planners.coevolution.kernels import Breeding, breed, renew
@@ -16,6 +14,11 @@ from evoexp.planners.coevolution.teams import Evaluated
 from evoexp.records import BoolArray, FloatArray
 
 HALF_TURN = DEGREE * 180.0  # [rad] genes live in [0, π)
+
+
+def num_uniforms(count: int) -> int:
+    """Return how many uniform numbers `breed` takes for so many offspring of a robot."""
+    return count + num_single_point_uniforms(count // 2) + num_allele_uniforms(count)
 
 
 class Breeder:
@@ -33,15 +36,15 @@ class Breeder:
             moving: (robots,) false for robots that stand still.
         """
         self._ga, self._moving, self.num_teams = ga, moving, 0
-        self._num_moving = int(np.count_nonzero(moving))
-        self._by_genome = ga.hall_distinct == "genome"
-        self._hall = Hall.room(ga.num_hall_teams, len(moving))
-        rules = HallRules(
+        self.num_moving = int(np.count_nonzero(moving))
+        self.by_genome = ga.hall_distinct == "genome"
+        self.hall = Hall.room(ga.num_hall_teams, len(moving))
+        self.rules = HallRules(
             memory=ga.hall_memory or 0,
             frozen=ga.hall_frozen,
-            exclusive=moving if self._by_genome else np.ones_like(moving),
+            exclusive=moving if self.by_genome else np.ones_like(moving),
         )
-        self._rules, self._memory = plain(rules), plain(self._hall)
+        self._rules, self._memory = plain(self.rules), plain(self.hall)
         self._nobody = np.full(len(moving), -1)
 
     def renew_hall(self, populations: FloatArray, found: Evaluated, best: BestTeam) -> None:
@@ -56,11 +59,11 @@ class Breeder:
                 found.criteria,
                 found.collisions,
                 found.teamable,
-                best.individuals if self._by_genome else self._nobody,
+                best.individuals if self.by_genome else self._nobody,
                 self._memory,
                 self.num_teams,
                 self._rules,
-                self._by_genome,
+                self.by_genome,
             )
 
     def bred(
@@ -69,23 +72,20 @@ class Breeder:
         """Return the populations of a generation: offspring, elites, then the hall's members."""
         ga, bred = self._ga, np.empty_like(populations)
         count = ga.population_size - ga.num_elites - self.num_teams
-        numbers = count + num_single_point_uniforms(count // 2) + num_allele_uniforms(count)
-        teams = self._hall.teams[: self.num_teams]
-        uniforms = rng.random((self._num_moving, numbers))
-        breed(uniforms, populations, costs, self._moving, teams, self._breeding(index), bred)
+        teams = self.hall.teams[: self.num_teams]
+        uniforms = rng.random((self.num_moving, num_uniforms(count)))
+        breed(uniforms, populations, costs, self._moving, teams, tuple(self.breeding(index)), bred)
         return bred
 
-    def _breeding(self, index: int) -> tuple[Any, ...]:
-        """Return the settings of a generation, made plain."""
+    def breeding(self, index: int) -> Breeding:
+        """Return the settings on the way to a generation."""
         ga = self._ga
-        rate = decayed_rate(ga.mutation_rate, ga.mutation_decay, index, ga.num_generations)
-        breeding = Breeding(
+        return Breeding(
             ga.num_elites,
             ga.selection == "inverse",
             ga.crossover_rate,
-            rate,
+            ga.mutation_rate_at(index),
             DEGREE * ga.mutation_step,
             HALF_TURN,
             ga.mutation_direction == "symmetric",
         )
-        return tuple(breeding)

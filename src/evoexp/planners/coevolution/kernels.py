@@ -21,6 +21,8 @@ from evoexp.numeric.named_tuples import named
 from evoexp.objectives.motion_criteria import measure_motions
 from evoexp.records import BoolArray, FloatArray, IntArray
 
+NOT_FINITE = "points and bases must be finite and below 1e150"
+
 
 class Breeding(NamedTuple):
     """Settings of selection, cross-over and mutation, as a generation has them.

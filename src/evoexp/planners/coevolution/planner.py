@@ -25,7 +25,8 @@ from evoexp.objectives.motion_criteria import MotionCriteria
 from evoexp.paths.motion import Motion, clamped_cubic, joint_ranges, top_speeds
 from evoexp.planners.coevolution.breeder import HALF_TURN, Breeder
 from evoexp.planners.coevolution.chromosome_length import SpeedLimit, length_notes
-from evoexp.planners.coevolution.kernels import evaluate_lines, measure
+from evoexp.planners.coevolution.generations import TeamSearch
+from evoexp.planners.coevolution.kernels import NOT_FINITE, evaluate_lines, measure
 from evoexp.planners.coevolution.link_problem import Problem, check_ends
 from evoexp.planners.coevolution.proven_teams import ProvenTeams
 from evoexp.planners.coevolution.settings import CoevolutionSettings
@@ -38,7 +39,7 @@ from evoexp.robots.assembly import Robot
 from evoexp.scenarios.link_motion import LinkMotion
 from evoexp.validation import Component, LayoutCount
 
-PAIR_BYTES = 5  # of a pair of individuals: their collisions, and whether they are a team
+PAIR_BYTES = 7  # of a pair of individuals: collisions in two generations, whether they are a team
 
 
 class Coevolution(PlannerDefaults, Component):
@@ -109,6 +110,13 @@ class Coevolution(PlannerDefaults, Component):
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield the initial populations, then one generation after the other (Fig. 2)."""
+        at_once = problem.collision.is_lines and self.ga.restart_after is None
+        if at_once and not self.answers_are_proven:
+            return TeamSearch(self, problem).generations(rng)
+        return self._step_by_step(problem, rng)
+
+    def _step_by_step(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
+        """Evolve as `evolve` does, kernel by kernel."""
         ga, keeper, breeder = self.ga, Keeper(), Breeder(self.ga, problem.moving)
         proven, waiting = ProvenTeams(self, problem) if self.answers_are_proven else None, 0
         populations = self.sample(problem, rng, ga.population_size)
@@ -117,7 +125,7 @@ class Coevolution(PlannerDefaults, Component):
             settled = proven.settle(populations, found) if proven else None
             standing = found.standing()
             best = settled or standing.best
-            yield self._recorded(keeper, problem, populations, found, standing._replace(best=best))
+            yield self.recorded(keeper, problem, populations, found, standing._replace(best=best))
             if index > ga.num_generations:
                 return
             breeder.renew_hall(populations, found, best)
@@ -130,7 +138,7 @@ class Coevolution(PlannerDefaults, Component):
             else:
                 populations = breeder.bred(rng, populations, found.costs, index)
 
-    def _recorded(
+    def recorded(
         self,
         keeper: Keeper,
         problem: Problem,
@@ -138,7 +146,15 @@ class Coevolution(PlannerDefaults, Component):
         found: Evaluated,
         standing: Standing,
     ) -> Generation:
-        """Keep the best team if it is better, and return the generation's record."""
+        """Keep the best team if it is better, and return the generation's record.
+
+        Args:
+            keeper: Of the run.
+            problem: The problem.
+            populations: (robots, 2 K, individuals).
+            found: Of these.
+            standing: Of these.
+        """
         (robots, _, count), best = populations.shape, standing.best
         if keeper.improves(best.cost):
             team = best.individuals if best.found else found.costs.argmin(axis=1)
@@ -209,7 +225,7 @@ class Coevolution(PlannerDefaults, Component):
         if not evaluate_lines(
             populations, *ends, problem.arms, *weights, criteria, own, pairs, costs
         ):
-            raise ValueError("points and bases must be finite and below 1e150")
+            raise ValueError(NOT_FINITE)
         return Evaluated(costs, criteria, own, pairs, np.zeros((robots, count), dtype=np.int64))
 
     def cost(self, problem: Problem, population: FloatArray) -> Judgement:

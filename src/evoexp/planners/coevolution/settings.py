@@ -6,6 +6,7 @@ from typing import ClassVar, Literal, Self
 from pydantic import model_validator
 
 from evoexp.errors import SettingError
+from evoexp.evolution.mutation import decayed_rate
 from evoexp.validation import Component, Count, NonNegativeCount, Positive, Rate
 
 _FLOOR_GUARD = 1e-9  # [-] 0.29 × 100 is 28.999999999999996
@@ -109,3 +110,7 @@ class CoevolutionSettings(Component):
     def num_offspring(self) -> int:
         """Individuals of a population that are new beside the elites and a full hall."""
         return self.population_size - self.num_elites - self.num_hall_teams
+
+    def mutation_rate_at(self, index: int) -> float:
+        """Return the rate on the way to a generation (Eq. 10)."""
+        return decayed_rate(self.mutation_rate, self.mutation_decay, index, self.num_generations)

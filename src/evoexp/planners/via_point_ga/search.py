@@ -6,14 +6,14 @@ import numpy as np
 
 from evoexp.numeric.random_stream import DrawnAhead
 from evoexp.planners.planner import Candidate, Keeper
-from evoexp.planners.stretches import Stretches
+from evoexp.planners.stretches import IndividualStretches
 from evoexp.planners.via_point_ga import kernels
 from evoexp.planners.via_point_ga.string_proofs import Prover
 from evoexp.planners.via_point_ga.strings import Problem, Strings
 from evoexp.records import FloatArray
 
 
-class Search(Stretches):
+class Search(IndividualStretches):
     """One run, and memory for its generations."""
 
     def __init__(

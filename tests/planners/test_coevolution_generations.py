@@ -1,0 +1,93 @@
+"""Generations computed in one call, against the same ones computed kernel by kernel."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from evoexp.configuration import compose
+from evoexp.planners.coevolution import generations
+from evoexp.planners.coevolution.generations import CACHED, STRETCH, TeamSearch, stretch
+from evoexp.records import Generation
+
+SMALL = ("ga.population_size=12", "ga.num_generations=30")
+
+
+def prepared(*words: str, only: str = "") -> tuple[Any, Any]:
+    condition = compose.expand(list(words), only=[only] if only else [])[0].conditions[0].condition
+    planner, problem = condition.prepare()
+    assert problem.collision.is_lines
+    return planner, problem
+
+
+def told(found: Iterator[Generation], rng: np.random.Generator) -> Iterator[tuple[Any, ...]]:
+    """Yield everything that a log takes of a generation, and the state of the generator there."""
+    for generation in found:
+        arrays = generation.best, generation.costs, generation.population, generation.criteria
+        rest = [value for value in generation if not isinstance(value, np.ndarray)]
+        copies = [None if array is None else array.tobytes() for array in arrays]
+        yield *copies, repr(rest), rng.bit_generator.state["state"]["state"]
+
+
+@pytest.mark.examples(4)
+@pytest.mark.parametrize(
+    "words",
+    [
+        *(("experiment=curkovic_methods", name) for name in ("I", "III", "VI", "VIII")),
+        ("experiment=curkovic_three collision.collision_substeps=1", ""),
+        ("experiment=curkovic_stationary scenario.obstacles=[]", ""),
+        ("experiment=curkovic_methods ga.hall_frozen=true", "V"),
+        ("experiment=curkovic_methods ga.hall_memory=3 ga.hall_distinct=index", "V"),
+        ("experiment=curkovic_methods ga.num_generations=0", "V"),
+        ("experiment=curkovic_methods ga.population_size=13 ga.num_elites=13", "I"),
+    ],
+    ids=" ".join,
+)
+def test_generations_in_one_call_are_those_of_one_kernel_after_the_other(
+    words: tuple[str, str],
+) -> None:
+    given = words[0].split()
+    named = {word.split("=")[0] for word in given}
+    small = [word for word in SMALL if word.split("=")[0] not in named]
+    planner, problem = prepared(*given, *small, only=words[1])
+    one, other = np.random.default_rng(5), np.random.default_rng(5)
+    at_once = told(TeamSearch(planner, problem).generations(one), one)
+    in_turn = told(planner._step_by_step(problem, other), other)
+    for ours, expected in zip(at_once, in_turn, strict=True):
+        assert ours == expected
+
+
+def test_the_lengths_of_stretches_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    planner, problem = prepared("experiment=curkovic_methods", *SMALL, only="V")
+    rng = np.random.default_rng(2)
+    expected = list(told(planner.evolve(problem, rng), rng))
+    for length in (1, 3, 100):
+        monkeypatch.setattr(generations, "stretch", lambda robots, count, most=length: most)
+        rng = np.random.default_rng(2)
+        assert list(told(planner.evolve(problem, rng), rng)) == expected
+
+
+def test_a_generation_stays_while_the_next_one_is_looked_at() -> None:
+    """A run that its budget ends is told by the generation before the one that was too much."""
+    planner, problem = prepared("experiment=curkovic_methods", *SMALL, only="V")
+    last, copy = None, b""
+    for generation in planner.evolve(problem, np.random.default_rng(3)):
+        if last is not None:
+            assert last.population.tobytes() == copy
+        last, copy = generation, generation.population.tobytes()
+
+
+def test_large_populations_are_computed_generation_by_generation() -> None:
+    assert stretch(2, 100) == STRETCH
+    assert stretch(2, 5000) == 1
+    for count in (1, 10, 150, 200, 1000):
+        length = stretch(2, count)
+        assert length == 1 or 2 * length * count * count <= CACHED
+
+
+def test_coordinates_that_are_not_finite_are_refused() -> None:
+    planner, problem = prepared("experiment=curkovic_methods", *SMALL, only="V")
+    problem = problem._replace(arms=np.full_like(problem.arms, 1e200))
+    with pytest.raises(ValueError, match="must be finite"):
+        next(iter(planner.evolve(problem, np.random.default_rng(0))))

@@ -54,9 +54,14 @@ def test_indices_stay_below_their_count() -> None:
     assert [draw_index(block, count) for count in (3, 3, 3, 2**53)] == [0, 1, 2, 2**53 - 1]
 
 
-@given(st.integers(0, 7), st.lists(st.integers(1, 5), min_size=1, max_size=6))
-def test_a_generator_follows_numbers_that_are_drawn_ahead(count: int, stretches: list[int]) -> None:
+@given(st.integers(0, 7), st.lists(st.integers(1, 5), min_size=1, max_size=6), st.booleans())
+def test_a_generator_follows_numbers_that_are_drawn_ahead(
+    count: int, stretches: list[int], half_is_left: bool
+) -> None:
     own, step_by_step = rng(), rng()
+    for generator in (own, step_by_step) if half_is_left else ():
+        generator.integers(0, 9, dtype=np.int32)
+        assert generator.bit_generator.state["has_uint32"]
     ahead = DrawnAhead(own, count)
     for steps in stretches:
         for numbers in ahead.draw(steps):

@@ -6,7 +6,8 @@ not depend on where blocks end.
 """
 
 from collections import deque
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +58,18 @@ def twin(rng: np.random.Generator) -> np.random.Generator:
     return np.random.Generator(bits)
 
 
+def passer(rng: np.random.Generator) -> Callable[[int], object]:
+    """Return a function that lets a generator pass uniform numbers, as if they were drawn.
+
+    Advancing a PCG64 takes a third of the time. It forgets half a number that is left of drawing
+    32 bits, which drawing uniform numbers does not.
+    """
+    bits: Any = rng.bit_generator
+    if isinstance(bits, np.random.PCG64) and not bits.state["has_uint32"]:
+        return bits.advance
+    return rng.random
+
+
 class DrawnAhead:
     """Uniform numbers for several steps at once, drawn ahead of a generator by a twin of it.
 
@@ -71,15 +84,15 @@ class DrawnAhead:
             rng: The generator.
             count: Numbers that each step takes.
         """
-        self._rng, self._twin, self._passed = rng, twin(rng), np.empty(count)
+        self._twin, self._pass, self._count = twin(rng), passer(rng), count
 
     def draw(self, steps: int) -> NDArray[np.float64]:
         """Return the numbers of the next steps, (steps, count)."""
-        return self._twin.random((steps, len(self._passed)))
+        return self._twin.random((steps, self._count))
 
     def follow(self) -> None:
         """Let the generator pass the numbers of one step."""
-        self._rng.random(out=self._passed)
+        self._pass(self._count)
 
 
 class DrawnByNeed:
@@ -95,12 +108,12 @@ class DrawnByNeed:
             rng: The generator.
             most: Numbers that a step takes at most.
         """
-        self._rng, self._twin, self._passed = rng, twin(rng), np.empty(most)
+        self._twin, self._pass, self._most = twin(rng), passer(rng), most
         self._left, self._taken = np.empty(0), deque[int]()
 
     def draw(self, steps: int) -> NDArray[np.float64]:
         """Return at least as many numbers as the next steps may take."""
-        missing = max(0, steps * len(self._passed) - len(self._left))
+        missing = max(0, steps * self._most - len(self._left))
         self._left = np.concatenate([self._left, self._twin.random(missing)])
         return self._left
 
@@ -111,7 +124,7 @@ class DrawnByNeed:
 
     def follow(self) -> None:
         """Let the generator pass the numbers of one step."""
-        self._rng.random(out=self._passed[: self._taken.popleft()])
+        self._pass(self._taken.popleft())
 
 
 @kernel

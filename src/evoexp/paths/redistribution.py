@@ -14,9 +14,10 @@ spacing, 100 paths of 21 points in the plane, fresh walks and populations just c
     16 chords               0.8e-3 … 1.1e-3   (0.4e-2 … 0.5e-2)
 
 Gauss's rule with a polynomial inverse needs as many roots for that: near a cusp, which crossed-over
-paths have, the speed is hardly smooth. What limits it is the speeds and their integral, half of the
-time, of which the square roots alone take two thirds; a quarter is finding the targets' samples and
-a fifth the points there, whose numbers stand at another place in every path.
+paths have, the speed is hardly smooth. The speeds and their integral are half of the time; a
+quarter is finding the targets' samples and a fifth the points there, whose numbers stand at another
+place in every path. The square roots hide behind the rest: without them it took 9 % less (Zen 4),
+and moving points while the next paths' roots are on their way took a tenth more.
 """
 
 import numpy as np

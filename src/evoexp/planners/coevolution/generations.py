@@ -63,7 +63,7 @@ class Table(NamedTuple):
 
 
 class Task(NamedTuple):
-    """What individuals are judged by; see `evaluate_lines`.
+    """Ends, arms and weights, by which individuals are judged; see `evaluate_lines`.
 
     Attributes:
         starts: (robots, 2) [rad].
@@ -81,7 +81,7 @@ class Task(NamedTuple):
 
 
 class Heredity(NamedTuple):
-    """What follows a generation.
+    """The rules by which one generation follows another.
 
     Attributes:
         breeding: Of any generation; its mutation rate is that of none.

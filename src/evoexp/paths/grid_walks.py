@@ -8,10 +8,13 @@ the path has that node at its place; so nothing needs to be cleared between path
 import numpy as np
 from numpy.typing import NDArray
 
-from evoexp.numeric.compilation import borrowed, kernel
+from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.random_stream import Block, used_up
+from evoexp.paths.grid_choices import SHIFT, TOTAL
 from evoexp.paths.grids import Moves, NodeArray, StepArray
 from evoexp.records import FloatArray
+
+ONE = np.uint64(1)
 
 
 @kernel
@@ -54,80 +57,113 @@ def walk(
     _write(trail, count, erase, path, place)
 
 
-MOST_MOVES = 8  # of a node, for weights packed into one word
-HEAVIEST = 15  # weight: eight of them stay below 128
-_BYTES = np.uint64(0x0101010101010101)
-_HIGH_BITS = np.uint64(0x8080808080808080)
+NEAR = 1024  # [2⁻⁵³] so close to a whole number the product is rounded as `walk` rounds it
+_BITS = 53  # of a uniform number
 
 
 @kernel
-def pack_weights(
-    neighbours: NodeArray, potentials: FloatArray, fronts: StepArray, out: NDArray[np.uint64]
-) -> bool:
-    """Write the weights of all moves toward all targets, see `walk`: one byte per move.
-
-    Args:
-        neighbours: (nodes, at most `MOST_MOVES`), see `grids.Grid`.
-        potentials: See `grids.Moves`.
-        fronts: (targets, nodes) steps to every node from each target.
-        out: (targets, nodes) written; the first move's weight is the lowest byte.
-
-    Returns:
-        False if a weight is no whole number up to `HEAVIEST`; then `out` is not complete.
-    """
-    neighbours, potentials, fronts, out = borrowed((neighbours, potentials, fronts, out))
-    for target in range(len(fronts)):
-        for node in range(len(neighbours)):
-            greatest, word = 0.0, np.uint64(0)
-            for move in range(neighbours.shape[1]):
-                if neighbours[node, move] >= 0:
-                    greatest = max(greatest, potentials[fronts[target, neighbours[node, move]]])
-            for move in range(neighbours.shape[1]):
-                if neighbours[node, move] >= 0:
-                    weight = greatest - potentials[fronts[target, neighbours[node, move]]] + 1.0
-                    if weight > HEAVIEST or weight != np.floor(weight):
-                        return False
-                    word |= np.uint64(int(weight)) << np.uint64(8 * move)
-            out[target, node] = word
-    return True
-
-
-@kernel
-def walk_by_weights(
+def walk_by_choices(
     draws: Block,
-    neighbours: NodeArray,
-    weights: NDArray[np.uint64],
+    entries: NDArray[np.uint32],
+    slots: NDArray[np.int16],
     ends: tuple[int, int],
     erase: bool,
     path: NodeArray,
     place: NodeArray,
 ) -> None:
-    """Write the same path as `walk`, by weights (nodes,) of `pack_weights` toward its target.
+    """Write the same path as `walk`, by the choices toward its target.
 
-    Whole weights and their differences are exact, so the part of a uniform number in front of the
-    point decides. The sums of bytes up to each move are those of one multiplication; the move is
-    the number of sums that do not pass that part.
+    Args:
+        draws: See `walk`, as for `ends`, `erase`, `path` and `place`.
+        entries: (nodes,) of `grid_choices.Choices`, toward the target.
+        slots: See there.
+    """
+    if erase:
+        walk_to_exits(draws, entries, slots, ends, place)
+        if not used_up(draws):
+            follow_exits(place, ends, path)
+        return
+    uniforms, taken = draws.uniforms, draws.taken
+    node, target = np.uint64(ends[0]), np.uint64(ends[1])
+    at, num, count = np.uint64(taken[0]), np.uint64(len(uniforms)), 1
+    trail = np.empty(max(len(uniforms) - taken[0], 0) + 2, np.int32)
+    trail[1] = node
+    while node != target and at < num:
+        node = _next_by_choice(uniforms[at], entries[node], slots, node)
+        at += ONE
+        count += 1
+        trail[count] = node
+    taken[0] = at if node == target else num + ONE
+    _write(trail, count, False, path, place)
+
+
+@kernel
+def walk_to_exits(
+    draws: Block,
+    entries: NDArray[np.uint32],
+    slots: NDArray[np.int16],
+    ends: tuple[int, int],
+    exits: NodeArray,
+) -> None:
+    """Walk as `walk` does, and keep the last exit of every node only.
+
+    Args:
+        draws: See `walk`.
+        entries: See `walk_by_choices`.
+        slots: See there.
+        ends: See `walk`.
+        exits: (nodes,) written, see `follow_exits`.
     """
     uniforms, taken = draws.uniforms, draws.taken
     node, target = np.uint64(ends[0]), np.uint64(ends[1])
-    at, num, count = taken[0], len(uniforms), 1
-    trail = np.empty(num - min(at, num) + 2, np.int32)
-    trail[1] = node
-    place[node] = 1
+    at, num = np.uint64(taken[0]), np.uint64(len(uniforms))
     while node != target and at < num:
-        sums = weights[node] * _BYTES
-        total = sums >> np.uint64(56)
-        part = np.uint64(uniforms[at] * np.float64(total))
-        passed = ((part * _BYTES | _HIGH_BITS) - sums) & _HIGH_BITS
-        move = (passed >> np.uint64(7)) * _BYTES >> np.uint64(56)
-        # a node without a neighbour stays where it is
-        node = np.uint64(neighbours[node, move]) if total > np.uint64(0) else node
-        at += 1
+        following = _next_by_choice(uniforms[at], entries[node], slots, node)
+        exits[node] = following
+        node = following
+        at += ONE
+    taken[0] = at if node == target else num + ONE
+
+
+@inlined
+def _next_by_choice(
+    uniform: float, entry: np.uint32, slots: NDArray[np.int16], node: np.uint64
+) -> np.uint64:
+    """Return where a walk goes from a node, whose index has no sign.
+
+    Whole weights and their differences are exact, so the part of the product in front of the point
+    decides.
+    """
+    place = np.uint64(entry >> SHIFT) + _whole_part(uniform, entry & TOTAL)
+    return np.uint64(np.int64(node) + slots[place])
+
+
+@inlined
+def _whole_part(uniform: float, total: np.uint32) -> np.uint64:
+    """Return the whole part of `uniform * total`, in whole numbers, which takes half the time."""
+    product = np.int64(uniform * 2.0**_BITS) * np.int64(total)
+    part = product >> _BITS
+    if (product + NEAR) >> _BITS != part:
+        part = np.int64(uniform * np.float64(total))
+    return np.uint64(part)
+
+
+@kernel
+def follow_exits(exits: NodeArray, ends: tuple[int, int], path: NodeArray) -> None:
+    """Write a walk without its loops: every node's last exit leads on (Wilson 1996).
+
+    Args:
+        exits: (nodes,) the node to which the walk last went from each.
+        ends: Its first node and its last.
+        path: Written.
+    """
+    node, target, count = np.uint64(ends[0]), np.uint64(ends[1]), 1
+    path[1] = node
+    while node != target:
+        node = np.uint64(exits[node])
         count += 1
-        trail[count] = node
-        place[node] = count
-    taken[0] = at if node == target else num + 1
-    _write(trail, count, erase, path, place)
+        path[count] = node
+    path[0] = count
 
 
 @kernel

@@ -9,32 +9,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from evoexp.numeric.compilation import borrowed, kernel
-from evoexp.paths.grid_walks import erase_loops
-from evoexp.paths.grids import NodeArray, StepArray
-from evoexp.records import FloatArray, IntArray
+from evoexp.numeric.compilation import borrowed, inlined, kernel
+from evoexp.paths.grid_choices import SHIFT, TOTAL, Choices, choices_of
+from evoexp.paths.grid_walks import erase_loops, follow_exits
+from evoexp.paths.grids import Moves, NodeArray
+from evoexp.records import IntArray
 
 LANES = 4  # walkers
 WORDS = LANES // 2  # of 64 random bits for a step of each
-MAX_SLOTS = 256  # of a node in a table of choices
-ONE, HALF, LOW = np.uint64(1), np.uint64(32), np.uint64(2**32 - 1)
+HALF, LOW = np.uint64(32), np.uint64(2**32 - 1)
 
 NEXT, COMPLETE = range(2)
 """Places in `State.progress`: the row that the next path is written to, and the complete paths."""
-
-
-class Choices(NamedTuple):
-    """The choices of walks to one target at every node: every move as often as it weighs.
-
-    Both arrays are empty where there is no such table.
-
-    Attributes:
-        totals: (nodes,) sums of the weights.
-        slots: (nodes, greatest sum) the node that each choice leads to.
-    """
-
-    totals: NDArray[np.uint64]
-    slots: NDArray[np.int16]
 
 
 class State(NamedTuple):
@@ -43,18 +29,34 @@ class State(NamedTuple):
     Attributes:
         progress: (2,) see NEXT and COMPLETE.
         nodes: (LANES,) where each walker is.
-        counts: (LANES,) number of nodes of its trail.
         rows: (LANES,) the path that it walks.
-        trails: (LANES, nodes + 1) its nodes, from index 1 on.
-        places: (LANES, nodes) place of every node in its trail.
+        exits: (LANES, nodes) the node to which it last went from each; without columns where loops
+            are kept.
+        counts: (LANES,) number of nodes of its trail, where loops are kept.
+        trails: (LANES, nodes + 1) its nodes, from index 1 on; without columns where loops are
+            erased.
     """
 
     progress: IntArray
     nodes: NDArray[np.uint64]
-    counts: NDArray[np.uint64]
     rows: IntArray
+    exits: NodeArray
+    counts: IntArray
     trails: NodeArray
-    places: NodeArray
+
+    @classmethod
+    def at(cls, start: int, nodes: int, erase: bool) -> "State":
+        """Return walkers at a node, of so many; their trails are kept, or their last exits."""
+        trails = np.empty((LANES, 0 if erase else nodes + 1), dtype=np.int32)
+        trails[:, 1:2] = start
+        return cls(
+            progress=np.array([LANES, 0]),
+            nodes=np.full(LANES, start, dtype=np.uint64),
+            rows=np.arange(LANES),
+            exits=np.empty((LANES, nodes if erase else 0), dtype=np.int32),
+            counts=np.ones(LANES, dtype=np.int64),
+            trails=trails,
+        )
 
 
 class Walkers:
@@ -70,7 +72,7 @@ class Walkers:
         """Put the walkers at the start.
 
         Args:
-            choices: See `choice_table`; not empty.
+            choices: See `choice_table`; with one row.
             ends: Indices of start and target.
             erase: Whether loops are erased.
             paths: (paths, nodes + 1), written: a path's number of nodes, then the nodes.
@@ -78,22 +80,13 @@ class Walkers:
         Raises:
             ValueError: If `paths` has another shape or type.
         """
-        nodes = len(choices.totals)
+        nodes = choices.entries.shape[1]
         if paths.ndim != 2 or paths.shape[1] != nodes + 1 or paths.dtype != np.int32:
             raise ValueError(
                 f"paths must be int32 (paths, {nodes + 1}), were {paths.dtype} {paths.shape}"
             )
         start, goal = ends
-        self._state = State(
-            progress=np.array([LANES, 0]),
-            nodes=np.full(LANES, start, dtype=np.uint64),
-            counts=np.ones(LANES, dtype=np.uint64),
-            rows=np.arange(LANES),
-            trails=np.empty((LANES, nodes + 1), dtype=np.int32),
-            places=np.zeros((LANES, nodes), dtype=np.int32),
-        )
-        trails = self._state.trails
-        trails[:, 0], trails[:, 1], self._state.places[:, start] = -1, start, 1
+        self._state = State.at(start, nodes, erase)
         self._choices, self._ends, self._erase, self._paths = choices, ends, erase, paths
         if start == goal:
             paths[:, 0], paths[:, 1] = 1, start
@@ -119,102 +112,110 @@ class Walkers:
         """
         if words.dtype != np.uint64:
             raise ValueError(f"words must be uint64, were {words.dtype}")
-        return _go(words, self._choices, self._ends, self._erase, self._state, self._paths)
+        go = _go_without_loops if self._erase else _go_with_loops
+        return go(words, self._choices, self._ends, self._state, self._paths)
+
+
+@inlined
+def _next_node(choices: Choices, node: np.uint64, random: np.uint64) -> np.uint64:
+    """Return where a walker goes by 32 random bits; a node has no sign, as it is an index."""
+    entry = choices.entries[0, node]
+    part = random * np.uint64(entry & TOTAL) >> HALF
+    shift = choices.slots[np.uint64(entry >> SHIFT) + part]
+    return np.uint64(np.int64(node) + shift)
 
 
 @kernel
-def _go(
+def _go_without_loops(
     words: NDArray[np.uint64],
     choices: Choices,
     ends: tuple[int, int],
-    erase: bool,
     state: State,
     paths: NodeArray,
 ) -> int:
-    """Run the kernel of `Walkers.go`.
+    """Run the kernel of `Walkers.go` where loops are erased.
 
-    Loops are erased in `trails` where they close, by the place of every node in `places`. A step
-    has no branch, because its outcome cannot be foreseen.
+    Only the last exit of every node is kept: from the start, they lead to the target without loops
+    (Wilson 1996). A step has no branch, because its outcome cannot be foreseen.
     """
     words, choices, state, paths = borrowed((words, choices, state, paths))
-    totals, slots, progress = choices.totals, choices.slots, state.progress
-    walkers, counts, trails, places = state.nodes, state.counts, state.trails, state.places
-    target, longest, taken = np.uint64(ends[1]), np.uint64(trails.shape[1] - 1), 0
+    progress, walkers, exits = state.progress, state.nodes, state.exits
+    target, taken = np.uint64(ends[1]), 0
+    one, two, three, four = walkers[0], walkers[1], walkers[2], walkers[3]
     while progress[COMPLETE] < len(paths) and taken + WORDS <= len(words):
-        to_look_at = False
-        for pair in range(WORDS):
-            word = words[taken + pair]
-            for half in range(2):
-                # the next node; the lane has no sign, as an index with one might count from the end
-                lane = np.uint64(2 * pair + half)
-                random = word >> HALF if half else word & LOW
-                node = walkers[lane]
-                node = np.uint64(slots[node, random * totals[node] >> HALF])
-                # back to its place if the trail has it (a place may be an earlier walk's)
-                count, known = counts[lane], np.uint64(places[lane, node])
-                there = trails[lane, known] == np.int32(node)
-                again = np.uint64(erase & (known <= count) & there)
-                count = count + ONE + (known - count - ONE) * again
-                trails[lane, count] = node
-                places[lane, node] = count
-                walkers[lane], counts[lane] = node, count
-                to_look_at |= (node == target) | (count == longest)
+        first, second = words[taken], words[taken + 1]
         taken += WORDS
-        if to_look_at:
+        to_one, to_two = _next_node(choices, one, first & LOW), _next_node(choices, two, first >> HALF)
+        to_three = _next_node(choices, three, second & LOW)
+        to_four = _next_node(choices, four, second >> HALF)
+        exits[0, one], exits[1, two] = to_one, to_two
+        exits[2, three], exits[3, four] = to_three, to_four
+        one, two, three, four = to_one, to_two, to_three, to_four
+        if (one == target) | (two == target) | (three == target) | (four == target):
+            walkers[0], walkers[1], walkers[2], walkers[3] = one, two, three, four
             for walker in range(LANES):
-                _look_at(walker, ends, erase, state, paths)
+                if walkers[walker] == target:
+                    row = _arrive(walker, ends, state, len(paths))
+                    if row < len(paths):
+                        follow_exits(exits[walker], ends, paths[row])
+            one, two, three, four = walkers[0], walkers[1], walkers[2], walkers[3]
+    walkers[0], walkers[1], walkers[2], walkers[3] = one, two, three, four
     return taken
 
 
 @kernel
-def _look_at(
-    walker: int, ends: tuple[int, int], erase: bool, state: State, paths: NodeArray
-) -> None:
-    """Begin the next path where a walker has arrived; erase the loops of a trail that is full."""
-    progress, walkers, counts, rows = state.progress, state.nodes, state.counts, state.rows
-    trails, places = state.trails, state.places
-    if walkers[walker] == ends[1]:
-        # the trail becomes a path, and the walker stands at the start
-        row = rows[walker]
-        if row < len(paths):
-            count = np.int64(counts[walker])
-            for k in range(1, count + 1):
-                paths[row, k] = trails[walker, k]
-            paths[row, 0] = count
-            progress[COMPLETE] += 1
-        rows[walker] = progress[NEXT]
-        progress[NEXT] += 1
-        walkers[walker], counts[walker] = ends[0], 1
-        trails[walker, 1] = ends[0]
-        places[walker, ends[0]] = 1
-    elif not erase and counts[walker] == trails.shape[1] - 1:  # a path without loops always fits
-        full = int(np.int64(counts[walker]))
-        erase_loops(trails[walker], full, trails[walker], places[walker])
-        counts[walker] = trails[walker, 0]
+def _go_with_loops(
+    words: NDArray[np.uint64],
+    choices: Choices,
+    ends: tuple[int, int],
+    state: State,
+    paths: NodeArray,
+) -> int:
+    """Run the kernel of `Walkers.go` where loops are kept, but those of a trail that is full."""
+    words, choices, state, paths = borrowed((words, choices, state, paths))
+    progress, walkers, counts, trails = state.progress, state.nodes, state.counts, state.trails
+    target, longest, taken = np.uint64(ends[1]), trails.shape[1] - 1, 0
+    place = np.empty(longest, np.int32)
+    while progress[COMPLETE] < len(paths) and taken + WORDS <= len(words):
+        for walker in range(LANES):
+            word = words[taken + (walker >> 1)]
+            random = word >> HALF if walker & 1 else word & LOW
+            node = _next_node(choices, walkers[walker], random)
+            counts[walker] += 1
+            trails[walker, counts[walker]] = node
+            walkers[walker] = node
+        taken += WORDS
+        for walker in range(LANES):
+            trail, count = trails[walker], counts[walker]
+            if walkers[walker] == target:
+                row = _arrive(walker, ends, state, len(paths))
+                if row < len(paths):
+                    for k in range(1, count + 1):
+                        paths[row, k] = trail[k]
+                    paths[row, 0] = count
+                counts[walker], trail[1] = 1, ends[0]
+            elif count == longest:  # a path without loops always fits
+                erase_loops(trail, count, trail, place)
+                counts[walker] = trail[0]
+    return taken
 
 
-def choice_table(neighbours: NodeArray, potentials: FloatArray, steps: StepArray) -> Choices:
-    """Return the table of choices of walks to one target.
+@kernel
+def _arrive(walker: int, ends: tuple[int, int], state: State, num_paths: int) -> int:
+    """Put a walker that has arrived at the start; return the row of the path that it walked."""
+    progress, row = state.progress, state.rows[walker]
+    progress[COMPLETE] += row < num_paths
+    state.rows[walker] = progress[NEXT]
+    progress[NEXT] += 1
+    state.nodes[walker] = ends[0]
+    return row
 
-    It is empty if the weights are no whole numbers or the table would be large; such walks are left
-    to `grid_walks.walk`.
 
-    Args:
-        neighbours: See `grids.Moves`, as for the next two.
-        potentials: See there.
-        steps: See there.
+def choice_table(moves: Moves) -> Choices:
+    """Return the choices of walks to one target, one row of them.
+
+    There is no row if the weights are no whole numbers or the table would be large; such walks are
+    left to `grid_walks.walk`.
     """
-    permitted = neighbours >= 0
-    potential = np.where(permitted, potentials[steps[neighbours]], -np.inf)
-    greatest = np.maximum(potential.max(axis=1, keepdims=True), 0.0)
-    weights = np.where(permitted, greatest - potential + 1.0, 0.0)
-    totals = weights.sum(axis=1)
-    whole = bool((weights == np.floor(weights)).all())
-    if not whole or totals.max() > MAX_SLOTS or len(totals) > 2**15:
-        return Choices(np.empty(0, dtype=np.uint64), np.empty((0, 0), dtype=np.int16))
-    slot = np.arange(int(totals.max()))
-    move = np.zeros((len(totals), len(slot)), dtype=np.int64)
-    for ends in np.cumsum(weights, axis=1).T[:-1]:
-        move += slot >= ends[:, None]
-    slots = np.take_along_axis(neighbours, move, axis=1).astype(np.int16)
-    return Choices(totals.astype(np.uint64), slots)
+    fronts = moves.steps[None, :]
+    return choices_of(moves.neighbours, moves.potentials, fronts, len(moves.neighbours))

@@ -6,11 +6,11 @@ A path is a row of a table, see `paths.grid_walks`.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import kernel
-from evoexp.numeric.random_stream import Block, draw_index
-from evoexp.paths.grid_walks import erase_loops, walk, walk_by_weights
+from evoexp.numeric.random_stream import Block, draw_index, used_up
+from evoexp.paths.grid_choices import Choices
+from evoexp.paths.grid_walks import erase_loops, walk, walk_by_choices
 from evoexp.paths.grids import Moves, NodeArray, StepArray, spread_front
 from evoexp.records import FloatArray
 
@@ -28,7 +28,7 @@ class World(NamedTuple):
         unsafeness: (nodes,).
         potentials: (≥ greatest number of steps + 1,) toward a target after so many steps.
         fronts: (nodes, nodes) steps to every node from every other; (0, nodes) on large grids.
-        weights: (nodes, nodes) of `grid_walks.pack_weights`; (0, nodes) where they do not fit.
+        choices: Of walks to all nodes; without rows where they do not fit.
     """
 
     neighbours: NodeArray
@@ -38,7 +38,7 @@ class World(NamedTuple):
     unsafeness: FloatArray
     potentials: FloatArray
     fronts: StepArray
-    weights: NDArray[np.uint64]
+    choices: Choices
 
 
 class Breeding(NamedTuple):
@@ -311,14 +311,18 @@ def mutate(draws: Block, world: World, erase: bool, path: NodeArray, scratch: Sc
     low, high = min(first, second), max(first, second)
     ends = (path[low], path[high])
     # a walk from one to the other
-    if len(world.weights) > 0:
-        walk_by_weights(draws, neighbours, world.weights[ends[1]], ends, erase, walked, place)
+    choices = world.choices
+    if len(choices.entries) > 0:
+        own = choices.entries[ends[1]]
+        walk_by_choices(draws, own, choices.slots, ends, erase, walked, place)
     elif len(fronts) > 0:
         walk(draws, Moves(neighbours, potentials, fronts[ends[1]]), ends, erase, walked, place)
     else:
         target = path[high : high + 1]
         spread_front(neighbours, world.num_moves, target, scratch.steps, scratch.queue)
         walk(draws, Moves(neighbours, potentials, scratch.steps), ends, erase, walked, place)
+    if used_up(draws):
+        return
     # head, walk and tail
     last = low - 1
     for k in range(1, low):

@@ -15,7 +15,6 @@ from collections.abc import Iterator
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from evoexp.collision.models.potential_fields import Fields, PotentialFields
 from evoexp.collision.scene import Scene, scene
@@ -23,10 +22,11 @@ from evoexp.errors import SettingError
 from evoexp.evolution.genetic_settings import ScaledGenetic
 from evoexp.numeric.random_stream import Draws
 from evoexp.objectives.path_cost import PathCost
-from evoexp.paths.grid_walks import MOST_MOVES, pack_weights, walk_each
+from evoexp.paths.grid_choices import Choices, choices_of
+from evoexp.paths.grid_walks import walk_each
 from evoexp.paths.grids import UNREACHED, Moves, NodeArray, StepArray, spread_front
 from evoexp.paths.motion import Motion
-from evoexp.paths.walkers import LANES, WORDS, Choices, Walkers, choice_table
+from evoexp.paths.walkers import LANES, WORDS, Walkers, choice_table
 from evoexp.planners.grid_path_ga import kernels
 from evoexp.planners.grid_path_ga.kernels import (
     COST,
@@ -46,7 +46,8 @@ from evoexp.scenarios.grid_motion import GridMotion
 from evoexp.validation import Component, NonNegativeCount
 
 FEW_NODES = 2048  # the steps between all nodes of smaller grids are worked out once: at most 8 MB
-FEWER_NODES = 1200  # and the weights of all moves toward them: at most 12 MB
+FEWER_NODES = 1200  # and the choices of walks between them: at most 6 MB
+MOST_PATTERNS = 4096  # of their weights
 FAULTS = "blocked_nodes", "forbidden_moves", "missed_ends"  # with one, a path costs inf
 STRETCH = 8  # generations that are computed in one call of a kernel, at most
 BLOCK = 16384  # uniform numbers drawn at once, at least
@@ -149,7 +150,7 @@ class GridPathGa(PlannerDefaults, Component):
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> np.ndarray:
         """Return random paths as in the initial population, (count, longest + 1)."""
         paths = np.empty((count, problem.fields.grid.num_nodes + 1), dtype=np.int32)
-        if len(problem.choices[0]):
+        if len(problem.choices.entries):
             self._fill(problem, rng, paths)
         else:
             self._fill_one_by_one(problem, rng, paths)
@@ -345,10 +346,10 @@ def _prepared(
         fields.unsafeness,
         fields.potentials,
         fronts,
-        _weights(fields, fronts),
+        _choices(fields, fronts),
     )
     moves = Moves(own.neighbours, fields.potentials, steps)
-    return Problem(fields, moves, choice_table(*moves), (start, goal), world, bodies, margin)
+    return Problem(fields, moves, choice_table(moves), (start, goal), world, bodies, margin)
 
 
 def named_terms(results: FloatArray, num_nodes: Any) -> dict[str, float]:
@@ -368,10 +369,7 @@ def _fronts(fields: Fields) -> StepArray:
     return fronts
 
 
-def _weights(fields: Fields, fronts: StepArray) -> NDArray[np.uint64]:
-    """Return the weights of all moves toward all nodes; (0, nodes) where they do not fit."""
-    neighbours = fields.grid.neighbours
-    if neighbours.shape[1] > MOST_MOVES or len(fronts) > FEWER_NODES:
-        fronts = fronts[:0]
-    weights = np.empty(fronts.shape, dtype=np.uint64)
-    return weights if pack_weights(neighbours, fields.potentials, fronts, weights) else weights[:0]
+def _choices(fields: Fields, fronts: StepArray) -> Choices:
+    """Return the choices of walks to all nodes; without rows where they do not fit."""
+    few = fronts if len(fronts) <= FEWER_NODES else fronts[:0]
+    return choices_of(fields.grid.neighbours, fields.potentials, few, MOST_PATTERNS)

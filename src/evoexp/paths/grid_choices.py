@@ -1,0 +1,166 @@
+"""What random walks over a grid choose from at every node, in tables: one look-up makes a step.
+
+Every move has as many slots as it weighs, so a random whole number below the sum of the weights is
+a choice. Nodes whose moves weigh the same share their slots, which hold differences of indices: a
+grid has a few hundred patterns of weights, which stay in the fastest memory.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evoexp.numeric.compilation import borrowed, kernel
+from evoexp.paths.grids import NodeArray, StepArray
+from evoexp.records import FloatArray, IntArray
+
+MOST_SLOTS = 256  # of a node
+MOST_NODES = 2**15  # whose differences are 16 bits
+TOTAL_BITS = 9  # of an entry: the number of slots
+TOTAL = np.uint32(2**TOTAL_BITS - 1)
+SHIFT = np.uint32(TOTAL_BITS)
+
+
+class Choices(NamedTuple):
+    """The choices of walks to some targets at every node.
+
+    There are no rows where there are no such tables.
+
+    Attributes:
+        entries: (targets, nodes) uint32: the sum of the weights in the lowest `TOTAL_BITS`, the
+            place of the first slot above them.
+        slots: (any,) the index of the node that a choice leads to, less that of the node where the
+            walk is.
+    """
+
+    entries: NDArray[np.uint32]
+    slots: NDArray[np.int16]
+
+
+class _Patterns(NamedTuple):
+    """Weights of the moves of one node, each combination once.
+
+    Attributes:
+        weights: (patterns + 1, moves); the last one is scratch.
+        first: (patterns + 1,) place of the first slot of each; behind the last one, of the next.
+        known: (a power of two,) where each is found by its hash; −1: nowhere.
+    """
+
+    weights: IntArray
+    first: IntArray
+    known: IntArray
+
+
+def choices_of(
+    neighbours: NodeArray, potentials: FloatArray, fronts: StepArray, most_patterns: int
+) -> Choices:
+    """Return the choices of walks to some targets; without rows where they do not fit.
+
+    They do not fit if a weight is no whole number, if a node has more than `MOST_SLOTS`, or if
+    there are more patterns than `most_patterns`.
+
+    Args:
+        neighbours: See `grids.Moves`, as for `potentials`.
+        potentials: See there.
+        fronts: (targets, nodes) steps to every node from each target.
+        most_patterns: Patterns of weights for which there is memory.
+    """
+    nodes, moves = neighbours.shape
+    none = Choices(np.empty((0, nodes), dtype=np.uint32), np.zeros(1, dtype=np.int16))
+    if nodes > MOST_NODES:
+        return none
+    patterns = _Patterns(
+        np.zeros((most_patterns + 1, moves), dtype=np.int64),
+        np.zeros(most_patterns + 1, dtype=np.int64),
+        np.full(4 << most_patterns.bit_length(), -1, dtype=np.int64),
+    )
+    entries, potential = np.empty(fronts.shape, dtype=np.uint32), np.empty(nodes)
+    count = _find_patterns(neighbours, potentials, fronts, potential, patterns, entries)
+    if count < 0:
+        return none
+    # a move leads to the same difference of indices from every node that has it
+    origins = np.arange(nodes, dtype=np.int32)[:, None]
+    differences = np.where(neighbours >= 0, neighbours - origins, 0)
+    shifts = differences[np.abs(differences).argmax(axis=0), np.arange(moves)]
+    repeats, stays = patterns.weights[:count], np.zeros(count, dtype=np.int64)
+    stays[~repeats.any(axis=1)] = 1  # a node without a neighbour stays where it is
+    counts = np.column_stack([repeats, stays]).ravel()
+    return Choices(entries, np.repeat(np.tile([*shifts, 0], count), counts).astype(np.int16))
+
+
+@kernel
+def _find_patterns(
+    neighbours: NodeArray,
+    potentials: FloatArray,
+    fronts: StepArray,
+    potential: FloatArray,
+    patterns: _Patterns,
+    entries: NDArray[np.uint32],
+) -> int:
+    """Write the entries of all nodes toward all targets, and the patterns that they need.
+
+    Args:
+        neighbours: See `choices_of`, as for the next two.
+        potentials: See there.
+        fronts: See there.
+        potential: (nodes,) scratch.
+        patterns: Written.
+        entries: (targets, nodes) written.
+
+    Returns:
+        The number of patterns; −1 if the choices do not fit.
+    """
+    neighbours, potentials, fronts, potential, patterns, entries = borrowed(
+        (neighbours, potentials, fronts, potential, patterns, entries)
+    )
+    count, moves = 0, neighbours.shape[1]
+    for target in range(len(fronts)):
+        for node in range(len(potential)):
+            potential[node] = potentials[fronts[target, node]]
+        for node in range(len(neighbours)):
+            # the weights, as the next pattern
+            greatest, total = 0.0, 0
+            own = patterns.weights[count]
+            for move in range(moves):
+                other = neighbours[node, move]
+                greatest = max(greatest, potential[other] if other >= 0 else 0.0)
+            for move in range(moves):
+                other = neighbours[node, move]
+                weight = greatest - potential[other] + 1.0 if other >= 0 else 0.0
+                if weight > MOST_SLOTS or weight != np.floor(weight):
+                    return -1
+                own[move] = int(weight)
+                total += own[move]
+            if total > MOST_SLOTS:
+                return -1
+            # one that is known, or a new one
+            found = _pattern_like(count, patterns)
+            if found == count:
+                count += 1
+                if count == len(patterns.first):
+                    return -1
+                patterns.first[count] = patterns.first[found] + max(total, 1)
+            entries[target, node] = patterns.first[found] << TOTAL_BITS | total
+    return count
+
+
+@kernel
+def _pattern_like(count: int, patterns: _Patterns) -> int:
+    """Return the number of the pattern with the weights of number `count`; `count` if it is new."""
+    own, known = patterns.weights[count], patterns.known
+    place = 0
+    for move in range(len(own)):
+        place = place * 31 + own[move]
+    place = place ^ place >> 15
+    while True:
+        place = place & (len(known) - 1)
+        other = known[place]
+        if other < 0:
+            known[place] = count
+            return count
+        alike = True
+        for move in range(len(own)):
+            alike &= own[move] == patterns.weights[other, move]
+        if alike:
+            return other
+        place += 1

@@ -57,8 +57,9 @@ def walk(
     _write(trail, count, erase, path, place)
 
 
-NEAR = 1024  # [2⁻⁵³] so close to a whole number the product is rounded as `walk` rounds it
-_BITS = 53  # of a uniform number
+BITS = 53  # of a uniform number
+REST = np.int64(2**BITS - 1)
+NEAR = np.int64(1024)  # [2⁻⁵³] from a whole number a product may be rounded to it
 
 
 @kernel
@@ -89,7 +90,8 @@ def walk_by_choices(
     trail = np.empty(max(len(uniforms) - taken[0], 0) + 2, np.int32)
     trail[1] = node
     while node != target and at < num:
-        node = _next_by_choice(uniforms[at], entries[node], slots, node)
+        part = np.uint64(uniforms[at] * np.float64(entries[node] & TOTAL))
+        node = np.uint64(np.int64(node) + slots[np.uint64(entries[node] >> SHIFT) + part])
         at += ONE
         count += 1
         trail[count] = node
@@ -115,37 +117,57 @@ def walk_to_exits(
         exits: (nodes,) written, see `follow_exits`.
     """
     uniforms, taken = draws.uniforms, draws.taken
-    node, target = np.uint64(ends[0]), np.uint64(ends[1])
-    at, num = np.uint64(taken[0]), np.uint64(len(uniforms))
+    at, is_right = _walked(np.uint64(taken[0]), uniforms, entries, slots, ends, False, exits)
+    if not is_right:
+        at, _ = _walked(np.uint64(taken[0]), uniforms, entries, slots, ends, True, exits)
+    taken[0] = at
+
+
+@inlined
+def _walked(
+    at: np.uint64,
+    uniforms: FloatArray,
+    entries: NDArray[np.uint32],
+    slots: NDArray[np.int16],
+    ends: tuple[int, int],
+    is_rounded: bool,
+    exits: NodeArray,
+) -> tuple[np.uint64, bool]:
+    """Walk by uniform numbers from a place on, and keep the last exit of every node.
+
+    Whole weights and their differences are exact, so the part of a product in front of the point
+    decides. Products in whole numbers take half the time, but are not rounded as `walk` rounds
+    them, which matters close below a whole number only.
+
+    Args:
+        at: The place.
+        uniforms: (numbers,).
+        entries: See `walk_by_choices`, as for `slots` and `ends`.
+        is_rounded: Whether products are rounded.
+        exits: (nodes,) written.
+
+    Returns:
+        The place behind the last number taken; behind the end of the block, if there were too few.
+        Whether the walk is that of rounded products.
+    """
+    node, target, num = np.uint64(ends[0]), np.uint64(ends[1]), np.uint64(len(uniforms))
+    nearest = np.int64(0)
     while node != target and at < num:
-        following = _next_by_choice(uniforms[at], entries[node], slots, node)
+        entry, uniform = entries[node], uniforms[at]
+        total = np.int64(entry & TOTAL)
+        product = np.int64(uniform * 2.0**BITS) * total
+        if is_rounded:
+            part = np.int64(uniform * np.float64(total))
+        else:
+            part = product >> BITS
+            nearest = max(nearest, product & REST)
+        following = np.uint64(
+            np.int64(node) + slots[np.uint64(entry >> SHIFT) + np.uint64(part)]
+        )
         exits[node] = following
         node = following
         at += ONE
-    taken[0] = at if node == target else num + ONE
-
-
-@inlined
-def _next_by_choice(
-    uniform: float, entry: np.uint32, slots: NDArray[np.int16], node: np.uint64
-) -> np.uint64:
-    """Return where a walk goes from a node, whose index has no sign.
-
-    Whole weights and their differences are exact, so the part of the product in front of the point
-    decides.
-    """
-    place = np.uint64(entry >> SHIFT) + _whole_part(uniform, entry & TOTAL)
-    return np.uint64(np.int64(node) + slots[place])
-
-
-@inlined
-def _whole_part(uniform: float, total: np.uint32) -> np.uint64:
-    """Return the whole part of `uniform * total`, in whole numbers, which takes half the time."""
-    product = np.int64(uniform * 2.0**_BITS) * np.int64(total)
-    part = product >> _BITS
-    if (product + NEAR) >> _BITS != part:
-        part = np.int64(uniform * np.float64(total))
-    return np.uint64(part)
+    return (at if node == target else num + ONE), is_rounded or nearest < REST - NEAR
 
 
 @kernel

@@ -5,7 +5,7 @@ if it costs no more. So a comparison with the genetic algorithm tells what selec
 add to this operator.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, ClassVar
 
 import numpy as np
@@ -14,6 +14,7 @@ from evoexp.errors import SettingError
 from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.numeric.random_stream import Draws
 from evoexp.planners.grid_path_ga import kernels
+from evoexp.planners.grid_path_ga.climbing_kernels import Ledger, climb_by_pieces
 from evoexp.planners.grid_path_ga.kernels import COST, RESULTS, Population
 from evoexp.planners.grid_path_ga.path_operators import Scratch
 from evoexp.planners.grid_path_ga.planner import BLOCK, GridPathGa, Problem, named_terms, trimmed
@@ -56,16 +57,12 @@ class PathClimbing(WrappedPlanner):
         """Yield the random walks, then the climbing paths after every generation's trials."""
         planner, keeper, draws = self.planner, Keeper(), Draws(BLOCK)
         assert isinstance(planner, GridPathGa), "prepare refuses other planners"
-        weights, erase = planner.objective.weights, not planner.revisits
-        nodes = problem.fields.grid.num_nodes
-        population, scratch = self._first(planner, problem, rng), Scratch.of(nodes)
-        candidate = Population(np.empty((1, nodes + 1), dtype=np.int32), np.empty((RESULTS, 1)))
-        trial = 0
+        population, trial = self._first(planner, problem, rng), 0
+        climb, arguments = _trials(planner, problem, population)
         for index in range(planner.num_generations + 1):
             evaluations = planner.num_evaluations(index)
             last = trial + evaluations if index else 0
-            arguments = problem.world, weights, erase, population, candidate, scratch
-            while (trial := kernels.climb(draws.block, trial, last, *arguments)) < last:
+            while (trial := climb(draws.block, trial, last, *arguments)) < last:
                 draws.extend(rng)
             costs = population.results[COST].copy()
             statistics = cost_statistics(costs)
@@ -92,3 +89,17 @@ class PathClimbing(WrappedPlanner):
         paths = np.zeros((len(best), problem.fields.grid.num_nodes + 1), dtype=np.int32)
         paths[:, : drawn.shape[1]] = drawn[best]
         return Population(paths, np.ascontiguousarray(results[:, best]))
+
+
+def _trials(
+    planner: GridPathGa, problem: Problem, population: Population
+) -> tuple[Callable[..., int], tuple[Any, ...]]:
+    """Return the kernel that makes trials, and what it takes behind the draws and their numbers."""
+    world, weights, erase = problem.world, planner.objective.weights, not planner.revisits
+    ledger = Ledger.of(population.paths, world) if erase else None
+    if ledger is not None:
+        return climb_by_pieces, (world, weights, population, ledger)
+    nodes = problem.fields.grid.num_nodes
+    candidate = Population(np.empty((1, nodes + 1), dtype=np.int32), np.empty((RESULTS, 1)))
+    scratch = Scratch.of(nodes)
+    return kernels.climb, (world, weights, erase, population, candidate, scratch)

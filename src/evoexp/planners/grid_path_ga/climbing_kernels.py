@@ -1,0 +1,221 @@
+"""Trials of path climbing, compiled: what a piece changes is worked out, not the whole path.
+
+A path without loops, of which a piece is regenerated, is measured by sums up to each of its places:
+moves of each kind, and the unsafeness of nodes, in whole numbers, whose sums are exact in any
+order. So a trial takes the nodes of its walk, and the path is written only if it is kept. The same
+results as `kernels.climb`, which regenerates, settles and measures whole paths.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evoexp.numeric.compilation import borrowed, inlined, kernel
+from evoexp.numeric.random_stream import Block, draw_index, used_up
+from evoexp.paths.grid_walks import walk_to_exits
+from evoexp.paths.grids import NodeArray
+from evoexp.planners.grid_path_ga.kernels import COST, DISTANCE, UNSAFENESS, Population
+from evoexp.planners.grid_path_ga.path_operators import World
+from evoexp.records import IntArray
+
+_KIND_BITS = 32  # moves are counted in one number: diagonal ones in the lower half of its bits
+_DIAGONALS = 2**_KIND_BITS - 1
+_ONE_OF_A_KIND = np.array([0, 0, 1, 1 << _KIND_BITS])  # by how many coordinates a move changes
+
+
+class Ledger(NamedTuple):
+    """Sums along climbing paths, and where they pass.
+
+    Attributes:
+        place: (paths, nodes) place of every node in each path; 0: the path does not pass it.
+        moves: (paths, nodes + 1) moves up to each place, those of either kind in half of the bits.
+        levels: (paths, nodes + 1) sum of the unsafeness of the nodes up to each place.
+        move_of: (greatest difference of neighbours' indices + 1,) a move, as `moves` counts it.
+        level_of: (nodes,) unsafeness in whole numbers.
+        exits: (nodes,) scratch of walks.
+        walked: (nodes + 1,) scratch: nodes of a walk without loops, from index 1 on.
+    """
+
+    place: NodeArray
+    moves: IntArray
+    levels: IntArray
+    move_of: IntArray
+    level_of: IntArray
+    exits: NodeArray
+    walked: NodeArray
+
+    @classmethod
+    def of(cls, paths: NodeArray, world: World) -> "Ledger | None":
+        """Return the sums along paths without loops (paths, nodes + 1).
+
+        None: unsafeness or weights of moves are no whole numbers, or the grid is large.
+        """
+        level_of = world.unsafeness.astype(np.int64)
+        if not len(world.choices.entries) or (level_of != world.unsafeness).any():
+            return None
+        num, nodes = len(paths), len(level_of)
+        own = cls(
+            np.zeros((num, nodes), dtype=np.int32),
+            np.zeros((num, nodes + 1), dtype=np.int64),
+            np.zeros((num, nodes + 1), dtype=np.int64),
+            _ONE_OF_A_KIND[world.kinds],
+            level_of,
+            np.empty(nodes, dtype=np.int32),
+            np.empty(nodes + 1, dtype=np.int32),
+        )
+        for k, path in enumerate(paths):
+            _enter(path, 1, own, k)
+        return own
+
+
+class Piece(NamedTuple):
+    """A path whose piece is regenerated: its head, some nodes of a walk, its tail.
+
+    Attributes:
+        head: Place of the last node of the head.
+        begin: Place in the walk of the same node.
+        end: Place in the walk of the first node of the tail.
+        tail: Place of the same node in the path.
+        moves: Of the whole path, see `Ledger`.
+        level: Sum of its unsafeness.
+    """
+
+    head: int
+    begin: int
+    end: int
+    tail: int
+    moves: int
+    level: int
+
+
+@kernel
+def climb_by_pieces(
+    draws: Block,
+    first: int,
+    last: int,
+    world: World,
+    weights: tuple[float, float],
+    population: Population,
+    ledger: Ledger,
+) -> int:
+    """Make the trials of `kernels.climb` where loops are erased.
+
+    Args:
+        draws: See there, as for `first`, `last`, `world`, `weights` and `population`.
+        ledger: Of these paths, changed with them.
+
+    Returns:
+        The number of the next trial: less than `last` if the draws did not suffice.
+    """
+    draws, world, population, ledger = borrowed((draws, world, population, ledger))
+    paths, results = population
+    entries, slots = world.choices
+    for trial in range(first, last):
+        before, k = draws.taken[0], trial % len(paths)
+        path, count = paths[k], np.int64(paths[k, 0])
+        # two different nodes, and a walk from one to the other
+        one = draw_index(draws, count) + 1
+        two = draw_index(draws, count - 1) + 1
+        two += two >= one
+        low, high = min(one, two), max(one, two)
+        ends = (path[low], path[high])
+        walk_to_exits(draws, entries[ends[1]], slots, ends, ledger.exits)
+        if used_up(draws):
+            draws.taken[0] = before
+            return trial
+        # the cost of the path with it
+        piece = _regenerated(ends, low, high, count, k, ledger)
+        nodes = piece.head + (piece.end - piece.begin) + (count - piece.tail)
+        diagonal, spatial = piece.moves & _DIAGONALS, piece.moves >> _KIND_BITS
+        lateral = nodes - 1 - diagonal - spatial
+        distance = lateral + diagonal * np.sqrt(2.0) + spatial * np.sqrt(3.0)
+        mean = np.float64(piece.level) / nodes
+        cost = weights[0] * distance + weights[1] * mean
+        if cost <= results[COST, k]:
+            _replace(path, piece, ledger, k)
+            results[DISTANCE, k], results[UNSAFENESS, k] = distance, mean
+            results[COST, k] = cost
+    return last
+
+
+@inlined
+def _regenerated(
+    ends: tuple[int, int], low: int, high: int, count: int, k: int, ledger: Ledger
+) -> Piece:
+    """Return a path whose nodes between two places are replaced by a walk, without loops.
+
+    Erasing loops one by one leaves the head up to the first node that the walk passes, too, and the
+    walk from there up to the first node of the tail.
+
+    Args:
+        ends: First and last node of the walk.
+        low: Place of the first one in the path.
+        high: Place of the last one.
+        count: Number of nodes of the path.
+        k: Number of the path.
+        ledger: With the last exits of the walk; `walked` is written.
+    """
+    place, moves, levels = ledger.place[k], ledger.moves[k], ledger.levels[k]
+    node, target = np.uint64(ends[0]), np.uint64(ends[1])
+    walked, num, moved, level = ledger.walked, 1, 0, 0
+    head, begin, moved_before, level_before = low, 1, 0, 0
+    tail, end, moved_until, level_until = 0, 1, 0, 0
+    walked[1] = node
+    while node != target:
+        # the next node of the walk, and sums up to it
+        following = np.uint64(ledger.exits[node])
+        moved += ledger.move_of[np.uint64(abs(np.int64(following) - np.int64(node)))]
+        level += ledger.level_of[following]
+        node = following
+        num += 1
+        walked[num] = node
+        own = place[node]
+        if own > 0:
+            if own < head:  # the head ends sooner
+                head, begin, moved_before, level_before, tail = own, num, moved, level, 0
+            elif own >= high and tail == 0:  # the tail begins
+                tail, end, moved_until, level_until = own, num, moved, level
+    return Piece(
+        head,
+        begin,
+        end,
+        tail,
+        moves[head] + (moved_until - moved_before) + (moves[count] - moves[tail]),
+        levels[head] + (level_until - level_before) + (levels[count] - levels[tail]),
+    )
+
+
+@kernel
+def _replace(path: NodeArray, piece: Piece, ledger: Ledger, k: int) -> None:
+    """Write a path with its regenerated piece."""
+    place, walked, count = ledger.place[k], ledger.walked, path[0]
+    head, tail = piece.head, piece.tail
+    for at in range(head + 1, tail):
+        place[path[at]] = 0
+    # the tail, from its near end or its far end on, so that nothing is overwritten
+    shift = head + (piece.end - piece.begin) - tail
+    if shift < 0:
+        for at in range(tail, count + 1):
+            path[at + shift] = path[at]
+    elif shift > 0:
+        for at in range(count, tail - 1, -1):
+            path[at + shift] = path[at]
+    # the walk between head and tail
+    for at in range(piece.begin + 1, piece.end):
+        path[head + (at - piece.begin)] = walked[at]
+    path[0] = count + shift
+    _enter(path, head + 1, ledger, k)
+
+
+@kernel
+def _enter(path: NodeArray, first: int, ledger: Ledger, k: int) -> None:
+    """Write places and sums of a path from a place on."""
+    place, moves, levels = ledger.place[k], ledger.moves[k], ledger.levels[k]
+    if first == 1:
+        place[path[1]], levels[1] = 1, ledger.level_of[path[1]]
+    for at in range(max(first, 2), path[0] + 1):
+        node = path[at]
+        place[node] = at
+        moves[at] = moves[at - 1] + ledger.move_of[abs(node - path[at - 1])]
+        levels[at] = levels[at - 1] + ledger.level_of[node]

@@ -13,15 +13,11 @@ from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.random_stream import Block, draw_index, used_up
-from evoexp.paths.grid_walks import walk_to_exits
+from evoexp.paths.grid_walks import Tolls, length_and_mean, walk_to_exits
 from evoexp.paths.grids import NodeArray
 from evoexp.planners.grid_path_ga.kernels import COST, DISTANCE, UNSAFENESS, Population
 from evoexp.planners.grid_path_ga.path_operators import World
 from evoexp.records import IntArray
-
-_KIND_BITS = 32  # moves are counted in one number: diagonal ones in the lower half of its bits
-_DIAGONALS = 2**_KIND_BITS - 1
-_ONE_OF_A_KIND = np.array([0, 0, 1, 1 << _KIND_BITS])  # by how many coordinates a move changes
 
 
 class Ledger(NamedTuple):
@@ -29,10 +25,9 @@ class Ledger(NamedTuple):
 
     Attributes:
         place: (paths, nodes) place of every node in each path; 0: the path does not pass it.
-        moves: (paths, nodes + 1) moves up to each place, those of either kind in half of the bits.
-        levels: (paths, nodes + 1) sum of the unsafeness of the nodes up to each place.
-        move_of: (greatest difference of neighbours' indices + 1,) a move, as `moves` counts it.
-        level_of: (nodes,) unsafeness in whole numbers.
+        moves: (paths, nodes + 1) tolls of the moves up to each place.
+        levels: (paths, nodes + 1) tolls of the nodes up to each place.
+        tolls: Of moves and nodes.
         exits: (nodes,) scratch of walks.
         walked: (nodes + 1,) scratch: nodes of a walk without loops, from index 1 on.
     """
@@ -40,8 +35,7 @@ class Ledger(NamedTuple):
     place: NodeArray
     moves: IntArray
     levels: IntArray
-    move_of: IntArray
-    level_of: IntArray
+    tolls: Tolls
     exits: NodeArray
     walked: NodeArray
 
@@ -51,16 +45,14 @@ class Ledger(NamedTuple):
 
         None: unsafeness or weights of moves are no whole numbers, or the grid is large.
         """
-        level_of = world.unsafeness.astype(np.int64)
-        if not len(world.choices.entries) or (level_of != world.unsafeness).any():
+        if not len(world.choices.entries) or not len(world.tolls.of_node):
             return None
-        num, nodes = len(paths), len(level_of)
+        num, nodes = len(paths), len(world.tolls.of_node)
         own = cls(
             np.zeros((num, nodes), dtype=np.int32),
             np.zeros((num, nodes + 1), dtype=np.int64),
             np.zeros((num, nodes + 1), dtype=np.int64),
-            _ONE_OF_A_KIND[world.kinds],
-            level_of,
+            world.tolls,
             np.empty(nodes, dtype=np.int32),
             np.empty(nodes + 1, dtype=np.int32),
         )
@@ -77,8 +69,8 @@ class Piece(NamedTuple):
         begin: Place in the walk of the same node.
         end: Place in the walk of the first node of the tail.
         tail: Place of the same node in the path.
-        moves: Of the whole path, see `Ledger`.
-        level: Sum of its unsafeness.
+        moves: Tolls of all its moves.
+        level: Tolls of all its nodes.
     """
 
     head: int
@@ -127,10 +119,7 @@ def climb_by_pieces(
         # the cost of the path with it
         piece = _regenerated(ends, low, high, count, k, ledger)
         nodes = piece.head + (piece.end - piece.begin) + (count - piece.tail)
-        diagonal, spatial = piece.moves & _DIAGONALS, piece.moves >> _KIND_BITS
-        lateral = nodes - 1 - diagonal - spatial
-        distance = lateral + diagonal * np.sqrt(2.0) + spatial * np.sqrt(3.0)
-        mean = np.float64(piece.level) / nodes
+        distance, mean = length_and_mean(nodes, piece.moves, piece.level)
         cost = weights[0] * distance + weights[1] * mean
         if cost <= results[COST, k]:
             _replace(path, piece, ledger, k)
@@ -165,8 +154,8 @@ def _regenerated(
     while node != target:
         # the next node of the walk, and sums up to it
         following = np.uint64(ledger.exits[node])
-        moved += ledger.move_of[np.uint64(abs(np.int64(following) - np.int64(node)))]
-        level += ledger.level_of[following]
+        moved += ledger.tolls.of_move[np.uint64(abs(np.int64(following) - np.int64(node)))]
+        level += ledger.tolls.of_node[following]
         node = following
         num += 1
         walked[num] = node
@@ -213,9 +202,9 @@ def _enter(path: NodeArray, first: int, ledger: Ledger, k: int) -> None:
     """Write places and sums of a path from a place on."""
     place, moves, levels = ledger.place[k], ledger.moves[k], ledger.levels[k]
     if first == 1:
-        place[path[1]], levels[1] = 1, ledger.level_of[path[1]]
+        place[path[1]], levels[1] = 1, ledger.tolls.of_node[path[1]]
     for at in range(max(first, 2), path[0] + 1):
         node = path[at]
         place[node] = at
-        moves[at] = moves[at - 1] + ledger.move_of[abs(node - path[at - 1])]
-        levels[at] = levels[at - 1] + ledger.level_of[node]
+        moves[at] = moves[at - 1] + ledger.tolls.of_move[abs(node - path[at - 1])]
+        levels[at] = levels[at - 1] + ledger.tolls.of_node[node]

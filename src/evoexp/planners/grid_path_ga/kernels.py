@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 from evoexp.evolution.cost_statistics import summarise
 from evoexp.evolution.scaled_selection import SelectionMemory, choose_parents
-from evoexp.numeric.compilation import borrowed, kernel
+from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.random_stream import Block, draw, used_up
-from evoexp.paths.grid_walks import measure_path
+from evoexp.paths.grid_walks import measure_by_tolls, measure_path
 from evoexp.paths.grids import NodeArray
 from evoexp.planners.grid_path_ga.path_operators import (
     Breeding,
@@ -37,12 +37,15 @@ class Population(NamedTuple):
     results: FloatArray
 
 
-@kernel
+@inlined
 def measure(
     path: NodeArray, world: World, weights: tuple[float, float], results: FloatArray, k: int
 ) -> None:
     """Write D, S and C = ε D + λ S of a path (Eqs. 1 to 3) into column k of `results`."""
-    distance, mean = measure_path(path, world.kinds, world.unsafeness)
+    if len(world.tolls.of_node) > 0:
+        distance, mean = measure_by_tolls(path, world.tolls)
+    else:
+        distance, mean = measure_path(path, world.kinds, world.unsafeness)
     results[DISTANCE, k], results[UNSAFENESS, k] = distance, mean
     results[COST, k] = weights[0] * distance + weights[1] * mean
 

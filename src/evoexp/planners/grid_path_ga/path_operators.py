@@ -7,14 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evoexp.numeric.compilation import kernel
+from evoexp.numeric.compilation import inlined, kernel
 from evoexp.numeric.random_stream import Block, draw_index, used_up
 from evoexp.paths.grid_choices import Choices
-from evoexp.paths.grid_walks import erase_loops, walk, walk_by_choices
+from evoexp.paths.grid_walks import Tolls, erase_loops, walk, walk_by_choices
 from evoexp.paths.grids import Moves, NodeArray, StepArray, spread_front
-from evoexp.records import FloatArray
+from evoexp.records import FloatArray, IntArray
 
 NOT_CONNECTED, CONNECTED = -1, -2
+PLACE_BITS = 32
+ONE = np.uint64(1)
 
 
 class World(NamedTuple):
@@ -26,6 +28,7 @@ class World(NamedTuple):
         coordinates: (nodes, dimensions).
         kinds: See `grids.Grid`.
         unsafeness: (nodes,).
+        tolls: The same two in whole numbers, whose sums are exact in any order.
         potentials: (≥ greatest number of steps + 1,) toward a target after so many steps.
         fronts: (nodes, nodes) steps to every node from every other; (0, nodes) on large grids.
         choices: Of walks to all nodes; without rows where they do not fit.
@@ -36,6 +39,7 @@ class World(NamedTuple):
     coordinates: NodeArray
     kinds: NodeArray
     unsafeness: FloatArray
+    tolls: Tolls
     potentials: FloatArray
     fronts: StepArray
     choices: Choices
@@ -65,7 +69,7 @@ class Scratch(NamedTuple):
     Attributes:
         place: (nodes,) places in a path.
         joined: (3 nodes + 3,) a path of several pieces.
-        sites: (2, nodes + 1) places where two paths meet.
+        sites: (nodes + 1,) places where two paths meet, see `coincident_sites`.
         steps: (nodes,) of a front.
         queue: (nodes,) of a front.
         walked: (nodes + 1,) a walk.
@@ -73,7 +77,7 @@ class Scratch(NamedTuple):
 
     place: NodeArray
     joined: NodeArray
-    sites: NodeArray
+    sites: IntArray
     steps: NodeArray
     queue: NodeArray
     walked: NodeArray
@@ -81,8 +85,11 @@ class Scratch(NamedTuple):
     @classmethod
     def of(cls, nodes: int) -> "Scratch":
         """Return scratch for a grid of so many nodes."""
-        shapes = nodes, 3 * nodes + 3, (2, nodes + 1), nodes, nodes, nodes + 1
-        return cls(*(np.zeros(shape, dtype=np.int32) for shape in shapes))
+        place, joined, steps, queue, walked = (
+            np.zeros(size, dtype=np.int32)
+            for size in (nodes, 3 * nodes + 3, nodes, nodes, nodes + 1)
+        )
+        return cls(place, joined, np.zeros(nodes + 1, dtype=np.int64), steps, queue, walked)
 
 
 @kernel
@@ -125,11 +132,10 @@ def cross(
     count = coincident_sites(one, two, place, sites)
     if count > 0:
         site = draw_index(draws, count)
-        i, j = sites[0, site], sites[1, site]
         if erase:
-            exchange_without_loops(one, two, i, j, sites[:, :count], children[0])
-            exchange_without_loops(two, one, j, i, sites[::-1, :count], children[1])
+            exchange_without_loops(one, two, sites[:count], site, children)
         else:
+            i, j = places_of(sites[site])
             settle(joined, _join(one, i, -1, two, j + 1, joined), False, children[0], place)
             settle(joined, _join(two, j, -1, one, i + 1, joined), False, children[1], place)
         return True
@@ -145,33 +151,54 @@ def cross(
     return True
 
 
+@inlined
+def places_of(site: int) -> tuple[int, int]:
+    """Return the places of a common node in the first path and in the second."""
+    return site >> PLACE_BITS, site & (2**PLACE_BITS - 1)
+
+
 @kernel
 def exchange_without_loops(
-    head: NodeArray, tail: NodeArray, i: int, j: int, sites: NodeArray, child: NodeArray
+    one: NodeArray,
+    two: NodeArray,
+    sites: IntArray,
+    site: int,
+    children: tuple[NodeArray, NodeArray],
 ) -> None:
-    """Write a path's head up to node i and another's tail behind node j, without loops.
+    """Exchange the remainders of two paths without loops at a site, and erase the loops.
 
-    Neither path has loops, so a loop begins in the head and ends in the tail, at a site. Erasing
-    loops one by one leaves the head up to the first node that the tail passes, too, and the tail
-    from there.
+    A loop begins in a head and ends in a tail, at a site. Erasing loops one by one leaves the head
+    up to the first node that the tail passes, too, and the tail from there.
 
     Args:
-        head: A path without loops.
-        tail: Another one.
-        i: Place of a node in the head.
-        j: Place of the same node in the tail.
-        sites: (2, sites) places in `head` and in `tail` of all common nodes but start and goal.
-        child: Written.
+        one: A path without loops.
+        two: Another one.
+        sites: (sites,) of both, see `coincident_sites`.
+        site: The number of the one.
+        children: Written.
     """
-    least, behind = i, j
-    for k in range(sites.shape[1]):
-        sooner = (sites[1, k] > j) & (sites[0, k] < least)
-        least = sites[0, k] if sooner else least
-        behind = sites[1, k] if sooner else behind
-    for k in range(1, least + 1):
+    # the first node of the first path's head among those of the second one's tail
+    own = sites[site]
+    nearest = own
+    for k in range(site + 1, len(sites)):
+        nearest = min(nearest, sites[k])
+    i, j = places_of(nearest)
+    _splice(one, i, two, j, children[0])
+    # the first node of the second path's head among those of the first one's tail
+    k = np.uint64(0)
+    while sites[k] < own:
+        k += ONE
+    i, j = places_of(sites[k])
+    _splice(two, j, one, i, children[1])
+
+
+@inlined
+def _splice(head: NodeArray, i: int, tail: NodeArray, j: int, child: NodeArray) -> None:
+    """Write a path's head up to a place, and another's tail behind a place."""
+    for k in range(1, i + 1):
         child[k] = head[k]
-    shift = least - behind
-    for k in range(behind + 1, tail[0] + 1):
+    shift = i - j
+    for k in range(j + 1, tail[0] + 1):
         child[k + shift] = tail[k]
     child[0] = tail[0] + shift
 
@@ -196,23 +223,26 @@ def _join(head: NodeArray, i: int, link: int, tail: NodeArray, j: int, joined: N
 
 
 @kernel
-def coincident_sites(one: NodeArray, two: NodeArray, place: NodeArray, sites: NodeArray) -> int:
-    """Write the places of common nodes but start and goal into `sites` (2, nodes + 1).
+def coincident_sites(one: NodeArray, two: NodeArray, place: NodeArray, sites: IntArray) -> int:
+    """Write the places of common nodes but start and goal into `sites` (nodes + 1,).
 
-    Of a node that the first path passes several times, the last time counts.
+    Of a node that the first path passes several times, the last time counts. A site is one number:
+    the place in the first path is in front of the lowest `PLACE_BITS`, that in the second in them.
+    Sites ascend by the latter.
 
     Returns:
         The number of sites.
     """
     for k in range(2, one[0]):
-        place[one[k]] = k
-    count = 0
+        place[np.uint64(one[k])] = k
+    count, last = np.uint64(0), one[0]
     for k in range(2, two[0]):
-        known = place[two[k]]
-        known = known if (known >= 2) & (known < one[0]) else 0
-        sites[0, count], sites[1, count] = known, k  # kept by counting it, without a branch
-        count += (known > 0) & (one[known] == two[k])
-    return count
+        node = two[k]
+        known = place[np.uint64(node)]
+        known = known if (known >= 2) & (known < last) else 0
+        sites[count] = np.int64(known) << PLACE_BITS | k  # kept by counting it, without a branch
+        count += np.uint64((known > 0) & (one[np.uint64(known)] == node))
+    return int(np.int64(count))
 
 
 @kernel

@@ -23,7 +23,7 @@ from evoexp.evolution.genetic_settings import ScaledGenetic
 from evoexp.numeric.random_stream import Draws
 from evoexp.objectives.path_cost import PathCost
 from evoexp.paths.grid_choices import Choices, choices_of
-from evoexp.paths.grid_walks import walk_each
+from evoexp.paths.grid_walks import Tolls, walk_each
 from evoexp.paths.grids import UNREACHED, Moves, NodeArray, StepArray, spread_front
 from evoexp.paths.motion import Motion
 from evoexp.paths.walkers import LANES, WORDS, Walkers, choice_table
@@ -344,6 +344,7 @@ def _prepared(
         own.coordinates,
         own.kinds,
         fields.unsafeness,
+        Tolls.of(own.kinds, fields.unsafeness),
         fields.potentials,
         fronts,
         _choices(fields, fronts),

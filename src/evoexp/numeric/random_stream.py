@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import kernel
+from evoexp.numeric.pcg64 import draw_uniforms
 
 
 class Block(NamedTuple):
@@ -46,7 +47,7 @@ class Draws:
     def extend(self, rng: np.random.Generator) -> None:
         """Put new numbers behind those that are left, at least as many as are left."""
         left = self.block.uniforms[self.block.taken[0] :]
-        drawn = rng.random(max(self._least, len(left)))
+        drawn = draw_uniforms(rng, max(self._least, len(left)))
         self.block = Block(np.concatenate([left, drawn]), self.block.taken)
         self.block.taken[0] = 0
 

@@ -74,7 +74,7 @@ class PathClimbing(WrappedPlanner):
             yield keeper.record(
                 statistics,
                 costs,
-                trimmed(population.paths),
+                trimmed(population.paths) if index == planner.num_generations else population.paths,
                 lowest=lowest,
                 num_feasible=len(costs),
                 evaluations=evaluations,

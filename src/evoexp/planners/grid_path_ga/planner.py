@@ -20,6 +20,7 @@ from evoexp.collision.models.potential_fields import Fields, PotentialFields
 from evoexp.collision.scene import Scene, scene
 from evoexp.errors import SettingError
 from evoexp.evolution.genetic_settings import ScaledGenetic
+from evoexp.numeric.pcg64 import draw_words
 from evoexp.numeric.random_stream import Draws
 from evoexp.objectives.path_cost import PathCost
 from evoexp.paths.grid_choices import Choices, choices_of
@@ -162,7 +163,7 @@ class GridPathGa(PlannerDefaults, Component):
         steps = STEPS_PER_WALK * len(paths) * problem.moves.steps[problem.ends[0]]
         num_words = WORDS * (int(steps / LANES) + 1)
         while walkers.complete < len(paths):
-            walkers.go(rng.bit_generator.random_raw(num_words))
+            walkers.go(draw_words(rng, num_words))
             num_words = FEW_WORDS
 
     def _fill_one_by_one(

@@ -8,12 +8,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from evoexp.numeric.random_stream import Block, used_up
+from evoexp.numeric.compilation import kernel
+from evoexp.paths.grid_choices import choices_of
 from evoexp.paths.grid_walks import (
-    HEAVIEST,
+    Tolls,
     erase_loops,
-    pack_weights,
+    measure_by_tolls,
+    measure_path,
     walk,
-    walk_by_weights,
+    walk_by_choices,
     walk_each,
 )
 from evoexp.paths.grids import UNREACHED
@@ -37,7 +40,7 @@ def test_a_single_walk_is_that_of_a_single_walker(
     assert nodes_of(path) == as_path(trail, erase, world.grid.num_nodes)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(
     st.tuples(*[st.integers(2, 7)] * 2),
     st.floats(0.0, 0.5),
@@ -45,40 +48,55 @@ def test_a_single_walk_is_that_of_a_single_walker(
     st.booleans(),
     SEEDS,
 )
-def test_packed_weights_lead_to_the_same_nodes(
+def test_choices_lead_to_the_same_nodes(
     shape: tuple[int, ...], share: float, steps: tuple[int, int], erase: bool, seed: int
 ) -> None:
     world, rng = World(shape, share, seed, (steps[0], sum(steps))), np.random.default_rng(seed)
     nodes, moves = world.grid.num_nodes, world.moves
-    weights = np.empty((1, nodes), dtype=np.uint64)
     fronts = np.where(moves.steps == UNREACHED, 0, moves.steps)[None, :]
-    assert pack_weights(moves.neighbours, moves.potentials, fronts, weights)
+    choices = choices_of(moves.neighbours, moves.potentials, fronts, nodes)
     moves = moves._replace(steps=fronts[0])
-    # numbers at the ends of the interval and at parts of a total, too
-    special = [0.0, 1.0 - 2.0**-53, *(k / total for total in range(2, 40) for k in range(total))]
+    # numbers at the ends of the interval, at parts of a total and close below them, too
+    parts = [k / total for total in range(2, 60) for k in range(total)]
+    below = np.nextafter(parts[1:], 0.0)
+    special = [0.0, 1.0 - 2.0**-53, *parts, *below, *np.nextafter(below, 0.0)]
     uniforms = np.where(rng.random(5000) < 0.5, rng.choice(special, 5000), rng.random(5000))
     found = []
-    for packed in (False, True):
+    for by_choices in (False, True):
         path, place = np.zeros(nodes + 1, dtype=np.int32), np.zeros(nodes, dtype=np.int32)
         draws = Block(uniforms, np.array([3]))
-        if packed:
-            own = weights[0]
-            walk_by_weights(draws, moves.neighbours, own, world.ends, erase, path, place)
+        if by_choices:
+            own = choices.entries[0], choices.slots
+            walk_by_choices(draws, *own, world.ends, erase, path, place)
         else:
             walk(draws, moves, world.ends, erase, path, place)
         found.append((draws.taken[0], path[: path[0] + 1].tolist()))
     assert found[0] == found[1]
 
 
-def test_weights_that_do_not_fit_are_not_packed() -> None:
-    for potentials, fits in (((1.0, 3.0), True), ((1.0, 3.5), False), ((1.0, 90.0), False)):
-        world = World((5, 5), 0.0, 0, potentials)
-        steps = world.moves.steps[None, :]
-        weights = np.empty(steps.shape, dtype=np.uint64)
-        own = world.moves.neighbours, world.moves.potentials
-        assert pack_weights(*own, steps, weights) == fits
-        if fits:
-            assert 1 < weights.view(np.uint8).max() <= HEAVIEST
+@settings(max_examples=40, deadline=None)
+@given(SHAPES, st.floats(0.0, 0.5), SEEDS)
+def test_tolls_measure_paths_to_the_same_bits(
+    shape: tuple[int, ...], share: float, seed: int
+) -> None:
+    world, rng = World(shape, share, seed, (1.0, 3.0)), np.random.default_rng(seed)
+    unsafeness = rng.integers(0, 11, world.grid.num_nodes).astype(np.float64)
+    trail = world.trail(iter(rng.random(20_000).tolist()))
+    path = np.array([len(trail), *trail], dtype=np.int32)
+    tolls = Tolls.of(world.grid.kinds, unsafeness)
+    assert _by_tolls(path, tolls) == measure_path(path, world.grid.kinds, unsafeness)
+
+
+@kernel
+def _by_tolls(path: np.ndarray, tolls: Tolls) -> tuple[float, float]:
+    return measure_by_tolls(path, tolls)
+
+
+def test_what_is_no_whole_number_has_no_tolls() -> None:
+    kinds = World((3, 3), 0.0, 0, (1.0, 3.0)).grid.kinds
+    for unsafeness in ([1.0, 2.5], [1.0, -1.0], [0.0, 2.0**40], [1.0, np.nan]):
+        assert len(Tolls.of(kinds, np.array(unsafeness)).of_node) == 0
+    assert Tolls.of(kinds, np.array([3.0, 0.0])).of_node.tolist() == [3, 0]
 
 
 def test_numbers_that_do_not_suffice_are_said() -> None:

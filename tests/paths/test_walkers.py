@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evoexp.paths.walkers import LANES, MAX_SLOTS, WORDS, Walkers, choice_table
-from paths.walked_worlds import POTENTIALS, SEEDS, SHAPES, World, as_path, nodes_of
+from evoexp.paths.walkers import LANES, WORDS, Walkers, choice_table
+from paths.walked_worlds import SEEDS, SHAPES, World, as_path, nodes_of
 
 
 def random_words(seed: int, count: int) -> np.ndarray:
@@ -53,7 +53,7 @@ def test_many_walks_are_those_of_walkers_that_take_turns(
 ) -> None:
     world = World(shape, share, seed, (1.0, 1.0 + step))
     words, paths = random_words(seed, 40_000), table(world, count)
-    walkers = Walkers(choice_table(*world.moves), world.ends, erase, paths)
+    walkers = Walkers(choice_table(world.moves), world.ends, erase, paths)
     taken = walkers.go(words)
     trails, expected = plain_trails(world, words, count)
     assert (walkers.complete, taken) == (count, expected)
@@ -68,7 +68,7 @@ def test_walks_go_on_with_more_words_as_if_they_had_been_there(
     shape: tuple[int, ...], erase: bool, blocks: list[int], seed: int
 ) -> None:
     world = World(shape, 0.3, seed, (1.0, 3.0))
-    words, choices = random_words(seed, 40_000), choice_table(*world.moves)
+    words, choices = random_words(seed, 40_000), choice_table(world.moves)
     at_once, piecewise = table(world, 2 * LANES + 1), table(world, 2 * LANES + 1)
     taken = Walkers(choices, world.ends, erase, at_once).go(words)
     walkers = Walkers(choices, world.ends, erase, piecewise)
@@ -83,35 +83,16 @@ def test_walks_go_on_with_more_words_as_if_they_had_been_there(
 def test_a_walk_to_where_it_begins_is_one_node() -> None:
     world = World((4, 4), 0.0, 0, (1.0, 3.0))
     paths = table(world, 3)
-    walkers = Walkers(choice_table(*world.moves), (world.ends[1], world.ends[1]), True, paths)
+    walkers = Walkers(choice_table(world.moves), (world.ends[1], world.ends[1]), True, paths)
     assert (walkers.complete, walkers.go(random_words(0, 8))) == (3, 0)
     assert [nodes_of(path) for path in paths] == [[world.ends[1]]] * 3
 
 
 def test_tables_and_words_that_kernels_would_misread_are_refused() -> None:
     world = World((4, 4), 0.0, 0, (1.0, 3.0))
-    choices = choice_table(*world.moves)
+    choices = choice_table(world.moves)
     for paths in (table(world, 3)[:, 1:], table(world, 3).astype(np.int64), table(world, 3)[0]):
         with pytest.raises(ValueError, match="paths must be int32"):
             Walkers(choices, world.ends, True, paths)
     with pytest.raises(ValueError, match="words must be uint64"):
         Walkers(choices, world.ends, True, table(world, 3)).go(np.zeros(4))
-
-
-@settings(deadline=None)
-@given(SHAPES, st.floats(0.0, 0.5), POTENTIALS, SEEDS)
-def test_a_table_has_every_move_as_often_as_it_weighs(
-    shape: tuple[int, ...], share: float, potentials: tuple[float, float], seed: int
-) -> None:
-    world = World(shape, share, seed, potentials)
-    totals, slots = choice_table(*world.moves)
-    weights = [world.weights(node) for node in range(world.grid.num_nodes)]
-    sums = [sum(row.values()) for row in weights]
-    whole = all(weight.is_integer() for row in weights for weight in row.values())
-    if not whole or max(sums) > MAX_SLOTS:
-        assert (len(totals), len(slots)) == (0, 0)
-        return
-    assert totals.tolist() == sums
-    for row, total, expected in zip(slots, totals, weights, strict=True):
-        found = row[: int(total)].tolist()
-        assert found == [other for other, weight in expected.items() for _ in range(int(weight))]

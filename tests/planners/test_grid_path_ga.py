@@ -63,19 +63,23 @@ def test_exchange_without_loops_is_exchange_and_then_erasing_loops(
     own = planner()
     problem = solvable(shape, share, seed, own)
     paths = own.sample(problem, rng(seed), 12)
-    place, sites = (
-        np.zeros(problem.fields.grid.num_nodes, dtype=np.int32),
-        np.zeros((2, 400), dtype=np.int32),
-    )
-    child = np.zeros(problem.fields.grid.num_nodes + 1, dtype=np.int32)
+    size = problem.fields.grid.num_nodes
+    place, sites = np.zeros(size, dtype=np.int32), np.zeros(size + 1, dtype=np.int64)
+    pair = np.zeros((2, size + 1), dtype=np.int32)
     for one, two in zip(paths[:-1], paths[1:], strict=True):
         count = path_operators.coincident_sites(one, two, place, sites)
         common = set(nodes_of(one)[1:-1]) & set(nodes_of(two)[1:-1])
         assert count == len(common)
-        for i, j in sites[:, :count].T.tolist():
+        for site, (i, j) in enumerate(map(places_of, sites[:count].tolist())):
             assert one[i] == two[j]
-            path_operators.exchange_without_loops(one, two, i, j, sites[:, :count], child)
-            assert nodes_of(child) == without_loops(nodes_of(one)[:i] + nodes_of(two)[j:])
+            children = pair[0], pair[1]
+            path_operators.exchange_without_loops(one, two, sites[:count], site, children)
+            heads = nodes_of(one)[:i] + nodes_of(two)[j:], nodes_of(two)[:j] + nodes_of(one)[i:]
+            assert [nodes_of(child) for child in pair] == [without_loops(head) for head in heads]
+
+
+def places_of(site: int) -> tuple[int, int]:
+    return divmod(site, 2**path_operators.PLACE_BITS)
 
 
 def test_paths_without_a_common_node_are_crossed_where_they_are_near() -> None:

@@ -16,8 +16,8 @@ from evoexp.planners.grid_path_ga.kernels import RESULTS, Population
 from evoexp.planners.grid_path_ga.path_climbing import PathClimbing
 from evoexp.planners.grid_path_ga.path_operators import Scratch
 from evoexp.planners.grid_path_ga.planner import GridPathGa
-from planners.grid_samples import FIELDS, planner, robot, scenario, solvable
 from paths.walked_worlds import SEEDS
+from planners.grid_samples import FIELDS, planner, robot, scenario, solvable
 from shipped_conditions import expanded
 
 SHAPES = st.sampled_from([(3, 3), (6, 5), (9, 9), (12, 4)])

@@ -9,7 +9,7 @@ Where numpy's layout of a generator in memory is not the known one, numpy draws 
 import ctypes
 from collections.abc import Callable
 from functools import cache
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from llvmlite import ir
@@ -18,7 +18,6 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import borrowed, inlined, kernel
-from evoexp.records import FloatArray
 
 Word = np.uint64
 Wide = tuple[np.uint64, np.uint64]  # 128 bits: the upper half and the lower
@@ -30,7 +29,7 @@ MULTIPLIER = Word(2549297995355413924), Word(4865540595714422341)
 LANES = 4
 
 
-def draw_uniforms(rng: np.random.Generator, count: int) -> FloatArray:
+def draw_uniforms(rng: np.random.Generator, count: int) -> NDArray[np.float64]:
     """Return the next uniform numbers in [0, 1), as `rng.random(count)` does."""
     return _drawn(rng, np.empty(count), _fill_uniforms, rng.random)
 
@@ -59,7 +58,8 @@ def _state_of(bits: np.random.PCG64) -> NDArray[np.uint64]:
     """Return the state and the increment of a generator, lower halves first, in its own memory."""
     # struct {struct {uint128 state, increment} *words; int has_uint32; uint32 uinteger;}
     address = ctypes.c_void_p.from_address(bits.ctypes.state_address).value or 0
-    return np.frombuffer((ctypes.c_uint64 * 4).from_address(address), dtype=np.uint64)
+    words: Any = (ctypes.c_uint64 * 4).from_address(address)
+    return np.asarray(words)
 
 
 @cache
@@ -78,7 +78,7 @@ def _layout_is_known() -> bool:
 
 
 @kernel
-def _fill_uniforms(state: NDArray[np.uint64], out: FloatArray) -> None:
+def _fill_uniforms(state: NDArray[np.uint64], out: NDArray[np.float64]) -> None:
     """Write the next uniform numbers; the state becomes the one behind them."""
     state, out = borrowed((state, out))
     increment = (state[3], state[2])
@@ -111,7 +111,10 @@ def _fill_words(state: NDArray[np.uint64], out: NDArray[np.uint64]) -> None:
     whole = len(out) - len(out) % LANES
     for k in range(0, whole, LANES):
         out[k], out[k + 1], out[k + 2], out[k + 3] = (
-            _word(one), _word(two), _word(three), _word(four)
+            _word(one),
+            _word(two),
+            _word(three),
+            _word(four),
         )
         state[1], state[0] = four
         one, two = _after(one, leap, shift), _after(two, leap, shift)
@@ -168,5 +171,5 @@ def _multiply_and_add(typing_context: Any, state: Any, factor: Any, term: Any) -
     return pair(pair, pair, pair), generate
 
 
-_after: Callable[[Wide, Wide, Wide], Wide] = intrinsic(_multiply_and_add)
+_after: Callable[[Wide, Wide, Wide], Wide] = cast(Any, intrinsic(_multiply_and_add))
 """Return state × multiplier + increment, each of 128 bits."""

@@ -154,7 +154,7 @@ def _pattern_like(count: int, patterns: _Patterns) -> int:
     place = place ^ place >> 15
     while True:
         place = place & (len(known) - 1)
-        other = known[place]
+        other: int = known[place]
         if other < 0:
             known[place] = count
             return count

@@ -145,7 +145,10 @@ def _go_without_loops(
     while progress[COMPLETE] < len(paths) and taken + WORDS <= len(words):
         first, second = words[taken], words[taken + 1]
         taken += WORDS
-        to_one, to_two = _next_node(choices, one, first & LOW), _next_node(choices, two, first >> HALF)
+        to_one, to_two = (
+            _next_node(choices, one, first & LOW),
+            _next_node(choices, two, first >> HALF),
+        )
         to_three = _next_node(choices, three, second & LOW)
         to_four = _next_node(choices, four, second >> HALF)
         exits[0, one], exits[1, two] = to_one, to_two
@@ -203,7 +206,8 @@ def _go_with_loops(
 @kernel
 def _arrive(walker: int, ends: tuple[int, int], state: State, num_paths: int) -> int:
     """Put a walker that has arrived at the start; return the row of the path that it walked."""
-    progress, row = state.progress, state.rows[walker]
+    progress = state.progress
+    row: int = state.rows[walker]
     progress[COMPLETE] += row < num_paths
     state.rows[walker] = progress[NEXT]
     progress[NEXT] += 1

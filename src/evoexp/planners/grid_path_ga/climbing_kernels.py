@@ -9,11 +9,11 @@ results as `kernels.climb`, which regenerates, settles and measures whole paths.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.random_stream import Block, draw_index, used_up
-from evoexp.paths.grid_walks import Tolls, length_and_mean, walk_to_exits
+from evoexp.paths.grid_measures import Tolls, length_and_mean
+from evoexp.paths.grid_walks import walk_to_exits
 from evoexp.paths.grids import NodeArray
 from evoexp.planners.grid_path_ga.kernels import COST, DISTANCE, UNSAFENESS, Population
 from evoexp.planners.grid_path_ga.path_operators import World
@@ -105,7 +105,7 @@ def climb_by_pieces(
     entries, slots = world.choices
     for trial in range(first, last):
         before, k = draws.taken[0], trial % len(paths)
-        path, count = paths[k], np.int64(paths[k, 0])
+        path, count = paths[k], int(np.int64(paths[k, 0]))
         # two different nodes, and a walk from one to the other
         one = draw_index(draws, count) + 1
         two = draw_index(draws, count - 1) + 1

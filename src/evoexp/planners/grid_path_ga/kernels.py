@@ -9,7 +9,7 @@ from evoexp.evolution.cost_statistics import summarise
 from evoexp.evolution.scaled_selection import SelectionMemory, choose_parents
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.numeric.random_stream import Block, draw, used_up
-from evoexp.paths.grid_walks import measure_by_tolls, measure_path
+from evoexp.paths.grid_measures import measure_by_tolls, measure_path
 from evoexp.paths.grids import NodeArray
 from evoexp.planners.grid_path_ga.path_operators import (
     Breeding,

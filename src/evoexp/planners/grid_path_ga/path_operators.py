@@ -10,7 +10,8 @@ import numpy as np
 from evoexp.numeric.compilation import inlined, kernel
 from evoexp.numeric.random_stream import Block, draw_index, used_up
 from evoexp.paths.grid_choices import Choices
-from evoexp.paths.grid_walks import Tolls, erase_loops, walk, walk_by_choices
+from evoexp.paths.grid_measures import Tolls
+from evoexp.paths.grid_walks import erase_loops, walk, walk_by_choices
 from evoexp.paths.grids import Moves, NodeArray, StepArray, spread_front
 from evoexp.records import FloatArray, IntArray
 
@@ -185,10 +186,10 @@ def exchange_without_loops(
     i, j = places_of(nearest)
     _splice(one, i, two, j, children[0])
     # the first node of the second path's head among those of the first one's tail
-    k = np.uint64(0)
-    while sites[k] < own:
-        k += ONE
-    i, j = places_of(sites[k])
+    first = np.uint64(0)
+    while sites[first] < own:
+        first += ONE
+    i, j = places_of(sites[first])
     _splice(two, j, one, i, children[1])
 
 

@@ -24,7 +24,8 @@ from evoexp.numeric.pcg64 import draw_words
 from evoexp.numeric.random_stream import Draws
 from evoexp.objectives.path_cost import PathCost
 from evoexp.paths.grid_choices import Choices, choices_of
-from evoexp.paths.grid_walks import Tolls, walk_each
+from evoexp.paths.grid_measures import Tolls
+from evoexp.paths.grid_walks import walk_each
 from evoexp.paths.grids import UNREACHED, Moves, NodeArray, StepArray, spread_front
 from evoexp.paths.motion import Motion
 from evoexp.paths.walkers import LANES, WORDS, Walkers, choice_table

@@ -10,15 +10,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from evoexp.numeric.compilation import borrowed, kernel
+from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.paths.grids import NodeArray, StepArray
-from evoexp.records import FloatArray, IntArray
+from evoexp.records import BoolArray, FloatArray, IntArray
 
 MOST_SLOTS = 256  # of a node
 MOST_NODES = 2**15  # whose differences are 16 bits
 TOTAL_BITS = 9  # of an entry: the number of slots
 TOTAL = np.uint32(2**TOTAL_BITS - 1)
 SHIFT = np.uint32(TOTAL_BITS)
+BYTES = 8  # of a word
+SCATTER = np.uint64(0x9E3779B97F4A7C15)  # odd; 2⁶⁴ over the golden ratio (Knuth 1998)
 
 
 class Choices(NamedTuple):
@@ -41,12 +43,13 @@ class _Patterns(NamedTuple):
     """Weights of the moves of one node, each combination once.
 
     Attributes:
-        weights: (patterns + 1, moves); the last one is scratch.
+        words: (patterns + 1, words) a byte for the weight of each move, the lowest first; the last
+            row is scratch.
         first: (patterns + 1,) place of the first slot of each; behind the last one, of the next.
         known: (a power of two,) where each is found by its hash; −1: nowhere.
     """
 
-    weights: IntArray
+    words: NDArray[np.uint64]
     first: IntArray
     known: IntArray
 
@@ -70,20 +73,23 @@ def choices_of(
     if nodes > MOST_NODES:
         return none
     patterns = _Patterns(
-        np.zeros((most_patterns + 1, moves), dtype=np.int64),
+        np.zeros((most_patterns + 1, -(-moves // BYTES)), dtype=np.uint64),
         np.zeros(most_patterns + 1, dtype=np.int64),
         np.full(4 << most_patterns.bit_length(), -1, dtype=np.int64),
     )
     entries, potential = np.empty(fronts.shape, dtype=np.uint32), np.empty(nodes)
-    count = _find_patterns(neighbours, potentials, fronts, potential, patterns, entries)
+    has_moves = (neighbours >= 0).any(axis=1)
+    count = _find_patterns(neighbours, has_moves, potentials, fronts, potential, patterns, entries)
     if count < 0:
         return none
     # a move leads to the same difference of indices from every node that has it
     origins = np.arange(nodes, dtype=np.int32)[:, None]
     differences = np.where(neighbours >= 0, neighbours - origins, 0)
     shifts = differences[np.abs(differences).argmax(axis=0), np.arange(moves)]
-    repeats, stays = patterns.weights[:count], np.zeros(count, dtype=np.int64)
-    stays[~repeats.any(axis=1)] = 1  # a node without a neighbour stays where it is
+    word, place = np.divmod(np.arange(moves), BYTES)
+    weights = patterns.words[:count, word] >> (BYTES * place).astype(np.uint64) & np.uint64(255)
+    repeats = weights.astype(np.int64)
+    stays = (~repeats.any(axis=1)).astype(np.int64)  # without a neighbour a walk stays
     counts = np.column_stack([repeats, stays]).ravel()
     return Choices(entries, np.repeat(np.tile([*shifts, 0], count), counts).astype(np.int16))
 
@@ -91,6 +97,7 @@ def choices_of(
 @kernel
 def _find_patterns(
     neighbours: NodeArray,
+    has_moves: BoolArray,
     potentials: FloatArray,
     fronts: StepArray,
     potential: FloatArray,
@@ -100,7 +107,8 @@ def _find_patterns(
     """Write the entries of all nodes toward all targets, and the patterns that they need.
 
     Args:
-        neighbours: See `choices_of`, as for the next two.
+        neighbours: See `choices_of`, as for `potentials` and `fronts`.
+        has_moves: (nodes,) whether a node has a neighbour.
         potentials: See there.
         fronts: See there.
         potential: (nodes,) scratch.
@@ -110,48 +118,61 @@ def _find_patterns(
     Returns:
         The number of patterns; −1 if the choices do not fit.
     """
-    neighbours, potentials, fronts, potential, patterns, entries = borrowed(
-        (neighbours, potentials, fronts, potential, patterns, entries)
+    neighbours, has_moves, potentials, fronts = borrowed(
+        (neighbours, has_moves, potentials, fronts)
     )
-    count, moves = 0, neighbours.shape[1]
+    potential, patterns, entries = borrowed((potential, patterns, entries))
+    words, first = patterns.words, patterns.first
+    # of nodes without a neighbour: one slot
+    count, moves = 1, neighbours.shape[1]
+    if len(first) < 2:
+        return -1
+    first[1] = 1
+    _same_or_new(0, patterns)
     for target in range(len(fronts)):
         for node in range(len(potential)):
             potential[node] = potentials[fronts[target, node]]
         for node in range(len(neighbours)):
-            # the weights, as the next pattern
-            greatest, total = 0.0, 0
-            own = patterns.weights[count]
+            if not has_moves[node]:
+                entries[target, node] = 0
+                continue
+            greatest = 0.0
             for move in range(moves):
                 other = neighbours[node, move]
                 greatest = max(greatest, potential[other] if other >= 0 else 0.0)
-            for move in range(moves):
-                other = neighbours[node, move]
-                weight = greatest - potential[other] + 1.0 if other >= 0 else 0.0
-                if weight > MOST_SLOTS or weight != np.floor(weight):
-                    return -1
-                own[move] = int(weight)
-                total += own[move]
+            # the weights, as the next pattern
+            total = 0
+            for k in range(words.shape[1]):
+                word = np.uint64(0)
+                for move in range(BYTES * k, min(BYTES * (k + 1), moves)):
+                    other = neighbours[node, move]
+                    weight = greatest - potential[other] + 1.0 if other >= 0 else 0.0
+                    if weight > MOST_SLOTS or weight != np.floor(weight):
+                        return -1
+                    total += int(weight)
+                    word |= np.uint64(int(weight)) << np.uint64(BYTES * (move - BYTES * k))
+                words[count, k] = word
             if total > MOST_SLOTS:
                 return -1
             # one that is known, or a new one
-            found = _pattern_like(count, patterns)
+            found = _same_or_new(count, patterns)
             if found == count:
                 count += 1
-                if count == len(patterns.first):
+                if count == len(first):
                     return -1
-                patterns.first[count] = patterns.first[found] + max(total, 1)
-            entries[target, node] = patterns.first[found] << TOTAL_BITS | total
+                first[count] = first[found] + total
+            entries[target, node] = first[found] << TOTAL_BITS | total
     return count
 
 
-@kernel
-def _pattern_like(count: int, patterns: _Patterns) -> int:
+@inlined
+def _same_or_new(count: int, patterns: _Patterns) -> int:
     """Return the number of the pattern with the weights of number `count`; `count` if it is new."""
-    own, known = patterns.weights[count], patterns.known
-    place = 0
-    for move in range(len(own)):
-        place = place * 31 + own[move]
-    place = place ^ place >> 15
+    words, known = patterns.words, patterns.known
+    mixed = np.uint64(0)
+    for k in range(words.shape[1]):
+        mixed = (mixed ^ words[count, k]) * SCATTER
+    place = np.int64(mixed >> np.uint64(32))
     while True:
         place = place & (len(known) - 1)
         other: int = known[place]
@@ -159,8 +180,8 @@ def _pattern_like(count: int, patterns: _Patterns) -> int:
             known[place] = count
             return count
         alike = True
-        for move in range(len(own)):
-            alike &= own[move] == patterns.weights[other, move]
+        for k in range(words.shape[1]):
+            alike &= words[count, k] == words[other, k]
         if alike:
             return other
         place += 1

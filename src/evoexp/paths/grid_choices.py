@@ -78,7 +78,7 @@ def choices_of(
         np.full(4 << most_patterns.bit_length(), -1, dtype=np.int64),
     )
     entries, potential = np.empty(fronts.shape, dtype=np.uint32), np.empty(nodes)
-    has_moves = (neighbours >= 0).any(axis=1)
+    has_moves = np.asarray((neighbours >= 0).any(axis=1))
     count = _find_patterns(neighbours, has_moves, potentials, fronts, potential, patterns, entries)
     if count < 0:
         return none

@@ -30,7 +30,7 @@ from typing import NamedTuple
 import numpy as np
 
 from evoexp.numeric.compilation import borrowed, inlined, kernel
-from evoexp.numeric.vectors import LANES, any_lane, load, select, spread, store
+from evoexp.numeric.vectors import LANES, any_lane, load, lower, select, spread, store, upper
 from evoexp.records import FloatArray
 from evoexp.references.grid_networks import Arrivals, Hops, Shifts, shifts_of
 from evoexp.robots.kinematics import U
@@ -225,9 +225,10 @@ def _extend_walks(
             tail = own - 1.0 * difference
             # the best so far, then the second best
             is_one, is_two = value < one, value < two
-            two = select(is_one, one, select(is_two, value, two))
-            tail_two = select(is_one, tail_one, select(is_two, tail, tail_two))
-            one, tail_one = select(is_one, value, one), select(is_one, tail, tail_one)
+            tail_two = select(is_two, select(is_one, tail_one, tail), tail_two)
+            tail_one = select(is_one, tail, tail_one)
+            two = lower(two, upper(one, value))
+            one = lower(one, value)
         weight, none = load(weights, U(node)), spread(NO_NODE)
         one = select(in_time, one + weight, nowhere)
         two = select(in_time, two + weight, nowhere)

@@ -18,6 +18,7 @@ import numpy as np
 from evoexp.numeric.compilation import borrowed, inlined, kernel
 from evoexp.paths.grids import Grid, NodeArray
 from evoexp.records import BoolArray, FloatArray, IntArray
+from evoexp.robots.kinematics import U
 
 NONE = -1
 SMALLEST_GAIN = 1e-10  # of a cost: less may be rounding
@@ -236,12 +237,12 @@ def best_single(terrain: Terrain, path: IntArray) -> Exchange:
                 row += 1
             # with a node between them
             for move in range(neighbours.shape[1]):
-                other = neighbours[one, move]
-                if other < 0 or (used[other] and (removed == 0 or other != middle)):
+                other = neighbours[U(one), move]
+                if other < 0 or (used[U(other)] and (removed == 0 or other != middle)):
                     continue
                 last = move_between(terrain, other, two)
                 if last != NONE:
-                    total = rest_unsafeness + own[other]
+                    total = rest_unsafeness + own[U(other)]
                     cost = rest_length + (lengths[move] + lengths[last]) + total / (num + 1)
                     if cost < lowest:
                         lowest, best = cost, Exchange(cost, place, removed, row)
@@ -292,8 +293,8 @@ def list_pieces(
                 used[node] = False
             depth -= 1
             continue
-        other = terrain.neighbours[node, tried[depth]]
-        if other >= 0 and not used[other] and near(terrain, other, behind, longest - depth):
+        other = terrain.neighbours[U(node), U(tried[depth])]
+        if other >= 0 and not used[U(other)] and near(terrain, other, behind, longest - depth):
             length[depth + 1] = length[depth] + terrain.lengths[tried[depth]]
             unsafeness[depth + 1] = unsafeness[depth] + terrain.unsafeness[other]
             depth += 1
@@ -337,8 +338,8 @@ def used_nodes(terrain: Terrain, path: IntArray) -> BoolArray:
 @inlined
 def move_between(terrain: Terrain, one: int, two: int) -> int:
     """Return the move from a node to another one; `NONE` if it is not permitted."""
-    move = terrain.moves[two - one + len(terrain.unsafeness) - 1]
-    return move if move != NONE and terrain.neighbours[one, move] == two else NONE
+    move: int = terrain.moves[U(two - one + len(terrain.unsafeness) - 1)]
+    return move if move != NONE and terrain.neighbours[U(one), U(move)] == two else NONE
 
 
 @inlined
@@ -346,5 +347,5 @@ def near(terrain: Terrain, one: int, two: int, reach: int) -> bool:
     """Return whether two nodes differ by at most `reach` in every coordinate."""
     found = True
     for axis in range(terrain.coordinates.shape[1]):
-        found &= abs(terrain.coordinates[one, axis] - terrain.coordinates[two, axis]) <= reach
+        found &= abs(terrain.coordinates[U(one), axis] - terrain.coordinates[U(two), axis]) <= reach
     return found

@@ -1,4 +1,4 @@
-"""What random walks over a grid choose from at every node, in tables: one look-up makes a step.
+"""Tables of the choices of random walks over a grid at every node: one look-up makes a step.
 
 Every move has as many slots as it weighs, so a random whole number below the sum of the weights is
 a choice. Nodes whose moves weigh the same share their slots, which hold differences of indices: a
@@ -124,7 +124,7 @@ def _find_patterns(
     potential, patterns, entries = borrowed((potential, patterns, entries))
     words, first = patterns.words, patterns.first
     # of nodes without a neighbour: one slot
-    count, moves = 1, neighbours.shape[1]
+    count = 1
     if len(first) < 2:
         return -1
     first[1] = 1
@@ -136,23 +136,8 @@ def _find_patterns(
             if not has_moves[node]:
                 entries[target, node] = 0
                 continue
-            greatest = 0.0
-            for move in range(moves):
-                other = neighbours[node, move]
-                greatest = max(greatest, potential[other] if other >= 0 else 0.0)
-            # the weights, as the next pattern
-            total = 0
-            for k in range(words.shape[1]):
-                word = np.uint64(0)
-                for move in range(BYTES * k, min(BYTES * (k + 1), moves)):
-                    other = neighbours[node, move]
-                    weight = greatest - potential[other] + 1.0 if other >= 0 else 0.0
-                    if weight > MOST_SLOTS or weight != np.floor(weight):
-                        return -1
-                    total += int(weight)
-                    word |= np.uint64(int(weight)) << np.uint64(BYTES * (move - BYTES * k))
-                words[count, k] = word
-            if total > MOST_SLOTS:
+            total = _weigh(neighbours, potential, node, words[count])
+            if total < 0:
                 return -1
             # one that is known, or a new one
             found = _same_or_new(count, patterns)
@@ -163,6 +148,38 @@ def _find_patterns(
                 first[count] = first[found] + total
             entries[target, node] = first[found] << TOTAL_BITS | total
     return count
+
+
+@inlined
+def _weigh(
+    neighbours: NodeArray, potential: FloatArray, node: int, words: NDArray[np.uint64]
+) -> int:
+    """Write the weights of a node's moves, see `grid_walks.walk`; return their sum.
+
+    Args:
+        neighbours: See `choices_of`.
+        potential: (nodes,).
+        node: The node.
+        words: (words,) written.
+
+    Returns:
+        The sum; −1 if it is more than `MOST_SLOTS`, or if a weight is no whole number.
+    """
+    greatest, total, moves = 0.0, 0, neighbours.shape[1]
+    for move in range(moves):
+        other = neighbours[node, move]
+        greatest = max(greatest, potential[other] if other >= 0 else 0.0)
+    for k in range(len(words)):
+        word = np.uint64(0)
+        for move in range(BYTES * k, min(BYTES * (k + 1), moves)):
+            other = neighbours[node, move]
+            weight = greatest - potential[other] + 1.0 if other >= 0 else 0.0
+            if weight > MOST_SLOTS or weight != np.floor(weight):
+                return -1
+            total += int(weight)
+            word |= np.uint64(int(weight)) << np.uint64(BYTES * (move - BYTES * k))
+        words[k] = word
+    return total if total <= MOST_SLOTS else -1
 
 
 @inlined

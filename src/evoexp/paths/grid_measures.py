@@ -45,7 +45,7 @@ def measure_path(path: NodeArray, kinds: NodeArray, unsafeness: FloatArray) -> t
 
 
 class Tolls(NamedTuple):
-    """What moves and nodes add to a path, in whole numbers, whose sums are exact in any order.
+    """Contributions of moves and nodes to a path, in whole numbers: sums are exact in any order.
 
     Attributes:
         of_move: (greatest difference of neighbours' indices + 1,) by that difference: diagonal

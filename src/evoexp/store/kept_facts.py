@@ -54,7 +54,7 @@ def kept_fact(kind: str, about: bytes, modules: Iterable[str], find: Callable[[]
 
 
 def kept_answer(kind: str, about: bytes, find: Callable[[], Any]) -> Any:
-    """Return what takes long to find whatever is loaded, from where it is kept.
+    """Return an answer that takes long to find whatever is loaded, from where it is kept.
 
     Args:
         kind: Of the answer.

@@ -68,12 +68,13 @@ def test_other_words_are_composed(composed: Callable[[], int]) -> None:
 def test_several_experiments_are_kept_one_by_one(composed: Callable[[], int]) -> None:
     first = expansions.expand(["experiment=lavoie_7dof", "budget=smoke"])
     words = ["experiment=lavoie_7dof,chen_fields", "budget=smoke"]
-    assert not expansions.is_kept(words, multirun=True)
     both = expansions.expand(words, multirun=True)
     assert composed() == 2, "the first one was kept"
     assert both[:1] == first
     assert both == compose.expand(words, multirun=True)
-    assert expansions.is_kept(words, multirun=True)
+    before = composed()
+    assert expansions.expand(words, multirun=True) == both
+    assert composed() == before, "both are kept"
     swept = [*words, "seed=0,1"]
     assert expansions.expand(swept, multirun=True) == compose.expand(swept, multirun=True)
 

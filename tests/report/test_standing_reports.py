@@ -8,7 +8,7 @@ import pytest
 
 from evoexp.cli import main
 from evoexp.report import standing_reports
-from evoexp.report.standing_reports import StandingReport
+from evoexp.report.standing_reports import StandingReport, inputs_of_reports
 
 RUN = ["run", "experiment=rana_planar", "budget=smoke", "--only", "via-point GA"]
 
@@ -19,20 +19,25 @@ def write(path: Path, text: str) -> None:
 
 
 @pytest.fixture
-def standing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> StandingReport:
+def standing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], StandingReport]:
+    """Return what looks at a report and all that it follows from."""
     monkeypatch.setenv("EVOEXP_CACHE", str(tmp_path / "cache"))
     for name in ("runs/1/replicates/0000.mcap", "reports/one/index.md", "conf/ga/mine.yaml"):
         write(tmp_path / name, name)
-    folders = (tmp_path / "conf",)
-    return StandingReport(tmp_path / "reports/one", ("words",), tmp_path, folders)
+
+    def look() -> StandingReport:
+        inputs = inputs_of_reports(tmp_path, [tmp_path / "conf"])
+        return StandingReport(tmp_path / "reports/one", ("words",), inputs)
+
+    return look
 
 
-def test_it_stands_once_it_is_remembered(standing: StandingReport) -> None:
-    assert not standing.stands()
-    standing.remember()
-    assert standing.stands()
-    assert not standing._replace(asked=("others",)).stands()
-    assert not standing._replace(directory=standing.directory.parent / "two").stands()
+def test_it_stands_once_it_is_remembered(standing: Callable[[], StandingReport]) -> None:
+    assert not standing().stands()
+    standing().remember()
+    assert standing().stands()
+    assert not standing()._replace(asked=("others",)).stands()
+    assert not standing()._replace(directory=standing().directory.parent / "two").stands()
 
 
 CHANGES: dict[str, Callable[[Path], object]] = {
@@ -47,24 +52,35 @@ CHANGES: dict[str, Callable[[Path], object]] = {
 
 
 @pytest.mark.parametrize("change", CHANGES)
-def test_it_falls_with(change: str, standing: StandingReport) -> None:
-    standing.remember()
-    CHANGES[change](standing.outputs)
-    assert not standing.stands()
+def test_it_falls_with(change: str, standing: Callable[[], StandingReport], tmp_path: Path) -> None:
+    standing().remember()
+    CHANGES[change](tmp_path)
+    assert not standing().stands()
 
 
-def test_it_falls_with_code(standing: StandingReport, monkeypatch: pytest.MonkeyPatch) -> None:
-    standing.remember()
+def test_it_falls_with_a_run_that_was_written_while_it_was_drawn(
+    standing: Callable[[], StandingReport], tmp_path: Path
+) -> None:
+    before = standing()
+    write(tmp_path / "runs/1/replicates/0001.mcap", "x")
+    before.remember()
+    assert not standing().stands()
+
+
+def test_it_falls_with_code(
+    standing: Callable[[], StandingReport], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    standing().remember()
     monkeypatch.setattr(standing_reports, "installed_code", lambda: b"other")
-    assert not standing.stands()
+    assert not standing().stands()
 
 
-def test_locks_and_damaged_notes(standing: StandingReport) -> None:
-    standing.remember()
-    write(standing.outputs / "runs/1/.lock", "")
-    assert standing.stands()
-    standing._path.write_bytes(b"damaged")
-    assert not standing.stands()
+def test_locks_and_damaged_notes(standing: Callable[[], StandingReport], tmp_path: Path) -> None:
+    standing().remember()
+    write(tmp_path / "runs/1/.lock", "")
+    assert standing().stands()
+    standing()._path.write_bytes(b"damaged")
+    assert not standing().stands()
 
 
 def test_run_draws_again_only_where_it_must(

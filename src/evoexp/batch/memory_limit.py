@@ -69,12 +69,16 @@ def refuse_large(condition: Condition, allowed: float, label: str = "") -> None:
 
 
 def _needs(condition: Condition) -> tuple[int, float]:
-    """Return the records of a replicate's log, and the planner's estimate of its memory [B]."""
+    """Return the records of a replicate's log, and the planner's estimate of its memory [B].
+
+    Neither depends on the seed.
+    """
 
     def find() -> list[float]:
         planner, problem = condition.prepare()
         return [planner.num_generations + 1, planner.memory(problem)]
 
-    text = condition.to_json()
-    generations, memory = kept_fact("needs", text, component_modules(json.loads(text)), find)
+    config = json.loads(condition.to_json()) | {"seed": 0}
+    about = json.dumps(config, sort_keys=True).encode()
+    generations, memory = kept_fact("needs", about, component_modules(config), find)
     return int(generations), float(memory)

@@ -1,6 +1,6 @@
 """The libraries that worker processes are forked with: importing this module loads them.
 
-One kernel is called as well: at the first call numba sets up its tables for a third of a second.
+One kernel is called as well: at the first call numba sets up what all compiled kernels need.
 """
 
 import coal  # noqa: F401

@@ -1,6 +1,8 @@
 """`evoexp report`: figures, tables and verdicts again, from the outputs alone."""
 
 import argparse
+import functools
+import importlib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -8,7 +10,8 @@ from rich.console import Console
 
 from evoexp.commands.arguments import add_experiment_arguments
 from evoexp.commands.console import plain_console
-from evoexp.commands.drafts import check_reports, draft_of, drafts
+from evoexp.commands.drafts import Draft, check_reports, draft_of, drafts
+from evoexp.commands.drawn_reports import name_reports
 from evoexp.commands.pack import unpacked
 from evoexp.configuration.experiment import Experiment
 from evoexp.configuration.search_path import options
@@ -57,9 +60,16 @@ def main(arguments: argparse.Namespace) -> int:
     found = drafts(arguments)
     if arguments.check:
         return check_reports((draft.files() for draft in found), console)
-    for draft in found:
-        console.print(f"report: {build.write_report(draft.files())}", soft_wrap=True)
-    return 0
+    if len(found) > 1:  # what all copies of this process need
+        importlib.import_module("evoexp.report.style")  # matplotlib
+    return name_reports(
+        [functools.partial(_written, draft) for draft in found],
+        console,
+    )
+
+
+def _written(draft: Draft) -> str:
+    return str(build.write_report(draft.files()))
 
 
 def _with_assumptions(words: Sequence[str], console: Console) -> list[str]:

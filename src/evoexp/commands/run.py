@@ -2,6 +2,8 @@
 
 import argparse
 import contextlib
+import functools
+import importlib
 import shlex
 import sys
 import tempfile
@@ -18,6 +20,7 @@ from evoexp.batch.jobs import Outcome
 from evoexp.batch.runner import Batch
 from evoexp.commands.arguments import add_experiment_arguments, folder_words
 from evoexp.commands.console import add_columns, add_hash_column, new_table, plain_console
+from evoexp.commands.drawn_reports import name_reports
 from evoexp.condition import Condition
 from evoexp.configuration import expansions
 from evoexp.configuration.experiment import Experiment, Labelled
@@ -25,7 +28,7 @@ from evoexp.configuration.search_path import folders
 from evoexp.errors import SettingError, printable
 from evoexp.extras import lacking
 from evoexp.report.pages import page_registration
-from evoexp.report.standing_reports import StandingReport
+from evoexp.report.standing_reports import StandingReport, inputs_of_reports
 from evoexp.store.run_directory import RunDirectory, outputs_root
 from evoexp.store.summaries import summary_table as stored_summaries
 
@@ -49,10 +52,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Run; exit code 1 if a replicate failed."""
     console = plain_console()
-    asked: Any = {"multirun": arguments.multirun, "only": arguments.only}
-    if not expansions.is_kept(arguments.overrides, **asked):
-        _start_server(arguments)  # while experiments are composed
-    experiments = expansions.expand(arguments.overrides, **asked)
+    experiments = expansions.expand(
+        arguments.overrides, multirun=arguments.multirun, only=arguments.only
+    )
     for experiment in experiments:
         page_registration(experiment.report)  # refuses an unknown page before anything is run
     command = _command(arguments)
@@ -83,14 +85,11 @@ def main(arguments: argparse.Namespace) -> int:
             f"{which}: evoexp list --failed; run again with --retry-failed", soft_wrap=True
         )
     try:
-        for experiment in experiments:
-            console.print(summary_table(experiment))
-            if not arguments.no_report:
-                console.print(f"report: {_report(experiment, arguments)}", soft_wrap=True)
+        code = _tell(experiments, arguments, console)
     finally:
         if failures:
             console.print(_failure_table(batch, failures))
-    return 1 if failures or left else 0
+    return code or (1 if failures or left else 0)
 
 
 @contextlib.contextmanager
@@ -102,21 +101,51 @@ def _folder_for_curves(wanted: bool) -> Iterator[Path | None]:
         yield Path(folder)
 
 
-def _report(experiment: Experiment, arguments: argparse.Namespace) -> str:
-    """Draw the report of an experiment, unless it stands as it would be drawn."""
-    directory = outputs_root() / "reports" / experiment.report_name
-    conditions = ((c.label, c.condition.id) for c in experiment.conditions)
-    asked = arguments.overrides, arguments.multirun, arguments.only, arguments.config_dir
-    words = repr((*conditions, experiment.num_replicates, experiment.report, *asked))
-    paths = tuple(folder.path for folder in folders())
-    standing = StandingReport(directory, (experiment.name, words), outputs_root(), paths)
-    if standing.stands():
-        return f"{directory / INDEX} (as it was)"
-    from evoexp.commands.report import of_experiment  # pandas
+def _tell(
+    experiments: Sequence[Experiment], arguments: argparse.Namespace, console: Console
+) -> int:
+    """Print the table of every experiment and the place of its report; return the exit code."""
+    if arguments.no_report:
+        for experiment in experiments:
+            console.print(summary_table(experiment))
+        return 0
+    inputs = inputs_of_reports(outputs_root(), [folder.path for folder in folders()])
+    standing = [_standing(each, arguments, inputs) for each in experiments]
+    stand = [each.stands() for each in standing]
+    if stand.count(False) > 1:  # what all copies of this process need
+        importlib.import_module("evoexp.commands.report")  # pandas
+        importlib.import_module("evoexp.report.style")  # matplotlib
 
-    page = of_experiment(experiment, *asked)
-    standing.remember()
-    return str(page)
+    def drawn(number: int) -> str:
+        page = standing[number].directory / INDEX
+        if stand[number]:
+            return f"{page} (as it was)"
+        from evoexp.commands.report import of_experiment
+
+        of_experiment(experiments[number], *_asked(arguments))
+        standing[number].remember()
+        return str(page)
+
+    return name_reports(
+        [functools.partial(drawn, number) for number in range(len(experiments))],
+        console,
+        before=lambda number: console.print(summary_table(experiments[number])),
+    )
+
+
+def _standing(
+    experiment: Experiment, arguments: argparse.Namespace, inputs: bytes
+) -> StandingReport:
+    """Return the report of an experiment, which may stand as it would be drawn."""
+    conditions = ((c.label, c.condition.id) for c in experiment.conditions)
+    words = repr((*conditions, experiment.num_replicates, experiment.report, *_asked(arguments)))
+    directory = outputs_root() / "reports" / experiment.report_name
+    return StandingReport(directory, (experiment.name, words), inputs)
+
+
+def _asked(arguments: argparse.Namespace) -> tuple[Any, ...]:
+    """Return the words that ask for a report."""
+    return arguments.overrides, arguments.multirun, arguments.only, arguments.config_dir
 
 
 def _that_can_run(experiment: Experiment, console: Console) -> list[Labelled]:

@@ -61,14 +61,6 @@ def expand(
     return experiments
 
 
-def is_kept(overrides: Sequence[str], *, multirun: bool = False, only: Sequence[str] = ()) -> bool:
-    """Return whether an expansion is kept, so that nothing has to be composed."""
-    if parts := _by_experiment(overrides, multirun):
-        return all(is_kept(part, multirun=_has_sweep(part), only=only) for part in parts)
-    path = _path(overrides, multirun, list(only))
-    return path is not None and path.is_file()
-
-
 def _by_experiment(overrides: Sequence[str], multirun: bool) -> list[list[str]]:
     """Return the overrides of each experiment, if several options of that group are swept over."""
     places = [k for k, word in enumerate(overrides) if word.startswith(f"{EXPERIMENT}=")]

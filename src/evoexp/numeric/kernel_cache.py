@@ -6,6 +6,7 @@ not at the files of the functions that the kernel calls. Here it is told of the 
 """
 
 import contextlib
+import functools
 import hashlib
 import importlib
 import os
@@ -17,10 +18,11 @@ from typing import Any
 import numba
 from filelock import BaseFileLock, FileLock, Timeout
 from numba.core import caching
+from numba.core.runtime.nrt import rtsys
 
 from evoexp.numeric.code_keys import is_kernel_module, module_key, written_since
 from evoexp.numeric.kept_files import MESSAGES, cache_root
-from evoexp.numeric.kernel_files import KernelFiles
+from evoexp.numeric.kept_libraries import FORMAT, LibraryFiles, use_kept_libraries
 
 NUM_KEPT_CACHES = 4  # [-] states of a module whose compiled kernels are kept
 KEPT_S = 86_400.0  # [s] and any that was used so lately
@@ -36,7 +38,7 @@ class ContentLocator(caching._CacheLocator):
         """Name the folder; nothing is written before a kernel is saved."""
         self._py_file = py_file  # numba names it where a function cannot be kept
         self._code = code
-        self._path = cache_root() / "kernels" / module / module_key(module)[:16]
+        self._path = cache_root() / "kernels" / module / f"{module_key(module)[:16]}{FORMAT}"
 
     @classmethod
     def from_function(cls, py_func: Any, py_file: str) -> "ContentLocator | None":
@@ -70,16 +72,17 @@ class _OpenedCache(caching.FunctionCache):
     def __init__(self, function: Any) -> None:
         """Open the cache; nothing is locked."""
         super().__init__(function)
-        files: Any = KernelFiles(Path(self._cache_path), self._impl.filename_base)
+        files: Any = LibraryFiles(Path(self._cache_path), self._impl.filename_base)
         self._cache_file = files
         self._held: BaseFileLock | None = None
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
         """Return the compiled kernel; None, and hold the lock, where it is to be compiled here."""
         self._release()  # held still where a compilation failed
-        found = super().load_overload(signature, target_context)
+        found = self._loaded(signature, target_context)
         if found is not None:
             return found
+        _spare_blas()
         with contextlib.suppress(OSError, Timeout):
             Path(self._cache_path).mkdir(parents=True, exist_ok=True)
             lock = FileLock(f"{self._cache_path}/{self._impl.filename_base}.lock")
@@ -89,6 +92,16 @@ class _OpenedCache(caching.FunctionCache):
             if found is not None:
                 self._release()
         return found
+
+    def _loaded(self, signature: Any, target_context: Any) -> Any:
+        """Return the compiled kernel, if it is kept.
+
+        numba's own way loads all that it can compile first, which takes a tenth of a second;
+        machine code needs the counts of references only.
+        """
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(signature, target_context)
 
     def save_overload(self, signature: Any, data: Any) -> None:
         """Keep a kernel that was compiled, and let those go on that wait for it.
@@ -141,11 +154,14 @@ def use_content_cache() -> None:
     """Have numba keep kernels by their content, from now on, in this process and its children."""
     config: Any = numba.config
     config.CACHE_LOCATOR_CLASSES = f"{__name__}.{ContentLocator.__name__},{_LOCATORS}"
-    _spare_blas()
+    use_kept_libraries()
 
 
+@functools.cache
 def _spare_blas() -> None:
     """Have numba believe in BLAS unseen: to look for it, it loads scipy.linalg, which takes 0.2 s.
+
+    To be called before anything is compiled.
 
     A kernel that does use BLAS loads it when it is compiled; none of ours does, as BLAS is not
     reproducible bit by bit.

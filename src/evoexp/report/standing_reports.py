@@ -11,8 +11,9 @@ import importlib.metadata
 import json
 import os
 import sys
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from evoexp.numeric.kept_files import Damaged, cache_root, read_kept, write_kept
 from evoexp.store.kept_facts import file_stamps, installed_code
@@ -27,14 +28,12 @@ class StandingReport(NamedTuple):
     Attributes:
         directory: Its folder.
         asked: What it was asked for in, words and identities that it follows from.
-        outputs: Root of all outputs.
-        folders: Folders of options.
+        inputs: Hash of all else that it follows from, as it was before it was drawn.
     """
 
     directory: Path
     asked: tuple[str, ...]
-    outputs: Path
-    folders: tuple[Path, ...]
+    inputs: bytes
 
     def stands(self) -> bool:
         """Whether it would be drawn as it is."""
@@ -54,10 +53,24 @@ class StandingReport(NamedTuple):
 
     def _state(self) -> bytes:
         """Return the hash of all that it follows from, and of its files."""
-        versions = [sys.version, *(importlib.metadata.version(name) for name in _DRAWERS)]
-        digest = hashlib.sha256(json.dumps([*versions, *self.asked]).encode())
-        digest.update(installed_code())
-        roots = _PACKAGE / "assets", *self.folders, self.outputs / "runs", self.directory
-        for stamp in file_stamps(roots):
-            digest.update(json.dumps(stamp).encode(errors="surrogateescape"))
+        digest = hashlib.sha256(json.dumps(self.asked).encode() + self.inputs)
+        _add_stamps(digest, [self.directory])
         return digest.hexdigest().encode()
+
+
+def inputs_of_reports(outputs: Path, folders: Sequence[Path]) -> bytes:
+    """Return the hash of all that reports follow from, now, but what each was asked for in.
+
+    Args:
+        outputs: Root of all outputs.
+        folders: Folders of options.
+    """
+    versions = [sys.version, *(importlib.metadata.version(name) for name in _DRAWERS)]
+    digest = hashlib.sha256(json.dumps(versions).encode() + installed_code())
+    _add_stamps(digest, [_PACKAGE / "assets", *folders, outputs / "runs"])
+    return digest.digest()
+
+
+def _add_stamps(digest: Any, roots: Iterable[Path]) -> None:
+    for stamp in file_stamps(roots):
+        digest.update(json.dumps(stamp).encode(errors="surrogateescape"))

@@ -65,7 +65,8 @@ def _write_all(files: Sequence[_File]) -> None:
     stop, locks = threading.Event(), [threading.Lock() for _ in shares]
     try:
         given = zip(shares, locks, strict=True)
-        writing = [_threads().submit(_write_share, share, stop, lock) for share, lock in given]
+        threads = _threads(os.getpid())
+        writing = [threads.submit(_write_share, share, stop, lock) for share, lock in given]
         wait(writing)  # for all of them, whatever happens to one
     except BaseException:  # Ctrl-C: no thread writes a file that is then removed
         stop.set()
@@ -87,8 +88,12 @@ def _write_share(files: Sequence[_File], stop: threading.Event, lock: threading.
 
 
 @cache
-def _threads() -> ThreadPoolExecutor:
-    """Return the threads that write; they stay, as starting them takes as long as two files."""
+def _threads(process: int) -> ThreadPoolExecutor:
+    """Return the threads that write; they stay, as starting them takes as long as two files.
+
+    Args:
+        process: Whose they are: a copy of a process that has them needs its own.
+    """
     return ThreadPoolExecutor(NUM_THREADS, "write")
 
 

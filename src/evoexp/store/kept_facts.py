@@ -43,15 +43,31 @@ def kept_fact(kind: str, about: bytes, modules: Iterable[str], find: Callable[[]
     """
     if set(modules) <= sys.modules.keys() - _LOADED_HERE:
         return find()
+
+    def found() -> Any:
+        before = set(sys.modules)
+        fact = find()
+        _LOADED_HERE.update(sys.modules.keys() - before)
+        return fact
+
+    return kept_answer(kind, about, found)
+
+
+def kept_answer(kind: str, about: bytes, find: Callable[[], Any]) -> Any:
+    """Return an answer that takes long to find whatever is loaded, from where it is kept.
+
+    Args:
+        kind: Of the answer.
+        about: Everything but the code that it follows from.
+        find: Finds it, as plain data; what it raises is not kept.
+    """
     digest = hashlib.sha256(installed_code())
     digest.update(json.dumps([kind, *_versions()]).encode())
     digest.update(about)
     path = cache_root() / "facts" / digest.hexdigest()[:32]
     with contextlib.suppress(FileNotFoundError, Damaged):
         return json.loads(read_kept(path))
-    before = set(sys.modules)
     found = find()
-    _LOADED_HERE.update(sys.modules.keys() - before)
     with contextlib.suppress(OSError):
         write_kept(path, json.dumps(found).encode())
     return found

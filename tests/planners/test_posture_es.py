@@ -23,8 +23,9 @@ FREE = ("corsepius_ball", "collision=corsepius_capsules")
 def differs(given: Any, fault: str = "") -> bool:
     """Return whether any generation is another one than that of the slow search."""
     planner, problem = given.prepare()
-    expected = posture_es_python.cycles(problem, planner, given.rng(0), fault)
-    found = planner.evolve(problem, given.rng(0))
+    rng, slow_rng = given.rng(0), given.rng(0)
+    expected = posture_es_python.cycles(problem, planner, slow_rng, fault)
+    found = planner.evolve(problem, rng)
     last = float(len(problem.phases))
     for ours, theirs in itertools.zip_longest(found, expected):
         if ours is None or theirs is None or ours.population.shape != theirs.postures.shape:
@@ -32,6 +33,7 @@ def differs(given: Any, fault: str = "") -> bool:
         searched_last = ours.terms["phase"] == last
         costs = np.where(theirs.feasible, theirs.costs, np.inf)
         same = (
+            rng.bit_generator.state == slow_rng.bit_generator.state,
             np.array_equal(ours.population, theirs.postures),
             np.array_equal(np.ravel(ours.costs), theirs.costs),
             np.array_equal(ours.best, np.ravel(theirs.best)),
@@ -72,6 +74,15 @@ def differs(given: Any, fault: str = "") -> bool:
 )
 def test_generations_are_those_of_the_slow_search(name: str, overrides: tuple[str, ...]) -> None:
     assert not differs(condition(name, *overrides))
+
+
+@pytest.mark.parametrize("stretch", [1, 3])
+def test_cycles_are_the_same_however_many_are_done_per_call(
+    stretch: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("evoexp.planners.posture_es.cycles.STRETCH", stretch)
+    words = ("ga.initial_size=30", "ga.num_immigrants=2", "ga.mutation=gaussian")
+    assert not differs(condition("corsepius_pick_and_place", *words))
 
 
 @pytest.mark.parametrize("fault", ["no selection", "no mutation", "no crossover"])

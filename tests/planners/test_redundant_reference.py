@@ -44,17 +44,21 @@ def condition(
 def largest_difference(given: Any, seed: int, fault: str = "") -> tuple[float, set[int]]:
     """Return the largest difference of genomes and costs, and the sub-paths that were searched.
 
-    It is inf where the runs differ in length, or one finds infeasible whom the other does not.
+    It is inf where the runs differ in length, one finds infeasible whom the other does not, or the
+    random generators are not at the same place.
     """
     planner = given.planner
-    ours = planner.evolve(planner.prepare(given.robot, given.scenario), np.random.default_rng(seed))
-    theirs = lavoie_numpy.evolve(given, np.random.default_rng(seed), fault)
+    rng, slow_rng = np.random.default_rng(seed), np.random.default_rng(seed)
+    ours = planner.evolve(planner.prepare(given.robot, given.scenario), rng)
+    theirs = lavoie_numpy.evolve(given, slow_rng, fault)
     largest, searched, count = 0.0, set(), 0
     for found, expected in itertools.zip_longest(ours, theirs):
         if found is None or expected is None:
             return np.inf, searched
         finite, count = np.isfinite(expected.costs), count + 1
         same_search = (found.terms["attempts"], found.terms["sub_path"]) == expected[:2]
+        same_place = rng.bit_generator.state == slow_rng.bit_generator.state
+        same_search = same_search and same_place
         if not same_search or not np.array_equal(np.isfinite(found.costs[0]), finite):
             return np.inf, searched
         assert found.num_feasible == np.count_nonzero(finite)
@@ -89,6 +93,14 @@ def test_generations_agree_to_rounding(changes: dict[str, Any]) -> None:
     difference, searched = largest_difference(condition(**changes), 0)
     assert difference < ROUNDING
     assert 1 in searched
+
+
+@pytest.mark.parametrize("stretch", [1, 3])
+def test_generations_agree_however_many_are_computed_per_call(
+    stretch: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("evoexp.planners.redundant_ga.sub_path.STRETCH", stretch)
+    assert largest_difference(condition(stop_cost_sp1=6.0, mutation="gaussian"), 0)[0] < ROUNDING
 
 
 def test_generations_of_bits_agree_to_rounding() -> None:

@@ -103,6 +103,22 @@ def test_the_first_generation_is_that_of_the_algorithm_and_none_descends_from_an
     assert not np.isin(second.population, before).any()
 
 
+def test_draws_are_the_same_however_many_are_made_per_call(monkeypatch: pytest.MonkeyPatch) -> None:
+    planner, problem = condition(*SMALL, "planner.stop_cost_sp1=9").prepare()
+    runs = []
+    for stretch in (1, 3, 8):
+        monkeypatch.setattr("evoexp.planners.redundant_ga.sub_path.STRETCH", stretch)
+        rng = np.random.default_rng(2)
+        runs.append(
+            [
+                (each.population.tobytes(), each.costs.tobytes(), str(rng.bit_generator.state))
+                for each in planner.evolve(problem, rng)
+            ]
+        )
+    assert runs[0] == runs[1] == runs[2]
+    assert len(runs[0]) > 9
+
+
 def test_without_offspring_nothing_is_drawn_after_the_first_population() -> None:
     planner, problem = condition(*SMALL, "ga.num_elites=60").prepare()
     searches = set()

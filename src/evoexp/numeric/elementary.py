@@ -346,10 +346,24 @@ def fill_standard_normal(rng: np.random.Generator, out: NDArray[np.float64]) -> 
         pairs[2 * i + 1] = v
         s[i] = u * u + v * v
         i += 1 if 0.0 < s[i] < 1.0 else 0
-    for i in range(num_pairs):
-        s[i] = math.sqrt(-2.0 * log(s[i]) / s[i])
+    scale_to_normal(pairs, s, out)
+
+
+@kernel
+def scale_to_normal(
+    pairs: NDArray[np.float64], squares: NDArray[np.float64], out: NDArray[np.float64]
+) -> None:
+    """Write standard normal deviates of points in the unit disc (Marsaglia & Bray 1964).
+
+    Args:
+        pairs: (≥ n) coordinates of uniform points, pair by pair.
+        squares: (≥ n / 2) their squared distances from the centre, in (0, 1); overwritten.
+        out: (n,) written.
+    """
+    for i in range(len(squares)):
+        squares[i] = math.sqrt(-2.0 * log(squares[i]) / squares[i])
     for i in range(out.size):
-        out[i] = pairs[i] * s[i // 2]
+        out[i] = pairs[i] * squares[i // 2]
 
 
 def standard_normal(rng: np.random.Generator, size: int | tuple[int, ...]) -> NDArray[np.float64]:

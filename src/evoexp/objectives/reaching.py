@@ -4,9 +4,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from evoexp.numeric.compilation import kernel
+from evoexp.numeric.compilation import inlined, kernel
 from evoexp.numeric.elementary import sincos
-from evoexp.numeric.vectors import LANES, load, root, select, spread, store
+from evoexp.numeric.vectors import LANES, Vector, load, root, select, spread, store
 from evoexp.records import FloatArray, IntArray
 from evoexp.robots.kinematics import U
 from evoexp.robots.planar_ends import VECTOR, PlanarArm, block_ends, load_lanes
@@ -69,20 +69,13 @@ def measure_reach(
         load_lanes(starts, lanes, first, count, begin)
         load_lanes(ends, lanes, first, count, end)
         block_ends(begin, end, arm, 1, 1, x, y)
-        # displacement (Eq. 2)
+        # displacement (Eq. 2), position error (Eq. 1), cost (Eq. 4)
         squares = spread(0.0)
         for k in range(len(starts)):
             turn = load(begin, U(k) * VECTOR) - load(end, U(k) * VECTOR)
             squares = squares + turn * turn
-        # position error (Eq. 1), cost (Eq. 4)
-        tip_x, tip_y, outside = load(x, U(rows)), load(y, U(rows)), spread(np.inf)
-        off_x, off_y = tip_x - target[0], tip_y - target[1]
-        off, turned = root(off_x * off_x + off_y * off_y), root(squares)
-        worth = weights[0] * off + weights[1] * turned
-        worth = select(tip_x < box[0], outside, worth)
-        worth = select(box[1] < tip_x, outside, worth)
-        worth = select(tip_y < box[2], outside, worth)
-        worth = select(box[3] < tip_y, outside, worth)
+        tip_x, tip_y = load(x, U(rows)), load(y, U(rows))
+        worth, off, turned = _weigh(tip_x, tip_y, squares, target, box, weights)
         store(found, U(0), worth)
         store(found, VECTOR, off)
         store(found, U(2) * VECTOR, turned)
@@ -93,6 +86,27 @@ def measure_reach(
                 found[LANES + n],
                 found[2 * LANES + n],
             )
+
+
+@inlined
+def _weigh(
+    tip_x: Vector,
+    tip_y: Vector,
+    squares: Vector,
+    target: FloatArray,
+    box: FloatArray,
+    weights: tuple[float, float],
+) -> tuple[Vector, Vector, Vector]:
+    """Return cost (Eq. 4), position error (Eq. 1) and displacement (Eq. 2) of eight individuals."""
+    outside = spread(np.inf)
+    off_x, off_y = tip_x - target[0], tip_y - target[1]
+    off, turned = root(off_x * off_x + off_y * off_y), root(squares)
+    worth = weights[0] * off + weights[1] * turned
+    worth = select(tip_x < box[0], outside, worth)
+    worth = select(box[1] < tip_x, outside, worth)
+    worth = select(tip_y < box[2], outside, worth)
+    worth = select(box[3] < tip_y, outside, worth)
+    return worth, off, turned
 
 
 @kernel
@@ -110,43 +124,35 @@ def measure_reach_from(
 ) -> None:
     """Measure a whole table of individuals from one start, bit for bit as `measure_reach` does.
 
-    Nothing is gathered, and only the tip is computed: joint after joint, all individuals at once.
+    Nothing is gathered, and of the links only the last one's end is written.
 
     Args:
         start: (N,) [rad].
-        ends: (N, ≥ count).
+        ends: (N, ≥ count, filled up to whole vectors).
         count: Number of individuals.
         arm: See `planar_ends.block_ends`.
         target: As of `measure_reach`, and so are `box` and `weights`.
         box: See there.
         weights: See there.
-        cost: (≥ count,) written, and so are `error` and `displacement`.
+        cost: (≥ count, filled up to whole vectors) written, and so are `error` and `displacement`;
+            behind `count` anything.
         error: See there.
         displacement: See there.
     """
     lengths, base_x, base_y, base_angle = arm
-    angle = np.empty(count)
-    tip_x, tip_y, turned = cost, error, displacement  # sums, until the last joint
-    for n in range(count):
-        angle[n], tip_x[n], tip_y[n], turned[n] = base_angle, base_x, base_y, 0.0
-    # links one after the other
-    for k in range(len(start)):
-        row, begin, length = ends[k], start[k], lengths[k]
-        for n in range(count):
-            direction, turn = angle[n] + row[n], begin - row[n]
-            s, c = sincos(direction)
-            tip_x[n] += length * c
-            tip_y[n] += length * s
-            turned[n] += turn * turn
-            angle[n] = direction
-    # errors and costs in place of the sums
-    for n in range(count):
-        x, y = tip_x[n], tip_y[n]
-        off_x, off_y = x - target[0], y - target[1]
-        off, way = np.sqrt(off_x * off_x + off_y * off_y), np.sqrt(turned[n])
-        worth = weights[0] * off + weights[1] * way
-        worth = worth if box[0] <= x else np.inf
-        worth = worth if x <= box[1] else np.inf
-        worth = worth if box[2] <= y else np.inf
-        worth = worth if y <= box[3] else np.inf
-        cost[n], error[n], displacement[n] = worth, off, way
+    flat, width = ends.reshape(-1), U(ends.shape[1])
+    for first in range(0, count, LANES):
+        at = U(first)
+        angle, squares = spread(base_angle), spread(0.0)
+        tip_x, tip_y = spread(base_x), spread(base_y)
+        for k in range(len(start)):
+            own = load(flat, U(k) * width + at)
+            turn = start[k] - own
+            angle = angle + own
+            s, c = sincos(angle)
+            tip_x, tip_y = tip_x + lengths[k] * c, tip_y + lengths[k] * s
+            squares = squares + turn * turn
+        worth, off, turned = _weigh(tip_x, tip_y, squares, target, box, weights)
+        store(cost, at, worth)
+        store(error, at, off)
+        store(displacement, at, turned)

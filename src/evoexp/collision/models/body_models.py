@@ -205,7 +205,8 @@ class BodyModel(NamedTuple):
             columns: Any = zip(shapes, extra, strict=True)
             shapes = Shapes(*(np.concatenate(both) for both in columns))
             pairs = (*pairs, *((body, own) for body in carried.watched))
-        return PrimitiveCollision.build(model, shapes, obstacles, pairs, ignored, of_joint)
+        table = self.assembly.table
+        return PrimitiveCollision.build(model, shapes, obstacles, pairs, ignored, of_joint, table)
 
     def touching(
         self,
@@ -241,8 +242,9 @@ class BodyModel(NamedTuple):
         shapes = Shapes(*(np.concatenate(column) for column in columns))
         every = ((body, k) for body in found for k in range(len(obstacles.kind)))
         ignored = tuple(pair for pair in every if pair not in allowed)
-        model = self.assembly.model
-        return PrimitiveCollision.build(model, shapes, obstacles, (), ignored, [0] * model.njoints)
+        model, table = self.assembly.model, self.assembly.table
+        arms = [0] * model.njoints
+        return PrimitiveCollision.build(model, shapes, obstacles, (), ignored, arms, table)
 
 
 class Carried(NamedTuple):

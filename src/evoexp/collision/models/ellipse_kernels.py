@@ -116,6 +116,18 @@ class Memory(NamedTuple):
     turn: FloatArray
 
 
+class PathChecks(NamedTuple):
+    """Boxes and scratch that all checks of an arm among the same ellipses share.
+
+    Attributes:
+        boxes: Around the ellipses.
+        memory: Scratch.
+    """
+
+    boxes: Boxes
+    memory: Memory
+
+
 @kernel
 def paths_collide(
     starts: FloatArray,
@@ -139,8 +151,14 @@ def paths_collide(
         path: The positions that are tested.
         hit: (individuals,) written for those tested: whether each collides.
     """
-    num, rows = len(starts), len(starts) * LANES
-    vectors = (len(ellipses.maps) + LANES - 1) // LANES
+    checks = prepare_checks(ellipses, len(starts), count)
+    check_paths(starts, ends, lanes, count, arm, ellipses, path, hit, checks)
+
+
+@kernel
+def prepare_checks(ellipses: Ellipses, num: int, count: int) -> PathChecks:
+    """Make boxes and scratch for `check_paths`: an arm of `num` links, at most `count` paths."""
+    rows, vectors = num * LANES, (len(ellipses.maps) + LANES - 1) // LANES
     memory = Memory(
         np.empty(count + LANES, dtype=np.int64),
         np.empty(rows),
@@ -151,8 +169,7 @@ def paths_collide(
         np.empty((2, vectors, num + 1), dtype=np.int64),
         np.empty(4 * rows),
     )
-    boxes = _boxes(ellipses, num, vectors)
-    _test_paths(starts, ends, lanes, count, arm, ellipses, boxes, path, hit, memory)
+    return PathChecks(_boxes(ellipses, num, vectors), memory)
 
 
 @kernel
@@ -182,21 +199,32 @@ def _boxes(ellipses: Ellipses, num: int, vectors: int) -> Boxes:
 
 
 @kernel
-def _test_paths(
+def check_paths(
     starts: FloatArray,
     ends: FloatArray,
     lanes: IntArray,
     count: int,
     arm: PlanarArm,
     ellipses: Ellipses,
-    boxes: Boxes,
     path: TestedPath,
     hit: BoolArray,
-    memory: Memory,
+    checks: PathChecks,
 ) -> None:
-    """Do the work of `paths_collide` in given memory, so that inner loops count no references."""
-    starts, ends, lanes, arm, ellipses, boxes, hit, memory = borrowed(
-        (starts, ends, lanes, arm, ellipses, boxes, hit, memory)
+    """Do the work of `paths_collide` with what is prepared, as often as paths are to be tested.
+
+    Args:
+        starts: As of `paths_collide`, and so are all but `checks`.
+        ends: See there.
+        lanes: See there.
+        count: See there.
+        arm: See there.
+        ellipses: See there.
+        path: See there.
+        hit: See there.
+        checks: Of `prepare_checks`; given, so that inner loops count no references.
+    """
+    starts, ends, lanes, arm, ellipses, hit, (boxes, memory) = borrowed(
+        (starts, ends, lanes, arm, ellipses, hit, checks)
     )
     alive, begin, end, x, y = memory.alive, memory.begin, memory.end, memory.x, memory.y
     alive[:count] = lanes[:count]

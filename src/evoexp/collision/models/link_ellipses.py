@@ -1,5 +1,6 @@
 """The collision model of Lavoie & Boudreau 2001: a planar arm's links as lines among ellipses."""
 
+from functools import cache
 from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -99,9 +100,7 @@ class EllipseCollision(NamedTuple):
     @property
     def path(self) -> TestedPath:
         """The positions tested: the end, halves, quarters, …; all again if chords are swept."""
-        first = _spread(self.num_positions)
-        first = first[:NUM_FIRST] if self.chords else first
-        return TestedPath(self.num_positions, first, self.chords)
+        return _tested_path(self.num_positions, self.chords)
 
     @property
     def queries(self) -> int:
@@ -163,6 +162,13 @@ def _first_link(arm: PlanarArm, center: FloatArray, rotation: FloatArray, size: 
     nearest = float(np.sqrt(np.sum(off * off))) * (1.0 - 1e-9)
     within = np.flatnonzero(np.cumsum(lengths) >= nearest)
     return int(within[0]) + 1 if len(within) else len(lengths) + 2
+
+
+@cache
+def _tested_path(num_positions: int, chords: bool) -> TestedPath:
+    """Return the positions that are tested, made once: every judged plan asks for them."""
+    first = _spread(num_positions)
+    return TestedPath(num_positions, first[:NUM_FIRST] if chords else first, chords)
 
 
 def _spread(num_positions: int) -> IntArray:

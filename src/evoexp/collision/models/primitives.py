@@ -138,6 +138,7 @@ class PrimitiveCollision(NamedTuple):
         pairs: Pairs | None = None,
         ignored: Pairs = (),
         arms: Sequence[int] | None = None,
+        table: KinematicTable | None = None,
     ) -> "PrimitiveCollision":
         """Return the collision model of a robot among obstacles, ready for batches.
 
@@ -152,12 +153,14 @@ class PrimitiveCollision(NamedTuple):
                 stands on.
             arms: Which arm each joint of the model belongs to, the world included; `arms_of_joints`
                 if not given. Negative numbers belong to every arm.
+            table: The model's kinematic table, if it is known.
 
         Raises:
             UnsupportedJoint: If a joint has not exactly one coordinate.
             ValueError: If shapes, pairs or arms do not fit the model.
         """
-        shapes, table = shapes.checked(model), kinematic_table(model)
+        shapes = shapes.checked(model)
+        table = kinematic_table(model) if table is None else table
         numbers, first = np.unique(shapes.labels, return_index=True)
         joints = shapes.joint[first]
         units, own, parts = pack_shapes(table, shapes, numbers, joints)

@@ -5,62 +5,80 @@ from typing import Any
 
 import numpy as np
 
-from evoexp.numeric.elementary import standard_normal
+from evoexp.evolution.cost_statistics import cost_statistics
+from evoexp.numeric.named_tuples import plain
+from evoexp.numeric.random_twin import Twin, fill_normals, fill_uniforms
 from evoexp.planners.posture_es import kernels
 from evoexp.planners.posture_es.kernels import (
     COST,
     EQUAL,
     GAUSSIAN,
     NORMAL,
+    ROWS,
     UNIFORM,
     Members,
     Memory,
     Strategy,
 )
+from evoexp.planners.posture_es.phase_kernels import (
+    Cycles,
+    Nodes,
+    Parents,
+    Scratch,
+    line_of,
+    run_cycles,
+    settle_one,
+)
 from evoexp.planners.posture_es.settings import StrategySettings
 from evoexp.records import FloatArray, IntArray
 
 ROOM = 256  # nodes of the ancestry that memory is first made for
+STRETCH = 8  # cycles per call, at most,
+MEMORY = 2**20  # [B] whose offspring and terms should not take more than this
 
 
 class Ancestry:
     """Postures that became parents, and of each its own parent: the paths of all individuals.
 
     Attributes:
-        count: Number of postures.
+        nodes: As the kernels append to them.
     """
 
-    def __init__(self, nq: int) -> None:
-        self.postures, self.parents = np.empty((ROOM, nq)), np.empty(ROOM, dtype=np.int64)
-        self.count = 0
+    def __init__(self, start: FloatArray) -> None:
+        """Begin with the start (nq,) as node 0."""
+        self.nodes = Nodes(
+            np.empty((ROOM, len(start))), np.empty(ROOM, dtype=np.int64), np.ones(1, dtype=np.int64)
+        )
+        self.nodes.postures[0], self.nodes.parents[0] = start, -1
 
-    def add(self, postures: FloatArray, parents: Any) -> IntArray:
-        """Append postures (n, nq) with their parents' nodes (−1: none); return their nodes."""
-        stop = self.count + len(postures)
-        while stop > len(self.parents):
-            self.postures = np.concatenate([self.postures, np.empty_like(self.postures)])
-            self.parents = np.concatenate([self.parents, np.empty_like(self.parents)])
-        nodes = np.arange(self.count, stop)
-        self.postures[nodes], self.parents[nodes] = postures, parents
-        self.count = stop
-        return nodes
+    def make_room(self, num: int) -> None:
+        """Make room for more nodes."""
+        postures, parents, count = self.nodes
+        while count[0] + num > len(parents):
+            postures = np.concatenate([postures, np.empty_like(postures)])
+            parents = np.concatenate([parents, np.empty_like(parents)])
+        self.nodes = Nodes(postures, parents, count)
+
+    def posture(self, node: int) -> FloatArray:
+        """Return the posture of a node, (nq,)."""
+        return np.asarray(self.nodes.postures[node])
 
     def path(self, node: int) -> FloatArray:
         """Return the postures from the first ancestor to a node, (postures, nq)."""
-        line = [node]
-        while self.parents[line[-1]] >= 0:
-            line.append(int(self.parents[line[-1]]))
-        return np.asarray(self.postures[line[::-1]])
+        return line_of(self.nodes.postures, self.nodes.parents, node)
 
 
 class Search:
-    """One phase being searched.
+    """One phase being searched; several cycles are done per call, and shown one after the other.
 
     Attributes:
-        memory: The individuals of the last cycle.
+        offspring: (nq, individuals) of the last cycle, a copy: one array for all of a size [rad].
+        costs: (individuals,) of the last cycle; a view.
+        summary: Least cost of any so far; lowest of the cycle, feasible or not; mean and deviation
+            of the feasible.
+        num_feasible: Feasible individuals of the cycle.
         best: Node of the best so far: the winner once there is one.
-        best_row: (ROWS,) its terms and cost.
-        least_cost: Least cost of any so far.
+        best_row: (ROWS,) its terms and cost; a view.
         cycles: Cycles so far.
         idle: Cycles since the last improvement.
         won: Whether somebody meets the goal.
@@ -74,6 +92,7 @@ class Search:
         edge_check: int,
         ancestry: Ancestry,
         node: int,
+        twin: Twin,
         accepts: Callable[[FloatArray, FloatArray], bool] | None = None,
     ) -> None:
         """Begin a phase.
@@ -85,11 +104,12 @@ class Search:
             edge_check: As in `kernels.Strategy`.
             ancestry: Of all phases.
             node: Where the phase begins.
+            twin: Of the generator, the source of all random numbers.
             accepts: Whether a parent (nq,) may have a child (nq,); None: any.
         """
-        self._accepts = accepts
-        self.ga, self.judging, self.ancestry = ga, stage.judging, ancestry
-        self._nq, room = len(problem.scope), ga.num_parents
+        self._accepts, self._twin = accepts, twin
+        self.ga, self._judging, self.ancestry = ga, stage.judging, ancestry
+        nq, room = len(problem.scope), ga.num_parents
         self._strategy = Strategy(
             problem.scope * stage.phase.scope_share,
             problem.limits,
@@ -101,90 +121,119 @@ class Search:
             ga.selection == "plus",
             edge_check,
         )
-        self._members = Members(np.empty((self._nq, room)), np.empty(room), 1)
-        self._nodes = np.full(room, node)
+        self._plain = plain(self._strategy), plain(self._judging)
+        self._parents = Parents(
+            np.empty((nq, room)),
+            np.empty(room),
+            np.full(room, node),
+            np.ones(1, dtype=np.int64),
+        )
         # the posture that the phase begins with is judged, and is the first parent
-        self.memory = Memory.of(self._nq, 1)
-        self.memory.offspring[:, 0] = self._members.postures[:, 0] = ancestry.postures[node]
-        kernels.judge(self.memory.offspring, self.judging, *self.memory[2:])
-        self.best, self.best_row = node, self.memory.rows[:, 0].copy()
-        self._members.costs[0] = self.least_cost = float(self.best_row[COST])
-        self.cycles = self.idle = 0
-        self.won = bool(self.memory.met[0])
+        self._done, memory = Cycles.of(nq, 1, 1), Memory.of(nq, 1)
+        self.offspring = ancestry.posture(node)[:, None].copy()
+        self._parents.postures[:, 0] = self.offspring[:, 0]
+        kernels.judge(self.offspring, self._judging, *memory[2:])
+        costs, feasible = memory.rows[COST], memory.feasible
+        usable = cost_statistics(np.where(feasible, costs, np.inf))
+        self._parents.costs[0] = costs[0]
+        self._done.rows[0], self._done.best_rows[0] = memory.rows, memory.rows[:, 0]
+        self._done.counts[0] = node, 0, memory.met[0], feasible[0]
+        self._done.costs[0] = costs[0], costs[0], usable.mean, usable.std
+        self._known = self.cycles = 0
+        self._show(0)
 
-    def advance(self, rng: np.random.Generator) -> None:
-        """Do one cycle."""
-        ga, nq = self.ga, self._nq
-        bred = ga.num_offspring if self.cycles else ga.initial_size
+    def advance(self) -> None:
+        """Go on to the next cycle."""
+        if self.cycles == self._known:
+            self._known = self._go_on()
+        self.cycles += 1
+        place = self.cycles % len(self._done.counts)
+        self._twin.follow(self._done.states[place])
+        np.copyto(self.offspring, self._done.offspring[place])
+        self._show(place)
+
+    def _show(self, place: int) -> None:
+        """Show a cycle that is done."""
+        done = self._done
+        self.costs, self.best_row = done.rows[place, COST], done.best_rows[place]
+        self.summary: list[float] = done.costs[place].tolist()
+        self.best, self.idle, won, self.num_feasible = done.counts[place].tolist()
+        self.won = won > 0
+
+    def _go_on(self) -> int:
+        """Do the next cycles; return the last one that was done."""
+        ga, first = self.ga, self.cycles
+        bred = ga.num_offspring if first else ga.initial_size
+        room = 8 * (len(self.offspring) + ROWS) * (bred + ga.num_immigrants)
+        stretch = max(1, min(STRETCH, MEMORY // room))
+        if self._accepts is not None or (first == 0 and ga.initial_size != ga.num_offspring):
+            stretch = 1
+        if first == 0 or self.offspring.shape[1] != bred + ga.num_immigrants:
+            self._enter(bred, min(stretch, ga.num_generations - first) + 1)
+        last = min(first + min(stretch, len(self._done.counts) - 1), ga.num_generations)
+        self.ancestry.make_room((last - first) * (ga.num_parents + 1))
+        self._twin.meet()
+        if self._accepts is not None:
+            self._do_one(bred, self._accepts)
+            return last
+        arrays = self._parents, self.ancestry.nodes, self._done, self._scratch
+        limits, words = (first, last, bred, ga.patience), self._twin.words
+        return run_cycles(words, *limits, *self._plain, *(tuple(each) for each in arrays))
+
+    def _enter(self, bred: int, num_places: int) -> None:
+        """Take memory for cycles of another size, and the present cycle's records along."""
+        ga, nq, before = self.ga, len(self.offspring), self._done
         count = bred + ga.num_immigrants
-        if self.memory.offspring.shape[1] != count or not self.cycles:
-            self.memory = Memory.of(nq, count)
-        # random numbers
+        self._done, self.offspring = Cycles.of(nq, count, num_places), np.empty((nq, count))
+        own, other = self.cycles % num_places, self.cycles % len(before.counts)
+        self._done.counts[own], self._done.costs[own] = before.counts[other], before.costs[other]
+        self._done.best_rows[own] = before.best_rows[other]
         gaussian, normal = ga.mutation == "gaussian", ga.parent_choice == "gaussian"
         per_child = (0 if gaussian else nq) + (2 + nq if ga.crossover_rate > 0.0 else 0)
-        uniforms = rng.random(bred * per_child + ga.num_immigrants * nq)
-        deviates = bred * ((nq if gaussian else 0) + normal)
-        normals = standard_normal(rng, deviates) if deviates else _NONE
-        # the cycle
-        chosen, winner = kernels.advance(
-            uniforms, normals, bred, self._strategy, self.judging, self._members, self.memory
+        self._scratch = Scratch(
+            np.empty(bred * per_child + ga.num_immigrants * nq),
+            np.empty(bred * ((nq if gaussian else 0) + normal)),
+            np.empty(count, dtype=np.int64),
+            np.empty(count, dtype=np.bool_),
         )
-        if self._accepts is not None:
-            chosen, winner = self._accepted(chosen, int(winner), self._accepts)
-        self.cycles += 1
-        origins = self._nodes[self.memory.origin]
-        self._take_best(int(winner), self._take_parents(chosen, count, origins), origins)
+
+    def _do_one(self, bred: int, accepts: Callable[[FloatArray, FloatArray], bool]) -> None:
+        """Do one cycle whose parents must be accepted."""
+        done, (uniforms, normals, origin, met) = self._done, self._scratch
+        place, words = (self.cycles + 1) % len(done.counts), self._twin.words
+        fill_uniforms(words, uniforms)
+        fill_normals(words, normals)
+        memory = Memory(done.offspring[place], origin, done.rows[place], done.feasible[place], met)
+        postures, costs, _, size = self._parents
+        members = Members(postures, costs, int(size[0]))
+        chosen, winner = kernels.advance(
+            uniforms, normals, bred, self._strategy, self._judging, members, memory
+        )
+        chosen, winner = self._accepted(chosen, int(winner), members, memory, accepts)
+        arrays = self._parents, self.ancestry.nodes, done
+        settle_one(chosen, winner, self.cycles, memory, *(tuple(each) for each in arrays))
+        done.states[place] = words[:2]
 
     def _accepted(
-        self, chosen: IntArray, winner: int, accepts: Callable[[FloatArray, FloatArray], bool]
+        self,
+        chosen: IntArray,
+        winner: int,
+        members: Members,
+        memory: Memory,
+        accepts: Callable[[FloatArray, FloatArray], bool],
     ) -> tuple[IntArray, int]:
         """Select again until everybody selected is accepted; who is refused is not feasible."""
-        offspring, origin = self.memory.offspring, self.memory.origin
+        offspring, origin, parents = memory.offspring, memory.origin, members.postures
         known: set[int] = set()
         while True:
             count = offspring.shape[1]
             asked = {n for n in (*chosen.tolist(), winner) if 0 <= n < count} - known
             known |= asked
-            parents = self._members.postures
             refused = [n for n in asked if not accepts(parents[:, origin[n]], offspring[:, n])]
             if not refused:
-                return chosen, winner
-            self.memory.feasible[refused] = False
-            chosen, winner = kernels.select(self._strategy, self._members, self.memory)
-
-    def _take_parents(self, chosen: IntArray, count: int, origins: IntArray) -> dict[int, int]:
-        """Take over the selected parents of a cycle of `count` offspring.
-
-        Returns:
-            The nodes of new parents by their places among the offspring.
-        """
-        offspring, costs_of = self.memory.offspring, self.memory.rows[COST]
-        postures, costs, _ = self._members
-        new = chosen[chosen < count]
-        nodes = self.ancestry.add(offspring[:, new].T, origins[new])
-        if len(chosen):  # else nobody is feasible, and the parents stay
-            size, is_new, place = len(chosen), chosen < count, np.maximum(chosen - count, 0)
-            kept = postures[:, place], costs[place], self._nodes[place]
-            kept[0][:, is_new], kept[1][is_new] = offspring[:, new], costs_of[new]
-            kept[2][is_new] = nodes
-            postures[:, :size], costs[:size], self._nodes[:size] = kept
-            self._members = self._members._replace(size=size)
-        return dict(zip(new.tolist(), nodes.tolist(), strict=True))
-
-    def _take_best(self, winner: int, nodes: dict[int, int], origins: IntArray) -> None:
-        """Take over the winner, or else the best individual if it is an improvement."""
-        rows = self.memory.rows
-        usable = np.where(self.memory.feasible, rows[COST], np.inf)
-        least = int(np.argmin(usable))
-        improved = usable[least] < self.least_cost
-        if improved or winner >= 0:
-            best = winner if winner >= 0 else least
-            if best not in nodes:  # it is no parent
-                posture = self.memory.offspring[:, [best]].T
-                nodes[best] = int(self.ancestry.add(posture, origins[[best]])[0])
-            self.best, self.best_row, self.won = nodes[best], rows[:, best].copy(), winner >= 0
-        self.least_cost = min(self.least_cost, float(usable[least]))
-        self.idle = 0 if improved else self.idle + 1
+                return chosen, int(winner)
+            memory.feasible[refused] = False
+            chosen, winner = kernels.select(self._strategy, members, memory)
 
     @property
     def stop_reason(self) -> str:
@@ -194,6 +243,3 @@ class Search:
         if self.idle >= self.ga.patience:
             return "stagnation"
         return "cap" if self.cycles >= self.ga.num_generations else ""
-
-
-_NONE = np.empty(0)

@@ -26,8 +26,9 @@ from pydantic import BeforeValidator, Field
 from evoexp.collision.certifier.certificate import certificate
 from evoexp.collision.models.body_models import CollisionModel
 from evoexp.collision.scene import Part
-from evoexp.evolution.cost_statistics import cost_statistics
+from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.numeric.elementary import DEGREE
+from evoexp.numeric.random_twin import Twin
 from evoexp.objectives.posture_cost import COLUMNS, PARALLEL, TERMS, UPRIGHT, PostureCost
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import CoverShape, Listing
@@ -37,6 +38,7 @@ from evoexp.planners.planner import COPIES, Candidate, Keeper, PlannerDefaults
 from evoexp.planners.posture_es import problem as posture_problem
 from evoexp.planners.posture_es.cycles import Ancestry, Search
 from evoexp.planners.posture_es.kernels import COST
+from evoexp.planners.posture_es.phase_kernels import rate_steps
 from evoexp.planners.posture_es.phases import Problem, Span, Stage
 from evoexp.planners.posture_es.settings import StrategySettings
 from evoexp.planners.proofs import Acceptance, Proofs
@@ -106,13 +108,12 @@ class PostureEs(PlannerDefaults, Component):
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield the start and then every cycle, phase by phase; their indices go on counting."""
         paths = _Paths(self, problem)
-        ancestry = Ancestry(len(problem.start))
-        node = int(ancestry.add(problem.start[None], -1)[0])
+        ancestry, twin, node = Ancestry(problem.start), Twin(rng), 0
         situation = problem.first_situation
         for index in range(len(problem.phases)):
-            stage = problem.begin(index, ancestry.postures[node], situation)
+            stage = problem.begin(index, ancestry.posture(node), situation)
             accepts = self._proves(problem, stage) if self.answers_are_proven else None
-            search = Search(self.ga, problem, stage, self.edge_check, ancestry, node, accepts)
+            search = Search(self.ga, problem, stage, self.edge_check, ancestry, node, twin, accepts)
             last = index == len(problem.phases) - 1
             while True:
                 reason = search.stop_reason
@@ -120,11 +121,11 @@ class PostureEs(PlannerDefaults, Component):
                 yield paths.record(search, index, reason if ends else "")
                 if reason:
                     break
-                search.advance(rng)
+                search.advance()
             if not search.won:
                 return
             node = search.best
-            situation = problem.finish(stage, ancestry.postures[node])
+            situation = problem.finish(stage, ancestry.posture(node))
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
         """Return postures uniform within the joint limits, (nq, count)."""
@@ -264,10 +265,11 @@ class _Paths:
     def __init__(self, planner: PostureEs, problem: Problem) -> None:
         self._planner, self._problem, self._keeper = planner, problem, Keeper()
         self._node, self._path, self._cycles = -1, {"": 0.0}, 0
+        self._chosen = planner.chosen
 
     def record(self, search: Search, phase: int, stop_reason: str) -> Generation:
         """Return the record of the last cycle, or of the posture that a phase begins with."""
-        memory, problem, planner, keeper = search.memory, self._problem, self._planner, self._keeper
+        problem, planner, keeper = self._problem, self._planner, self._keeper
         last, several = phase == len(problem.phases) - 1, len(problem.phases) > 1
         self._cycles += min(search.cycles, 1)
         # the best so far
@@ -277,18 +279,19 @@ class _Paths:
             solution, self._node = postures.ravel(), search.best
             self._path = path_terms(postures, problem.scope)
         counts = {"phase": phase + 1.0, "cycles": float(self._cycles)}
-        terms = named(search.best_row, planner.chosen) | self._path | counts
+        terms = named(search.best_row, self._chosen) | self._path | counts
         terms["idle_cycles"] = float(search.idle)
+        least, lowest, mean, std = search.summary
         best = Candidate(solution, terms, search.won and last)
-        keeper.keep(search.least_cost if last else np.inf, best)
+        keeper.keep(least if last else np.inf, best)
         # the generation
-        costs, count = memory.rows[COST], memory.offspring.shape[1]
+        costs, count = search.costs, search.offspring.shape[1]
         return keeper.record(
-            cost_statistics(np.where(memory.feasible, costs, np.inf)),
+            CostStatistics(0, mean, std),
             costs[None, :] if several else costs,
-            memory.offspring,
-            lowest=float(costs.min()) if last else np.inf,
-            num_feasible=int(np.count_nonzero(memory.feasible)),
+            search.offspring,
+            lowest=lowest if last else np.inf,
+            num_feasible=search.num_feasible,
             evaluations=count,
             collision_queries=count * (1 + (planner.edge_check if search.cycles else 0)),
             stop_reason=stop_reason,
@@ -297,17 +300,17 @@ class _Paths:
 
 def named(row: FloatArray, chosen: tuple[int, ...]) -> dict[str, float]:
     """Return some terms of a posture (ROWS,) by name, and its cost."""
-    return {COLUMNS[k]: float(row[k]) for k in chosen} | {"cost": float(row[COST])}
+    values = row.tolist()
+    return {COLUMNS[k]: values[k] for k in chosen} | {"cost": values[COST]}
 
 
 def path_terms(postures: FloatArray, scope: FloatArray) -> dict[str, float]:
     """Return the terms of a path (postures, nq): its steps in units of the scope."""
-    steps = np.abs(np.diff(postures, axis=0)) / scope
-    longest = steps.max(axis=1) if len(steps) else np.zeros(0)
+    longest, oversized = rate_steps(postures, scope, OVERSIZED)
     return {
         "postures": float(len(postures)),
-        "longest_step_scopes": float(longest.max()) if len(steps) else 0.0,
-        "oversized_steps": float(np.count_nonzero(longest > OVERSIZED)),
+        "longest_step_scopes": longest,
+        "oversized_steps": float(oversized),
     }
 
 

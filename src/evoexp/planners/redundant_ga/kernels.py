@@ -1,227 +1,271 @@
-"""One generation of end postures of a sub-path, compiled (Lavoie & Boudreau 2001).
+"""Generations of end postures of a sub-path, compiled (Lavoie & Boudreau 2001).
 
 A population is a table of rows, individuals innermost: the genes; the joint angles, which are the
 genes themselves in real coding and follow them in binary coding; then cost, position error and
-joint displacement. A whole generation is one call.
+joint displacement. Generations are computed several per call, one table for each of them.
 """
 
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from evoexp.collision.models.ellipse_kernels import Ellipses, TestedPath, paths_collide
+from evoexp.collision.models.ellipse_kernels import PathChecks, prepare_checks
 from evoexp.evolution.cost_statistics import summarise
-from evoexp.evolution.crossover import ONE_POINT, cross_genes, cross_single_point
-from evoexp.evolution.mutation import decode_bits, flip_bits, mutate_genes
-from evoexp.evolution.selection import (
-    choose_by_tournament,
-    choose_elites,
-    inverse_weights,
-    rank_weights,
-    spin_roulette,
-)
-from evoexp.evolution.succession import succeed_rows
+from evoexp.evolution.mutation import GAUSSIAN, NON_UNIFORM, decode_bits, non_uniform_spread
+from evoexp.evolution.selection import choose_elites
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.named_tuples import named
-from evoexp.objectives.reaching import measure_reach, measure_reach_from
+from evoexp.numeric.random_twin import Words, fill_normals, fill_uniforms
+from evoexp.planners.redundant_ga.breeding import Breeding, Draws, breed
+from evoexp.planners.redundant_ga.sub_path_costs import (
+    RESULTS,
+    Judging,
+    drop_collisions,
+    list_inside,
+    measure,
+)
 from evoexp.records import BoolArray, FloatArray, IntArray
-from evoexp.robots.planar_ends import PlanarArm
 
-TOURNAMENT, ROULETTE, RANK = range(3)
-RESULTS = 3  # rows of cost, position error, joint displacement
+SUMMARY = 4  # of a population: see `summarise_costs`
 
 
-class Draws(NamedTuple):
-    """Random numbers of one generation.
+class Generations(NamedTuple):
+    """Some generations; number g is at place g modulo the number of places.
 
     Attributes:
-        choosing: Uniform numbers for the choice of parents.
-        crossing: Uniform numbers for crossover.
-        mutating: Uniform numbers for mutation.
-        normals: (genes, ≥ offspring) normal deviates, for Gaussian mutation only.
+        tables: (places, rows, individuals, filled up to whole vectors).
+        states: (places, 2) of the random generator behind each: high and low half.
+        summaries: (places, SUMMARY).
     """
 
-    choosing: FloatArray
-    crossing: FloatArray
-    mutating: FloatArray
-    normals: FloatArray
-
-
-class Breeding(NamedTuple):
-    """Settings of the operators.
-
-    Attributes:
-        num_genes: Number of genes.
-        binary: Whether they are bits.
-        selection: TOURNAMENT, ROULETTE or RANK.
-        tournament_size: Contestants per tournament.
-        rank_pressure: See `rank_weights`.
-        crossover: See `cross_genes`, and so are its rate and α.
-        crossover_rate: Probability per pair.
-        blend_alpha: α of BLX-α.
-        mutation: See `mutate_genes`, and so are its scope and rate.
-        mutation_scope: See there.
-        mutation_rate: See there.
-        limits: (joints, 2) of the joint angles [rad].
-    """
-
-    num_genes: int
-    binary: bool
-    selection: int
-    tournament_size: int
-    rank_pressure: float
-    crossover: int
-    crossover_rate: float
-    blend_alpha: float
-    mutation: int
-    mutation_scope: int
-    mutation_rate: float
-    limits: FloatArray
-
-
-class Judging(NamedTuple):
-    """The collision model and the objective of a sub-path.
-
-    Attributes:
-        arm: The arm.
-        ellipses: The ellipses.
-        path: The positions that are tested.
-        target: (2,) desired place of the tip [length unit].
-        box: (4,) least and greatest x, least and greatest y of the tip [length unit].
-        weights: w1, w2 of Eq. 4.
-    """
-
-    arm: PlanarArm
-    ellipses: Ellipses
-    path: TestedPath
-    target: FloatArray
-    box: FloatArray
-    weights: tuple[float, float]
+    tables: FloatArray
+    states: Words
+    summaries: FloatArray
 
 
 class Memory(NamedTuple):
-    """Arrays of one search.
+    """Arrays that a generation writes on its way.
 
     Attributes:
-        population: Table of the population.
-        offspring: Table of its offspring.
+        uniforms: (choosing + crossing + mutating,) uniform numbers.
+        normals: Normal deviates; see `Draws`.
         parents: (offspring,) indices of individuals.
         elites: (elites,) likewise.
         lanes: (individuals + LANES,) scratch.
         hit: (individuals,) scratch.
+        num_choosing: Uniform numbers for the choice of parents.
+        num_crossing: The same for crossover.
     """
 
-    population: FloatArray
-    offspring: FloatArray
+    uniforms: FloatArray
+    normals: FloatArray
     parents: IntArray
     elites: IntArray
     lanes: IntArray
     hit: BoolArray
+    num_choosing: int
+    num_crossing: int
+
+
+@kernel
+def evolve(
+    words: Words,
+    first: int,
+    last: int,
+    stop_cost: float,
+    evolving: bool,
+    plain_breeding: tuple[Any, ...],
+    plain_judging: tuple[Any, ...],
+    starts: FloatArray,
+    plain_generations: tuple[Any, ...],
+    plain_memory: tuple[Any, ...],
+) -> int:
+    """Compute the generations behind one up to another, or up to the first that is good enough.
+
+    Args:
+        words: The random generator, see `numeric.random_twin`.
+        first: The present generation.
+        last: The last one to be computed.
+        stop_cost: The first generation whose best costs less ends the search.
+        evolving: Whether generations are bred; if not, each is drawn as the initial one is, as many
+            individuals as would be bred.
+        plain_breeding: `Breeding`, made plain.
+        plain_judging: `Judging`, made plain.
+        starts: (joints, ≥ individuals) start of the sub-path, the same for all [rad].
+        plain_generations: `Generations`, made plain.
+        plain_memory: `Memory`, made plain.
+
+    Returns:
+        The last generation that was computed.
+    """
+    breeding, judging = named(Breeding, plain_breeding), named(Judging, plain_judging)
+    generations, memory = named(Generations, plain_generations), named(Memory, plain_memory)
+    words, starts, breeding, judging, generations, memory = borrowed(
+        (words, starts, breeding, judging, generations, memory)
+    )
+    tables, states, summaries = generations
+    count = len(memory.parents)
+    checks = prepare_checks(judging.ellipses, len(starts), tables.shape[2])
+    for index in range(first, last):
+        own, other = index % len(tables), (index + 1) % len(tables)
+        following = tables[other]
+        costs = following[len(following) - RESULTS]
+        if evolving:
+            draws = _drawn(words, breeding, memory)
+            advance(draws, index, breeding, judging, starts, tables[own], following, memory, checks)
+        else:
+            draw(words, count, breeding, judging, starts, following, memory, checks)
+            costs = costs[:count]
+        costs = costs[: len(memory.hit)]
+        summarise_costs(costs, summaries[other])
+        states[other, 0], states[other, 1] = words[0], words[1]
+        if costs[int(summaries[other, 0])] < stop_cost:
+            return index + 1
+    return last
+
+
+@kernel
+def begin(
+    words: Words,
+    plain_breeding: tuple[Any, ...],
+    plain_judging: tuple[Any, ...],
+    starts: FloatArray,
+    plain_generations: tuple[Any, ...],
+    plain_memory: tuple[Any, ...],
+) -> None:
+    """Draw and judge the initial population, at place 0; see `evolve`."""
+    breeding, judging = named(Breeding, plain_breeding), named(Judging, plain_judging)
+    generations, memory = named(Generations, plain_generations), named(Memory, plain_memory)
+    (tables, states, summaries), size = generations, len(memory.hit)
+    checks = prepare_checks(judging.ellipses, len(starts), tables.shape[2])
+    draw(words, size, breeding, judging, starts, tables[0], memory, checks)
+    summarise_costs(tables[0, len(tables[0]) - RESULTS, :size], summaries[0])
+    states[0, 0], states[0, 1] = words[0], words[1]
+
+
+@kernel
+def _drawn(words: Words, breeding: Breeding, memory: Memory) -> Draws:
+    """Return the random numbers of the next generation."""
+    chosen, crossed = memory.num_choosing, memory.num_choosing + memory.num_crossing
+    fill_uniforms(words, memory.uniforms)
+    if breeding.mutation == GAUSSIAN:
+        fill_normals(words, memory.normals.reshape(-1))
+    uniforms = memory.uniforms
+    return Draws(uniforms[:chosen], uniforms[chosen:crossed], uniforms[crossed:], memory.normals)
+
+
+@kernel
+def draw(
+    words: Words,
+    count: int,
+    breeding: Breeding,
+    judging: Judging,
+    starts: FloatArray,
+    table: FloatArray,
+    memory: Memory,
+    checks: PathChecks,
+) -> None:
+    """Draw the first `count` individuals, uniform within the limits or bit by bit, and judge them.
+
+    Args:
+        words: The random generator.
+        count: Number of individuals.
+        breeding: Coding and limits.
+        judging: Collision model and objective.
+        starts: See `evolve`.
+        table: Written.
+        memory: Scratch.
+        checks: Of the ellipses.
+    """
+    num_genes, limits, numbers = breeding.num_genes, breeding.limits, np.empty(count)
+    for gene in range(num_genes):
+        fill_uniforms(words, numbers)
+        row = table[gene]
+        if breeding.binary:
+            for k in range(count):
+                row[k] = np.floor(2.0 * numbers[k])
+        else:
+            low, wide = limits[gene, 0], limits[gene, 1] - limits[gene, 0]
+            for k in range(count):
+                row[k] = low + wide * numbers[k]
+    angles = _angles(table, count, breeding, len(starts))
+    measure(starts, angles, count, judging, table)
+    lanes, left = memory.lanes, list_inside(table, count, memory.lanes)
+    drop_collisions(starts, angles, lanes, left, judging, table, memory.hit, checks)
+
+
+@kernel
+def _angles(table: FloatArray, count: int, breeding: Breeding, num_joints: int) -> FloatArray:
+    """Return the rows of the joint angles of a table; those of the first `count` are decoded."""
+    first = breeding.num_genes if breeding.binary else 0
+    angles = table[first : first + num_joints]
+    if breeding.binary:
+        decode_bits(table[: breeding.num_genes], count, breeding.limits, angles)
+    return angles
 
 
 @kernel
 def advance(
-    plain_draws: tuple[Any, ...],
-    spread: float,
-    plain_breeding: tuple[Any, ...],
-    plain_judging: tuple[Any, ...],
-    starts: FloatArray,
-    plain_memory: tuple[Any, ...],
-) -> tuple[int, float, float, int]:
-    """Replace a population by the next one.
-
-    Args:
-        plain_draws: `Draws`, made plain.
-        spread: Of mutation, see `mutate_genes`.
-        plain_breeding: `Breeding`, made plain.
-        plain_judging: `Judging`, made plain.
-        starts: (joints, ≥ offspring) start of the sub-path, the same for all [rad].
-        plain_memory: `Memory`, made plain: population and scratch.
-
-    Returns:
-        See `summary`.
-    """
-    draws, breeding = named(Draws, plain_draws), named(Breeding, plain_breeding)
-    judging, memory = named(Judging, plain_judging), named(Memory, plain_memory)
-    draws, breeding, judging, starts, memory = borrowed((draws, breeding, judging, starts, memory))
-    population, offspring, count = memory.population, memory.offspring, len(memory.parents)
-    num_joints, num_genes, binary = len(starts), breeding.num_genes, breeding.binary
-    costs = population[len(population) - RESULTS]
-    choose_elites(costs, memory.elites)
-    # offspring, decoded and judged
-    genomes, children = population[:num_genes], offspring[:num_genes]
-    breed(draws, spread, breeding, costs, genomes, memory.parents, children)
-    first = num_genes if binary else 0
-    angles = offspring[first : first + num_joints]
-    if binary:
-        decode_bits(children, count, breeding.limits, angles)
-    judge_children(starts, angles, num_genes, judging, memory)
-    # succession
-    succeed_rows(population, offspring, count, memory.elites)
-    found: tuple[int, float, float, int] = summary(costs)
-    return found
-
-
-@kernel
-def summary(costs: FloatArray) -> tuple[int, float, float, int]:
-    """Return index of the best, mean and deviation of the finite costs, and how many are finite."""
-    best, mean, std = summarise(costs)
-    finite = 0
-    for k in range(len(costs)):
-        finite += np.isfinite(costs[k])
-    return best, mean, std, finite
-
-
-@kernel
-def breed(
     draws: Draws,
-    spread: float,
+    index: int,
     breeding: Breeding,
-    costs: FloatArray,
-    genomes: FloatArray,
-    parents: IntArray,
-    out: FloatArray,
+    judging: Judging,
+    starts: FloatArray,
+    population: FloatArray,
+    following: FloatArray,
+    memory: Memory,
+    checks: PathChecks,
 ) -> None:
-    """Write offspring: selected, crossed and mutated.
+    """Write the population that follows generation `index`: offspring, then elites, best first.
 
     Args:
         draws: Random numbers.
-        spread: Of mutation, see `mutate_genes`.
+        index: Of the present generation.
         breeding: Settings of the operators.
-        costs: (individuals,) of the parents' generation.
-        genomes: (genes, individuals) of the parents' generation.
-        parents: (offspring,) written.
-        out: (genes, ≥ offspring) written.
+        judging: Collision model and objective.
+        starts: See `evolve`.
+        population: Table of the present generation.
+        following: Written.
+        memory: Scratch.
+        checks: Of the ellipses.
     """
-    # parents
-    if breeding.selection == TOURNAMENT:
-        choose_by_tournament(draws.choosing, costs, breeding.tournament_size, parents)
-    else:
-        weights = np.empty(len(costs))
-        if breeding.selection == ROULETTE:
-            inverse_weights(costs, weights)
-        else:
-            rank_weights(costs, breeding.rank_pressure, weights)
-        spin_roulette(weights, draws.choosing, parents)
-    # crossover
-    rate, limits = breeding.crossover_rate, breeding.limits
-    if breeding.crossover == ONE_POINT:
-        cross_single_point(draws.crossing, genomes, parents, rate, out)
-    else:
-        kind, alpha = breeding.crossover, breeding.blend_alpha
-        cross_genes(kind, draws.crossing, genomes, parents, rate, alpha, limits, out)
-    # mutation
-    uniforms, count, rate = draws.mutating, len(parents), breeding.mutation_rate
-    if breeding.binary:
-        flip_bits(uniforms, out, count, rate)
-    else:
-        kind, scope, normals = breeding.mutation, breeding.mutation_scope, draws.normals
-        mutate_genes(kind, scope, uniforms, normals, out, count, rate, spread, limits)
+    elites, count, num_genes = memory.elites, len(memory.parents), breeding.num_genes
+    costs = population[len(population) - RESULTS, : len(memory.hit)]
+    choose_elites(costs, elites)
+    # offspring, decoded and judged
+    spread = breeding.mutation_std
+    if breeding.mutation == NON_UNIFORM:
+        spread = non_uniform_spread(index, breeding.num_generations, breeding.mutation_power)
+    genomes, children = population[:num_genes], following[:num_genes]
+    breed(draws, spread, breeding, costs, genomes, memory.parents, children)
+    angles = _angles(following, count, breeding, len(starts))
+    judge_children(starts, angles, num_genes, judging, population, following, memory, checks)
+    # succession
+    for row in range(len(population)):
+        for k in range(len(elites)):
+            following[row, count + k] = population[row, elites[k]]
+
+
+@kernel
+def summarise_costs(costs: FloatArray, out: FloatArray) -> None:
+    """Write index of the best, mean and deviation of the finite costs, and how many are finite."""
+    out[0], out[1], out[2] = summarise(costs)
+    finite = 0
+    for k in range(len(costs)):
+        finite += np.isfinite(costs[k])
+    out[3] = finite
 
 
 @kernel
 def judge_children(
-    starts: FloatArray, angles: FloatArray, num_genes: int, judging: Judging, memory: Memory
+    starts: FloatArray,
+    angles: FloatArray,
+    num_genes: int,
+    judging: Judging,
+    population: FloatArray,
+    following: FloatArray,
+    memory: Memory,
+    checks: PathChecks,
 ) -> None:
     """Write Eq. 4 and its parts for all offspring.
 
@@ -233,87 +277,27 @@ def judge_children(
         num_genes: Rows that make a child its own parent if they are equal; the child then costs as
             much as the parent.
         judging: Collision model and objective.
-        memory: Both tables and the parents; the last rows of the offspring are written.
+        population: Table of the parents.
+        following: Table of the offspring; its last rows are written.
+        memory: The parents; scratch.
+        checks: Of the ellipses.
     """
-    population, offspring, parents, lanes = (
-        memory.population,
-        memory.offspring,
+    row, count, parents, lanes = (
+        len(population) - RESULTS,
+        len(memory.parents),
         memory.parents,
         memory.lanes,
     )
-    row, count, start = len(population) - RESULTS, len(parents), starts[:, 0].copy()
-    cost, error, displacement = offspring[row], offspring[row + 1], offspring[row + 2]
-    arm, target, box, weights = judging.arm, judging.target, judging.box, judging.weights
-    measure_reach_from(start, angles, count, arm, target, box, weights, cost, error, displacement)
-    # children inside the box
-    inside = 0
-    for k in range(count):
-        lanes[inside] = k
-        inside += cost[k] < np.inf
-    # of these, children that differ from their parents
-    left = 0
-    for n in range(inside):
+    measure(starts, angles, count, judging, following)
+    # children inside the box that differ from their parents
+    left, cost = 0, following[row]
+    for n in range(list_inside(following, count, lanes)):
         child = lanes[n]
         parent, gene = parents[child], 0
-        while gene < num_genes and offspring[gene, child] == population[gene, parent]:
+        while gene < num_genes and following[gene, child] == population[gene, parent]:
             gene += 1
         if gene == num_genes:
             cost[child] = population[row, parent]
         lanes[left] = child
         left += gene < num_genes
-    _drop_collisions(starts, angles, lanes, left, judging, cost, memory.hit)
-
-
-@kernel
-def judge(
-    starts: FloatArray,
-    ends: FloatArray,
-    lanes: IntArray,
-    count: int,
-    judging: Judging,
-    results: FloatArray,
-    hit: BoolArray,
-) -> None:
-    """Write Eq. 4 and its parts for some individuals.
-
-    An individual whose tip ends outside the box is not tested for collisions.
-
-    Args:
-        starts: (joints, individuals) [rad].
-        ends: (joints, individuals) [rad].
-        lanes: (≥ count + LANES) indices of individuals, changed.
-        count: Number of individuals.
-        judging: Collision model and objective.
-        results: (3, individuals) written: cost, position error, joint displacement.
-        hit: (individuals,) scratch.
-    """
-    starts, ends, lanes, judging, results, hit = borrowed(
-        (starts, ends, lanes, judging, results, hit)
-    )
-    arm, target, box, weights = judging.arm, judging.target, judging.box, judging.weights
-    cost, error, displacement = results[0], results[1], results[2]
-    measure_reach(starts, ends, lanes, count, arm, target, box, weights, cost, error, displacement)
-    # individuals inside the box
-    left = 0
-    for k in range(count):
-        individual = lanes[k]
-        lanes[left] = individual
-        left += cost[individual] < np.inf
-    _drop_collisions(starts, ends, lanes, left, judging, cost, hit)
-
-
-@kernel
-def _drop_collisions(
-    starts: FloatArray,
-    ends: FloatArray,
-    lanes: IntArray,
-    count: int,
-    judging: Judging,
-    cost: FloatArray,
-    hit: BoolArray,
-) -> None:
-    """Write inf as the cost of those among `lanes` that collide on their way."""
-    paths_collide(starts, ends, lanes, count, judging.arm, judging.ellipses, judging.path, hit)
-    for k in range(count):
-        individual = lanes[k]
-        cost[individual] = np.inf if hit[individual] else cost[individual]
+    drop_collisions(starts, angles, lanes, left, judging, following, memory.hit, checks)

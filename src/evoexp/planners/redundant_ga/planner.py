@@ -22,6 +22,7 @@ import numpy as np
 
 from evoexp.collision.models.link_ellipses import LinkEllipses
 from evoexp.errors import SettingError
+from evoexp.numeric.named_tuples import plain
 from evoexp.numeric.vectors import LANES
 from evoexp.objectives.reaching import Reaching
 from evoexp.paths.motion import Motion
@@ -29,10 +30,9 @@ from evoexp.planners.departures import joint_names, of_limits, of_place
 from evoexp.planners.planner import COPIES, Candidate, Keeper, PlannerDefaults, num_values
 from evoexp.planners.proofs import Acceptance, Proofs
 from evoexp.planners.reaching_tasks import Problem, reaching_problem
-from evoexp.planners.redundant_ga import kernels
-from evoexp.planners.redundant_ga.kernels import RESULTS, Judging
 from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic, SelectiveSettings
-from evoexp.planners.redundant_ga.sub_path import BestEnd, Search
+from evoexp.planners.redundant_ga.sub_path import BestEnd, RunMemory, Search
+from evoexp.planners.redundant_ga.sub_path_costs import RESULTS, Judging, judge_paths
 from evoexp.records import BoolArray, FloatArray, Generation
 from evoexp.robots.assembly import Robot
 from evoexp.scenarios.pick_and_place import PickAndPlace
@@ -126,49 +126,46 @@ class RedundantGa(PlannerDefaults, Component):
             rng: Source of all random numbers.
             kind: What searches a sub-path: the genetic algorithm, or a control in its place.
         """
-        plans, proofs = _Plans(self, problem), None
+        judgings = tuple(plain(self._judging(problem, path)) for path in range(2))
+        plans, proofs = _Plans(self, problem, judgings), None
+        memory = RunMemory(self.ga, problem.joint_limits, rng)
         if self.answers_are_proven:
             proofs = Proofs(self, problem)
+
+        def search_from(*start: FloatArray) -> Search:
+            """Return the search of SP1, or of SP2 behind a posture A."""
+
+            def is_proven(end: FloatArray) -> bool:
+                assert proofs is not None
+                return proofs.is_proven(np.concatenate([*start, *[end] * (3 - len(start))]))
+
+            path = len(start) - 1
+            stop_cost, accepts = self._stop_costs[path], is_proven if proofs else None
+            return kind(memory, judgings[path], start[-1], stop_cost, accepts)
+
         for _ in range(self.num_attempts):
-            plans.attempts += 1
-            search = self._new(kind, problem, (), proofs)
-            via = yield from self._search(search, rng, plans, 0)
+            plans.begin_attempt()
+            via = yield from self._search(search_from(problem.start), plans, 0)
             if self.successful(0, via.cost):
                 plans.via = via
-                search = self._new(kind, problem, (via.posture,), proofs)
-                goal = yield from self._search(search, rng, plans, 1)
+                search = search_from(problem.start, via.posture)
+                goal = yield from self._search(search, plans, 1)
                 if self.successful(1, goal.cost):
                     return
 
-    def _new(
-        self,
-        kind: type[Search],
-        problem: Problem,
-        via: tuple[FloatArray, ...],
-        proofs: Proofs | None,
-    ) -> Search:
-        """Return the search of SP1, or of SP2 behind a posture A."""
-        start = (problem.start, *via)
-
-        def is_proven(end: FloatArray) -> bool:
-            assert proofs is not None
-            return proofs.is_proven(np.concatenate([*start, *[end] * (3 - len(start))]))
-
-        judging, accepts = self._judging(problem, len(via)), is_proven if proofs else None
-        return kind(self.ga, problem.joint_limits, judging, start[-1], accepts)
-
     def _search(
-        self, search: Search, rng: np.random.Generator, plans: "_Plans", path: int
+        self, search: Search, plans: "_Plans", path: int
     ) -> Generator[Generation, None, BestEnd]:
         """Search the end of one sub-path (0: SP1, 1: SP2); yield generations, return the best."""
-        search.begin(rng)
-        yield plans.record(search, path, self.ga.population_size)
+        search.begin()
+        plans.begin(path)
+        yield plans.record(search, self.ga.population_size)
         for index in range(self.ga.num_generations):
-            if search.best.cost < self._stop_costs[path]:
+            if search.lowest < self._stop_costs[path]:
                 break
-            search.advance(rng, index)
-            yield plans.record(search, path, self.ga.num_offspring)
-        return search.best
+            search.advance(index)
+            yield plans.record(search, self.ga.num_offspring)
+        return search.best()
 
     @property
     def _stop_costs(self) -> tuple[float, float]:
@@ -206,12 +203,7 @@ class RedundantGa(PlannerDefaults, Component):
         self, problem: Problem, path: int, starts: FloatArray, ends: FloatArray
     ) -> FloatArray:
         """Return cost, position error and joint displacement of sub-paths, (3, individuals)."""
-        count = starts.shape[1]
-        lanes, results = np.arange(count + LANES), np.empty((RESULTS, count))
-        starts, ends = np.ascontiguousarray(starts), np.ascontiguousarray(ends)
-        hit = np.zeros(count, dtype=np.bool_)
-        kernels.judge(starts, ends, lanes, count, self._judging(problem, path), results, hit)
-        return results
+        return _judge(plain(self._judging(problem, path)), starts, ends)
 
     def _judging(self, problem: Problem, path: int) -> Judging:
         """Return collision model and objective of a sub-path."""
@@ -284,49 +276,81 @@ class _Plans:
     """The best plan so far, and the records of generations.
 
     Attributes:
-        attempts: Attempts so far.
         via: The posture A that SP2 starts from.
     """
 
-    def __init__(self, planner: RedundantGa, problem: Problem) -> None:
+    def __init__(self, planner: RedundantGa, problem: Problem, judgings: Any) -> None:
         self._planner, self._problem, self._keeper = planner, problem, Keeper()
-        self.attempts, self.via = 0, BestEnd(np.inf, problem.start, np.empty(0))
+        self._judgings, self._queries = judgings, problem.collision.queries
+        self._attempts, self._path = 0, 0
+        self.via = BestEnd(np.inf, problem.start, np.empty(0))
         self._via_cost = np.inf  # of the posture A that takes the place of a plan
 
-    def record(self, search: Search, path: int, count: int) -> Generation:
+    def begin_attempt(self) -> None:
+        """Count an attempt."""
+        self._attempts += 1
+
+    def begin(self, path: int) -> None:
+        """Begin with a sub-path (0: SP1, 1: SP2)."""
+        self._path, keeper = path, self._keeper
+        keeper.best = keeper.best._replace(terms=keeper.best.terms | self._counts)
+
+    @property
+    def _counts(self) -> dict[str, float]:
+        return {"attempts": float(self._attempts), "sub_path": self._path + 1.0}
+
+    def record(self, search: Search, count: int) -> Generation:
         """Improve the best plan by a population of which `count` are new; return its record."""
-        best, keeper = search.best, self._keeper
+        keeper, path, costs = self._keeper, self._path, search.costs
         if path == 0:
-            self._improve_via(best)
-        elif best.cost < keeper.cost:
+            self._improve_via(search)
+        elif search.lowest < keeper.cost:
+            best = search.best()
             terms = named_terms(np.array([self.via.terms, best.terms]))
             self._keep(best.cost, self.via.posture, best.posture, terms)
-        found = keeper.record(
+        return keeper.record(
             search.statistics,
-            search.costs[None, :],
+            costs[None, :],
             search.genomes,
-            lowest=np.inf if path == 0 else float(search.costs[search.statistics.best]),
+            lowest=np.inf if path == 0 else costs.item(search.statistics.best),
             num_feasible=search.num_finite,
             evaluations=count,
-            collision_queries=count * self._problem.collision.queries,
+            collision_queries=count * self._queries,
         )
-        counted = {"attempts": float(self.attempts), "sub_path": path + 1.0}
-        return found._replace(terms=found.terms | counted)
 
-    def _improve_via(self, best: BestEnd) -> None:
+    def _improve_via(self, search: Search) -> None:
         """Without a plan of finite cost, keep the best posture A as a plan that stays there."""
         keeper = self._keeper
-        if keeper.index < 0 or (keeper.cost == np.inf and best.cost < self._via_cost):
-            self._via_cost = best.cost
-            plan = np.concatenate([self._problem.start, best.posture, best.posture])
-            terms = named_terms(self._planner.judge_plan(self._problem, plan))
-            self._keep(np.inf, best.posture, best.posture, terms)
+        if keeper.index < 0 or (keeper.cost == np.inf and search.lowest < self._via_cost):
+            best = search.best()
+            self._via_cost, start, end = best.cost, self._problem.start[:, None], best.posture
+            ends = (start, end[:, None]), (end[:, None], end[:, None])
+            pairs = zip(self._judgings, ends, strict=True)
+            terms = np.array([_judge(judging, *pair)[:, 0] for judging, pair in pairs])
+            self._keep(np.inf, end, end, named_terms(terms))
 
     def _keep(
         self, cost: float, via: FloatArray, goal: FloatArray, terms: dict[str, float]
     ) -> None:
         plan = np.concatenate([self._problem.start, via, goal])
-        self._keeper.keep(cost, Candidate(plan, terms, bool(self._planner.successful(1, cost))))
+        solved = bool(self._planner.successful(1, cost))
+        self._keeper.keep(cost, Candidate(plan, terms | self._counts, solved))
+
+
+def _judge(judging: tuple[Any, ...], starts: FloatArray, ends: FloatArray) -> FloatArray:
+    """Return cost, position error and joint displacement of sub-paths, (3, individuals).
+
+    Args:
+        judging: `Judging`, made plain.
+        starts: (joints, individuals) [rad].
+        ends: (joints, individuals) [rad].
+    """
+    count = starts.shape[1]
+    lanes, results = np.arange(count + LANES), np.empty((RESULTS, count))
+    starts, ends = np.ascontiguousarray(starts), np.ascontiguousarray(ends)
+    hit = np.zeros(count, dtype=np.bool_)
+    judge_paths(starts, ends, lanes, count, judging, results, hit)
+    return results
 
 
 def named_terms(terms: FloatArray) -> dict[str, float]:

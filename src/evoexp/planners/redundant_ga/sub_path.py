@@ -1,7 +1,7 @@
 """One genetic search for the end posture of a sub-path (Lavoie & Boudreau 2001)."""
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,20 +18,21 @@ from evoexp.evolution.mutation import (
     MUTATIONS,
     NON_UNIFORM,
     SCOPES,
-    decode_bits,
-    non_uniform_spread,
     num_mutation_uniforms,
 )
-from evoexp.numeric.elementary import standard_normal
 from evoexp.numeric.named_tuples import plain
+from evoexp.numeric.random_twin import Twin
 from evoexp.numeric.vectors import LANES
 from evoexp.planners.redundant_ga import kernels
-from evoexp.planners.redundant_ga.kernels import RESULTS, Breeding, Draws, Judging, Memory
+from evoexp.planners.redundant_ga.breeding import Breeding
+from evoexp.planners.redundant_ga.kernels import SUMMARY, Generations, Memory
 from evoexp.planners.redundant_ga.settings import BinaryGenetic, RealGenetic, SelectiveSettings
+from evoexp.planners.redundant_ga.sub_path_costs import RESULTS
 from evoexp.records import FloatArray
 
 SELECTIONS = ("tournament", "roulette", "rank")  # in the order of the kernels' numbers
-_NO_NORMALS = np.empty((0, 0))
+STRETCH = 8  # generations computed per call, at most,
+MEMORY = 2**20  # [B] whose tables should not take more than this
 
 
 class BestEnd(NamedTuple):
@@ -48,144 +49,205 @@ class BestEnd(NamedTuple):
     terms: FloatArray
 
 
+class RunMemory:
+    """Generator, settings and memory for generations that the searches of one run share.
+
+    Attributes:
+        ga: Settings.
+        twin: Of the run's generator.
+        breeding: The operators as the kernels take them, made plain.
+        num_places: Generations in memory.
+        generations: See `kernels.Generations`.
+        plain: `Generations` and `Memory`, made plain.
+        costs: Of every place (individuals,), a view.
+        angles: Of every place (joints, individuals), a view [rad].
+        genomes: Of every place (genes, individuals), a view.
+    """
+
+    def __init__(self, ga: SelectiveSettings, limits: FloatArray, rng: np.random.Generator) -> None:
+        """Take the settings, and memory.
+
+        Args:
+            ga: Settings.
+            limits: (joints, 2) [rad].
+            rng: Source of all random numbers.
+        """
+        breeding, size, count = _breeding(ga, limits), ga.population_size, ga.num_offspring
+        self.ga, self.twin, self.breeding = ga, Twin(rng), plain(breeding)
+        first = breeding.num_genes if breeding.binary else 0
+        rows, filled = first + len(limits) + RESULTS, -(-size // LANES) * LANES
+        stretch = max(1, min(STRETCH, MEMORY // (8 * rows * filled)))
+        self.num_places = min(stretch, ga.num_generations) + 1
+        self.generations = Generations(
+            np.zeros((self.num_places, rows, filled)),
+            np.empty((self.num_places, 2), dtype=np.uint64),
+            np.empty((self.num_places, SUMMARY)),
+        )
+        choosing, crossing, mutating = _num_uniforms(ga, breeding)
+        gaussian = breeding.mutation == GAUSSIAN
+        memory = Memory(
+            np.empty(choosing + crossing + mutating),
+            np.empty((breeding.num_genes if gaussian else 0, count)),
+            np.empty(count, dtype=np.int64),
+            np.empty(ga.num_elites, dtype=np.int64),
+            np.empty(size + LANES, dtype=np.int64),
+            np.zeros(size, dtype=np.bool_),
+            choosing,
+            crossing,
+        )
+        self.plain = plain(self.generations), plain(memory)
+        tables = self.generations.tables[:, :, :size]
+        self.costs, self.angles = list(tables[:, -RESULTS]), list(tables[:, first:-RESULTS])
+        self.genomes = list(tables[:, : breeding.num_genes])
+
+
 class Search:
     """One run of the genetic algorithm over the ends of one sub-path.
 
+    Several generations are computed per call of a kernel, and shown one after the other.
+
     Attributes:
-        genomes: (genes, individuals) of the population; a view.
+        genomes: (genes, individuals) of the population, a copy: one array for all generations.
         costs: (individuals,) a view.
-        best: A copy of the best individual; elites keep it the best so far.
+        lowest: The best individual's cost; elites keep it the best so far.
         statistics: Mean and deviation of the costs.
         num_finite: Number of finite costs.
     """
 
-    best: BestEnd
+    evolving = True
+    genomes: FloatArray
+    costs: FloatArray
+    lowest: float
     statistics: CostStatistics
     num_finite: int
 
     def __init__(
         self,
-        ga: SelectiveSettings,
-        limits: FloatArray,
-        judging: Judging,
+        memory: RunMemory,
+        judging: tuple[Any, ...],
         start: FloatArray,
+        stop_cost: float,
         accepts: Callable[[FloatArray], bool] | None = None,
     ) -> None:
-        """Take the settings, and memory for a population.
+        """Begin a search.
 
         Args:
-            ga: Settings of a real or a binary genetic algorithm.
-            limits: (joints, 2) of the joint angles [rad].
-            judging: Collision model and objective.
-            start: (joints,) where the sub-path starts [rad].
-            accepts: Whether an end (joints,) [rad] may be the best one; None: any of finite cost.
+            memory: Of the run, for one search after the other.
+            judging: `Judging` of the sub-path, made plain.
+            start: (joints,) where the sub-path begins [rad].
+            stop_cost: The search ends where the best costs less.
+            accepts: Whether a posture (joints,) may be the best one; None: any of finite cost.
         """
-        self._accepts = accepts
-        joints, size, count = len(start), ga.population_size, ga.num_offspring
-        self._ga, self._judging, self._breeding = ga, judging, _breeding(ga, limits)
-        first = self._breeding.num_genes if self._breeding.binary else 0
-        rows = first + joints + RESULTS
-        self._memory = Memory(
-            np.empty((rows, size)),
-            np.empty((rows, count)),
-            np.empty(count, dtype=np.int64),
-            np.empty(ga.num_elites, dtype=np.int64),
-            np.arange(size + LANES),
-            np.zeros(size, dtype=np.bool_),
-        )
-        self._plain = plain(self._breeding), plain(judging), plain(self._memory)
-        table = self._memory.population
-        self._starts = np.repeat(start[:, None], size, axis=1)
-        self._angles, self._results = table[first:-RESULTS], table[-RESULTS:]
-        self.genomes, self.costs = table[: self._breeding.num_genes], self._results[0]
-        self._stops = self._places()
+        self._memory, self._judging, self._accepts = memory, judging, accepts
+        self._starts = np.repeat(start[:, None], memory.ga.population_size, axis=1)
+        self.genomes = np.empty(memory.genomes[0].shape)
+        self._stop_cost, self._known, self._place = stop_cost, 0, 0
 
-    def _places(self) -> list[int]:
-        """Return where the uniform numbers for choice, crossover and mutation end."""
-        ga, breeding, count = self._ga, self._breeding, self._ga.num_offspring
-        pairs, genes = count // 2, breeding.num_genes
-        one_point, scope = breeding.crossover == ONE_POINT, breeding.mutation_scope
-        numbers = (
-            count * (ga.tournament_size if ga.selection == "tournament" else 1),
-            num_single_point_uniforms(pairs) if one_point else num_gene_uniforms(genes, pairs),
-            num_mutation_uniforms(genes, count, scope),
-        )
-        return [int(stop) for stop in np.cumsum(numbers)]
-
-    def begin(self, rng: np.random.Generator) -> None:
+    def begin(self) -> None:
         """Draw the initial population, uniform within the limits, and judge it."""
-        size = len(self._starts[0])
-        self._take(self._draw(rng, size), size)
+        run = self._memory
+        run.twin.meet()
+        kernels.begin(run.twin.words, run.breeding, self._judging, self._starts, *run.plain)
+        self._show(0)
 
-    def _draw(self, rng: np.random.Generator, count: int) -> tuple[int, float, float, int]:
-        """Draw the first `count` individuals anew and judge them; return their summary."""
-        limits, angles = self._breeding.limits, self._angles[:, :count]
-        if self._breeding.binary:
-            self.genomes[:, :count] = np.floor(2.0 * rng.random((len(self.genomes), count)))
-            decode_bits(self.genomes, count, limits, self._angles)
-        else:
-            low, high = limits.T
-            angles[:] = low[:, None] + (high - low)[:, None] * rng.random(angles.shape)
-        lanes, judged = self._memory.lanes, (self._judging, self._results, self._memory.hit)
-        lanes[:] = np.arange(len(lanes))
-        kernels.judge(self._starts, self._angles, lanes, count, *judged)
-        found: tuple[int, float, float, int] = kernels.summary(self._results[0, :count])
-        return found
-
-    def advance(self, rng: np.random.Generator, index: int) -> None:
-        """Replace the population of generation `index` by the next one."""
-        ga, breeding = self._ga, self._breeding
-        chosen, crossed, end = self._stops
-        uniforms, normals, spread = rng.random(end), _NO_NORMALS, 0.0
-        if isinstance(ga, RealGenetic) and breeding.mutation == NON_UNIFORM:
-            spread = float(non_uniform_spread(index, ga.num_generations, ga.mutation_power))
-        elif isinstance(ga, RealGenetic) and breeding.mutation == GAUSSIAN:
-            normals, spread = (
-                standard_normal(rng, (breeding.num_genes, ga.num_offspring)),
-                ga.mutation_std,
+    def advance(self, index: int) -> None:
+        """Go on from the population of generation `index` to the next one."""
+        run = self._memory
+        if index == self._known:
+            ahead = 1 if self._accepts is not None else run.num_places - 1
+            run.twin.meet()
+            self._known = kernels.evolve(
+                run.twin.words,
+                index,
+                min(index + ahead, run.ga.num_generations),
+                self._stop_cost,
+                self.evolving,
+                run.breeding,
+                self._judging,
+                self._starts,
+                *run.plain,
             )
-        draws = Draws(uniforms[:chosen], uniforms[chosen:crossed], uniforms[crossed:], normals)
-        settings, judging, memory = self._plain
-        found = kernels.advance(tuple(draws), spread, settings, judging, self._starts, memory)
-        self._take(found, len(self._starts[0]))
+        self._show(index + 1)
 
-    def _take(self, summary: tuple[int, float, float, int], count: int) -> None:
-        """Take over the summary of the first `count` individuals; refused ends cost inf."""
-        costs = self._results[0, :count]
-        while self._accepts is not None and np.isfinite(costs[summary[0]]):
-            if self._accepts(self._angles[:, summary[0]]):
+    def _show(self, index: int) -> None:
+        """Show a generation that is computed; the run's generator is where it was behind it."""
+        run = self._memory
+        self._place = place = index % run.num_places
+        run.twin.follow(run.generations.states[place])
+        self.costs = run.costs[place]
+        self._take(place)
+        np.copyto(self.genomes, run.genomes[place][:, : len(self.costs)])
+
+    def _take(self, place: int) -> None:
+        """Take over the summary of a generation; refused ends cost inf."""
+        costs, summary = self.costs, self._memory.generations.summaries[place]
+        best, mean, std, finite = summary.tolist()
+        self.lowest = costs.item(int(best))
+        while self._accepts is not None and np.isfinite(self.lowest):
+            if self._accepts(self._memory.angles[place][:, int(best)]):
                 break
-            costs[summary[0]] = np.inf
-            summary = kernels.summary(costs)
-        self.statistics, self.num_finite = CostStatistics(*summary[:3]), summary[3]
-        terms = self._results[:, summary[0]].copy()
-        self.best = BestEnd(float(terms[0]), self._angles[:, summary[0]].copy(), terms)
+            costs[int(best)] = np.inf
+            kernels.summarise_costs(costs, summary)
+            best, mean, std, finite = summary.tolist()
+            self.lowest = costs.item(int(best))
+        self.statistics, self.num_finite = CostStatistics(int(best), mean, std), int(finite)
+
+    def best(self) -> BestEnd:
+        """Return a copy of the best individual."""
+        run, place, k = self._memory, self._place, self.statistics.best
+        posture = run.angles[place][:, k].copy()
+        return BestEnd(self.lowest, posture, run.generations.tables[place, -RESULTS:, k].copy())
 
 
 class DrawnSearch(Search):
     """The same search without evolution: every generation is drawn as the initial population is.
 
     A generation draws as many individuals as the genetic algorithm breeds, and costs as many
-    evaluations. `genomes` and `costs` are those of the last draw.
+    evaluations. `genomes` and `costs` are those of the last draw; the best is that of all draws.
     """
 
-    def advance(self, rng: np.random.Generator, index: int) -> None:
+    evolving = False
+    _best: BestEnd | None = None
+
+    def advance(self, index: int) -> None:
         """Draw the next population; keep the best individual of all draws so far."""
-        before, count = self.best, self._ga.num_offspring
-        if count == 0:  # all are elites: nothing is bred, and nothing drawn
-            return
-        self._take(self._draw(rng, count), count)
-        self.genomes, self.costs = self.genomes[:, :count], self._results[0, :count]
-        self.best = self.best if self.best.cost < before.cost else before
+        if self._memory.ga.num_offspring:  # else all are elites: nothing is bred, and nothing drawn
+            super().advance(index)
+
+    def _take(self, place: int) -> None:
+        if self._best is not None:
+            count = self._memory.ga.num_offspring
+            self.genomes, self.costs = self.genomes[:, :count], self.costs[:count]
+        super()._take(place)
+        if self._best is None or self.lowest < self._best.cost:
+            self._best = super().best()
+        self.lowest = self._best.cost
+
+    def best(self) -> BestEnd:
+        """Return the best individual of all draws."""
+        assert self._best is not None
+        return self._best
+
+
+def _num_uniforms(ga: SelectiveSettings, breeding: Breeding) -> tuple[int, int, int]:
+    """Count the uniform numbers of a generation: for choice, crossover and mutation."""
+    count, genes = ga.num_offspring, breeding.num_genes
+    pairs, one_point = count // 2, breeding.crossover == ONE_POINT
+    return (
+        count * (ga.tournament_size if ga.selection == "tournament" else 1),
+        num_single_point_uniforms(pairs) if one_point else num_gene_uniforms(genes, pairs),
+        num_mutation_uniforms(genes, count, breeding.mutation_scope),
+    )
 
 
 def _breeding(ga: SelectiveSettings, limits: FloatArray) -> Breeding:
     """Return the settings of the operators as the kernels take them."""
     binary = isinstance(ga, BinaryGenetic)
-    crossover, alpha, mutation, scope = ONE_POINT, 0.0, NON_UNIFORM, GENE
+    crossover, alpha, mutation, scope, std, power = ONE_POINT, 0.0, NON_UNIFORM, GENE, 0.0, 0
     if isinstance(ga, RealGenetic):
         crossover, alpha = CROSSOVERS.index(ga.crossover), ga.blend_alpha
         mutation, scope = MUTATIONS.index(ga.mutation), SCOPES.index(ga.mutation_scope)
+        std, power = ga.mutation_std, ga.mutation_power
     return Breeding(
         num_genes=len(limits) * (ga.bits_per_gene if isinstance(ga, BinaryGenetic) else 1),
         binary=binary,
@@ -198,5 +260,8 @@ def _breeding(ga: SelectiveSettings, limits: FloatArray) -> Breeding:
         mutation=mutation,
         mutation_scope=scope,
         mutation_rate=ga.mutation_rate,
+        mutation_std=std,
+        mutation_power=power,
+        num_generations=ga.num_generations,
         limits=limits,
     )

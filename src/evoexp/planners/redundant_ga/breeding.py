@@ -1,0 +1,119 @@
+"""Operators of the genetic algorithm over the ends of a sub-path, compiled."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from evoexp.evolution.crossover import ONE_POINT, cross_genes, cross_single_point
+from evoexp.evolution.mutation import flip_bits, mutate_genes
+from evoexp.evolution.selection import (
+    choose_by_tournament,
+    inverse_weights,
+    rank_weights,
+    spin_roulette,
+)
+from evoexp.numeric.compilation import kernel
+from evoexp.records import FloatArray, IntArray
+
+TOURNAMENT, ROULETTE, RANK = range(3)
+
+
+class Draws(NamedTuple):
+    """Random numbers of one generation.
+
+    Attributes:
+        choosing: Uniform numbers for the choice of parents.
+        crossing: Uniform numbers for crossover.
+        mutating: Uniform numbers for mutation.
+        normals: (genes, ≥ offspring) normal deviates, for Gaussian mutation only.
+    """
+
+    choosing: FloatArray
+    crossing: FloatArray
+    mutating: FloatArray
+    normals: FloatArray
+
+
+class Breeding(NamedTuple):
+    """Settings of the operators.
+
+    Attributes:
+        num_genes: Number of genes.
+        binary: Whether they are bits.
+        selection: TOURNAMENT, ROULETTE or RANK.
+        tournament_size: Contestants per tournament.
+        rank_pressure: See `rank_weights`.
+        crossover: See `cross_genes`, and so are its rate and α.
+        crossover_rate: Probability per pair.
+        blend_alpha: α of BLX-α.
+        mutation: See `mutate_genes`, and so are its scope and rate.
+        mutation_scope: See there.
+        mutation_rate: See there.
+        mutation_std: Of Gaussian mutation, in units of a gene's range.
+        mutation_power: b of non-uniform mutation.
+        num_generations: T of non-uniform mutation.
+        limits: (joints, 2) of the joint angles [rad].
+    """
+
+    num_genes: int
+    binary: bool
+    selection: int
+    tournament_size: int
+    rank_pressure: float
+    crossover: int
+    crossover_rate: float
+    blend_alpha: float
+    mutation: int
+    mutation_scope: int
+    mutation_rate: float
+    mutation_std: float
+    mutation_power: int
+    num_generations: int
+    limits: FloatArray
+
+
+@kernel
+def breed(
+    draws: Draws,
+    spread: float,
+    breeding: Breeding,
+    costs: FloatArray,
+    genomes: FloatArray,
+    parents: IntArray,
+    out: FloatArray,
+) -> None:
+    """Write offspring: selected, crossed and mutated.
+
+    Args:
+        draws: Random numbers.
+        spread: Of mutation, see `mutate_genes`.
+        breeding: Settings of the operators.
+        costs: (individuals,) of the parents' generation.
+        genomes: (genes, individuals) of the parents' generation.
+        parents: (offspring,) written.
+        out: (genes, ≥ offspring) written.
+    """
+    # parents
+    if breeding.selection == TOURNAMENT:
+        choose_by_tournament(draws.choosing, costs, breeding.tournament_size, parents)
+    else:
+        weights = np.empty(len(costs))
+        if breeding.selection == ROULETTE:
+            inverse_weights(costs, weights)
+        else:
+            rank_weights(costs, breeding.rank_pressure, weights)
+        spin_roulette(weights, draws.choosing, parents)
+    # crossover
+    rate, limits = breeding.crossover_rate, breeding.limits
+    if breeding.crossover == ONE_POINT:
+        cross_single_point(draws.crossing, genomes, parents, rate, out)
+    else:
+        kind, alpha = breeding.crossover, breeding.blend_alpha
+        cross_genes(kind, draws.crossing, genomes, parents, rate, alpha, limits, out)
+    # mutation
+    uniforms, count, rate = draws.mutating, len(parents), breeding.mutation_rate
+    if breeding.binary:
+        flip_bits(uniforms, out, count, rate)
+    else:
+        kind, scope, normals = breeding.mutation, breeding.mutation_scope, draws.normals
+        mutate_genes(kind, scope, uniforms, normals, out, count, rate, spread, limits)

@@ -1,0 +1,123 @@
+"""Costs of the ends of a sub-path, compiled: Eq. 4, and which sub-paths collide."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from evoexp.collision.models.ellipse_kernels import (
+    Ellipses,
+    PathChecks,
+    TestedPath,
+    check_paths,
+    paths_collide,
+)
+from evoexp.numeric.compilation import borrowed, kernel
+from evoexp.numeric.named_tuples import named
+from evoexp.objectives.reaching import measure_reach, measure_reach_from
+from evoexp.records import BoolArray, FloatArray, IntArray
+from evoexp.robots.planar_ends import PlanarArm
+
+RESULTS = 3  # last rows of a table of individuals: cost, position error, joint displacement
+
+
+class Judging(NamedTuple):
+    """The collision model and the objective of a sub-path.
+
+    Attributes:
+        arm: The arm.
+        ellipses: The ellipses.
+        path: The positions that are tested.
+        target: (2,) desired place of the tip [length unit].
+        box: (4,) least and greatest x, least and greatest y of the tip [length unit].
+        weights: w1, w2 of Eq. 4.
+    """
+
+    arm: PlanarArm
+    ellipses: Ellipses
+    path: TestedPath
+    target: FloatArray
+    box: FloatArray
+    weights: tuple[float, float]
+
+
+@kernel
+def measure(
+    starts: FloatArray, angles: FloatArray, count: int, judging: Judging, table: FloatArray
+) -> None:
+    """Write Eq. 4 without collisions, and its parts, for the first `count` individuals."""
+    start, row = starts[:, 0].copy(), len(table) - RESULTS
+    arm, target, box, weights = judging.arm, judging.target, judging.box, judging.weights
+    results = table[row], table[row + 1], table[row + 2]
+    measure_reach_from(start, angles, count, arm, target, box, weights, *results)
+
+
+@kernel
+def list_inside(table: FloatArray, count: int, lanes: IntArray) -> int:
+    """List the individuals of finite cost in `lanes`; return how many there are."""
+    cost, inside = table[len(table) - RESULTS], 0
+    for k in range(count):
+        lanes[inside] = k
+        inside += cost[k] < np.inf
+    return inside
+
+
+@kernel
+def drop_collisions(
+    starts: FloatArray,
+    angles: FloatArray,
+    lanes: IntArray,
+    count: int,
+    judging: Judging,
+    table: FloatArray,
+    hit: BoolArray,
+    checks: PathChecks,
+) -> None:
+    """Write inf as the cost of those among `lanes` that collide on their way."""
+    cost = table[len(table) - RESULTS]
+    arm, ellipses, path = judging.arm, judging.ellipses, judging.path
+    check_paths(starts, angles, lanes, count, arm, ellipses, path, hit, checks)
+    for k in range(count):
+        individual = lanes[k]
+        cost[individual] = np.inf if hit[individual] else cost[individual]
+
+
+@kernel
+def judge_paths(
+    starts: FloatArray,
+    ends: FloatArray,
+    lanes: IntArray,
+    count: int,
+    plain_judging: tuple[Any, ...],
+    results: FloatArray,
+    hit: BoolArray,
+) -> None:
+    """Write Eq. 4 and its parts for some individuals.
+
+    An individual whose tip ends outside the box is not tested for collisions.
+
+    Args:
+        starts: (joints, individuals) [rad].
+        ends: (joints, individuals) [rad].
+        lanes: (≥ count + LANES) indices of individuals, changed.
+        count: Number of individuals.
+        plain_judging: `Judging`, made plain.
+        results: (3, individuals) written: cost, position error, joint displacement.
+        hit: (individuals,) scratch.
+    """
+    judging = named(Judging, plain_judging)
+    starts, ends, lanes, judging, results, hit = borrowed(
+        (starts, ends, lanes, judging, results, hit)
+    )
+    arm, target, box, weights = judging.arm, judging.target, judging.box, judging.weights
+    cost, error, displacement = results[0], results[1], results[2]
+    measure_reach(starts, ends, lanes, count, arm, target, box, weights, cost, error, displacement)
+    # individuals inside the box
+    left = 0
+    for k in range(count):
+        individual = lanes[k]
+        lanes[left] = individual
+        left += cost[individual] < np.inf
+    paths_collide(starts, ends, lanes, left, arm, judging.ellipses, judging.path, hit)
+    for k in range(left):
+        individual = lanes[k]
+        cost[individual] = np.inf if hit[individual] else cost[individual]

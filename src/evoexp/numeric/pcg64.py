@@ -1,43 +1,128 @@
-"""Numbers of numpy's PCG64, many at once: the same bits in half the time.
+"""numpy's PCG64 in kernels: its numbers, to the last bit, in half the time.
 
-A step of the generator must wait for the step before it. Here four steps are made side by side,
-each four numbers ahead of its last one: s ← A⁴ s + (A³ + A² + A + 1) c (O'Neill 2014, PCG).
+The generator (O'Neill 2014, PCG XSL RR 128/64) multiplies a state of 128 bits and adds an
+increment; a number is made of the halves of the state. Here four states that are four steps apart
+go on at once, because a multiplication takes longer than the next one has to wait for it; the
+numbers are then made of many states at once, in vectors.
 
-Where numpy's layout of a generator in memory is not the known one, numpy draws the numbers itself.
+A kernel takes a generator as `words`: high and low half of the state, of the increment. Outside of
+kernels `draw_uniforms` and `draw_words` draw for a generator; where numpy's layout of it in memory
+is not the known one, numpy draws the numbers itself.
 """
 
-import ctypes
 from collections.abc import Callable
-from functools import cache
 from typing import Any, cast
 
 import numpy as np
 from llvmlite import ir
-from numba.core import types
+from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from evoexp.numeric.compilation import borrowed, inlined, kernel
+from evoexp.numeric.compilation import inlined, kernel
+from evoexp.numeric.elementary import scale_to_normal
+from evoexp.numeric.generator_memory import layout_is_known, words_of
 
-Word = np.uint64
-Wide = tuple[np.uint64, np.uint64]  # 128 bits: the upper half and the lower
+Words = NDArray[np.uint64]
 
-ROTATION = Word(58)  # of the upper half: so many bits above it tell by how much words are rotated
-WORD_BITS, NONE, ONE = Word(64), Word(0), Word(1)
-FRACTION = Word(11)  # bits that a uniform number leaves out
-MULTIPLIER = Word(2549297995355413924), Word(4865540595714422341)
-LANES = 4
+_MULTIPLIER = 0x2360ED051FC65DA44385DF649FCCF645
+_HALF = 2**64
+_HIGH, _LOW = np.uint64(_MULTIPLIER // _HALF), np.uint64(_MULTIPLIER % _HALF)
+_BLOCK = 64  # states of which numbers are made at once
+_STREAMS = 4
+_INT64, _INT128, _DOUBLE = ir.IntType(64), ir.IntType(128), ir.DoubleType()
+
+
+class Twin:
+    """A generator's twin, of which kernels draw numbers ahead; the generator follows.
+
+    Attributes:
+        words: The twin, as kernels take it.
+    """
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        """Begin where a generator is.
+
+        Args:
+            rng: The generator; its bit generator must be a PCG64.
+
+        Raises:
+            TypeError: Another bit generator.
+        """
+        if not isinstance(rng.bit_generator, np.random.PCG64):
+            raise TypeError(f"rng: must be a PCG64, was a {type(rng.bit_generator).__name__}")
+        self._bits, self.words = rng.bit_generator, np.empty(4, dtype=np.uint64)
+        self._state: Any = {}
+        self.meet()
+
+    def meet(self) -> None:
+        """Go where the generator is."""
+        self._state = self._bits.state
+        state, increment = self._state["state"]["state"], self._state["state"]["inc"]
+        self.words[:] = state // _HALF, state % _HALF, increment // _HALF, increment % _HALF
+
+    def follow(self, state: Words) -> None:
+        """Let the generator, left alone since they met, go to a state: high and low half."""
+        high, low = state.tolist()
+        self._state["state"]["state"] = high * _HALF + low
+        self._bits.state = self._state
+
+
+def _joined(builder: Any, high: Any, low: Any) -> Any:
+    """Return a number of 128 bits from its halves."""
+    shifted = builder.shl(builder.zext(high, _INT128), ir.Constant(_INT128, 64))
+    return builder.or_(shifted, builder.zext(low, _INT128))
+
+
+@intrinsic
+def _step(
+    typing_context: Any,
+    high: Any,
+    low: Any,
+    factor_high: Any,
+    factor_low: Any,
+    addend_high: Any,
+    addend_low: Any,
+) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        state, factor, addend = (_joined(builder, *arguments[k : k + 2]) for k in (0, 2, 4))
+        found = builder.add(builder.mul(state, factor), addend)
+        shifted = builder.lshr(found, ir.Constant(_INT128, 64))
+        halves = [builder.trunc(part, _INT64) for part in (shifted, found)]
+        return context.make_tuple(builder, signature.return_type, halves)
+
+    return types.UniTuple(types.uint64, 2)(*[types.uint64] * 6), generate
+
+
+@intrinsic
+def _make_word(typing_context: Any, high: Any, low: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        high, low = arguments
+        mixed, places = builder.xor(high, low), builder.lshr(high, ir.Constant(_INT64, 58))
+        kind = ir.FunctionType(_INT64, [_INT64] * 3)
+        turn = builder.module.declare_intrinsic("llvm.fshr", [_INT64], kind)
+        return builder.call(turn, [mixed, mixed, places])
+
+    return types.uint64(types.uint64, types.uint64), generate
+
+
+# for kernels: without the typing context
+_stepped: Callable[..., tuple[np.uint64, np.uint64]] = cast(Any, _step)
+"""Return state · factor + addend, modulo 2^128; all of them are given in halves."""
+
+_word: Callable[[np.uint64, np.uint64], np.uint64] = cast(Any, _make_word)
+"""Return the word of a state: exclusive or of its halves, rotated."""
 
 
 def draw_uniforms(rng: np.random.Generator, count: int) -> NDArray[np.float64]:
     """Return the next uniform numbers in [0, 1), as `rng.random(count)` does."""
-    return _drawn(rng, np.empty(count), _fill_uniforms, rng.random)
+    return _drawn(rng, np.empty(count), fill_uniforms, rng.random)
 
 
-def draw_words(rng: np.random.Generator, count: int) -> NDArray[np.uint64]:
+def draw_words(rng: np.random.Generator, count: int) -> Words:
     """Return the next words of 64 random bits, as `rng.bit_generator.random_raw(count)` does."""
     raw: Any = rng.bit_generator.random_raw
-    return _drawn(rng, np.empty(count, dtype=np.uint64), _fill_words, raw)
+    return _drawn(rng, np.empty(count, dtype=np.uint64), fill_words, raw)
 
 
 def _drawn(
@@ -47,129 +132,99 @@ def _drawn(
     otherwise: Callable[[int], NDArray[Any]],
 ) -> NDArray[Any]:
     bits = rng.bit_generator
-    if not isinstance(bits, np.random.PCG64) or not _layout_is_known():
+    if not isinstance(bits, np.random.PCG64) or not layout_is_known():
         return otherwise(len(out))
     with bits.lock:
-        fill(_state_of(bits), out)
+        memory = words_of(bits)
+        words = memory[[1, 0, 3, 2]]
+        fill(words, out)
+        memory[1], memory[0] = words[0], words[1]
     return out
 
 
-def _state_of(bits: np.random.PCG64) -> NDArray[np.uint64]:
-    """Return the state and the increment of a generator, lower halves first, in its own memory."""
-    # struct {struct {uint128 state, increment} *words; int has_uint32; uint32 uinteger;}
-    address = ctypes.c_void_p.from_address(bits.ctypes.state_address).value or 0
-    words: Any = (ctypes.c_uint64 * 4).from_address(address)
-    return np.asarray(words)
-
-
-@cache
-def _layout_is_known() -> bool:
-    """Whether the memory of a PCG64 shows its state and increment where they are expected."""
-    if np.__version__.split(".")[0] != "2":
-        return False
-    probe = np.random.PCG64(0)
-    words = {"state": 0x0123456789ABCDEF1032547698BADCFE, "inc": 0x1112131415161718191A1B1C1D1E1F21}
-    state: Any = {"bit_generator": "PCG64", "state": words, "has_uint32": 0, "uinteger": 0}
-    probe.state = state
-    found = [int(word) for word in _state_of(probe)]
-    return found == [
-        half for name in ("state", "inc") for half in (words[name] % 2**64, words[name] >> 64)
-    ]
+@inlined
+def _number(word: np.uint64) -> float:
+    """Return a word as a number in [0, 1), of which 53 bits are kept."""
+    return np.int64(word >> np.uint64(11)) * 2.0**-53
 
 
 @kernel
-def _fill_uniforms(state: NDArray[np.uint64], out: NDArray[np.float64]) -> None:
-    """Write the next uniform numbers; the state becomes the one behind them."""
-    state, out = borrowed((state, out))
-    increment = (state[3], state[2])
-    leap, shift = _leap(increment)
-    one = _after((state[1], state[0]), MULTIPLIER, increment)
-    two = _after(one, MULTIPLIER, increment)
-    three = _after(two, MULTIPLIER, increment)
-    four = _after(three, MULTIPLIER, increment)
-    whole = len(out) - len(out) % LANES
-    for k in range(0, whole, LANES):
-        out[k], out[k + 1] = _uniform(_word(one)), _uniform(_word(two))
-        out[k + 2], out[k + 3] = _uniform(_word(three)), _uniform(_word(four))
-        state[1], state[0] = four
-        one, two = _after(one, leap, shift), _after(two, leap, shift)
-        three, four = _after(three, leap, shift), _after(four, leap, shift)
-    for k in range(whole, len(out)):
-        out[k] = _uniform(_next_word(state))
+def fill_uniforms(words: Words, out: NDArray[np.float64]) -> None:
+    """Fill out (n,) with uniform numbers in [0, 1), as `Generator.random` does.
+
+    Args:
+        words: The generator, which goes on by n steps.
+        out: Written.
+    """
+    bits = out.view(np.uint64)
+    fill_words(words, bits)
+    for k in range(len(out)):
+        out[k] = _number(bits[k])
 
 
 @kernel
-def _fill_words(state: NDArray[np.uint64], out: NDArray[np.uint64]) -> None:
-    """Write the next words; the state becomes the one behind them."""
-    state, out = borrowed((state, out))
-    increment = (state[3], state[2])
-    leap, shift = _leap(increment)
-    one = _after((state[1], state[0]), MULTIPLIER, increment)
-    two = _after(one, MULTIPLIER, increment)
-    three = _after(two, MULTIPLIER, increment)
-    four = _after(three, MULTIPLIER, increment)
-    whole = len(out) - len(out) % LANES
-    for k in range(0, whole, LANES):
-        out[k], out[k + 1], out[k + 2], out[k + 3] = (
-            _word(one),
-            _word(two),
-            _word(three),
-            _word(four),
+def fill_words(words: Words, out: Words) -> None:
+    """Fill out (n,) with words of 64 random bits, as `BitGenerator.random_raw` does.
+
+    Args:
+        words: The generator, which goes on by n steps.
+        out: Written.
+    """
+    high, low, add_high, add_low = words[0], words[1], words[2], words[3]
+    num_blocks, none = len(out) // _BLOCK, np.uint64(0)
+    # factor and addend of four steps at once: those of two, twice
+    far_high, far_low, far_add_high, far_add_low = _HIGH, _LOW, add_high, add_low
+    for _ in range(2):
+        far_add_high, far_add_low = _stepped(
+            far_add_high, far_add_low, far_high, far_low, far_add_high, far_add_low
         )
-        state[1], state[0] = four
-        one, two = _after(one, leap, shift), _after(two, leap, shift)
-        three, four = _after(three, leap, shift), _after(four, leap, shift)
-    for k in range(whole, len(out)):
-        out[k] = _next_word(state)
+        far_high, far_low = _stepped(far_high, far_low, far_high, far_low, none, none)
+    # the next four states
+    a_high, a_low = _stepped(high, low, _HIGH, _LOW, add_high, add_low)
+    b_high, b_low = _stepped(a_high, a_low, _HIGH, _LOW, add_high, add_low)
+    c_high, c_low = _stepped(b_high, b_low, _HIGH, _LOW, add_high, add_low)
+    d_high, d_low = _stepped(c_high, c_low, _HIGH, _LOW, add_high, add_low)
+    highs, lows = np.empty(_BLOCK, dtype=np.uint64), np.empty(_BLOCK, dtype=np.uint64)
+    for block in range(num_blocks):
+        # states of a block
+        for k in range(0, _BLOCK, _STREAMS):
+            at = np.uint64(k)
+            highs[at], lows[at] = a_high, a_low
+            highs[at + np.uint64(1)], lows[at + np.uint64(1)] = b_high, b_low
+            highs[at + np.uint64(2)], lows[at + np.uint64(2)] = c_high, c_low
+            highs[at + np.uint64(3)], lows[at + np.uint64(3)] = d_high, d_low
+            high, low = d_high, d_low
+            a_high, a_low = _stepped(a_high, a_low, far_high, far_low, far_add_high, far_add_low)
+            b_high, b_low = _stepped(b_high, b_low, far_high, far_low, far_add_high, far_add_low)
+            c_high, c_low = _stepped(c_high, c_low, far_high, far_low, far_add_high, far_add_low)
+            d_high, d_low = _stepped(d_high, d_low, far_high, far_low, far_add_high, far_add_low)
+        # their words
+        for k in range(_BLOCK):
+            out[block * _BLOCK + k] = _word(highs[k], lows[k])
+    # the rest, one by one
+    for k in range(num_blocks * _BLOCK, len(out)):
+        high, low = _stepped(high, low, _HIGH, _LOW, add_high, add_low)
+        out[k] = _word(high, low)
+    words[0], words[1] = high, low
 
 
-@inlined
-def _next_word(state: NDArray[np.uint64]) -> Word:
-    """Make a step and return its word."""
-    state[1], state[0] = _after((state[1], state[0]), MULTIPLIER, (state[3], state[2]))
-    return _word((state[1], state[0]))
+@kernel
+def fill_normals(words: Words, out: NDArray[np.float64]) -> None:
+    """Fill out (n,) with standard normal deviates, as `elementary.standard_normal` does.
 
-
-@inlined
-def _leap(increment: Wide) -> tuple[Wide, Wide]:
-    """Return the multiplier and the increment of `LANES` steps at once."""
-    multiplier, shift = MULTIPLIER, increment
-    for _ in range(LANES - 1):
-        multiplier = _after(multiplier, MULTIPLIER, (NONE, NONE))
-        shift = _after(shift, MULTIPLIER, increment)
-    return multiplier, shift
-
-
-@inlined
-def _word(state: Wide) -> Word:
-    """Return the word of a state: both halves together, rotated (XSL RR)."""
-    high, low = state
-    mixed, rotated = high ^ low, high >> ROTATION
-    return mixed >> rotated | mixed << (WORD_BITS - rotated & WORD_BITS - ONE)
-
-
-@inlined
-def _uniform(word: Word) -> float:
-    """Return a word as a number in [0, 1)."""
-    return np.int64(word >> FRACTION) * 2.0**-53
-
-
-def _multiply_and_add(typing_context: Any, state: Any, factor: Any, term: Any) -> Any:
-    wide, half = ir.IntType(128), ir.IntType(64)
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        def joined(pair: Any) -> Any:
-            high, low = (builder.zext(builder.extract_value(pair, k), wide) for k in (0, 1))
-            return builder.or_(builder.shl(high, ir.Constant(wide, 64)), low)
-
-        value, by, plus = map(joined, arguments)
-        found = builder.add(builder.mul(value, by), plus)
-        high = builder.trunc(builder.lshr(found, ir.Constant(wide, 64)), half)
-        return context.make_tuple(builder, pair, (high, builder.trunc(found, half)))
-
-    pair = types.UniTuple(types.uint64, 2)
-    return pair(pair, pair, pair), generate
-
-
-_after: Callable[[Wide, Wide, Wide], Wide] = cast(Any, intrinsic(_multiply_and_add))
-"""Return state × multiplier + increment, each of 128 bits."""
+    Args:
+        words: The generator, which goes on by as many steps as attempts take.
+        out: Written.
+    """
+    high, low, add_high, add_low = words[0], words[1], words[2], words[3]
+    num_pairs = (out.size + 1) // 2
+    pairs, squares, i = np.empty(2 * num_pairs), np.empty(num_pairs), 0
+    while i < num_pairs:
+        high, low = _stepped(high, low, _HIGH, _LOW, add_high, add_low)
+        u = 2.0 * _number(_word(high, low)) - 1.0
+        high, low = _stepped(high, low, _HIGH, _LOW, add_high, add_low)
+        v = 2.0 * _number(_word(high, low)) - 1.0
+        pairs[2 * i], pairs[2 * i + 1], squares[i] = u, v, u * u + v * v
+        i += 1 if 0.0 < squares[i] < 1.0 else 0
+    scale_to_normal(pairs, squares, out)
+    words[0], words[1] = high, low

@@ -89,7 +89,7 @@ class DrawnAhead:
 
     def draw(self, steps: int) -> NDArray[np.float64]:
         """Return the numbers of the next steps, (steps, count)."""
-        return self._twin.random((steps, self._count))
+        return draw_uniforms(self._twin, steps * self._count).reshape(steps, self._count)
 
     def follow(self) -> None:
         """Let the generator pass the numbers of one step."""
@@ -115,7 +115,7 @@ class DrawnByNeed:
     def draw(self, steps: int) -> NDArray[np.float64]:
         """Return at least as many numbers as the next steps may take."""
         missing = max(0, steps * self._most - len(self._left))
-        self._left = np.concatenate([self._left, self._twin.random(missing)])
+        self._left = np.concatenate([self._left, draw_uniforms(self._twin, missing)])
         return self._left
 
     def took(self, counts: list[int]) -> None:

@@ -1,13 +1,13 @@
 """The chain of digests, which tells from which generation on two runs differ."""
 
-import ctypes
-from collections.abc import Callable, Iterable
-from functools import cache
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 import xxhash
 from numpy.typing import NDArray
+
+from evoexp.numeric.generator_memory import state_reader
 
 
 class Chain:
@@ -75,59 +75,3 @@ def array_bytes(array: NDArray[Any]) -> bytes:
 def any_nan(arrays: Iterable[bytes]) -> bool:
     """Return whether float64 arrays, given as bytes, hold any NaN."""
     return bool(np.isnan(np.frombuffer(b"".join(arrays))).any())
-
-
-def state_bytes(bit_generator: np.random.PCG64) -> bytes:
-    """Return the state of a PCG64.
-
-    State (16), increment (16), has_uint32 (4), uinteger (4), all little-endian.
-    """
-    state: Any = bit_generator.state
-    words = state["state"]
-    half = state["has_uint32"] | state["uinteger"] << 32
-    return b"".join(
-        (
-            words["state"].to_bytes(16, "little"),
-            words["inc"].to_bytes(16, "little"),
-            half.to_bytes(8, "little"),
-        )
-    )
-
-
-def state_reader(bit_generator: np.random.PCG64) -> Callable[[], bytes]:
-    """Return a function that gives `state_bytes` of this generator.
-
-    Where numpy's layout is known, it takes a tenth of the time.
-
-    numpy publishes the address of the state but not its layout, so the layout is tried on a
-    generator of our own first.
-    """
-    return _read_memory(bit_generator) if _layout_is_known() else lambda: state_bytes(bit_generator)
-
-
-def _read_memory(bit_generator: np.random.PCG64) -> Callable[[], bytes]:
-    # struct {struct {uint128 state, increment} *words; int has_uint32; uint32 uinteger;}
-    address: int = bit_generator.ctypes.state_address
-    words = memoryview(
-        (ctypes.c_uint8 * 32).from_address(ctypes.c_void_p.from_address(address).value or 0)
-    )
-    half = memoryview((ctypes.c_uint8 * 8).from_address(address + ctypes.sizeof(ctypes.c_void_p)))
-
-    def read(owner: np.random.PCG64 = bit_generator) -> bytes:  # the owner keeps the memory alive
-        return b"".join((words, half))
-
-    return read
-
-
-@cache
-def _layout_is_known() -> bool:
-    """Whether the memory of a PCG64 shows its state before and after a change, in every word."""
-    if np.__version__.split(".")[0] != "2":
-        return False
-    probe = np.random.PCG64(0)
-    read = _read_memory(probe)
-    agree = read() == state_bytes(probe)
-    words = {"state": 0x0123456789ABCDEF1032547698BADCFE, "inc": 0x1112131415161718191A1B1C1D1E1F21}
-    state: Any = {"bit_generator": "PCG64", "state": words, "has_uint32": 1, "uinteger": 0xDEADBEEF}
-    probe.state = state
-    return agree and read() == state_bytes(probe)

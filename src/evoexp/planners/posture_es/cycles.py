@@ -7,7 +7,7 @@ import numpy as np
 
 from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.numeric.named_tuples import plain
-from evoexp.numeric.random_twin import Twin, fill_normals, fill_uniforms
+from evoexp.numeric.pcg64 import Twin, fill_normals, fill_uniforms
 from evoexp.planners.posture_es import kernels
 from evoexp.planners.posture_es.kernels import (
     COST,

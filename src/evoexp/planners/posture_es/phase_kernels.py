@@ -11,7 +11,7 @@ import numpy as np
 from evoexp.evolution.cost_statistics import summarise
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.named_tuples import named
-from evoexp.numeric.random_twin import Words, fill_normals, fill_uniforms
+from evoexp.numeric.pcg64 import Words, fill_normals, fill_uniforms
 from evoexp.planners.posture_es.kernels import (
     COST,
     ROWS,
@@ -127,7 +127,7 @@ def run_cycles(
     """Do the cycles behind one up to another, or up to the one with which the phase ends.
 
     Args:
-        words: The random generator, see `numeric.random_twin`.
+        words: The random generator, see `numeric.pcg64`.
         first: The present cycle.
         last: The last one.
         num_bred: Children of parents; the rest of the offspring are immigrants.

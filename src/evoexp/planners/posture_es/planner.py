@@ -28,7 +28,7 @@ from evoexp.collision.models.body_models import CollisionModel
 from evoexp.collision.scene import Part
 from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.numeric.elementary import DEGREE
-from evoexp.numeric.random_twin import Twin
+from evoexp.numeric.pcg64 import Twin
 from evoexp.objectives.posture_cost import COLUMNS, PARALLEL, TERMS, UPRIGHT, PostureCost
 from evoexp.paths.motion import Motion
 from evoexp.planners.answers import CoverShape, Listing

@@ -15,7 +15,7 @@ from evoexp.evolution.mutation import GAUSSIAN, NON_UNIFORM, decode_bits, non_un
 from evoexp.evolution.selection import choose_elites
 from evoexp.numeric.compilation import borrowed, kernel
 from evoexp.numeric.named_tuples import named
-from evoexp.numeric.random_twin import Words, fill_normals, fill_uniforms
+from evoexp.numeric.pcg64 import Words, fill_normals, fill_uniforms
 from evoexp.planners.redundant_ga.breeding import Breeding, Draws, breed
 from evoexp.planners.redundant_ga.sub_path_costs import (
     RESULTS,
@@ -83,7 +83,7 @@ def evolve(
     """Compute the generations behind one up to another, or up to the first that is good enough.
 
     Args:
-        words: The random generator, see `numeric.random_twin`.
+        words: The random generator, see `numeric.pcg64`.
         first: The present generation.
         last: The last one to be computed.
         stop_cost: The first generation whose best costs less ends the search.

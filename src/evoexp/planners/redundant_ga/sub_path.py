@@ -21,7 +21,7 @@ from evoexp.evolution.mutation import (
     num_mutation_uniforms,
 )
 from evoexp.numeric.named_tuples import plain
-from evoexp.numeric.random_twin import Twin
+from evoexp.numeric.pcg64 import Twin
 from evoexp.numeric.vectors import LANES
 from evoexp.planners.redundant_ga import kernels
 from evoexp.planners.redundant_ga.breeding import Breeding

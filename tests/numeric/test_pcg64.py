@@ -87,8 +87,12 @@ def test_a_twin_meets_its_generator_and_leaves_it_alone_until_it_follows() -> No
     assert np.array_equal(again, own.random(5))
 
 
-def test_half_a_number_that_a_generator_keeps_stays_kept() -> None:
+@pytest.mark.parametrize("known", [True, False])
+def test_half_a_number_that_a_generator_keeps_stays_kept(
+    known: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """`integers` draws 32 bits at a time and keeps the other 32."""
+    monkeypatch.setattr(pcg64, "layout_is_known", lambda: known)
     own, other = rng(1), rng(1)
     assert own.integers(0, 9, dtype=np.uint32) == other.integers(0, 9, dtype=np.uint32)
     twin, found = Twin(own), np.empty(3)

@@ -72,8 +72,10 @@ def halls(given: Condition, seed: int, monkeypatch: pytest.MonkeyPatch) -> list[
     with monkeypatch.context() as patch:
         patch.setattr(breeder_module, "renew", watched)
         planner, problem = given.prepare()
-        for _ in planner.evolve(problem, np.random.default_rng(seed)):
+        # kernel by kernel, so that one of them can be watched
+        for _ in planner._step_by_step(problem, np.random.default_rng(seed)):
             pass
+    assert found
     return found
 
 

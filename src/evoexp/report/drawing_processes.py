@@ -17,8 +17,6 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from multiprocessing import connection
 from typing import Any, Generic, TypeVar
 
-import joblib
-
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
@@ -63,12 +61,19 @@ def each_on_all_cores(
     return _shared(attempted, items, sent_at_once=True)
 
 
+def num_cores() -> int:
+    """Return how many cores this process may use."""
+    import joblib  # takes as long as a command that has nothing to draw
+
+    return int(joblib.cpu_count())
+
+
 def _shared(
     function: Callable[[Item], Result], items: Sequence[Item], sent_at_once: bool
 ) -> Generator[Result, None, None]:
     """Yield the results of all items in order."""
     # elsewhere libraries do not survive a fork
-    if sys.platform != "linux" or min(int(joblib.cpu_count()), len(items)) < 2:
+    if sys.platform != "linux" or len(items) < 2 or num_cores() < 2:
         yield from map(function, items)
         return
     with _CORES.counted():
@@ -93,7 +98,7 @@ class _Cores:
             yield
             return
         context = multiprocessing.get_context("fork")
-        self._idle, self._has_one = context.Semaphore(int(joblib.cpu_count()) - 1), True
+        self._idle, self._has_one = context.Semaphore(num_cores() - 1), True
         try:
             yield
         finally:

@@ -6,8 +6,8 @@ longer than `PATIENCE_S`, the next one ends the process at once; if it takes lon
 `CLOSING_S`, as where a library waits for a task that never ends, no further one is needed. Nothing
 is lost by that: finished files are whole at any moment.
 
-A library may catch the exception with a bare `except:` and go on. So a timer checks whether it is
-still under way, and raises it again if not.
+A library may catch the exception with a bare `except:` and go on. A timer therefore looks whether
+the exception is still under way, and raises another one if not.
 """
 
 import contextlib

@@ -45,6 +45,52 @@ class Generation(NamedTuple):
     arrays: Mapping[str, NDArray[Any]] | None = None  # of references: attached as <name>.npy
 
 
+class Standing(NamedTuple):
+    """The best solution from a generation of a stretch on, up to the next standing."""
+
+    place: int  # of this generation in its stretch
+    best: FloatArray  # flat solution, never changed
+    cost: float
+    terms: dict[str, float]  # never changed
+    solved: bool
+
+
+class Stretch(NamedTuple):
+    """Generations in a row: `Generation`, field by field."""
+
+    first: int  # index of the first generation
+    standings: list[Standing]  # the first one is at place 0
+    lowest: list[float]  # of each generation; see `Generation.best_cost_in_generation`
+    means: list[float]
+    deviations: list[float]
+    num_feasible: list[int]
+    evaluations: list[int]
+    collision_queries: list[int]
+    costs: FloatArray  # (generations, individuals)
+    states: list[bytes]  # of the generator, behind each generation
+    times: list[float]  # [s] when each generation was there
+    population: NDArray[Any] | None  # of the last generation, if it ends the run
+
+    def last(self) -> Generation:
+        """Return the last generation; without a population unless it ends the run."""
+        standing, population = self.standings[-1], self.population
+        return Generation(
+            self.first + len(self.lowest) - 1,
+            standing.best,
+            standing.cost,
+            self.lowest[-1],
+            self.means[-1],
+            self.deviations[-1],
+            self.num_feasible[-1],
+            self.evaluations[-1],
+            self.collision_queries[-1],
+            standing.solved,
+            standing.terms,
+            self.costs[-1],
+            np.empty(0) if population is None else population,
+        )
+
+
 class GenerationRow(NamedTuple):
     """One generation as it is read back from a log, with its link of the chain."""
 

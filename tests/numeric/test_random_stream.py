@@ -1,9 +1,11 @@
 """Uniform numbers in blocks: the same numbers in the same order, wherever blocks end."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from evoexp.numeric.generator_memory import state_bytes, states_behind
 from evoexp.numeric.random_stream import (
     Block,
     DrawnAhead,
@@ -94,3 +96,31 @@ def test_a_generator_follows_steps_that_take_what_they_need(
             ahead.follow()
             assert own.bit_generator.state == step_by_step.bit_generator.state
             begin += count
+
+
+@pytest.mark.parametrize("count", [0, 1, 7, 1000])
+@pytest.mark.parametrize("has_half", [False, True])
+def test_states_behind_steps_are_those_that_drawing_leads_to(count: int, has_half: bool) -> None:
+    rng = np.random.default_rng(3)
+    if has_half:
+        rng.integers(0, 10, dtype=np.uint32)
+    found, before = states_behind(rng.bit_generator, count, 5), state_bytes(rng.bit_generator)
+    assert state_bytes(rng.bit_generator) == before
+    for state in found:
+        rng.random(count)
+        assert state_bytes(rng.bit_generator) == state
+
+
+def test_all_steps_at_once_are_one_after_the_other() -> None:
+    one, other = np.random.default_rng(4), np.random.default_rng(4)
+    ahead, behind = DrawnAhead(one, 13), DrawnAhead(other, 13)
+    found = ahead.follow_all(6)
+    for state in found:
+        behind.follow()
+        assert state_bytes(other.bit_generator) == state
+    assert one.random() == other.random()
+
+
+def test_states_of_another_generator_are_refused() -> None:
+    with pytest.raises(TypeError, match="must be a PCG64, was MT19937"):
+        states_behind(np.random.MT19937(0), 1, 1)

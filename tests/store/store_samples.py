@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from evoexp.records import FrontRow, Generation, ReplicateSummary
+from evoexp.records import FrontRow, Generation, ReplicateSummary, Standing, Stretch
+from evoexp.store.digests import Chain
 from evoexp.store.log import Finished, Log
 
 CONFIG = b'{"planner": "demo", "seed": 1}'
@@ -79,6 +80,36 @@ def summary(replicate: int = 7, **changes: Any) -> ReplicateSummary:
         wall_s=0.5,
     )
     return row._replace(**changes)
+
+
+def in_stretches(written: Sequence[Generation], most: int) -> list[Stretch]:
+    """Return the same generations, so many together; all with one state of the generator."""
+    state = Chain(np.random.default_rng(5)).state()
+    found = []
+    for begin in range(0, len(written), most):
+        own = written[begin : begin + most]
+        standings: list[Standing] = []
+        for k, each in enumerate(own):
+            standing = Standing(k, each.best, each.best_cost, each.terms, each.solved)
+            if not standings or each.terms is not standings[-1].terms:
+                standings.append(standing)
+        found.append(
+            Stretch(
+                first=own[0].index,
+                standings=standings,
+                lowest=[each.best_cost_in_generation for each in own],
+                means=[each.mean_cost for each in own],
+                deviations=[each.std_cost for each in own],
+                num_feasible=[each.num_feasible for each in own],
+                evaluations=[each.evaluations for each in own],
+                collision_queries=[each.collision_queries for each in own],
+                costs=np.array([each.costs for each in own]),
+                states=[state] * len(own),
+                times=[0.0] * len(own),
+                population=own[-1].population,
+            )
+        )
+    return found
 
 
 def write(

@@ -10,14 +10,22 @@ import numpy as np
 import orjson
 import pytest
 from mcap.reader import make_reader
-from store_samples import CONDITION, CONFIG, ENVIRONMENT, generations, summary, write
+from store_samples import (
+    CONDITION,
+    CONFIG,
+    ENVIRONMENT,
+    generations,
+    in_stretches,
+    summary,
+    write,
+)
 
 from evoexp.records import FrontRow, GenerationRow
 from evoexp.store.digests import Chain, array_bytes
 from evoexp.store.generation_columns import generation_columns
+from evoexp.store.generation_texts import encode_generations
 from evoexp.store.log import Log
 from evoexp.store.log_reader import read_log, read_solution, read_summary
-from evoexp.store.messages import encode_generations
 
 FRONT = FrontRow(4, 1, np.array([[1.0, math.inf], [math.nan, -2.5], [-math.inf, 0.1]]))
 
@@ -258,3 +266,37 @@ def test_rows_together_are_the_rows_one_by_one() -> None:
     assert encode_generations(rows) == [orjson.dumps(row) for row in rows]
     assert encode_generations(rows[:1]) == [orjson.dumps(rows[0])]
     assert encode_generations([]) == []
+
+
+@pytest.mark.parametrize("most", [1, 2, 7, 64, 400])
+@pytest.mark.parametrize("name", ["length", "},{", "null", 'x":1},{"y', "β"])
+def test_stretches_give_the_log_of_their_generations(most: int, name: str) -> None:
+    """Among them generations whose numbers or costs are not finite, or NaN with a payload."""
+    written = [
+        each._replace(terms={**each.terms, name: float(each.index)}) for each in generations(150)
+    ]
+    payload = np.frombuffer(np.array([0xFFF8000000000123], dtype=np.uint64).tobytes())
+    written[20].costs[3:4] = payload
+    whole = written[4:]  # every number is finite
+    for given in (written, whole):
+        logs = [Log(CONDITION, CONFIG, 7, np.random.default_rng(5)) for _ in range(2)]
+        for each in given:
+            logs[0].write(each)
+        for stretch in in_stretches(given, most):
+            logs[1].write_stretch(stretch)
+        one, other = (log.finish(summary()) for log in logs)
+        assert one.content == other.content
+
+
+def test_generations_and_stretches_may_follow_each_other() -> None:
+    written = generations(30)
+    log, expected = (Log(CONDITION, CONFIG, 7, np.random.default_rng(5)) for _ in range(2))
+    for each in written:
+        expected.write(each)
+    for each in written[:10]:
+        log.write(each)
+    for stretch in in_stretches(written[10:20], 4):
+        log.write_stretch(stretch)
+    for each in written[20:]:
+        log.write(each)
+    assert log.finish(summary()).content == expected.finish(summary()).content

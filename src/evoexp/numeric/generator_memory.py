@@ -6,11 +6,15 @@ of our own first.
 
 import ctypes
 from collections.abc import Callable
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+MULTIPLIER = 0x2360ED051FC65DA44385DF649FCCF645  # of a PCG64
+_STATE_SIZE = 16  # [B]
+_MASK = 2**128 - 1
 
 
 def state_bytes(bit_generator: np.random.PCG64) -> bytes:
@@ -28,6 +32,40 @@ def state_bytes(bit_generator: np.random.PCG64) -> bytes:
             half.to_bytes(8, "little"),
         )
     )
+
+
+def states_behind(bit_generator: Any, count: int, steps: int) -> list[bytes]:
+    """Return the states behind some steps that take so many numbers each; see `state_bytes`.
+
+    The generator stays where it is. A step of many numbers is one multiplication and one addition,
+    as each number is (Brown 1994).
+
+    Raises:
+        TypeError: If the generator is no PCG64.
+    """
+    if not isinstance(bit_generator, np.random.PCG64):
+        raise TypeError(f"bit_generator: must be a PCG64, was {type(bit_generator).__name__}")
+    whole: Any = bit_generator.state
+    state, increment = whole["state"]["state"], whole["state"]["inc"]
+    factor, addend = _jump(count, increment)
+    rest = state_bytes(bit_generator)[_STATE_SIZE:]
+    found = []
+    for _ in range(steps):
+        state = (state * factor + addend) & _MASK
+        found.append(state.to_bytes(_STATE_SIZE, "little") + rest)
+    return found
+
+
+@lru_cache(maxsize=8)
+def _jump(count: int, increment: int) -> tuple[int, int]:
+    """Return factor and addend of `count` steps of a PCG64 at once."""
+    factor, addend, power, power_addend = 1, 0, MULTIPLIER, increment
+    while count:
+        if count & 1:
+            factor, addend = factor * power & _MASK, (addend * power + power_addend) & _MASK
+        power, power_addend = power * power & _MASK, power_addend * (power + 1) & _MASK
+        count >>= 1
+    return factor, addend
 
 
 def state_reader(bit_generator: np.random.PCG64) -> Callable[[], bytes]:

@@ -21,13 +21,12 @@ from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import inlined, kernel
 from evoexp.numeric.elementary import scale_to_normal
-from evoexp.numeric.generator_memory import layout_is_known, words_of
+from evoexp.numeric.generator_memory import MULTIPLIER, layout_is_known, words_of
 
 Words = NDArray[np.uint64]
 
-_MULTIPLIER = 0x2360ED051FC65DA44385DF649FCCF645
 _HALF = 2**64
-_HIGH, _LOW = np.uint64(_MULTIPLIER // _HALF), np.uint64(_MULTIPLIER % _HALF)
+_HIGH, _LOW = np.uint64(MULTIPLIER // _HALF), np.uint64(MULTIPLIER % _HALF)
 _BLOCK = 64  # states of which numbers are made at once
 _STREAMS = 4
 _HIGH_FIRST = [1, 0, 3, 2]  # order of the words in a generator's memory

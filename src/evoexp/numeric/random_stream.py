@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import kernel
+from evoexp.numeric.generator_memory import states_behind
 from evoexp.numeric.pcg64 import draw_uniforms
 
 
@@ -86,6 +87,7 @@ class DrawnAhead:
             count: Numbers that each step takes.
         """
         self._twin, self._pass, self._count = twin(rng), passer(rng), count
+        self._bits = rng.bit_generator
 
     def draw(self, steps: int) -> NDArray[np.float64]:
         """Return the numbers of the next steps, (steps, count)."""
@@ -94,6 +96,12 @@ class DrawnAhead:
     def follow(self) -> None:
         """Let the generator pass the numbers of one step."""
         self._pass(self._count)
+
+    def follow_all(self, steps: int) -> list[bytes]:
+        """Let the generator pass the numbers of some steps; return its state behind each."""
+        states = states_behind(self._bits, self._count, steps)
+        self._pass(steps * self._count)
+        return states
 
 
 class DrawnByNeed:

@@ -1,7 +1,7 @@
-"""Generations that are computed several per call of a kernel, and yielded one by one.
+"""Generations that are computed several per call of a kernel; yielded one by one, or together.
 
 With kernels that take some ten microseconds per generation, a call for each would be a third of the
-time.
+time, and a record of each another third.
 """
 
 from abc import ABC, abstractmethod
@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.evolution.genetic_settings import ScaledGenetic
 from evoexp.evolution.scaled_selection import SelectionMemory
+from evoexp.numeric.generator_memory import states_behind
 from evoexp.numeric.random_stream import DrawnAhead, DrawnByNeed, Draws
 from evoexp.planners.planner import Candidate, Keeper
-from evoexp.records import FloatArray, Generation
+from evoexp.records import FloatArray, Generation, Standing, Stretch
 
+TOGETHER = 128  # generations that are recorded together, at least
 SUMMARY = 4  # of a generation: index of the best, mean and deviation of costs, number of feasible
 
 
@@ -35,6 +37,17 @@ class Sizes(Protocol):
     @property
     def num_generations(self) -> int:
         """Generations after the initial one."""
+
+
+def stretch_of(most: int, size: int, cached: int) -> int:
+    """Return how many generations are best computed in one call of a kernel.
+
+    Args:
+        most: Behind so many, the call itself takes no time any more.
+        size: Memory of a generation [B].
+        cached: Memory beyond which generations would push each other out of the caches [B].
+    """
+    return max(1, min(most, cached // max(1, size)))
 
 
 class Stretches(ABC):
@@ -98,6 +111,87 @@ class Stretches(ABC):
         """
 
 
+class _Gathered:
+    """Generations that are gathered into a stretch; see `Stretch`, field by field.
+
+    Attributes:
+        keeper: Of the run.
+        first: Index of the first generation.
+    """
+
+    def __init__(self) -> None:
+        self.keeper, self.first = Keeper(), 0
+        self._begin()
+
+    def _begin(self) -> None:
+        self.standings: list[Standing] = []
+        self.lowest: list[float] = []
+        self.means: list[float] = []
+        self.deviations: list[float] = []
+        self.num_feasible: list[int] = []
+        self.evaluations: list[int] = []
+        self.collision_queries: list[int] = []
+        self.costs: list[FloatArray] = []
+        self.states: list[bytes] = []
+        self.times: list[float] = []
+
+    def stand(self) -> None:
+        """Note what the keeper keeps as the best from the next generation on."""
+        (solution, terms, solved), cost = self.keeper.best, self.keeper.cost
+        if self.standings and self.standings[-1].place == len(self.lowest):
+            self.standings.pop()
+        self.standings.append(Standing(len(self.lowest), solution, cost, terms, solved))
+
+    def stretch(self, population: NDArray[Any] | None) -> Stretch:
+        """Return the generations gathered, the last one with its population; begin anew."""
+        found = Stretch(
+            self.first,
+            self.standings,
+            self.lowest,
+            self.means,
+            self.deviations,
+            self.num_feasible,
+            self.evaluations,
+            self.collision_queries,
+            np.concatenate(self.costs),
+            self.states,
+            self.times,
+            population,
+        )
+        self.first += len(self.lowest)
+        self._begin()
+        self.stand()
+        return found
+
+
+class Run(Iterator[Generation]):
+    """The generations of a run: one by one as an iterator, or by `stretches`, not both."""
+
+    def __init__(self, search: "IndividualStretches", rng: np.random.Generator) -> None:
+        self._search, self._rng = search, rng
+        self._each: Iterator[Generation] | None = None
+
+    def __iter__(self) -> Iterator[Generation]:
+        if self._each is None:
+            self._each = self._search.generations(self._rng)
+        return self._each
+
+    def __next__(self) -> Generation:
+        return next(iter(self))
+
+    def close(self) -> None:
+        """End the run, as a generator's `close` does."""
+        self._each = iter(())
+
+    def stretches(self, read_clock: Callable[[], float]) -> Iterator[Stretch]:
+        """Yield the initial population, then every other generation, several together.
+
+        Args:
+            read_clock: What it returns behind each call of a kernel is in `Stretch.times`.
+        """
+        return self._search.stretches(self._rng, read_clock)
+
+
 class IndividualStretches(Stretches):
     """Generations whose best is one individual.
 
@@ -105,7 +199,60 @@ class IndividualStretches(Stretches):
         queries_each: Configurations that judging an individual asks for.
     """
 
+    drawn: DrawnAhead | None = None
     queries_each = 0
+
+    def stretches(
+        self, rng: np.random.Generator, read_clock: Callable[[], float]
+    ) -> Iterator[Stretch]:
+        """Yield the initial population, then every other generation, several together.
+
+        Of a search whose `keep` is that of this class. See `Run.stretches`.
+        """
+        self.begin(rng)
+        gathered, index, last = _Gathered(), 0, self._ga.num_generations
+        self._gather(gathered, 0, 0, self._states(rng, 1), read_clock())
+        while index < last:
+            first, index = index, min(index + self.num_places - 1, last)
+            self.go_on(rng, first, index)
+            steps, drawn = index - first, self.drawn
+            states = self._states(rng, steps) if drawn is None else drawn.follow_all(steps)
+            self._gather(gathered, first + 1, index, states, read_clock())
+            if len(gathered.lowest) >= TOGETHER and index < last:
+                yield gathered.stretch(None)
+        yield gathered.stretch(self.population(last % self.num_places, True))
+
+    @staticmethod
+    def _states(rng: np.random.Generator, count: int) -> list[bytes]:
+        """Return the state of the generator, so many times."""
+        return states_behind(rng.bit_generator, 0, 1) * count
+
+    def _gather(
+        self, gathered: "_Gathered", first: int, last: int, states: list[bytes], time: float
+    ) -> None:
+        """Keep the best of some generations, and gather what is recorded of each of them."""
+        places, keeper = np.arange(first, last + 1) % self.num_places, gathered.keeper
+        costs, summaries = self.costs[places], self.summaries[places]
+        best, means, deviations, num_feasible = summaries.T.tolist()
+        for k, (individual, row) in enumerate(zip(map(int, best), costs, strict=True)):
+            lowest = row.item(individual)
+            if keeper.improves(lowest):
+                keeper.keep(lowest, self.candidate(places.item(k), individual))
+                gathered.stand()
+            gathered.lowest.append(lowest)
+            keeper.index += 1
+        gathered.means += means
+        gathered.deviations += deviations
+        gathered.num_feasible += map(int, num_feasible)
+        each = self._ga.num_offspring if first else self._ga.population_size
+        for _ in range(first, last + 1):
+            keeper.evaluations += each
+            keeper.collision_queries += each * self.queries_each
+            gathered.evaluations.append(keeper.evaluations)
+            gathered.collision_queries.append(keeper.collision_queries)
+        gathered.costs.append(costs)
+        gathered.states += states
+        gathered.times += [time] * len(states)
 
     def keep(self, keeper: Keeper, place: int) -> None:
         """Keep the best individual of a generation if it is better than all before."""

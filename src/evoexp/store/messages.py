@@ -7,7 +7,7 @@ needed: `{"best_cost": "inf"}` for a field, `{"values": {"3": "nan"}}` for an el
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from functools import cache
 from sys import intern
 from typing import Any, get_type_hints
@@ -62,54 +62,6 @@ def json_schema(record: type, terms: tuple[str, ...] = ()) -> bytes:
     return orjson.dumps({"title": title, "type": "object", "properties": properties})
 
 
-def generation_row(
-    values: Sequence[Any],
-    terms: Mapping[str, Any],
-    columns: Iterable[tuple[str, str]],
-    chain: str,
-) -> dict[str, Any]:
-    """Return the recorded part of a generation as plain values, for `encode_generations`.
-
-    Args:
-        values: Of the fields of `Generation`, from `index` to `solved`.
-        terms: Its terms.
-        columns: (name, column) of every term, in the order of the columns.
-        chain: Its link.
-    """
-    index, _, best, lowest, mean, std, num_feasible, evaluations, queries, solved = values
-    row: dict[str, Any] = {
-        "index": int(index),
-        "best_cost": float(best),
-        "best_cost_in_generation": float(lowest),
-        "mean_cost": float(mean),
-        "std_cost": float(std),
-        "num_feasible": int(num_feasible),
-        "evaluations": int(evaluations),
-        "collision_queries": int(queries),
-        "solved": bool(solved),
-    }
-    for name, column in columns:
-        row[column] = float(terms[name])
-    row["chain"] = chain
-    return row
-
-
-def encode_generations(rows: Sequence[dict[str, Any]]) -> list[bytes]:
-    """Return the messages of generations.
-
-    All rows together take little more than half the time that they take one by one.
-
-    Args:
-        rows: Of `generation_row`.
-    """
-    text = orjson.dumps(rows)
-    if b"null" not in text:  # every number is finite
-        parts = text[2:-2].split(b"},{")
-        if len(parts) == len(rows):  # no name of a term looks like the end of a row
-            return [b"{%b}" % part for part in parts]
-    return [orjson.dumps(_flagged(row)) for row in rows]
-
-
 def encode_solution(generation: int, cost: float, values: FloatArray) -> bytes:
     """Return the message of one solution; `values` is flat."""
     row = {"generation": int(generation), "cost": float(cost), "values": values}
@@ -131,7 +83,7 @@ def encode_front(front: FrontRow) -> bytes:
 def encode_summary(summary: ReplicateSummary) -> dict[str, str]:
     """Return the summary as metadata: every value one JSON text, terms in alphabetical order."""
     row = flatten(summary._replace(terms=dict(sorted(summary.terms.items()))))
-    return encode_values(_flagged(row))
+    return encode_values(flagged(row))
 
 
 def encode_values(values: Mapping[str, Any]) -> dict[str, str]:
@@ -159,7 +111,7 @@ def decode_environment(metadata: Mapping[str, str]) -> dict[str, Any]:
 
 
 def decode_generation(data: bytes) -> GenerationRow:
-    """Undo `encode_generations`."""
+    """Undo `generation_texts.encode_generations`."""
     fields, terms = _decode(GenerationRow, data)
     return GenerationRow(**fields, terms=terms)
 
@@ -190,10 +142,10 @@ def _encode_with_array(row: dict[str, Any], name: str) -> bytes:
     if array.size and finite:
         least, greatest = array.item(array.argmin()), array.item(array.argmax())
         finite = math.isfinite(least) and math.isfinite(greatest)
-    return orjson.dumps(row if finite else _flagged(row), option=orjson.OPT_SERIALIZE_NUMPY)
+    return orjson.dumps(row if finite else flagged(row), option=orjson.OPT_SERIALIZE_NUMPY)
 
 
-def _flagged(row: dict[str, Any]) -> dict[str, Any]:
+def flagged(row: dict[str, Any]) -> dict[str, Any]:
     """Return the row with `nonfinite` appended where a number of it needs the flag."""
     flags: dict[str, Any] = {}
     for name, value in row.items():

@@ -19,7 +19,7 @@ from evoexp.planners.coevolution.kernels import NOT_FINITE, Breeding, breed, eva
 from evoexp.planners.coevolution.link_problem import Problem
 from evoexp.planners.coevolution.teams import Evaluated, Standing, survey
 from evoexp.planners.planner import Keeper
-from evoexp.planners.stretches import Stretches
+from evoexp.planners.stretches import Stretches, stretch_of
 from evoexp.records import BoolArray, FloatArray, Generation, IntArray
 
 STRETCH = 8  # generations that are computed in one call, at most
@@ -227,7 +227,7 @@ def follow(
 def stretch(robots: int, count: int) -> int:
     """Return how many generations of populations of `count` are best computed in one call."""
     collisions = robots * (robots - 1) * count * count  # [B] of one generation
-    return max(1, min(STRETCH, CACHED // max(1, collisions)))
+    return stretch_of(STRETCH, collisions, CACHED)
 
 
 class TeamSearch(Stretches):

@@ -41,7 +41,7 @@ from evoexp.planners.grid_path_ga.path_operators import Breeding, Scratch, World
 from evoexp.planners.grid_path_ga.proven_moves import only_proven
 from evoexp.planners.planner import Candidate, PlannerDefaults
 from evoexp.planners.proofs import Acceptance
-from evoexp.planners.stretches import ScaledStretches
+from evoexp.planners.stretches import Run, ScaledStretches
 from evoexp.records import BoolArray, FloatArray, Generation
 from evoexp.robots.floor_platform import FloorPlatform
 from evoexp.scenarios.grid_motion import GridMotion
@@ -51,7 +51,9 @@ FEW_NODES = 2048  # the steps between all nodes of smaller grids are worked out 
 FEWER_NODES = 1200  # and the choices of walks between them: at most 6 MB
 MOST_PATTERNS = 4096  # of their weights
 FAULTS = "blocked_nodes", "forbidden_moves", "missed_ends"  # with one, a path costs inf
-STRETCH = 8  # generations that are computed in one call of a kernel, at most
+# Generations that are computed in one call of a kernel, at most. The generator is digested as it is
+# behind the call: another number needs another revision.
+STRETCH = 8
 BLOCK = 16384  # uniform numbers drawn at once, at least
 TABLES = 10  # of paths: those of a stretch, and of those that are bred
 STEPS_PER_WALK = 3.5  # times the fewest: random words for so many steps are drawn at first
@@ -147,7 +149,7 @@ class GridPathGa(PlannerDefaults, Component):
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield the population of random paths, then every generation."""
-        return _Search(self, problem).generations(rng)
+        return Run(_Search(self, problem), rng)
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> np.ndarray:
         """Return random paths as in the initial population, (count, longest + 1)."""

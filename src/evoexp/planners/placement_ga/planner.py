@@ -26,7 +26,7 @@ from evoexp.planners.placement_ga import kernels
 from evoexp.planners.placement_ga.kernels import GENES, ROWS, Breeding, Coding, Population
 from evoexp.planners.planner import Candidate, PlannerDefaults
 from evoexp.planners.proofs import Acceptance
-from evoexp.planners.stretches import ScaledStretches
+from evoexp.planners.stretches import Run, ScaledStretches
 from evoexp.records import BoolArray, FloatArray, Generation, IntArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.mobile_arm import MobileArm
@@ -36,7 +36,9 @@ from evoexp.validation import Component
 NAMES = ("torque_norm", "torque_max", "obstacle", "manipulability")  # E1, E2, Σ γ E_obs, E_man
 BRANCHES = ("", "other_")
 FIRST_CRITERION = GENES  # row of the costs; the other criteria and the branch follow it
-STRETCH = 16  # generations that are computed in one call of a kernel, at most
+# Generations that are computed in one call of a kernel, at most. The generator is digested as it is
+# behind the call: another number needs another revision.
+STRETCH = 16
 TERM_VALUES = 200  # numbers kept for an individual: those of the generations of a stretch
 BLOCK = 8192  # uniform numbers drawn at once, at least
 
@@ -132,7 +134,7 @@ class PlacementGa(PlannerDefaults, Component):
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield the initial population, then every generation."""
-        return _Search(self, problem).generations(rng)
+        return Run(_Search(self, problem), rng)
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> np.ndarray:
         """Return random strings, (2, count)."""

@@ -31,6 +31,7 @@ from evoexp.planners.arm_tasks import (
 )
 from evoexp.planners.departures import joint_names, of_limits, of_place
 from evoexp.planners.planner import COPIES, PlannerDefaults, num_values
+from evoexp.planners.stretches import Run
 from evoexp.planners.via_point_ga.covered_strings import CoveredStrings
 from evoexp.planners.via_point_ga.search import ProvenSearch, Search
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
@@ -71,8 +72,9 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield the initial population, then one generation after the other."""
-        search = ProvenSearch if self.answers_are_proven else Search
-        return search(self, problem, self._strings(problem)).generations(rng)
+        if self.answers_are_proven:
+            return ProvenSearch(self, problem, self._strings(problem)).generations(rng)
+        return Run(Search(self, problem, self._strings(problem)), rng)
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
         """Return new trajectories as in the initial population, (nq, N + 1, count)."""

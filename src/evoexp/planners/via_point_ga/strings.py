@@ -16,13 +16,15 @@ from evoexp.objectives.string_fitness import StringTerms
 from evoexp.paths.walk import num_uniforms, walk
 from evoexp.paths.workspace import Redistribution
 from evoexp.planners.arm_tasks import margins
+from evoexp.planners.stretches import stretch_of
 from evoexp.planners.via_point_ga import kernels
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
 from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
 
 LANES = 8  # individuals are padded to whole vectors
-STRETCH = 8  # generations that are computed in one call of a kernel, at most
+STRETCH = 16  # generations that are computed in one call of a kernel, at most,
+CACHED = 1 << 19  # [B] and as many as take so much memory
 
 
 class Problem(NamedTuple):
@@ -137,13 +139,7 @@ class Judgement(NamedTuple):
 
 
 class Strings:
-    """The population-wide steps of one planner on one problem.
-
-    Attributes:
-        stretch: Generations that are best computed at once.
-    """
-
-    stretch = STRETCH
+    """The population-wide steps of one planner on one problem."""
 
     def __init__(self, planner: ViaPointSettings, problem: Problem) -> None:
         self.planner, self.problem, ga, spline = planner, problem, planner.ga, problem.spline
@@ -175,6 +171,11 @@ class Strings:
             weights=planner.objective.weights,
             tables=getattr(problem.collision, "tables", ()),
         )
+
+    @property
+    def stretch(self) -> int:
+        """Generations that are best computed at once."""
+        return stretch_of(STRETCH, self.empty(self.planner.ga.population_size).nbytes, CACHED)
 
     @property
     def num_drawn(self) -> int:

@@ -1,0 +1,88 @@
+"""Generations that are recorded many at a time, against the same ones recorded one by one."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from evoexp.batch.replicate import run_replicate
+from evoexp.condition import Condition
+from evoexp.configuration import compose
+from evoexp.planners.stretches import TOGETHER, Run, stretch_of
+from evoexp.store.log_reader import read_log
+from masked_logs import masked_log
+
+RUNS = (
+    "experiment=rana_planar ga.num_generations=300",
+    "experiment=rana_planar ga.num_generations=0",
+    "experiment=rana_puma ga.num_generations=17",
+    "experiment=chen_placement ga.num_generations=130",
+    "experiment=chen_placement ga.num_generations=1 ga.population_size=31 ga.num_elites=1",
+    "experiment=chen_path ga.num_generations=150",
+    "experiment=chen_path planner.revisits=true ga.num_generations=16",
+)
+
+
+def condition(words: str) -> Condition:
+    return compose.expand(words.split())[0].conditions[0].condition
+
+
+@pytest.mark.parametrize("words", RUNS)
+def test_the_log_is_the_same_one_by_one_and_together(words: str) -> None:
+    given = condition(words)
+    heard: list[int] = []
+    together = run_replicate(given, 3).content
+    one_by_one = run_replicate(given, 3, hear=lambda each: heard.append(each.index)).content
+    assert masked_log(together) == masked_log(one_by_one)
+    assert heard == [*range(len(read_log(together).generations))]
+
+
+@pytest.mark.parametrize("words", RUNS[::3])
+def test_a_run_yields_what_its_stretches_hold(words: str) -> None:
+    planner, problem = condition(words).prepare()
+    rngs = np.random.default_rng(2), np.random.default_rng(2)
+    one, other = (planner.evolve(problem, rng) for rng in rngs)
+    assert isinstance(other, Run)
+    clock = itertools.count()
+    for stretch in other.stretches(lambda: float(next(clock))):
+        assert stretch.times == sorted(stretch.times)
+        assert [each.place for each in stretch.standings] == sorted(
+            {0, *(each.place for each in stretch.standings)}
+        )
+        for k, lowest in enumerate(stretch.lowest):
+            each, rng = next(one), rngs[0]
+            standing = [found for found in stretch.standings if found.place <= k][-1]
+            assert (each.index, each.best_cost, each.terms, each.solved) == (
+                stretch.first + k,
+                standing.cost,
+                standing.terms,
+                standing.solved,
+            )
+            np.testing.assert_array_equal(each.best, standing.best)
+            np.testing.assert_array_equal(each.costs, stretch.costs[k])
+            assert each.best_cost_in_generation == lowest
+            assert (each.evaluations, each.collision_queries, each.num_feasible) == (
+                stretch.evaluations[k],
+                stretch.collision_queries[k],
+                stretch.num_feasible[k],
+            )
+            np.testing.assert_array_equal(
+                (each.mean_cost, each.std_cost), (stretch.means[k], stretch.deviations[k])
+            )
+            state = rng.bit_generator.state["state"]["state"]
+            assert stretch.states[k][:16] == state.to_bytes(16, "little")
+        assert len(stretch.lowest) >= TOGETHER or stretch.population is not None
+    np.testing.assert_array_equal(each.population, stretch.population)
+    assert next(one, None) is None
+
+
+def test_an_iterator_goes_on_where_it_is() -> None:
+    planner, problem = condition(RUNS[0]).prepare()
+    run = planner.evolve(problem, np.random.default_rng(0))
+    assert next(run).index == 0
+    assert next(iter(run)).index == 1
+    assert next(run).index == 2
+
+
+def test_a_stretch_is_as_long_as_the_caches_allow() -> None:
+    assert [stretch_of(16, size, 1000) for size in (0, 10, 100, 400, 2000)] == [16, 16, 10, 2, 1]

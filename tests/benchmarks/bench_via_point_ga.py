@@ -155,21 +155,18 @@ def bench_log(beside: Any) -> None:
     """
     given = condition()
     planner, problem = given.prepare()
-    recorded = []
-    for generation in planner.evolve(problem, given.rng(0)):
-        views = {"costs": generation.costs.copy(), "population": generation.population}
-        recorded.append(generation._replace(best=generation.best.copy(), **views))
+    recorded = list(planner.evolve(problem, given.rng(0)).stretches(lambda: 0.0))
     rng = given.rng(0)
     finished = run_replicate(given, 0).summary
 
     def ours() -> None:
         log = Log(given.id, given.to_json(), 0, rng)
-        for generation in recorded:
-            log.write(generation)
+        for stretch in recorded:
+            log.write_stretch(stretch)
         log.finish(finished)
 
     def run() -> None:
-        for _ in planner.evolve(problem, given.rng(0)):
+        for _ in planner.evolve(problem, given.rng(0)).stretches(lambda: 0.0):
             pass
 
     beside(

@@ -1,15 +1,17 @@
-"""The bytes of mcap's own writer, whatever is written."""
+"""The bytes of mcap's own writer, whatever is written; both compress with the same level."""
 
 import io
 from collections.abc import Callable
 from typing import Any
 
+import mcap.writer
 import numpy as np
 import pytest
+import zstandard
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType, Writer
 
-from evoexp.store.container_writer import ContainerWriter, Messages
+from evoexp.store.container_writer import LEVEL, ContainerWriter, Messages
 
 CHUNK_SIZE = 2000
 
@@ -88,7 +90,11 @@ def random_calls(rng: np.random.Generator) -> list[Callable[[Any], Any]]:
 
 
 @pytest.mark.parametrize("seed", range(100))
-def test_random_files_have_the_bytes_of_mcaps_writer(seed: int) -> None:
+def test_random_files_have_the_bytes_of_mcaps_writer(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compress = zstandard.ZstdCompressor(LEVEL).compress
+    monkeypatch.setattr(mcap.writer.zstandard, "compress", compress)
     rng = np.random.default_rng(seed)
     chunk_size = int(rng.choice([1, 100, CHUNK_SIZE, 10**6]))
     ours, theirs = ContainerWriter("evoexp", chunk_size), ByMcap("evoexp", chunk_size)

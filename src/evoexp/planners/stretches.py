@@ -135,12 +135,13 @@ class _Gathered:
         self.states: list[bytes] = []
         self.times: list[float] = []
 
-    def stand(self) -> None:
-        """Note what the keeper keeps as the best from the next generation on."""
+    def stand(self, place: int) -> None:
+        """Note what the keeper keeps as the best from a place behind those gathered on."""
         (solution, terms, solved), cost = self.keeper.best, self.keeper.cost
-        if self.standings and self.standings[-1].place == len(self.lowest):
+        place += len(self.lowest)
+        if self.standings and self.standings[-1].place == place:
             self.standings.pop()
-        self.standings.append(Standing(len(self.lowest), solution, cost, terms, solved))
+        self.standings.append(Standing(place, solution, cost, terms, solved))
 
     def stretch(self, population: NDArray[Any] | None) -> Stretch:
         """Return the generations gathered, the last one with its population; begin anew."""
@@ -160,7 +161,7 @@ class _Gathered:
         )
         self.first += len(self.lowest)
         self._begin()
-        self.stand()
+        self.stand(0)
         return found
 
 
@@ -231,25 +232,26 @@ class IndividualStretches(Stretches):
         self, gathered: "_Gathered", first: int, last: int, states: list[bytes], time: float
     ) -> None:
         """Keep the best of some generations, and gather what is recorded of each of them."""
-        places, keeper = np.arange(first, last + 1) % self.num_places, gathered.keeper
+        generations, keeper = np.arange(first, last + 1), gathered.keeper
+        places, count = generations % self.num_places, len(generations)
         costs, summaries = self.costs[places], self.summaries[places]
-        best, means, deviations, num_feasible = summaries.T.tolist()
-        for k, (individual, row) in enumerate(zip(map(int, best), costs, strict=True)):
-            lowest = row.item(individual)
-            if keeper.improves(lowest):
-                keeper.keep(lowest, self.candidate(places.item(k), individual))
-                gathered.stand()
-            gathered.lowest.append(lowest)
+        individuals = summaries[:, 0].astype(np.int64)
+        lowest = costs[generations - first, individuals].tolist()
+        for k, cost in enumerate(lowest):
+            if keeper.improves(cost):
+                keeper.keep(cost, self.candidate(places.item(k), individuals.item(k)))
+                gathered.stand(k)
             keeper.index += 1
+        _, means, deviations, num_feasible = summaries.T.tolist()
+        gathered.lowest += lowest
         gathered.means += means
         gathered.deviations += deviations
         gathered.num_feasible += map(int, num_feasible)
         each = self._ga.num_offspring if first else self._ga.population_size
-        for _ in range(first, last + 1):
-            keeper.evaluations += each
-            keeper.collision_queries += each * self.queries_each
-            gathered.evaluations.append(keeper.evaluations)
-            gathered.collision_queries.append(keeper.collision_queries)
+        evaluations = [keeper.evaluations + each * k for k in range(1, count + 1)]
+        keeper.evaluations = evaluations[-1]
+        gathered.evaluations += evaluations
+        gathered.collision_queries += [each * self.queries_each for each in evaluations]
         gathered.costs.append(costs)
         gathered.states += states
         gathered.times += [time] * len(states)

@@ -20,6 +20,8 @@ RUNS = (
     "experiment=chen_placement ga.num_generations=1 ga.population_size=31 ga.num_elites=1",
     "experiment=chen_path ga.num_generations=150",
     "experiment=chen_path planner.revisits=true ga.num_generations=16",
+    "experiment=chen_mission budget=smoke",
+    "experiment=chen_mission",
 )
 
 

@@ -6,6 +6,7 @@ time, and a record of each another third.
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -168,13 +169,23 @@ class _Gathered:
 class Run(Iterator[Generation]):
     """The generations of a run: one by one as an iterator, or by `stretches`, not both."""
 
-    def __init__(self, search: "IndividualStretches", rng: np.random.Generator) -> None:
-        self._search, self._rng = search, rng
+    def __init__(
+        self,
+        generations: Callable[[], Iterator[Generation]],
+        stretches: Callable[[Callable[[], float]], Iterator[Stretch]],
+    ) -> None:
+        """Take the two functions that begin it.
+
+        Args:
+            generations: Yields them one by one.
+            stretches: Yields them many at a time, see the method.
+        """
+        self._begin, self._stretches = generations, stretches
         self._each: Iterator[Generation] | None = None
 
     def __iter__(self) -> Iterator[Generation]:
         if self._each is None:
-            self._each = self._search.generations(self._rng)
+            self._each = self._begin()
         return self._each
 
     def __next__(self) -> Generation:
@@ -190,7 +201,7 @@ class Run(Iterator[Generation]):
         Args:
             read_clock: What it returns behind each call of a kernel is in `Stretch.times`.
         """
-        return self._search.stretches(self._rng, read_clock)
+        return self._stretches(read_clock)
 
 
 class IndividualStretches(Stretches):
@@ -203,13 +214,14 @@ class IndividualStretches(Stretches):
     drawn: DrawnAhead | None = None
     queries_each = 0
 
-    def stretches(
+    def run(self, rng: np.random.Generator) -> Run:
+        """Return the generations, of a search whose `keep` is that of this class."""
+        return Run(partial(self.generations, rng), partial(self._run_together, rng))
+
+    def _run_together(
         self, rng: np.random.Generator, read_clock: Callable[[], float]
     ) -> Iterator[Stretch]:
-        """Yield the initial population, then every other generation, several together.
-
-        Of a search whose `keep` is that of this class. See `Run.stretches`.
-        """
+        """Yield the initial population, then every other generation; see `Run.stretches`."""
         self.begin(rng)
         gathered, index, last = _Gathered(), 0, self._ga.num_generations
         self._gather(gathered, 0, 0, self._states(rng, 1), read_clock())

@@ -53,12 +53,13 @@ def encode_generations(rows: Sequence[dict[str, Any]]) -> list[bytes]:
     Args:
         rows: Of `generation_row`.
     """
-    text = orjson.dumps(rows)
-    if b"null" not in text:  # every number is finite
-        parts = text[2:-2].split(b"},{")
-        if len(parts) == len(rows):  # no name of a term looks like the end of a row
-            return [b"{%b}" % part for part in parts]
-    return [orjson.dumps(flagged(row)) for row in rows]
+    parts = orjson.dumps(rows)[2:-2].split(b"},{")
+    if len(parts) != len(rows):  # a name of a term looks like the end of a row
+        return [orjson.dumps(flagged(row)) for row in rows]
+    return [
+        orjson.dumps(flagged(row)) if b"null" in part else b"{%b}" % part  # is a number not finite?
+        for part, row in zip(parts, rows, strict=True)
+    ]
 
 
 def encode_stretch(stretch: Stretch, links: Sequence[str]) -> list[bytes]:

@@ -6,9 +6,9 @@ A non-finite number is written as null and named in `nonfinite`, a key that is t
 needed: `{"best_cost": "inf"}` for a field, `{"values": {"3": "nan"}}` for an element of an array.
 """
 
-import math
 from collections.abc import Mapping
 from functools import cache
+from math import isfinite
 from sys import intern
 from typing import Any, get_type_hints
 
@@ -137,22 +137,23 @@ def decode_front(data: bytes) -> FrontRow:
 
 def _encode_with_array(row: dict[str, Any], name: str) -> bytes:
     array = row[name]
-    finite = math.isfinite(row.get("cost", 0.0))
+    finite = isfinite(row.get("cost", 0.0))
     # argmin and argmax stop at NaN; cheaper than np.isfinite for arrays this short
     if array.size and finite:
         least, greatest = array.item(array.argmin()), array.item(array.argmax())
-        finite = math.isfinite(least) and math.isfinite(greatest)
+        finite = isfinite(least) and isfinite(greatest)
     return orjson.dumps(row if finite else flagged(row), option=orjson.OPT_SERIALIZE_NUMPY)
 
 
 def flagged(row: dict[str, Any]) -> dict[str, Any]:
     """Return the row with `nonfinite` appended where a number of it needs the flag."""
-    flags: dict[str, Any] = {}
+    flags: dict[str, Any] = {
+        name: repr(float(value))
+        for name, value in row.items()
+        if isinstance(value, float) and not isfinite(value)
+    }
     for name, value in row.items():
-        if isinstance(value, float):
-            if not math.isfinite(value):
-                flags[name] = repr(float(value))
-        elif isinstance(value, np.ndarray):
+        if type(value) is np.ndarray:
             where = np.flatnonzero(~np.isfinite(value))
             if where.size:
                 flags[name] = {str(index): repr(float(value[index])) for index in where.tolist()}

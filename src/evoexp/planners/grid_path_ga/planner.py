@@ -11,7 +11,6 @@ coordinates of its nodes, x, y[, z] of one after the other, as many as there are
 """
 
 import functools
-from collections.abc import Iterator
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -42,7 +41,7 @@ from evoexp.planners.grid_path_ga.proven_moves import only_proven
 from evoexp.planners.planner import Candidate, PlannerDefaults
 from evoexp.planners.proofs import Acceptance
 from evoexp.planners.stretches import Run, ScaledStretches
-from evoexp.records import BoolArray, FloatArray, Generation
+from evoexp.records import BoolArray, FloatArray
 from evoexp.robots.floor_platform import FloorPlatform
 from evoexp.scenarios.grid_motion import GridMotion
 from evoexp.validation import Component, NonNegativeCount
@@ -147,9 +146,9 @@ class GridPathGa(PlannerDefaults, Component):
         grid = problem.fields.grid
         return int(grid.inner(grid.free).size)
 
-    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
+    def evolve(self, problem: Problem, rng: np.random.Generator) -> Run:
         """Yield the population of random paths, then every generation."""
-        return Run(_Search(self, problem), rng)
+        return _Search(self, problem).run(rng)
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> np.ndarray:
         """Return random paths as in the initial population, (count, longest + 1)."""

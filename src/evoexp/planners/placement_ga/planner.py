@@ -8,7 +8,6 @@ A population is an array (2, individuals) of strings of bits, a number per angle
 flat: θ1, θ2 [deg].
 """
 
-from collections.abc import Iterator
 from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
@@ -27,7 +26,7 @@ from evoexp.planners.placement_ga.kernels import GENES, ROWS, Breeding, Coding, 
 from evoexp.planners.planner import Candidate, PlannerDefaults
 from evoexp.planners.proofs import Acceptance
 from evoexp.planners.stretches import Run, ScaledStretches
-from evoexp.records import BoolArray, FloatArray, Generation, IntArray
+from evoexp.records import BoolArray, FloatArray, IntArray
 from evoexp.robots.assembly import Assembly
 from evoexp.robots.mobile_arm import MobileArm
 from evoexp.scenarios.docking import Docking
@@ -132,9 +131,9 @@ class PlacementGa(PlannerDefaults, Component):
         bodies = scene(assembly, scenario.obstacles, self_pairs=True)
         return Problem(assembly, model, limits, bodies, scenario.security_margin)
 
-    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
+    def evolve(self, problem: Problem, rng: np.random.Generator) -> Run:
         """Yield the initial population, then every generation."""
-        return Run(_Search(self, problem), rng)
+        return _Search(self, problem).run(rng)
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> np.ndarray:
         """Return random strings, (2, count)."""

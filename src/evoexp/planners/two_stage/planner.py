@@ -9,7 +9,8 @@ A solution is flat: θ1, θ2 [deg], then the coordinates of the path's nodes. It
 C (Eq. 1). In the first stage there is no path: the cost of the plan is inf, the individuals cost E.
 """
 
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
+from functools import partial
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -25,7 +26,8 @@ from evoexp.planners.placement_ga.planner import PlacementGa
 from evoexp.planners.placement_ga.planner import Problem as PlacementProblem
 from evoexp.planners.planner import Candidate, Judgement, Keeper, PlannerDefaults
 from evoexp.planners.proofs import Acceptance, Proofs
-from evoexp.records import FloatArray
+from evoexp.planners.stretches import Run
+from evoexp.records import FloatArray, Standing, Stretch
 from evoexp.records import Generation as Record
 from evoexp.robots.floor_manipulator import NUM_JOINTS, FloorManipulator
 from evoexp.scenarios.mission import Mission
@@ -90,9 +92,56 @@ class TwoStage(PlannerDefaults, Component):
 
     def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Record]:
         """Yield the generations of both stages; their indices go on counting."""
+        if self.answers_are_proven:
+            return self._generations(problem, rng)
+        return Run(partial(self._generations, problem, rng), partial(self._stretches, problem, rng))
+
+    def _generations(self, problem: Problem, rng: np.random.Generator) -> Iterator[Record]:
         keeper = Keeper()
         docked = yield from self._place(problem, rng, keeper)
         yield from self._drive(problem, rng, keeper, docked)
+
+    def _stretches(
+        self, problem: Problem, rng: np.random.Generator, read_clock: Callable[[], float]
+    ) -> Iterator[Stretch]:
+        """Yield what `_generations` does, many at a time."""
+        no_path, docked = dict.fromkeys(PATH, 0.0) | {"sub_path": 1.0}, None
+        start = problem.scenario.grid.start
+        for stretch in self.placement.evolve(problem.placement, rng).stretches(read_clock):
+            standings = [
+                Standing(
+                    place,
+                    np.concatenate([angles, start]),
+                    np.inf,
+                    self._posture_terms(problem, angles) | no_path,
+                    False,
+                )
+                for place, angles, *_ in stretch.standings
+            ]
+            docked, evaluations = stretch.standings[-1], stretch.evaluations[-1]
+            first = stretch.first + len(stretch.lowest)
+            lowest = [np.inf] * len(stretch.lowest)
+            yield stretch._replace(standings=standings, lowest=lowest, population=None)
+        assert docked is not None, "a search has an initial population"
+        posture = self._posture_terms(problem, docked.best) | {"sub_path": 2.0}
+        path_problem = self._path_problem(problem, docked.best)
+        for stretch in self.path.evolve(path_problem, rng).stretches(read_clock):
+            standings = [
+                Standing(
+                    place,
+                    np.concatenate([docked.best, nodes]),
+                    docked.cost + cost,
+                    posture | {name: terms[name] for name in PATH},
+                    docked.solved and solved,
+                )
+                for place, nodes, cost, terms, solved in stretch.standings
+            ]
+            yield stretch._replace(
+                first=first + stretch.first,
+                standings=standings,
+                lowest=[docked.cost + cost for cost in stretch.lowest],
+                evaluations=[evaluations + count for count in stretch.evaluations],
+            )
 
     def _place(
         self, problem: Problem, rng: np.random.Generator, keeper: Keeper

@@ -31,7 +31,6 @@ from evoexp.planners.arm_tasks import (
 )
 from evoexp.planners.departures import joint_names, of_limits, of_place
 from evoexp.planners.planner import COPIES, PlannerDefaults, num_values
-from evoexp.planners.stretches import Run
 from evoexp.planners.via_point_ga.covered_strings import CoveredStrings
 from evoexp.planners.via_point_ga.search import ProvenSearch, Search
 from evoexp.planners.via_point_ga.settings import ViaPointSettings
@@ -74,7 +73,7 @@ class ViaPointGa(PlannerDefaults, ViaPointSettings, Component):
         """Yield the initial population, then one generation after the other."""
         if self.answers_are_proven:
             return ProvenSearch(self, problem, self._strings(problem)).generations(rng)
-        return Run(Search(self, problem, self._strings(problem)), rng)
+        return Search(self, problem, self._strings(problem)).run(rng)
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> FloatArray:
         """Return new trajectories as in the initial population, (nq, N + 1, count)."""

@@ -104,7 +104,7 @@ class TwoStage(PlannerDefaults, Component):
     def _stretches(
         self, problem: Problem, rng: np.random.Generator, read_clock: Callable[[], float]
     ) -> Iterator[Stretch]:
-        """Yield what `_generations` does, many at a time."""
+        """Yield the same generations, many at a time."""
         no_path, docked = dict.fromkeys(PATH, 0.0) | {"sub_path": 1.0}, None
         start = problem.scenario.grid.start
         for stretch in self.placement.evolve(problem.placement, rng).stretches(read_clock):

@@ -47,7 +47,7 @@ class Source(NamedTuple):
 
 
 @functools.cache
-def _compilers() -> tuple[str, ...]:
+def compilers() -> tuple[str, ...]:
     """Return the versions of what compiles kernels, without loading any of it."""
     return metadata.version("numba"), metadata.version("llvmlite"), sys.version
 
@@ -59,7 +59,7 @@ def module_key(module: str) -> str:
     Args:
         module: Dotted name; one that cannot be found counts by its name alone.
     """
-    digest = hashlib.sha256(" ".join(_compilers()).encode())
+    digest = hashlib.sha256(" ".join(compilers()).encode())
     for name in sorted(_reached(module)):
         source = _source_of(name)
         digest.update(f"{name}\0{source.digest if source else ''}\0".encode())

@@ -23,6 +23,7 @@ from numba.core.runtime.nrt import rtsys
 from evoexp.numeric.code_keys import is_kernel_module, module_key, written_since
 from evoexp.numeric.kept_files import MESSAGES, cache_root
 from evoexp.numeric.kept_libraries import FORMAT, LibraryFiles, use_kept_libraries
+from evoexp.numeric.kept_runtime import use_kept_runtime
 
 NUM_KEPT_CACHES = 4  # [-] states of a module whose compiled kernels are kept
 KEPT_S = 86_400.0  # [s] and any that was used so lately
@@ -155,6 +156,7 @@ def use_content_cache() -> None:
     config: Any = numba.config
     config.CACHE_LOCATOR_CLASSES = f"{__name__}.{ContentLocator.__name__},{_LOCATORS}"
     use_kept_libraries()
+    use_kept_runtime()
 
 
 @functools.cache

@@ -6,17 +6,46 @@ names the other files by the hash of their content, so none can be taken for ano
 """
 
 import contextlib
+import io
 import pickle
+import sys
 from pathlib import Path
 from typing import Any
 
 import xxhash
+from numba.core import environment
 from numba.core.serialize import dumps
 
 from evoexp.numeric import kept_files
 from evoexp.numeric.kept_files import MESSAGES, Damaged
 
 USED = set[Path]()  # the files of all kernels that this process loaded or kept
+
+
+class _Unpickler(pickle.Unpickler):
+    """Reads what was kept, and imports no module for its functions alone."""
+
+    def find_class(self, module: str, name: str) -> Any:
+        """Return the named class or function; ours for the environments of compiled functions."""
+        if (module, name) == (environment.__name__, environment._rebuild_env.__name__):
+            return _environment
+        return super().find_class(module, name)
+
+
+def _environment(module: str, constants: list[Any], name: str) -> Any:
+    """Return the environment of a compiled function; without the names of an absent module.
+
+    numba imports the module for them. Only what was compiled to handle Python's objects looks one
+    up, and no kernel is. Some call a function of numba's own whose module registers all that it can
+    compile, or loads scipy.linalg: a tenth of a second.
+    """
+    if module in sys.modules or environment.lookup_environment(name) is not None:
+        return environment._rebuild_env(module, constants, name)
+    made = environment.Environment({"__name__": module})
+    made.consts[:] = constants
+    made.env_name = name
+    environment.Environment._memo[name] = made
+    return made
 
 
 class KernelFiles:
@@ -70,7 +99,7 @@ class KernelFiles:
     def _unpickled(self, path: Path, missing: Any) -> Any:
         """Return the value in a file; `missing` if it is not there or damaged, which is said."""
         try:
-            value = pickle.loads(kept_files.read_kept(path))
+            value = _Unpickler(io.BytesIO(kept_files.read_kept(path))).load()
         except FileNotFoundError:
             return missing
         except Damaged:

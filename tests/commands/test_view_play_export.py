@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from command_samples import SMALL, Evoexp
 
-from evoexp.commands.list_ import origin_of
+from evoexp.commands.run_origins import origin_of
 from evoexp.store.run_directory import find_runs
 
 Refused = Callable[..., str]
@@ -32,6 +32,25 @@ def test_view_writes_a_page_of_the_best_replicate(
     assert "rana_planar · " in path.read_text()
 
 
+LIBRARIES = {"numba", "pinocchio", "coal", "scipy", "hydra", "joblib", "matplotlib", "rich"}
+
+
+def loaded_by_view(*words: str) -> tuple[str, set[str]]:
+    """Return what `view` says in a process of its own, and the modules loaded when it ends."""
+    code = "import sys; from evoexp.cli import main; main(sys.argv[1:]); print(*sys.modules)"
+    command = [sys.executable, "-c", code, "view", *words]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
+    return said[0], set(said[1].split())
+
+
+def test_a_page_is_drawn_without_what_a_motion_does_not_need(stored: Path, runs: list[str]) -> None:
+    loaded_by_view(runs[0], "--turn-speed", "41")  # its kernels are kept from now on
+    said, modules = loaded_by_view(runs[0], "--turn-speed", "43")  # a page that is not kept
+    assert str(stored / "motions") in said
+    assert modules & LIBRARIES == {"numba", "pinocchio", "coal", "scipy"}
+    assert not modules & {"scipy.linalg", "numba.np.linalg", "evoexp.batch", "evoexp.report"}
+
+
 def test_a_page_that_was_drawn_is_written_again_without_what_draws_it(
     evoexp: Evoexp, stored: Path, runs: list[str]
 ) -> None:
@@ -39,11 +58,8 @@ def test_a_page_that_was_drawn_is_written_again_without_what_draws_it(
     (path,) = (stored / "motions").glob("*.html")
     drawn = path.read_bytes()
     path.unlink()
-    code = "import sys; from evoexp.cli import main; main(sys.argv[1:]); "
-    code += "print(*{'numba', 'pinocchio', 'coal', 'scipy'} & set(sys.modules))"
-    command = [sys.executable, "-c", code, "view", runs[1]]
-    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
-    assert str(path) in said[0] and said[1:] == [""]
+    said, modules = loaded_by_view(runs[1])
+    assert str(path) in said and not modules & LIBRARIES
     assert path.read_bytes() == drawn
 
 

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from evoexp import shipped
 from evoexp.commands.arguments import add_config_dir_argument
 from evoexp.commands.console import (
     add_columns,
@@ -17,6 +16,7 @@ from evoexp.commands.console import (
     print_json,
 )
 from evoexp.commands.hashes import stored_runs
+from evoexp.commands.run_origins import origin_of
 from evoexp.configuration.search_path import description, find, options
 from evoexp.errors import EvoexpError, printable
 from evoexp.store.damage import listed
@@ -169,18 +169,3 @@ def _run_table(runs: list[dict[str, Any]]) -> Table:
             "–" if cost is None else f"{cost:.4g}",
         )
     return table
-
-
-def origin_of(run: RunDirectory) -> dict[str, Any]:
-    """Return experiment, label and budget of a run as it was asked for: experiments share runs."""
-    try:
-        notes = run.manifest()
-    except EvoexpError:
-        notes = {}
-    table, asked = shipped.shipped(), (notes.get("experiment"), notes.get("label"))
-    rows = [row for row in table if row.condition_id == run.condition_id]
-    if rows:
-        row = next((row for row in rows if (row.experiment, row.label) == asked), rows[0])
-        return {"experiment": row.experiment, "label": row.label, "budget": row.budget}
-    names = {name: notes.get(name) for name in ("experiment", "label", "budget")}
-    return names | {"changed": any(row.experiment == asked[0] for row in table)}

@@ -3,7 +3,6 @@
 import argparse
 import math
 
-from evoexp.commands.given_motion import fitting_motions
 from evoexp.commands.motion_words import MANY, ChosenLog, check_speeds, chosen_logs
 from evoexp.errors import MotionFileError, RevisionMismatch
 from evoexp.playback.recording import Heading, Recording, record
@@ -63,6 +62,8 @@ def _stored(log: ChosenLog, limits: SpeedLimits) -> Recording:
 
 def _own(words: list[str], only: str, limits: SpeedLimits) -> list[Recording]:
     """Return the motion of a file in every condition that it fits, in the first `MANY` of them."""
+    from evoexp.commands.given_motion import fitting_motions  # Hydra's words, of no stored run
+
     path, fitting = fitting_motions(words, only=(only,) if only else ())
     return [
         record(each.condition, each.solution, Heading(f"{path.name} · {each.label}"), limits)

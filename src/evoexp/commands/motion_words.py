@@ -12,7 +12,7 @@ from typing import NamedTuple
 from evoexp import shipped
 from evoexp.commands.arguments import add_config_dir_argument, is_motion, is_override
 from evoexp.commands.hashes import with_candidates
-from evoexp.commands.list_ import origin_of
+from evoexp.commands.run_origins import origin_of
 from evoexp.errors import (
     EvoexpError,
     MotionFileError,

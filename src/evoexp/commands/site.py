@@ -10,7 +10,7 @@ from rich.console import Console
 
 from evoexp.commands.console import plain_console
 from evoexp.commands.hashes import stored_runs
-from evoexp.commands.list_ import origin_of
+from evoexp.commands.run_origins import origin_of
 from evoexp.configuration.search_path import options
 from evoexp.errors import EvoexpError, NothingStored
 from evoexp.registry import CLAIMS, names, registered

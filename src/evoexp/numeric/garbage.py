@@ -6,7 +6,7 @@ they take a sixth of that time.
 
 import gc
 
-NEW_OBJECTS = 100_000  # [-] between two searches for garbage; by default 700
+NEW_OBJECTS = 200_000  # [-] between two searches for garbage; by default 700
 
 
 def search_less() -> None:

@@ -134,6 +134,8 @@ def combined(parts: Sequence[Certificate]) -> Certificate:
 
     It has the first contact, or else the least clearance.
     """
+    if len(parts) == 1 and not parts[0].allowed_contacts:
+        return parts[0]
     queries, allowed = sum(part.certificate_queries for part in parts), _allowed(parts)
     touched = [part for part in parts if part.refuted_at is not None]
     if touched:

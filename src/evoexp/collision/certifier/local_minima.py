@@ -15,6 +15,10 @@ SHRINK = 0.0625  # [-] of the step where neither side is closer
 
 MAX_MOVES = 1000  # on the way to a local minimum
 
+MAX_POLISHED = 8  # pairs whose local minimum is sought, those with the least distances
+
+SAME = 1e-4  # [segments] a local minimum so close is the same one
+
 
 @kernel
 def polish(
@@ -65,3 +69,62 @@ def polish(
             if step < FINEST:
                 break
         t[walk], distances[walk] = here, best
+
+
+@kernel
+def nearest_minimum(
+    task: Task,
+    work: Workspace,
+    least: FloatArray,
+    begins: FloatArray,
+    worth: float,
+    known: tuple[int, float],
+    rounding: float,
+) -> tuple[int, float]:
+    """Return pair and instant of the least local minimum; of equal ones the first in time.
+
+    Args:
+        task: The motion.
+        work: From `work_space`.
+        least: (pairs,) the distance of each that was found.
+        begins: (pairs,) its instant, at which the walk begins.
+        worth: Pairs with a greater distance are left out, and those whose distances are not exact.
+        known: Pair and instant of a local minimum that is known.
+        rounding: Distances closer than that are equal [length unit].
+
+    Returns:
+        A pair of −1 if there is none but the known one.
+    """
+    # the pairs that came closest, at most MAX_POLISHED, the closest first
+    order, count = np.empty(MAX_POLISHED + 1, dtype=np.int64), 0
+    for pair in range(len(least)):
+        if least[pair] <= worth and task.exact[pair]:
+            k = count
+            while k > 0 and least[order[k - 1]] > least[pair]:
+                order[k] = order[k - 1]
+                k -= 1
+            order[k] = pair
+            count = min(count + 1, MAX_POLISHED)
+    # without the one that is known
+    pairs, t, num_walks = np.empty_like(order), np.empty(len(order)), 0
+    for k in range(count):
+        # a motion of one instant is swept as a segment without movement
+        begin = min(begins[order[k]], task.last)
+        if order[k] != known[0] or not abs(begin - known[1]) < SAME:
+            pairs[num_walks], t[num_walks] = order[k], begin
+            num_walks += 1
+    if num_walks == 0:
+        return -1, np.nan
+    # their local minima
+    pairs, t, distances = pairs[:num_walks], t[:num_walks], np.empty(num_walks)
+    polish(task, work, pairs, t, distances)
+    tied = distances.min() + rounding
+    earliest = np.inf
+    for k in range(num_walks):
+        if distances[k] <= tied:
+            earliest = min(earliest, t[k])
+    first, nearest = 0, np.inf
+    for k in range(num_walks):
+        if distances[k] <= tied and t[k] <= earliest + SAME and distances[k] < nearest:
+            first, nearest = k, distances[k]
+    return pairs[first], t[first]

@@ -76,10 +76,12 @@ class Workspace(NamedTuple):
 def work_space(task: Task) -> Workspace:
     """Return the workspace of a task; bodies that stand still are in their places."""
     num_joints, bodies = len(task.chain.parent), task.bodies
+    world = np.empty((len(bodies.joint), FRAME))
+    world[:, :9], world[:, 9:] = bodies.rotation, bodies.translation
     return Workspace(
         q=np.zeros(task.coefficients.shape[2]),
         frames=np.zeros((num_joints, FRAME)),
-        world=np.hstack([bodies.rotation, bodies.translation]),
+        world=world,
         stamps=np.zeros(len(bodies.joint) + 2, dtype=np.int64),
         normals=np.ones((len(task.pairs), 3)),
         simplex=np.zeros((4, 3)),

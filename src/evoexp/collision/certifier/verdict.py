@@ -19,22 +19,18 @@ from evoexp.collision.certifier.coal_distances import (
     search_interval,
     walk_down,
 )
-from evoexp.collision.certifier.local_minima import polish
+from evoexp.collision.certifier.local_minima import MAX_POLISHED, nearest_minimum
 from evoexp.collision.certifier.sweep import Goal, Sweep, sweep_motion
 from evoexp.collision.certifier.task import Task, approach_weights, work_space
 from evoexp.collision.motion_bounds import approach_bounds, moved_by_one
 from evoexp.collision.scene import Scene
 from evoexp.paths.motion import Motion
-from evoexp.records import FloatArray, IntArray
+from evoexp.records import FloatArray
 
 Status = Literal["certified", "refuted", "undecided"]
 
 ROUNDING = 1e-12
 """[-] of the scene's size: error of the sweep's own distances."""
-
-SAME = 1e-4  # [segments] a local minimum so close is the same one
-
-MAX_POLISHED = 8  # pairs whose local minimum is sought, those with the least distances
 
 
 class Verdict(NamedTuple):
@@ -114,12 +110,11 @@ def certify(
     """
     begin = clock() if clock is not None else np.nan
     _check(scene, motion, security_margin, contact_tolerance, resolution)
-    tolerances = (
-        scene.tolerances
-        if contact_tolerance is None
-        else np.full(len(scene.pairs), contact_tolerance)
-    )
-    margins = np.broadcast_to(np.asarray(security_margin, np.float64), (len(scene.pairs),))
+    tolerances, num_pairs = scene.tolerances, len(scene.pairs)
+    if contact_tolerance is not None:
+        tolerances = np.full(num_pairs, contact_tolerance)
+    margins = np.empty(num_pairs)
+    margins[:] = security_margin
     verdict = _Judgement(scene, motion, margins, tolerances, resolution, limits).verdict()
     return verdict._replace(duration_s=(clock() if clock is not None else np.nan) - begin)
 
@@ -155,11 +150,13 @@ class _Judgement:
             polynomials = np.zeros((1, 4, motion.q.shape[1]))
             polynomials[0, 0] = motion.q[0]
         bodies, chain = scene.bodies, scene.table.chain
+        exact = bodies.exact[scene.pairs].all(axis=1)
+        self.all_exact = bool(exact.all())
         self.task = Task(
             chain,
             bodies,
             scene.pairs,
-            bodies.exact[scene.pairs].all(axis=1),
+            exact,
             np.ascontiguousarray(polynomials),
             motion.coefficients is None,
             float(motion.num_segments),
@@ -211,7 +208,9 @@ class _Judgement:
         low, bound = self._search(np.inf, self.margins, self.margins - self.tolerances)
         if low is not None:
             if self.task.exact[low.pair]:
-                self._polish_from(np.array([low.pair]), np.array([low.t]))
+                least = np.full(len(self.scene.pairs), np.inf)
+                least[low.pair] = low.distance
+                self._polish_from(least, np.full(len(least), low.t), low.distance)
             self._note(low)
             return "refuted"
         return "certified" if bound > -np.inf else "undecided"
@@ -224,15 +223,14 @@ class _Judgement:
         The bound is −inf if a limit was used up.
         """
         refine = resolution < np.inf
-        rounding = ROUNDING * self.scene.size
-        wanted = Goal(
-            goal, level, self.tolerances, np.inf, resolution, self.floor, rounding, True, refine, 0
-        )
-        self._look_at_meshes(wanted)
+        asked = goal, level, self.tolerances
+        precision = resolution, self.floor, ROUNDING * self.scene.size
+        if not self.all_exact:
+            self._look_at_meshes(Goal(*asked, np.inf, *precision, True, refine, 0))
         while True:
             known, left = self.best.distance, self.limits.intervals - self.intervals
             instants = not (self.looked and refine)
-            question = wanted._replace(known=known, max_nodes=left, instants=instants)
+            question = Goal(*asked, known, *precision, instants, refine, left)
             found = sweep_motion(self.task, question, self.work)
             self.looked = True
             self.intervals += found.nodes
@@ -241,7 +239,7 @@ class _Judgement:
                 pair = found.first_pair
                 t = first_contact(self.coal, pair, min(found.first, self.task.last), level[pair])
                 if t is None:  # coal sees no contact there: coal alone judges this pair
-                    self.task.exact[pair] = self.looked = False
+                    self.task.exact[pair] = self.all_exact = self.looked = False
                     continue
                 contact = _Candidate(level[pair], t, pair)
             self.sweep = found
@@ -250,7 +248,7 @@ class _Judgement:
 
     def _look_at_meshes(self, goal: Goal) -> None:
         """Ask coal for the distances of meshes where their convex hulls are closest."""
-        if self.task.exact.all() or self.best.pair >= 0:
+        if self.best.pair >= 0:
             return
         found = sweep_motion(self.task, goal, self.work)
         pairs = np.flatnonzero(~self.task.exact)
@@ -268,6 +266,8 @@ class _Judgement:
     ) -> tuple[_Candidate | None, float]:
         """Have coal settle the leaves, from left to right up to the first contact."""
         proven = found.proven
+        if len(found.leaves) == 0:
+            return contact, proven
         for pair, begin, end in found.leaves[np.argsort(found.leaves[:, 1], kind="stable")]:
             if contact is not None and begin >= contact.t:
                 break
@@ -288,11 +288,9 @@ class _Judgement:
 
     def _polish(self) -> None:
         """Walk down to local minima of the pairs that came closest."""
-        least = self.sweep.pair_least
-        worth = least <= self.sweep.least + max(self.resolution * self.sweep.least, self.floor)
-        pairs = np.flatnonzero(worth & self.task.exact)
-        pairs = pairs[np.argsort(least[pairs], kind="stable")][:MAX_POLISHED]
-        self._polish_from(pairs, self.sweep.pair_least_at[pairs])
+        found = self.sweep
+        worth = found.least + max(self.resolution * found.least, self.floor)
+        self._polish_from(found.pair_least, found.pair_least_at, worth)
         if self.best.pair >= 0 and not self.task.exact[self.best.pair]:
             distance, t = self.best.distance, self.best.t
             speed = self._greatest_speed(self.best.pair)
@@ -308,19 +306,12 @@ class _Judgement:
             found = max(found, float(speeds[0, 0]))
         return found
 
-    def _polish_from(self, pairs: IntArray, begins: FloatArray) -> None:
-        """Ask coal for the least of some pairs' local minima; for the first of equal ones."""
-        # a motion of one instant is swept as a segment without movement
-        t = np.minimum(begins, self.task.last)
-        seen = (pairs == self.best.pair) & (np.abs(t - self.best.t) < SAME)
-        pairs, t = pairs[~seen], t[~seen]
-        if len(pairs) > 0:
-            distances = np.empty(len(pairs))
-            polish(self.task, self.work, pairs, t, distances)
-            tied = distances <= distances.min() + ROUNDING * self.scene.size
-            first = np.argmin(np.where(tied & (t <= t[tied].min() + SAME), distances, np.inf))
-            at, pair = float(t[first]), int(pairs[first])
-            self._note(_Candidate(self.coal(pair, at), at, pair))
+    def _polish_from(self, least: FloatArray, begins: FloatArray, worth: float) -> None:
+        """Ask coal for the least local minimum of the pairs that come as close as `worth`."""
+        rounding, known = ROUNDING * self.scene.size, (self.best.pair, self.best.t)
+        found = nearest_minimum(self.task, self.work, least, begins, worth, known, rounding)
+        if found[0] >= 0:
+            self._note(_Candidate(self.coal(*found), found[1], found[0]))
 
     def _note(self, seen: _Candidate) -> None:
         if seen.distance < self.best.distance:
@@ -347,13 +338,17 @@ def _check(
         raise ValueError(
             f"motion: coefficients must have shape {must}, was {motion.coefficients.shape}"
         )
-    if not np.isfinite(motion.polynomials).all() or not np.isfinite(motion.q).all():
+    if not np.isfinite(motion.q).all() or not np.isfinite(motion.polynomials).all():
         raise ValueError("motion: q must be finite, was not")
-    margins = np.asarray(security_margin, dtype=np.float64)
-    if margins.shape not in ((), (len(scene.pairs),)):
-        text = f"one number, or one per pair ({len(scene.pairs)})"
-        raise ValueError(f"security_margin must be {text}, was of shape {margins.shape}")
-    if not ((margins >= 0.0) & (margins < np.inf)).all():
+    if isinstance(security_margin, float):  # most often; arrays take longer
+        in_range = 0.0 <= security_margin < np.inf
+    else:
+        margins = np.asarray(security_margin, dtype=np.float64)
+        if margins.shape not in ((), (len(scene.pairs),)):
+            text = f"one number, or one per pair ({len(scene.pairs)})"
+            raise ValueError(f"security_margin must be {text}, was of shape {margins.shape}")
+        in_range = bool(((margins >= 0.0) & (margins < np.inf)).all())
+    if not in_range:
         raise ValueError(f"security_margin must be at least 0, was {security_margin}")
     if contact_tolerance is not None and not 0.0 < contact_tolerance < np.inf:
         raise ValueError(f"contact_tolerance must be above 0, was {contact_tolerance}")

@@ -28,7 +28,7 @@ LEFT_EARLY = "A worker stopped while some jobs were given to the executor"
 """Beginning of loky's warning of a worker that took ever more memory, and that it replaces."""
 
 _OF_THE_PARENT = ("SIGINT", "SIGTERM", "SIGHUP")  # signals that end a batch in an orderly way
-_PRELOADED = ["evoexp.batch.rare_searches", "evoexp.batch.preloaded"]
+_RARE_SEARCHES, _PRELOADED = "evoexp.batch.rare_searches", "evoexp.batch.preloaded"
 _SERVED = "forkserver"  # the name of this way to start processes
 _NUM_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(2**26), "MALLOC_TRIM_THRESHOLD_": str(2**28)}
@@ -40,16 +40,19 @@ from the system.
 """
 
 
-def start_server() -> None:
+def start_server(modules: Iterable[str] = ()) -> None:
     """Start a server process that loads all common libraries, and from which workers are forked.
 
     Only for processes that are evoexp's own: it changes how all of joblib's workers start. Without
     it, or where processes cannot be forked, each worker loads everything by itself, later.
+
+    Args:
+        modules: More modules for it to load, which every worker would load.
     """
     if num_cores() == 1 or _SERVED not in multiprocessing.get_all_start_methods():
         return
     cache_root()  # settled here, for the server and the workers too
-    multiprocessing.set_forkserver_preload(_PRELOADED)
+    multiprocessing.set_forkserver_preload([_RARE_SEARCHES, *modules, _PRELOADED])
     resource_tracker.ensure_running()  # lets signals through when it starts
     # The path of its socket may be too long, or its folder full.
     with suppress(OSError), _children_ignore_signals(), _environment_of_workers():

@@ -13,6 +13,7 @@ import contextlib
 import functools
 import hashlib
 import json
+import os
 import sys
 from collections.abc import Iterable, Iterator
 from importlib import metadata
@@ -102,7 +103,9 @@ def _reached(module: str) -> frozenset[str]:
         source = _source_of(waiting.pop())
         for name in source.imports if source else ():
             inner = name if _file_of(name) is not None else name.rpartition(".")[0]
-            if inner not in found | _KEEPERS and _file_of(inner) is not None:
+            if inner in found or inner in _KEEPERS:
+                continue
+            if _file_of(inner) is not None:
                 found.add(inner)
                 waiting.append(inner)
     return frozenset(found)
@@ -113,12 +116,15 @@ def _file_of(module: str) -> Path | None:
     if module in _files or module in _no_modules:
         return _files.get(module)
     package, *parts = module.split(".")
+    within = _file_of(module.rpartition(".")[0]) if package == _PACKAGE and parts else None
+    if within is not None and within.name != "__init__.py":  # a function or class of that module
+        _no_modules.add(module)
+        return None
     for root in [_ROOT] if package == _PACKAGE else _roots_of(package):
-        path = root.joinpath(package, *parts)
-        for candidate in (path.with_suffix(".py"), path / "__init__.py"):
-            if candidate.is_file():
-                _files[module] = candidate
-                return candidate
+        path = os.path.join(root, package, *parts)  # a `Path` of each name takes long
+        for candidate in (f"{path}.py", os.path.join(path, "__init__.py")):
+            if os.path.isfile(candidate):
+                return _files.setdefault(module, Path(candidate))
     if package == _PACKAGE:
         _no_modules.add(module)
     return None

@@ -32,7 +32,7 @@ def all_walks(problem: Any, number: int) -> list[list[int]]:
 
 def padded(values: np.ndarray, shifts: Shifts) -> np.ndarray:
     """Return values of nodes as long as the rows of the moves."""
-    return np.pad(values, (0, shifts.lengths.shape[1] - len(values)))
+    return np.pad(values, (0, shifts.width - len(values)))
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -54,7 +54,7 @@ def test_walks_are_the_best_of_all_that_never_go_straight_back(seed: int) -> Non
             for walk in all_walks(problem, number)
         }
         least = min(costs.values(), default=np.inf)
-        assert walks.best[number, network.ends[1]] == pytest.approx(least)
+        assert walks.costs[number] == pytest.approx(least)
         if number == most:
             # the excess of visits is that of the best walk
             excess = np.empty(len(weights))
@@ -75,7 +75,7 @@ def test_any_multipliers_give_a_bound_for_every_number_of_nodes(seed: int) -> No
     walks = Walks.of(most, shifts)
     passing = weights[1] / most * network.unsafeness + multipliers
     find_walks(shifts, padded(passing, shifts), most, walks)
-    bounds = walks.best[:, network.ends[1]] - multipliers.sum()
+    bounds = walks.costs - multipliers.sum()
     for path in all_simple_paths(problem):
         if len(path) <= most:
             assert bounds[len(path)] <= path_cost(own, problem, path) + 1e-12
@@ -122,3 +122,44 @@ def test_the_truth_of_the_papers_workspace_is_known_within_one_per_cent(
     truth = own.truth(problem)
     assert least < truth.terms["lower_bound"] <= truth.cost
     assert truth.cost <= 1.01 * truth.terms["lower_bound"]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_walks_in_memory_of_others_are_those_of_new_memory(seed: int) -> None:
+    """Blocks that are left out keep old costs and moves, which no walk to the goal may take."""
+    most, rng = 30, np.random.default_rng(seed)
+    network = network_of(solvable((9, 8), 0.25, seed, planner()))
+    shifts = shifts_of(arrivals_of(network, 0.3), hops_of(network))
+    used, excesses = Walks.of(most, shifts), np.empty((2, len(network.unsafeness)))
+    for number in (most, 17, 25, 12, 26):
+        weights = padded(rng.uniform(0.0, 2.0, len(network.unsafeness)), shifts)
+        fresh = Walks.of(most, shifts)
+        for walks, excess in zip((used, fresh), excesses, strict=True):
+            find_walks(shifts, weights, number, walks)
+            count_excess(shifts, walks, number, np.ones(len(excess)), excess)
+        np.testing.assert_array_equal(used.costs[: number + 1], fresh.costs[: number + 1])
+        np.testing.assert_array_equal(*excesses)
+        # a walk of so many nodes that costs as much, written plainly, level by level
+        plain = plain_costs(network, weights, number)
+        np.testing.assert_array_equal(fresh.costs[: number + 1], plain)
+
+
+def plain_costs(network: Any, weights: np.ndarray, number: int) -> list[float]:
+    """Return the costs of the best walks to the goal by numbers of nodes: one edge at a time."""
+    start, goal = network.ends
+    edges = list(
+        zip(network.tails.tolist(), network.heads.tolist(), network.lengths.tolist(), strict=True)
+    )
+    at: dict[tuple[int, int], float] = {(start, -1): weights[start]}  # by node and the one before
+    costs = [np.inf, np.inf]
+    for _ in range(2, number + 1):
+        following: dict[tuple[int, int], float] = {}
+        for (node, before), cost in at.items():
+            for tail, head, length in edges:
+                if tail == node != goal and head not in (before, start):
+                    value = (cost + 0.3 * length) + weights[head]
+                    key = (head, node)
+                    following[key] = min(value, following.get(key, np.inf))
+        at = following
+        costs.append(min((c for (node, _), c in at.items() if node == goal), default=np.inf))
+    return costs

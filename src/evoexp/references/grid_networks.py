@@ -3,11 +3,14 @@
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from evoexp.numeric.vectors import LANES
 from evoexp.records import FloatArray, IntArray
 
 TILE = 4  # moves to a node are filled up to a multiple
+NO_MOVE, NO_WAY_BACK = -1, -2
+UNREACHED = 2**31  # more moves than any path has
 
 
 class Network(NamedTuple):
@@ -96,31 +99,34 @@ def hops_of(network: Network) -> Hops:
 class Shifts(NamedTuple):
     """The permitted moves by the difference of their nodes' indices, for vectors of nodes.
 
-    Rows are `width` long: the nodes, and as many places behind them as vectors read; no move ends
-    there.
+    Nodes are counted in blocks of `LANES`, from the first one where a move ends. The last block may
+    reach beyond the nodes; no move ends there.
 
     Attributes:
         differences: (moves,) index where each kind of move ends, less that where it starts;
             descending, so that nodes where moves start ascend.
-        lengths: (moves, width) times ε, of the move that ends at each node; inf where there is
-            none, and of moves from the goal or to the start.
+        backward: (moves,) the kind of move that leads back; `NO_WAY_BACK` where there is none.
+        lengths: (moves,) times ε.
+        permitted: (blocks · moves,) uint8; bit k of entry block · moves + move tells whether such a
+            move ends at node k of the block. None leads from the goal or to the start.
         unsafeness: (nodes,).
-        indices: (width,) 0, 1, 2, ….
-        from_start: (width,) fewest moves from the start; inf where no path leads.
-        to_goal: (width,) fewest moves to the goal.
-        first: The first node where a move ends.
-        last: The last one.
+        from_start: (blocks,) fewest moves from the start to a node of the block; `UNREACHED` where
+            no path leads.
+        to_goal: (blocks,) fewest moves from a node of the block to the goal.
+        first: The first node of the first block.
+        width: Of a row of numbers for all nodes: so many vectors may be read.
         ends: Start and goal.
     """
 
     differences: IntArray
+    backward: IntArray
     lengths: FloatArray
+    permitted: NDArray[np.uint8]
     unsafeness: FloatArray
-    indices: FloatArray
-    from_start: FloatArray
-    to_goal: FloatArray
+    from_start: IntArray
+    to_goal: IntArray
     first: int
-    last: int
+    width: int
     ends: tuple[int, int]
 
 
@@ -132,26 +138,39 @@ def shifts_of(arrivals: Arrivals, hops: Hops) -> Shifts:
     """
     (start, goal), nodes = arrivals.ends, len(arrivals.unsafeness)
     heads, moves = np.nonzero(np.isfinite(arrivals.lengths))
-    tails = arrivals.tails[heads, moves]
-    lengths = np.where(tails == goal, np.inf, arrivals.lengths[heads, moves])
-    differences = np.unique(heads - tails)[::-1].copy()
+    tails, lengths = arrivals.tails[heads, moves], arrivals.lengths[heads, moves]
+    differences, kinds = np.unique(tails - heads, return_inverse=True)
+    differences = -differences
     first, last, farthest = int(heads.min()), int(heads.max()), int(np.abs(differences).max())
     if first < farthest:
         raise ValueError(f"node {first} is no node within a ring: moves go {farthest} nodes on")
-    width = nodes + farthest + LANES
-    table = np.full((len(differences), width), np.inf)
-    table[np.searchsorted(-differences, tails - heads), heads] = lengths
-    table[:, start] = np.inf
-    from_start, to_goal = np.full((2, width), np.inf)
-    from_start[:nodes], to_goal[:nodes] = hops.from_start, hops.to_goal
+    by_kind = np.empty(len(differences))
+    by_kind[kinds] = lengths
+    backward = [np.flatnonzero(differences == -other) for other in differences]
+    # which moves end at the nodes of each block
+    blocks = (last - first) // LANES + 1
+    ends_here = np.zeros((blocks * LANES, len(differences)), dtype=bool)
+    allowed = (tails != goal) & (heads != start)
+    ends_here[heads[allowed] - first, kinds[allowed]] = True
+    bits = np.packbits(ends_here.reshape(blocks, LANES, -1), axis=1, bitorder="little")
     return Shifts(
         differences,
-        table,
+        np.array([found[0] if len(found) else NO_WAY_BACK for found in backward]),
+        by_kind,
+        bits.ravel(),
         arrivals.unsafeness,
-        np.arange(float(width)),
-        from_start,
-        to_goal,
+        _least_of_blocks(hops.from_start, first, blocks),
+        _least_of_blocks(hops.to_goal, first, blocks),
         first,
-        last,
+        max(nodes, first + blocks * LANES) + farthest,
         arrivals.ends,
     )
+
+
+def _least_of_blocks(hops: FloatArray, first: int, blocks: int) -> IntArray:
+    """Return the fewest moves of the nodes of each block, (blocks,)."""
+    count = blocks * LANES
+    own = hops[first : first + count]
+    filled = np.pad(own, (0, count - len(own)), constant_values=np.inf)
+    least = filled.reshape(blocks, LANES).min(axis=1)
+    return np.where(np.isfinite(least), least, UNREACHED).astype(np.int64)

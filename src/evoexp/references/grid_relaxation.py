@@ -28,39 +28,50 @@ bound, however good the steps are.
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import borrowed, inlined, kernel
-from evoexp.numeric.vectors import LANES, any_lane, load, lower, select, spread, store, upper
+from evoexp.numeric.vector_bytes import (
+    equal_bytes,
+    load_bytes,
+    load_mask,
+    spread_byte,
+    store_bytes,
+)
+from evoexp.numeric.vectors import LANES, load, lower, select, spread, store, upper
 from evoexp.records import FloatArray
-from evoexp.references.grid_networks import Arrivals, Hops, Shifts, shifts_of
+from evoexp.references.grid_networks import NO_MOVE, Arrivals, Hops, Shifts, shifts_of
 from evoexp.robots.kinematics import U
 
 PATIENCE = 10  # steps without a better bound after which they are halved
 SHORTEST_STEP = 1.0 / 64.0  # of Polyak's length, at which a number of nodes is left
-NO_NODE = -1.0
 
 
 class Walks(NamedTuple):
     """The best walks to every node by every number of nodes, written by `find_walks`.
 
+    Costs are kept of two numbers of nodes only, which take turns.
+
     Attributes:
-        best: (numbers, width) values of the best walks; see `Shifts` for the width.
-        second: (numbers, width) of the best whose last but one node is another.
-        before: (numbers, width) last but one node of the best, a whole number.
-        second_before: (numbers, width) of the second best.
+        costs: (numbers,) of the best walks to the goal.
+        best: (2 · width,) costs of the best walks; see `Shifts` for the width.
+        second: (2 · width,) of the best whose last but one node is another.
+        moves: (numbers · width,) int8, the last move of the best walks; `NO_MOVE` where there is
+            none.
+        second_moves: (numbers · width,) of the second best.
     """
 
+    costs: FloatArray
     best: FloatArray
     second: FloatArray
-    before: FloatArray
-    second_before: FloatArray
+    moves: NDArray[np.int8]
+    second_moves: NDArray[np.int8]
 
     @classmethod
     def of(cls, most: int, shifts: Shifts) -> "Walks":
         """Return memory for walks of at most so many nodes on a grid."""
-        shape = most + 1, shifts.lengths.shape[1]
-        values = np.full(shape, np.inf), np.full(shape, np.inf)
-        return cls(*values, np.full(shape, NO_NODE), np.full(shape, NO_NODE))
+        moves = np.full((2, (most + 1) * shifts.width), NO_MOVE, dtype=np.int8)
+        return cls(np.full(most + 1, np.inf), *np.full((2, 2 * shifts.width), np.inf), *moves)
 
 
 def relaxed_bounds(
@@ -121,18 +132,18 @@ def raise_bound(
         walks: Scratch.
         bounds: (numbers,) raised.
     """
-    goal, length, since, best = shifts.ends[1], 1.0, 0, -np.inf
+    length, since, best = 1.0, 0, -np.inf
     best_multipliers = multipliers.copy()
-    weights, excess = np.zeros(shifts.lengths.shape[1]), np.empty(len(multipliers))
+    weights, excess = np.zeros(shifts.width), np.empty(len(multipliers))
     for _ in range(most_steps):
         for node in range(len(multipliers)):
             weights[node] = lam / number * shifts.unsafeness[node] + multipliers[node]
         find_walks(shifts, weights, number, walks)
         # L_N(π), and bounds of smaller numbers
         total = multipliers.sum()
-        value = walks.best[number, goal] - total
+        value = walks.costs[number] - total
         for smaller in range(number + 1):
-            bounds[smaller] = max(bounds[smaller], walks.best[smaller, goal] - total)
+            bounds[smaller] = max(bounds[smaller], walks.costs[smaller] - total)
         # shorter steps, from the best multipliers, where nothing is gained
         since += 1
         if value > best + 1e-9 * abs(known):
@@ -157,7 +168,9 @@ def raise_bound(
 def find_walks(shifts: Shifts, weights: FloatArray, number: int, walks: Walks) -> None:
     """Write the best walks of 1 … `number` nodes that never go straight back.
 
-    Walks that cannot reach the goal by `number` nodes any more are left out.
+    Blocks of nodes are left out until the start reaches them, and as soon as they cannot reach the
+    goal by `number` nodes any more: costs that they keep from before lead to no other block that
+    can.
 
     Args:
         shifts: The moves.
@@ -166,78 +179,58 @@ def find_walks(shifts: Shifts, weights: FloatArray, number: int, walks: Walks) -
         walks: Written.
     """
     shifts, weights, walks = borrowed((shifts, weights, walks))
-    start, lengths = shifts.ends[0], shifts.lengths.reshape(-1)
-    walks.best[:2], walks.second[:2] = np.inf, np.inf
-    walks.before[:2], walks.second_before[:2] = NO_NODE, NO_NODE
-    walks.best[1, start] = weights[start]
-    flat = borrowed(
-        Walks(
-            walks.best.reshape(-1),
-            walks.second.reshape(-1),
-            walks.before.reshape(-1),
-            walks.second_before.reshape(-1),
-        )
-    )
+    (start, goal), width = shifts.ends, shifts.width
+    walks.best[:], walks.second[:] = np.inf, np.inf
+    walks.moves[: 2 * width] = NO_MOVE
+    walks.best[width + start] = weights[start]
+    walks.costs[0], walks.costs[1] = np.inf, walks.best[width + goal]
     for k in range(2, number + 1):
-        for node in range(shifts.first, shifts.last + 1, LANES):
-            _extend_walks(shifts, lengths, weights, k, number, node, flat)
+        for block in range(len(shifts.to_goal)):
+            if shifts.from_start[block] < k and shifts.to_goal[block] <= number - k:
+                _extend_walks(shifts, weights, k, block, walks)
+        walks.costs[k] = walks.best[(k & 1) * width + goal]
 
 
 @inlined
-def _extend_walks(
-    shifts: Shifts,
-    lengths: FloatArray,
-    weights: FloatArray,
-    k: int,
-    number: int,
-    node: int,
-    walks: Walks,
-) -> None:
-    """Write the best walks of k nodes to eight nodes from one on, from those of one node less.
+def _extend_walks(shifts: Shifts, weights: FloatArray, k: int, block: int, walks: Walks) -> None:
+    """Write the best walks of k nodes to a block of nodes, from those of one node less.
 
     Args:
         shifts: The moves.
-        lengths: (moves · width,) theirs, flat.
         weights: (width,) cost of passing a node.
         k: Number of nodes of the walks.
-        number: Most nodes of a walk to the goal.
-        node: The first of the eight.
-        walks: (numbers · width,) each, flat.
+        block: Which nodes.
+        walks: Written.
     """
-    best, second, before, second_before = walks
-    width = len(weights)
-    own, to = load(shifts.indices, U(node)), k * width + node
-    nowhere = spread(np.inf)
-    one, two = nowhere, nowhere
-    tail_one, tail_two = spread(NO_NODE), spread(NO_NODE)
-    # nodes that the start reaches, and from which the goal is reached, in time
-    left = select(
-        load(shifts.from_start, U(node)) < k * 1.0, load(shifts.to_goal, U(node)), nowhere
-    )
-    in_time = left < number - k + 0.5
-    if any_lane(in_time):
-        for move in range(len(shifts.differences)):
-            difference = shifts.differences[move]
-            at = U(to - width - difference)
-            is_back = load(before, at) == own
-            value = select(is_back, load(second, at), load(best, at))
-            value = value + load(lengths, U(move * width + node))
-            tail = own - 1.0 * difference
-            # the best so far, then the second best
-            is_one, is_two = value < one, value < two
-            tail_two = select(is_two, select(is_one, tail_one, tail), tail_two)
-            tail_one = select(is_one, tail, tail_one)
-            two = lower(two, upper(one, value))
-            one = lower(one, value)
-        weight, none = load(weights, U(node)), spread(NO_NODE)
-        one = select(in_time, one + weight, nowhere)
-        two = select(in_time, two + weight, nowhere)
-        tail_one = select(in_time, tail_one, none)
-        tail_two = select(in_time, tail_two, none)
-    store(best, U(to), one)
-    store(second, U(to), two)
-    store(before, U(to), tail_one)
-    store(second_before, U(to), tail_two)
+    width, kinds = shifts.width, len(shifts.differences)
+    node = shifts.first + block * LANES
+    before, to = ((k + 1) & 1) * width + node, (k & 1) * width + node
+    moves_before = (k - 1) * width + node
+    one, two = spread(np.inf), spread(np.inf)
+    move_one, move_two = spread_byte(NO_MOVE), spread_byte(NO_MOVE)
+    for move in range(kinds):
+        difference = shifts.differences[move]
+        at = U(before - difference)
+        # the best walk, or the second best where the best one would go straight back
+        is_back = equal_bytes(
+            load_bytes(walks.moves, U(moves_before - difference)), shifts.backward[move]
+        )
+        value = select(is_back, load(walks.second, at), load(walks.best, at))
+        value = value + shifts.lengths[move]
+        # the best so far, then the second best
+        permitted = load_mask(shifts.permitted, U(block * kinds + move))
+        value = select(permitted, value, spread(np.inf))
+        is_one, is_two = value < one, value < two
+        own = spread_byte(move)
+        move_two = select(is_two, select(is_one, move_one, own), move_two)
+        move_one = select(is_one, own, move_one)
+        two = lower(two, upper(one, value))
+        one = lower(one, value)
+    weight = load(weights, U(node))
+    store(walks.best, U(to), one + weight)
+    store(walks.second, U(to), two + weight)
+    store_bytes(walks.moves, U(k * width + node), move_one)
+    store_bytes(walks.second_moves, U(k * width + node), move_two)
 
 
 @kernel
@@ -257,15 +250,17 @@ def count_excess(
         The sum of squares; 0 if there is no walk of so many nodes.
     """
     excess[:] = -1.0
-    node, is_second = shifts.ends[1], False
-    if walks.best[number, node] == np.inf:
+    node, is_second, width = shifts.ends[1], False, shifts.width
+    if walks.costs[number] == np.inf:
         return 0.0
-    for k in range(number, 0, -1):
+    for k in range(number, 1, -1):
         excess[node] += 1.0
-        tail = walks.second_before[k, node] if is_second else walks.before[k, node]
-        # the walk to `tail` that does not come from `node`
-        is_second = k > 1 and walks.before[k - 1, int(tail)] == node
-        node = int(tail)
+        moves = walks.second_moves if is_second else walks.moves
+        move = moves[k * width + node]
+        # the walk to the node before that does not come from this one
+        node -= shifts.differences[move]
+        is_second = walks.moves[(k - 1) * width + node] == shifts.backward[move]
+    excess[node] += 1.0
     square = 0.0
     for other in range(len(excess)):
         if excess[other] < 0.0 and multipliers[other] == 0.0:

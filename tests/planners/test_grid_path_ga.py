@@ -14,6 +14,7 @@ from evoexp.objectives.path_cost import PathCost
 from evoexp.planners.baselines.random_search import RandomSearch
 from evoexp.planners.grid_path_ga import path_operators
 from evoexp.planners.grid_path_ga import planner as grid_planner
+from evoexp.planners.grid_path_ga.path_sampling import PathSampling
 from evoexp.planners.proofs import judge_motion
 from planners.grid_samples import FIELDS, faults, planner, robot, scenario, solvable
 
@@ -295,6 +296,30 @@ def test_random_search_draws_the_same_first_paths() -> None:
         nodes_of(path) for path in drawn.population
     ]
     assert np.array_equal(first.costs, drawn.costs)
+
+
+@pytest.mark.parametrize("shape", [(9, 9), (4, 4, 4)])
+def test_paths_drawn_and_measured_at_once_are_those_of_words_drawn_before(
+    shape: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = planner()
+    problem, at_once, one_by_one = solvable(shape, 0.3, 4, own), rng(5), rng(5)
+    draw = own.judged_samples(problem, at_once)
+    found = []
+    for count in (12, 5, 12, 1):
+        paths, judged = draw(count)
+        found.append((paths.copy(), judged, judged.named_terms(0), at_once.bit_generator.state))
+    with pytest.raises(ValueError, match=r"count must be 1\.\.12, was 13"):
+        draw(13)
+    # the longer way, of any generator
+    monkeypatch.setattr(PathSampling, "is_fit", lambda *_: False)
+    draw = own.judged_samples(problem, one_by_one)
+    for paths, judged, terms, state in found:
+        expected, expected_judged = draw(len(paths))
+        np.testing.assert_array_equal(paths, expected)
+        np.testing.assert_array_equal(judged.cost, expected_judged.cost)
+        assert terms == expected_judged.named_terms(0)
+        assert state == one_by_one.bit_generator.state
 
 
 def test_populations_are_checked() -> None:

@@ -26,7 +26,7 @@ from evoexp.numeric.generator_memory import MULTIPLIER, layout_is_known, words_o
 Words = NDArray[np.uint64]
 
 _HALF = 2**64
-_HIGH, _LOW = np.uint64(MULTIPLIER // _HALF), np.uint64(MULTIPLIER % _HALF)
+HIGH_FACTOR, LOW_FACTOR = np.uint64(MULTIPLIER // _HALF), np.uint64(MULTIPLIER % _HALF)
 _BLOCK = 64  # states of which numbers are made at once
 _STREAMS = 4
 _HIGH_FIRST = [1, 0, 3, 2]  # order of the words in a generator's memory
@@ -114,10 +114,10 @@ def _make_word(typing_context: Any, high: Any, low: Any) -> Any:
 
 
 # for kernels: without the typing context
-_stepped: Callable[..., tuple[np.uint64, np.uint64]] = cast(Any, _step)
+step_state: Callable[..., tuple[np.uint64, np.uint64]] = cast(Any, _step)
 """Return state · factor + addend, modulo 2^128; all of them are given in halves."""
 
-_word: Callable[[np.uint64, np.uint64], np.uint64] = cast(Any, _make_word)
+word_of_state: Callable[[np.uint64, np.uint64], np.uint64] = cast(Any, _make_word)
 """Return the word of a state: exclusive or of its halves, rotated."""
 
 
@@ -180,17 +180,17 @@ def fill_words(words: Words, out: Words) -> None:
     high, low, add_high, add_low = words[0], words[1], words[2], words[3]
     num_blocks, none = len(out) // _BLOCK, np.uint64(0)
     # factor and addend of four steps at once: those of two, twice
-    far_high, far_low, far_add_high, far_add_low = _HIGH, _LOW, add_high, add_low
+    far_high, far_low, far_add_high, far_add_low = HIGH_FACTOR, LOW_FACTOR, add_high, add_low
     for _ in range(2):
-        far_add_high, far_add_low = _stepped(
+        far_add_high, far_add_low = step_state(
             far_add_high, far_add_low, far_high, far_low, far_add_high, far_add_low
         )
-        far_high, far_low = _stepped(far_high, far_low, far_high, far_low, none, none)
+        far_high, far_low = step_state(far_high, far_low, far_high, far_low, none, none)
     # the next four states
-    a_high, a_low = _stepped(high, low, _HIGH, _LOW, add_high, add_low)
-    b_high, b_low = _stepped(a_high, a_low, _HIGH, _LOW, add_high, add_low)
-    c_high, c_low = _stepped(b_high, b_low, _HIGH, _LOW, add_high, add_low)
-    d_high, d_low = _stepped(c_high, c_low, _HIGH, _LOW, add_high, add_low)
+    a_high, a_low = step_state(high, low, HIGH_FACTOR, LOW_FACTOR, add_high, add_low)
+    b_high, b_low = step_state(a_high, a_low, HIGH_FACTOR, LOW_FACTOR, add_high, add_low)
+    c_high, c_low = step_state(b_high, b_low, HIGH_FACTOR, LOW_FACTOR, add_high, add_low)
+    d_high, d_low = step_state(c_high, c_low, HIGH_FACTOR, LOW_FACTOR, add_high, add_low)
     highs, lows = np.empty(_BLOCK, dtype=np.uint64), np.empty(_BLOCK, dtype=np.uint64)
     for block in range(num_blocks):
         # states of a block
@@ -201,17 +201,45 @@ def fill_words(words: Words, out: Words) -> None:
             highs[at + np.uint64(2)], lows[at + np.uint64(2)] = c_high, c_low
             highs[at + np.uint64(3)], lows[at + np.uint64(3)] = d_high, d_low
             high, low = d_high, d_low
-            a_high, a_low = _stepped(a_high, a_low, far_high, far_low, far_add_high, far_add_low)
-            b_high, b_low = _stepped(b_high, b_low, far_high, far_low, far_add_high, far_add_low)
-            c_high, c_low = _stepped(c_high, c_low, far_high, far_low, far_add_high, far_add_low)
-            d_high, d_low = _stepped(d_high, d_low, far_high, far_low, far_add_high, far_add_low)
+            a_high, a_low = step_state(a_high, a_low, far_high, far_low, far_add_high, far_add_low)
+            b_high, b_low = step_state(b_high, b_low, far_high, far_low, far_add_high, far_add_low)
+            c_high, c_low = step_state(c_high, c_low, far_high, far_low, far_add_high, far_add_low)
+            d_high, d_low = step_state(d_high, d_low, far_high, far_low, far_add_high, far_add_low)
         # their words
         for k in range(_BLOCK):
-            out[block * _BLOCK + k] = _word(highs[k], lows[k])
+            out[block * _BLOCK + k] = word_of_state(highs[k], lows[k])
     # the rest, one by one
     for k in range(num_blocks * _BLOCK, len(out)):
-        high, low = _stepped(high, low, _HIGH, _LOW, add_high, add_low)
-        out[k] = _word(high, low)
+        high, low = step_state(high, low, HIGH_FACTOR, LOW_FACTOR, add_high, add_low)
+        out[k] = word_of_state(high, low)
+    words[0], words[1] = high, low
+
+
+@kernel
+def skip_words(words: Words, count: int) -> None:
+    """Let a generator go on by so many steps at once, as if that many words were drawn.
+
+    Steps are composed: those of every power of two are one step of another factor and addend
+    (Brown 1994, "Random number generation with arbitrary strides").
+
+    Args:
+        words: The generator.
+        count: Of steps.
+    """
+    high, low, none = words[0], words[1], np.uint64(0)
+    factor_high, factor_low, add_high, add_low = HIGH_FACTOR, LOW_FACTOR, words[2], words[3]
+    left = count
+    while left > 0:
+        if left & 1:
+            high, low = step_state(high, low, factor_high, factor_low, add_high, add_low)
+        # twice as many steps: a · (a · x + c) + c
+        add_high, add_low = step_state(
+            add_high, add_low, factor_high, factor_low, add_high, add_low
+        )
+        factor_high, factor_low = step_state(
+            factor_high, factor_low, factor_high, factor_low, none, none
+        )
+        left >>= 1
     words[0], words[1] = high, low
 
 
@@ -227,10 +255,10 @@ def fill_normals(words: Words, out: NDArray[np.float64]) -> None:
     num_pairs = (out.size + 1) // 2
     pairs, squares, i = np.empty(2 * num_pairs), np.empty(num_pairs), 0
     while i < num_pairs:
-        high, low = _stepped(high, low, _HIGH, _LOW, add_high, add_low)
-        u = 2.0 * _number(_word(high, low)) - 1.0
-        high, low = _stepped(high, low, _HIGH, _LOW, add_high, add_low)
-        v = 2.0 * _number(_word(high, low)) - 1.0
+        high, low = step_state(high, low, HIGH_FACTOR, LOW_FACTOR, add_high, add_low)
+        u = 2.0 * _number(word_of_state(high, low)) - 1.0
+        high, low = step_state(high, low, HIGH_FACTOR, LOW_FACTOR, add_high, add_low)
+        v = 2.0 * _number(word_of_state(high, low)) - 1.0
         pairs[2 * i], pairs[2 * i + 1], squares[i] = u, v, u * u + v * v
         i += 1 if 0.0 < squares[i] < 1.0 else 0
     scale_to_normal(pairs, squares, out)

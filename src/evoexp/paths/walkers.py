@@ -117,7 +117,7 @@ class Walkers:
 
 
 @inlined
-def _next_node(choices: Choices, node: np.uint64, random: np.uint64) -> np.uint64:
+def next_node(choices: Choices, node: np.uint64, random: np.uint64) -> np.uint64:
     """Return where a walker goes by 32 random bits; a node has no sign, as it is an index."""
     entry = choices.entries[0, node]
     part = random * np.uint64(entry & TOTAL) >> HALF
@@ -146,11 +146,11 @@ def _go_without_loops(
         first, second = words[taken], words[taken + 1]
         taken += WORDS
         to_one, to_two = (
-            _next_node(choices, one, first & LOW),
-            _next_node(choices, two, first >> HALF),
+            next_node(choices, one, first & LOW),
+            next_node(choices, two, first >> HALF),
         )
-        to_three = _next_node(choices, three, second & LOW)
-        to_four = _next_node(choices, four, second >> HALF)
+        to_three = next_node(choices, three, second & LOW)
+        to_four = next_node(choices, four, second >> HALF)
         exits[0, one], exits[1, two] = to_one, to_two
         exits[2, three], exits[3, four] = to_three, to_four
         one, two, three, four = to_one, to_two, to_three, to_four
@@ -183,7 +183,7 @@ def _go_with_loops(
         for walker in range(LANES):
             word = words[taken + (walker >> 1)]
             random = word >> HALF if walker & 1 else word & LOW
-            node = _next_node(choices, walkers[walker], random)
+            node = next_node(choices, walkers[walker], random)
             counts[walker] += 1
             trails[walker, counts[walker]] = node
             walkers[walker] = node

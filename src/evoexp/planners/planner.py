@@ -161,6 +161,16 @@ class _Budgeted(Protocol):
         """Has `population_size`, `num_offspring` and `num_generations`."""
 
 
+class _Sampling(Protocol):
+    """A planner, as far as random search needs it."""
+
+    def sample(self, problem: Any, rng: np.random.Generator, count: int) -> FloatArray:
+        """Draw individuals."""
+
+    def cost(self, problem: Any, population: FloatArray) -> Judgement:
+        """Judge them."""
+
+
 class PlannerDefaults:
     """The usual answers of a planner, to be inherited before `Component`.
 
@@ -194,6 +204,21 @@ class PlannerDefaults:
     ) -> FloatArray | None:
         """Return None: there is no local operator."""
         return None
+
+    def judged_samples(
+        self: _Sampling, problem: Any, rng: np.random.Generator
+    ) -> Callable[[int], tuple[NDArray[Any], Judgement]]:
+        """Return a function that draws and judges so many individuals, as random search does.
+
+        A planner may keep memory from one call to the next: what the function returns is valid
+        until it is called again. No more than an evaluation of a generation are asked for.
+        """
+
+        def draw(count: int) -> tuple[NDArray[Any], Judgement]:
+            population = self.sample(problem, rng, count)
+            return population, self.cost(problem, population)
+
+        return draw
 
     def parts(self, problem: Any, motion: Motion) -> Sequence[Part]:
         """Return the whole motion with the problem's scene, or nothing without a scene."""

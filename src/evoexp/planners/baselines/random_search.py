@@ -1,11 +1,12 @@
 """Random search: the best of as many samples as a planner evaluates, without any evolution."""
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
 
-from evoexp.planners.planner import Keeper
+from evoexp.planners.planner import Keeper, PlannerDefaults
 from evoexp.planners.wrapped_planner import WrappedPlanner
 from evoexp.records import Generation
 
@@ -25,7 +26,11 @@ class RandomSearch(WrappedPlanner):
     def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield one generation of new samples after the other."""
         planner, keeper = self.planner, Keeper()
+        # a planner of others may write everything itself
+        judged_samples = getattr(planner, "judged_samples", None)
+        if judged_samples is None:
+            judged_samples = partial(PlannerDefaults.judged_samples, planner)
+        draw = judged_samples(problem, rng)
         for index in range(planner.num_generations + 1):
-            population = planner.sample(problem, rng, planner.num_evaluations(index))
-            judged = planner.cost(problem, population)
+            population, judged = draw(planner.num_evaluations(index))
             yield keeper.record_judged(planner, problem, population, judged)

@@ -11,6 +11,7 @@ coordinates of its nodes, x, y[, z] of one after the other, as many as there are
 """
 
 import functools
+from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -27,7 +28,7 @@ from evoexp.paths.grid_measures import Tolls
 from evoexp.paths.grid_walks import walk_each
 from evoexp.paths.grids import UNREACHED, Moves, NodeArray, StepArray, spread_front
 from evoexp.paths.motion import Motion
-from evoexp.paths.walkers import LANES, WORDS, Walkers, choice_table
+from evoexp.paths.walkers import Walkers, choice_table
 from evoexp.planners.grid_path_ga import kernels
 from evoexp.planners.grid_path_ga.kernels import (
     COST,
@@ -37,7 +38,9 @@ from evoexp.planners.grid_path_ga.kernels import (
     Population,
 )
 from evoexp.planners.grid_path_ga.path_operators import Breeding, Scratch, World
+from evoexp.planners.grid_path_ga.path_sampling import FEW_WORDS, PathSampling, first_words
 from evoexp.planners.grid_path_ga.proven_moves import only_proven
+from evoexp.planners.judgements import Judgement as AnyJudgement
 from evoexp.planners.planner import Candidate, PlannerDefaults
 from evoexp.planners.proofs import Acceptance
 from evoexp.planners.stretches import Run, ScaledStretches
@@ -55,8 +58,6 @@ FAULTS = "blocked_nodes", "forbidden_moves", "missed_ends"  # with one, a path c
 STRETCH = 8
 BLOCK = 16384  # uniform numbers drawn at once, at least
 TABLES = 10  # of paths: those of a stretch, and of those that are bred
-STEPS_PER_WALK = 3.5  # times the fewest: random words for so many steps are drawn at first
-FEW_WORDS = 512  # (a multiple of `WORDS`) drawn whenever these do not suffice; a rest is lost
 
 
 class Problem(NamedTuple):
@@ -152,6 +153,9 @@ class GridPathGa(PlannerDefaults, Component):
 
     def sample(self, problem: Problem, rng: np.random.Generator, count: int) -> np.ndarray:
         """Return random paths as in the initial population, (count, longest + 1)."""
+        if not self.revisits and PathSampling.is_fit(problem, rng) and count:
+            sampling = PathSampling(problem, self.objective.weights, rng, count)
+            return np.ascontiguousarray(sampling.draw(count)[0])
         paths = np.empty((count, problem.fields.grid.num_nodes + 1), dtype=np.int32)
         if len(problem.choices.entries):
             self._fill(problem, rng, paths)
@@ -159,11 +163,25 @@ class GridPathGa(PlannerDefaults, Component):
             self._fill_one_by_one(problem, rng, paths)
         return trimmed(paths)
 
+    def judged_samples(
+        self, problem: Problem, rng: np.random.Generator
+    ) -> Callable[[int], tuple[np.ndarray, AnyJudgement]]:
+        """Return a function that draws and judges so many paths, see `PlannerDefaults`."""
+        if self.revisits or not PathSampling.is_fit(problem, rng):
+            return super().judged_samples(problem, rng)
+        most = max(self.num_evaluations(0), self.num_evaluations(1))
+        sampling = PathSampling(problem, self.objective.weights, rng, most)
+
+        def draw(count: int) -> tuple[np.ndarray, Judgement]:
+            paths, results = sampling.draw(count)
+            return paths, Judgement(results, paths[:, 0])
+
+        return draw
+
     def _fill(self, problem: Problem, rng: np.random.Generator, paths: NodeArray) -> None:
         """Let walkers fill a table of paths."""
         walkers = Walkers(problem.choices, problem.ends, not self.revisits, paths)
-        steps = STEPS_PER_WALK * len(paths) * problem.moves.steps[problem.ends[0]]
-        num_words = WORDS * (int(steps / LANES) + 1)
+        num_words = first_words(len(paths), int(problem.moves.steps[problem.ends[0]]))
         while walkers.complete < len(paths):
             walkers.go(draw_words(rng, num_words))
             num_words = FEW_WORDS

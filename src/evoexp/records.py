@@ -66,7 +66,7 @@ class Stretch(NamedTuple):
     num_feasible: list[int]
     evaluations: list[int]
     collision_queries: list[int]
-    costs: FloatArray  # (generations, individuals)
+    costs: list[FloatArray]  # (generations, individuals) of some generations after the other
     states: list[bytes]  # of the generator, behind each generation
     times: list[float]  # [s] when each generation was there
     population: NDArray[Any] | None  # of the last generation, if it ends the run
@@ -86,7 +86,7 @@ class Stretch(NamedTuple):
             self.collision_queries[-1],
             standing.solved,
             standing.terms,
-            self.costs[-1],
+            self.costs[-1][-1],
             np.empty(0) if population is None else population,
         )
 

@@ -122,5 +122,5 @@ def test_all_steps_at_once_are_one_after_the_other() -> None:
 
 
 def test_states_of_another_generator_are_refused() -> None:
-    with pytest.raises(TypeError, match="must be a PCG64, was MT19937"):
+    with pytest.raises(TypeError, match="must be a PCG64, was a MT19937"):
         states_behind(np.random.MT19937(0), 1, 1)

@@ -8,7 +8,8 @@ import pytest
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.configuration import compose
-from evoexp.planners.stretches import TOGETHER, Run, stretch_of
+from evoexp.planners.gathering import TOGETHER, Run
+from evoexp.planners.stretches import stretch_of
 from evoexp.store.log_reader import read_log
 from masked_logs import masked_log
 
@@ -22,11 +23,18 @@ RUNS = (
     "experiment=chen_path planner.revisits=true ga.num_generations=16",
     "experiment=chen_mission budget=smoke",
     "experiment=chen_mission",
+    "experiment=chen_path --only=(a),_random_search",
+    "experiment=chen_placement --only=B_link,_random_search",
+    "experiment=rana_planar --only=random_search ga.num_generations=30",
+    "experiment=chen_path --only=(c),_path_climbing",
 )
 
 
 def condition(words: str) -> Condition:
-    return compose.expand(words.split())[0].conditions[0].condition
+    """Return the condition of an experiment; spaces of a label are written _."""
+    names = [word for word in words.split() if not word.startswith("--only=")]
+    labels = [word[7:].replace("_", " ") for word in words.split() if word not in names]
+    return compose.expand(names, only=labels)[0].conditions[0].condition
 
 
 @pytest.mark.parametrize("words", RUNS)
@@ -51,6 +59,7 @@ def test_a_run_yields_what_its_stretches_hold(words: str) -> None:
         assert [each.place for each in stretch.standings] == sorted(
             {0, *(each.place for each in stretch.standings)}
         )
+        costs = [row for block in stretch.costs for row in block]
         for k, lowest in enumerate(stretch.lowest):
             each, rng = next(one), rngs[0]
             standing = [found for found in stretch.standings if found.place <= k][-1]
@@ -61,7 +70,7 @@ def test_a_run_yields_what_its_stretches_hold(words: str) -> None:
                 standing.solved,
             )
             np.testing.assert_array_equal(each.best, standing.best)
-            np.testing.assert_array_equal(each.costs, stretch.costs[k])
+            np.testing.assert_array_equal(each.costs, costs[k])
             assert each.best_cost_in_generation == lowest
             assert (each.evaluations, each.collision_queries, each.num_feasible) == (
                 stretch.evaluations[k],

@@ -103,7 +103,7 @@ def in_stretches(written: Sequence[Generation], most: int) -> list[Stretch]:
                 num_feasible=[each.num_feasible for each in own],
                 evaluations=[each.evaluations for each in own],
                 collision_queries=[each.collision_queries for each in own],
-                costs=np.array([each.costs for each in own]),
+                costs=[each.costs[None] for each in own],
                 states=[state] * len(own),
                 times=[0.0] * len(own),
                 population=own[-1].population,

@@ -9,8 +9,8 @@ from evoexp.batch.compile_clock import cpu_now, now
 from evoexp.collision.box_support import EXACT
 from evoexp.condition import Condition
 from evoexp.errors import SettingError
+from evoexp.planners.gathering import Run
 from evoexp.planners.proofs import judge_motion
-from evoexp.planners.stretches import Run
 from evoexp.records import Generation, ReplicateSummary
 from evoexp.registry import guests
 from evoexp.store.log import Finished, Log

@@ -43,8 +43,7 @@ def states_behind(bit_generator: Any, count: int, steps: int) -> list[bytes]:
     Raises:
         TypeError: If the generator is no PCG64.
     """
-    if not isinstance(bit_generator, np.random.PCG64):
-        raise TypeError(f"bit_generator: must be a PCG64, was {type(bit_generator).__name__}")
+    _demand_pcg64(bit_generator)
     whole: Any = bit_generator.state
     state, increment = whole["state"]["state"], whole["state"]["inc"]
     factor, addend = _jump(count, increment)
@@ -68,12 +67,21 @@ def _jump(count: int, increment: int) -> tuple[int, int]:
     return factor, addend
 
 
-def state_reader(bit_generator: np.random.PCG64) -> Callable[[], bytes]:
+def state_reader(bit_generator: Any) -> Callable[[], bytes]:
     """Return a function that gives `state_bytes` of this generator.
 
     Where numpy's layout is known, it takes a tenth of the time.
+
+    Raises:
+        TypeError: If the generator is no PCG64.
     """
+    _demand_pcg64(bit_generator)
     return _read_memory(bit_generator) if layout_is_known() else lambda: state_bytes(bit_generator)
+
+
+def _demand_pcg64(bit_generator: Any) -> None:
+    if not isinstance(bit_generator, np.random.PCG64):
+        raise TypeError(f"rng: must be a PCG64, was a {type(bit_generator).__name__}")
 
 
 def words_of(bit_generator: np.random.PCG64) -> NDArray[np.uint64]:

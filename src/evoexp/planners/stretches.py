@@ -17,10 +17,10 @@ from evoexp.evolution.genetic_settings import ScaledGenetic
 from evoexp.evolution.scaled_selection import SelectionMemory
 from evoexp.numeric.generator_memory import states_behind
 from evoexp.numeric.random_stream import DrawnAhead, DrawnByNeed, Draws
+from evoexp.planners.gathering import TOGETHER, Gathered, Run
 from evoexp.planners.planner import Candidate, Keeper
-from evoexp.records import FloatArray, Generation, Standing, Stretch
+from evoexp.records import FloatArray, Generation, Stretch
 
-TOGETHER = 128  # generations that are recorded together, at least
 SUMMARY = 4  # of a generation: index of the best, mean and deviation of costs, number of feasible
 
 
@@ -112,98 +112,6 @@ class Stretches(ABC):
         """
 
 
-class _Gathered:
-    """Generations that are gathered into a stretch; see `Stretch`, field by field.
-
-    Attributes:
-        keeper: Of the run.
-        first: Index of the first generation.
-    """
-
-    def __init__(self) -> None:
-        self.keeper, self.first = Keeper(), 0
-        self._begin()
-
-    def _begin(self) -> None:
-        self.standings: list[Standing] = []
-        self.lowest: list[float] = []
-        self.means: list[float] = []
-        self.deviations: list[float] = []
-        self.num_feasible: list[int] = []
-        self.evaluations: list[int] = []
-        self.collision_queries: list[int] = []
-        self.costs: list[FloatArray] = []
-        self.states: list[bytes] = []
-        self.times: list[float] = []
-
-    def stand(self, place: int) -> None:
-        """Note what the keeper keeps as the best from a place behind those gathered on."""
-        (solution, terms, solved), cost = self.keeper.best, self.keeper.cost
-        place += len(self.lowest)
-        if self.standings and self.standings[-1].place == place:
-            self.standings.pop()
-        self.standings.append(Standing(place, solution, cost, terms, solved))
-
-    def stretch(self, population: NDArray[Any] | None) -> Stretch:
-        """Return the generations gathered, the last one with its population; begin anew."""
-        found = Stretch(
-            self.first,
-            self.standings,
-            self.lowest,
-            self.means,
-            self.deviations,
-            self.num_feasible,
-            self.evaluations,
-            self.collision_queries,
-            np.concatenate(self.costs),
-            self.states,
-            self.times,
-            population,
-        )
-        self.first += len(self.lowest)
-        self._begin()
-        self.stand(0)
-        return found
-
-
-class Run(Iterator[Generation]):
-    """The generations of a run: one by one as an iterator, or by `stretches`, not both."""
-
-    def __init__(
-        self,
-        generations: Callable[[], Iterator[Generation]],
-        stretches: Callable[[Callable[[], float]], Iterator[Stretch]],
-    ) -> None:
-        """Take the two functions that begin it.
-
-        Args:
-            generations: Yields them one by one.
-            stretches: Yields them many at a time, see the method.
-        """
-        self._begin, self._stretches = generations, stretches
-        self._each: Iterator[Generation] | None = None
-
-    def __iter__(self) -> Iterator[Generation]:
-        if self._each is None:
-            self._each = self._begin()
-        return self._each
-
-    def __next__(self) -> Generation:
-        return next(iter(self))
-
-    def close(self) -> None:
-        """End the run, as a generator's `close` does."""
-        self._each = iter(())
-
-    def stretches(self, read_clock: Callable[[], float]) -> Iterator[Stretch]:
-        """Yield the initial population, then every other generation, several together.
-
-        Args:
-            read_clock: What it returns behind each call of a kernel is in `Stretch.times`.
-        """
-        return self._stretches(read_clock)
-
-
 class IndividualStretches(Stretches):
     """Generations whose best is one individual.
 
@@ -223,7 +131,7 @@ class IndividualStretches(Stretches):
     ) -> Iterator[Stretch]:
         """Yield the initial population, then every other generation; see `Run.stretches`."""
         self.begin(rng)
-        gathered, index, last = _Gathered(), 0, self._ga.num_generations
+        gathered, index, last = Gathered(), 0, self._ga.num_generations
         self._gather(gathered, 0, 0, self._states(rng, 1), read_clock())
         while index < last:
             first, index = index, min(index + self.num_places - 1, last)
@@ -241,7 +149,7 @@ class IndividualStretches(Stretches):
         return states_behind(rng.bit_generator, 0, 1) * count
 
     def _gather(
-        self, gathered: "_Gathered", first: int, last: int, states: list[bytes], time: float
+        self, gathered: "Gathered", first: int, last: int, states: list[bytes], time: float
     ) -> None:
         """Keep the best of some generations, and gather what is recorded of each of them."""
         generations, keeper = np.arange(first, last + 1), gathered.keeper

@@ -25,8 +25,6 @@ class Chain:
         Raises:
             TypeError: Another bit generator: its state has another layout.
         """
-        if not isinstance(rng.bit_generator, np.random.PCG64):
-            raise TypeError(f"rng: must be a PCG64, was a {type(rng.bit_generator).__name__}")
         self._state = state_reader(rng.bit_generator)
         self.link = b""
 

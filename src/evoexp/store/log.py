@@ -236,7 +236,8 @@ class Log:
         of_each = chain.from_iterable(
             map(repeat, solutions, map(sub, (*places[1:], count), places))
         )
-        links = self._chain.extend(_rows_as_bytes(stretch.costs), of_each, stretch.states)
+        costs = chain.from_iterable(map(_rows_as_bytes, stretch.costs))
+        links = self._chain.extend(costs, of_each, stretch.states)
         data, indices = encode_stretch(stretch, links), range(stretch.first, stretch.first + count)
         cpu = [int(time * 1e9) for time in stretch.times]
         self._append(data, indices, cpu, places, solutions, best_costs)
@@ -373,11 +374,11 @@ class Log:
         contents.extend(data)
 
 
-def _rows_as_bytes(costs: NDArray[np.float64]) -> list[bytes]:
-    """Return `array_bytes` of each row of costs."""
-    if np.isnan(costs).any():
-        return [array_bytes(row) for row in costs]
-    content, size = costs.tobytes(), costs.itemsize * costs.shape[1]
+def _rows_as_bytes(block: NDArray[np.float64]) -> Iterable[bytes]:
+    """Return `array_bytes` of each row of a block of costs."""
+    if block.size == 0 or np.isnan(block.item(block.argmin())):  # argmin finds a NaN first
+        return map(array_bytes, block)
+    content, size = block.tobytes(), block.itemsize * block.shape[1]
     return [content[begin : begin + size] for begin in range(0, len(content), size)]
 
 

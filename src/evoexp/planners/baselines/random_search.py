@@ -5,10 +5,13 @@ from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from evoexp.planners.planner import Keeper, PlannerDefaults
+from evoexp.evolution.cost_statistics import cost_statistics
+from evoexp.planners.gathering import Run, Scored
+from evoexp.planners.planner import Candidate, Judgement, Keeper, PlannerDefaults
 from evoexp.planners.wrapped_planner import WrappedPlanner
-from evoexp.records import Generation
+from evoexp.records import BoolArray, Generation
 
 
 class RandomSearch(WrappedPlanner):
@@ -25,12 +28,48 @@ class RandomSearch(WrappedPlanner):
 
     def evolve(self, problem: Any, rng: np.random.Generator) -> Iterator[Generation]:
         """Yield one generation of new samples after the other."""
-        planner, keeper = self.planner, Keeper()
+        if self.answers_are_proven:
+            return self._proven(problem, rng)
+        return Run.of(partial(self._scored, problem, rng), rng)
+
+    def _proven(self, problem: Any, rng: np.random.Generator) -> Iterator[Generation]:
+        keeper = Keeper()
+        for population, judged in self._judged(problem, rng):
+            yield keeper.record_judged(self.planner, problem, population, judged)
+
+    def _scored(self, problem: Any, rng: np.random.Generator) -> Iterator[Scored]:
+        for index, (population, judged) in enumerate(self._judged(problem, rng)):
+            feasible = judged.feasible
+
+            def candidate(
+                k: int,
+                population: NDArray[Any] = population,
+                judged: Judgement = judged,
+                feasible: BoolArray = feasible,
+            ) -> Candidate:
+                solution = self.planner.solution(problem, population, k)
+                return Candidate(solution, judged.named_terms(k), bool(feasible[k]))
+
+            yield Scored(
+                cost_statistics(judged.cost),
+                judged.cost,
+                population,
+                candidate,
+                int(np.count_nonzero(feasible)),
+                len(judged.cost),
+                judged.collision_queries,
+                index == self.planner.num_generations,
+            )
+
+    def _judged(
+        self, problem: Any, rng: np.random.Generator
+    ) -> Iterator[tuple[NDArray[Any], Judgement]]:
+        """Yield samples and their judgements, each valid until the next ones."""
+        planner = self.planner
         # a planner of others may write everything itself
         judged_samples = getattr(planner, "judged_samples", None)
         if judged_samples is None:
             judged_samples = partial(PlannerDefaults.judged_samples, planner)
         draw = judged_samples(problem, rng)
         for index in range(planner.num_generations + 1):
-            population, judged = draw(planner.num_evaluations(index))
-            yield keeper.record_judged(planner, problem, population, judged)
+            yield draw(planner.num_evaluations(index))

@@ -6,6 +6,7 @@ add to this operator.
 """
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -13,14 +14,14 @@ import numpy as np
 from evoexp.errors import SettingError
 from evoexp.evolution.cost_statistics import cost_statistics
 from evoexp.numeric.random_stream import Draws
+from evoexp.planners.gathering import Run, Scored
 from evoexp.planners.grid_path_ga import kernels
 from evoexp.planners.grid_path_ga.climbing_kernels import Ledger, climb_by_pieces
 from evoexp.planners.grid_path_ga.kernels import COST, RESULTS, Population
 from evoexp.planners.grid_path_ga.path_operators import Scratch
 from evoexp.planners.grid_path_ga.planner import BLOCK, GridPathGa, Problem, named_terms, trimmed
-from evoexp.planners.planner import Candidate, Keeper
+from evoexp.planners.planner import Candidate
 from evoexp.planners.wrapped_planner import WrappedPlanner
-from evoexp.records import Generation
 from evoexp.validation import Count
 
 
@@ -53,33 +54,29 @@ class PathClimbing(WrappedPlanner):
             raise SettingError("control.num_paths", must, self.num_paths)
         return super().prepare(robot, scenario)
 
-    def evolve(self, problem: Problem, rng: np.random.Generator) -> Iterator[Generation]:
+    def evolve(self, problem: Problem, rng: np.random.Generator) -> Run:
         """Yield the random walks, then the climbing paths after every generation's trials."""
-        planner, keeper, draws = self.planner, Keeper(), Draws(BLOCK)
+        return Run.of(partial(self._climb, problem, rng), rng)
+
+    def _climb(self, problem: Problem, rng: np.random.Generator) -> Iterator[Scored]:
+        planner, draws = self.planner, Draws(BLOCK)
         assert isinstance(planner, GridPathGa), "prepare refuses other planners"
         population, trial = self._first(planner, problem, rng), 0
         climb, arguments = _trials(planner, problem, population)
+
+        def candidate(k: int) -> Candidate:
+            terms = named_terms(population.results[:, k], population.paths[k, 0])
+            return Candidate(planner.solution(problem, population.paths, k), terms, True)
+
+        costs = population.results[COST]
         for index in range(planner.num_generations + 1):
-            evaluations = planner.num_evaluations(index)
+            evaluations, is_last = planner.num_evaluations(index), index == planner.num_generations
             last = trial + evaluations if index else 0
             while (trial := climb(draws.block, trial, last, *arguments)) < last:
                 draws.extend(rng)
-            costs = population.results[COST].copy()
-            statistics = cost_statistics(costs)
-            k, lowest = statistics.best, float(costs[statistics.best])
-            if keeper.improves(lowest):
-                terms = named_terms(population.results[:, k], population.paths[k, 0])
-                solution = planner.solution(problem, population.paths, k)
-                keeper.keep(lowest, Candidate(solution, terms, True))
-            yield keeper.record(
-                statistics,
-                costs,
-                trimmed(population.paths) if index == planner.num_generations else population.paths,
-                lowest=lowest,
-                num_feasible=len(costs),
-                evaluations=evaluations,
-                collision_queries=0,
-            )
+            paths = trimmed(population.paths) if is_last else population.paths
+            statistics, count = cost_statistics(costs), len(costs)
+            yield Scored(statistics, costs, paths, candidate, count, evaluations, 0, is_last)
 
     def _first(self, planner: GridPathGa, problem: Problem, rng: np.random.Generator) -> Population:
         """Draw the random walks and return the best of them, in a table as wide as any path."""

@@ -29,6 +29,7 @@ from evoexp.paths.grid_walks import walk_each
 from evoexp.paths.grids import UNREACHED, Moves, NodeArray, StepArray, spread_front
 from evoexp.paths.motion import Motion
 from evoexp.paths.walkers import Walkers, choice_table
+from evoexp.planners.gathering import Run
 from evoexp.planners.grid_path_ga import kernels
 from evoexp.planners.grid_path_ga.kernels import (
     COST,
@@ -43,7 +44,7 @@ from evoexp.planners.grid_path_ga.proven_moves import only_proven
 from evoexp.planners.judgements import Judgement as AnyJudgement
 from evoexp.planners.planner import Candidate, PlannerDefaults
 from evoexp.planners.proofs import Acceptance
-from evoexp.planners.stretches import Run, ScaledStretches
+from evoexp.planners.stretches import ScaledStretches
 from evoexp.records import BoolArray, FloatArray
 from evoexp.robots.floor_platform import FloorPlatform
 from evoexp.scenarios.grid_motion import GridMotion

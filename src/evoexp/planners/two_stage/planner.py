@@ -20,13 +20,13 @@ from evoexp.errors import SettingError
 from evoexp.evolution.cost_statistics import CostStatistics
 from evoexp.numeric.elementary import DEGREE
 from evoexp.paths.motion import Motion
+from evoexp.planners.gathering import Run
 from evoexp.planners.grid_path_ga.planner import GridPathGa
 from evoexp.planners.grid_path_ga.planner import Problem as PathProblem
 from evoexp.planners.placement_ga.planner import PlacementGa
 from evoexp.planners.placement_ga.planner import Problem as PlacementProblem
 from evoexp.planners.planner import Candidate, Judgement, Keeper, PlannerDefaults
 from evoexp.planners.proofs import Acceptance, Proofs
-from evoexp.planners.stretches import Run
 from evoexp.records import FloatArray, Standing, Stretch
 from evoexp.records import Generation as Record
 from evoexp.robots.floor_manipulator import NUM_JOINTS, FloorManipulator

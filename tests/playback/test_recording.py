@@ -8,7 +8,7 @@ from evoexp.configuration.compose import expand
 from evoexp.paths.motion import Motion, clamped_cubic
 from evoexp.planners.proofs import judge_motion
 from evoexp.playback import contacts
-from evoexp.playback.body_poses import MAX_TICKS, ticks
+from evoexp.playback.body_poses import MAX_TICKS, points, ticks
 from evoexp.playback.contacts import at_instant, clearance, remainder
 from evoexp.playback.recording import Recording
 from evoexp.playback.shapes import outline
@@ -249,3 +249,15 @@ def test_distances_are_those_of_all_pairs_though_few_are_asked_for(
     every = clearance(parts, motion, times)
     assert np.array_equal(few.least, every.least)
     assert few[1:] == every[1:]
+
+
+def test_points_of_frames_are_where_their_matrices_put_them(shown: Recording) -> None:
+    several = np.array([[0.0, 0.0, 0.0], [0.3, -0.2, 0.1], [-1.0, 2.0, 0.5]])
+    for frame in range(-1, len(shown.frames)):
+        found = points(shown.poses.world, frame, several)
+        assert found.shape == (3, len(shown.times), 3)
+        for point, way in zip(several, found, strict=True):
+            assert np.array_equal(points(shown.poses.world, frame, point), way)
+            turns = [np.eye(4) if frame < 0 else matrix(row[frame]) for row in shown.poses.world]
+            truth = [(turn @ [*point, 1.0])[:3] for turn in turns]
+            assert np.allclose(way, truth, rtol=0.0, atol=1e-12 * max(1.0, np.abs(truth).max()))

@@ -101,17 +101,19 @@ def poses(
 
 
 def points(world: FloatArray, frame: int, point: FloatArray) -> FloatArray:
-    """Return the positions of a point of a frame over time, (ticks, 3).
+    """Return the positions of a point of a frame over time, (ticks, 3), or of several points.
 
     Args:
         world: (ticks, frames, 7).
         frame: Its index; −1: the world.
-        point: (3,) in the frame.
+        point: (3,) in the frame, or (points, 3): the result is then (points, ticks, 3).
     """
+    ticks = len(world)
+    rows = np.broadcast_to(point[..., None, :], (*point.shape[:-1], ticks, 3))
     if frame < 0:
-        return np.tile(point, (len(world), 1))
+        return rows.copy()
     x, y, z, w = world[:, frame, 3:].T
-    vector, rows = np.stack([x, y, z], axis=1), np.tile(point, (len(world), 1))
+    vector = np.stack([x, y, z], axis=1)
     twice = 2.0 * np.cross(vector, rows)
     return np.asarray(world[:, frame, :3] + rows + w[:, None] * twice + np.cross(vector, twice))
 

@@ -266,4 +266,5 @@ def _corners(shape: Shape, world: FloatArray) -> FloatArray:
     elif len(outline.size) == 2:
         half[2] = 0.5 * outline.size[1] + (outline.size[0] if outline.kind == "capsule" else 0.0)
     signs = np.array(list(product((-1.0, 1.0), repeat=3)))
-    return np.concatenate([points(world, shape.frame, turn * (sign * half)) for sign in signs])
+    corners = np.array([turn * (sign * half) for sign in signs])
+    return points(world, shape.frame, corners).reshape(-1, 3)

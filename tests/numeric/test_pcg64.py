@@ -13,6 +13,7 @@ from evoexp.numeric.pcg64 import (
     draw_words,
     fill_normals,
     fill_uniforms,
+    put_uniforms,
     skip_words,
 )
 
@@ -40,6 +41,9 @@ def test_numbers_and_states_are_numpys(
 def test_where_the_layout_is_not_known_numpy_draws(monkeypatch: pytest.MonkeyPatch) -> None:
     assert pcg64.layout_is_known()
     monkeypatch.setattr(pcg64, "layout_is_known", lambda: False)
+    own, numpys, out = np.random.default_rng(4), np.random.default_rng(4), np.empty(9)
+    put_uniforms(own, out[2:])
+    np.testing.assert_array_equal(out[2:], numpys.random(7))
     own, numpys = np.random.default_rng(3), np.random.default_rng(3)
     np.testing.assert_array_equal(draw_uniforms(own, 9), numpys.random(9))
     np.testing.assert_array_equal(draw_words(own, 9), numpys.bit_generator.random_raw(9))

@@ -126,6 +126,13 @@ def draw_uniforms(rng: np.random.Generator, count: int) -> NDArray[np.float64]:
     return _drawn(rng, np.empty(count), fill_uniforms, rng.random)
 
 
+def put_uniforms(rng: np.random.Generator, out: NDArray[np.float64]) -> None:
+    """Fill out (n,), contiguous, with the next uniform numbers, as `rng.random(out=out)` does."""
+    drawn = _drawn(rng, out, fill_uniforms, rng.random)
+    if drawn is not out:
+        out[:] = drawn
+
+
 def draw_words(rng: np.random.Generator, count: int) -> Words:
     """Return the next words of 64 random bits, as `rng.bit_generator.random_raw(count)` does."""
     raw: Any = rng.bit_generator.random_raw

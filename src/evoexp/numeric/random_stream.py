@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from evoexp.numeric.compilation import kernel
 from evoexp.numeric.generator_memory import states_behind
-from evoexp.numeric.pcg64 import draw_uniforms
+from evoexp.numeric.pcg64 import draw_uniforms, put_uniforms
 
 
 class Block(NamedTuple):
@@ -30,10 +30,10 @@ class Block(NamedTuple):
 
 
 class Draws:
-    """The blocks of one run, each drawn when the last one is used up.
+    """The blocks of one run, each drawn when the last one is used up, into the same memory.
 
     Attributes:
-        block: The block that kernels take numbers of.
+        block: The block that kernels take numbers of; valid until the next one.
     """
 
     def __init__(self, least: int) -> None:
@@ -42,14 +42,18 @@ class Draws:
         Args:
             least: Numbers that are drawn at once, at least.
         """
-        self._least = least
-        self.block = Block(np.empty(0), np.zeros(1, dtype=np.int64))
+        self._least, self._memory = least, np.empty(0)
+        self.block = Block(self._memory, np.zeros(1, dtype=np.int64))
 
     def extend(self, rng: np.random.Generator) -> None:
         """Put new numbers behind those that are left, at least as many as are left."""
         left = self.block.uniforms[self.block.taken[0] :]
-        drawn = draw_uniforms(rng, max(self._least, len(left)))
-        self.block = Block(np.concatenate([left, drawn]), self.block.taken)
+        count = len(left) + max(self._least, len(left))
+        if count > len(self._memory):
+            self._memory = np.empty(2 * count)
+        self._memory[: len(left)] = left
+        put_uniforms(rng, self._memory[len(left) : count])
+        self.block = Block(self._memory[:count], self.block.taken)
         self.block.taken[0] = 0
 
 

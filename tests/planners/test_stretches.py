@@ -8,6 +8,7 @@ import pytest
 from evoexp.batch.replicate import run_replicate
 from evoexp.condition import Condition
 from evoexp.configuration import compose
+from evoexp.planners import gathering
 from evoexp.planners.gathering import TOGETHER, Run
 from evoexp.planners.stretches import stretch_of
 from evoexp.store.log_reader import read_log
@@ -97,3 +98,23 @@ def test_an_iterator_goes_on_where_it_is() -> None:
 
 def test_a_stretch_is_as_long_as_the_caches_allow() -> None:
     assert [stretch_of(16, size, 1000) for size in (0, 10, 100, 400, 2000)] == [16, 16, 10, 2, 1]
+
+
+def test_costs_that_take_much_memory_are_recorded_sooner(monkeypatch: pytest.MonkeyPatch) -> None:
+    given = condition("experiment=rana_planar ga.num_generations=40")
+    expected = masked_log(run_replicate(given, 0).content)
+    monkeypatch.setattr(gathering, "ENOUGH", 9_000)
+    planner, problem = given.prepare()
+    stretches = list(planner.evolve(problem, given.rng(0)).stretches(lambda: 0.0))
+    assert len(stretches) > 2
+    assert masked_log(run_replicate(given, 0).content) == expected
+
+
+def test_a_run_that_is_closed_ends() -> None:
+    planner, problem = condition(RUNS[0]).prepare()
+    run = planner.evolve(problem, np.random.default_rng(0))
+    each = iter(run)
+    next(run)
+    run.close()
+    assert next(run, None) is None
+    assert next(each, None) is None

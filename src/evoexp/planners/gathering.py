@@ -4,7 +4,7 @@ Records of their own, and a log that takes one after the other, would be a third
 kernels that take ten microseconds per generation.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -17,7 +17,8 @@ from evoexp.planners.planner import Candidate, Keeper
 from evoexp.records import FloatArray, Generation, Standing, Stretch
 
 Clock = Callable[[], float]
-TOGETHER = 128  # generations that are recorded together, at least
+TOGETHER = 128  # generations that are recorded together, at least,
+ENOUGH = 1 << 22  # [B] or as many as have costs of so much memory
 
 
 class Scored(NamedTuple):
@@ -67,6 +68,7 @@ class Gathered:
         self.costs: list[FloatArray] = []
         self.states: list[bytes] = []
         self.times: list[float] = []
+        self._size = 0  # [B] of the costs
 
     def stand(self, place: int) -> None:
         """Note what the keeper keeps as the best from a place behind those gathered on."""
@@ -98,9 +100,19 @@ class Gathered:
         self.num_feasible.append(scored.num_feasible)
         self.evaluations.append(keeper.evaluations)
         self.collision_queries.append(keeper.collision_queries)
-        self.costs.append(scored.costs[None].copy())
+        self.add_costs(scored.costs[None].copy())
         self.states.append(state)
         self.times.append(time)
+
+    @property
+    def is_full(self) -> bool:
+        """Whether there are enough generations to record them."""
+        return len(self.lowest) >= TOGETHER or self._size >= ENOUGH
+
+    def add_costs(self, costs: FloatArray) -> None:
+        """Gather the costs of some generations, (generations, individuals), nobody else's."""
+        self.costs.append(costs)
+        self._size += costs.nbytes
 
     def stretch(self, population: NDArray[Any] | None) -> Stretch:
         """Return the generations gathered, the last one with its population; begin anew."""
@@ -151,7 +163,9 @@ class Run(Iterator[Generation]):
 
     def close(self) -> None:
         """End the run, as a generator's `close` does."""
-        self._each = iter(())
+        each, self._each = self._each, iter(())
+        if isinstance(each, Generator):
+            each.close()
 
     def stretches(self, read_clock: Clock) -> Iterator[Stretch]:
         """Yield the initial population, then every other generation, several together.
@@ -199,5 +213,5 @@ def _together(
         gathered.add(each, read_state(), read_clock())
         if each.is_last:
             yield gathered.stretch(each.population)
-        elif len(gathered.lowest) >= TOGETHER:
+        elif gathered.is_full:
             yield gathered.stretch(None)

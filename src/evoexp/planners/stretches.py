@@ -17,7 +17,7 @@ from evoexp.evolution.genetic_settings import ScaledGenetic
 from evoexp.evolution.scaled_selection import SelectionMemory
 from evoexp.numeric.generator_memory import states_behind
 from evoexp.numeric.random_stream import DrawnAhead, DrawnByNeed, Draws
-from evoexp.planners.gathering import TOGETHER, Gathered, Run
+from evoexp.planners.gathering import Gathered, Run
 from evoexp.planners.planner import Candidate, Keeper
 from evoexp.records import FloatArray, Generation, Stretch
 
@@ -139,7 +139,7 @@ class IndividualStretches(Stretches):
             steps, drawn = index - first, self.drawn
             states = self._states(rng, steps) if drawn is None else drawn.follow_all(steps)
             self._gather(gathered, first + 1, index, states, read_clock())
-            if len(gathered.lowest) >= TOGETHER and index < last:
+            if gathered.is_full and index < last:
                 yield gathered.stretch(None)
         yield gathered.stretch(self.population(last % self.num_places, True))
 
@@ -172,7 +172,7 @@ class IndividualStretches(Stretches):
         keeper.evaluations = evaluations[-1]
         gathered.evaluations += evaluations
         gathered.collision_queries += [each * self.queries_each for each in evaluations]
-        gathered.costs.append(costs)
+        gathered.add_costs(costs)
         gathered.states += states
         gathered.times += [time] * len(states)
 
